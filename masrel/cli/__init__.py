@@ -1,0 +1,74 @@
+"""The command line: one verb a file, loaded only when it is called.
+
+Exit codes: 0 fine; 1 the run failed; 2 the input or the call is wrong. Errors
+go to stderr as sentences; a traceback is a bug.
+"""
+
+import importlib
+import sys
+
+import click
+
+import masrel
+from masrel.errors import ConvergenceError, DeviceError, MasrelError
+
+__all__ = ["main"]
+
+VERBS = {
+    "init": "Make a new study from a template.",
+    "check": "Validate a study and say every error.",
+    "schedule": "Draw the schedules of a study, once.",
+    "run": "Present a schedule's models and record every grade.",
+    "ratings": "Turn session logs into the table of ratings.",
+    "analyze": "Compute the agreement tables a study asks for.",
+    "report": "Write the report of a study.",
+    "agree": "Agreement of any CSV file of ratings, no study needed.",
+    "trace": "Torque trace of one stretch of one model.",
+    "demo": "The whole flow on the simulated device.",
+}
+"""Verb to summary. The verb ``x`` is the command ``command`` of ``masrel.cli.x``."""
+
+
+class _Verbs(click.Group):
+    """A group that imports a verb only when it is called."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's signature
+        return list(VERBS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002 - click's signature
+        if cmd_name not in VERBS:
+            return None
+        command: click.Command = importlib.import_module(
+            f"masrel.cli.{cmd_name}"
+        ).command
+        return command
+
+    def format_commands(
+        self,
+        ctx: click.Context,  # noqa: ARG002 - click's signature
+        formatter: click.HelpFormatter,
+    ) -> None:
+        # Summaries are listed here so that --help imports no verb.
+        with formatter.section("Commands"):
+            formatter.write_dl(list(VERBS.items()))
+
+
+@click.group(cls=_Verbs, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(masrel.__version__, prog_name="masrel")
+def cli() -> None:
+    """Reliability studies on a haptic simulator of elbow spasticity."""
+
+
+def main() -> None:
+    """Run the command line and exit with its code."""
+    try:
+        cli()
+    except (DeviceError, ConvergenceError) as error:
+        _fail(error, 1)
+    except (MasrelError, OSError) as error:
+        _fail(error, 2)
+
+
+def _fail(error: Exception, code: int) -> None:
+    click.echo(f"masrel: {error}", err=True)
+    sys.exit(code)

@@ -1,0 +1,159 @@
+"""The parameters of a spastic elbow, and the four models of Table III.
+
+Source: Park, Kim and Damiano (2012), IEEE TNSRE 20(3), 361-370,
+https://doi.org/10.1109/TNSRE.2012.2195330, equations (1)-(6) and Table III.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from masrel.errors import ParameterError
+
+__all__ = ["STANDARD_MODELS", "ElbowParameters", "PostCatch"]
+
+PostCatch = Literal["continuous", "additive"]
+"""Reading of equation (5): "continuous" starts from the residual torque."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ElbowParameters:
+    """Parameters of the joint model, in SI units (angles in rad).
+
+    Angle 0 is full flexion and grows with extension.
+
+    Attributes
+    ----------
+    catch_angle_constant : float
+        L of (2), rad.
+    catch_torque_constant : float
+        H of (3), N·m·s/rad.
+    residual_ratio : float
+        Q of (3): residual torque over peak torque, both above pre-catch.
+    catch_travel : float
+        D of (4), rad: the angle travelled during the catch.
+    inertia : float
+        m of (1), kg·m². Not commanded by the device.
+    damping : float
+        b of (1), N·m·s/rad.
+    stiffness : float
+        k of (1), N·m/rad.
+    catch_slope : float
+        α of (2), s.
+    peak_duration : float
+        ΔT_peak of (3), s.
+    post_catch_stiffness : float
+        k_post of (5), N·m/rad.
+    speed_threshold : float
+        ν_th of Fig. 7, rad/s.
+    slowest_mean_speed : float
+        ν_L of (6), rad/s: below it the catch angle grows no more.
+    smallest_catch_angle : float
+        θ_L of (6), rad.
+    range_end : float
+        End of the range of motion, rad.
+    rest_angle : float or None
+        θ_rest of (1), rad; None means the angle where the stretch starts.
+    post_catch : {"continuous", "additive"}
+        Reading of (5).
+
+    Raises
+    ------
+    ParameterError
+        If a parameter is not finite or outside its range; the message names it.
+    """
+
+    catch_angle_constant: float
+    catch_torque_constant: float
+    residual_ratio: float
+    catch_travel: float
+    inertia: float = 0.0
+    damping: float = 1.26
+    stiffness: float = 3.15
+    catch_slope: float = 0.35
+    peak_duration: float = 0.1
+    post_catch_stiffness: float = 5.8
+    speed_threshold: float = math.radians(20.0)
+    slowest_mean_speed: float = math.radians(60.0)
+    smallest_catch_angle: float = math.radians(60.0)
+    range_end: float = math.radians(146.0)
+    rest_angle: float | None = None
+    post_catch: PostCatch = "continuous"
+
+    def __post_init__(self) -> None:
+        for name in self.__slots__:
+            value = getattr(self, name)
+            if isinstance(value, int | float) and not math.isfinite(value):
+                raise ParameterError(f"{name}: needs a finite number, got {value}")
+        for name in ("catch_angle_constant", "catch_travel", "range_end"):
+            self._require(name, 0.0, math.pi, "(0, 180] degrees")
+        for name in ("catch_slope", "peak_duration", "speed_threshold"):
+            self._require(name, 0.0, math.inf, "more than 0")
+        if not 0.0 <= self.residual_ratio < 1.0:
+            raise ParameterError(
+                f"residual_ratio: needs [0, 1), got {self.residual_ratio}"
+            )
+        for name in (
+            "catch_torque_constant",
+            "inertia",
+            "damping",
+            "stiffness",
+            "post_catch_stiffness",
+            "slowest_mean_speed",
+            "smallest_catch_angle",
+        ):
+            if getattr(self, name) < 0.0:
+                raise ParameterError(
+                    f"{name}: needs 0 or more, got {getattr(self, name)}"
+                )
+        if self.post_catch not in ("continuous", "additive"):
+            raise ParameterError(
+                f'post_catch: needs "continuous" or "additive", got {self.post_catch!r}'
+            )
+
+    def _require(self, name: str, low: float, high: float, words: str) -> None:
+        value = getattr(self, name)
+        if not low < value <= high:
+            raise ParameterError(f"{name}: needs {words}, got {value} (SI units)")
+
+    @property
+    def fastest_mean_speed(self) -> float:
+        """ν_H of (6), rad/s: above it the catch angle is the smallest."""
+        span = self.catch_angle_constant - self.smallest_catch_angle
+        return span / self.catch_slope
+
+    def catch_angle(self, mean_speed: float) -> float:
+        """Return the catch angle for a mean pre-catch speed.
+
+        Parameters
+        ----------
+        mean_speed : float
+            Mean speed of the pre-catch phase so far, rad/s.
+
+        Returns
+        -------
+        float
+            Catch angle, rad, by (2) with the clamps of (6).
+        """
+        if mean_speed > self.fastest_mean_speed:
+            return self.smallest_catch_angle  # third line of (6)
+        slowed = max(mean_speed, self.slowest_mean_speed)  # first line of (6)
+        return self.catch_angle_constant - self.catch_slope * slowed  # (2)
+
+
+def _table_iii(length: float, torque: float, ratio: float, travel: float) -> ElbowParameters:
+    return ElbowParameters(
+        catch_angle_constant=math.radians(length),
+        catch_torque_constant=torque,
+        residual_ratio=ratio,
+        catch_travel=math.radians(travel),
+    )
+
+
+STANDARD_MODELS: dict[str, ElbowParameters] = {
+    "HM1": _table_iii(130.0, 1.4, 0.15, 60.0),  # MAS 1
+    "HM2": _table_iii(120.0, 2.0, 0.30, 50.0),  # MAS 1+
+    "HM3": _table_iii(115.0, 2.8, 0.60, 30.0),  # MAS 2
+    "HM4": _table_iii(110.0, 3.8, 0.80, 10.0),  # MAS 3
+}
+"""Table III: L, H, Q and D; every other constant is the default above."""

@@ -1,0 +1,115 @@
+"""Everything masrel raises or warns on purpose.
+
+The tree::
+
+    MasrelError
+    ├── ProtocolError (ValueError)       a study's protocol is not usable
+    ├── ScheduleError (ValueError)       a schedule file is missing, foreign or stale
+    ├── RatingsError (ValueError)        a table of ratings is not usable
+    ├── CountsError (ValueError)         a table of counts is not usable
+    ├── ParameterError (ValueError)      an argument is outside its range
+    ├── RecordingError (ValueError)      a recording is damaged or not one
+    ├── SessionLogError (ValueError)     a session log is damaged or not one
+    ├── ConvergenceError (RuntimeError)  a sampler has not converged
+    └── DeviceError (RuntimeError)       the device cannot go on
+        ├── DeviceTimeoutError (TimeoutError)
+        └── LimitExceededError
+
+    MasrelWarning (UserWarning)
+    ├── UndefinedStatisticWarning  a statistic is 0/0; its value is nan, with a reason
+    ├── SmallSampleWarning         an interval rests on too little to hold what it says
+    └── OverrunWarning             the control loop missed deadlines
+"""
+
+__all__ = [
+    "ConvergenceError",
+    "CountsError",
+    "DeviceError",
+    "DeviceTimeoutError",
+    "LimitExceededError",
+    "MasrelError",
+    "MasrelWarning",
+    "OverrunWarning",
+    "ParameterError",
+    "ProtocolError",
+    "RatingsError",
+    "RecordingError",
+    "ScheduleError",
+    "SessionLogError",
+    "SmallSampleWarning",
+    "UndefinedStatisticWarning",
+]
+
+
+class MasrelError(Exception):
+    """Anything masrel raises on purpose."""
+
+
+class ProtocolError(MasrelError, ValueError):
+    """A study's protocol is not usable.
+
+    Attributes
+    ----------
+    problems : tuple of str
+        Every problem found, each with file and key.
+    """
+
+    def __init__(self, *problems: str) -> None:
+        super().__init__("\n".join(problems))
+        self.problems = problems
+
+
+class ScheduleError(MasrelError, ValueError):
+    """A schedule file is missing, foreign, or was drawn from another protocol."""
+
+
+class RatingsError(MasrelError, ValueError):
+    """A table of ratings is not usable."""
+
+
+class CountsError(MasrelError, ValueError):
+    """A table of counts is not usable."""
+
+
+class ParameterError(MasrelError, ValueError):
+    """An argument is outside its range or not among its options."""
+
+
+class RecordingError(MasrelError, ValueError):
+    """A recording is damaged, incomplete, or not a recording."""
+
+
+class SessionLogError(MasrelError, ValueError):
+    """A session log is damaged or not a session log."""
+
+
+class ConvergenceError(MasrelError, RuntimeError):
+    """A sampler has not converged; the message says how many more steps it needs."""
+
+
+class DeviceError(MasrelError, RuntimeError):
+    """The device cannot go on."""
+
+
+class DeviceTimeoutError(DeviceError, TimeoutError):
+    """The device did not answer in time."""
+
+
+class LimitExceededError(DeviceError):
+    """A safety limit was exceeded and the presentation was stopped."""
+
+
+class MasrelWarning(UserWarning):
+    """Anything masrel warns of."""
+
+
+class UndefinedStatisticWarning(MasrelWarning):
+    """A statistic is undefined; its value is ``nan`` and its result says why."""
+
+
+class SmallSampleWarning(MasrelWarning):
+    """An interval rests on too little data to hold what it says."""
+
+
+class OverrunWarning(MasrelWarning):
+    """The control loop missed deadlines; the ticks were skipped and counted."""

@@ -1,0 +1,142 @@
+"""The two result types of every statistic: an estimate and its interval."""
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+__all__ = ["Estimate", "Interval", "Target", "Unit", "as_document"]
+
+Target = Literal["items", "raters", "both"]
+"""What a new study would draw anew: the population an interval speaks of."""
+
+Unit = Literal["items", "raters", "both"]
+"""What is resampled or left out."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Interval:
+    """A confidence or credible interval that can be understood alone.
+
+    Attributes
+    ----------
+    low, high : float
+        Endpoints; ``nan`` when undefined.
+    level : float
+        Nominal level, 0.95 unless asked otherwise.
+    kind : {"confidence", "credible"}
+        What the level promises.
+    method : str
+        How it was computed, in words.
+    target : {"items", "raters", "both"}
+        The population it speaks of.
+    unit : {"items", "raters", "both"} or None
+        What was resampled or left out; None when nothing was.
+    n_resamples : int or None
+        Resamples or draws used; None when no Monte Carlo was used.
+    n_undefined : int
+        Resamples on which the statistic was undefined.
+    monte_carlo_error : tuple of float or None
+        Standard error of `low` and of `high` from Monte Carlo; None when exact.
+    seed : int or None
+        Seed that repeats it; None when nothing was drawn.
+    notes : tuple of str
+        What the reader must know before relying on it.
+    reason : str or None
+        Why it is undefined, or None.
+    """
+
+    low: float
+    high: float
+    level: float
+    kind: Literal["confidence", "credible"]
+    method: str
+    target: Target
+    unit: Unit | None = None
+    n_resamples: int | None = None
+    n_undefined: int = 0
+    monte_carlo_error: tuple[float, float] | None = None
+    seed: int | None = None
+    notes: tuple[str, ...] = ()
+    reason: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Estimate:
+    """An agreement coefficient with what it was computed from.
+
+    Attributes
+    ----------
+    coefficient : str
+        Name of the function that computed it, such as ``"fleiss_kappa"``.
+    weights : str
+        Name of the weights, ``"identity"`` when unweighted.
+    value : float
+        The coefficient; ``nan`` when undefined.
+    standard_error : float
+        Delta-method standard error, items random; ``nan`` when undefined.
+    interval : Interval or None
+        Only when one was asked for.
+    observed, chance : float
+        Observed and chance agreement; ``nan`` when undefined.
+    n_items, n_raters, n_categories : int
+        Items with at least one rating, raters with at least one, and declared
+        categories.
+    reason : str or None
+        Why `value` is undefined, or None.
+    """
+
+    coefficient: str
+    weights: str
+    value: float
+    standard_error: float
+    interval: Interval | None = None
+    observed: float
+    chance: float
+    n_items: int
+    n_raters: int
+    n_categories: int
+    reason: str | None = None
+
+    def __str__(self) -> str:
+        if self.reason is not None:
+            return f"{self.coefficient}: undefined ({self.reason})"
+        return f"{self.coefficient}: {self.value:.4g} (SE {self.standard_error:.2g})"
+
+
+def as_document(result: Estimate | Interval) -> dict[str, object]:
+    """Turn a result into plain values for JSON, ``nan`` and infinities as None.
+
+    Parameters
+    ----------
+    result : Estimate or Interval
+        The result, its interval nested.
+
+    Returns
+    -------
+    dict
+        Field name to value, in the order of the fields.
+
+    Examples
+    --------
+    >>> interval = Interval(
+    ...     low=0.1, high=float("nan"), level=0.95, kind="credible",
+    ...     method="exact", target="items",
+    ... )
+    >>> as_document(interval)["high"] is None
+    True
+    """
+    return {
+        field.name: _plain(getattr(result, field.name))
+        for field in dataclasses.fields(result)
+    }
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, Interval | Estimate):
+        return as_document(value)
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if isinstance(value, tuple):
+        return [_plain(part) for part in value]
+    return value

@@ -1,0 +1,194 @@
+"""The types a protocol file decodes into; each key of the file is a field here.
+
+Every field has its unit in its name, its range in its type, and its meaning in
+``docs/protocol.md``.
+"""
+
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+from masrel.estimates import Target
+
+__all__ = [
+    "Analysis",
+    "DeviceSettings",
+    "ElbowConstants",
+    "EstimatePlan",
+    "Model",
+    "Protocol",
+    "Rater",
+    "Report",
+    "ScaleDefinition",
+    "ScheduleScheme",
+    "Session",
+    "SimulatedRaters",
+    "Stretch",
+    "Study",
+]
+
+Identifier = Annotated[str, Meta(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,31}$")]
+Text = Annotated[str, Meta(min_length=1)]
+Angle = Annotated[float, Meta(gt=0, le=180)]
+Positive = Annotated[float, Meta(gt=0)]
+NonNegative = Annotated[float, Meta(ge=0)]
+
+
+class Table(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A table of the protocol file; unknown keys are errors."""
+
+
+class Study(Table):
+    """``[study]``: what the study is."""
+
+    id: Identifier
+    title: Text
+    source: str = ""
+    notes: str = ""
+
+
+class ScaleDefinition(Table):
+    """``[scale]``: the grades a rater may give, least first."""
+
+    name: Text
+    grades: Annotated[tuple[Text, ...], Meta(min_length=2)]
+
+
+class ElbowConstants(Table):
+    """``[elbow]``: the constants all models share (Table III's last column)."""
+
+    inertia_kg_m2: NonNegative = 0.0
+    damping_nms_rad: NonNegative = 1.26
+    stiffness_nm_rad: NonNegative = 3.15
+    catch_slope_s: Positive = 0.35
+    peak_duration_s: Positive = 0.1
+    post_catch_stiffness_nm_rad: NonNegative = 5.8
+    speed_threshold_deg_s: Positive = 20.0
+    slowest_mean_speed_deg_s: NonNegative = 60.0
+    smallest_catch_angle_deg: Angle = 60.0
+    range_end_deg: Angle = 146.0
+    post_catch: Literal["continuous", "additive"] = "continuous"
+
+
+class Model(Table):
+    """``[[models]]``: one haptic model."""
+
+    id: Identifier
+    role: Literal["standard", "dummy"] = "standard"
+    intended_grade: str | None = None
+    catch_angle_constant_deg: Angle  # L
+    catch_torque_nms_rad: NonNegative  # H
+    residual_ratio: Annotated[float, Meta(ge=0, lt=1)]  # Q
+    catch_travel_deg: Angle  # D
+
+
+class Rater(Table):
+    """``[[raters]]``: one rater."""
+
+    id: Identifier
+    note: str = ""
+
+
+class Session(Table):
+    """``[[sessions]]``: one occasion on which raters meet every model."""
+
+    id: Identifier
+    raters: Annotated[tuple[str, ...], Meta(min_length=1)]
+    note: str = ""
+
+
+class ScheduleScheme(Table):
+    """``[schedule]``: how the order of presentations is drawn."""
+
+    seed: Annotated[int, Meta(ge=0, lt=2**63)]
+    scheme: Literal["random-order"] = "random-order"
+    repeats: Annotated[int, Meta(ge=1, le=20)] = 1
+
+
+class Stretch(Table):
+    """``[stretch]``: the movement a rater is asked to make."""
+
+    start_deg: Annotated[float, Meta(ge=0, lt=180)] = 30.0
+    end_deg: Angle = 146.0
+
+
+class DeviceSettings(Table):
+    """``[device]``: which device, and the limits around it."""
+
+    backend: Identifier = "simulated"
+    rate_hz: Annotated[int, Meta(ge=100, le=4000)] = 1000
+    torque_limit_nm: Annotated[float, Meta(gt=0, le=28)] = 20.0
+    speed_limit_deg_s: Annotated[float, Meta(gt=0, le=600)] = 400.0
+    missed_ticks_limit: Annotated[int, Meta(ge=0)] = 20
+    friction_compensation: Annotated[float, Meta(ge=0, le=1)] = 0.9
+    slip_speed_drop_deg_s: Positive = 40.0
+
+
+class SimulatedRaters(Table):
+    """``[simulated_raters]``: the raters of ``--grades simulated``."""
+
+    seed: Annotated[int, Meta(ge=0, lt=2**63)] = 0
+    accuracy: Annotated[float, Meta(ge=0, le=1)] = 0.84
+    retest_agreement: Annotated[float, Meta(ge=0, le=1)] = 0.85
+    mean_speed_deg_s: Positive = 85.0
+    speed_sd_deg_s: NonNegative = 15.0
+
+
+class EstimatePlan(Table):
+    """``[[analysis.estimates]]``: one line of the analysis plan."""
+
+    id: Identifier
+    kind: Literal["inter-rater", "test-retest"]
+    coefficient: Text
+    models: Literal["standard", "dummy", "all"] = "standard"
+    sessions: Annotated[tuple[str, ...], Meta(min_length=1, max_length=2)]
+    target: Target
+    interval: Literal["none", "analytic", "jackknife", "bootstrap", "posterior"] = (
+        "none"
+    )
+
+
+class Analysis(Table):
+    """``[analysis]``: the plan, written before the data."""
+
+    level: Annotated[float, Meta(gt=0.5, lt=1)] = 0.95
+    seed: Annotated[int, Meta(ge=0, lt=2**63)] = 0
+    n_resamples: Annotated[int, Meta(ge=100, le=1_000_000)] = 10_000
+    estimates: tuple[EstimatePlan, ...] = ()
+
+
+class Report(Table):
+    """``[report]``: which sections the report has, in order."""
+
+    title: str = ""
+    sections: tuple[
+        Literal[
+            "design",
+            "grades",
+            "agreement",
+            "intended",
+            "in-person",
+            "test-retest",
+            "speeds",
+            "traces",
+        ],
+        ...,
+    ] = ("design", "grades", "agreement", "intended", "test-retest", "speeds", "traces")
+
+
+class Protocol(Table):
+    """A whole protocol file."""
+
+    study: Study
+    scale: ScaleDefinition
+    elbow: ElbowConstants = ElbowConstants()
+    models: Annotated[tuple[Model, ...], Meta(min_length=1)]
+    raters: Annotated[tuple[Rater, ...], Meta(min_length=1)]
+    sessions: Annotated[tuple[Session, ...], Meta(min_length=1)]
+    schedule: ScheduleScheme
+    stretch: Stretch = Stretch()
+    device: DeviceSettings = DeviceSettings()
+    simulated_raters: SimulatedRaters = SimulatedRaters()
+    analysis: Analysis = Analysis()
+    report: Report = Report()

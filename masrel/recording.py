@@ -1,0 +1,156 @@
+"""What one presentation leaves: columns sampled by the control loop, and facts.
+
+A recording is two files side by side: ``NAME.npz`` with the columns, units in
+their names, and ``NAME.json`` with the facts and the SHA-256 of the first.
+"""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from masrel.errors import RecordingError
+
+__all__ = [
+    "PHASES",
+    "RECORDING_COLUMNS",
+    "Phase",
+    "Recording",
+    "read_recording",
+    "write_recording",
+]
+
+Phase = Literal["pre-catch", "catch", "post-catch"]
+
+PHASES: tuple[Phase, ...] = ("pre-catch", "catch", "post-catch")
+"""Names of the phases; their positions are the codes in the column `phase`."""
+
+RECORDING_COLUMNS = (
+    "time_s",  # since the presentation began
+    "angle_deg",  # as the encoder reads it
+    "velocity_deg_s",  # as the controller estimates it
+    "model_torque_nm",  # what the joint model asks for
+    "command_torque_nm",  # what was sent: model, friction compensation, limits
+    "phase",  # position in PHASES
+)
+
+Fact = str | int | float | bool | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recording:
+    """The columns and facts of one presentation.
+
+    Attributes
+    ----------
+    columns : mapping of str to ndarray, shape (n_samples,)
+        One array per name of `RECORDING_COLUMNS`, all of one length, read-only.
+    facts : mapping of str to str, int, float, bool or None
+        What was presented and how: ``simulated``, ``device``, ``model``, ``code``,
+        ``rate_hz``, ``n_missed_ticks``, ``fault``, ``mean_speed_deg_s`` and others.
+
+    Raises
+    ------
+    RecordingError
+        If a column is missing, foreign, or of another length.
+    """
+
+    columns: Mapping[str, NDArray[np.float64]] = field(compare=False, repr=False)
+    facts: Mapping[str, Fact]
+
+    def __post_init__(self) -> None:
+        if set(self.columns) != set(RECORDING_COLUMNS):
+            raise RecordingError(
+                f"a recording needs the columns {', '.join(RECORDING_COLUMNS)}, "
+                f"got {', '.join(sorted(self.columns)) or 'none'}"
+            )
+        shapes = {column.shape for column in self.columns.values()}
+        if len(shapes) != 1 or len(next(iter(shapes))) != 1:
+            raise RecordingError(
+                f"columns of a recording need one length, got shapes {sorted(shapes)}"
+            )
+        for column in self.columns.values():
+            column.setflags(write=False)
+
+    @property
+    def n_samples(self) -> int:
+        """Samples in every column."""
+        return int(self.columns["time_s"].size)
+
+
+def write_recording(recording: Recording, path: Path) -> str:
+    """Write a recording beside its facts.
+
+    Parameters
+    ----------
+    recording : Recording
+        What to write.
+    path : Path
+        The ``.npz`` file; the facts go to the same name with ``.json``.
+
+    Returns
+    -------
+    str
+        SHA-256 of the ``.npz`` file, in hexadecimal.
+
+    Raises
+    ------
+    RecordingError
+        If `path` does not end in ``.npz``.
+    OSError
+        If the files cannot be written.
+    """
+    if path.suffix != ".npz":
+        raise RecordingError(f"{path}: the file of a recording must end in .npz")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    ordered = {name: recording.columns[name] for name in RECORDING_COLUMNS}
+    with path.open("wb") as file:
+        np.savez_compressed(file, allow_pickle=False, **ordered)
+    checksum = hashlib.sha256(path.read_bytes()).hexdigest()
+    document = {"sha256": checksum, **recording.facts}
+    path.with_suffix(".json").write_text(
+        json.dumps(document, indent=1, sort_keys=True, allow_nan=False) + "\n",
+        encoding="utf-8",
+    )
+    return checksum
+
+
+def read_recording(path: Path) -> Recording:
+    """Read a recording and check it against its checksum.
+
+    Parameters
+    ----------
+    path : Path
+        The ``.npz`` file; its facts lie beside it with ``.json``.
+
+    Returns
+    -------
+    Recording
+        Columns and facts.
+
+    Raises
+    ------
+    RecordingError
+        If a file is missing, damaged, or not a recording.
+    """
+    facts_path = path.with_suffix(".json")
+    for needed in (path, facts_path):
+        if not needed.is_file():
+            raise RecordingError(f"{needed}: no such file")
+    try:
+        facts = json.loads(facts_path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise RecordingError(f"{facts_path}: not JSON ({error})") from error
+    if not isinstance(facts, dict) or "sha256" not in facts:
+        raise RecordingError(f"{facts_path}: needs an object with the key sha256")
+    checksum = hashlib.sha256(path.read_bytes()).hexdigest()
+    if facts.pop("sha256") != checksum:
+        raise RecordingError(f"{path}: is not the file whose checksum {facts_path} holds")
+    with np.load(path, allow_pickle=False) as archive:
+        columns = {name: archive[name] for name in archive.files}
+    return Recording(columns=columns, facts=facts)

@@ -1,0 +1,77 @@
+"""A rating scale: its grades in order, as text, with the values weights use."""
+
+from dataclasses import dataclass
+
+from masrel.errors import ParameterError
+
+__all__ = ["MODIFIED_ASHWORTH", "Scale"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scale:
+    """A rating scale with its grades in declared order.
+
+    Attributes
+    ----------
+    name : str
+        Short name, such as ``"MAS"``.
+    grades : tuple of str
+        Every grade a rater may give, least first. Grades are text: "1" and "1+"
+        are names, not numbers.
+
+    Raises
+    ------
+    ParameterError
+        If there are no grades, a grade is empty, or two are the same.
+
+    Examples
+    --------
+    >>> MODIFIED_ASHWORTH.code("1+")
+    2
+    """
+
+    name: str
+    grades: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        if not self.grades:
+            raise ParameterError(f"scale {self.name!r}: needs at least one grade")
+        for grade in self.grades:
+            if not isinstance(grade, str) or not grade.strip():
+                raise ParameterError(
+                    f"scale {self.name!r}: grades must be text, got {grade!r}"
+                )
+        repeated = sorted({g for g in self.grades if self.grades.count(g) > 1})
+        if repeated:
+            raise ParameterError(
+                f"scale {self.name!r}: grades must differ, repeated: {repeated}"
+            )
+
+    def code(self, grade: str) -> int:
+        """Return the rank of a grade, from 0.
+
+        Parameters
+        ----------
+        grade : str
+            A grade of the scale.
+
+        Returns
+        -------
+        int
+            Its position in the declared order.
+
+        Raises
+        ------
+        ParameterError
+            If the scale has no such grade.
+        """
+        if grade not in self.grades:
+            raise ParameterError(
+                f"{grade!r} is not a grade of {self.name}: "
+                f"needed one of {', '.join(self.grades)}"
+            )
+        return self.grades.index(grade)
+
+
+MODIFIED_ASHWORTH = Scale(name="MAS", grades=("0", "1", "1+", "2", "3", "4"))
+"""The Modified Ashworth Scale (Bohannon and Smith 1987)."""
