@@ -6,6 +6,7 @@ their names, and ``NAME.json`` with the facts and the SHA-256 of the first.
 
 import hashlib
 import json
+import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -150,7 +151,12 @@ def read_recording(path: Path) -> Recording:
         raise RecordingError(f"{facts_path}: needs an object with the key sha256")
     checksum = hashlib.sha256(path.read_bytes()).hexdigest()
     if facts.pop("sha256") != checksum:
-        raise RecordingError(f"{path}: is not the file whose checksum {facts_path} holds")
-    with np.load(path, allow_pickle=False) as archive:
-        columns = {name: archive[name] for name in archive.files}
+        raise RecordingError(
+            f"{path}: is not the file whose checksum {facts_path} holds"
+        )
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            columns = {name: archive[name] for name in archive.files}
+    except (ValueError, EOFError, OSError, zipfile.BadZipFile) as error:
+        raise RecordingError(f"{path}: not an archive of columns ({error})") from error
     return Recording(columns=columns, facts=facts)

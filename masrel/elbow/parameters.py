@@ -141,7 +141,9 @@ class ElbowParameters:
         return self.catch_angle_constant - self.catch_slope * slowed  # (2)
 
 
-def _table_iii(length: float, torque: float, ratio: float, travel: float) -> ElbowParameters:
+def _table_iii(
+    length: float, torque: float, ratio: float, travel: float
+) -> ElbowParameters:
     return ElbowParameters(
         catch_angle_constant=math.radians(length),
         catch_torque_constant=torque,

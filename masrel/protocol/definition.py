@@ -39,7 +39,7 @@ class Table(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """A table of the protocol file; unknown keys are errors."""
 
 
-class Study(Table):
+class Study(Table, frozen=True, kw_only=True):
     """``[study]``: what the study is."""
 
     id: Identifier
@@ -48,14 +48,14 @@ class Study(Table):
     notes: str = ""
 
 
-class ScaleDefinition(Table):
+class ScaleDefinition(Table, frozen=True, kw_only=True):
     """``[scale]``: the grades a rater may give, least first."""
 
     name: Text
     grades: Annotated[tuple[Text, ...], Meta(min_length=2)]
 
 
-class ElbowConstants(Table):
+class ElbowConstants(Table, frozen=True, kw_only=True):
     """``[elbow]``: the constants all models share (Table III's last column)."""
 
     inertia_kg_m2: NonNegative = 0.0
@@ -71,7 +71,7 @@ class ElbowConstants(Table):
     post_catch: Literal["continuous", "additive"] = "continuous"
 
 
-class Model(Table):
+class Model(Table, frozen=True, kw_only=True):
     """``[[models]]``: one haptic model."""
 
     id: Identifier
@@ -83,14 +83,14 @@ class Model(Table):
     catch_travel_deg: Angle  # D
 
 
-class Rater(Table):
+class Rater(Table, frozen=True, kw_only=True):
     """``[[raters]]``: one rater."""
 
     id: Identifier
     note: str = ""
 
 
-class Session(Table):
+class Session(Table, frozen=True, kw_only=True):
     """``[[sessions]]``: one occasion on which raters meet every model."""
 
     id: Identifier
@@ -98,7 +98,7 @@ class Session(Table):
     note: str = ""
 
 
-class ScheduleScheme(Table):
+class ScheduleScheme(Table, frozen=True, kw_only=True):
     """``[schedule]``: how the order of presentations is drawn."""
 
     seed: Annotated[int, Meta(ge=0, lt=2**63)]
@@ -106,14 +106,14 @@ class ScheduleScheme(Table):
     repeats: Annotated[int, Meta(ge=1, le=20)] = 1
 
 
-class Stretch(Table):
+class Stretch(Table, frozen=True, kw_only=True):
     """``[stretch]``: the movement a rater is asked to make."""
 
     start_deg: Annotated[float, Meta(ge=0, lt=180)] = 30.0
     end_deg: Angle = 146.0
 
 
-class DeviceSettings(Table):
+class DeviceSettings(Table, frozen=True, kw_only=True):
     """``[device]``: which device, and the limits around it."""
 
     backend: Identifier = "simulated"
@@ -125,7 +125,7 @@ class DeviceSettings(Table):
     slip_speed_drop_deg_s: Positive = 40.0
 
 
-class SimulatedRaters(Table):
+class SimulatedRaters(Table, frozen=True, kw_only=True):
     """``[simulated_raters]``: the raters of ``--grades simulated``."""
 
     seed: Annotated[int, Meta(ge=0, lt=2**63)] = 0
@@ -135,7 +135,7 @@ class SimulatedRaters(Table):
     speed_sd_deg_s: NonNegative = 15.0
 
 
-class EstimatePlan(Table):
+class EstimatePlan(Table, frozen=True, kw_only=True):
     """``[[analysis.estimates]]``: one line of the analysis plan."""
 
     id: Identifier
@@ -149,7 +149,7 @@ class EstimatePlan(Table):
     )
 
 
-class Analysis(Table):
+class Analysis(Table, frozen=True, kw_only=True):
     """``[analysis]``: the plan, written before the data."""
 
     level: Annotated[float, Meta(gt=0.5, lt=1)] = 0.95
@@ -158,7 +158,7 @@ class Analysis(Table):
     estimates: tuple[EstimatePlan, ...] = ()
 
 
-class Report(Table):
+class Report(Table, frozen=True, kw_only=True):
     """``[report]``: which sections the report has, in order."""
 
     title: str = ""
@@ -177,7 +177,7 @@ class Report(Table):
     ] = ("design", "grades", "agreement", "intended", "test-retest", "speeds", "traces")
 
 
-class Protocol(Table):
+class Protocol(Table, frozen=True, kw_only=True):
     """A whole protocol file."""
 
     study: Study

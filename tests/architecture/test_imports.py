@@ -1,0 +1,68 @@
+"""What is loaded, seen by looking at the loaded modules of a fresh interpreter."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+HEAVY = {"pandas", "scipy", "statsmodels", "matplotlib", "emcee", "arviz_stats"}
+
+
+def loaded_after(code: str) -> set[str]:
+    """Top-level names of the modules a fresh interpreter holds after `code`."""
+    script = (
+        "import sys, json, io, contextlib\n"
+        "with contextlib.redirect_stdout(io.StringIO()):\n"
+        "    try:\n"
+        + "".join(f"        {line}\n" for line in code.splitlines())
+        + "    except SystemExit:\n        pass\n"
+        "print(json.dumps(sorted({name.split('.')[0] for name in sys.modules})))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    return set(json.loads(done.stdout))
+
+
+def test_the_detector_sees_a_heavy_import() -> None:
+    assert loaded_after("import scipy") & HEAVY == {"scipy"}
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import masrel",
+        "from masrel.cli import cli\ncli(['--help'])",
+        "from masrel.cli import cli\ncli(['--version'])",
+    ],
+)
+def test_the_package_and_its_help_load_nothing_heavy(code: str) -> None:
+    assert loaded_after(code) & (HEAVY | {"numpy"}) == set()
+
+
+@pytest.mark.parametrize("package", ["agreement", "elbow", "hess", "intervals"])
+def test_a_library_loads_numpy_at_most(package: str) -> None:
+    assert loaded_after(f"import masrel.{package}") & HEAVY == set()
+
+
+@pytest.mark.parametrize("stage", ["protocol", "schedule", "run"])
+def test_a_stage_before_the_ratings_loads_no_pandas(stage: str) -> None:
+    assert loaded_after(f"import masrel.{stage}") & HEAVY == set()
+
+
+def test_one_kappa_loads_numpy_alone() -> None:
+    code = (
+        "from masrel.agreement import fleiss_kappa\n"
+        "fleiss_kappa([['1', '1'], ['1', '2']], categories=['1', '2'])"
+    )
+    assert loaded_after(code) & HEAVY == set()
+
+
+def test_an_analysis_loads_no_matplotlib() -> None:
+    loaded = loaded_after("import masrel.analysis, masrel.ratings")
+    assert loaded & {"matplotlib", "emcee", "statsmodels"} == set()
+
+
+def test_sub_packages_come_on_first_use() -> None:
+    assert "numpy" in loaded_after("import masrel\nmasrel.elbow.STANDARD_MODELS")

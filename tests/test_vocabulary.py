@@ -1,0 +1,104 @@
+"""Scales, results and errors: the words everything else speaks."""
+
+import dataclasses
+import math
+import warnings
+
+import pytest
+
+import masrel
+from masrel import errors
+from masrel.errors import MasrelError, MasrelWarning, ParameterError, ProtocolError
+from masrel.estimates import Estimate, Interval, as_document
+from masrel.scales import MODIFIED_ASHWORTH, Scale
+
+
+def estimate(**changes: object) -> Estimate:
+    plain = Estimate(
+        coefficient="fleiss_kappa",
+        weights="identity",
+        value=0.5,
+        standard_error=0.1,
+        observed=0.75,
+        chance=0.5,
+        n_items=4,
+        n_raters=8,
+        n_categories=6,
+    )
+    return dataclasses.replace(plain, **changes)  # type: ignore[arg-type]
+
+
+def test_grades_are_text_and_keep_their_declared_order() -> None:
+    assert [MODIFIED_ASHWORTH.code(g) for g in ("0", "1", "1+", "2", "3", "4")] == [
+        0,
+        1,
+        2,
+        3,
+        4,
+        5,
+    ]
+
+
+@pytest.mark.parametrize(
+    ("grades", "match"),
+    [
+        ((), "at least one"),
+        (("a", ""), "text"),
+        (("a", "b", "a"), r"repeated: \['a'\]"),
+    ],
+)
+def test_a_scale_that_is_none_is_refused(grades: tuple[str, ...], match: str) -> None:
+    with pytest.raises(ParameterError, match=match):
+        Scale(name="S", grades=grades)
+
+
+def test_a_grade_off_the_scale_is_named() -> None:
+    with pytest.raises(ParameterError, match=r"'1\.5' is not a grade of MAS"):
+        MODIFIED_ASHWORTH.code("1.5")
+
+
+def test_a_document_has_every_field_and_no_nan() -> None:
+    interval = Interval(
+        low=0.1,
+        high=math.inf,
+        level=0.95,
+        kind="confidence",
+        method="m",
+        target="items",
+        monte_carlo_error=(0.01, math.nan),
+    )
+    document = as_document(estimate(value=math.nan, interval=interval, reason="0/0"))
+    assert list(document) == [f.name for f in dataclasses.fields(Estimate)]
+    assert document["value"] is None
+    assert document["interval"]["high"] is None  # type: ignore[index]
+    assert document["interval"]["monte_carlo_error"] == [0.01, None]  # type: ignore[index]
+
+
+def test_an_undefined_estimate_says_so_in_its_line() -> None:
+    assert str(estimate()) == "fleiss_kappa: 0.5 (SE 0.1)"
+    assert "undefined (0/0)" in str(estimate(value=math.nan, reason="0/0"))
+
+
+def test_everything_raised_on_purpose_has_one_root() -> None:
+    for name in errors.__all__:
+        kind = getattr(errors, name)
+        assert issubclass(kind, MasrelError | MasrelWarning), name
+        assert name in (errors.__doc__ or "") or kind in (MasrelError, MasrelWarning)
+
+
+def test_a_protocol_error_holds_every_problem() -> None:
+    error = ProtocolError("one", "two")
+    assert error.problems == ("one", "two")
+    assert str(error) == "one\ntwo"
+
+
+def test_an_unknown_sub_package_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="nonsense"):
+        masrel.nonsense  # noqa: B018 - the access is what is tested
+
+
+def test_every_sub_package_is_reachable_and_warns_of_nothing() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for name in masrel.__all__:
+            assert getattr(masrel, name).__doc__
