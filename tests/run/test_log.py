@@ -1,0 +1,236 @@
+"""The log is a chain on disk: what was appended stays, what was changed shows."""
+
+import hashlib
+import json
+import os
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from masrel.errors import SessionLogError
+from masrel.run.log import SessionLog, read_log
+
+
+def noon() -> datetime:
+    return datetime(2031, 5, 6, 12, 0, tzinfo=UTC)
+
+
+def filled(path: Path, n_events: int = 4) -> Path:
+    with SessionLog.open(path, now=noon) as log:
+        for number in range(n_events):
+            log.append("grade", {"code": f"C{number}", "grade": "1+"})
+    return path
+
+
+def test_what_is_appended_is_what_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "sessions" / "a.jsonl"
+    facts = {"code": "K7", "grade": "1+", "speed": 81.5, "fault": None, "n": 3}
+    with SessionLog.open(path, now=noon) as log:
+        log.append("grade", facts)
+        log.append("correction", {"why": "Größe, 등급\u2028\n"})
+        assert log.events == read_log(path)
+    first, second = read_log(path)
+    assert (first.line, first.kind, first.fields) == (1, "grade", facts)
+    assert first.time_utc == "2031-05-06T12:00:00.000Z"
+    assert second.fields["why"] == "Größe, 등급\u2028\n"
+
+
+def test_the_chain_is_the_one_the_documentation_describes(tmp_path: Path) -> None:
+    previous = "0" * 64
+    for line in filled(tmp_path / "a.jsonl").read_bytes().splitlines():
+        assert json.loads(line)["previous"] == previous
+        previous = hashlib.sha256(line).hexdigest()
+
+
+def test_each_event_is_synced_before_append_returns(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    synced: list[int] = []
+    fsync = os.fsync
+
+    def counted(descriptor: int) -> None:
+        fsync(descriptor)
+        synced.append(os.fstat(descriptor).st_size)
+
+    with SessionLog.open(tmp_path / "a.jsonl") as log:
+        monkeypatch.setattr(os, "fsync", counted)
+        for number in (1, 2, 3):
+            log.append("grade", {"code": "A"})
+            assert len(synced) == number
+            assert synced[-1] == log.path.stat().st_size
+
+
+def test_a_reopened_log_goes_on_with_the_chain(tmp_path: Path) -> None:
+    path = filled(tmp_path / "a.jsonl", 2)
+    filled(path, 3)
+    assert [event.line for event in read_log(path)] == [1, 2, 3, 4, 5]
+
+
+@pytest.mark.parametrize("number", [1, 2, 3])
+def test_a_changed_line_is_found_with_its_file_and_line(
+    tmp_path: Path, number: int
+) -> None:
+    path = filled(tmp_path / "a.jsonl")
+    lines = path.read_bytes().splitlines(keepends=True)
+    lines[number - 1] = lines[number - 1].replace(b"1+", b"2 ")
+    path.write_bytes(b"".join(lines))
+    with pytest.raises(SessionLogError, match=rf"a\.jsonl: line {number + 1}: needed"):
+        read_log(path)
+    with pytest.raises(SessionLogError, match=f"line {number + 1}"):
+        SessionLog.open(path)
+
+
+@pytest.mark.parametrize("number", [1, 2, 3])
+def test_a_removed_line_is_found(tmp_path: Path, number: int) -> None:
+    path = filled(tmp_path / "a.jsonl")
+    lines = path.read_bytes().splitlines(keepends=True)
+    del lines[number - 1]
+    path.write_bytes(b"".join(lines))
+    with pytest.raises(SessionLogError, match=rf"line {number}: needed previous"):
+        read_log(path)
+
+
+def test_exchanged_lines_are_found(tmp_path: Path) -> None:
+    path = filled(tmp_path / "a.jsonl")
+    lines = path.read_bytes().splitlines(keepends=True)
+    lines[1], lines[2] = lines[2], lines[1]
+    path.write_bytes(b"".join(lines))
+    with pytest.raises(SessionLogError, match="line 2: needed previous"):
+        read_log(path)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        b"not json",
+        b"[1, 2]",
+        b'{"event": "grade"}',
+        b"\xff\xfe",
+        b"",
+        b'{"event": 1, "time_utc": "", "previous": "", "fields": {}}',
+        b'{"event": "a", "time_utc": "", "previous": "", "fields": {"a": [1]}}',
+    ],
+)
+def test_a_line_that_is_no_event_is_refused(tmp_path: Path, line: bytes) -> None:
+    path = filled(tmp_path / "a.jsonl", 1)
+    path.write_bytes(path.read_bytes() + line + b"\n")
+    with pytest.raises(SessionLogError, match=r"a\.jsonl: line 2: "):
+        read_log(path)
+
+
+def test_a_missing_log_is_named(tmp_path: Path) -> None:
+    with pytest.raises(SessionLogError, match=r"gone\.jsonl: no such session log"):
+        read_log(tmp_path / "gone.jsonl")
+
+
+def test_an_empty_log_has_no_events(tmp_path: Path) -> None:
+    path = tmp_path / "a.jsonl"
+    path.touch()
+    assert read_log(path) == ()
+    assert len(read_log(filled(path, 1))) == 1
+
+
+@settings(
+    max_examples=40,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+    deadline=None,
+)
+@given(cut=st.integers(min_value=1, max_value=400))
+def test_a_log_cut_anywhere_keeps_every_whole_event(tmp_path: Path, cut: int) -> None:
+    path = tmp_path / "a.jsonl"
+    path.unlink(missing_ok=True)
+    beside = tmp_path / "a.jsonl.torn"
+    beside.unlink(missing_ok=True)
+    whole = filled(path).read_bytes()
+    left = whole[:-cut]
+    path.write_bytes(left)
+    *lines, torn = left.split(b"\n")
+    with SessionLog.open(path, now=noon) as log:
+        log.append("grade", {"code": "after"})
+    events = read_log(path)
+    # All but its newline is a whole event: its closing brace is there.
+    kept = len(lines) + (1 if torn.endswith(b"}}") else 0)
+    assert path.read_bytes().startswith(b"\n".join([*lines, b""]))
+    assert [e.fields["code"] for e in events[:kept]] == [f"C{i}" for i in range(kept)]
+    assert [e.kind for e in events[kept:]] == ["recovered"] * bool(torn) + ["grade"]
+    if torn and kept == len(lines):
+        assert beside.read_bytes() == torn + b"\n"
+        recovered = events[kept].fields
+        assert recovered["sha256"] == hashlib.sha256(torn).hexdigest()
+        assert (recovered["kept"], recovered["moved_to"]) == (False, beside.name)
+    else:
+        assert not beside.exists()
+
+
+def test_a_torn_log_is_not_read_as_if_it_were_whole(tmp_path: Path) -> None:
+    path = filled(tmp_path / "a.jsonl", 2)
+    path.write_bytes(path.read_bytes()[:-10])
+    with pytest.raises(SessionLogError, match="line 2: ends without a newline"):
+        read_log(path)
+
+
+def test_a_crash_during_the_recovery_loses_nothing(tmp_path: Path) -> None:
+    # The event that takes the torn bytes' place is itself torn.
+    path = filled(tmp_path / "a.jsonl", 2)
+    whole = path.read_bytes()
+    path.write_bytes(whole + b'{"event": "recov')
+    SessionLog.open(path, now=noon).close()
+    recovered = path.read_bytes()
+    path.write_bytes(recovered[:-30])
+    SessionLog.open(path, now=noon).close()
+    assert [event.kind for event in read_log(path)] == ["grade"] * 2 + ["recovered"]
+    assert path.read_bytes().startswith(whole)
+    assert (tmp_path / "a.jsonl.torn").read_bytes().startswith(b'{"event": "recov\n')
+
+
+def test_after_a_failed_write_nothing_follows_on_the_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = filled(tmp_path / "a.jsonl", 1)
+    write = os.write
+
+    def full_disk(descriptor: int, data: bytes) -> int:
+        if len(data) < 40:
+            raise OSError(28, "No space left on device")
+        return write(descriptor, data[: len(data) - 30])
+
+    with SessionLog.open(path) as log:
+        monkeypatch.setattr(os, "write", full_disk)
+        with pytest.raises(OSError, match="No space left"):
+            log.append("grade", {"code": "B"})
+        monkeypatch.undo()
+        assert not log.is_open
+        with pytest.raises(SessionLogError, match="closed"):
+            log.append("grade", {"code": "B"})
+    filled(path, 1)
+    assert [event.kind for event in read_log(path)] == ["grade", "recovered", "grade"]
+
+
+def test_a_log_has_one_writer(tmp_path: Path) -> None:
+    with (
+        SessionLog.open(tmp_path / "a.jsonl"),
+        pytest.raises(SessionLogError, match="another process has this log open"),
+    ):
+        SessionLog.open(tmp_path / "a.jsonl")
+    SessionLog.open(tmp_path / "a.jsonl").close()
+
+
+def test_closing_twice_is_harmless(tmp_path: Path) -> None:
+    log = SessionLog.open(tmp_path / "a.jsonl")
+    log.close()
+    log.close()
+    assert not log.is_open
+
+
+@pytest.mark.parametrize("fact", [float("nan"), float("inf"), "\ud800", [1], {"a": 1}])
+def test_a_fact_that_is_no_json_is_refused_and_leaves_the_log_whole(
+    tmp_path: Path, fact: object
+) -> None:
+    with SessionLog.open(tmp_path / "a.jsonl") as log:
+        with pytest.raises(SessionLogError, match=r"event 'grade': speed needs"):
+            log.append("grade", {"speed": fact})  # type: ignore[dict-item]
+        log.append("grade", {"speed": 1.0})
+    assert len(read_log(tmp_path / "a.jsonl")) == 1
