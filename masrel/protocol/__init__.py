@@ -1,1 +1,52 @@
-"""The protocol of a study: its types, and reading it with every error at once."""
+"""The protocol of a study: its types, and reading it with every error at once.
+
+Goes in: ``protocol.toml``. Comes out: a :class:`Protocol`, and from it the scale,
+the joint parameters of each model in SI units, and two hashes.
+"""
+
+from masrel.protocol.definition import (
+    Analysis,
+    DeviceSettings,
+    ElbowConstants,
+    EstimatePlan,
+    Model,
+    Protocol,
+    Rater,
+    Report,
+    ScaleDefinition,
+    ScheduleScheme,
+    Session,
+    SimulatedRaters,
+    Stretch,
+    Study,
+)
+from masrel.protocol.fingerprint import presented_hash, protocol_hash
+from masrel.protocol.models import elbow_parameters, scale_of
+from masrel.protocol.read import read_protocol
+from masrel.protocol.study import StudyPaths
+from masrel.protocol.templates import copy_template, template_names
+
+__all__ = [
+    "Analysis",
+    "DeviceSettings",
+    "ElbowConstants",
+    "EstimatePlan",
+    "Model",
+    "Protocol",
+    "Rater",
+    "Report",
+    "ScaleDefinition",
+    "ScheduleScheme",
+    "Session",
+    "SimulatedRaters",
+    "Stretch",
+    "Study",
+    "StudyPaths",
+    "copy_template",
+    "elbow_parameters",
+    "presented_hash",
+    "protocol_hash",
+    "read_protocol",
+    "scale_of",
+    "template_names",
+]

@@ -28,7 +28,7 @@ __all__ = [
     "Study",
 ]
 
-Identifier = Annotated[str, Meta(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,31}$")]
+Identifier = Annotated[str, Meta(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,31}\Z")]
 Text = Annotated[str, Meta(min_length=1)]
 Angle = Annotated[float, Meta(gt=0, le=180)]
 Positive = Annotated[float, Meta(gt=0)]
@@ -101,7 +101,7 @@ class Session(Table, frozen=True, kw_only=True):
 class ScheduleScheme(Table, frozen=True, kw_only=True):
     """``[schedule]``: how the order of presentations is drawn."""
 
-    seed: Annotated[int, Meta(ge=0, lt=2**63)]
+    seed: Annotated[int, Meta(ge=0, le=2**63 - 1)]
     scheme: Literal["random-order"] = "random-order"
     repeats: Annotated[int, Meta(ge=1, le=20)] = 1
 
@@ -128,7 +128,7 @@ class DeviceSettings(Table, frozen=True, kw_only=True):
 class SimulatedRaters(Table, frozen=True, kw_only=True):
     """``[simulated_raters]``: the raters of ``--grades simulated``."""
 
-    seed: Annotated[int, Meta(ge=0, lt=2**63)] = 0
+    seed: Annotated[int, Meta(ge=0, le=2**63 - 1)] = 0
     accuracy: Annotated[float, Meta(ge=0, le=1)] = 0.84
     retest_agreement: Annotated[float, Meta(ge=0, le=1)] = 0.85
     mean_speed_deg_s: Positive = 85.0
@@ -153,7 +153,7 @@ class Analysis(Table, frozen=True, kw_only=True):
     """``[analysis]``: the plan, written before the data."""
 
     level: Annotated[float, Meta(gt=0.5, lt=1)] = 0.95
-    seed: Annotated[int, Meta(ge=0, lt=2**63)] = 0
+    seed: Annotated[int, Meta(ge=0, le=2**63 - 1)] = 0
     n_resamples: Annotated[int, Meta(ge=100, le=1_000_000)] = 10_000
     estimates: tuple[EstimatePlan, ...] = ()
 

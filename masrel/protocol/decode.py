@@ -1,0 +1,172 @@
+"""Decode a TOML table into a struct key by key, collecting every problem."""
+
+import math
+import typing
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+
+import msgspec
+from msgspec.structs import FieldInfo
+
+from masrel.protocol.wording import got, needed
+
+__all__ = ["Decoded", "decode_table"]
+
+Table = dict[str, typing.Any]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Decoded:
+    """What could be decoded of a table, and what could not.
+
+    Attributes
+    ----------
+    values : dict
+        The keys whose values are usable, defaults filled in; tables as dicts,
+        arrays as lists in which an unusable entry is None.
+    problems : list of str
+        Everything else, each ``key.path: needed ..., got ...``.
+    """
+
+    values: Table = field(default_factory=dict)
+    problems: list[str] = field(default_factory=list)
+
+
+def decode_table(
+    raw: Mapping[str, object], struct: type[msgspec.Struct], at: str = ""
+) -> Decoded:
+    """Decode a table into the fields of a struct, going on after each problem.
+
+    Parameters
+    ----------
+    raw : mapping
+        The table as ``tomllib`` gives it.
+    struct : type
+        The struct that says which keys there are.
+    at : str
+        Key path of the table, empty for the file itself.
+
+    Returns
+    -------
+    Decoded
+        Usable values and problems.
+    """
+    decoded = Decoded()
+    fields = {info.encode_name: info for info in msgspec.structs.fields(struct)}
+    for key in raw:
+        if key not in fields:
+            decoded.problems.append(_unknown(_join(at, key), key, fields))
+    for key, info in fields.items():
+        where = _join(at, key)
+        if key in raw:
+            _decode_value(raw[key], info.type, where, key, decoded)
+        elif info.required:
+            decoded.problems.append(f"{where}: needed {_form(info, where)}, got none")
+        else:
+            decoded.values[key] = msgspec.to_builtins(info.default)
+    return decoded
+
+
+def _decode_value(
+    value: object, annotation: object, where: str, key: str, into: Decoded
+) -> None:
+    if _is_struct(annotation):
+        if isinstance(value, Mapping):
+            part = decode_table(value, annotation, where)
+            into.values[key] = part.values
+            into.problems.extend(part.problems)
+        else:
+            into.problems.append(f"{where}: needed a table [{where}], got {got(value)}")
+    elif (entry := _entry_type(annotation)) is not None:
+        _decode_array(value, annotation, entry, where, key, into)
+    elif (problem := _leaf_problem(value, annotation, where)) is None:
+        into.values[key] = value
+    else:
+        into.problems.append(problem)
+
+
+def _decode_array(
+    value: object,
+    annotation: object,
+    entry: object,
+    where: str,
+    key: str,
+    into: Decoded,
+) -> None:
+    tables = _is_struct(entry)
+    words = f"an array of tables [[{where}]]" if tables else needed(annotation)
+    if not isinstance(value, list):
+        into.problems.append(f"{where}: needed {words}, got {got(value)}")
+        return
+    found = Decoded()
+    for index, item in enumerate(value):
+        before = len(found.problems)
+        _decode_value(item, entry, f"{where}[{index}]", str(index), found)
+        _name_entry(item, found.problems, before)
+    into.problems.extend(found.problems)
+    into.values[key] = [found.values.get(str(i)) for i in range(len(value))]
+    # The array's own limits, which its entries cannot show.
+    info = msgspec.inspect.type_info(annotation)
+    if isinstance(info, msgspec.inspect.VarTupleType) and not (
+        (info.min_length or 0) <= len(value) <= (info.max_length or math.inf)
+    ):
+        into.problems.append(f"{where}: needed {needed(annotation)}, got {got(value)}")
+
+
+def _name_entry(item: object, problems: list[str], start: int) -> None:
+    # Entries are counted from 0; their id helps to find them in the file.
+    name = item.get("id") if isinstance(item, Mapping) else None
+    if isinstance(name, str):
+        problems[start:] = [f"{text} (id {got(name)})" for text in problems[start:]]
+
+
+def _leaf_problem(value: object, annotation: object, where: str) -> str | None:
+    problem = f"{where}: needed {needed(annotation)}, got {got(value)}"
+    if isinstance(value, float) and not math.isfinite(value):
+        return problem  # TOML has inf and nan; no key of a protocol does
+    try:
+        msgspec.convert(value, annotation)
+    except msgspec.ValidationError:
+        info = msgspec.inspect.type_info(annotation)
+        options = info.values if isinstance(info, msgspec.inspect.LiteralType) else ()
+        return problem + _closest(value, [str(option) for option in options])
+    return None
+
+
+def _unknown(where: str, key: str, fields: Mapping[str, FieldInfo]) -> str:
+    hint = _closest(key, list(fields))
+    known = "" if hint else f" ({', '.join(fields)})"
+    return f"{where}: needed a known key{known}, got {got(key)}{hint}"
+
+
+def _closest(value: object, options: list[str]) -> str:
+    near = get_close_matches(str(value), options, n=1)
+    return f"; did you mean {near[0]}?" if near else ""
+
+
+def _form(info: FieldInfo, where: str) -> str:
+    if _is_struct(info.type):
+        return f"a table [{where}]"
+    entry = _entry_type(info.type)
+    if entry is not None and _is_struct(entry):
+        return f"an array of tables [[{where}]]"
+    return needed(info.type)
+
+
+def _is_struct(annotation: object) -> typing.TypeGuard[type[msgspec.Struct]]:
+    return isinstance(annotation, type) and issubclass(annotation, msgspec.Struct)
+
+
+def _entry_type(annotation: object) -> object | None:
+    # X of tuple[X, ...], annotated or not; None for anything else.
+    if typing.get_origin(annotation) is typing.Annotated:
+        annotation = typing.get_args(annotation)[0]
+    if typing.get_origin(annotation) is tuple:
+        entry: object = typing.get_args(annotation)[0]
+        return entry
+    return None
+
+
+def _join(at: str, key: str) -> str:
+    return f"{at}.{key}" if at else key
