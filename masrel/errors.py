@@ -11,6 +11,7 @@ The tree::
     ├── RecordingError (ValueError)      a recording is damaged or not one
     ├── SessionLogError (ValueError)     a session log is damaged or not one
     ├── ConvergenceError (RuntimeError)  a sampler has not converged
+    ├── SessionStoppedError (RuntimeError)  a person stopped a session before its end
     └── DeviceError (RuntimeError)       the device cannot go on
         ├── DeviceTimeoutError (TimeoutError)
         └── LimitExceededError
@@ -36,6 +37,7 @@ __all__ = [
     "RecordingError",
     "ScheduleError",
     "SessionLogError",
+    "SessionStoppedError",
     "SmallSampleWarning",
     "UndefinedStatisticWarning",
 ]
@@ -85,6 +87,10 @@ class SessionLogError(MasrelError, ValueError):
 
 class ConvergenceError(MasrelError, RuntimeError):
     """A sampler has not converged; the message says how many more steps it needs."""
+
+
+class SessionStoppedError(MasrelError, RuntimeError):
+    """A person stopped a session before its end; it can be gone on with."""
 
 
 class DeviceError(MasrelError, RuntimeError):

@@ -10,7 +10,12 @@ import sys
 import click
 
 import masrel
-from masrel.errors import ConvergenceError, DeviceError, MasrelError
+from masrel.errors import (
+    ConvergenceError,
+    DeviceError,
+    MasrelError,
+    SessionStoppedError,
+)
 
 __all__ = ["main"]
 
@@ -63,7 +68,7 @@ def main() -> None:
     """Run the command line and exit with its code."""
     try:
         cli()
-    except (DeviceError, ConvergenceError) as error:
+    except (DeviceError, ConvergenceError, SessionStoppedError) as error:
         _fail(error, 1)
     except (MasrelError, OSError) as error:
         _fail(error, 2)
