@@ -10,8 +10,8 @@ __all__ = ["broken_rules"]
 
 Values = dict[str, Any]
 
-MOST_PRESENTATIONS = 1000
-"""Presentations of one session; beyond it, blinded codes would run short."""
+MOST_PRESENTATIONS = 500
+"""Presentations of one session; blinded codes are drawn from 1800."""
 
 MISSING_MARKS = ("NA",)
 """Marks of a missing rating in a ratings file; no grade may be called that."""

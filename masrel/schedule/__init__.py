@@ -1,1 +1,20 @@
-"""(to be written)"""
+"""The schedules of a study: who meets which model when, drawn once and kept.
+
+Goes in: a protocol. Comes out: for each rater and session a schedule file that
+names the models, and a blinded sheet that does not.
+"""
+
+from masrel.schedule.files import read_schedule
+from masrel.schedule.keep import schedule_problems, write_schedules
+from masrel.schedule.presentation import Presentation, Schedule, check_schedule
+from masrel.schedule.randomize import draw_schedule
+
+__all__ = [
+    "Presentation",
+    "Schedule",
+    "check_schedule",
+    "draw_schedule",
+    "read_schedule",
+    "schedule_problems",
+    "write_schedules",
+]

@@ -1,0 +1,86 @@
+"""``masrel check``: everything that is wrong with a study, at once."""
+
+import sys
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import click
+
+from masrel.errors import MasrelError, ProtocolError
+from masrel.protocol import Protocol, StudyPaths, read_protocol, scale_of
+from masrel.schedule import schedule_problems
+
+__all__ = ["check_study", "command"]
+
+
+@click.command("check")
+@click.argument("study", type=click.Path(path_type=Path))
+def command(study: Path) -> None:
+    """Check the protocol, schedules and ratings of STUDY and say every problem."""
+    paths = StudyPaths(study)
+    problems = check_study(paths)
+    for problem in problems:
+        click.echo(problem, err=True)
+    if problems:
+        click.echo(f"masrel: {study}: {_count(len(problems), 'problem')}", err=True)
+        sys.exit(2)
+    click.echo(_summary(paths))
+
+
+def check_study(study: StudyPaths) -> tuple[str, ...]:
+    """Gather the problems of a study from every checker.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is.
+
+    Returns
+    -------
+    tuple of str
+        Every problem with its file; empty when the study is usable. Without a
+        usable protocol there is nothing to hold the other files against, so its
+        problems are then all.
+    """
+    try:
+        protocol = read_protocol(study.protocol)
+    except ProtocolError as error:
+        return error.problems
+    return tuple(
+        problem for checker in _CHECKERS for problem in checker(protocol, study)
+    )
+
+
+def _ratings_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
+    files = [f for f in (study.ratings_file, study.published_file) if f.is_file()]
+    if not files:
+        return
+    from masrel.ratings import read_ratings  # loads pandas
+
+    for path in files:
+        try:
+            read_ratings(path, scale=scale_of(protocol))
+        except MasrelError as error:
+            yield str(error)
+
+
+_CHECKERS: tuple[Callable[[Protocol, StudyPaths], Iterable[str]], ...] = (
+    schedule_problems,
+    _ratings_problems,
+)
+
+
+def _summary(study: StudyPaths) -> str:
+    protocol = read_protocol(study.protocol)
+    places = [(rater, s.id) for s in protocol.sessions for rater in s.raters]
+    n_drawn = sum(study.schedule_file(*place).is_file() for place in places)
+    return (
+        f"{study.root}: no problems. {_count(len(protocol.models), 'model')}, "
+        f"{_count(len(protocol.raters), 'rater')}, "
+        f"{_count(len(protocol.sessions), 'session')}; "
+        f"{n_drawn} of {_count(len(places), 'schedule')} drawn."
+    )
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}" + ("" if number == 1 else "s")
