@@ -8,7 +8,7 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from masrel.ratings.files import ratings_hash, read_ratings, write_ratings
+    from masrel.ratings.files import read_ratings
     from masrel.ratings.in_person import InPerson, InPersonRow, read_in_person
     from masrel.ratings.logs import ratings_from_logs
     from masrel.ratings.matrices import (
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
         Ratings,
         ratings_from_rows,
     )
+    from masrel.ratings.writing import ratings_hash, write_ratings
 
 __all__ = [
     "DEFAULT_SESSION",
@@ -45,7 +46,7 @@ __all__ = [
 ]
 
 _HOMES = {
-    "files": ("ratings_hash", "read_ratings", "write_ratings"),
+    "files": ("read_ratings",),
     "in_person": ("InPerson", "InPersonRow", "read_in_person"),
     "logs": ("ratings_from_logs",),
     "matrices": ("RatingMatrix", "RetestPairs", "rating_matrix", "retest_pairs"),
@@ -56,6 +57,7 @@ _HOMES = {
         "Ratings",
         "ratings_from_rows",
     ),
+    "writing": ("ratings_hash", "write_ratings"),
 }
 
 

@@ -1,8 +1,5 @@
-"""Reading any CSV file of ratings as text, and writing the table of a study."""
+"""Reading any CSV file of ratings as text."""
 
-import csv
-import hashlib
-import io
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,14 +10,13 @@ from masrel.ratings.columns import Chosen, LongColumns, WideColumns, find_column
 from masrel.ratings.rows import MISSING, CsvRows, Problems, read_rows
 from masrel.ratings.table import (
     DEFAULT_SESSION,
-    RATING_COLUMNS,
     SOURCES,
     Ratings,
     assemble,
 )
 from masrel.scales import Scale
 
-__all__ = ["ratings_hash", "read_ratings", "write_ratings"]
+__all__ = ["read_ratings"]
 
 _LOOKS_MISSING = frozenset({"n/a", "na", "nan", "null", "none", ".", "-", "?"})
 
@@ -50,7 +46,7 @@ def read_ratings(
     session: str | None = None,
     categories: Sequence[str] | None = None,
 ) -> Ratings:
-    """Read a long or wide CSV file of ratings, everything as text.
+    r"""Read a long or wide CSV file of ratings, everything as text.
 
     Parameters
     ----------
@@ -82,7 +78,7 @@ def read_ratings(
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     path = Path(folder) / "wide.csv"
-    ...     _ = path.write_text("patient,Kim,Lee\\nA,1,1+\\nB,2,NA\\n")
+    ...     _ = path.write_text("patient,Kim,Lee\nA,1,1+\nB,2,NA\n")
     ...     ratings = read_ratings(path, categories=["1", "1+", "2"])
     >>> ratings.table["grade"].tolist()
     ['1', '1+', '2', None]
@@ -106,64 +102,7 @@ def read_ratings(
     return assemble([_as_row(cell) for cell in cells], scale, rows.path)
 
 
-def write_ratings(ratings: Ratings, path: Path) -> None:
-    """Write a table of ratings; the same table gives the same bytes.
-
-    Parameters
-    ----------
-    ratings : Ratings
-        The table.
-    path : Path
-        The CSV file; its folder is made when missing.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
-    """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    head = "# Ratings, one row a rating; grades are text; NA is missing.\n"
-    if ratings.simulated:
-        head = f"# SIMULATED: not grades of persons on hardware.\n{head}"
-    path.write_text(head + _body(ratings), encoding="utf-8", newline="")
-
-
-def ratings_hash(ratings: Ratings) -> str:
-    """Return the SHA-256 of a table's rows and of its scale.
-
-    Parameters
-    ----------
-    ratings : Ratings
-        The table.
-
-    Returns
-    -------
-    str
-        In hexadecimal; where the table was read from does not matter.
-    """
-    scale = "\n".join((ratings.scale.name, *ratings.scale.grades))
-    return hashlib.sha256(f"{scale}\n\n{_body(ratings)}".encode()).hexdigest()
-
-
-def _body(ratings: Ratings) -> str:
-    text = io.StringIO(newline="")
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(RATING_COLUMNS)
-    columns = [ratings.table[name].tolist() for name in RATING_COLUMNS]
-    for row in zip(*columns, strict=True):
-        writer.writerow([_as_text(value) for value in row])
-    return text.getvalue()
-
-
-def _as_text(value: object) -> str:
-    if value is None or (isinstance(value, float) and math.isnan(value)):
-        return "NA"
-    return repr(value) if isinstance(value, float) else str(value)
-
-
-def _long_cells(
-    rows: CsvRows, columns: LongColumns, problems: Problems
-) -> list[_Cell]:
+def _long_cells(rows: CsvRows, columns: LongColumns, problems: Problems) -> list[_Cell]:
     extra = {
         name: rows.header.index(name)
         for name in ("repeat", "mean_speed_deg_s", "source")

@@ -70,7 +70,8 @@ def read_in_person(path: Path | str) -> InPerson:
     ----------
     path : Path or str
         CSV with the columns source_table, rater, subject, model, in_person_grade,
-        haptic_grade, note; an empty cell or NA is a missing grade.
+        haptic_grade, note; others are left aside. An empty cell or NA is a missing
+        grade.
 
     Returns
     -------
@@ -80,11 +81,11 @@ def read_in_person(path: Path | str) -> InPerson:
     Raises
     ------
     RatingsError
-        If a column is missing or unknown, a row lacks source table, rater, subject
-        or model, or is there twice. The message lists up to 20 problems.
+        If a column is missing, a row lacks source table, rater, subject or model,
+        or is there twice. The message lists up to 20 problems.
     """
     rows = read_rows(Path(path))
-    if set(rows.header) != set(IN_PERSON_COLUMNS):
+    if not set(IN_PERSON_COLUMNS) <= set(rows.header):
         raise RatingsError(
             f"{rows.path}: line {rows.header_line}: needed the columns "
             f"{', '.join(IN_PERSON_COLUMNS)}, got {', '.join(rows.header)}"

@@ -8,17 +8,14 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from masrel.run.chain import Event, read_log
+    from masrel.run.console import ConsoleGrades
     from masrel.run.correction import record_correction
-    from masrel.run.grades import (
-        Asked,
-        ConsoleGrades,
-        GradeSource,
-        ScriptGrades,
-        SessionStoppedError,
-    )
-    from masrel.run.log import Event, SessionLog, read_log
-    from masrel.run.session import SessionSummary, run_session
+    from masrel.run.grades import Asked, GradeSource, ScriptGrades
+    from masrel.run.log import SessionLog
+    from masrel.run.session import run_session
     from masrel.run.simulated import SimulatedGrades
+    from masrel.run.walk import SessionSummary
 
 __all__ = [
     "Asked",
@@ -27,7 +24,6 @@ __all__ = [
     "GradeSource",
     "ScriptGrades",
     "SessionLog",
-    "SessionStoppedError",
     "SessionSummary",
     "SimulatedGrades",
     "read_log",
@@ -36,17 +32,14 @@ __all__ = [
 ]
 
 _HOMES = {
+    "chain": ("Event", "read_log"),
+    "console": ("ConsoleGrades",),
     "correction": ("record_correction",),
-    "grades": (
-        "Asked",
-        "ConsoleGrades",
-        "GradeSource",
-        "ScriptGrades",
-        "SessionStoppedError",
-    ),
-    "log": ("Event", "SessionLog", "read_log"),
-    "session": ("SessionSummary", "run_session"),
+    "grades": ("Asked", "GradeSource", "ScriptGrades"),
+    "log": ("SessionLog",),
+    "session": ("run_session",),
     "simulated": ("SimulatedGrades",),
+    "walk": ("SessionSummary",),
 }
 
 

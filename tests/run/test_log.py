@@ -11,7 +11,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from masrel.errors import SessionLogError
-from masrel.run.log import SessionLog, read_log
+from masrel.run.chain import read_log
+from masrel.run.log import SessionLog
 
 
 def noon() -> datetime:

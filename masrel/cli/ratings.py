@@ -1,0 +1,37 @@
+"""``masrel ratings``: turn session logs into the table of ratings."""
+
+from pathlib import Path
+
+import click
+
+from masrel.protocol import StudyPaths, read_protocol
+
+__all__ = ["command"]
+
+
+@click.command("ratings")
+@click.argument("study", type=click.Path(path_type=Path))
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    help="File to write; default: STUDY/ratings/ratings.csv.",
+)
+def command(study: Path, output: Path | None) -> None:
+    """Collect the ratings of STUDY from its session logs.
+
+    Every chain of hashes is verified, and every recording that is there is held
+    against its checksum. Corrections take the place of the grades they correct.
+    """
+    from masrel.ratings import ratings_from_logs, write_ratings
+
+    paths = StudyPaths(study)
+    ratings = ratings_from_logs(paths, read_protocol(paths.protocol))
+    destination = output or paths.ratings_file
+    write_ratings(ratings, destination)
+    n_rows = len(ratings.table)
+    n_missing = int(ratings.table["grade"].isna().sum())
+    label = " (simulated)" if ratings.simulated else ""
+    click.echo(
+        f"{n_rows - n_missing} ratings{label}, {n_missing} missing: {destination}"
+    )

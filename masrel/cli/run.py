@@ -1,0 +1,120 @@
+"""``masrel run``: present a schedule's models and record every grade."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import click
+from tqdm import tqdm
+
+from masrel.cli.notes import notes
+from masrel.protocol import Protocol, StudyPaths, read_protocol, scale_of
+
+if TYPE_CHECKING:
+    from masrel.run import GradeSource
+
+__all__ = ["command"]
+
+
+@click.command("run")
+@click.argument("study", type=click.Path(path_type=Path))
+@click.option("--rater", required=True, help="Id of the rater.")
+@click.option("--session", required=True, help="Id of the session.")
+@click.option(
+    "--grades",
+    type=click.Choice(["console", "simulated"]),
+    default="console",
+    show_default=True,
+    help="Who gives the grades.",
+)
+@click.option(
+    "--clock",
+    type=click.Choice(["real", "simulated"]),
+    help="Clock of the control loop; default: real, for simulated grades simulated.",
+)
+@click.option("--quiet", is_flag=True, help="No progress bar and no closing line.")
+@click.option("--correct", metavar="CODE", help="Correct the grade of this code.")
+@click.option("--grade", help="With --correct: what the grade should have been.")
+@click.option("--who", help="With --correct: who corrects it.")
+@click.option("--why", help="With --correct: for what reason.")
+def command(
+    study: Path,
+    rater: str,
+    session: str,
+    grades: Literal["console", "simulated"],
+    clock: Literal["real", "simulated"] | None,
+    quiet: bool,
+    correct: str | None,
+    grade: str | None,
+    who: str | None,
+    why: str | None,
+) -> None:
+    """Run one rater's session of STUDY, or go on with it where it stopped.
+
+    The rater is shown blinded codes only. With --correct no model is presented: the
+    correction is added to the session's log, where the first grade stays.
+    """
+    paths = StudyPaths(study)
+    protocol = read_protocol(paths.protocol)
+    if correct is None:
+        _refuse_strays({"--grade": grade, "--who": who, "--why": why})
+        _run(paths, protocol, rater, session, grades, clock, quiet=quiet)
+        return
+    from masrel.run import record_correction
+
+    if grade is None or who is None or why is None:
+        raise click.UsageError("--correct needs --grade, --who and --why too")
+    record_correction(
+        paths, protocol, rater, session, code=correct, grade=grade, who=who, why=why
+    )
+
+
+def _refuse_strays(given: dict[str, str | None]) -> None:
+    strays = [name for name, value in given.items() if value is not None]
+    if strays:
+        raise click.UsageError(f"{', '.join(strays)} needs --correct CODE too")
+
+
+def _run(
+    paths: StudyPaths,
+    protocol: Protocol,
+    rater: str,
+    session: str,
+    grades: Literal["console", "simulated"],
+    clock: Literal["real", "simulated"] | None,
+    *,
+    quiet: bool,
+) -> None:
+    from masrel.run import run_session
+
+    n_presentations = len(protocol.models) * protocol.schedule.repeats
+    # A person's prompts count the presentations themselves.
+    hidden = quiet or grades == "console"
+    with (
+        notes(),
+        tqdm(total=n_presentations, unit="", desc=rater, disable=hidden) as bar,
+    ):
+        done = run_session(
+            paths,
+            protocol,
+            rater,
+            session,
+            grades=_source(grades, protocol),
+            clock=clock or ("simulated" if grades == "simulated" else "real"),
+            progress=lambda _: bar.update(),
+        )
+    if not quiet:
+        label = " (simulated)" if done.simulated else ""
+        click.echo(
+            f"session {done.session} of {done.rater} is complete: "
+            f"{done.n_presentations} grades{label} in {paths.log_file(rater, session)}"
+        )
+
+
+def _source(
+    grades: Literal["console", "simulated"], protocol: Protocol
+) -> "GradeSource":
+    from masrel.run import ConsoleGrades, SimulatedGrades
+
+    if grades == "console":
+        return ConsoleGrades(scale_of(protocol))
+    return SimulatedGrades(protocol)

@@ -1,0 +1,134 @@
+"""From session logs to the table of ratings."""
+
+import hashlib
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+from masrel.errors import RatingsError
+from masrel.protocol import Protocol, StudyPaths, scale_of
+from masrel.ratings.table import Ratings, ratings_from_rows
+from masrel.run.chain import Event, read_log
+from masrel.run.replay import SessionState, replay
+from masrel.schedule import Schedule, check_schedule, read_schedule
+
+__all__ = ["ratings_from_logs"]
+
+
+def ratings_from_logs(study: StudyPaths, protocol: Protocol) -> Ratings:
+    """Collect the ratings of a study from its session logs.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is.
+    protocol : Protocol
+        The study's protocol.
+
+    Returns
+    -------
+    Ratings
+        Sessions and raters in the protocol's order, models in the schedule's. A
+        session that has begun has a row for every presentation, without grade
+        where there is none yet; one that has no log has none. Corrections are in
+        the place of the grades they correct; the speed is that of the last
+        presentation before the grade.
+
+    Raises
+    ------
+    RatingsError
+        If no session has begun, a log is of another schedule, a grade is not of
+        the scale, or a recording is not the one its log has the checksum of.
+        Recordings that are not there are not checked.
+    SessionLogError
+        If a log is damaged.
+    ScheduleError
+        If a schedule is missing, damaged or stale.
+    """
+    rows = [
+        row
+        for session in protocol.sessions
+        for rater in session.raters
+        if study.log_file(rater, session.id).exists()
+        for row in _rows(study, protocol, rater, session.id)
+    ]
+    if not rows:
+        raise RatingsError(
+            f"{study.sessions}: needed a session log, got none; masrel run makes them"
+        )
+    return ratings_from_rows(rows, scale_of(protocol))
+
+
+def _rows(
+    study: StudyPaths, protocol: Protocol, rater: str, session: str
+) -> Iterator[dict[str, object]]:
+    log = study.log_file(rater, session)
+    state = replay(log, read_log(log))
+    if not state.header:
+        return
+    schedule = _schedule(study, protocol, state, log)
+    for code, events in state.presented.items():
+        if code not in {shown.code for shown in schedule.presentations}:
+            raise RatingsError(
+                f"{log}: line {events[0].line}: needed a code of the schedule, "
+                f"got {code!r}"
+            )
+        for event in events:
+            _check_recording(study, log, event)
+    for shown in schedule.presentations:
+        grade = state.grades.get(shown.code)
+        if grade is not None and grade not in protocol.scale.grades:
+            raise RatingsError(
+                f"{log}: grade of {shown.code}: needed one of "
+                f"{', '.join(protocol.scale.grades)}, got {grade!r}"
+            )
+        yield {
+            "session": session,
+            "rater": rater,
+            "model": shown.model,
+            "repeat": shown.repeat,
+            "grade": grade,
+            "mean_speed_deg_s": _speed(state.presented.get(shown.code, [])),
+            "source": "simulated" if _is_simulated(state) else "recorded",
+        }
+
+
+def _schedule(
+    study: StudyPaths, protocol: Protocol, state: SessionState, log: Path
+) -> Schedule:
+    rater, session = str(state.header["rater"]), str(state.header["session"])
+    if log != study.log_file(rater, session):
+        raise RatingsError(
+            f"{log}: is the log of rater {rater} in session {session} by its first "
+            "event: needed the one its name says"
+        )
+    path = study.schedule_file(rater, session)
+    schedule = read_schedule(path)
+    check_schedule(schedule, protocol)
+    if state.header["schedule_sha256"] != hashlib.sha256(path.read_bytes()).hexdigest():
+        raise RatingsError(f"{log}: was recorded with another schedule than {path}")
+    return schedule
+
+
+def _check_recording(study: StudyPaths, log: Path, event: Event) -> None:
+    path = study.sessions / str(event.fields["recording"])
+    if not path.is_file():
+        return
+    if hashlib.sha256(path.read_bytes()).hexdigest() != event.fields["sha256"]:
+        raise RatingsError(
+            f"{log}: line {event.line}: {path} is not the recording whose checksum "
+            "this line holds"
+        )
+
+
+def _speed(presented: list[Event]) -> float:
+    speed = presented[-1].fields["mean_speed_deg_s"] if presented else None
+    return math.nan if speed is None else float(speed)
+
+
+def _is_simulated(state: SessionState) -> bool:
+    return bool(state.header["simulated"]) or any(
+        event.fields["simulated"]
+        for events in state.presented.values()
+        for event in events
+    )

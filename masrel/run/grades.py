@@ -1,0 +1,116 @@
+"""What a source of grades is, and the one that reads them off a script."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Protocol
+
+from masrel.errors import ParameterError
+from masrel.schedule import Presentation
+
+__all__ = ["MOST_FAULTS", "Asked", "GradeSource", "ScriptGrades"]
+
+MOST_FAULTS = 3
+"""Faults in a row of one presentation after which nobody is asked any more."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Asked:
+    """What a grade is asked for.
+
+    Attributes
+    ----------
+    rater, session : str
+        Who grades, and in which session.
+    presentation : Presentation
+        What is presented. A person is told its position and code, never the model.
+    n_presentations : int
+        Presentations in the session.
+    attempt : int
+        From 1; above 1 when it is presented again.
+    n_faults : int
+        Faults in a row so far.
+    """
+
+    rater: str
+    session: str
+    presentation: Presentation
+    n_presentations: int
+    attempt: int
+    n_faults: int = 0
+
+
+class GradeSource(Protocol):
+    """Who is asked for grades."""
+
+    @property
+    def name(self) -> str:
+        """Name of the source, kept in the log."""
+        ...
+
+    @property
+    def simulated(self) -> bool:
+        """Whether its grades are no person's."""
+        ...
+
+    def make_ready(self, asked: Asked) -> None:
+        """Return when the rater is ready for the presentation."""
+        ...
+
+    def grade(self, asked: Asked) -> str | None:
+        """Return the grade, or None to have it presented again first."""
+        ...
+
+    def present_again(self, asked: Asked, fault: str) -> bool:
+        """Return whether to go on after a fault by presenting it again."""
+        ...
+
+
+class ScriptGrades:
+    """Grades fixed beforehand.
+
+    Parameters
+    ----------
+    grades : mapping of str to str, or sequence of str
+        Grade by code, or one grade a position.
+    """
+
+    name: ClassVar[str] = "script"
+    simulated: ClassVar[bool] = True
+
+    def __init__(self, grades: Mapping[str, str] | Sequence[str]) -> None:
+        self._grades = grades
+
+    def make_ready(self, asked: Asked) -> None:
+        """Return at once."""
+
+    def grade(self, asked: Asked) -> str | None:
+        """Return the grade of the script.
+
+        Parameters
+        ----------
+        asked : Asked
+            What was presented.
+
+        Returns
+        -------
+        str
+            The grade.
+
+        Raises
+        ------
+        ParameterError
+            If the script has none for it.
+        """
+        shown, grades = asked.presentation, self._grades
+        if isinstance(grades, Mapping):
+            if shown.code in grades:
+                return grades[shown.code]
+        elif shown.position <= len(grades):
+            return grades[shown.position - 1]
+        raise ParameterError(
+            f"script: needed a grade of position {shown.position}, code {shown.code}"
+        )
+
+    def present_again(self, asked: Asked, fault: str) -> bool:  # noqa: ARG002 - the interface's
+        """Return whether there were fewer faults in a row than `MOST_FAULTS`."""
+        return asked.n_faults < MOST_FAULTS

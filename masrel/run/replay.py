@@ -1,0 +1,146 @@
+"""What a session log says, event after event: where the session stands."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from masrel.errors import SessionLogError
+from masrel.run.chain import Event, Fact
+
+__all__ = ["EVENTS", "SessionState", "replay"]
+
+EVENTS: dict[str, tuple[str, ...]] = {
+    "session": (
+        "format",
+        "study",
+        "rater",
+        "session",
+        "protocol_sha256",
+        "presented_sha256",
+        "schedule_sha256",
+        "simulated",
+        "grades",
+        "device",
+        "clock",
+        "masrel_version",
+    ),
+    "resumed": ("protocol_sha256", "n_graded", "clock", "masrel_version"),
+    "presented": (
+        "code",
+        "position",
+        "attempt",
+        "recording",
+        "sha256",
+        "mean_speed_deg_s",
+        "n_missed_ticks",
+        "fault",
+        "simulated",
+    ),
+    "grade": ("code", "position", "grade"),
+    "correction": ("code", "grade", "who", "why"),
+    "stopped": ("code", "position", "why"),
+    "recovered": ("line", "n_bytes", "sha256", "kept", "moved_to"),
+    "complete": ("n_presentations",),
+}
+"""Every kind of event with the fields it has."""
+
+
+@dataclass(slots=True, kw_only=True)
+class SessionState:
+    """Where a session stands.
+
+    Attributes
+    ----------
+    header : Mapping
+        Fields of the event ``session``; empty when there is none yet.
+    presented : dict of str to list of Event
+        Presentations of each code, in order.
+    given : dict of str to str
+        Grade of each graded code as the rater gave it.
+    grades : dict of str to str
+        The same with corrections.
+    is_complete : bool
+        Whether the session came to its end.
+    """
+
+    header: Mapping[str, Fact] = field(default_factory=dict)
+    presented: dict[str, list[Event]] = field(default_factory=dict)
+    given: dict[str, str] = field(default_factory=dict)
+    grades: dict[str, str] = field(default_factory=dict)
+    is_complete: bool = False
+
+
+def replay(path: Path, events: Sequence[Event]) -> SessionState:
+    """Find out where a session stands from its log.
+
+    Parameters
+    ----------
+    path : Path
+        The log, for messages.
+    events : sequence of Event
+        Its events.
+
+    Returns
+    -------
+    SessionState
+        Where the session stands.
+
+    Raises
+    ------
+    SessionLogError
+        If an event is unknown, lacks a field, or cannot come where it is.
+    """
+    state = SessionState()
+    for event in events:
+        fault = _misfit(state, event)
+        if fault is not None:
+            raise SessionLogError(f"{path}: line {event.line}: {event.kind}: {fault}")
+        _take(state, event)
+    return state
+
+
+def _misfit(state: SessionState, event: Event) -> str | None:
+    # -> why the event cannot follow, or None
+    if event.kind not in EVENTS:
+        return f"needed an event of {', '.join(EVENTS)}"
+    if set(event.fields) != set(EVENTS[event.kind]):
+        return (
+            f"needed the fields {', '.join(EVENTS[event.kind])}, "
+            f"got {', '.join(event.fields)}"
+        )
+    if event.kind == "recovered":
+        return None
+    if (event.kind == "session") == bool(state.header):
+        return "needed the event session once, before all others"
+    if state.is_complete and event.kind != "correction":
+        return "needed no event but a correction after complete"
+    return _misfit_of_code(state, event)
+
+
+def _misfit_of_code(state: SessionState, event: Event) -> str | None:
+    code = event.fields.get("code")
+    if event.kind == "presented" and code in state.given:
+        return f"needed a code that is not graded yet, got {code}"
+    if event.kind == "grade":
+        if code in state.given:
+            return f"needed one grade of {code}, got another"
+        before = state.presented.get(str(code), [])
+        if not before or before[-1].fields["fault"] is not None:
+            return f"needed a presentation of {code} without fault before its grade"
+    if event.kind == "correction" and code not in state.given:
+        return f"needed a code that is graded, got {code}"
+    return None
+
+
+def _take(state: SessionState, event: Event) -> None:
+    code, grade = str(event.fields.get("code")), str(event.fields.get("grade"))
+    if event.kind == "session":
+        state.header = event.fields
+    elif event.kind == "presented":
+        state.presented.setdefault(code, []).append(event)
+    elif event.kind == "grade":
+        state.given[code] = state.grades[code] = grade
+    elif event.kind == "correction":
+        state.grades[code] = grade
+    elif event.kind == "complete":
+        state.is_complete = True

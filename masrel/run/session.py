@@ -1,0 +1,104 @@
+"""Walk one schedule: present each model, ask for its grade, log both at once.
+
+Started again, a session goes on where its log ends: what has a grade keeps it, and
+what was presented but not graded is presented again and logged as another attempt.
+"""
+
+import hashlib
+from collections.abc import Callable
+from datetime import datetime
+
+from masrel.errors import ParameterError, ScheduleError
+from masrel.protocol import Protocol, StudyPaths
+from masrel.run.grades import GradeSource
+from masrel.run.log import SessionLog, utc_now
+from masrel.run.present import SIMULATED_BACKEND
+from masrel.run.walk import CLOCKS, ClockName, SessionSummary, Walk
+from masrel.schedule import Presentation, check_schedule, read_schedule
+
+__all__ = ["run_session"]
+
+
+def run_session(
+    study: StudyPaths,
+    protocol: Protocol,
+    rater: str,
+    session: str,
+    *,
+    grades: GradeSource,
+    clock: ClockName,
+    progress: Callable[[Presentation], object] | None = None,
+    now: Callable[[], datetime] = utc_now,
+) -> SessionSummary:
+    """Run one rater's session to its end, or go on with it.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is; its schedules are drawn.
+    protocol : Protocol
+        The study's protocol.
+    rater, session : str
+        Whose session.
+    grades : GradeSource
+        Who is asked for grades.
+    clock : {"real", "simulated"}
+        The clock of the control loop; only the simulated device has both.
+    progress : callable, optional
+        Called with each presentation once it has its grade; at once for those
+        that have it already.
+    now : callable, optional
+        Gives the time of day for the log, aware.
+
+    Returns
+    -------
+    SessionSummary
+        What came of it. A complete session is left as it is.
+
+    Raises
+    ------
+    ScheduleError
+        If the schedule is missing, damaged, foreign, or stale.
+    SessionLogError
+        If the log is damaged, of another schedule or protocol, was begun with
+        another source of grades or device, or is open elsewhere.
+    ParameterError
+        If `clock` is unknown or does not fit the device, or the source gives a
+        grade that is not of the scale.
+    DeviceError
+        If the device cannot be used, or faults are not to be tried again.
+    SessionStoppedError
+        If the person stops. As after all of these but the first two, the same
+        call goes on where this one ended.
+    OSError
+        If log or recording cannot be written.
+
+    Warns
+    -----
+    OverrunWarning
+        If the control loop missed ticks.
+    """
+    _check_clock(clock, protocol)
+    path = study.schedule_file(rater, session)
+    schedule = read_schedule(path)
+    check_schedule(schedule, protocol)
+    if (schedule.rater, schedule.session) != (rater, session):
+        raise ScheduleError(
+            f"{path}: needed the schedule of rater {rater} in session {session}, "
+            f"got that of {schedule.rater} in {schedule.session}"
+        )
+    checksum = hashlib.sha256(path.read_bytes()).hexdigest()
+    with SessionLog.open(study.log_file(rater, session), now=now) as log:
+        walk = Walk(study, protocol, schedule, grades, clock, log)
+        walk.begin(checksum)
+        return walk.to_the_end(progress)
+
+
+def _check_clock(clock: str, protocol: Protocol) -> None:
+    if clock not in CLOCKS:
+        raise ParameterError(f"clock: needed one of {', '.join(CLOCKS)}, got {clock!r}")
+    backend = protocol.device.backend
+    if clock == "simulated" and backend != SIMULATED_BACKEND:
+        raise ParameterError(
+            f"clock: needed the real one for device {backend!r}, got 'simulated'"
+        )

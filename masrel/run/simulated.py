@@ -1,0 +1,199 @@
+"""Simulated raters: grades and speeds of a stated accuracy, for trying a study out.
+
+Nothing here models a person. ``docs/session_log.md`` states the rules in words.
+"""
+
+import hashlib
+import itertools
+import json
+import math
+import statistics
+from typing import ClassVar, Literal
+
+from masrel.errors import ParameterError, ProtocolError
+from masrel.protocol import Model, Protocol, scale_of
+from masrel.run.grades import MOST_FAULTS, Asked
+
+__all__ = ["SimulatedGrades", "intended_speed", "severity"]
+
+_Purpose = Literal["accuracy", "neighbour", "severity", "retest", "speed"]
+
+
+class SimulatedGrades:
+    """Simulated raters as ``[simulated_raters]`` of a protocol describes them.
+
+    A grade depends on seed, rater, session, model and repeat alone: not on the
+    order of presentations, nor on what was graded before. The true grade of a model
+    with an intended grade is that one; any other model has a severity (`severity`)
+    between two grades, and its true grade is the upper one with a probability of
+    the fraction. The rater gives the true grade with probability `accuracy`, else a
+    neighbouring one. In a later session the rater gives the grade of the first one
+    with probability `retest_agreement`, else grades anew.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        The protocol.
+
+    Raises
+    ------
+    ProtocolError
+        If no model has an intended grade.
+    """
+
+    name: ClassVar[str] = "simulated"
+    simulated: ClassVar[bool] = True
+
+    def __init__(self, protocol: Protocol) -> None:
+        self._settings = protocol.simulated_raters
+        self._grades = protocol.scale.grades
+        self._severity = {
+            model.id: severity(protocol, model) for model in protocol.models
+        }
+        self._first_session: dict[str, str] = {}
+        for session in protocol.sessions:
+            for rater in session.raters:
+                self._first_session.setdefault(rater, session.id)
+
+    def make_ready(self, asked: Asked) -> None:
+        """Return at once."""
+
+    def grade(self, asked: Asked) -> str | None:
+        """Return the grade the simulated rater gives.
+
+        Parameters
+        ----------
+        asked : Asked
+            What was presented.
+
+        Returns
+        -------
+        str
+            A grade of the scale.
+
+        Raises
+        ------
+        ParameterError
+            If the protocol has no such model.
+        """
+        shown = asked.presentation
+        if shown.model not in self._severity:
+            raise ParameterError(
+                f"model: needed one of {', '.join(self._severity)}, got {shown.model!r}"
+            )
+        session = asked.session
+        first = self._first_session.get(asked.rater, session)
+        key = (asked.rater, session, shown.model, shown.repeat)
+        repeats = _uniform(self._settings.seed, "retest", *key)
+        if session != first and repeats < self._settings.retest_agreement:
+            session = first
+        return self._fresh(asked.rater, session, shown.model, shown.repeat)
+
+    def present_again(self, asked: Asked, fault: str) -> bool:  # noqa: ARG002 - the interface's
+        """Return whether there were fewer faults in a row than `MOST_FAULTS`."""
+        return asked.n_faults < MOST_FAULTS
+
+    def _fresh(self, rater: str, session: str, model: str, repeat: int) -> str:
+        seed, key = self._settings.seed, (rater, session, model, repeat)
+        position = self._severity[model]
+        lower = math.floor(position)
+        upper = _uniform(seed, "severity", *key) < position - lower
+        code = lower + 1 if upper else lower
+        if _uniform(seed, "accuracy", *key) >= self._settings.accuracy:
+            last = len(self._grades) - 1
+            near = [c for c in (code - 1, code + 1) if 0 <= c <= last]
+            code = near[int(_uniform(seed, "neighbour", *key) * len(near))]
+        return self._grades[code]
+
+
+def severity(protocol: Protocol, model: Model) -> float:
+    """Place a model on the scale, from facts of the protocol alone.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        The protocol.
+    model : Model
+        One of its models.
+
+    Returns
+    -------
+    float
+        Rank of the intended grade; without one, interpolated linearly in H (the
+        height of the catch) between the models with an intended grade, and at most
+        the last of them at either end. Models of the same H count with their mean.
+
+    Raises
+    ------
+    ProtocolError
+        If no model has an intended grade.
+
+    Examples
+    --------
+    >>> from masrel.protocol import copy_template, read_protocol
+    >>> import pathlib, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     copy_template("hess2012", pathlib.Path(folder) / "study")
+    ...     protocol = read_protocol(pathlib.Path(folder) / "study" / "protocol.toml")
+    >>> severity(protocol, protocol.models[0])  # HM1, grade "1", second of the scale
+    1.0
+    """
+    scale = scale_of(protocol)
+    if model.intended_grade is not None:
+        return float(scale.code(model.intended_grade))
+    ranks: dict[float, list[int]] = {}
+    for other in protocol.models:
+        if other.intended_grade is not None:
+            of_height = ranks.setdefault(other.catch_torque_nms_rad, [])
+            of_height.append(scale.code(other.intended_grade))
+    if not ranks:
+        raise ProtocolError(
+            "models: simulated raters need a model with an intended_grade, got none"
+        )
+    known = sorted((height, statistics.fmean(of)) for height, of in ranks.items())
+    return _interpolated(model.catch_torque_nms_rad, known)
+
+
+def intended_speed(
+    protocol: Protocol, rater: str, session: str, model: str, repeat: int
+) -> float:
+    """Return the mean speed a simulated hand means to stretch with.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        The protocol; its ``[simulated_raters]`` has mean and standard deviation.
+    rater, session, model : str
+        Whose hand, when and on what.
+    repeat : int
+        Which presentation of the model in the session, from 1.
+
+    Returns
+    -------
+    float
+        deg/s: normal, cut off at 3 standard deviations and at a fifth of the mean.
+    """
+    settings = protocol.simulated_raters
+    mean, sd = settings.mean_speed_deg_s, settings.speed_sd_deg_s
+    share = _uniform(settings.seed, "speed", rater, session, model, repeat)
+    speed = mean + sd * statistics.NormalDist().inv_cdf(share)
+    return min(max(speed, mean - 3 * sd, 0.2 * mean), mean + 3 * sd)
+
+
+def _interpolated(height: float, known: list[tuple[float, float]]) -> float:
+    # known: (height, rank), by height
+    if height <= known[0][0]:
+        return known[0][1]
+    for (low, below), (high, above) in itertools.pairwise(known):
+        if height <= high:
+            return below + (above - below) * (height - low) / (high - low)
+    return known[-1][1]
+
+
+def _uniform(
+    seed: int, purpose: _Purpose, rater: str, session: str, model: str, repeat: int
+) -> float:
+    # In (0, 1), from SHA-256 so that it is the same on every machine and version.
+    key = json.dumps([seed, purpose, rater, session, model, repeat])
+    word = int.from_bytes(hashlib.sha256(key.encode()).digest()[:8], "big")
+    return ((word >> 12) + 0.5) / 2**52

@@ -1,0 +1,277 @@
+"""One walk along a schedule: present, ask, and log both at once."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import masrel
+from masrel.errors import (
+    DeviceError,
+    ParameterError,
+    SessionLogError,
+    SessionStoppedError,
+)
+from masrel.hess import Clock, RealClock, SimulatedClock
+from masrel.protocol import Protocol, StudyPaths, presented_hash, protocol_hash
+from masrel.run.chain import Fact
+from masrel.run.grades import Asked, GradeSource
+from masrel.run.log import SessionLog
+from masrel.run.present import SIMULATED_BACKEND, Shown, present
+from masrel.run.replay import SessionState, replay
+from masrel.schedule import Presentation, Schedule
+
+__all__ = ["CLOCKS", "ClockName", "SessionSummary", "Walk"]
+
+ClockName = Literal["real", "simulated"]
+
+CLOCKS: dict[str, Callable[[], Clock]] = {
+    "real": RealClock,
+    "simulated": SimulatedClock,
+}
+"""The clocks a control loop can run on, by name."""
+
+_FORMAT = 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SessionSummary:
+    """What came of running a session.
+
+    Attributes
+    ----------
+    rater, session : str
+        Whose session.
+    n_presentations : int
+        Presentations of the schedule; all are graded.
+    n_graded_before : int
+        Those already graded when it was started.
+    n_again : int
+        Presentations beyond the first of a code, in this run.
+    n_faults : int
+        Presentations a fault stopped, in this run.
+    simulated : bool
+        Whether grades or device are simulated.
+    """
+
+    rater: str
+    session: str
+    n_presentations: int
+    n_graded_before: int
+    n_again: int
+    n_faults: int
+    simulated: bool
+
+
+class Walk:
+    """One run of one session; what it does is on disk before it goes on.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is.
+    protocol : Protocol
+        The study's protocol.
+    schedule : Schedule
+        What is presented, in order.
+    grades : GradeSource
+        Who is asked.
+    clock : {"real", "simulated"}
+        The clock of the control loop.
+    log : SessionLog
+        The session's log, open.
+
+    Raises
+    ------
+    SessionLogError
+        If the events of the log do not make a session.
+    """
+
+    def __init__(
+        self,
+        study: StudyPaths,
+        protocol: Protocol,
+        schedule: Schedule,
+        grades: GradeSource,
+        clock: ClockName,
+        log: SessionLog,
+    ) -> None:
+        self._study = study
+        self._protocol = protocol
+        self._schedule = schedule
+        self._grades = grades
+        self._clock = clock
+        self._log = log
+        self._state: SessionState = replay(log.path, log.events)
+        self._n_graded_before = len(self._state.given)
+        self._n_again = 0
+        self._n_faults = 0
+
+    @property
+    def _is_simulated(self) -> bool:
+        on_simulator = self._protocol.device.backend == SIMULATED_BACKEND
+        return self._grades.simulated or on_simulator
+
+    def begin(self, schedule_sha256: str) -> None:
+        """Log what this is; or, when the log says it, that it is still the same.
+
+        Parameters
+        ----------
+        schedule_sha256 : str
+            SHA-256 of the schedule's file.
+
+        Raises
+        ------
+        SessionLogError
+            If the log was begun with something else.
+        """
+        protocol, schedule = self._protocol, self._schedule
+        same: dict[str, Fact] = {
+            "format": _FORMAT,
+            "study": protocol.study.id,
+            "rater": schedule.rater,
+            "session": schedule.session,
+            "presented_sha256": presented_hash(protocol),
+            "schedule_sha256": schedule_sha256,
+            "simulated": self._is_simulated,
+            "grades": self._grades.name,
+            "device": protocol.device.backend,
+        }
+        provenance: dict[str, Fact] = {
+            "protocol_sha256": protocol_hash(protocol),
+            "clock": self._clock,
+            "masrel_version": masrel.__version__,
+        }
+        header = self._state.header
+        if not header:
+            self._log.append("session", {**same, **provenance})
+            return
+        for name, value in same.items():
+            if header[name] != value:
+                raise SessionLogError(
+                    f"{self._log.path}: begun with {name} = {header[name]}: needed "
+                    f"the same to go on, got {value}"
+                )
+        if not self._state.is_complete:
+            self._log.append(
+                "resumed", {**provenance, "n_graded": self._n_graded_before}
+            )
+
+    def to_the_end(
+        self, progress: Callable[[Presentation], object] | None
+    ) -> SessionSummary:
+        """Present and ask until every presentation has its grade.
+
+        Parameters
+        ----------
+        progress : callable or None
+            Called with each presentation that has its grade.
+
+        Returns
+        -------
+        SessionSummary
+            What came of it.
+
+        Raises
+        ------
+        DeviceError
+            If the device cannot be used, or a fault is not to be tried again.
+        ParameterError
+            If the source gives a grade that is not of the scale.
+        SessionStoppedError
+            If the person stops.
+        """
+        schedule = self._schedule
+        for shown in schedule.presentations:
+            if shown.code not in self._state.given:
+                self._rate(shown)
+            if progress is not None:
+                progress(shown)
+        if not self._state.is_complete:
+            n_presentations = len(schedule.presentations)
+            self._log.append("complete", {"n_presentations": n_presentations})
+        return SessionSummary(
+            rater=schedule.rater,
+            session=schedule.session,
+            n_presentations=len(schedule.presentations),
+            n_graded_before=self._n_graded_before,
+            n_again=self._n_again,
+            n_faults=self._n_faults,
+            simulated=self._is_simulated,
+        )
+
+    def _rate(self, presentation: Presentation) -> None:
+        shown: dict[str, Fact] = {
+            "code": presentation.code,
+            "position": presentation.position,
+        }
+        try:
+            grade = self._until_graded(presentation)
+        except SessionStoppedError as error:
+            self._log.append("stopped", {**shown, "why": str(error)})
+            raise
+        self._log.append("grade", {**shown, "grade": grade})
+
+    def _until_graded(self, presentation: Presentation) -> str:
+        attempt = len(self._state.presented.get(presentation.code, []))
+        n_faults, grade = 0, None
+        while grade is None:
+            attempt += 1
+            asked = self._asked(presentation, attempt, n_faults)
+            self._grades.make_ready(asked)
+            fault = self._present(asked).fault
+            n_faults = 0 if fault is None else n_faults + 1
+            asked = self._asked(presentation, attempt, n_faults)
+            if fault is None:
+                grade = self._checked(asked, self._grades.grade(asked))
+            elif not self._grades.present_again(asked, fault):
+                raise DeviceError(
+                    f"session {asked.session} of {asked.rater}: presentation "
+                    f"{presentation.position}, code {presentation.code}, was stopped "
+                    f"by a fault: {fault}"
+                )
+        return grade
+
+    def _asked(self, presentation: Presentation, attempt: int, n_faults: int) -> Asked:
+        return Asked(
+            rater=self._schedule.rater,
+            session=self._schedule.session,
+            presentation=presentation,
+            n_presentations=len(self._schedule.presentations),
+            attempt=attempt,
+            n_faults=n_faults,
+        )
+
+    def _present(self, asked: Asked) -> Shown:
+        shown = asked.presentation
+        file = self._study.recording_file(asked.rater, asked.session, shown.code)
+        if asked.attempt > 1:
+            file = file.with_name(f"{shown.code}-{asked.attempt}.npz")
+        # A new one each time, so that the simulated clock starts at zero.
+        clock = CLOCKS[self._clock]()
+        left = present(self._protocol, asked, clock=clock, file=file)
+        self._n_again += asked.attempt > 1
+        self._n_faults += left.fault is not None
+        self._log.append(
+            "presented",
+            {
+                "code": shown.code,
+                "position": shown.position,
+                "attempt": asked.attempt,
+                "recording": file.relative_to(self._study.sessions).as_posix(),
+                "sha256": left.sha256,
+                "mean_speed_deg_s": left.mean_speed_deg_s,
+                "n_missed_ticks": left.n_missed_ticks,
+                "fault": left.fault,
+                "simulated": left.simulated,
+            },
+        )
+        return left
+
+    def _checked(self, asked: Asked, grade: str | None) -> str | None:
+        grades = self._protocol.scale.grades
+        if grade is not None and grade not in grades:
+            raise ParameterError(
+                f"grade of {asked.presentation.code}: needed one of "
+                f"{', '.join(grades)}, got {grade!r}"
+            )
+        return grade
