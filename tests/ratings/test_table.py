@@ -1,0 +1,130 @@
+"""What is written is what is read, in the same bytes each time."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from masrel.errors import RatingsError
+from masrel.ratings import (
+    RATING_COLUMNS,
+    SOURCES,
+    ratings_from_rows,
+    ratings_hash,
+    read_in_person,
+    read_ratings,
+    write_ratings,
+)
+from masrel.scales import MODIFIED_ASHWORTH
+
+ROW = {"rater": "R1", "model": "HM1", "grade": "1+"}
+
+ROWS = st.lists(
+    st.fixed_dictionaries(
+        {
+            "session": st.sampled_from(["test", "retest"]),
+            "rater": st.sampled_from(["R1", 'R"2', "R,3"]),
+            "model": st.sampled_from(["HM1", "HM2"]),
+            "repeat": st.integers(1, 3),
+            "grade": st.sampled_from([*MODIFIED_ASHWORTH.grades, None]),
+            "mean_speed_deg_s": st.floats(0, 1e6) | st.just(float("nan")),
+            "source": st.sampled_from(SOURCES),
+        }
+    ),
+    unique_by=lambda row: (row["session"], row["rater"], row["model"], row["repeat"]),
+    max_size=12,
+)
+
+
+@settings(
+    max_examples=60,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+    deadline=None,
+)
+@given(rows=ROWS)
+def test_written_and_read_back_nothing_has_changed(
+    tmp_path: Path, rows: list[dict[str, object]]
+) -> None:
+    ratings = ratings_from_rows(rows, MODIFIED_ASHWORTH)
+    path = tmp_path / "ratings" / "ratings.csv"
+    write_ratings(ratings, path)
+    first = path.read_bytes()
+    again = read_ratings(path, scale=MODIFIED_ASHWORTH)
+    # Exact: a float's repr reads back as the same float.
+    assert again.table.equals(ratings.table)
+    assert again.simulated == ratings.simulated
+    assert ratings_hash(again) == ratings_hash(ratings)
+    write_ratings(again, path)
+    assert path.read_bytes() == first
+
+
+def test_the_file_is_what_the_documentation_says(tmp_path: Path) -> None:
+    rows = [{**ROW, "mean_speed_deg_s": 81.25}, {**ROW, "model": "HM2", "grade": None}]
+    write_ratings(ratings_from_rows(rows, MODIFIED_ASHWORTH), tmp_path / "r.csv")
+    assert (tmp_path / "r.csv").read_bytes().splitlines()[1:] == [
+        ",".join(RATING_COLUMNS).encode(),
+        b"test,R1,HM1,1,1+,81.25,foreign",
+        b"test,R1,HM2,1,NA,NA,foreign",
+    ]
+
+
+def test_a_file_of_simulated_ratings_says_so_first(tmp_path: Path) -> None:
+    simulated = ratings_from_rows([{**ROW, "source": "simulated"}], MODIFIED_ASHWORTH)
+    write_ratings(simulated, tmp_path / "r.csv")
+    assert (tmp_path / "r.csv").read_text().startswith("# SIMULATED")
+
+
+def test_the_hash_changes_with_any_rating() -> None:
+    one = ratings_from_rows([ROW], MODIFIED_ASHWORTH)
+    other = ratings_from_rows([{**ROW, "grade": "2"}], MODIFIED_ASHWORTH)
+    assert ratings_hash(one) != ratings_hash(other)
+
+
+@pytest.mark.parametrize(
+    ("row", "message"),
+    [
+        ({"rater": ""}, "row 2: rater: needed text"),
+        ({"model": 3}, "row 2: model: needed text, got 3"),
+        ({"grade": "5"}, "row 2: grade: needed one of 0, 1"),
+        ({"grade": 1}, "row 2: grade: needed one of .*, got 1"),
+        ({"repeat": 0}, "row 2: repeat"),
+        ({"repeat": True}, "row 2: repeat"),
+        ({"source": "hearsay"}, "row 2: source: needed one of published"),
+        ({"mean_speed_deg_s": "fast"}, "row 2: mean_speed_deg_s"),
+        ({"speed": 3.0}, "row 2: unknown columns speed"),
+        ({}, r"row 2: \('test', 'R1', 'HM1', 1\) is in row 1 already"),
+    ],
+)
+def test_rows_are_checked(row: dict[str, object], message: str) -> None:
+    with pytest.raises(RatingsError, match=message):
+        ratings_from_rows([ROW, {**ROW, **row}], MODIFIED_ASHWORTH)
+
+
+IN_PERSON = "source_table,rater,subject,model,in_person_grade,haptic_grade,note\n"
+
+
+def test_in_person_grades_are_text_and_may_be_missing(tmp_path: Path) -> None:
+    path = tmp_path / "in_person.csv"
+    path.write_text(IN_PERSON + "IV,R1,1,HM1,1,1+,\nIV,R3,1,HM1,,NA,absent\n")
+    first, second = read_in_person(path).rows
+    assert (first.in_person_grade, first.haptic_grade) == ("1", "1+")
+    assert (second.in_person_grade, second.haptic_grade) == (None, None)
+    assert (second.line, second.note, second.subject) == (3, "absent", "1")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("rater,subject\nR1,1\n", "line 1: needed the columns source_table"),
+        (IN_PERSON + "IV,,1,HM1,1,1,\n", "line 2, column 'rater': needed text"),
+        (IN_PERSON + "IV,R1,1,HM1,1,1,\n" * 2, "line 3: .*line 2 has one already"),
+    ],
+)
+def test_a_bad_in_person_table_is_refused(
+    tmp_path: Path, text: str, message: str
+) -> None:
+    path = tmp_path / "in_person.csv"
+    path.write_text(text)
+    with pytest.raises(RatingsError, match=rf"in_person\.csv: {message}"):
+        read_in_person(path)
