@@ -77,7 +77,7 @@ def _decode_value(
             into.values[key] = part.values
             into.problems.extend(part.problems)
         else:
-            into.problems.append(f"{where}: needed a table [{where}], got {got(value)}")
+            into.problems.append(f"{where}: needed a table, got {got(value)}")
     elif (entry := _entry_type(annotation)) is not None:
         _decode_array(value, annotation, entry, where, key, into)
     elif (problem := _leaf_problem(value, annotation, where)) is None:

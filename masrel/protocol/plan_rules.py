@@ -39,6 +39,8 @@ def _line(line: Values, values: Values) -> Iterator[str]:
     if kind is None or named is None or None in named:
         return
     count = SESSIONS_NEEDED[kind]
+    if len(named) not in SESSIONS_NEEDED.values():
+        return  # no line has so many, and the key itself has been refused
     if len(named) != count:
         words = "exactly one session" if count == 1 else "exactly two sessions"
         yield f"sessions: needed {words} for {got(kind)}, got {len(named)}"
@@ -59,10 +61,10 @@ def _raters(kind: str, named: list[str], values: Values) -> Iterator[str]:
                 f"sessions[{place}]: needed a session of [[sessions]] ({known}), "
                 f"got {got(name)}"
             )
-    present = [raters.get(name) for name in named]
-    if None in present:
-        return
-    groups = [set(group or ()) for group in present]
+    groups = [set(raters.get(name) or ()) for name in named]
+    present = {rater.get("id") for rater in values.get("raters") or [] if rater}
+    if not all(group and group <= present for group in groups):
+        return  # something else is wrong with a session; who meets whom is open
     if kind == "inter-rater" and len(groups) == 1 and len(groups[0]) < 2:
         yield "sessions: needed a session of at least two raters, got one of 1"
     if kind == "test-retest" and len(groups) == 2 and not groups[0] & groups[1]:

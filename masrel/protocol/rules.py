@@ -75,8 +75,8 @@ def _repeated_ids(key: str, entries: list[tuple[int, Values]]) -> Iterator[str]:
         earlier = first.setdefault(name.casefold(), (index, name))
         if earlier[0] != index:
             yield (
-                f"{key}[{index}].id: needed ids that differ in more than case, "
-                f"got {got(name)} as {key}[{earlier[0]}] has {got(earlier[1])}"
+                f"{key}[{index}].id: needed ids that differ by more than case, "
+                f"got {got(name)} where {key}[{earlier[0]}] has {got(earlier[1])}"
             )
 
 
@@ -95,6 +95,7 @@ def _intended(values: Values) -> Iterator[str]:
 
 def _raters(values: Values) -> Iterator[str]:
     known = [rater and rater.get("id") for rater in values.get("raters") or []]
+    known = list(dict.fromkeys(known))
     for index, session in _entries(values, "sessions"):
         named = session.get("raters") or []
         for place, rater in enumerate(named):

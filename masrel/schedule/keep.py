@@ -147,17 +147,17 @@ def _refusal(place: _Place, fault: str, *, redraw: bool) -> str | None:
     # Why a schedule with this fault may not be drawn, or None.
     if place.log.exists():
         return (
-            f"{fault}\n{place.schedule}: not drawn, because the session has begun: "
-            f"{place.log} was recorded by the schedule it had. Bring back that "
-            "schedule and protocol, or move the log out of the study"
+            f"{fault}. It was not drawn, because the session has begun: {place.log} "
+            "was recorded by the schedule there was. Bring back that schedule and its "
+            "protocol, or move the log out of the study"
         )
     if place.sheet.exists() and _is_filled_in(place.sheet):
         return (
-            f"{fault}\n{place.schedule}: not drawn, because {place.sheet} has grades "
-            "on it. Move it out of the study first"
+            f"{fault}. It was not drawn, because {place.sheet} has grades on it. Move "
+            "the sheet out of the study first"
         )
     if place.schedule.exists() and not redraw:
-        return f"{fault}\n{place.schedule}: kept; --redraw draws it anew"
+        return f"{fault}. It was kept; --redraw draws it anew"
     return None
 
 

@@ -96,9 +96,10 @@ def check_schedule(schedule: Schedule, protocol: Protocol) -> None:
     now = presented_hash(protocol)
     if schedule.presented_sha256 != now:
         raise ScheduleError(
-            f"{where}: the protocol has changed in what it presents since this was "
-            f"drawn: needed presented_sha256 {now[:12]}..., "
-            f"got {schedule.presented_sha256[:12]}..."
+            f"{where}: needed one drawn from the protocol as it is, got one from "
+            "before a change in its study id, scale, elbow, models, schedule, stretch "
+            f"or device (presented_sha256 {now[:12]} and "
+            f"{schedule.presented_sha256[:12]})"
         )
     asked = Counter(
         (model.id, repeat)

@@ -1,0 +1,72 @@
+"""docs/protocol.md has every table and key, with the default the code has."""
+
+import json
+import re
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from masrel.protocol import Protocol, definition
+
+PAGE = (Path(__file__).parents[2] / "docs" / "protocol.md").read_text(encoding="utf-8")
+
+TABLES = {
+    "[study]": definition.Study,
+    "[scale]": definition.ScaleDefinition,
+    "[elbow]": definition.ElbowConstants,
+    "[[models]]": definition.Model,
+    "[[raters]]": definition.Rater,
+    "[[sessions]]": definition.Session,
+    "[schedule]": definition.ScheduleScheme,
+    "[stretch]": definition.Stretch,
+    "[device]": definition.DeviceSettings,
+    "[simulated_raters]": definition.SimulatedRaters,
+    "[analysis]": definition.Analysis,
+    "[[analysis.estimates]]": definition.EstimatePlan,
+    "[report]": definition.Report,
+}
+
+
+def documented(heading: str) -> dict[str, str]:
+    """Key to default of the table under a heading of the page."""
+    pattern = rf"^#+ `{re.escape(heading)}`.*?(?=^#|\Z)"
+    found = re.search(pattern, PAGE, flags=re.DOTALL | re.MULTILINE)
+    assert found, heading
+    rows = re.findall(
+        r"^\| `(\w+)` \|.*\| ([^|]+) \| [^|]+ \|$", found[0], re.MULTILINE
+    )
+    return dict(rows)
+
+
+def said(field: msgspec.structs.FieldInfo) -> str:
+    """The default of a field as the page says it."""
+    if field.required:
+        return "required"
+    if field.default is None:
+        return "none"
+    if field.name == "sections":
+        return 'all but `"in-person"`'
+    return f"`{json.dumps(field.default)}`"
+
+
+@pytest.mark.parametrize("heading", TABLES)
+def test_every_key_is_there_with_its_default(heading: str) -> None:
+    fields = msgspec.structs.fields(TABLES[heading])
+    assert documented(heading) == {field.name: said(field) for field in fields}
+
+
+def test_every_table_of_a_protocol_is_there() -> None:
+    names = {heading.strip("[]") for heading in TABLES}
+    fields = {field.name for field in msgspec.structs.fields(Protocol)}
+    assert names == fields | {"analysis.estimates"}
+
+
+def test_the_default_sections_are_all_but_in_person() -> None:
+    (field,) = (
+        f for f in msgspec.structs.fields(definition.Report) if f.name == "sections"
+    )
+    info = msgspec.inspect.type_info(field.type)
+    assert isinstance(info, msgspec.inspect.VarTupleType)
+    assert isinstance(info.item_type, msgspec.inspect.LiteralType)
+    assert {*field.default, "in-person"} == set(info.item_type.values)

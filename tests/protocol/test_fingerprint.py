@@ -1,0 +1,96 @@
+"""A hash follows the meaning of a protocol and nothing else."""
+
+import hashlib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from masrel.protocol import presented_hash, protocol_hash, read_protocol
+from tests.protocol.documents import VALID, changed, write
+
+
+def hashes(document: dict[str, Any], folder: Path) -> tuple[str, str]:
+    protocol = read_protocol(write(document, folder))
+    return protocol_hash(protocol), presented_hash(protocol)
+
+
+def test_comments_layout_order_and_defaults_do_not_enter(tmp_path: Path) -> None:
+    before = hashes(VALID, tmp_path)
+    other = dict(reversed(changed("schedule", "repeats", to=1).items()))
+    other["models"][0]["catch_angle_constant_deg"] = 130.0
+    path = write(other, tmp_path)
+    path.write_text("# a comment\n\n" + path.read_text(encoding="utf-8"))
+    protocol = read_protocol(path)
+    assert (protocol_hash(protocol), presented_hash(protocol)) == before
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        (("study", "id"), "other"),
+        (("models", 0, "catch_travel_deg"), 59.0),
+        (("models", 1, "id"), "D2"),
+        (("scale", "grades"), ["0", "1", "1+", "2", "3"]),
+        (("schedule", "seed"), 6),
+        (("elbow", "catch_slope_s"), 0.3),
+        (("stretch", "start_deg"), 31.0),
+        (("device", "torque_limit_nm"), 19.0),
+    ],
+)
+def test_what_a_rater_meets_enters_both(
+    tmp_path: Path, path: tuple[str | int, ...], value: object
+) -> None:
+    before, after = hashes(VALID, tmp_path), hashes(changed(*path, to=value), tmp_path)
+    assert before[0] != after[0]
+    assert before[1] != after[1]
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        (("study", "title"), "Another"),
+        (("raters",), [{"id": "R1"}, {"id": "R2"}, {"id": "R3"}]),
+        (("sessions", 1, "note"), "later"),
+        (("analysis", "level"), 0.9),
+        (("report", "title"), "Another"),
+    ],
+)
+def test_what_no_rater_meets_enters_the_whole_only(
+    tmp_path: Path, path: tuple[str | int, ...], value: object
+) -> None:
+    before, after = hashes(VALID, tmp_path), hashes(changed(*path, to=value), tmp_path)
+    assert before[0] != after[0]
+    assert before[1] == after[1]
+
+
+def test_a_hash_is_that_of_canonical_json(tmp_path: Path) -> None:
+    # Written by hand from docs/protocol.md: keys sorted, no spaces, defaults in.
+    elbow = (
+        '{"catch_slope_s":0.35,"damping_nms_rad":1.26,"inertia_kg_m2":0.0,'
+        '"peak_duration_s":0.1,"post_catch":"continuous",'
+        '"post_catch_stiffness_nm_rad":5.8,"range_end_deg":146.0,'
+        '"slowest_mean_speed_deg_s":60.0,"smallest_catch_angle_deg":60.0,'
+        '"speed_threshold_deg_s":20.0,"stiffness_nm_rad":3.15}'
+    )
+    device = (
+        '{"backend":"simulated","friction_compensation":0.9,"missed_ticks_limit":20,'
+        '"rate_hz":1000,"slip_speed_drop_deg_s":40.0,"speed_limit_deg_s":400.0,'
+        '"torque_limit_nm":20.0}'
+    )
+    models = (
+        '[{"catch_angle_constant_deg":130.0,"catch_torque_nms_rad":1.4,'
+        '"catch_travel_deg":60.0,"id":"HM1","intended_grade":"1",'
+        '"residual_ratio":0.15,"role":"standard"},'
+        '{"catch_angle_constant_deg":125.5,"catch_torque_nms_rad":1.7,'
+        '"catch_travel_deg":55.0,"id":"D1","intended_grade":null,'
+        '"residual_ratio":0.2,"role":"dummy"}]'
+    )
+    text = (
+        f'{{"device":{device},"elbow":{elbow},"models":{models},'
+        '"scale":{"grades":["0","1","1+","2"],"name":"MAS"},'
+        '"schedule":{"repeats":1,"scheme":"random-order","seed":5},'
+        '"stretch":{"end_deg":146.0,"start_deg":30.0},"study":"pilot"}'
+    )
+    expected = hashlib.sha256(text.encode("utf-8")).hexdigest()
+    assert hashes(VALID, tmp_path)[1] == expected

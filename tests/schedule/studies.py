@@ -1,0 +1,42 @@
+"""Protocols to draw from, made without a file."""
+
+from masrel.protocol import (
+    Model,
+    Protocol,
+    Rater,
+    ScaleDefinition,
+    ScheduleScheme,
+    Session,
+    Study,
+)
+
+
+def protocol_of(
+    *,
+    models: tuple[str, ...] = ("HM1", "HM2", "HM3", "HM4"),
+    raters: tuple[str, ...] = ("R1", "R2"),
+    seed: int = 1,
+    repeats: int = 1,
+    title: str = "A study",
+    study: str = "tiny",
+    sessions: tuple[str, ...] = ("test",),
+) -> Protocol:
+    """A protocol in which every rater is in every session."""
+    return Protocol(
+        study=Study(id=study, title=title),
+        scale=ScaleDefinition(name="MAS", grades=("1", "1+", "2", "3")),
+        models=tuple(
+            Model(
+                id=name,
+                intended_grade="1+",
+                catch_angle_constant_deg=120.0,
+                catch_torque_nms_rad=2.0,
+                residual_ratio=0.3,
+                catch_travel_deg=50.0,
+            )
+            for name in models
+        ),
+        raters=tuple(Rater(id=name) for name in raters),
+        sessions=tuple(Session(id=name, raters=raters) for name in sessions),
+        schedule=ScheduleScheme(seed=seed, repeats=repeats),
+    )

@@ -1,0 +1,96 @@
+"""A schedule file is read back as written, and anything else is refused by line."""
+
+from pathlib import Path
+
+import pytest
+
+from masrel.errors import ScheduleError
+from masrel.schedule import draw_schedule, read_schedule
+from masrel.schedule.files import schedule_text
+from tests.schedule.studies import protocol_of
+
+SCHEDULE = draw_schedule(protocol_of(models=("A", "B")), "R1", "test")
+LINES = schedule_text(SCHEDULE).splitlines()
+
+
+def test_the_file_is_provenance_then_rows() -> None:
+    first, second = SCHEDULE.presentations
+    assert LINES == [
+        "# study: tiny",
+        "# rater: R1",
+        "# session: test",
+        "# seed: 1",
+        "# scheme: random-order",
+        f"# protocol_sha256: {SCHEDULE.protocol_sha256}",
+        f"# presented_sha256: {SCHEDULE.presented_sha256}",
+        f"# masrel_version: {SCHEDULE.masrel_version}",
+        "position,code,model,repeat",
+        f"1,{first.code},{first.model},1",
+        f"2,{second.code},{second.model},1",
+    ]
+
+
+@pytest.mark.parametrize("ending", ["\n", "\r\n"])
+def test_what_was_written_is_read_back(tmp_path: Path, ending: str) -> None:
+    path = tmp_path / "test_R1.csv"
+    path.write_bytes((ending.join(LINES) + ending).encode())
+    assert read_schedule(path) == SCHEDULE
+
+
+@pytest.mark.parametrize(
+    ("number", "line", "message"),
+    [
+        (1, None, "needed a line '# study: ...', got none"),
+        (1, "# studio: tiny", "line 1: needed '# key: value'"),
+        (2, "# study: tiny", "line 2: needed '# key: value'"),
+        (4, "# seed: -1", "line 4: needed seed"),
+        (6, "# protocol_sha256: 12", "line 6: needed protocol_sha256"),
+        (9, "code,position,model,repeat", "line 9: needed columns position,code"),
+        (10, "2,47K,A,1", "line 10: needed position 1, got '2'"),
+        (10, "1,../x,A,1", "line 10: needed a code of letters and digits, got '../x'"),
+        (10, "1,47K,,1", "line 10: needed the id of a model"),
+        (10, "1,47K,A,0", "line 10: needed repeat"),
+        (10, "1,47K,A", "line 10: needed 4 cells, got 3"),
+        (11, f"2,{SCHEDULE.presentations[0].code},B,1", "line 11: needed codes that"),
+    ],
+)
+def test_a_wrong_line_is_named(
+    tmp_path: Path, number: int, line: str | None, message: str
+) -> None:
+    lines = list(LINES)
+    lines[number - 1 : number] = [] if line is None else [line]
+    path = tmp_path / "test_R1.csv"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    with pytest.raises(ScheduleError) as caught:
+        read_schedule(path)
+    assert f"{path}: {message}" in str(caught.value)
+
+
+def test_every_wrong_line_is_named_at_once(tmp_path: Path) -> None:
+    lines = list(LINES)
+    lines[3], lines[9], lines[10] = "# seed: x", "1,47K", "3,48K,B,1"
+    path = tmp_path / "test_R1.csv"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    with pytest.raises(ScheduleError) as caught:
+        read_schedule(path)
+    found = [text.split(": ")[1] for text in str(caught.value).splitlines()]
+    assert found == ["line 4", "line 10", "line 11"]
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (None, "needed a schedule file, got: No such file"),
+        (b"", "needed columns position,code,model,repeat, got nothing"),
+        (b"\xff\xfe", "needed UTF-8 text"),
+        ("\n".join(LINES[:9]).encode(), "needed at least one presentation, got none"),
+    ],
+)
+def test_a_file_that_is_no_schedule_is_refused(
+    tmp_path: Path, content: bytes | None, message: str
+) -> None:
+    path = tmp_path / "x.csv"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(ScheduleError, match=message):
+        read_schedule(path)
