@@ -1,0 +1,99 @@
+"""Ratings from logs: corrected, checked against recordings, missing where missing."""
+
+from collections.abc import Callable
+
+import pytest
+
+from masrel.errors import RatingsError, SessionLogError
+from masrel.protocol import Protocol, StudyPaths
+from masrel.ratings import rating_matrix, ratings_from_logs
+from masrel.run import ScriptGrades, read_log, run_session
+from masrel.schedule import read_schedule
+from tests.run.conftest import new_study, small
+
+__all__ = ["new_study", "small"]  # fixtures of the same small study
+
+Small = tuple[StudyPaths, Protocol]
+
+
+def graded(
+    study: Small, *grades: str, rater: str = "R1", session: str = "test"
+) -> None:
+    run_session(*study, rater, session, grades=ScriptGrades(grades), clock="simulated")
+
+
+def test_sessions_come_in_the_protocols_order_with_their_speeds(small: Small) -> None:
+    study, protocol = small
+    graded(small, "3", "3", "3", session="retest")
+    graded(small, "2", "2", "2", rater="R2")
+    graded(small, "1", "1+", "1")
+    table = ratings_from_logs(study, protocol).table
+    keys = list(dict.fromkeys(zip(table["session"], table["rater"], strict=True)))
+    assert keys == [("test", "R1"), ("test", "R2"), ("retest", "R1")]
+    shown = read_schedule(study.schedule_file("R1", "test")).presentations
+    first = table[:3]
+    assert first["model"].tolist() == [each.model for each in shown]
+    assert first["grade"].tolist() == ["1", "1+", "1"]
+    logged = [
+        event.fields["mean_speed_deg_s"]
+        for event in read_log(study.log_file("R1", "test"))
+        if event.kind == "presented"
+    ]
+    assert first["mean_speed_deg_s"].tolist() == logged
+    assert set(table["source"]) == {"simulated"}
+
+
+def test_a_session_that_has_begun_has_a_row_for_every_model(small: Small) -> None:
+    with pytest.raises(ValueError, match="position 2"):
+        graded(small, "1+")
+    ratings = ratings_from_logs(*small)
+    assert ratings.table["grade"].tolist() == ["1+", None, None]
+    assert ratings.table["mean_speed_deg_s"].isna().tolist() == [False, False, True]
+    assert rating_matrix(ratings, session="test").n_missing == 2
+
+
+def test_repeats_of_a_model_are_kept_apart(new_study: Callable[..., Small]) -> None:
+    study = new_study(("seed = 11", "seed = 11\nrepeats = 2"))
+    graded(study, "0", "1", "1+", "2", "3", "4")
+    ratings = ratings_from_logs(*study)
+    matrix = rating_matrix(ratings, session="test", models=["HM1"])
+    assert matrix.items == ("HM1", "HM1#2")
+    assert sorted(ratings.table["grade"]) == ["0", "1", "1+", "2", "3", "4"]
+
+
+def test_a_study_without_logs_has_no_ratings(small: Small) -> None:
+    with pytest.raises(RatingsError, match="needed a session log, got none"):
+        ratings_from_logs(*small)
+
+
+def test_a_changed_recording_is_named_with_its_line(small: Small) -> None:
+    graded(small, "1", "1", "1")
+    code = read_schedule(small[0].schedule_file("R1", "test")).presentations[1].code
+    file = small[0].recording_file("R1", "test", code)
+    file.write_bytes(file.read_bytes()[:-1] + b"x")
+    with pytest.raises(RatingsError, match=rf"line 4: .*{code}\.npz is not the record"):
+        ratings_from_logs(*small)
+    file.unlink()
+    assert len(ratings_from_logs(*small).table) == 3
+
+
+def test_a_changed_log_is_refused(small: Small) -> None:
+    graded(small, "1", "1", "1")
+    log = small[0].log_file("R1", "test")
+    log.write_bytes(log.read_bytes().replace(b'"grade": "1"', b'"grade": "2"', 1))
+    with pytest.raises(SessionLogError, match="line 4: needed previous"):
+        ratings_from_logs(*small)
+
+
+def test_a_log_belongs_to_its_rater_and_schedule(small: Small) -> None:
+    study = small[0]
+    graded(small, "1", "1", "1")
+    log = study.log_file("R1", "test")
+    study.log_file("R2", "test").write_bytes(log.read_bytes())
+    with pytest.raises(RatingsError, match="is the log of rater R1 in session test"):
+        ratings_from_logs(*small)
+    study.log_file("R2", "test").unlink()
+    path = study.schedule_file("R1", "test")
+    path.write_bytes(path.read_bytes().replace(b"seed: 11", b"seed: 12"))
+    with pytest.raises(RatingsError, match="recorded with another schedule"):
+        ratings_from_logs(*small)

@@ -1,0 +1,388 @@
+"""A session presents, asks and logs; stopped anywhere, it goes on there."""
+
+import hashlib
+import io
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from masrel.errors import (
+    DeviceError,
+    ParameterError,
+    ScheduleError,
+    SessionLogError,
+    SessionStoppedError,
+)
+from masrel.protocol import DeviceSettings, Protocol, StudyPaths
+from masrel.ratings import ratings_from_logs
+from masrel.recording import read_recording
+from masrel.run import (
+    Asked,
+    ConsoleGrades,
+    GradeSource,
+    ScriptGrades,
+    SessionSummary,
+    SimulatedGrades,
+    read_log,
+    record_correction,
+    run_session,
+)
+from masrel.scales import MODIFIED_ASHWORTH
+from masrel.schedule import Presentation, read_schedule
+
+Small = tuple[StudyPaths, Protocol]
+
+
+def run(small: Small, grades: GradeSource, **options: object) -> SessionSummary:
+    return run_session(
+        *small,
+        "R1",
+        "test",
+        grades=grades,
+        clock="simulated",
+        **options,  # type: ignore[arg-type]
+    )
+
+
+def events(small: Small) -> list[str]:
+    return [event.kind for event in read_log(small[0].log_file("R1", "test"))]
+
+
+def console(answers: str) -> tuple[ConsoleGrades, io.StringIO]:
+    said = io.StringIO()
+    source = ConsoleGrades(
+        MODIFIED_ASHWORTH, answers=io.StringIO(answers), questions=said
+    )
+    return source, said
+
+
+def test_a_session_logs_each_presentation_and_its_grade(small: Small) -> None:
+    study, _ = small
+    summary = run(small, ScriptGrades(["1", "1+", "3"]))
+    assert (summary.n_presentations, summary.n_again, summary.n_faults) == (3, 0, 0)
+    assert summary.simulated
+    assert events(small) == ["session", *["presented", "grade"] * 3, "complete"]
+    schedule = read_schedule(study.schedule_file("R1", "test"))
+    log = read_log(study.log_file("R1", "test"))
+    for shown, presented, grade in zip(
+        schedule.presentations, log[1::2], log[2::2], strict=False
+    ):
+        assert presented.fields["code"] == grade.fields["code"] == shown.code
+        file = study.recording_file("R1", "test", shown.code)
+        assert study.sessions / str(presented.fields["recording"]) == file
+        assert (
+            presented.fields["sha256"] == hashlib.sha256(file.read_bytes()).hexdigest()
+        )
+        facts = read_recording(file).facts
+        assert (facts["model"], facts["simulated"]) == (shown.model, True)
+        assert facts["mean_speed_deg_s"] == presented.fields["mean_speed_deg_s"]
+    assert [e.fields["grade"] for e in log if e.kind == "grade"] == ["1", "1+", "3"]
+    assert log[0].fields["simulated"] is True
+
+
+def test_two_runs_give_the_same_log_but_for_times_of_day(
+    new_study: Callable[..., Small],
+) -> None:
+    facts = []
+    for name in ("one", "two"):
+        small = new_study(name=name)
+        run(small, SimulatedGrades(small[1]))
+        log = read_log(small[0].log_file("R1", "test"))
+        facts.append([(event.kind, dict(event.fields)) for event in log])
+    assert facts[0] == facts[1]
+
+
+def test_a_complete_session_is_left_as_it_is(small: Small) -> None:
+    run(small, ScriptGrades(["1", "1+", "3"]))
+    path = small[0].log_file("R1", "test")
+    before = path.read_bytes()
+    done: list[str] = []
+    summary = run(
+        small, ScriptGrades([]), progress=lambda shown: done.append(shown.code)
+    )
+    assert path.read_bytes() == before
+    assert summary.n_graded_before == 3
+    assert len(done) == 3
+
+
+def test_a_stopped_session_goes_on_where_it_stopped(small: Small) -> None:
+    source, _ = console("\n1\n\nstop\n")
+    with pytest.raises(SessionStoppedError, match="presentation 2 of 3"):
+        run(small, source)
+    source, said = console("\n2\n\n3\n")
+    run(small, source)
+    assert "Presentation 1 of 3" not in said.getvalue()
+    assert "Presentation 2 of 3" in said.getvalue()
+    assert events(small) == [
+        *("session", "presented", "grade", "presented", "stopped"),
+        *("resumed", "presented", "grade", "presented", "grade", "complete"),
+    ]
+    log = read_log(small[0].log_file("R1", "test"))
+    again = log[6].fields
+    assert (again["attempt"], again["code"]) == (2, log[3].fields["code"])
+    assert again["recording"] == f"test_R1/{again['code']}-2.npz"
+    both = [small[0].sessions / str(log[i].fields["recording"]) for i in (3, 6)]
+    assert all(path.is_file() for path in both)
+
+
+def test_the_end_of_the_input_leaves_the_session_to_go_on_with(small: Small) -> None:
+    with pytest.raises(SessionStoppedError, match="by the end of its input"):
+        run(small, console("\n1\n")[0])
+    run(small, console("\n2\n\n3\n")[0])
+    assert events(small).count("grade") == 3
+
+
+def test_an_interrupt_while_asking_leaves_the_session_to_go_on_with(
+    small: Small,
+) -> None:
+    class Interrupted(io.StringIO):
+        def readline(self, size: int = -1) -> str:  # noqa: ARG002 - io's
+            raise KeyboardInterrupt
+
+    source = ConsoleGrades(
+        MODIFIED_ASHWORTH, answers=Interrupted(), questions=io.StringIO()
+    )
+    with pytest.raises(SessionStoppedError, match="by an interrupt"):
+        run(small, source)
+    assert events(small) == ["session", "stopped"]
+
+
+def test_the_rater_sees_codes_and_never_models(small: Small) -> None:
+    source, said = console("\n1\n\nagain\n\n1+\n\n3\n")
+    run(small, source)
+    schedule = read_schedule(small[0].schedule_file("R1", "test"))
+    for shown in schedule.presentations:
+        assert shown.code in said.getvalue()
+        assert shown.model not in said.getvalue()
+
+
+def test_what_is_no_grade_is_asked_again(small: Small) -> None:
+    source, said = console("\n1 +\n5\n\n1+\n\n2\n\n3\n")
+    run(small, source)
+    assert "'1 +' is not a grade: needed one of 0, 1, 1+, 2, 3, 4." in said.getvalue()
+    log = read_log(small[0].log_file("R1", "test"))
+    assert [e.fields["grade"] for e in log if e.kind == "grade"] == ["1+", "2", "3"]
+
+
+def test_a_rater_may_feel_it_again(small: Small) -> None:
+    source, said = console("\nagain\n\n1\n\n2\n\n3\n")
+    summary = run(small, source)
+    assert summary.n_again == 1
+    assert events(small)[:4] == ["session", "presented", "presented", "grade"]
+    assert "again. Enter to begin" in said.getvalue()
+
+
+@pytest.fixture
+def faulty(new_study: Callable[..., Small]) -> Small:
+    """A study whose speed limit every stretch exceeds."""
+    limit = "[device]\nspeed_limit_deg_s = 30.0\n\n[schedule]"
+    return new_study(("[schedule]", limit))
+
+
+def test_faults_are_logged_and_stop_the_session_after_three(faulty: Small) -> None:
+    with pytest.raises(DeviceError, match=r"presentation 1, code .*speed"):
+        run(faulty, SimulatedGrades(faulty[1]))
+    assert events(faulty) == ["session", "presented", "presented", "presented"]
+    log = read_log(faulty[0].log_file("R1", "test"))
+    assert [event.fields["attempt"] for event in log[1:]] == [1, 2, 3]
+    for event in log[1:]:
+        assert "speed" in str(event.fields["fault"])
+        path = faulty[0].sessions / str(event.fields["recording"])
+        assert read_recording(path).facts["fault"] == event.fields["fault"]
+
+
+def test_a_person_decides_whether_to_try_again_after_a_fault(faulty: Small) -> None:
+    source, said = console("\nyes\n\nperhaps\nno\n")
+    with pytest.raises(DeviceError, match="stopped by a fault"):
+        run(faulty, source)
+    assert events(faulty) == ["session", "presented", "presented"]
+    assert said.getvalue().count("Present it again? (yes, no): ") == 3
+
+
+def test_sources_of_grades_do_not_mix(small: Small) -> None:
+    with pytest.raises(ParameterError, match="script: needed a grade of position 2"):
+        run(small, ScriptGrades(["1"]))
+    with pytest.raises(SessionLogError, match=r"begun with grades = script.*got simul"):
+        run(small, SimulatedGrades(small[1]))
+
+
+def test_a_session_goes_on_with_its_own_schedule_only(small: Small) -> None:
+    with pytest.raises(ParameterError, match="position 2"):
+        run(small, ScriptGrades(["1"]))
+    path = small[0].schedule_file("R1", "test")
+    lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+    changed = [
+        line.replace("# seed: 11", "# seed: 12") if "seed" in line else line
+        for line in lines
+    ]
+    assert changed != lines
+    path.write_text("".join(changed), encoding="utf-8")
+    with pytest.raises(SessionLogError, match="begun with schedule_sha256"):
+        run(small, ScriptGrades(["1", "1", "1"]))
+
+
+def test_a_stale_schedule_is_refused(small: Small) -> None:
+    study, protocol = small
+    slower = DeviceSettings(speed_limit_deg_s=30.0)
+    changed = msgspec.structs.replace(protocol, device=slower)
+    with pytest.raises(ScheduleError, match="presented_sha256"):
+        run((study, changed), ScriptGrades(["1", "1", "1"]))
+
+
+def test_a_schedule_of_somebody_else_is_refused(small: Small) -> None:
+    study, _ = small
+    other = study.schedule_file("R2", "test").read_bytes()
+    study.schedule_file("R1", "test").write_bytes(other)
+    with pytest.raises(ScheduleError, match="of rater R1 in session test, got that of"):
+        run(small, ScriptGrades(["1", "1", "1"]))
+
+
+def test_an_unknown_rater_has_no_schedule(small: Small) -> None:
+    with pytest.raises(ScheduleError, match="test_R9"):
+        run_session(*small, "R9", "test", grades=ScriptGrades([]), clock="simulated")
+    assert not small[0].log_file("R9", "test").exists()
+
+
+def test_a_grade_beyond_the_scale_is_not_logged(small: Small) -> None:
+    with pytest.raises(ParameterError, match=r"needed one of 0, 1.*got '7'"):
+        run(small, ScriptGrades(["7", "1", "1"]))
+    assert events(small) == ["session", "presented"]
+
+
+def test_an_unknown_clock_is_refused(small: Small) -> None:
+    with pytest.raises(ParameterError, match="clock: needed one of real, simulated"):
+        run_session(
+            *small,
+            "R1",
+            "test",
+            grades=ScriptGrades([]),
+            clock="wall",  # type: ignore[arg-type]
+        )
+
+
+def test_a_crash_while_presenting_leaves_only_what_was_done(
+    small: Small, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Broken(ScriptGrades):
+        def make_ready(self, asked: Asked) -> None:
+            if asked.presentation.position == 2:
+                raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run(small, Broken(["1", "1", "1"]))
+    assert events(small) == ["session", "presented", "grade"]
+    monkeypatch.undo()
+    run(small, ScriptGrades(["4", "2", "3"]))
+    given = ratings_from_logs(*small).table.set_index("model")["grade"]
+    order = [
+        p.model
+        for p in read_schedule(small[0].schedule_file("R1", "test")).presentations
+    ]
+    assert given[order].tolist() == ["1", "2", "3"]
+
+
+@pytest.mark.filterwarnings("ignore::masrel.errors.OverrunWarning")
+def test_on_the_real_clock_a_stretch_takes_its_time(
+    new_study: Callable[..., Small],
+) -> None:
+    settings = "seed = 5\nmean_speed_deg_s = 150.0\nspeed_sd_deg_s = 0.0"
+    # A busy machine may miss ticks; that is tested with the loop.
+    patient = "[device]\nmissed_ticks_limit = 1000000\n\n[schedule]"
+    study, protocol = new_study(("seed = 5", settings), ("[schedule]", patient))
+    began = time.monotonic()
+    run_session(
+        study, protocol, "R1", "test", grades=ScriptGrades(["1"] * 3), clock="real"
+    )
+    # From 30 to 146 degrees at no more than 150 deg/s, three times.
+    assert time.monotonic() - began > 3 * 116 / 150
+    header = read_log(study.log_file("R1", "test"))[0].fields
+    assert (header["clock"], header["simulated"]) == ("real", True)
+
+
+def test_a_correction_is_a_new_event_and_the_grade_stays(small: Small) -> None:
+    study, protocol = small
+    run(small, ScriptGrades(["1", "1+", "3"]))
+    first = read_schedule(study.schedule_file("R1", "test")).presentations[0]
+    record_correction(
+        study,
+        protocol,
+        "R1",
+        "test",
+        code=first.code,
+        grade="2",
+        who="Kim ",
+        why="misheard",
+    )
+    log = read_log(study.log_file("R1", "test"))
+    assert log[2].fields["grade"] == "1"
+    assert log[-1].fields == {
+        "code": first.code,
+        "grade": "2",
+        "who": "Kim",
+        "why": "misheard",
+    }
+    table = ratings_from_logs(study, protocol).table.set_index("model")
+    assert table["grade"][first.model] == "2"
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"grade": "7"}, "grade: needed one of"),
+        ({"who": " "}, "who: needed text"),
+        ({"why": ""}, "why: needed text"),
+        ({"code": "nope"}, r"needed a code that has a grade \("),
+    ],
+)
+def test_a_correction_needs_a_code_a_grade_a_person_and_a_reason(
+    small: Small, change: dict[str, str], message: str
+) -> None:
+    study, protocol = small
+    run(small, ScriptGrades(["1", "1+", "3"]))
+    before = study.log_file("R1", "test").read_bytes()
+    code = read_schedule(study.schedule_file("R1", "test")).presentations[0].code
+    asked = {"code": code, "grade": "2", "who": "Kim", "why": "misheard", **change}
+    with pytest.raises((ParameterError, SessionLogError), match=message):
+        record_correction(study, protocol, "R1", "test", **asked)
+    assert study.log_file("R1", "test").read_bytes() == before
+
+
+def test_a_correction_needs_a_session(small: Small) -> None:
+    with pytest.raises(SessionLogError, match="no such session log"):
+        record_correction(*small, "R2", "test", code="X", grade="1", who="K", why="w")
+    assert not small[0].log_file("R2", "test").exists()
+
+
+def test_a_recording_is_on_disk_before_the_log_names_it(
+    small: Small, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    order: list[str] = []
+    fsync = os.fsync
+
+    def noted(descriptor: int) -> None:
+        fsync(descriptor)
+        order.append(Path(os.readlink(f"/proc/self/fd/{descriptor}")).suffix)
+
+    monkeypatch.setattr(os, "fsync", noted)
+    run(small, ScriptGrades(["1", "1", "1"]))
+    written = [suffix for suffix in order if suffix in (".npz", ".json", ".jsonl")]
+    assert written == [
+        ".jsonl",
+        *[".npz", ".json", ".jsonl", ".jsonl"] * 3,
+        ".jsonl",
+    ]
+
+
+def test_a_script_by_code_and_by_position() -> None:
+    shown = Presentation(position=2, code="K7", model="HM1", repeat=1)
+    asked = Asked(
+        rater="R1", session="test", presentation=shown, n_presentations=3, attempt=1
+    )
+    assert ScriptGrades({"K7": "1+"}).grade(asked) == "1+"
+    assert ScriptGrades(["1", "2"]).grade(asked) == "2"
+    with pytest.raises(ParameterError, match="position 2, code K7"):
+        ScriptGrades({"A": "1"}).grade(asked)
