@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from masrel.errors import MasrelError, ProtocolError
+from masrel.errors import MasrelError, ParameterError, ProtocolError
 from masrel.protocol import Protocol, StudyPaths, read_protocol, scale_of
 from masrel.schedule import schedule_problems
 
@@ -51,6 +51,17 @@ def check_study(study: StudyPaths) -> tuple[str, ...]:
     )
 
 
+def _plan_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
+    from masrel.agreement import coefficient  # loads numpy
+
+    for index, line in enumerate(protocol.analysis.estimates):
+        try:
+            coefficient(line.coefficient)
+        except ParameterError as error:
+            where = f"{study.protocol}: analysis.estimates[{index}]"
+            yield f'{where}.{error} (id "{line.id}")'
+
+
 def _ratings_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
     files = [f for f in (study.ratings_file, study.published_file) if f.is_file()]
     if not files:
@@ -65,6 +76,7 @@ def _ratings_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
 
 
 _CHECKERS: tuple[Callable[[Protocol, StudyPaths], Iterable[str]], ...] = (
+    _plan_problems,
     schedule_problems,
     _ratings_problems,
 )

@@ -71,6 +71,17 @@ def test_check_says_every_problem_on_a_line_of_its_own(study: Path) -> None:
     assert lines[-1] == f"masrel: {study}: 3 problems"
 
 
+def test_check_finds_a_coefficient_there_is_none_of(study: Path) -> None:
+    protocol = study / "protocol.toml"
+    text = protocol.read_text(encoding="utf-8").replace("fleiss_kappa", "flies_kappa")
+    protocol.write_text(text, encoding="utf-8")
+    _, errors = masrel("check", study, code=2)
+    (problem, _) = errors.splitlines()
+    assert problem.startswith(f"{protocol}: analysis.estimates[0].coefficient: need")
+    assert "fleiss_kappa" in problem
+    assert problem.endswith("got 'flies_kappa' (id \"kappa\")")
+
+
 def test_check_finds_stale_schedules_and_wrong_ratings_at_once(study: Path) -> None:
     masrel("schedule", study)
     protocol = study / "protocol.toml"
