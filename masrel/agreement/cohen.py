@@ -191,7 +191,7 @@ def pair_features(codes: NDArray[np.int64], n_categories: int) -> Floats:
         Agreement, presence, and indicators of the two categories; zeros where one
         is missing.
     """
-    both: NDArray[np.bool_] = (codes >= 0).all(axis=1)
+    both = np.logical_and(codes[:, 0] >= 0, codes[:, 1] >= 0)
     agree = both & (codes[:, 0] == codes[:, 1])
     present = both.reshape(-1, 1)
     ranks = np.arange(n_categories)

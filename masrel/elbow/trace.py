@@ -1,0 +1,102 @@
+"""The trace of a stretch: what the controller would command, sample by sample."""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from masrel.elbow.motion import Motion
+from masrel.elbow.parameters import ElbowParameters
+from masrel.elbow.sampled import SampledJoint
+from masrel.errors import ParameterError
+
+__all__ = ["Trace", "trace"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trace:
+    """Columns of a stretch at a fixed rate; arrays are read-only.
+
+    Attributes
+    ----------
+    time : ndarray, shape (n_samples,)
+        s.
+    angle : ndarray, shape (n_samples,)
+        rad.
+    velocity : ndarray, shape (n_samples,)
+        rad/s.
+    torque : ndarray, shape (n_samples,)
+        Torque that resists extension, N·m; without the inertial term.
+    phase : ndarray of int8, shape (n_samples,)
+        Position in `masrel.recording.PHASES`.
+    rate_hz : float
+        Samples a second.
+    """
+
+    time: NDArray[np.float64] = field(compare=False, repr=False)
+    angle: NDArray[np.float64] = field(compare=False, repr=False)
+    velocity: NDArray[np.float64] = field(compare=False, repr=False)
+    torque: NDArray[np.float64] = field(compare=False, repr=False)
+    phase: NDArray[np.int8] = field(compare=False, repr=False)
+    rate_hz: float
+
+
+def trace(
+    parameters: ElbowParameters, motion: Motion, *, rate_hz: float = 1000.0
+) -> Trace:
+    """Step the sampled law over a stretch.
+
+    Parameters
+    ----------
+    parameters : ElbowParameters
+        The joint.
+    motion : Motion
+        The stretch, SI units; it is cut at the end of range.
+    rate_hz : float, optional
+        Samples a second.
+
+    Returns
+    -------
+    Trace
+        What the driver's controller commands for this motion, sample for sample.
+
+    Raises
+    ------
+    ParameterError
+        If `rate_hz` is not more than 0.
+
+    Examples
+    --------
+    >>> from math import radians
+    >>> from masrel.elbow import STANDARD_MODELS, ConstantSpeed
+    >>> stretch = ConstantSpeed(start=radians(30), end=radians(146), speed=radians(92))
+    >>> made = trace(STANDARD_MODELS["HM3"], stretch)
+    >>> made.time.size, int(made.phase.max())
+    (1261, 2)
+    """
+    if not 0.0 < rate_hz < math.inf:
+        raise ParameterError(f"rate_hz: needs more than 0, got {rate_hz}")
+    end = motion.duration
+    if motion.end > parameters.range_end > motion.start:
+        end = motion.time_at(parameters.range_end)
+    time = np.arange(math.floor(end * rate_hz) + 1) / rate_hz
+    angle, velocity = motion.angle(time), motion.velocity(time)
+    joint = SampledJoint(parameters, start_angle=motion.start)
+    torque = np.empty(time.size)
+    phase = np.empty(time.size, dtype=np.int8)
+    samples = zip(time.tolist(), angle.tolist(), velocity.tolist(), strict=True)
+    for i, (t, theta, speed) in enumerate(samples):
+        torque[i] = joint.step(t, theta, speed)
+        phase[i] = joint.phase
+    columns = (time, angle, velocity, torque, phase)
+    for column in columns:
+        column.setflags(write=False)
+    return Trace(
+        time=time,
+        angle=angle,
+        velocity=velocity,
+        torque=torque,
+        phase=phase,
+        rate_hz=rate_hz,
+    )
