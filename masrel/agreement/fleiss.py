@@ -10,7 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 from masrel.agreement.coding import CodedRatings, Label, code_ratings
 from masrel.agreement.counts import check_counts, distinct_rows, item_counts
 from masrel.agreement.kernel import Floats, Kernel, divide
-from masrel.agreement.percent import item_agreement, observed_agreement
+from masrel.agreement.percent import (
+    item_agreement,
+    observed_agreement,
+    pairs_without_self,
+)
 from masrel.agreement.undefined import defined, kappa, ratio
 from masrel.estimates import Estimate
 
@@ -184,4 +188,13 @@ def _value(sums: Floats, n_categories: int) -> Floats:
     return divide(observed - chance, np.where(disagreement > 0, 1 - chance, 0.0))
 
 
-FLEISS_KERNEL = Kernel(features=_features, value=_value)
+def _rater_sums(coded: CodedRatings, times: Floats) -> Floats:
+    # times (n_resamples, n_raters) -> (n_resamples, 3 + n_categories)
+    agreement, usable, taken = pairs_without_self(coded, times)
+    n = taken.sum(axis=-1)  # (n_resamples, n_items)
+    shares = np.where(n[..., None] > 0, taken / np.maximum(n, 1)[..., None], 0.0)
+    heads = [agreement.sum(axis=-1), usable.sum(axis=-1), (n > 0).sum(axis=-1)]
+    return np.column_stack([*heads, shares.sum(axis=-2)]).astype(np.float64)
+
+
+FLEISS_KERNEL = Kernel(features=_features, value=_value, rater_sums=_rater_sums)

@@ -29,10 +29,15 @@ class Kernel:
     value : callable
         Sums of shape (..., n_features) and the number of categories to values of
         shape (...), ``nan`` where undefined.
+    rater_sums : callable or None
+        CodedRatings and how often each rater is taken, shape (n_resamples,
+        n_raters), to sums of shape (n_resamples, n_features). A rater is never
+        paired with a copy of itself. None where raters cannot be resampled.
     """
 
     features: Callable[[CodedRatings], Floats]
     value: Callable[[Floats, int], Floats]
+    rater_sums: Callable[[CodedRatings, Floats], Floats] | None = None
 
 
 def divide(numerator: Floats, denominator: Floats) -> Floats:

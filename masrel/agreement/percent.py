@@ -17,6 +17,7 @@ __all__ = [
     "PERCENT_KERNEL",
     "item_agreement",
     "observed_agreement",
+    "pairs_without_self",
     "percent_agreement",
     "percent_agreement_from_counts",
 ]
@@ -185,4 +186,38 @@ def _value(sums: Floats, n_categories: int) -> Floats:  # noqa: ARG001 - a kerne
     return divide(sums[..., 0], sums[..., 1])
 
 
-PERCENT_KERNEL = Kernel(features=_features, value=_value)
+def pairs_without_self(
+    coded: CodedRatings, times: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Return agreement and categories when raters are taken several times.
+
+    Parameters
+    ----------
+    coded : CodedRatings
+        The ratings.
+    times : ndarray, shape (n_resamples, n_raters)
+        How often each rater is taken.
+
+    Returns
+    -------
+    tuple of ndarray
+        Share of agreeing pairs of different raters, 0 where there is no pair, and
+        whether there is one, both (n_resamples, n_items); ratings per category,
+        (n_resamples, n_items, n_categories).
+    """
+    chosen = coded.codes[:, :, None] == np.arange(coded.n_categories)
+    taken = np.einsum("br,irk->bik", times, chosen, optimize=True)
+    with_self = np.einsum("br,irk->bik", times**2, chosen, optimize=True)
+    agreeing = (taken**2 - with_self).sum(axis=-1)
+    pairs = taken.sum(axis=-1) ** 2 - with_self.sum(axis=-1)
+    usable = pairs > 0
+    shares = np.where(usable, divide(agreeing, pairs), 0.0)
+    return shares, usable.astype(np.float64), taken
+
+
+def _rater_sums(coded: CodedRatings, times: Floats) -> Floats:
+    shares, usable, _ = pairs_without_self(coded, times)
+    return np.stack([shares.sum(axis=-1), usable.sum(axis=-1)], axis=-1)
+
+
+PERCENT_KERNEL = Kernel(features=_features, value=_value, rater_sums=_rater_sums)

@@ -1,1 +1,12 @@
-"""(to be written)"""
+"""Intervals for agreement coefficients: what was sampled is asked, never guessed.
+
+In: a coefficient's name, its ratings, and the `target` population. Out: an
+`Interval`. scipy and emcee load only when a method needs them.
+"""
+
+from masrel.intervals.analytic import analytic
+from masrel.intervals.bootstrap import bootstrap
+from masrel.intervals.jackknife import jackknife
+from masrel.intervals.posterior import posterior
+
+__all__ = ["analytic", "bootstrap", "jackknife", "posterior"]

@@ -1,0 +1,133 @@
+"""Analytic intervals from the delta-method standard error: other items, same raters."""
+
+import math
+import warnings
+from collections.abc import Sequence
+from typing import Literal, get_args
+
+from masrel.agreement.coding import Label
+from masrel.errors import ParameterError, UndefinedStatisticWarning
+from masrel.estimates import Interval, Target
+from masrel.intervals.case import (
+    Case,
+    Statistic,
+    normal,
+    open_case,
+    student_t,
+    warn_small,
+)
+
+__all__ = ["Distribution", "analytic"]
+
+Distribution = Literal["t", "normal", "logit"]
+
+
+def analytic(
+    coefficient: Statistic,
+    ratings: object,
+    *,
+    target: Target,
+    categories: Sequence[Label] | None = None,
+    level: float = 0.95,
+    distribution: Distribution = "t",
+) -> Interval:
+    """Compute an interval from the delta-method standard error.
+
+    Parameters
+    ----------
+    coefficient : str or callable
+        Name of a coefficient, or its public function.
+    ratings : nested sequence, array_like or DataFrame
+        What the coefficient takes.
+    target : {"items"}
+        The standard error takes items as the sample; it says nothing of raters.
+    categories : sequence, optional
+        The declared scale in order.
+    level : float, optional
+        Nominal level.
+    distribution : {"t", "normal", "logit"}, optional
+        Student's t with n - 1 degrees, the normal, or t on the logit of the
+        position between the ends of the parameter space.
+
+    Returns
+    -------
+    Interval
+        A confidence interval; ``nan`` with a reason when undefined.
+
+    Raises
+    ------
+    ParameterError
+        If an option is none, or `target` is not "items".
+    RatingsError
+        If the ratings do not fit the coefficient.
+
+    Warns
+    -----
+    SmallSampleWarning
+        Below 10 items.
+    UndefinedStatisticWarning
+        If the estimate or its standard error is undefined or 0.
+
+    References
+    ----------
+    .. [1] Gwet, K. L. (2014). Handbook of Inter-Rater Reliability, 4th ed., ch. 5.
+
+    Examples
+    --------
+    >>> ratings = [["a", "a"], ["a", "b"], ["b", "b"], ["b", "b"]] * 5
+    >>> found = analytic("cohen_kappa", ratings, target="items")
+    >>> round(found.low, 3), round(found.high, 3)
+    (0.14, 0.86)
+    """
+    if distribution not in get_args(Distribution):
+        raise ParameterError(
+            f"distribution: needs one of {', '.join(get_args(Distribution))}, "
+            f"got {distribution!r}"
+        )
+    case = open_case(
+        coefficient, ratings, target=target, categories=categories, level=level
+    )
+    if target != "items":
+        raise ParameterError(
+            'target: the delta method speaks of other items only, so "items"; for '
+            f'other raters use the jackknife; got "{target}"'
+        )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UndefinedStatisticWarning)  # said below
+        estimate = case.entry(ratings, categories=categories)
+    method = f"delta method, {_WORDS[distribution]}"
+    error = estimate.standard_error
+    if estimate.reason is not None or not error > 0.0:
+        reason = estimate.reason or (
+            "the standard error is 0: every item agrees alike, which does not mean "
+            "that there is no uncertainty"
+        )
+        if math.isnan(error) and estimate.reason is None:
+            reason = "one item has no standard error"
+        return case.undefined(reason, method=method, unit=None)
+    notes = warn_small(estimate.n_items, 10, "items")
+    low, high = _ends(case, estimate.value, error, estimate.n_items, distribution)
+    return case.closed(low, high, method=method, unit=None, notes=notes)
+
+
+_WORDS = {"t": "t(n-1)", "normal": "normal", "logit": "t(n-1) on the logit"}
+
+
+def _ends(
+    case: Case, value: float, error: float, n_items: int, distribution: Distribution
+) -> tuple[float, float]:
+    if distribution == "normal":
+        half = normal(case.level) * error
+        return value - half, value + half
+    quantile = student_t(case.level, n_items - 1)
+    lowest = case.entry.lowest
+    if distribution == "t" or not lowest < value < 1.0:
+        return value - quantile * error, value + quantile * error
+    # x = (value - lowest) / (1 - lowest); the error of logit x is error / (...)
+    width = 1.0 - lowest
+    share = (value - lowest) / width
+    half = quantile * error / (width * share * (1.0 - share))
+    odds = math.log(share / (1.0 - share))
+    return tuple(
+        lowest + width / (1.0 + math.exp(-o)) for o in (odds - half, odds + half)
+    )  # type: ignore[return-value]

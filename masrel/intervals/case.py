@@ -1,0 +1,195 @@
+"""One question put to an interval method, checked once."""
+
+import math
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import get_args
+
+import numpy as np
+
+from masrel.agreement.coding import CodedRatings, Label
+from masrel.agreement.kernel import Floats
+from masrel.agreement.registry import Coefficient, coefficient
+from masrel.errors import ParameterError, SmallSampleWarning, UndefinedStatisticWarning
+from masrel.estimates import Estimate, Interval, Target, Unit
+
+__all__ = ["Case", "Statistic", "open_case"]
+
+Statistic = str | Callable[..., Estimate] | Coefficient
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Case:
+    """A coefficient, its data as sums of features, and what was asked.
+
+    Attributes
+    ----------
+    entry : Coefficient
+        The coefficient.
+    coded : CodedRatings
+        The ratings.
+    features : ndarray, shape (n_items, n_features)
+        Features of every item with at least one rating.
+    value : float
+        The estimate; ``nan`` when undefined.
+    target : {"items", "raters", "both"}
+        The population asked for.
+    level : float
+        Nominal level.
+    """
+
+    entry: Coefficient
+    coded: CodedRatings
+    features: Floats = field(compare=False, repr=False)
+    value: float
+    target: Target
+    level: float
+
+    @property
+    def n_items(self) -> int:
+        """Items with at least one rating."""
+        return int(self.features.shape[0])
+
+    def values(self, sums: Floats) -> Floats:
+        """Return the coefficient for sums of shape (..., n_features)."""
+        return self.entry.kernel.value(sums, self.coded.n_categories)
+
+    def closed(
+        self,
+        low: float,
+        high: float,
+        *,
+        method: str,
+        unit: Unit | None,
+        notes: Sequence[str] = (),
+    ) -> Interval:
+        """Return a confidence interval, cut at the ends of the parameter space."""
+        said = list(notes)
+        lowest = self.entry.lowest
+        if low < lowest or high > 1.0:
+            said.append(f"cut at the end of the parameter space [{lowest:g}, 1]")
+        return Interval(
+            low=max(low, lowest),
+            high=min(high, 1.0),
+            level=self.level,
+            kind="confidence",
+            method=method,
+            target=self.target,
+            unit=unit,
+            notes=tuple(said),
+        )
+
+    def undefined(self, reason: str, *, method: str, unit: Unit | None) -> Interval:
+        """Return an interval of ``nan`` that says why, with a warning."""
+        warnings.warn(
+            f"{method} interval of {self.entry.title} is undefined: {reason}",
+            UndefinedStatisticWarning,
+            stacklevel=3,
+        )
+        return Interval(
+            low=math.nan,
+            high=math.nan,
+            level=self.level,
+            kind="confidence",
+            method=method,
+            target=self.target,
+            unit=unit,
+            reason=reason,
+        )
+
+
+def open_case(
+    statistic: Statistic,
+    ratings: object,
+    *,
+    target: Target,
+    categories: Sequence[Label] | None,
+    level: float,
+) -> Case:
+    """Check a question and prepare its data.
+
+    Parameters
+    ----------
+    statistic : str, callable or Coefficient
+        Name of a coefficient, or its public function.
+    ratings : nested sequence, array_like or DataFrame
+        What the coefficient takes.
+    target : {"items", "raters", "both"}
+        What a new study would draw anew.
+    categories : sequence or None
+        The declared scale.
+    level : float
+        Nominal level, within (0, 1).
+
+    Returns
+    -------
+    Case
+        The question.
+
+    Raises
+    ------
+    ParameterError
+        If the coefficient, target or level is none.
+    RatingsError
+        If the ratings do not fit.
+    """
+    if isinstance(statistic, Coefficient):
+        entry = statistic
+    elif isinstance(statistic, str):
+        entry = coefficient(statistic)
+    else:
+        entry = coefficient(getattr(statistic, "__name__", repr(statistic)))
+    if target not in get_args(Target):
+        raise ParameterError(
+            f"target: needs one of {', '.join(get_args(Target))}, got {target!r}"
+        )
+    if not 0.0 < level < 1.0:
+        raise ParameterError(f"level: needs (0, 1), got {level}")
+    coded = entry.code(ratings, categories)
+    fewest, most = entry.n_raters
+    columns = coded.codes.shape[1]
+    if entry.shape == "ratings" and (
+        columns < fewest or (most is not None and columns > most)
+    ):
+        wanted = f"{fewest}" if most == fewest else f"at least {fewest}"
+        raise ParameterError(f"{entry.title} needs {wanted} raters, got {columns}")
+    rated = (coded.codes >= 0).any(axis=1)
+    features = entry.kernel.features(coded)[rated]
+    value = float(entry.kernel.value(features.sum(axis=0), coded.n_categories))
+    return Case(
+        entry=entry,
+        coded=coded,
+        features=features,
+        value=value,
+        target=target,
+        level=level,
+    )
+
+
+def warn_small(count: int, least: int, what: str) -> tuple[str, ...]:
+    """Warn below a number of items or raters, and return the note of it."""
+    if count >= least:
+        return ()
+    note = f"{count} {what}: below {least} the interval may cover less than it says"
+    warnings.warn(note, SmallSampleWarning, stacklevel=4)
+    return (note,)
+
+
+def student_t(level: float, df: float) -> float:
+    """Return the two-sided quantile of Student's t."""
+    from scipy.special import stdtrit  # loaded only when an interval is asked for
+
+    return float(stdtrit(df, 0.5 + 0.5 * level))
+
+
+def normal(level: float) -> float:
+    """Return the two-sided quantile of the normal."""
+    from scipy.special import ndtri
+
+    return float(ndtri(0.5 + 0.5 * level))
+
+
+def finite_mean_square(values: Floats) -> float:
+    """Return the mean of squared deviations from the mean."""
+    return float(np.mean((values - values.mean()) ** 2))

@@ -1,0 +1,153 @@
+"""Jackknife intervals: leave out items, raters, or both, one at a time."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from masrel.agreement.coding import Label
+from masrel.agreement.kernel import Floats
+from masrel.errors import ParameterError
+from masrel.estimates import Interval, Target
+from masrel.intervals.case import (
+    Case,
+    Statistic,
+    finite_mean_square,
+    open_case,
+    student_t,
+    warn_small,
+)
+
+__all__ = ["jackknife"]
+
+
+def jackknife(
+    coefficient: Statistic,
+    ratings: object,
+    *,
+    target: Target,
+    categories: Sequence[Label] | None = None,
+    level: float = 0.95,
+) -> Interval:
+    """Compute a jackknife interval with Student's t.
+
+    Parameters
+    ----------
+    coefficient : str or callable
+        Name of a coefficient, or its public function.
+    ratings : nested sequence, array_like or DataFrame
+        What the coefficient takes. For test-retest agreement an item is left out
+        with the ratings of all its raters.
+    target : {"items", "raters", "both"}
+        What a new study would draw anew, and so what is left out.
+    categories : sequence, optional
+        The declared scale in order.
+    level : float, optional
+        Nominal level.
+
+    Returns
+    -------
+    Interval
+        A confidence interval around the estimate; ``nan`` with a reason when
+        undefined.
+
+    Raises
+    ------
+    ParameterError
+        If an option is none, or `target` is not "items" with two raters: leaving
+        one out leaves no pair.
+    RatingsError
+        If the ratings do not fit the coefficient.
+
+    Warns
+    -----
+    SmallSampleWarning
+        Below 5 raters or 10 items, of those that are left out.
+    UndefinedStatisticWarning
+        If the estimate is undefined, or is with one left out, or never changes.
+
+    Notes
+    -----
+    For "both" the variances of leaving out items and of leaving out raters are
+    added, and the degrees of freedom are Satterthwaite's. The disagreement of one
+    rater on one item is in both, so this interval is rather too wide than too
+    narrow.
+
+    References
+    ----------
+    .. [1] Efron, B., Stein, C. (1981). The jackknife estimate of variance. Annals of
+       Statistics, 9(3), 586-596. https://doi.org/10.1214/aos/1176345462
+    .. [2] Satterthwaite, F. E. (1946). An approximate distribution of estimates of
+       variance components. Biometrics Bulletin, 2(6), 110-114.
+       https://doi.org/10.2307/3002019
+
+    Examples
+    --------
+    >>> ratings = [["a", "a"], ["a", "b"], ["b", "b"], ["b", "b"]] * 5
+    >>> found = jackknife("cohen_kappa", ratings, target="items")
+    >>> round(found.low, 3), round(found.high, 3)
+    (0.122, 0.878)
+    """
+    case = open_case(
+        coefficient, ratings, target=target, categories=categories, level=level
+    )
+    units = {"items": ("items",), "raters": ("raters",), "both": ("items", "raters")}
+    method = f"{'two-way' if target == 'both' else target.removesuffix('s')} jackknife"
+    if np.isnan(case.value):
+        return case.undefined(
+            "the estimate itself is undefined", method=method, unit=target
+        )
+    parts: list[tuple[float, int]] = []
+    notes: list[str] = []
+    for unit in units[target]:
+        replicates = _without_item(case) if unit == "items" else _without_rater(case)
+        if np.isnan(replicates).any():
+            reason = f"with one of the {unit} left out the estimate is undefined"
+            return case.undefined(reason, method=method, unit=target)
+        n = replicates.size
+        parts.append(((n - 1) * finite_mean_square(replicates), n - 1))
+        notes += warn_small(n, 10 if unit == "items" else 5, unit)
+    variance = sum(part for part, _ in parts)
+    if not variance > 0.0:
+        reason = (
+            f"leaving out any of the {' or '.join(units[target])} leaves the estimate "
+            "as it is, so the jackknife cannot say how uncertain it is"
+        )
+        return case.undefined(reason, method=method, unit=target)
+    df = variance**2 / sum(part**2 / n for part, n in parts)  # Satterthwaite [2]
+    half = student_t(level, df) * float(np.sqrt(variance))
+    return case.closed(
+        case.value - half,
+        case.value + half,
+        method=f"{method}, t({df:g})" if target != "both" else f"{method}, t",
+        unit=target,
+        notes=notes,
+    )
+
+
+def _without_item(case: Case) -> Floats:
+    # (n_items,): sums without an item are the total less its features
+    if case.n_items < 2:
+        return np.array([np.nan])
+    return case.values(case.features.sum(axis=0) - case.features)
+
+
+def _without_rater(case: Case) -> Floats:
+    # (n_raters,): features are made anew, because pairs of raters go
+    width = 2 if case.entry.shape == "pairs" else 1  # columns of a rater
+    codes = case.coded.codes
+    n_raters = codes.shape[1] // width
+    fewest = 2 if width == 2 else 3
+    if n_raters < fewest:
+        raise ParameterError(
+            f'target: "{case.target}" needs at least {fewest} raters, because one is '
+            f"left out; got {n_raters}"
+        )
+    values = []
+    for rater in range(n_raters):
+        rest = np.delete(codes, np.s_[rater * width : (rater + 1) * width], axis=1)
+        sums = case.entry.kernel.features(
+            dataclasses.replace(case.coded, codes=rest)
+        ).sum(axis=0)
+        values.append(float(case.values(sums)))
+    return np.array(values)
