@@ -7,7 +7,7 @@ import pytest
 from masrel.errors import RatingsError, SessionLogError
 from masrel.protocol import Protocol, StudyPaths
 from masrel.ratings import rating_matrix, ratings_from_logs
-from masrel.run import ScriptGrades, read_log, run_session
+from masrel.run import ScriptGrades, SessionLog, read_log, run_session
 from masrel.schedule import read_schedule
 from tests.run.conftest import new_study, small
 
@@ -50,6 +50,22 @@ def test_a_session_that_has_begun_has_a_row_for_every_model(small: Small) -> Non
     assert ratings.table["grade"].tolist() == ["1+", None, None]
     assert ratings.table["mean_speed_deg_s"].isna().tolist() == [False, False, True]
     assert rating_matrix(ratings, session="test").n_missing == 2
+
+
+def test_the_speed_is_that_of_the_presentation_before_the_grade(
+    small: Small,
+) -> None:
+    study = small[0]
+    with pytest.raises(ValueError, match="position 1"):
+        graded(small)
+    path = study.log_file("R1", "test")
+    with SessionLog.open(path) as log:
+        presented = {**log.events[-1].fields, "attempt": 2, "mean_speed_deg_s": 12.5}
+        log.append("presented", presented)
+        code = presented["code"]
+        log.append("grade", {"code": code, "position": 1, "grade": "1"})
+    first = ratings_from_logs(*small).table.iloc[0]
+    assert (first["grade"], first["mean_speed_deg_s"]) == ("1", 12.5)
 
 
 def test_repeats_of_a_model_are_kept_apart(new_study: Callable[..., Small]) -> None:

@@ -116,7 +116,7 @@ def test_a_column_given_one_meaning_has_no_other(tmp_path: Path) -> None:
     with pytest.raises(RatingsError, match="one column for the item, got item and sub"):
         read(tmp_path, text)
     assert cells(read(tmp_path, text, item="item"))[1] == ("R1", "i2", "2")
-    by_subject = read(tmp_path, text, item="item", session="subject")
+    by_subject = read(tmp_path, text, session="subject")
     assert by_subject.table["session"].tolist() == ["s1", "s1"]
 
 

@@ -187,6 +187,17 @@ def test_a_crash_during_the_recovery_loses_nothing(tmp_path: Path) -> None:
     assert (tmp_path / "a.jsonl.torn").read_bytes().startswith(b'{"event": "recov\n')
 
 
+def test_a_torn_line_longer_than_the_event_in_its_place_is_gone_whole(
+    tmp_path: Path,
+) -> None:
+    path = filled(tmp_path / "a.jsonl", 1)
+    torn = b'{"event": "correction", "why": "' + b"long " * 400
+    path.write_bytes(path.read_bytes() + torn)
+    SessionLog.open(path, now=noon).close()
+    assert [event.kind for event in read_log(path)] == ["grade", "recovered"]
+    assert (tmp_path / "a.jsonl.torn").read_bytes() == torn + b"\n"
+
+
 def test_after_a_failed_write_nothing_follows_on_the_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
