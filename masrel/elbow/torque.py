@@ -155,7 +155,7 @@ def _post_catch(
     climb = np.asarray(parameters.post_catch_stiffness * (motion.angle(at) - begin))
     residual = parameters.residual_ratio * rise
     if parameters.post_catch == "additive":
-        return _pre_catch(parameters, motion, at) + residual + climb
+        return np.asarray(_pre_catch(parameters, motion, at) + residual + climb)
     values = pre_end + residual + climb
     if parameters.inertia:
         values = values + parameters.inertia * motion.acceleration(at)
