@@ -1,1 +1,20 @@
-"""(to be written)"""
+"""The report of a study: tables, figures and pages.
+
+In: a protocol, ratings and their analysis. Out: one self-contained HTML page, the
+same as Markdown, tables as CSV, figures as PNG and SVG.
+"""
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from masrel.report.document import ReportFiles, write_report
+
+__all__ = ["ReportFiles", "write_report"]
+
+
+def __getattr__(name: str) -> object:
+    if name in __all__:
+        from masrel.report import document
+
+        return getattr(document, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

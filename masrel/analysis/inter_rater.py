@@ -1,0 +1,68 @@
+"""Agreement between raters in one session."""
+
+import dataclasses
+
+from masrel.agreement import coefficient
+from masrel.analysis.interval import planned_interval, stream_seed
+from masrel.analysis.results import PlannedEstimate
+from masrel.analysis.selection import absence, rated_models
+from masrel.protocol import EstimatePlan, Protocol
+from masrel.ratings import Ratings, rating_matrix
+
+__all__ = ["inter_rater"]
+
+
+def inter_rater(
+    line: EstimatePlan, protocol: Protocol, ratings: Ratings
+) -> PlannedEstimate:
+    """Estimate agreement between the raters of one session.
+
+    Parameters
+    ----------
+    line : EstimatePlan
+        A line of the plan of kind "inter-rater".
+    protocol : Protocol
+        The study's protocol.
+    ratings : Ratings
+        The ratings.
+
+    Returns
+    -------
+    PlannedEstimate
+        The estimate with its interval, or the reason why there is none.
+
+    Raises
+    ------
+    ParameterError
+        If the coefficient or the interval does not exist.
+    CountsError, RatingsError
+        If the ratings do not fit the coefficient.
+    """
+    missing = absence(line, protocol, ratings)
+    if missing is not None:
+        return PlannedEstimate(line=line, reason=missing)
+    matrix = rating_matrix(
+        ratings, session=line.sessions[0], models=rated_models(line, protocol, ratings)
+    )
+    if len(matrix.raters) < 2:
+        reason = f"Session {line.sessions[0]} has one rater; agreement needs two."
+        return PlannedEstimate(line=line, reason=reason)
+    categories = protocol.scale.grades
+    estimate = coefficient(line.coefficient)(matrix.grades, categories=categories)
+    interval = planned_interval(
+        line.interval,
+        line.coefficient,
+        matrix.grades,
+        target=line.target,
+        categories=categories,
+        level=protocol.analysis.level,
+        n_resamples=protocol.analysis.n_resamples,
+        seed=stream_seed(protocol.analysis.seed, line.id),
+    )
+    return PlannedEstimate(
+        line=line,
+        items=matrix.items,
+        raters=matrix.raters,
+        n_missing=matrix.n_missing,
+        estimate=dataclasses.replace(estimate, interval=interval),
+    )

@@ -1,0 +1,111 @@
+"""The interval a line of the plan asks for; the others are never loaded."""
+
+import hashlib
+from collections.abc import Sequence
+
+from masrel.errors import ParameterError
+from masrel.estimates import Interval, Target
+
+__all__ = ["planned_interval", "stream_seed"]
+
+
+def planned_interval(
+    kind: str,
+    coefficient: str,
+    ratings: Sequence[Sequence[str | None]],
+    *,
+    target: Target,
+    categories: Sequence[str],
+    level: float,
+    n_resamples: int,
+    seed: int,
+) -> Interval | None:
+    """Compute the interval of one kind.
+
+    Parameters
+    ----------
+    kind : {"none", "analytic", "jackknife", "bootstrap", "posterior"}
+        Which one.
+    coefficient : str
+        Name of the coefficient.
+    ratings : sequence, shape (n_items, n_raters)
+        The ratings; None is missing.
+    target : {"items", "raters", "both"}
+        What a new study would draw anew.
+    categories : sequence of str
+        The declared scale in order.
+    level : float
+        Nominal level.
+    n_resamples : int
+        Resamples where a method draws them.
+    seed : int
+        Seed where a method draws.
+
+    Returns
+    -------
+    Interval or None
+        The interval; None for "none".
+
+    Raises
+    ------
+    ParameterError
+        If there is no such kind, or it does not exist for this coefficient or
+        target.
+    """
+    if kind == "none":
+        return None
+    # Imported here: asking for a kappa alone loads no interval.
+    from masrel import intervals
+
+    if kind == "analytic":
+        return intervals.analytic(
+            coefficient, ratings, target=target, categories=categories, level=level
+        )
+    if kind == "jackknife":
+        return intervals.jackknife(
+            coefficient, ratings, target=target, categories=categories, level=level
+        )
+    if kind == "bootstrap":
+        return intervals.bootstrap(
+            coefficient,
+            ratings,
+            target=target,
+            categories=categories,
+            level=level,
+            n_resamples=n_resamples,
+            rng=seed,
+        )
+    if kind == "posterior":
+        return intervals.posterior(
+            coefficient,
+            ratings,
+            target=target,
+            categories=categories,
+            level=level,
+            rng=seed,
+        )
+    raise ParameterError(
+        "interval: needs one of none, analytic, jackknife, bootstrap, posterior, "
+        f"got {kind!r}"
+    )
+
+
+def stream_seed(root: int, purpose: str) -> int:
+    """Derive the seed of one purpose from a study's root seed.
+
+    Adding a line to a plan then moves no other line's numbers.
+
+    Parameters
+    ----------
+    root : int
+        The root seed.
+    purpose : str
+        What the stream is for.
+
+    Returns
+    -------
+    int
+        A seed of 63 bits.
+    """
+    digest = hashlib.sha256(f"{root}/{purpose}".encode()).digest()
+    return int.from_bytes(digest[:8], "big") >> 1

@@ -1,0 +1,126 @@
+"""Agreement of raters with themselves over two sessions."""
+
+import dataclasses
+from collections.abc import Sequence
+
+from masrel.agreement import coefficient, cohen_kappa, stratified_kappa
+from masrel.analysis.interval import planned_interval, stream_seed
+from masrel.analysis.results import PlannedEstimate, RaterEstimate
+from masrel.analysis.selection import absence, rated_models
+from masrel.estimates import Estimate
+from masrel.protocol import EstimatePlan, Protocol
+from masrel.ratings import Ratings, RetestPairs, retest_pairs
+
+__all__ = ["retest_agreement"]
+
+
+def retest_agreement(
+    line: EstimatePlan, protocol: Protocol, ratings: Ratings
+) -> PlannedEstimate:
+    """Estimate agreement of every rater with him- or herself.
+
+    ``stratified_kappa`` gives one estimate over all raters, each a stratum, and
+    every rater's Cohen's kappa beside it; any other coefficient is computed for
+    every rater alone. Pairs of different raters are never pooled.
+
+    Parameters
+    ----------
+    line : EstimatePlan
+        A line of the plan of kind "test-retest".
+    protocol : Protocol
+        The study's protocol.
+    ratings : Ratings
+        The ratings.
+
+    Returns
+    -------
+    PlannedEstimate
+        The estimates, or the reason why there are none.
+
+    Raises
+    ------
+    ParameterError
+        If the coefficient or the interval does not exist.
+    CountsError, RatingsError
+        If the ratings do not fit the coefficient.
+    """
+    missing = absence(line, protocol, ratings)
+    if missing is not None:
+        return PlannedEstimate(line=line, reason=missing)
+    first, second = line.sessions
+    pairs = retest_pairs(
+        ratings,
+        first=first,
+        second=second,
+        models=rated_models(line, protocol, ratings),
+    )
+    if not pairs.raters:
+        reason = f"No rater has ratings in both {first} and {second}."
+        return PlannedEstimate(line=line, reason=reason)
+    found = _stratified if line.coefficient == "stratified_kappa" else _each_rater
+    return dataclasses.replace(
+        found(line, protocol, pairs),
+        items=pairs.items,
+        raters=pairs.raters,
+        n_missing=pairs.n_missing,
+    )
+
+
+def _stratified(
+    line: EstimatePlan, protocol: Protocol, pairs: RetestPairs
+) -> PlannedEstimate:
+    categories = protocol.scale.grades
+    estimate = stratified_kappa(pairs.pairs, categories=categories)
+    return PlannedEstimate(
+        line=line,
+        estimate=_with_interval(estimate, line, protocol, pairs.pairs, line.id),
+        by_rater=tuple(
+            RaterEstimate(
+                rater=rater, estimate=cohen_kappa(of_rater, categories=categories)
+            )
+            for rater, of_rater in zip(pairs.raters, pairs.pairs, strict=True)
+        ),
+    )
+
+
+def _each_rater(
+    line: EstimatePlan, protocol: Protocol, pairs: RetestPairs
+) -> PlannedEstimate:
+    own = coefficient(line.coefficient)
+    categories = protocol.scale.grades
+    return PlannedEstimate(
+        line=line,
+        by_rater=tuple(
+            RaterEstimate(
+                rater=rater,
+                estimate=_with_interval(
+                    own(of_rater, categories=categories),
+                    line,
+                    protocol,
+                    of_rater,
+                    f"{line.id}/{rater}",
+                ),
+            )
+            for rater, of_rater in zip(pairs.raters, pairs.pairs, strict=True)
+        ),
+    )
+
+
+def _with_interval(
+    estimate: Estimate,
+    line: EstimatePlan,
+    protocol: Protocol,
+    pairs: Sequence[object],
+    purpose: str,
+) -> Estimate:
+    interval = planned_interval(
+        line.interval,
+        line.coefficient,
+        pairs,
+        target=line.target,
+        categories=protocol.scale.grades,
+        level=protocol.analysis.level,
+        n_resamples=protocol.analysis.n_resamples,
+        seed=stream_seed(protocol.analysis.seed, purpose),
+    )
+    return dataclasses.replace(estimate, interval=interval)

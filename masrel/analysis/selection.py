@@ -1,0 +1,76 @@
+"""What a line of the plan means, and whether the data hold it."""
+
+from masrel.protocol import EstimatePlan, Protocol
+from masrel.ratings import Ratings
+
+__all__ = ["absence", "rated_models"]
+
+
+def rated_models(
+    line: EstimatePlan, protocol: Protocol, ratings: Ratings
+) -> tuple[str, ...]:
+    """Return the models a line asks for that have a rating in each of its sessions.
+
+    Parameters
+    ----------
+    line : EstimatePlan
+        A line of the plan.
+    protocol : Protocol
+        The study's protocol.
+    ratings : Ratings
+        The ratings.
+
+    Returns
+    -------
+    tuple of str
+        Their ids, in the protocol's order.
+    """
+    table = ratings.table
+    given = table[table["grade"].notna()]
+    rated = [
+        set(given.loc[given["session"] == session, "model"])
+        for session in line.sessions
+    ]
+    common = set.intersection(*rated)
+    return tuple(model for model in _planned(line, protocol) if model in common)
+
+
+def absence(line: EstimatePlan, protocol: Protocol, ratings: Ratings) -> str | None:
+    """Say why a line of the plan cannot be estimated from these data.
+
+    Parameters
+    ----------
+    line : EstimatePlan
+        A line of the plan.
+    protocol : Protocol
+        The study's protocol.
+    ratings : Ratings
+        The ratings.
+
+    Returns
+    -------
+    str or None
+        The reason; None when the data hold what the line asks for.
+    """
+    present = set(ratings.table["session"])
+    lost = [session for session in line.sessions if session not in present]
+    if lost:
+        return f"There are no ratings of session {' or '.join(lost)}."
+    planned = _planned(line, protocol)
+    if not planned:
+        return f"The study has no {line.models} models."
+    rated = set(rated_models(line, protocol, ratings))
+    sessions = " and ".join(line.sessions)
+    # A role without any rating was not part of these data: an estimate over the
+    # rest would carry the name of more than it holds.
+    for role in ("standard", "dummy"):
+        of_role = [m.id for m in protocol.models if m.role == role and m.id in planned]
+        if of_role and not rated.intersection(of_role):
+            return f"No {role} model has ratings in session {sessions}."
+    return None
+
+
+def _planned(line: EstimatePlan, protocol: Protocol) -> tuple[str, ...]:
+    return tuple(
+        model.id for model in protocol.models if line.models in ("all", model.role)
+    )

@@ -1,0 +1,95 @@
+"""The clocks a control loop can run on: a real one, and one that never waits."""
+
+import time
+from typing import Protocol
+
+from masrel.errors import ParameterError
+
+__all__ = ["Clock", "RealClock", "SimulatedClock"]
+
+
+class Clock(Protocol):
+    """What the loop and the simulated device ask of a clock."""
+
+    def now_ns(self) -> int:
+        """Return the time in integer nanoseconds, from an arbitrary zero."""
+        ...
+
+    def sleep_until_ns(self, deadline_ns: int) -> None:
+        """Return when `deadline_ns` has come; at once when it has passed."""
+        ...
+
+
+class RealClock:
+    """The machine's monotonic clock: it cannot be set, so it cannot jump.
+
+    Examples
+    --------
+    >>> clock = RealClock()
+    >>> start = clock.now_ns()
+    >>> clock.sleep_until_ns(start + 1_000_000)
+    >>> clock.now_ns() - start >= 1_000_000
+    True
+    """
+
+    __slots__ = ()
+
+    def now_ns(self) -> int:
+        """Return the monotonic time, ns."""
+        return time.monotonic_ns()
+
+    def sleep_until_ns(self, deadline_ns: int) -> None:
+        """Sleep until an absolute time.
+
+        Parameters
+        ----------
+        deadline_ns : int
+            When to return, ns on this clock.
+        """
+        # Again in a loop: a sleep may return a little before its time.
+        while (left_ns := deadline_ns - time.monotonic_ns()) > 0:
+            time.sleep(left_ns * 1e-9)
+
+
+class SimulatedClock:
+    """A clock on which a second takes no time: it stands still until told to sleep.
+
+    Parameters
+    ----------
+    start_ns : int, optional
+        Its time in the beginning, ns.
+
+    Raises
+    ------
+    ParameterError
+        If `start_ns` is negative.
+
+    Examples
+    --------
+    >>> clock = SimulatedClock()
+    >>> clock.sleep_until_ns(3_000_000_000)
+    >>> clock.now_ns()
+    3000000000
+    """
+
+    __slots__ = ("_now_ns",)
+
+    def __init__(self, start_ns: int = 0) -> None:
+        if start_ns < 0:
+            raise ParameterError(f"start_ns: needs 0 or more, got {start_ns}")
+        self._now_ns = start_ns
+
+    def now_ns(self) -> int:
+        """Return the simulated time, ns."""
+        return self._now_ns
+
+    def sleep_until_ns(self, deadline_ns: int) -> None:
+        """Put the time forward, never back.
+
+        Parameters
+        ----------
+        deadline_ns : int
+            The new time, ns.
+        """
+        if deadline_ns > self._now_ns:
+            self._now_ns = deadline_ns

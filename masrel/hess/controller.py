@@ -1,0 +1,146 @@
+"""The controller of Fig. 7: the joint model, friction, and loss of grip.
+
+Source: Park, Kim and Damiano (2012), IEEE TNSRE 20(3), 361-370,
+https://doi.org/10.1109/TNSRE.2012.2195330, section III.B and Fig. 7.
+"""
+
+import math
+
+from masrel.elbow.parameters import ElbowParameters
+from masrel.elbow.sampled import SampledJoint
+from masrel.errors import ParameterError
+from masrel.hess.friction import Friction, FrictionCompensation
+
+__all__ = ["Controller"]
+
+_SLIP_WINDOW_S = 0.010
+_RANGE_END_MARGIN = math.radians(3.0)
+
+
+class Controller:
+    """Decide a torque from every sample of the motion.
+
+    Grip is lost when, in catch or post-catch, the speed falls by more than
+    `slip_speed_drop` within 10 ms, or the arm moves backwards faster than ν_th. The
+    model is then released to pre-catch at once and stays there until the arm is
+    slower than ν_th. A fall of speed within 3 deg of the end of range does not count:
+    there it is the joint that stops the arm.
+
+    Parameters
+    ----------
+    parameters : ElbowParameters
+        The joint model. Its inertial term is not commanded: the mannequin has it.
+    start_angle : float
+        Where the stretch starts, rad.
+    friction : Friction or None, optional
+        Friction of the device; None for that of the source.
+    compensation : float, optional
+        Share of the friction that is compensated, 0 to 1.
+    slip_speed_drop : float, optional
+        Fall of speed that means a lost grip, rad/s.
+    rate_hz : int, optional
+        Steps a second.
+
+    Raises
+    ------
+    ParameterError
+        If a value is outside its range.
+
+    Examples
+    --------
+    At rest where the stretch starts nothing is commanded:
+
+    >>> from masrel.elbow import STANDARD_MODELS
+    >>> Controller(STANDARD_MODELS["HM2"], start_angle=0.5).step(0.0, 0.5, 0.0)
+    0.0
+    """
+
+    __slots__ = (
+        "_compensation",
+        "_damping",
+        "_free_end",
+        "_joint",
+        "_past",
+        "_past_index",
+        "_released",
+        "_slip_speed_drop",
+        "grip_lost",
+        "model_torque",
+        "phase",
+        "speed_threshold",
+    )
+
+    def __init__(
+        self,
+        parameters: ElbowParameters,
+        *,
+        start_angle: float,
+        friction: Friction | None = None,
+        compensation: float = 0.9,
+        slip_speed_drop: float = math.radians(40.0),
+        rate_hz: int = 1000,
+    ) -> None:
+        if not 0.0 < slip_speed_drop < math.inf:
+            raise ParameterError(
+                f"slip_speed_drop: needs more than 0, got {slip_speed_drop}"
+            )
+        if rate_hz < 1:
+            raise ParameterError(f"rate_hz: needs 1 or more, got {rate_hz}")
+        self._joint = SampledJoint(parameters, start_angle=start_angle)
+        self._compensation = FrictionCompensation(
+            friction or Friction(), share=compensation
+        )
+        self._slip_speed_drop = slip_speed_drop
+        self._damping = parameters.damping
+        self._free_end = parameters.range_end - _RANGE_END_MARGIN
+        self._past = [0.0] * max(1, round(_SLIP_WINDOW_S * rate_hz))
+        self._past_index = 0
+        self._released = False
+        self.speed_threshold = parameters.speed_threshold
+        self.grip_lost = False
+        self.model_torque = 0.0
+        self.phase = 0
+
+    def step(self, time_s: float, angle: float, velocity: float) -> float:
+        """Take one sample in and decide.
+
+        Afterwards `model_torque` holds what the model alone asks for, N·m, `phase`
+        its phase (position in `masrel.recording.PHASES`), and `grip_lost` whether
+        grip has been lost since the beginning.
+
+        Parameters
+        ----------
+        time_s : float
+            Time of the sample, s.
+        angle : float
+            Elbow angle, rad.
+        velocity : float
+            Estimated speed, rad/s.
+
+        Returns
+        -------
+        float
+            Torque to command, N·m; positive resists extension.
+        """
+        index = self._past_index
+        drop = self._past[index] - velocity
+        self._past[index] = velocity
+        self._past_index = index + 1 if index + 1 < len(self._past) else 0
+        joint = self._joint
+        if joint.phase != 0 and (
+            velocity < -self.speed_threshold
+            or (drop > self._slip_speed_drop and angle < self._free_end)
+        ):
+            joint.release()
+            self.grip_lost = self._released = True
+        if self._released and velocity > self.speed_threshold:
+            # The arm still runs on: at ν_th it cannot be caught again, and b of (1)
+            # gives the rest of the speed its resistance.
+            torque = joint.step(time_s, angle, self.speed_threshold)
+            torque += self._damping * (velocity - self.speed_threshold)
+        else:
+            self._released = False
+            torque = joint.step(time_s, angle, velocity)
+        self.model_torque = torque
+        self.phase = joint.phase
+        return torque - self._compensation.torque(velocity)

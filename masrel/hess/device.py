@@ -1,0 +1,163 @@
+"""What a device is to the control loop, whichever hardware or simulation it is."""
+
+import warnings
+from abc import ABC, abstractmethod
+from types import TracebackType
+from typing import ClassVar, Literal, NamedTuple, Self
+
+from masrel.errors import DeviceError
+
+__all__ = ["Device", "Reading"]
+
+State = Literal["new", "open", "closed"]
+
+
+class Reading(NamedTuple):
+    """One reading of the encoder; a named tuple because one is made per tick.
+
+    Attributes
+    ----------
+    time_ns : int
+        When it was read, on the device's clock.
+    angle : float
+        Elbow angle, rad: 0 is full flexion and grows with extension. The speed
+        is not read but estimated by the loop, the same way for every device.
+    """
+
+    time_ns: int
+    angle: float
+
+
+class Device(ABC):
+    """A one-joint device in torque mode.
+
+    A device is opened once and closed once: what was closed, by a fault or on
+    purpose, stays closed, and going on needs a new one. `close` sends zero torque
+    first. A subclass provides the four hooks `_start`, `_read`, `_send`, `_stop`.
+
+    Attributes
+    ----------
+    name : str
+        Name of the backend, as in `open_device`.
+    simulated : bool
+        Whether no hardware moves; goes into every recording.
+    """
+
+    name: ClassVar[str]
+    simulated: ClassVar[bool]
+
+    _state: State = "new"  # on the class, so that `__del__` always finds one
+
+    @property
+    def is_open(self) -> bool:
+        """Whether it can be read and commanded."""
+        return self._state == "open"
+
+    def open(self) -> None:
+        """Take hold of the device; do nothing when it is open already.
+
+        Raises
+        ------
+        DeviceError
+            If it was closed before, or cannot be opened.
+        """
+        if self._state == "open":
+            return
+        if self._state == "closed":
+            raise DeviceError(
+                f"{self.name}: needs a new device, this one has been closed"
+            )
+        self._start()
+        self._state = "open"  # only after it has worked
+
+    def read(self) -> Reading:
+        """Read the encoder.
+
+        Returns
+        -------
+        Reading
+            Time and angle.
+
+        Raises
+        ------
+        DeviceError
+            If the device is not open or does not answer.
+        """
+        if self._state != "open":
+            raise self._not_open("read")
+        return self._read()
+
+    def command(self, torque_nm: float) -> None:
+        """Send a torque, held until the next one.
+
+        Parameters
+        ----------
+        torque_nm : float
+            Torque at the elbow, N·m; positive resists extension.
+
+        Raises
+        ------
+        DeviceError
+            If the device is not open or does not take it.
+        """
+        if self._state != "open":
+            raise self._not_open("command")
+        self._send(torque_nm)
+
+    def close(self) -> None:
+        """Send zero torque and let go; do nothing when there is nothing to close.
+
+        Raises
+        ------
+        DeviceError
+            If the device does not take the zero torque; it is let go all the same.
+        """
+        was, self._state = self._state, "closed"
+        if was == "open":
+            try:
+                self._send(0.0)
+            finally:
+                self._stop()
+
+    def __enter__(self) -> Self:
+        self.open()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def __del__(self) -> None:
+        if self._state == "open":
+            warnings.warn(
+                f"{self.name}: a device was never closed",
+                ResourceWarning,
+                stacklevel=2,
+                source=self,
+            )
+            self.close()
+
+    def _not_open(self, wish: str) -> DeviceError:
+        return DeviceError(
+            f"{self.name}: needs an open device to {wish}, this one is {self._state}"
+        )
+
+    @abstractmethod
+    def _start(self) -> None:
+        """Take hold of the hardware; raise `DeviceError` when that fails."""
+
+    @abstractmethod
+    def _read(self) -> Reading:
+        """Read the encoder of an open device."""
+
+    @abstractmethod
+    def _send(self, torque_nm: float) -> None:
+        """Send a torque to an open device."""
+
+    @abstractmethod
+    def _stop(self) -> None:
+        """Let go of the hardware; the torque is zero already."""

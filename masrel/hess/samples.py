@@ -1,0 +1,179 @@
+"""What the loop writes during a presentation, and what it says of it afterwards."""
+
+import math
+from array import array
+
+import numpy as np
+from numpy.typing import NDArray
+
+from masrel.recording import PHASES
+
+__all__ = [
+    "Samples",
+    "catch_angle_deg",
+    "mean_speed_deg_s",
+    "movement_facts",
+    "phase_sequence",
+]
+
+Columns = dict[str, NDArray[np.float64]]
+
+_CATCH = PHASES.index("catch")
+
+
+class Samples:
+    """Columns allocated before the presentation, filled by index during it.
+
+    Parameters
+    ----------
+    capacity : int
+        Samples that fit in.
+    """
+
+    __slots__ = ("_angle", "_command", "_model", "_phase", "_time", "_velocity", "n")
+
+    def __init__(self, capacity: int) -> None:
+        zeros = bytes(8 * capacity)
+        self._time = array("d", zeros)
+        self._angle = array("d", zeros)
+        self._velocity = array("d", zeros)
+        self._model = array("d", zeros)
+        self._command = array("d", zeros)
+        self._phase = array("d", zeros)
+        self.n = 0
+
+    def add(
+        self,
+        time_s: float,
+        angle: float,
+        velocity: float,
+        model_torque: float,
+        command_torque: float,
+        phase: int,
+    ) -> None:
+        """Write one sample, SI units; the columns must not be full."""
+        n = self.n
+        self._time[n] = time_s
+        self._angle[n] = angle
+        self._velocity[n] = velocity
+        self._model[n] = model_torque
+        self._command[n] = command_torque
+        self._phase[n] = phase
+        self.n = n + 1
+
+    @property
+    def last_time_s(self) -> float:
+        """Time of the last sample, s; minus infinity when there is none."""
+        return self._time[self.n - 1] if self.n else -math.inf
+
+    def columns(self) -> Columns:
+        """Return copies of what was written, in the units of a recording.
+
+        Returns
+        -------
+        dict of str to ndarray, shape (n,)
+            One array per name of `masrel.recording.RECORDING_COLUMNS`.
+        """
+        return {
+            "time_s": self._written(self._time),
+            "angle_deg": np.degrees(self._written(self._angle)),
+            "velocity_deg_s": np.degrees(self._written(self._velocity)),
+            "model_torque_nm": self._written(self._model),
+            "command_torque_nm": self._written(self._command),
+            "phase": self._written(self._phase),
+        }
+
+    def _written(self, column: "array[float]") -> NDArray[np.float64]:
+        # -> (n,), a copy: the buffer is not kept alive
+        return np.frombuffer(column, dtype=np.float64, count=self.n).copy()
+
+
+def movement_facts(
+    columns: Columns, speed_threshold: float
+) -> dict[str, str | float | None]:
+    """Return what a recording's facts say of the movement.
+
+    Parameters
+    ----------
+    columns : dict of str to ndarray
+        Columns of a recording.
+    speed_threshold : float
+        ν_th, rad/s.
+
+    Returns
+    -------
+    dict
+        ``phases``, ``catch_angle_deg`` and ``mean_speed_deg_s``.
+    """
+    return {
+        "phases": ", ".join(phase_sequence(columns)),
+        "catch_angle_deg": catch_angle_deg(columns),
+        "mean_speed_deg_s": mean_speed_deg_s(columns, speed_threshold),
+    }
+
+
+def phase_sequence(columns: Columns) -> tuple[str, ...]:
+    """Return the names of the phases in the order they came.
+
+    Parameters
+    ----------
+    columns : dict of str to ndarray
+        Columns of a recording.
+
+    Returns
+    -------
+    tuple of str
+        One name per change of phase; empty for no samples.
+    """
+    codes = columns["phase"].astype(np.int64)
+    if codes.size == 0:
+        return ()
+    changes = np.flatnonzero(np.diff(codes)) + 1
+    return tuple(PHASES[codes[index]] for index in (0, *changes))
+
+
+def catch_angle_deg(columns: Columns) -> float | None:
+    """Return the angle where the first catch began.
+
+    Parameters
+    ----------
+    columns : dict of str to ndarray
+        Columns of a recording.
+
+    Returns
+    -------
+    float or None
+        Angle, deg; None when there was no catch.
+    """
+    caught = np.flatnonzero(columns["phase"] == _CATCH)
+    return float(columns["angle_deg"][caught[0]]) if caught.size else None
+
+
+def mean_speed_deg_s(columns: Columns, speed_threshold: float) -> float | None:
+    """Return the mean speed before the catch, as Table V reports it.
+
+    Parameters
+    ----------
+    columns : dict of str to ndarray
+        Columns of a recording.
+    speed_threshold : float
+        ν_th, rad/s: the movement begins when the speed first reaches it.
+
+    Returns
+    -------
+    float or None
+        Angle travelled over time, from the onset to the catch, deg/s; to the last
+        sample at ν_th or above when there was no catch; None without movement.
+    """
+    threshold = math.degrees(speed_threshold)
+    moving = np.flatnonzero(np.abs(columns["velocity_deg_s"]) >= threshold)
+    if moving.size == 0:
+        return None
+    onset, last = int(moving[0]), int(moving[-1])
+    caught = np.flatnonzero(columns["phase"] == _CATCH)
+    if caught.size:
+        last = int(caught[0])
+    if last <= onset:
+        return None
+    travel = columns["angle_deg"][last] - columns["angle_deg"][onset]
+    return float(travel / (columns["time_s"][last] - columns["time_s"][onset]))

@@ -1,0 +1,186 @@
+"""Sections `design` and `grades`: what was presented to whom, and what they said."""
+
+from masrel.protocol import Protocol
+from masrel.report.grid import grade_grid
+from masrel.report.material import Drawing, Material, Paragraph, Section
+from masrel.report.tables import Column, Table
+
+__all__ = ["design_section", "grades_section"]
+
+
+def design_section(material: Material) -> Section:
+    """Describe the study: models with parameters, raters and sessions.
+
+    Parameters
+    ----------
+    material : Material
+        What the report is made from.
+
+    Returns
+    -------
+    Section
+        The section.
+    """
+    protocol = material.protocol
+    study = protocol.study
+    n_standard = sum(1 for model in protocol.models if model.role == "standard")
+    said = [
+        f"{study.title}. {len(protocol.models)} haptic models ({n_standard} standard, "
+        f"{len(protocol.models) - n_standard} dummy), {len(protocol.raters)} raters, "
+        f"{len(protocol.sessions)} session(s); scale {protocol.scale.name}: "
+        f"{', '.join(protocol.scale.grades)}."
+    ]
+    said.extend(text for text in (study.notes,) if text)
+    if study.source:
+        said.append(f"Source: {study.source}")
+    if material.ratings.simulated:
+        said.append(_simulation(protocol))
+    return Section(
+        name="design",
+        title="Design",
+        blocks=(
+            *(Paragraph(text=text) for text in said),
+            _models_table(material),
+            _constants_table(material),
+            _sessions_table(material),
+        ),
+    )
+
+
+def _simulation(protocol: Protocol) -> str:
+    settings = protocol.simulated_raters
+    return (
+        "The grades are simulated: every simulated rater gives the intended grade with "
+        f"probability {settings.accuracy:g} and repeats a grade at a retest with "
+        f"probability {settings.retest_agreement:g} (seed {settings.seed}). They show "
+        "that the study runs; they say nothing about people or about the models."
+    )
+
+
+def _models_table(material: Material) -> Table:
+    rows = tuple(
+        (
+            model.id,
+            model.role,
+            model.intended_grade,
+            float(model.catch_angle_constant_deg),
+            float(model.catch_torque_nms_rad),
+            float(model.residual_ratio),
+            float(model.catch_travel_deg),
+        )
+        for model in material.protocol.models
+    )
+    return Table(
+        name="models",
+        caption="Haptic models and their parameters",
+        columns=(
+            Column(key="model", heading="Model", align="left"),
+            Column(key="role", heading="Role", align="left"),
+            Column(key="intended_grade", heading="Intended grade", align="center"),
+            Column(key="catch_angle_constant_deg", heading="L (deg)", digits=1),
+            Column(key="catch_torque_nms_rad", heading="H (N·m·s/rad)", digits=2),
+            Column(key="residual_ratio", heading="Q", digits=2),
+            Column(key="catch_travel_deg", heading="D (deg)", digits=1),
+        ),
+        rows=rows,
+        notes=(
+            "L: catch angle at rest; H: catch torque per stretching speed; Q: residual "
+            "over peak torque of the catch; D: angle travelled during the catch.",
+        ),
+        data=material.data,
+    )
+
+
+def _constants_table(material: Material) -> Table:
+    elbow, stretch = material.protocol.elbow, material.protocol.stretch
+    rows = (
+        ("m", "inertia (kg·m²)", float(elbow.inertia_kg_m2)),
+        ("b", "damping (N·m·s/rad)", float(elbow.damping_nms_rad)),
+        ("k", "stiffness (N·m/rad)", float(elbow.stiffness_nm_rad)),
+        ("α", "catch slope (s)", float(elbow.catch_slope_s)),
+        ("ΔT_peak", "duration of the peak (s)", float(elbow.peak_duration_s)),
+        (
+            "k_post",
+            "post-catch stiffness (N·m/rad)",
+            float(elbow.post_catch_stiffness_nm_rad),
+        ),
+        ("ν_th", "speed threshold (deg/s)", float(elbow.speed_threshold_deg_s)),
+        ("ν_L", "slowest mean speed (deg/s)", float(elbow.slowest_mean_speed_deg_s)),
+        ("θ_L", "smallest catch angle (deg)", float(elbow.smallest_catch_angle_deg)),
+        ("θ_start", "start of a stretch (deg)", float(stretch.start_deg)),
+        ("θ_end", "end of the range of motion (deg)", float(elbow.range_end_deg)),
+    )
+    return Table(
+        name="constants",
+        caption="Constants all models share",
+        columns=(
+            Column(key="symbol", heading="Symbol", align="left"),
+            Column(key="meaning", heading="Meaning", align="left"),
+            Column(key="value", heading="Value", digits=2),
+        ),
+        rows=rows,
+        data=material.data,
+    )
+
+
+def _sessions_table(material: Material) -> Table:
+    table = material.ratings.table
+    rows = []
+    for session in material.protocol.sessions:
+        of_session = table[table["session"] == session.id]
+        n_given = int(of_session["grade"].notna().sum())
+        n_planned = (
+            len(session.raters)
+            * len(material.protocol.models)
+            * material.protocol.schedule.repeats
+        )
+        rows.append(
+            (
+                session.id,
+                len(session.raters),
+                ", ".join(session.raters),
+                n_planned,
+                n_given,
+                session.note or None,
+            )
+        )
+    absent = [row[0] for row in rows if row[4] == 0]
+    notes = ()
+    if absent:
+        notes = (f"No ratings in these data: session {', '.join(map(str, absent))}.",)
+    return Table(
+        name="sessions",
+        caption="Sessions, their raters, and the ratings there are",
+        columns=(
+            Column(key="session", heading="Session", align="left"),
+            Column(key="n_raters", heading="Raters"),
+            Column(key="raters", heading="Who", align="left"),
+            Column(key="n_planned", heading="Ratings planned"),
+            Column(key="n_given", heading="Ratings given"),
+            Column(key="note", heading="Note", align="left"),
+        ),
+        rows=tuple(rows),
+        notes=notes,
+        data=material.data,
+    )
+
+
+def grades_section(material: Material) -> Section:
+    """Show every grade of every session.
+
+    Parameters
+    ----------
+    material : Material
+        What the report is made from.
+
+    Returns
+    -------
+    Section
+        The section.
+    """
+    blocks: list[Paragraph | Table | Drawing] = []
+    for session in material.sessions:
+        blocks.extend(grade_grid(material, session))
+    if not blocks:
+        blocks.append(Paragraph(text="These data hold no ratings.", absent=True))
+    return Section(name="grades", title="Grades", blocks=tuple(blocks))

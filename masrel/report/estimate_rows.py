@@ -1,0 +1,206 @@
+"""Estimates as the rows of tables and figures: their names, texts and remarks."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from masrel.analysis import PlannedEstimate
+from masrel.estimates import Estimate, Interval
+from masrel.report.tables import interval_words, number
+
+__all__ = [
+    "TARGETS",
+    "EstimateRow",
+    "coefficient_name",
+    "estimate_rows",
+    "interval_name",
+    "meanings",
+]
+
+_NAMES = {
+    "fleiss_kappa": "Fleiss' κ",
+    "cohen_kappa": "Cohen's κ",
+    "stratified_kappa": "κ stratified over raters",
+    "percent_agreement": "Percent agreement (0-1)",
+}
+
+TARGETS = {"raters": "other raters", "items": "other models", "both": "both"}
+"""Target of an interval to what it speaks of."""
+
+_POPULATIONS = {
+    "raters": "the same models were put to other raters like these",
+    "items": "these raters graded other models like these",
+    "both": "other raters graded other models, both like these",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EstimateRow:
+    """One row: an estimate, or why there is none.
+
+    Attributes
+    ----------
+    name : str
+        Id of the line of the plan, and the rater if it is one rater's.
+    coefficient : str
+        Name of the coefficient for a reader.
+    models, sessions : str
+        What it was estimated from.
+    estimate : Estimate or None
+        The estimate.
+    reason : str or None
+        Why there is none.
+    """
+
+    name: str
+    coefficient: str
+    models: str
+    sessions: str
+    estimate: Estimate | None
+    reason: str | None
+
+    @property
+    def interval(self) -> Interval | None:
+        """The interval, if one was asked for."""
+        return None if self.estimate is None else self.estimate.interval
+
+    @property
+    def text(self) -> str:
+        """The value with its interval, or that there is none."""
+        if self.estimate is None:
+            return "not in these data"
+        if not math.isfinite(self.estimate.value):
+            return "undefined"
+        value = number(self.estimate.value, 3)
+        if self.interval is None:
+            return value
+        return f"{value} {interval_words(self.interval.low, self.interval.high)}"
+
+    @property
+    def detail(self) -> str:
+        """How much it rests on, and what its interval speaks of."""
+        if self.estimate is None:
+            return f"{self.models} models, {self.sessions}"
+        size = f"{self.estimate.n_items} models, {self.estimate.n_raters} raters"
+        if self.interval is None:
+            return size
+        return f"{size}; {self.interval.kind}, {TARGETS[self.interval.target]}"
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What a reader must know before relying on it, each once."""
+        said = [self.reason]
+        if self.estimate is not None:
+            said.append(self.estimate.reason)
+        if self.interval is not None:
+            said.extend((*self.interval.notes, self.interval.reason))
+            if self.interval.n_undefined:
+                said.append(f"undefined on {self.interval.n_undefined} resamples")
+        return tuple(dict.fromkeys(text for text in said if text))
+
+
+def coefficient_name(coefficient: str) -> str:
+    """Return a coefficient's name for a reader.
+
+    Parameters
+    ----------
+    coefficient : str
+        Its name in code.
+
+    Returns
+    -------
+    str
+        Its name in print.
+    """
+    return _NAMES.get(coefficient, coefficient.replace("_", " "))
+
+
+def interval_name(interval: Interval) -> str:
+    """Return level, kind and method of an interval.
+
+    Parameters
+    ----------
+    interval : Interval
+        The interval.
+
+    Returns
+    -------
+    str
+        Such as ``"95 % confidence, rater jackknife, t(7)"``.
+    """
+    return f"{number(100 * interval.level, 0)} % {interval.kind}, {interval.method}"
+
+
+def estimate_rows(planned: Sequence[PlannedEstimate]) -> tuple[EstimateRow, ...]:
+    """Lay out planned estimates, each followed by those of its raters.
+
+    Parameters
+    ----------
+    planned : sequence of PlannedEstimate
+        Lines of the plan and what came of them.
+
+    Returns
+    -------
+    tuple of EstimateRow
+        The rows. A line with estimates per rater only has no row of its own.
+    """
+    rows = []
+    for entry in planned:
+        sessions = " and ".join(entry.line.sessions)
+        if entry.estimate is not None or not entry.by_rater:
+            rows.append(
+                EstimateRow(
+                    name=entry.line.id,
+                    coefficient=coefficient_name(entry.line.coefficient),
+                    models=entry.line.models,
+                    sessions=sessions,
+                    estimate=entry.estimate,
+                    reason=entry.reason,
+                )
+            )
+        rows.extend(
+            EstimateRow(
+                name=f"{entry.line.id}: {own.rater}",
+                coefficient=coefficient_name(own.estimate.coefficient),
+                models=entry.line.models,
+                sessions=sessions,
+                estimate=own.estimate,
+                reason=None,
+            )
+            for own in entry.by_rater
+        )
+    return tuple(rows)
+
+
+def meanings(rows: Sequence[EstimateRow]) -> tuple[str, ...]:
+    """Say in one plain sentence each what the intervals of some rows mean.
+
+    Parameters
+    ----------
+    rows : sequence of EstimateRow
+        The rows.
+
+    Returns
+    -------
+    tuple of str
+        One sentence per kind of interval and target there is.
+    """
+    said = []
+    for row in rows:
+        if row.interval is None:
+            continue
+        percent = number(100 * row.interval.level, 0)
+        population = _POPULATIONS[row.interval.target]
+        if row.interval.kind == "confidence":
+            said.append(
+                f"Confidence interval: if {population}, again and again, about "
+                f"{percent} % of the intervals made this way would hold the value that "
+                "all such studies together would give."
+            )
+        else:
+            said.append(
+                "Credible interval: given these ratings and the prior, the value that "
+                f"would be found if {population}, without end, lies inside with "
+                f"probability {percent} %."
+            )
+    return tuple(dict.fromkeys(said))

@@ -1,0 +1,67 @@
+"""The backdrivability test of Fig. 8: the torque a hand feels on the bare device."""
+
+import math
+from math import radians
+
+import pytest
+
+from masrel.hess import Friction, FrictionCompensation, SimulatedClock
+from masrel.hess.simulated import SimulatedDevice
+from masrel.hess.velocity import VelocityEstimate
+
+TRAVEL = radians(100.0)
+DURATION = 1.8  # one way
+
+
+class BackAndForth:
+    """A hand that goes forth and back by minimum jerk, peak speed 104 deg/s."""
+
+    stiffness = 600.0
+    damping = 40.0
+    slip_time = math.inf
+    start = radians(35.0)
+
+    def intended(self, time_s: float) -> tuple[float, float]:
+        trip, within = divmod(time_s, DURATION)
+        s = within / DURATION
+        shape = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+        rate = 30.0 * s**2 * (1.0 - s) ** 2 / DURATION
+        if trip % 2:
+            return self.start + TRAVEL * (1.0 - shape), -TRAVEL * rate
+        return self.start + TRAVEL * shape, TRAVEL * rate
+
+
+def felt(share: float) -> list[float]:
+    # The hand's torque at every tick of two trips, N·m. As in (7), the moving mass
+    # is the motor's: the forearm hangs behind the sensor.
+    clock = SimulatedClock()
+    device = SimulatedDevice(clock=clock, hand=BackAndForth(), arm_inertia=0.0)
+    compensation = FrictionCompensation(Friction(), share=share)
+    estimate = VelocityEstimate()
+    torques = []
+    with device:
+        device.open()
+        for tick in range(round(2e3 * DURATION)):
+            clock.sleep_until_ns(tick * 1_000_000)
+            velocity = estimate.update(tick * 1e-3, device.read().angle)
+            device.command(-compensation.torque(velocity))
+            torques.append(device.hand_torque)
+    return torques
+
+
+def test_without_compensation_the_hand_feels_what_equation_7_says() -> None:
+    # Peak speed 1.875 × 100 / 1.8 = 104.2 deg/s = 1.818 rad/s, without acceleration:
+    # 0.168 × 1.818 + 0.189 = 0.494 N·m, and the inertia adds a little before.
+    expected = 0.168 * 1.875 * TRAVEL / DURATION + 0.189
+    assert max(felt(0.0)) == pytest.approx(expected, rel=0.05)
+
+
+def test_compensation_brings_it_from_above_a_half_to_below_a_fifth() -> None:
+    without, compensated = felt(0.0), felt(0.9)
+    assert max(abs(torque) for torque in without) > 0.5
+    assert max(abs(torque) for torque in compensated) < 0.2
+
+
+def test_in_motion_a_tenth_of_the_friction_is_left() -> None:
+    # In the middle of a trip: 0.1 × 0.494 = 0.049 N·m, the filter lags 5.6 ms.
+    assert felt(0.9)[round(500 * DURATION)] == pytest.approx(0.049, abs=0.005)

@@ -1,0 +1,66 @@
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from masrel.errors import LimitExceededError, ParameterError
+from masrel.hess import DeviceLimits
+
+LIMITS = DeviceLimits(
+    torque=20.0, speed=7.0, missed_ticks=3, lowest_angle=0.0, highest_angle=2.7
+)
+
+
+@given(st.floats(allow_nan=False))
+def test_a_torque_is_cut_off_at_the_limit_and_passes_below(torque: float) -> None:
+    sent = LIMITS.saturate(torque)
+    assert abs(sent) <= 20.0
+    assert sent == torque if abs(torque) <= 20.0 else sent == math.copysign(20, torque)
+
+
+def test_a_torque_that_is_no_number_is_never_sent() -> None:
+    with pytest.raises(LimitExceededError, match="torque: needs a number"):
+        LIMITS.saturate(math.nan)
+
+
+@pytest.mark.parametrize("angle", [-0.001, 2.701, math.nan, math.inf])
+def test_an_angle_out_of_range_is_named(angle: float) -> None:
+    with pytest.raises(LimitExceededError, match=r"range: needs 0\.0 to 154\.7 deg"):
+        LIMITS.check_motion(angle, 0.0)
+
+
+@pytest.mark.parametrize("velocity", [7.001, -7.001, math.nan])
+def test_a_speed_either_way_is_named(velocity: float) -> None:
+    with pytest.raises(LimitExceededError, match="speed: needs at most 401 deg/s"):
+        LIMITS.check_motion(1.0, velocity)
+
+
+def test_what_lies_on_the_limits_passes() -> None:
+    LIMITS.check_motion(0.0, -7.0)
+    LIMITS.check_motion(2.7, 7.0)
+    LIMITS.check_missed(3)
+    assert LIMITS.saturate(20.0) == 20.0
+
+
+def test_one_missed_tick_too_many_is_named() -> None:
+    with pytest.raises(LimitExceededError, match="at most 3 .* missed 4"):
+        LIMITS.check_missed(4)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"torque": 0.0}, "torque: needs a finite limit > 0, got 0.0"),
+        ({"torque": math.inf}, "torque: needs"),
+        ({"speed": math.nan}, "speed: needs"),
+        ({"missed_ticks": -1}, "missed_ticks: needs 0 or more, got -1"),
+        ({"lowest_angle": 3.2}, "lowest_angle, highest_angle: need"),
+        ({"highest_angle": math.inf}, "lowest_angle, highest_angle: need"),
+    ],
+)
+def test_limits_that_limit_nothing_are_refused(
+    change: dict[str, float], words: str
+) -> None:
+    with pytest.raises(ParameterError, match=words):
+        DeviceLimits(**{"torque": 20.0, "speed": 7.0, "missed_ticks": 3, **change})

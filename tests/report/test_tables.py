@@ -1,0 +1,122 @@
+"""Rounding, words and the three forms of a table."""
+
+import csv
+import io
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from masrel.report.tables import (
+    Column,
+    Table,
+    as_csv,
+    as_text,
+    interval_words,
+    number,
+    shown,
+    strength,
+    whole_or_tenths,
+)
+
+
+def example(data: str = "published") -> Table:
+    return Table(
+        name="example",
+        caption="Values by model",
+        columns=(
+            Column(key="model", heading="Model", align="left"),
+            Column(key="value_nm", heading="Value (N·m)", digits=2),
+        ),
+        rows=(("HM1", 1 / 3), ("HM2", math.nan), ("HM3", None)),
+        notes=("One is undefined.",),
+        data=data,
+    )
+
+
+def test_a_number_is_rounded_only_when_it_is_shown() -> None:
+    assert number(0.626083678854127, 3) == "0.626"
+    assert "0.3333333333333333" in as_csv(example())
+
+
+def test_a_negative_number_has_a_true_minus_and_zero_has_none() -> None:
+    assert number(-0.25, 2) == "−0.25"
+    assert number(-0.0004, 3) == "0.000"
+
+
+def test_undefined_and_absent_are_told_apart() -> None:
+    column = Column(key="x", heading="x", digits=1)
+    assert shown(math.nan, column) == "undefined"
+    assert shown(None, column) == "–"
+    assert interval_words(math.nan, 0.5) == "[undefined]"
+
+
+# Landis and Koch (1977), p. 165: .00-.20 slight, .21-.40 fair, .41-.60 moderate,
+# .61-.80 substantial, .81-1.00 almost perfect, below 0 poor.
+@pytest.mark.parametrize(
+    ("value", "word"),
+    [
+        (-0.01, "poor"),
+        (0.0, "slight"),
+        (0.20, "slight"),
+        (0.21, "fair"),
+        (0.40, "fair"),
+        (0.41, "moderate"),
+        (0.60, "moderate"),
+        (0.61, "substantial"),
+        (0.80, "substantial"),
+        (0.81, "almost perfect"),
+        (1.0, "almost perfect"),
+    ],
+)
+def test_the_words_are_landis_and_kochs(value: float, word: str) -> None:
+    assert strength("fleiss_kappa", value) == word
+
+
+def test_only_a_defined_kappa_has_a_word() -> None:
+    assert strength("percent_agreement", 0.9) == "–"
+    assert strength("fleiss_kappa", math.nan) == "–"
+
+
+def test_every_row_of_a_csv_says_where_its_data_come_from() -> None:
+    rows = list(csv.DictReader(io.StringIO(as_csv(example("simulated")))))
+    assert [row["data"] for row in rows] == ["simulated"] * 3
+    assert [row["value_nm"] for row in rows] == [repr(1 / 3), "", ""]
+
+
+def test_a_simulated_table_says_so_on_screen() -> None:
+    assert as_text(example("simulated")).startswith("SIMULATED DATA")
+    assert "SIMULATED" not in as_text(example("published"))
+
+
+def test_the_columns_of_a_screen_table_line_up() -> None:
+    lines = as_text(example()).splitlines()
+    assert lines[1:6] == [
+        "Model  Value (N·m)",
+        "-----  -----------",
+        "HM1           0.33",
+        "HM2      undefined",
+        "HM3              –",
+    ]
+
+
+def test_whole_measurements_are_shown_whole() -> None:
+    assert whole_or_tenths([122.0, 68.0]) == 0
+    assert whole_or_tenths([122.0, 68.5, math.nan]) == 1
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False, width=32))
+def test_a_csv_gives_every_digit_back(value: float) -> None:
+    table = Table(
+        name="one",
+        caption="One value",
+        columns=(
+            Column(key="name", heading="Name"),
+            Column(key="value", heading="Value", digits=1),
+        ),
+        rows=(("a", value),),
+        data="foreign",
+    )
+    (row,) = csv.DictReader(io.StringIO(as_csv(table)))
+    assert float(row["value"]) == value
