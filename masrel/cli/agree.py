@@ -1,7 +1,6 @@
 """``masrel agree``: agreement of any CSV file of ratings, no study needed."""
 
 import json
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from masrel.cli.notes import notes
-from masrel.errors import MasrelError, ParameterError, RatingsError
+from masrel.errors import RatingsError
 from masrel.estimates import Estimate, Interval, Target, as_document
 
 if TYPE_CHECKING:
@@ -133,9 +132,7 @@ def _sessions(ratings: "Ratings", file: Path, by: str | None) -> list[str]:
     return sessions
 
 
-def _estimates(
-    ratings: "Ratings", session: str, asked: _Asked
-) -> list[Estimate]:
+def _estimates(ratings: "Ratings", session: str, asked: _Asked) -> list[Estimate]:
     from masrel.agreement import coefficient
     from masrel.ratings import rating_matrix
 
@@ -191,8 +188,7 @@ def _write(
 
 
 def _as_screen(found: list[tuple[str, Estimate]], by: str | None) -> str:
-    from masrel.report.estimate_rows import TARGETS, coefficient_name, interval_name
-    from masrel.report.tables import LANDIS_KOCH, Column, Table, as_text, strength
+    from masrel.report.tables import Column
 
     columns = (
         Column(key="coefficient", heading="Coefficient", align="left"),

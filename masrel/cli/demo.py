@@ -45,7 +45,9 @@ def command(out: Path, template: str, quiet: bool) -> None:
         _simulate(study, protocol, quiet=quiet)
         pages = [_report_simulated(study, protocol, out / "report-simulated", quiet)]
         if study.published_file.is_file():
-            pages += [_report_published(study, protocol, out / "report-published", quiet)]
+            pages += [
+                _report_published(study, protocol, out / "report-published", quiet)
+            ]
     click.echo(f"The simulated study is in {study.root}.")
     click.echo("Open these in a browser:")
     for page in pages:
