@@ -70,10 +70,13 @@ def main() -> None:
         cli()
     except (DeviceError, ConvergenceError, SessionStoppedError) as error:
         _fail(error, 1)
-    except (MasrelError, OSError) as error:
+    except MasrelError as error:
         _fail(error, 2)
+    except OSError as error:
+        where = "" if error.filename is None else f"{error.filename}: "
+        _fail(f"{where}{error.strerror or error}", 2)
 
 
-def _fail(error: Exception, code: int) -> None:
+def _fail(error: object, code: int) -> None:
     click.echo(f"masrel: {error}", err=True)
     sys.exit(code)

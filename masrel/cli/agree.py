@@ -1,14 +1,14 @@
 """``masrel agree``: agreement of any CSV file of ratings, no study needed."""
 
 import json
+import warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from masrel.cli.notes import notes
-from masrel.errors import RatingsError
+from masrel.errors import MasrelWarning, ParameterError, RatingsError
 from masrel.estimates import Estimate, Interval, Target, as_document
 
 if TYPE_CHECKING:
@@ -107,13 +107,15 @@ def command(
         categories=None if categories is None else _listed(categories),
     )
     sessions = _sessions(ratings, file, by)
-    with notes():
+    with warnings.catch_warnings():
+        # Every note is in the result, and so below the table or in the JSON.
+        warnings.simplefilter("ignore", MasrelWarning)
         found = [
             (session, estimate)
             for session in sessions
             for estimate in _estimates(ratings, session, asked)
         ]
-    _write(found, by, json_file)
+    _write(found, file, by, json_file)
     if target is None:
         click.echo(NO_INTERVAL, err=True)
 
@@ -140,7 +142,13 @@ def _estimates(ratings: "Ratings", session: str, asked: _Asked) -> list[Estimate
     categories = ratings.scale.grades
     found = []
     for name in asked.coefficients:
-        estimate = coefficient(name)(matrix.grades, categories=categories)
+        entry = coefficient(name)
+        if entry.shape == "pairs":
+            raise ParameterError(
+                f"--coefficients: {name} takes each rater's grades of two sessions; "
+                "masrel analyze computes it from a study's plan"
+            )
+        estimate = entry(matrix.grades, categories=categories)
         if asked.target is not None:
             interval = _interval(name, matrix.grades, categories, asked.target, asked)
             estimate = replace(estimate, interval=interval)
@@ -157,8 +165,9 @@ def _interval(
 ) -> Interval | None:
     from masrel.analysis.interval import planned_interval
 
+    usual = "analytic" if target == "items" else "jackknife"
     return planned_interval(
-        _kind(asked.interval, target, len(grades)),
+        usual if asked.interval == "default" else asked.interval,
         name,
         grades,
         target=target,
@@ -170,7 +179,10 @@ def _interval(
 
 
 def _write(
-    found: list[tuple[str, Estimate]], by: str | None, json_file: Path | None
+    found: list[tuple[str, Estimate]],
+    file: Path,
+    by: str | None,
+    json_file: Path | None,
 ) -> None:
     documents = [
         as_document(estimate) if by is None else {by: session, **as_document(estimate)}
@@ -184,18 +196,68 @@ def _write(
         return
     if json_file is not None:
         json_file.write_text(text + "\n", encoding="utf-8", newline="\n")
-    click.echo(_as_screen(found, by))
+    click.echo(_as_screen(found, file, by))
 
 
-def _as_screen(found: list[tuple[str, Estimate]], by: str | None) -> str:
-    from masrel.report.tables import Column
+def _as_screen(found: list[tuple[str, Estimate]], file: Path, by: str | None) -> str:
+    from masrel.agreement import COEFFICIENTS
+    from masrel.report.tables import Column, Table, as_text, interval_words
 
     columns = (
+        *([] if by is None else [Column(key=by, heading=by.title(), align="left")]),
         Column(key="coefficient", heading="Coefficient", align="left"),
         Column(key="value", heading="Value", digits=3),
-        Column(key="low", heading="Low", digits=3),
-        Column(key="high", heading="High", digits=3),
+        Column(key="standard_error", heading="SE", digits=3),
+        Column(key="interval", heading="Interval", align="left"),
         Column(key="n_items", heading="Items"),
         Column(key="n_raters", heading="Raters"),
-        Column(key="strength", heading="Strength", align="left"),
+        Column(key="n_categories", heading="Categories"),
     )
+    rows = tuple(
+        (
+            *([] if by is None else [session]),
+            COEFFICIENTS[estimate.coefficient].title,
+            estimate.value,
+            estimate.standard_error,
+            None
+            if estimate.interval is None
+            else interval_words(estimate.interval.low, estimate.interval.high),
+            estimate.n_items,
+            estimate.n_raters,
+            estimate.n_categories,
+        )
+        for session, estimate in found
+    )
+    return as_text(
+        Table(
+            name="agreement",
+            caption=f"Agreement of the raters in {file}",
+            columns=columns,
+            rows=rows,
+            notes=_below([estimate for _, estimate in found]),
+            data="foreign",
+        )
+    )
+
+
+def _below(estimates: list[Estimate]) -> tuple[str, ...]:
+    # How each interval was made, what to know of it, and why a value is undefined.
+    said = ["SE: delta method, items as the sample."]
+    for estimate in estimates:
+        interval = estimate.interval
+        name = estimate.coefficient
+        if estimate.reason is not None:
+            said.append(f"{name}: undefined: {estimate.reason}.")
+        if interval is None:
+            continue
+        said.append(
+            f"Interval: {100 * interval.level:g} % {interval.kind}, {interval.method}; "
+            f"speaks of other {_OTHERS[interval.target]}."
+        )
+        said += [f"{name}: {note}." for note in interval.notes]
+        if interval.reason not in (None, estimate.reason):
+            said.append(f"{name}: no interval: {interval.reason}.")
+    return tuple(dict.fromkeys(said))
+
+
+_OTHERS = {"items": "items", "raters": "raters", "both": "items and raters"}

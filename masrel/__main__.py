@@ -1,0 +1,6 @@
+"""``python -m masrel`` is ``masrel``."""
+
+from masrel.cli import main
+
+if __name__ == "__main__":
+    main()
