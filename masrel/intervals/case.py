@@ -6,15 +6,20 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import get_args
 
-import numpy as np
-
 from masrel.agreement.coding import CodedRatings, Label
 from masrel.agreement.kernel import Floats
 from masrel.agreement.registry import Coefficient, coefficient
 from masrel.errors import ParameterError, SmallSampleWarning, UndefinedStatisticWarning
 from masrel.estimates import Estimate, Interval, Target, Unit
 
-__all__ = ["Case", "Statistic", "open_case"]
+__all__ = [
+    "Case",
+    "Statistic",
+    "normal",
+    "open_case",
+    "student_t",
+    "warn_small",
+]
 
 Statistic = str | Callable[..., Estimate] | Coefficient
 
@@ -168,7 +173,25 @@ def open_case(
 
 
 def warn_small(count: int, least: int, what: str) -> tuple[str, ...]:
-    """Warn below a number of items or raters, and return the note of it."""
+    """Warn below a number of items or raters, and return the note of it.
+
+    Parameters
+    ----------
+    count, least : int
+        How many there are, and how many are enough.
+    what : str
+        Of what, such as ``"raters"``.
+
+    Returns
+    -------
+    tuple of str
+        One note for the result, or none.
+
+    Warns
+    -----
+    SmallSampleWarning
+        If there are too few.
+    """
     if count >= least:
         return ()
     note = f"{count} {what}: below {least} the interval may cover less than it says"
@@ -177,19 +200,38 @@ def warn_small(count: int, least: int, what: str) -> tuple[str, ...]:
 
 
 def student_t(level: float, df: float) -> float:
-    """Return the two-sided quantile of Student's t."""
+    """Return the two-sided quantile of Student's t.
+
+    Parameters
+    ----------
+    level : float
+        Probability between its negative and it.
+    df : float
+        Degrees of freedom.
+
+    Returns
+    -------
+    float
+        The quantile at (1 + level) / 2.
+    """
     from scipy.special import stdtrit  # loaded only when an interval is asked for
 
     return float(stdtrit(df, 0.5 + 0.5 * level))
 
 
 def normal(level: float) -> float:
-    """Return the two-sided quantile of the normal."""
+    """Return the two-sided quantile of the standard normal.
+
+    Parameters
+    ----------
+    level : float
+        Probability between its negative and it.
+
+    Returns
+    -------
+    float
+        The quantile at (1 + level) / 2.
+    """
     from scipy.special import ndtri
 
     return float(ndtri(0.5 + 0.5 * level))
-
-
-def finite_mean_square(values: Floats) -> float:
-    """Return the mean of squared deviations from the mean."""
-    return float(np.mean((values - values.mean()) ** 2))

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import expit
 
 from masrel.agreement.kernel import Floats
 
@@ -20,10 +21,16 @@ class DirichletMultinomial:
 
     Attributes
     ----------
-    deep : ndarray of int64, shape (depth, n_categories)
-        N_kj: items with more than j ratings in category k. All the likelihood needs.
-    deep_items : ndarray of int64, shape (depth,)
-        n_j: items with more than j ratings.
+    prior : ndarray, shape (n_parts,)
+        Parameters of the Dirichlet prior of π. Categories nobody used enter the
+        likelihood nowhere, so they are one part, whose parameter is the sum of
+        theirs (the Dirichlet's aggregation property).
+    above, depth : ndarray of int64, shape (n_above,)
+        Part k and depth j of every factor A π_k + j there is.
+    times : ndarray, shape (n_above,)
+        N_kj: items with more than j ratings in category k, the factor's power.
+    times_below : ndarray, shape (largest number of ratings of an item,)
+        n_j: items with more than j ratings, the power of A + j.
 
     References
     ----------
@@ -31,21 +38,46 @@ class DirichletMultinomial:
        Biometrika, 49(1/2), 65-82. https://doi.org/10.2307/2333468
     """
 
-    deep: NDArray[np.int64] = field(compare=False, repr=False)
-    deep_items: NDArray[np.int64] = field(compare=False, repr=False)
+    prior: Floats = field(compare=False, repr=False)
+    above: NDArray[np.int64] = field(compare=False, repr=False)
+    depth: NDArray[np.int64] = field(compare=False, repr=False)
+    times: Floats = field(compare=False, repr=False)
+    times_below: Floats = field(compare=False, repr=False)
 
     @classmethod
     def of_counts(cls, counts: NDArray[np.int64]) -> "DirichletMultinomial":
-        """Compress counts of shape (n_items, n_categories)."""
+        """Compress counts of shape (n_items, n_categories) to all that matters.
+
+        Parameters
+        ----------
+        counts : ndarray of int64, shape (n_items, n_categories)
+            Raters per item and category, at least two categories.
+
+        Returns
+        -------
+        DirichletMultinomial
+            The model with π ~ Dirichlet(1, ..., 1) over all categories.
+        """
+        used = counts.any(axis=0)
+        prior = np.ones(int(used.sum()))
+        if not used.all():
+            prior = np.append(prior, float((~used).sum()))
         n = counts.sum(axis=1)
-        depth = np.arange(int(n.max(initial=0)))
-        deep = (counts[None] > depth[:, None, None]).sum(axis=1)
-        return cls(deep=deep, deep_items=(n[None] > depth[:, None]).sum(axis=1))
+        depths = np.arange(int(n.max()))
+        deep = (counts[:, used, None] > depths).sum(axis=0)  # N_kj
+        above, depth = np.nonzero(deep)
+        return cls(
+            prior=prior,
+            above=above,
+            depth=depth,
+            times=deep[above, depth].astype(np.float64),
+            times_below=(n[:, None] > depths).sum(axis=0).astype(np.float64),
+        )
 
     @property
     def n_dimensions(self) -> int:
         """The logit of ρ, and the log-ratios of π to its last part."""
-        return int(self.deep.shape[1])
+        return int(self.prior.size)
 
     def parts(self, position: Floats) -> tuple[Floats, Floats, Floats]:
         """Return ρ, 1 - ρ and π at unbounded positions.
@@ -58,10 +90,9 @@ class DirichletMultinomial:
         Returns
         -------
         tuple of ndarray
-            ρ and 1 - ρ, both (n,), and π, (n, n_categories).
+            ρ and 1 - ρ, both (n,), and π, (n, n_parts).
         """
-        rho = 1.0 / (1.0 + np.exp(-position[:, 0]))
-        rest = 1.0 / (1.0 + np.exp(position[:, 0]))
+        rho, rest = expit(position[:, 0]), expit(-position[:, 0])
         ratios = np.column_stack([position[:, 1:], np.zeros(len(position))])
         ratios = np.exp(ratios - ratios.max(axis=1, keepdims=True))
         return rho, rest, ratios / ratios.sum(axis=1, keepdims=True)
@@ -71,26 +102,43 @@ class DirichletMultinomial:
 
         With A = (1 - ρ)/ρ every factor A π_k + j and A + j of [1] times ρ is
         (1 - ρ) π_k + j ρ and 1 - ρ + j ρ; there are as many above as below.
+
+        Parameters
+        ----------
+        rho, rest : ndarray, shape (n,)
+            ρ and 1 - ρ.
+        pi : ndarray, shape (n, n_parts)
+            Shares of the categories.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Its logarithm.
         """
-        depth = np.arange(len(self.deep_items))
-        above = (
-            rest[:, None, None] * pi[:, None, :] + rho[:, None, None] * depth[:, None]
-        )
-        below = rest[:, None] + rho[:, None] * depth
-        used = np.log(np.where(self.deep > 0, above, 1.0))
-        return np.asarray(
-            (self.deep * used).sum(axis=(1, 2))
-            - (self.deep_items * np.log(below)).sum(1)
-        )
+        above = rest[:, None] * pi[:, self.above] + rho[:, None] * self.depth
+        below = rest[:, None] + rho[:, None] * np.arange(self.times_below.size)
+        return np.asarray(np.log(above) @ self.times - np.log(below) @ self.times_below)
 
     def log_density(self, position: Floats) -> Floats:
         """Return the log posterior density of unbounded positions.
 
-        Prior ρ ~ U(0, 1) and π ~ Dirichlet(1, ..., 1); the Jacobian is ρ (1 - ρ) of
+        Prior ρ ~ U(0, 1) and π ~ Dirichlet(`prior`); the Jacobian is ρ (1 - ρ) of
         the logit and Π π_k of the log-ratios.
+
+        Parameters
+        ----------
+        position : ndarray, shape (n, n_dimensions)
+            As in `parts`.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            The logarithm, up to a constant; -inf where it is 0 in floating point.
         """
         rho, rest, pi = self.parts(position)
-        with np.errstate(divide="ignore"):  # far out a part is 0, and its density too
-            jacobian = np.log(rho) + np.log(rest) + np.log(pi).sum(axis=1)
-            density = self.log_likelihood(rho, rest, pi) + jacobian
+        with np.errstate(divide="ignore", invalid="ignore"):  # far out a part is 0
+            of_rho = np.log(rho) + np.log(rest)
+            # Dirichlet density Π π_k^(a_k - 1), times the Jacobian Π π_k
+            of_pi = np.log(pi) @ self.prior
+            density = self.log_likelihood(rho, rest, pi) + of_rho + of_pi
         return np.where(np.isfinite(density), density, -np.inf)

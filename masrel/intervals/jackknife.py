@@ -12,7 +12,6 @@ from masrel.estimates import Interval, Target
 from masrel.intervals.case import (
     Case,
     Statistic,
-    finite_mean_square,
     open_case,
     student_t,
     warn_small,
@@ -105,7 +104,8 @@ def jackknife(
             reason = f"with one of the {unit} left out the estimate is undefined"
             return case.undefined(reason, method=method, unit=target)
         n = replicates.size
-        parts.append(((n - 1) * finite_mean_square(replicates), n - 1))
+        # (n - 1)/n times the sum of squared deviations, (1.1) of [1]
+        parts.append(((n - 1) * float(replicates.var()), n - 1))
         notes += warn_small(n, 10 if unit == "items" else 5, unit)
     variance = sum(part for part, _ in parts)
     if not variance > 0.0:

@@ -10,7 +10,6 @@ from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target
 from masrel.intervals.bootstrap import recorded_generator
 from masrel.intervals.case import Statistic, open_case
-from masrel.intervals.dirichlet import DirichletMultinomial
 
 __all__ = ["posterior"]
 
@@ -100,7 +99,9 @@ def posterior(
         )
     if case.coded.n_categories < 2:
         return case.undefined("one category is declared", method=method, unit=None)
-    from masrel.intervals.mcmc import sample  # loads emcee
+    # Imported here: the other intervals load neither scipy nor emcee.
+    from masrel.intervals.dirichlet import DirichletMultinomial
+    from masrel.intervals.mcmc import sample
 
     generator, seed = recorded_generator(rng)
     model = DirichletMultinomial.of_counts(counts)

@@ -1,0 +1,61 @@
+"""The sampler on laws whose answer is known."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from masrel.errors import ConvergenceError
+from masrel.intervals.mcmc import LARGEST_R_HAT, LEAST_ESS, sample
+
+Floats = NDArray[np.float64]
+
+
+def correlated_normal(position: Floats) -> Floats:
+    # variance 1 each, correlation .8
+    x, y = position[:, 0], position[:, 1]
+    density: Floats = -(x * x - 1.6 * x * y + y * y) / (2 * (1 - 0.64))
+    return density
+
+
+def first(position: Floats) -> Floats:
+    return position[:, 0]
+
+
+def test_quantiles_of_a_normal_are_within_their_errors() -> None:
+    draws = sample(
+        correlated_normal, 2, first,
+        generator=np.random.default_rng(2), n_steps=2000, most_steps=16_000,
+    )  # fmt: skip
+    for share, exact in ((0.025, -1.959964), (0.5, 0.0), (0.975, 1.959964)):
+        # 4.5 errors, three times: once in 49 000 runs of other seeds
+        off = abs(draws.quantile(share) - exact)
+        assert off < 4.5 * draws.quantile_error(share)
+        assert draws.quantile_error(share) < 0.05
+    assert draws.r_hat < LARGEST_R_HAT
+    assert draws.ess >= LEAST_ESS
+
+
+def test_two_far_modes_are_not_called_converged() -> None:
+    def two_modes(position: Floats) -> Floats:
+        x = position[:, 0]
+        far: Floats = np.logaddexp(-0.5 * (x - 60) ** 2, -0.5 * (x + 60) ** 2)
+        return far
+
+    with pytest.raises(ConvergenceError, match="R-hat"):
+        sample(
+            two_modes, 1, first,
+            generator=np.random.default_rng(2), n_steps=200, most_steps=400,
+        )  # fmt: skip
+
+
+def test_the_generator_decides_every_draw() -> None:
+    def drawn(seed: int) -> Floats:
+        return sample(
+            correlated_normal, 2, first,
+            generator=np.random.default_rng(seed), n_steps=2000, most_steps=16_000,
+        ).values  # fmt: skip
+
+    one = drawn(2)
+    np.random.seed(99)  # noqa: NPY002 - the global state must not matter
+    assert np.array_equal(one, drawn(2))
+    assert not np.array_equal(one, drawn(3))
