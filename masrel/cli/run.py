@@ -66,6 +66,11 @@ def command(
     record_correction(
         paths, protocol, rater, session, code=correct, grade=grade, who=who, why=why
     )
+    if not quiet:
+        click.echo(
+            f"{correct} of {rater}, session {session}, is now {grade}; the first grade "
+            f"stays in {paths.log_file(rater, session)}. Then: masrel ratings"
+        )
 
 
 def _refuse_strays(given: dict[str, str | None]) -> None:

@@ -71,7 +71,9 @@ def test_table_v_on_the_whole_scale_has_its_exact_ends() -> None:
     assert found.n_resamples is not None
 
 
-def test_a_missing_part_of_the_jacobian_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_part_of_the_jacobian_is_seen(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     def without(self: DirichletMultinomial, position: Floats) -> Floats:
         rho, rest, pi = self.parts(position)
         density = self.log_likelihood(rho, rest, pi) + np.log(pi) @ self.prior
