@@ -12,7 +12,7 @@ __all__ = ["planned_interval", "stream_seed"]
 def planned_interval(
     kind: str,
     coefficient: str,
-    ratings: Sequence[Sequence[str | None]],
+    ratings: object,
     *,
     target: Target,
     categories: Sequence[str],
@@ -28,8 +28,8 @@ def planned_interval(
         Which one.
     coefficient : str
         Name of the coefficient.
-    ratings : sequence, shape (n_items, n_raters)
-        The ratings; None is missing.
+    ratings : nested sequence
+        What the coefficient takes; None is missing.
     target : {"items", "raters", "both"}
         What a new study would draw anew.
     categories : sequence of str

@@ -1,7 +1,6 @@
 """Agreement of raters with themselves over two sessions."""
 
 import dataclasses
-from collections.abc import Sequence
 
 from masrel.agreement import coefficient, cohen_kappa, stratified_kappa
 from masrel.analysis.interval import planned_interval, stream_seed
@@ -110,7 +109,7 @@ def _with_interval(
     estimate: Estimate,
     line: EstimatePlan,
     protocol: Protocol,
-    pairs: Sequence[object],
+    pairs: object,
     purpose: str,
 ) -> Estimate:
     interval = planned_interval(

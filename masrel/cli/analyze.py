@@ -78,7 +78,7 @@ def _show(material: StudyMaterial, analysis: "Analysis", *, as_csv_text: bool) -
 
 def _computed(analysis: "Analysis") -> list[str]:
     # Sections of the report that show what an analysis holds; a trace is not one.
-    kinds = {line.kind for line in analysis.estimates}
+    kinds = {planned.line.kind for planned in analysis.estimates}
     asked = {
         "agreement": "inter-rater" in kinds,
         "test-retest": "test-retest" in kinds,

@@ -2,6 +2,7 @@
 
 import warnings
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 from tqdm import tqdm
@@ -14,6 +15,9 @@ from masrel.protocol import (
     read_protocol,
     scale_of,
 )
+
+if TYPE_CHECKING:
+    from masrel.ratings import Ratings
 
 __all__ = ["command"]
 
@@ -121,6 +125,7 @@ def _report(
             ratings,
             analysis,
             destination,
+            in_person=in_person,
             progress=lambda _: bar.update(),
         )
     return files.html

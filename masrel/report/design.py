@@ -84,7 +84,7 @@ def _models_table(material: Material) -> Table:
         ),
         rows=rows,
         notes=(
-            "L: catch angle at rest; H: catch torque per stretching speed; Q: residual "
+            "L: catch angle constant; H: catch torque per stretching speed; Q: residual "
             "over peak torque of the catch; D: angle travelled during the catch.",
         ),
         data=material.data,
@@ -145,7 +145,7 @@ def _sessions_table(material: Material) -> Table:
             )
         )
     absent = [row[0] for row in rows if row[4] == 0]
-    notes = ()
+    notes: tuple[str, ...] = ()
     if absent:
         notes = (f"No ratings in these data: session {', '.join(map(str, absent))}.",)
     return Table(

@@ -22,7 +22,7 @@ from masrel.report.tables import Table, as_csv, shown
 
 __all__ = ["ReportFiles", "write_report"]
 
-Progress = Callable[[str], None]
+Progress = Callable[[str], object]
 """Called with the name of each figure, and of the pages, once it is made."""
 
 BANNER = "SIMULATED DATA – no person gave these grades"

@@ -128,7 +128,12 @@ def _panel(material: Material, values: Sequence[Speed], model: str) -> "TracePan
         parameters, motion = _stretch(material, value)
         drawn = trace(parameters, motion, rate_hz=material.protocol.device.rate_hz)
         stretches.append(
-            (drawn.time, np.degrees(drawn.angle), drawn.torque, drawn.phase)
+            (
+                drawn.time,
+                np.degrees(drawn.angle),
+                drawn.torque,
+                drawn.phase.astype(np.float64),
+            )
         )
     intended = {m.id: m.intended_grade for m in material.protocol.models}[model]
     scale = material.protocol.scale.name
@@ -156,7 +161,9 @@ def _peak_table(
         rows.append((model, *own, min(known), max(known)))
     return Table(
         name="peak_torque",
-        caption=f"Peak model torque at each rater's mean speed, session {session} (N·m)",
+        caption=(
+            f"Peak model torque at each rater's mean speed, session {session} (N·m)"
+        ),
         columns=(
             Column(key="model", heading="Model", align="left"),
             *(Column(key=f"{rater}_nm", heading=rater, digits=2) for rater in raters),
