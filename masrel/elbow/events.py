@@ -4,13 +4,15 @@ Source: Park, Kim and Damiano (2012), IEEE TNSRE 20(3), 361-370,
 https://doi.org/10.1109/TNSRE.2012.2195330, equations (2), (4), (6) and Fig. 7.
 """
 
+import math
 from dataclasses import dataclass
 
 from masrel.elbow.motion import Motion, first_true
 from masrel.elbow.parameters import ElbowParameters
+from masrel.errors import ParameterError
 from masrel.recording import Phase
 
-__all__ = ["Events", "PhaseSpan", "events"]
+__all__ = ["Events", "PhaseSpan", "events", "stretch_end"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,6 +91,11 @@ def events(parameters: ElbowParameters, motion: Motion) -> Events:
     Events
         Exact to rounding; what the stretch does not reach is None.
 
+    Raises
+    ------
+    ParameterError
+        If the stretch starts at or beyond the end of range.
+
     Examples
     --------
     HM3 at 92 deg/s catches at L - α v = 115 - 0.35 x 92 = 82.8 deg:
@@ -102,9 +109,7 @@ def events(parameters: ElbowParameters, motion: Motion) -> Events:
     >>> [span.name for span in found.phases]
     ['pre-catch', 'catch', 'post-catch']
     """
-    end = motion.duration
-    if motion.end > parameters.range_end > motion.start:
-        end = motion.time_at(parameters.range_end)  # the joint goes no further
+    end = stretch_end(parameters, motion)
     fast = motion.times_above(parameters.speed_threshold)
     if fast is None or fast[0] >= end:
         return Events(onset=None, end=end, phases=_phases(motion, [], end))
@@ -141,6 +146,45 @@ def events(parameters: ElbowParameters, motion: Motion) -> Events:
     )
 
 
+def stretch_end(parameters: ElbowParameters, motion: Motion) -> float:
+    """Return when a stretch ends, at its own end or at the end of range.
+
+    Parameters
+    ----------
+    parameters : ElbowParameters
+        The joint, of which the end of range is used.
+    motion : Motion
+        The stretch, SI units.
+
+    Returns
+    -------
+    float
+        Time from the start, s.
+
+    Raises
+    ------
+    ParameterError
+        If the stretch starts at or beyond the end of range.
+
+    Examples
+    --------
+    >>> from masrel.elbow import STANDARD_MODELS, ConstantSpeed
+    >>> from math import radians
+    >>> stretch = ConstantSpeed(start=radians(46), end=radians(160), speed=radians(50))
+    >>> round(stretch_end(STANDARD_MODELS["HM1"], stretch), 12)
+    2.0
+    """
+    if motion.start >= parameters.range_end:
+        raise ParameterError(
+            "start: needs less than the end of range, "
+            f"{math.degrees(parameters.range_end):g} degrees, got "
+            f"{math.degrees(motion.start):g} degrees"
+        )
+    if motion.end > parameters.range_end:
+        return motion.time_at(parameters.range_end)  # the joint goes no further
+    return motion.duration
+
+
 def _mean_speed(motion: Motion, onset: float, time: float) -> float:
     # v̄ of (2); at the onset itself its limit, the speed there
     if time == onset:
@@ -157,14 +201,16 @@ def _catch(
         mean_speed = _mean_speed(motion, onset, time)
         return bool(motion.angle(time) > parameters.catch_angle(mean_speed))
 
-    if beyond(onset):
-        return onset
-    constant = float(motion.velocity(onset)) == float(motion.velocity(slow))
+    speed = float(motion.velocity(onset))
+    constant = speed == float(motion.velocity(slow))
     if constant and not motion.turning_times(0.0, 1.0, 0.0):
         # v̄ is the speed itself, so θ_catch is one angle, reached in closed form
-        mean_speed = _mean_speed(motion, onset, slow)
-        angle = parameters.catch_angle(mean_speed)
-        return motion.time_at(angle) if beyond(slow) else None
+        if speed <= parameters.speed_threshold or not beyond(slow):
+            return None  # Fig. 7 asks for more than ν_th
+        angle = parameters.catch_angle(_mean_speed(motion, onset, slow))
+        return onset if beyond(onset) else motion.time_at(angle)
+    if beyond(onset):
+        return onset
     # θ grows, and θ_catch falls as long as v̄ grows, that is until the speed has
     # fallen to v̄; after that θ_catch rises, and may overtake θ again before `slow`.
     low = onset

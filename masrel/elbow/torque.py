@@ -46,7 +46,8 @@ def torque(
     Raises
     ------
     ParameterError
-        If a time is outside the stretch.
+        If a time is outside the stretch, or the stretch starts at or beyond the end
+        of range.
 
     Examples
     --------
@@ -71,7 +72,7 @@ def torque(
     pre_end, rise = _catch_levels(parameters, motion, found)
     caught = at >= found.catch
     values[caught] = np.where(
-        at[caught] - found.catch < parameters.peak_duration,
+        at[caught] < found.catch + parameters.peak_duration,
         pre_end + rise,  # (3), first line
         pre_end + parameters.residual_ratio * rise,  # (3), second line
     )
@@ -99,6 +100,11 @@ def peak_torque(parameters: ElbowParameters, motion: Motion) -> float:
     float
         The largest torque of the whole stretch, N·m: at an event, at an end, or
         where a phase's torque turns.
+
+    Raises
+    ------
+    ParameterError
+        If the stretch starts at or beyond the end of range.
 
     Examples
     --------

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from masrel.elbow.events import stretch_end
 from masrel.elbow.motion import Motion
 from masrel.elbow.parameters import ElbowParameters
 from masrel.elbow.sampled import SampledJoint
@@ -64,7 +65,8 @@ def trace(
     Raises
     ------
     ParameterError
-        If `rate_hz` is not more than 0.
+        If `rate_hz` is not more than 0, or the stretch starts at or beyond the end
+        of range.
 
     Examples
     --------
@@ -77,9 +79,7 @@ def trace(
     """
     if not 0.0 < rate_hz < math.inf:
         raise ParameterError(f"rate_hz: needs more than 0, got {rate_hz}")
-    end = motion.duration
-    if motion.end > parameters.range_end > motion.start:
-        end = motion.time_at(parameters.range_end)
+    end = stretch_end(parameters, motion)
     time = np.arange(math.floor(end * rate_hz) + 1) / rate_hz
     angle, velocity = motion.angle(time), motion.velocity(time)
     joint = SampledJoint(parameters, start_angle=motion.start)
