@@ -248,7 +248,10 @@ class MinimumJerk:
         force = stiffness * share
         force = force + damping / duration * share.deriv()
         force = force + inertia / duration**2 * share.deriv(2)
+        slope = force.deriv()
+        # A leading term that is nothing within 0 to 1 would spoil the other roots.
+        slope = slope.trim(np.finfo(np.float64).eps * np.abs(slope.coef).max())
         # A complex root's real part is no stationary time, but a time all the same:
         # whoever takes the largest torque over these loses nothing by it.
-        shares = force.deriv().roots().real
+        shares = slope.roots().real
         return tuple(float(s) * duration for s in shares if 0.0 < s < 1.0)

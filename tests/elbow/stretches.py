@@ -1,0 +1,136 @@
+"""Stretches, joints and counters that the tests of the elbow share."""
+
+import csv
+from math import radians
+from pathlib import Path
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from hypothesis import strategies as st
+
+from masrel.elbow import ConstantSpeed, ElbowParameters, MinimumJerk, Motion
+
+PUBLISHED = Path(__file__).parents[2] / "studies/hess2012/ratings/published.csv"
+
+START_DEG, END_DEG = 30.0, 146.0
+
+
+class Published(NamedTuple):
+    model: str
+    speed_deg_s: float
+
+
+def table_v() -> list[Published]:
+    """The 32 models and mean speeds of Table V."""
+    with PUBLISHED.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    return [Published(row["model"], float(row["mean_speed_deg_s"])) for row in rows]
+
+
+def constant(
+    speed_deg_s: float, *, start_deg: float = START_DEG, end_deg: float = END_DEG
+) -> ConstantSpeed:
+    return ConstantSpeed(
+        start=radians(start_deg), end=radians(end_deg), speed=radians(speed_deg_s)
+    )
+
+
+def minimum_jerk(
+    speed_deg_s: float, *, start_deg: float = START_DEG, end_deg: float = END_DEG
+) -> MinimumJerk:
+    return MinimumJerk(
+        start=radians(start_deg), end=radians(end_deg), mean_speed=radians(speed_deg_s)
+    )
+
+
+@st.composite
+def joints(draw: st.DrawFn, *, inertia: bool = True) -> ElbowParameters:
+    """Draw a joint around those of Table III, its constants changed as well."""
+
+    def between(low: float, high: float) -> float:
+        return draw(st.floats(low, high))
+
+    return ElbowParameters(
+        catch_angle_constant=radians(between(95.0, 135.0)),
+        catch_torque_constant=between(0.0, 5.0),
+        residual_ratio=between(0.0, 0.95),
+        catch_travel=radians(between(5.0, 70.0)),
+        inertia=draw(st.sampled_from([0.0, 0.05])) if inertia else 0.0,
+        damping=between(0.0, 2.0),
+        stiffness=between(0.0, 5.0),
+        catch_slope=between(0.1, 0.5),
+        peak_duration=between(0.02, 0.2),
+        post_catch_stiffness=between(0.0, 8.0),
+        post_catch=draw(st.sampled_from(["continuous", "additive"])),
+    )
+
+
+@st.composite
+def motions(draw: st.DrawFn) -> Motion:
+    """Draw a stretch at 5 to 200 deg/s, of either kind, short or beyond the limit."""
+    kind = draw(st.sampled_from([constant, minimum_jerk]))
+    start = draw(st.floats(0.0, 60.0))
+    end = draw(st.floats(80.0, 175.0))
+    return kind(draw(st.floats(5.0, 200.0)), start_deg=start, end_deg=end)
+
+
+class CountedMotion:
+    """A motion that counts how often, and at how many times, it is asked."""
+
+    def __init__(self, motion: Motion) -> None:
+        self._motion = motion
+        self.n_calls = 0
+        self.n_times = 0
+        self.largest = 0  # times in one call
+
+    def _count(self, time: object) -> None:
+        size = int(np.size(time))
+        self.n_calls += 1
+        self.n_times += size
+        self.largest = max(self.largest, size)
+
+    @property
+    def start(self) -> float:
+        return self._motion.start
+
+    @property
+    def end(self) -> float:
+        return self._motion.end
+
+    @property
+    def duration(self) -> float:
+        return self._motion.duration
+
+    def angle(self, time):
+        self._count(time)
+        return self._motion.angle(time)
+
+    def velocity(self, time):
+        self._count(time)
+        return self._motion.velocity(time)
+
+    def acceleration(self, time):
+        self._count(time)
+        return self._motion.acceleration(time)
+
+    def time_at(self, angle: float) -> float:
+        return self._motion.time_at(angle)
+
+    def times_above(self, speed: float) -> tuple[float, float] | None:
+        return self._motion.times_above(speed)
+
+    def turning_times(
+        self, stiffness: float, damping: float, inertia: float
+    ) -> tuple[float, ...]:
+        return self._motion.turning_times(stiffness, damping, inertia)
+
+
+class CountedJoint(ElbowParameters):
+    """A joint that counts how often its catch angle is evaluated."""
+
+    __slots__ = ()
+    n_catch_angles: ClassVar[int] = 0
+
+    def catch_angle(self, mean_speed: float) -> float:
+        type(self).n_catch_angles += 1
+        return super().catch_angle(mean_speed)
