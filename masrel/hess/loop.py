@@ -55,7 +55,8 @@ def run_presentation(
     The presentation ends when the arm has been slower than 5 deg/s for 0.1 s within 3
     deg of `end_angle` or beyond, or at `max_duration_s`, with zero torque. A limit or
     an error of the device ends it with a fault: zero torque, device closed. Any
-    other exception does the same and goes on to the caller.
+    other exception does the same and goes on to the caller, with a note when the
+    device did not take the zero torque.
 
     Parameters
     ----------
@@ -82,7 +83,7 @@ def run_presentation(
     Raises
     ------
     ParameterError
-        If the rate or the duration is not above 0.
+        If the rate or the duration is not above 0, or `end_angle` is not finite.
     DeviceError
         If the device is not open to begin with.
 
@@ -111,6 +112,8 @@ def run_presentation(
             "rate_hz, max_duration_s: need more than 0, "
             f"got {rate_hz} Hz and {max_duration_s} s"
         )
+    if not math.isfinite(end_angle):
+        raise ParameterError(f"end_angle: needs a finite angle, got {end_angle} rad")
     if not device.is_open:
         raise DeviceError(f"{device.name}: needs an open device to present on")
     n_ticks = math.ceil(max_duration_s * rate_hz)
@@ -132,7 +135,7 @@ def run_presentation(
         "fault": fault,
         "ended": ended,
         "grip_lost": controller.grip_lost,
-        **movement_facts(columns, controller.speed_threshold),
+        **movement_facts(columns, controller.speed_threshold, fault),
     }
     recording = Recording(columns=columns, facts=facts)
     return Presented(recording=recording, fault=fault, n_missed_ticks=ticks.n_missed)
@@ -140,20 +143,21 @@ def run_presentation(
 
 def _guarded(ticks: Ticks, device: Device) -> tuple[str, str | None]:
     # -> how it ended, fault; whatever happens, the torque is zero afterwards
-    ended, fault = "fault", None
     with _collector_off():
         try:
-            outcome = ticks.run()
+            ended = ticks.run()
             device.command(0.0)
-            ended = outcome
-        except DeviceError as error:
+        except BaseException as error:
+            unsafe = _close(device)  # before anything else, whatever came
+            if not isinstance(error, DeviceError):
+                if unsafe is not None:
+                    error.add_note(f"closing the device: {unsafe}")
+                raise
             fault = str(error)
-        finally:
-            unsafe = _close(device) if ended == "fault" else None
-    if fault is not None:
-        ticks.mark_fault()
-        fault = fault if unsafe is None else f"{fault}; closing it: {unsafe}"
-    return ended, fault
+        else:
+            return ended, None
+    ticks.mark_fault()
+    return "fault", fault if unsafe is None else f"{fault}; closing it: {unsafe}"
 
 
 @contextmanager

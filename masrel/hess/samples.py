@@ -89,7 +89,7 @@ class Samples:
 
 
 def movement_facts(
-    columns: Columns, speed_threshold: float
+    columns: Columns, speed_threshold: float, fault: str | None
 ) -> dict[str, str | float | None]:
     """Return what a recording's facts say of the movement.
 
@@ -99,16 +99,23 @@ def movement_facts(
         Columns of a recording.
     speed_threshold : float
         ν_th, rad/s.
+    fault : str or None
+        What stopped the presentation.
 
     Returns
     -------
     dict
-        ``phases``, ``catch_angle_deg`` and ``mean_speed_deg_s``.
+        ``phases``, ``catch_angle_deg`` and ``mean_speed_deg_s``. After a fault before
+        the catch there is no mean speed: the last reading may be what was wrong.
     """
+    caught = catch_angle_deg(columns)
+    whole = fault is None or caught is not None
     return {
         "phases": ", ".join(phase_sequence(columns)),
-        "catch_angle_deg": catch_angle_deg(columns),
-        "mean_speed_deg_s": mean_speed_deg_s(columns, speed_threshold),
+        "catch_angle_deg": caught,
+        "mean_speed_deg_s": (
+            mean_speed_deg_s(columns, speed_threshold) if whole else None
+        ),
     }
 
 

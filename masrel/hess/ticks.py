@@ -2,6 +2,7 @@
 
 import math
 
+from masrel.errors import DeviceError
 from masrel.hess.clock import Clock
 from masrel.hess.controller import Controller
 from masrel.hess.device import Device
@@ -11,6 +12,8 @@ from masrel.hess.velocity import VelocityEstimate
 
 __all__ = ["Ticks"]
 
+# A hand that presses against the end stop rests within a few tenths of a degree of
+# it; one encoder step makes 0.8 deg/s; 0.1 s is shorter than a person's reaction.
 _ARRIVAL_TOLERANCE = math.radians(3.0)
 _ARRIVAL_SPEED = math.radians(5.0)
 _ARRIVAL_TIME_S = 0.1
@@ -121,6 +124,11 @@ class Ticks:
         # Read, estimate, check, decide, send, record -> time s, angle, speed
         time_ns, angle = self._device.read()
         time_s = (time_ns - self._start_ns) * 1e-9
+        if self._latest is not None and time_s <= self._latest[0]:
+            raise DeviceError(
+                f"reading: needs one newer than the last, of {self._latest[0]:.6f} s, "
+                f"got one of {time_s:.6f} s"
+            )
         velocity = self._estimate.update(time_s, angle)
         self._latest = latest = (time_s, angle, velocity)
         self._limits.check_motion(angle, velocity)

@@ -44,7 +44,7 @@ def test_what_lies_on_the_limits_passes() -> None:
 
 
 def test_one_missed_tick_too_many_is_named() -> None:
-    with pytest.raises(LimitExceededError, match="at most 3 .* missed 4"):
+    with pytest.raises(LimitExceededError, match=r"at most 3 .* missed 4"):
         LIMITS.check_missed(4)
 
 

@@ -1,0 +1,480 @@
+"""The loop of one presentation: pace, faults, endings, and the same result twice."""
+
+import gc
+import json
+import math
+import warnings
+from math import radians
+
+import numpy as np
+import pytest
+
+from masrel.elbow import STANDARD_MODELS
+from masrel.errors import DeviceError, OverrunWarning, ParameterError
+from masrel.hess import (
+    Controller,
+    DeviceLimits,
+    RealClock,
+    SimulatedClock,
+    SimulatedHand,
+    open_device,
+    run_presentation,
+)
+from masrel.recording import RECORDING_COLUMNS, write_recording
+
+from .rig import LIMITS, START, ScriptedDevice, present
+
+PERIOD_NS = 1_000_000
+
+
+class LateClock(SimulatedClock):
+    """A simulated clock whose sleep returns late at chosen deadlines."""
+
+    __slots__ = ("deadlines", "overshoots")
+
+    def __init__(self, overshoots: dict[int, int], start_ns: int = 0) -> None:
+        super().__init__(start_ns)
+        self.overshoots = overshoots  # deadline ns -> how late, ns
+        self.deadlines: list[int] = []
+
+    def sleep_until_ns(self, deadline_ns: int) -> None:
+        self.deadlines.append(deadline_ns)
+        late_ns = self.overshoots.get(deadline_ns, 0)
+        super().sleep_until_ns(deadline_ns + late_ns)
+
+
+def rest(clock, *, angle=lambda _time_s: START, limits=LIMITS, **options):
+    # One presentation of HM3 on a scripted device -> device, presented
+    device = ScriptedDevice(clock, angle)
+    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
+    device.open()
+    options = {"max_duration_s": 0.02, **options}
+    presented = run_presentation(
+        device, controller, clock=clock, limits=limits, **options
+    )
+    device.close()
+    return device, presented
+
+
+def ticks_ms(device: ScriptedDevice) -> list[float]:
+    # When a torque was sent during the ticks: the closing zeros are left out.
+    return [time_ns / PERIOD_NS for time_ns, _ in device.commands[:-2]]
+
+
+# Pace
+
+
+def test_every_tick_comes_at_its_absolute_deadline() -> None:
+    device, _ = rest(SimulatedClock(start_ns=7_000_000))
+    assert ticks_ms(device) == list(range(7, 27))
+
+
+def test_a_little_lateness_does_not_move_the_deadlines_after_it() -> None:
+    # Every sleep returns 0.3 ms late: with relative waits the last of 20 ticks would
+    # be 5.7 ms late.
+    clock = LateClock({n * PERIOD_NS: 300_000 for n in range(1, 21)})
+    device, presented = rest(clock)
+    assert ticks_ms(device) == [0.0, *(n + 0.3 for n in range(1, 20))]
+    assert clock.deadlines == [n * PERIOD_NS for n in range(1, 21)]
+    assert presented.n_missed_ticks == 0
+
+
+def test_a_late_tick_is_skipped_and_counted_never_sent_in_a_burst() -> None:
+    # The sleep for tick 5 returns at 8.4 ms: 5, 6 and 7 are over, 8 is due.
+    clock = LateClock({5 * PERIOD_NS: 3_400_000})
+    with pytest.warns(OverrunWarning, match="missed 3 ticks; they were skipped"):
+        device, presented = rest(clock)
+    assert ticks_ms(device) == [0, 1, 2, 3, 4, 8.4, *range(9, 20)]
+    assert presented.n_missed_ticks == 3
+    assert presented.recording.facts["n_missed_ticks"] == 3
+    assert presented.fault is None
+
+
+def test_a_tick_one_nanosecond_before_the_next_one_is_late_but_not_missed() -> None:
+    clock = LateClock({5 * PERIOD_NS: PERIOD_NS - 1})
+    device, presented = rest(clock)
+    assert presented.n_missed_ticks == 0
+    assert len(ticks_ms(device)) == 20
+
+
+def test_the_presentation_is_not_prolonged_by_what_it_missed() -> None:
+    clock = LateClock({15 * PERIOD_NS: 30 * PERIOD_NS})
+    with pytest.warns(OverrunWarning):
+        device, presented = rest(clock, limits=limits_with(missed_ticks=30))
+    assert ticks_ms(device) == list(range(15))
+    assert presented.recording.facts["ended"] == "max-duration"
+
+
+def test_the_time_in_the_recording_begins_at_zero_and_shows_the_gap() -> None:
+    clock = LateClock({1_000_000_005: 2_000_000}, start_ns=999_000_005)
+    with pytest.warns(OverrunWarning):
+        _, presented = rest(clock)
+    time_ms = presented.recording.columns["time_s"] * 1e3
+    assert time_ms == pytest.approx([0, *range(3, 20)], abs=1e-9)
+
+
+def test_another_rate_has_another_period() -> None:
+    device, presented = rest(SimulatedClock(), rate_hz=250)
+    assert ticks_ms(device) == [0, 4, 8, 12, 16]
+    assert presented.recording.facts["rate_hz"] == 250
+
+
+# Faults
+
+
+def limits_with(**change: float) -> DeviceLimits:
+    usual = {"torque": 20.0, "speed": radians(400.0), "missed_ticks": 20}
+    return DeviceLimits(**{**usual, **change})
+
+
+def test_too_fast_an_arm_is_a_fault_that_is_named_and_latched() -> None:
+    clock = SimulatedClock()
+    hand = SimulatedHand(start=START, end=radians(146.0), mean_speed=radians(130.0))
+    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
+    device = open_device("simulated", clock=clock, hand=hand)
+    presented = run_presentation(
+        device, controller, clock=clock, limits=limits_with(speed=radians(100.0))
+    )
+    assert presented.fault is not None
+    assert presented.fault.startswith("speed: needs at most 100 deg/s, the arm moves")
+    assert not device.is_open
+    for act in (device.open, device.read, lambda: device.command(0.0)):
+        with pytest.raises(DeviceError):
+            act()
+    with pytest.raises(DeviceError, match="needs an open device to present on"):
+        run_presentation(device, controller, clock=clock, limits=LIMITS)
+
+
+def test_a_fault_leaves_the_recording_up_to_its_moment() -> None:
+    presented = present("HM3", 130.0, limits=limits_with(speed=radians(100.0)))
+    columns = presented.recording.columns
+    assert presented.recording.facts["fault"] == presented.fault
+    assert presented.recording.facts["ended"] == "fault"
+    assert np.all(np.abs(columns["velocity_deg_s"][:-1]) <= 100.0)
+    # The last sample is the one that was too much, and what was sent then is zero.
+    assert columns["velocity_deg_s"][-1] > 100.0
+    assert columns["command_torque_nm"][-1] == 0.0
+    assert columns["command_torque_nm"][-2] != 0.0
+    whole = present("HM3", 130.0).recording.columns
+    for name in RECORDING_COLUMNS:
+        before = columns[name][:-1]
+        np.testing.assert_array_equal(before, whole[name][: before.size])
+
+
+def test_at_a_fault_zero_is_the_last_torque_and_the_device_is_let_go() -> None:
+    clock = SimulatedClock()
+    device, presented = rest(
+        clock, angle=lambda t: START if t < 0.0095 else radians(-8.0)
+    )
+    assert presented.fault == ("range: needs 0.0 to 180.0 deg, the arm is at -8.0 deg")
+    assert device.commands[-1] == (10 * PERIOD_NS, 0.0)
+    assert device.stopped
+    assert len(device.commands) == 11  # ticks 0 to 9, and one zero
+
+
+def test_more_missed_ticks_than_allowed_are_a_fault() -> None:
+    clock = LateClock({5 * PERIOD_NS: 3_400_000})
+    with pytest.warns(OverrunWarning, match="missed 3 ticks"):
+        device, presented = rest(clock, limits=limits_with(missed_ticks=2))
+    assert presented.fault == (
+        "missed ticks: needs at most 2 in a presentation, the loop missed 3"
+    )
+    assert device.commands[-1] == (8_400_000, 0.0)
+    assert presented.n_missed_ticks == 3
+    assert presented.recording.columns["time_s"][-1] == pytest.approx(8.4e-3)
+
+
+def test_a_torque_above_the_limit_is_cut_off_counted_and_recorded() -> None:
+    presented = present("HM4", 110.0, limits=limits_with(torque=5.0))
+    columns, facts = presented.recording.columns, presented.recording.facts
+    assert presented.fault is None
+    assert np.max(np.abs(columns["command_torque_nm"])) == 5.0
+    assert np.max(columns["model_torque_nm"]) > 5.0
+    cut = np.count_nonzero(np.abs(columns["command_torque_nm"]) == 5.0)
+    assert facts["n_saturated_ticks"] == cut > 0
+
+
+def test_a_torque_that_is_no_number_is_a_fault() -> None:
+    clock = SimulatedClock()
+    device = ScriptedDevice(clock)
+    controller = Controller(STANDARD_MODELS["HM3"], start_angle=math.nan)
+    with device:
+        presented = run_presentation(device, controller, clock=clock, limits=LIMITS)
+    assert presented.fault == "torque: needs a number, the controller gave nan"
+    assert [torque for _, torque in device.commands] == [0.0]
+
+
+@pytest.mark.parametrize("attribute", ["silent_after", "deaf_after"])
+def test_a_device_that_fails_is_a_fault_with_its_own_words(attribute: str) -> None:
+    clock = SimulatedClock()
+    device = ScriptedDevice(clock)
+    setattr(device, attribute, 6)
+    device.open()
+    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
+    presented = run_presentation(device, controller, clock=clock, limits=LIMITS)
+    assert presented.fault is not None
+    assert presented.fault.startswith("scripted: ")
+    assert not device.is_open
+    assert device.stopped  # also when it does not take the zero
+    assert presented.recording.columns["time_s"][-1] == pytest.approx(6e-3)
+
+
+def test_what_goes_wrong_while_closing_is_added_to_the_fault() -> None:
+    clock = SimulatedClock()
+    device = ScriptedDevice(clock)
+    device.silent_after = device.deaf_after = 6
+    device.open()
+    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
+    presented = run_presentation(device, controller, clock=clock, limits=LIMITS)
+    assert presented.fault == (
+        "scripted: no answer; closing it: scripted: does not listen"
+    )
+
+
+def test_a_reading_that_is_not_newer_than_the_last_one_is_a_fault() -> None:
+    class StuckDevice(ScriptedDevice):
+        def _read(self):
+            reading = super()._read()
+            return reading._replace(time_ns=min(reading.time_ns, 5 * PERIOD_NS))
+
+    clock = SimulatedClock()
+    device = StuckDevice(clock)
+    device.open()
+    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
+    presented = run_presentation(device, controller, clock=clock, limits=LIMITS)
+    assert presented.fault is not None
+    assert presented.fault.startswith("reading: needs one newer than the last")
+    assert not device.is_open
+
+
+@pytest.mark.parametrize("angle", [math.nan, math.inf, -math.inf, radians(200.0)])
+def test_a_fault_of_the_encoder_leaves_a_recording_that_can_be_written(
+    angle: float, tmp_path
+) -> None:
+    # The arm moves at 57 deg/s, 1 rad/s, when the encoder fails.
+    _, presented = rest(
+        SimulatedClock(), angle=lambda t: START + t if t < 0.0175 else angle
+    )
+    assert presented.fault is not None
+    assert presented.fault.startswith("range: ")
+    write_recording(presented.recording, tmp_path / "fault.npz")
+    facts = json.loads((tmp_path / "fault.json").read_text())
+    assert facts["fault"] == presented.fault
+    assert facts["mean_speed_deg_s"] is None  # no catch, and the last angle is wrong
+
+
+# Exceptions that are no fault of the device
+
+
+@pytest.mark.parametrize("interruption", [KeyboardInterrupt, SystemExit, OSError])
+def test_an_exception_leaves_zero_torque_and_a_closed_device(interruption) -> None:
+    class InterruptedClock(SimulatedClock):
+        def sleep_until_ns(self, deadline_ns: int) -> None:
+            super().sleep_until_ns(deadline_ns)
+            if deadline_ns == 7 * PERIOD_NS:
+                raise interruption
+
+    clock = InterruptedClock()
+    device = ScriptedDevice(clock)
+    device.open()
+    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
+    with pytest.raises(interruption):
+        run_presentation(device, controller, clock=clock, limits=LIMITS)
+    assert device.commands[-1] == (7 * PERIOD_NS, 0.0)
+    assert device.stopped
+    assert not device.is_open
+
+
+def test_an_exception_says_when_the_zero_was_not_taken() -> None:
+    class InterruptedClock(SimulatedClock):
+        def sleep_until_ns(self, deadline_ns: int) -> None:
+            raise KeyboardInterrupt(deadline_ns)
+
+    clock = InterruptedClock()
+    device = ScriptedDevice(clock)
+    device.deaf_after = 1
+    device.open()
+    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
+    with pytest.raises(KeyboardInterrupt) as caught:
+        run_presentation(device, controller, clock=clock, limits=LIMITS)
+    assert caught.value.__notes__ == ["closing the device: scripted: does not listen"]
+
+
+@pytest.mark.parametrize("collecting", [True, False])
+def test_the_collector_is_off_during_the_ticks_and_as_before_afterwards(
+    collecting: bool,
+) -> None:
+    seen = []
+
+    def angle(_time_s: float) -> float:
+        seen.append(gc.isenabled())
+        return START
+
+    was = gc.isenabled()
+    try:
+        (gc.enable if collecting else gc.disable)()
+        rest(SimulatedClock(), angle=angle)
+        assert gc.isenabled() is collecting
+    finally:
+        (gc.enable if was else gc.disable)()
+    assert not any(seen)
+
+
+# Endings
+
+
+def test_it_ends_when_the_arm_has_rested_at_the_end() -> None:
+    presented = present("HM2", 90.0)
+    columns, facts = presented.recording.columns, presented.recording.facts
+    assert facts["ended"] == "arrived"
+    resting = (columns["angle_deg"] >= 143.0) & (np.abs(columns["velocity_deg_s"]) <= 5)
+    since = columns["time_s"].size - int(np.argmin(resting[::-1]))
+    rested_s = columns["time_s"][-1] - columns["time_s"][since]
+    assert rested_s == pytest.approx(0.1, abs=1e-9)
+
+
+def test_a_rest_before_the_end_does_not_end_it() -> None:
+    device, presented = rest(
+        SimulatedClock(), angle=lambda _: radians(142.9), max_duration_s=0.3
+    )
+    assert presented.recording.facts["ended"] == "max-duration"
+    assert len(ticks_ms(device)) == 300
+
+
+def test_a_rest_that_is_broken_off_begins_anew() -> None:
+    # At 145 deg, but between 50 and 60 ms back at 120 deg.
+    def angle(time_s: float) -> float:
+        return radians(120.0 if 0.0495 < time_s < 0.0605 else 145.0)
+
+    _, presented = rest(
+        SimulatedClock(),
+        angle=angle,
+        max_duration_s=1.0,
+        limits=limits_with(speed=1e5),
+    )
+    # There again at 61 ms, at rest when the low-pass has forgotten the jump.
+    assert presented.recording.facts["ended"] == "arrived"
+    assert presented.recording.columns["time_s"][-1] > 0.161
+
+
+def test_a_hand_that_never_arrives_is_stopped_at_the_longest_duration() -> None:
+    presented = present("HM3", 90.0, slip_time=0.3, max_duration_s=0.8)
+    columns = presented.recording.columns
+    assert presented.recording.facts["ended"] == "max-duration"
+    assert presented.recording.n_samples == 800
+    assert columns["time_s"][-1] == pytest.approx(0.799)
+
+
+def test_without_a_fault_it_ends_with_zero_torque_and_stays_open() -> None:
+    clock = SimulatedClock()
+    device = ScriptedDevice(clock, lambda _: radians(145.0))
+    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
+    with device:
+        presented = run_presentation(device, controller, clock=clock, limits=LIMITS)
+        assert presented.recording.facts["ended"] == "arrived"
+        assert device.is_open
+        assert device.commands[-1][1] == 0.0
+        assert device.commands[-2][1] > 0.0
+
+
+# The result
+
+
+def test_the_same_presentation_twice_is_the_same_to_the_last_bit() -> None:
+    first, second = present("HM4", 73.0), present("HM4", 73.0)
+    assert first.recording.facts == second.recording.facts
+    for name in RECORDING_COLUMNS:
+        column = first.recording.columns[name]
+        assert column.tobytes() == second.recording.columns[name].tobytes()
+
+
+@pytest.mark.parametrize("start_ns", [1, 86_400_000_000_000])
+def test_the_zero_of_the_clock_changes_nothing_but_rounding(start_ns: int) -> None:
+    first, second = present("HM2", 100.0), present("HM2", 100.0, start_ns=start_ns)
+    for name in RECORDING_COLUMNS:
+        np.testing.assert_allclose(
+            second.recording.columns[name], first.recording.columns[name], atol=1e-9
+        )
+
+
+def test_the_facts_say_how_it_went() -> None:
+    presented = present("HM3", 92.0)
+    facts = presented.recording.facts
+    assert facts["simulated"] is True
+    assert facts["device"] == "simulated"
+    assert facts["fault"] is None
+    assert facts["phases"] == "pre-catch, catch, post-catch, pre-catch"
+    # θ_catch = L - α v̄ of (2) at the mean speed that the recording gives
+    assert facts["catch_angle_deg"] == pytest.approx(
+        115.0 - 0.35 * facts["mean_speed_deg_s"], abs=0.2
+    )
+    assert presented.n_missed_ticks == 0
+
+
+def test_with_a_real_clock_it_goes_the_same_way() -> None:
+    # A short stretch, 100 to 146 deg at 110 deg/s: about 0.6 s with the rests. How
+    # late the machine is may differ, so every tick may be missed without a fault.
+    start, hand = radians(100.0), {"end": radians(146.0), "mean_speed": radians(110.0)}
+    found = []
+    for clock in (RealClock(), SimulatedClock()):
+        controller = Controller(STANDARD_MODELS["HM1"], start_angle=start)
+        moved = SimulatedHand(start=start, **hand)
+        with open_device("simulated", clock=clock, hand=moved) as device:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", OverrunWarning)
+                presented = run_presentation(
+                    device,
+                    controller,
+                    clock=clock,
+                    limits=limits_with(missed_ticks=2_000),
+                    max_duration_s=1.4,
+                )
+        found.append(presented)
+    real, simulated = (presented.recording for presented in found)
+    assert real.facts["fault"] is None
+    assert real.facts["ended"] == simulated.facts["ended"] == "arrived"
+    assert real.facts["phases"] == simulated.facts["phases"]
+    assert np.all(np.diff(real.columns["time_s"]) > 0.0)
+    # Every tick was run or counted as missed.
+    n_ticks = real.n_samples + found[0].n_missed_ticks
+    assert n_ticks == math.floor(real.columns["time_s"][-1] * 1000) + 1
+    angles = np.interp(
+        real.columns["time_s"],
+        simulated.columns["time_s"],
+        simulated.columns["angle_deg"],
+    )
+    np.testing.assert_allclose(real.columns["angle_deg"], angles, atol=2.0)
+
+
+# What is refused
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"rate_hz": 0},
+        {"max_duration_s": 0.0},
+        {"max_duration_s": math.inf},
+        {"max_duration_s": math.nan},
+        {"end_angle": math.nan},
+        {"end_angle": math.inf},
+    ],
+)
+def test_what_cannot_be_run_is_refused_before_anything_moves(change) -> None:
+    clock = SimulatedClock()
+    device = ScriptedDevice(clock)
+    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
+    options = {"rate_hz": 1000, "max_duration_s": 1.0, **change}
+    name = next(iter(change))
+    with device:
+        with pytest.raises(ParameterError, match=name):
+            run_presentation(device, controller, clock=clock, limits=LIMITS, **options)
+        assert device.n_reads == 0
+        assert device.commands == []
+
+
+def test_a_closed_device_is_refused() -> None:
+    clock = SimulatedClock()
+    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
+    with pytest.raises(DeviceError, match="scripted: needs an open device to present"):
+        run_presentation(ScriptedDevice(clock), controller, clock=clock, limits=LIMITS)
