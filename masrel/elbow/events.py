@@ -211,10 +211,12 @@ def _catch(
         return onset if beyond(onset) else motion.time_at(angle)
     if beyond(onset):
         return onset
-    # θ grows, and θ_catch falls as long as v̄ grows, that is until the speed has
-    # fallen to v̄; after that θ_catch rises, and may overtake θ again before `slow`.
+    # θ - θ_catch grows as long as v̄ grows, that is until the speed has fallen to v̄;
+    # it goes on growing until θ_catch rises faster than θ, and may grow once more
+    # when v̄ < ν_L keeps θ_catch in place. Each part has at most one change.
+    fastest = _fastest_mean(motion, onset, slow)
     low = onset
-    for high in (_fastest_mean(motion, onset, slow), slow):
+    for high in (fastest, _overtaken(parameters, motion, onset, fastest, slow), slow):
         if high > low and beyond(high):
             return first_true(beyond, low, high)
         low = high
@@ -229,6 +231,27 @@ def _fastest_mean(motion: Motion, onset: float, slow: float) -> float:
     peak = 0.5 * motion.duration
     low = min(max(peak, onset), slow)
     return first_true(slower, low, slow) if slower(slow) and not slower(low) else slow
+
+
+def _overtaken(
+    parameters: ElbowParameters,
+    motion: Motion,
+    onset: float,
+    fastest: float,
+    slow: float,
+) -> float:
+    # from where, after `fastest`, θ_catch of (2) rises faster than θ: dθ_catch/dt is
+    # -α dv̄/dt with dv̄/dt = (ω - v̄)/(t - t_onset), unless v̄ > ν_H keeps θ_catch
+    def rises_faster(time: float) -> bool:
+        mean_speed = _mean_speed(motion, onset, time)
+        speed = float(motion.velocity(time))
+        rise = parameters.catch_slope * (mean_speed - speed)
+        clamped = mean_speed > parameters.fastest_mean_speed
+        return not clamped and rise > speed * (time - onset)
+
+    if rises_faster(slow) and not rises_faster(fastest):
+        return first_true(rises_faster, fastest, slow)
+    return slow
 
 
 def _phases(
