@@ -61,24 +61,28 @@ def write_analysis(analysis: Analysis, path: Path) -> None:
 
 
 def _with_inputs(part: object, analysis: Analysis) -> dict[str, object]:
-    plain = _plain(part)
-    named = dict(plain) if isinstance(plain, dict) else {"value": plain}
-    line = named.pop("line", {})  # a line of the plan reads best beside its numbers
-    return {**line, **named, "inputs": dict(analysis.inputs)}
+    # A line of the plan reads best beside its numbers.
+    named = {**_fields(getattr(part, "line", None)), **_fields(part)}
+    named.pop("line", None)
+    return {**named, "inputs": dict(analysis.inputs)}
+
+
+def _fields(part: object) -> dict[str, object]:
+    if isinstance(part, msgspec.Struct):
+        part = msgspec.structs.asdict(part)
+    elif dataclasses.is_dataclass(part):
+        names = (field.name for field in dataclasses.fields(part))
+        part = {name: getattr(part, name) for name in names}
+    if not isinstance(part, Mapping):
+        return {}
+    return {str(name): _plain(value) for name, value in part.items()}
 
 
 def _plain(value: object) -> object:
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {
-            field.name: _plain(getattr(value, field.name))
-            for field in dataclasses.fields(value)
-        }
-    if isinstance(value, msgspec.Struct):
-        return _plain(msgspec.structs.asdict(value))
+    if dataclasses.is_dataclass(value) or isinstance(value, msgspec.Struct | Mapping):
+        return _fields(value)
     if isinstance(value, float):
         return value if math.isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {str(key): _plain(part) for key, part in value.items()}
     if isinstance(value, tuple | list):
         return [_plain(part) for part in value]
     return value

@@ -45,7 +45,7 @@ def inter_rater(
         ratings, session=line.sessions[0], models=rated_models(line, protocol, ratings)
     )
     if len(matrix.raters) < 2:
-        reason = f"Session {line.sessions[0]} has one rater; agreement needs two."
+        reason = f"session {line.sessions[0]} has one rater; agreement needs two"
         return PlannedEstimate(line=line, reason=reason)
     categories = protocol.scale.grades
     estimate = coefficient(line.coefficient)(matrix.grades, categories=categories)

@@ -54,7 +54,7 @@ def retest_agreement(
         models=rated_models(line, protocol, ratings),
     )
     if not pairs.raters:
-        reason = f"No rater has ratings in both {first} and {second}."
+        reason = f"no rater has ratings in both {first} and {second}"
         return PlannedEstimate(line=line, reason=reason)
     found = _stratified if line.coefficient == "stratified_kappa" else _each_rater
     return dataclasses.replace(

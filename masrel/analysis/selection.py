@@ -55,10 +55,10 @@ def absence(line: EstimatePlan, protocol: Protocol, ratings: Ratings) -> str | N
     present = set(ratings.table["session"])
     lost = [session for session in line.sessions if session not in present]
     if lost:
-        return f"There are no ratings of session {' or '.join(lost)}."
+        return f"there are no ratings of session {' or '.join(lost)}"
     planned = _planned(line, protocol)
     if not planned:
-        return f"The study has no {line.models} models."
+        return f"the study has no {line.models} models"
     rated = set(rated_models(line, protocol, ratings))
     sessions = " and ".join(line.sessions)
     # A role without any rating was not part of these data: an estimate over the
@@ -66,7 +66,7 @@ def absence(line: EstimatePlan, protocol: Protocol, ratings: Ratings) -> str | N
     for role in ("standard", "dummy"):
         of_role = [m.id for m in protocol.models if m.role == role and m.id in planned]
         if of_role and not rated.intersection(of_role):
-            return f"No {role} model has ratings in session {sessions}."
+            return f"no {role} model has ratings in session {sessions}"
     return None
 
 

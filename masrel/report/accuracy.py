@@ -1,7 +1,7 @@
 """Sections `intended` and `in-person`: grades against what they should equal."""
 
-from masrel.report.material import Material, Paragraph, Section
-from masrel.report.tables import Column, Table, number
+from masrel.report.material import Material, Paragraph, Section, absent_section
+from masrel.report.tables import Column, Table, counted, number
 
 __all__ = ["in_person_section", "intended_section"]
 
@@ -22,8 +22,8 @@ def intended_section(material: Material) -> Section:
     found = material.analysis.intended
     title = "Agreement with the intended grade"
     if found is None or not found.models:
-        why = "It was not computed." if found is None else str(found.reason)
-        return _absent("intended", title, why)
+        why = None if found is None else found.reason
+        return absent_section("intended", title, why)
     table = Table(
         name="intended",
         caption=f"Raters who gave the intended grade, session {found.session}",
@@ -38,12 +38,13 @@ def intended_section(material: Material) -> Section:
             (row.model, row.intended_grade, row.n_ratings, row.n_agree, row.percent)
             for row in found.models
         ),
-        notes=() if found.reason is None else (found.reason,),
+        notes=() if found.reason is None else (f"Mean or SD: {found.reason}.",),
         data=material.data,
     )
     said = (
-        f"Mean over the {len(found.models)} standard models: {number(found.mean, 1)} % "
-        f"(standard deviation between models {number(found.sd, 1)}, n − 1)."
+        f"Mean over the {counted(len(found.models), 'standard model')}: "
+        f"{number(found.mean, 1)} % (standard deviation between models "
+        f"{number(found.sd, 1)}, n − 1)."
     )
     return Section(name="intended", title=title, blocks=(table, Paragraph(text=said)))
 
@@ -64,8 +65,8 @@ def in_person_section(material: Material) -> Section:
     found = material.analysis.in_person
     title = "In-person and haptic grades"
     if found is None or found.n_pairs == 0:
-        why = "It was not computed." if found is None else str(found.reason)
-        return _absent("in-person", title, why)
+        why = None if found is None else found.reason
+        return absent_section("in-person", title, why)
     table = Table(
         name="in_person",
         caption=(
@@ -109,8 +110,3 @@ def _remarks(material: Material) -> tuple[str, ...]:
         if row.note
     )
     return tuple(dict.fromkeys(said))
-
-
-def _absent(name: str, title: str, why: str) -> Section:
-    text = f"Not in these data. {why}"
-    return Section(name=name, title=title, blocks=(Paragraph(text=text, absent=True),))

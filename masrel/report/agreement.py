@@ -4,37 +4,15 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from masrel.analysis import PlannedEstimate
-from masrel.report.estimate_rows import (
-    TARGETS,
-    EstimateRow,
-    estimate_rows,
-    interval_name,
-    meanings,
-)
+from masrel.report.estimate_rows import EstimateRow, estimate_rows, meanings
+from masrel.report.estimate_table import estimate_table
 from masrel.report.material import Drawing, Material, Paragraph, Section
-from masrel.report.tables import ABSENT, LANDIS_KOCH, Column, Table, Value, strength
+from masrel.report.tables import Table
 
 if TYPE_CHECKING:
     from masrel.report.figures import Drawn
 
-__all__ = ["agreement_section", "agreement_table", "retest_section"]
-
-COLUMNS = (
-    Column(key="id", heading="Estimate", align="left"),
-    Column(key="coefficient", heading="Coefficient", align="left"),
-    Column(key="models", heading="Models", align="left"),
-    Column(key="sessions", heading="Session", align="left"),
-    Column(key="n_items", heading="n models"),
-    Column(key="n_raters", heading="n raters"),
-    Column(key="value", heading="Value", digits=3),
-    Column(key="low", heading="Low", digits=3),
-    Column(key="high", heading="High", digits=3),
-    Column(key="interval", heading="Interval", align="left"),
-    Column(key="target", heading="Speaks of", align="left"),
-    Column(key="strength", heading="Strength", align="left"),
-    Column(key="observed", heading="Observed", digits=3),
-    Column(key="chance", heading="By chance", digits=3),
-)
+__all__ = ["agreement_section", "retest_section"]
 
 
 def agreement_section(material: Material) -> Section:
@@ -73,51 +51,18 @@ def retest_section(material: Material) -> Section:
     return Section(name="test-retest", title="Test-retest agreement", blocks=blocks)
 
 
-def agreement_table(
-    rows: Sequence[EstimateRow], *, name: str, caption: str, data: str
-) -> Table:
-    """Make a table of estimates.
-
-    Parameters
-    ----------
-    rows : sequence of EstimateRow
-        The estimates.
-    name, caption : str
-        Name of its file and what it shows.
-    data : str
-        Where the data come from.
-
-    Returns
-    -------
-    Table
-        One row per estimate: interval, method, target and numbers.
-    """
-    notes = [f"{row.name}: {remark}" for row in rows for remark in row.remarks]
-    if any(_word(row) is not None for row in rows):
-        notes.append(LANDIS_KOCH)
-    return Table(
-        name=name,
-        caption=caption,
-        columns=COLUMNS,
-        rows=tuple(_cells(row) for row in rows),
-        notes=tuple(notes),
-        data=data,
-    )
-
-
 def _blocks(
     material: Material, kind: str, name: str, caption: str
 ) -> tuple[Paragraph | Table | Drawing, ...]:
     planned = [p for p in material.analysis.estimates if p.line.kind == kind]
     if not planned:
         return (Paragraph(text="The plan asks for no such estimate.", absent=True),)
-    missing = tuple(_missing(entry) for entry in planned if _is_missing(entry))
-    if len(missing) == len(planned):
-        return missing
+    if all(_is_missing(entry) for entry in planned):
+        return tuple(_missing(entry) for entry in planned)
     rows = estimate_rows(planned)
-    table = agreement_table(rows, name=name, caption=caption, data=material.data)
+    table = estimate_table(rows, name=name, caption=caption, data=material.data)
     said = tuple(Paragraph(text=text) for text in meanings(rows))
-    return (table, *said, _forest(material, rows, name, caption), *missing)
+    return (table, *said, _forest(material, rows, name, caption))
 
 
 def _is_missing(entry: PlannedEstimate) -> bool:
@@ -125,40 +70,8 @@ def _is_missing(entry: PlannedEstimate) -> bool:
 
 
 def _missing(entry: PlannedEstimate) -> Paragraph:
-    text = f"{entry.line.id}: not in these data. {entry.reason}"
+    text = f"{entry.line.id}: not in these data: {entry.reason}."
     return Paragraph(text=text, absent=True)
-
-
-def _word(row: EstimateRow) -> str | None:
-    if row.estimate is None:
-        return None
-    word = strength(row.estimate.coefficient, row.estimate.value)
-    return None if word == ABSENT else word
-
-
-def _cells(row: EstimateRow) -> tuple[Value, ...]:
-    head = (row.name, row.coefficient, row.models, row.sessions)
-    estimate, interval = row.estimate, row.interval
-    if estimate is None:
-        return (*head, *[None] * 5, row.text, *[None] * 4)
-    ends = (None, None, None, None)
-    if interval is not None:
-        ends = (
-            interval.low,
-            interval.high,
-            interval_name(interval),
-            TARGETS[interval.target],
-        )
-    return (
-        *head,
-        estimate.n_items,
-        estimate.n_raters,
-        estimate.value,
-        *ends,
-        _word(row),
-        estimate.observed,
-        estimate.chance,
-    )
 
 
 def _forest(
@@ -178,7 +91,7 @@ def _forest(
             )
             for row in rows
         ]
-        axis = "agreement (1 is perfect, 0 is what chance gives a κ)"
+        axis = "agreement (1: perfect; for a κ, 0: as by chance)"
         return figures.draw_forest(lines, axis_label=axis, stamp=material.stamp)
 
     told = "; ".join(f"{row.coefficient}, {row.name}: {row.text}" for row in rows)

@@ -3,9 +3,16 @@
 from masrel.protocol import Protocol
 from masrel.report.grid import grade_grid
 from masrel.report.material import Drawing, Material, Paragraph, Section
-from masrel.report.tables import Column, Table
+from masrel.report.tables import Column, Table, counted, decimals_given
 
 __all__ = ["design_section", "grades_section"]
+
+_PARAMETERS = (
+    ("catch_angle_constant_deg", "L (deg)"),
+    ("catch_torque_nms_rad", "H (N·m·s/rad)"),
+    ("residual_ratio", "Q"),
+    ("catch_travel_deg", "D (deg)"),
+)
 
 
 def design_section(material: Material) -> Section:
@@ -25,14 +32,15 @@ def design_section(material: Material) -> Section:
     study = protocol.study
     n_standard = sum(1 for model in protocol.models if model.role == "standard")
     said = [
-        f"{study.title}. {len(protocol.models)} haptic models ({n_standard} standard, "
-        f"{len(protocol.models) - n_standard} dummy), {len(protocol.raters)} raters, "
-        f"{len(protocol.sessions)} session(s); scale {protocol.scale.name}: "
+        f"{study.title}. {counted(len(protocol.models), 'haptic model')} ({n_standard} "
+        f"standard, {len(protocol.models) - n_standard} dummy), "
+        f"{counted(len(protocol.raters), 'rater')}, "
+        f"{counted(len(protocol.sessions), 'session')}; scale {protocol.scale.name}: "
         f"{', '.join(protocol.scale.grades)}."
     ]
     said.extend(text for text in (study.notes,) if text)
-    if study.source:
-        said.append(f"Source: {study.source}")
+    if study.source and material.data != "published":  # else it is in the head
+        said.append(f"The study follows {study.source}.")
     if material.ratings.simulated:
         said.append(_simulation(protocol))
     return Section(
@@ -58,18 +66,11 @@ def _simulation(protocol: Protocol) -> str:
 
 
 def _models_table(material: Material) -> Table:
-    rows = tuple(
-        (
-            model.id,
-            model.role,
-            model.intended_grade,
-            float(model.catch_angle_constant_deg),
-            float(model.catch_torque_nms_rad),
-            float(model.residual_ratio),
-            float(model.catch_travel_deg),
-        )
-        for model in material.protocol.models
-    )
+    models = material.protocol.models
+    parameters = [
+        tuple(float(getattr(model, key)) for key, _ in _PARAMETERS) for model in models
+    ]
+    digits = [decimals_given(values) for values in zip(*parameters, strict=True)]
     return Table(
         name="models",
         caption="Haptic models and their parameters",
@@ -77,15 +78,19 @@ def _models_table(material: Material) -> Table:
             Column(key="model", heading="Model", align="left"),
             Column(key="role", heading="Role", align="left"),
             Column(key="intended_grade", heading="Intended grade", align="center"),
-            Column(key="catch_angle_constant_deg", heading="L (deg)", digits=1),
-            Column(key="catch_torque_nms_rad", heading="H (N·m·s/rad)", digits=2),
-            Column(key="residual_ratio", heading="Q", digits=2),
-            Column(key="catch_travel_deg", heading="D (deg)", digits=1),
+            *(
+                Column(key=key, heading=heading, digits=decimals)
+                for (key, heading), decimals in zip(_PARAMETERS, digits, strict=True)
+            ),
         ),
-        rows=rows,
+        rows=tuple(
+            (model.id, model.role, model.intended_grade, *own)
+            for model, own in zip(models, parameters, strict=True)
+        ),
         notes=(
-            "L: catch angle constant; H: catch torque per stretching speed; Q: residual "
-            "over peak torque of the catch; D: angle travelled during the catch.",
+            "L: catch angle constant; H: catch torque per stretching speed; Q: "
+            "residual over peak torque of the catch; D: angle travelled during the "
+            "catch.",
         ),
         data=material.data,
     )
@@ -116,7 +121,7 @@ def _constants_table(material: Material) -> Table:
         columns=(
             Column(key="symbol", heading="Symbol", align="left"),
             Column(key="meaning", heading="Meaning", align="left"),
-            Column(key="value", heading="Value", digits=2),
+            Column(key="value", heading="Value"),
         ),
         rows=rows,
         data=material.data,

@@ -4,9 +4,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from masrel.agreement import COEFFICIENTS
 from masrel.analysis import PlannedEstimate
 from masrel.estimates import Estimate, Interval
-from masrel.report.tables import interval_words, number
+from masrel.report.tables import counted, interval_words, number
 
 __all__ = [
     "TARGETS",
@@ -17,14 +18,11 @@ __all__ = [
     "meanings",
 ]
 
-_NAMES = {
-    "fleiss_kappa": "Fleiss' κ",
-    "cohen_kappa": "Cohen's κ",
-    "stratified_kappa": "κ stratified over raters",
-    "percent_agreement": "Percent agreement (0-1)",
+TARGETS = {
+    "raters": "other raters",
+    "items": "other models",
+    "both": "other raters and models",
 }
-
-TARGETS = {"raters": "other raters", "items": "other models", "both": "both"}
 """Target of an interval to what it speaks of."""
 
 _POPULATIONS = {
@@ -50,6 +48,8 @@ class EstimateRow:
         The estimate.
     reason : str or None
         Why there is none.
+    is_own : bool
+        Whether it is one rater's agreement with him- or herself.
     """
 
     name: str
@@ -58,6 +58,14 @@ class EstimateRow:
     sessions: str
     estimate: Estimate | None
     reason: str | None
+    is_own: bool = False
+
+    @property
+    def n_raters(self) -> int | None:
+        """Raters it rests on: one, where a rater is compared with him- or herself."""
+        if self.estimate is None:
+            return None
+        return 1 if self.is_own else self.estimate.n_raters
 
     @property
     def interval(self) -> Interval | None:
@@ -81,7 +89,10 @@ class EstimateRow:
         """How much it rests on, and what its interval speaks of."""
         if self.estimate is None:
             return f"{self.models} models, {self.sessions}"
-        size = f"{self.estimate.n_items} models, {self.estimate.n_raters} raters"
+        size = counted(self.estimate.n_items, "model")
+        size += (
+            ", twice" if self.is_own else f", {counted(self.n_raters or 0, 'rater')}"
+        )
         if self.interval is None:
             return size
         return f"{size}; {self.interval.kind}, {TARGETS[self.interval.target]}"
@@ -112,7 +123,9 @@ def coefficient_name(coefficient: str) -> str:
     str
         Its name in print.
     """
-    return _NAMES.get(coefficient, coefficient.replace("_", " "))
+    title = COEFFICIENTS[coefficient].title
+    # A share as all others are: 1 is all, not 100.
+    return f"{title} (0–1)" if coefficient == "percent_agreement" else title
 
 
 def interval_name(interval: Interval) -> str:
@@ -166,6 +179,7 @@ def estimate_rows(planned: Sequence[PlannedEstimate]) -> tuple[EstimateRow, ...]
                 sessions=sessions,
                 estimate=own.estimate,
                 reason=None,
+                is_own=True,
             )
             for own in entry.by_rater
         )

@@ -1,14 +1,18 @@
 """The grid of one session's grades: models by raters, as a table and a figure."""
 
+from collections import Counter
 from typing import TYPE_CHECKING
 
 from masrel.report.material import Drawing, Material
-from masrel.report.tables import Column, Table
+from masrel.report.tables import Column, Table, counted
 
 if TYPE_CHECKING:
     from masrel.report.figures import Drawn
 
 __all__ = ["grade_grid"]
+
+# by model and rater, the grades of every presentation; none is missing
+_Grades = tuple[tuple[tuple[str, ...], ...], ...]
 
 
 def grade_grid(material: Material, session: str) -> tuple[Table, Drawing]:
@@ -28,7 +32,7 @@ def grade_grid(material: Material, session: str) -> tuple[Table, Drawing]:
     """
     raters, models, grades = _cells(material, session)
     intended = {m.id: m.intended_grade for m in material.protocol.models}
-    n_missing = sum(grade is None for row in grades for grade in row)
+    n_missing = sum(not cell for row in grades for cell in row)
     table = Table(
         name=f"grades_{session}",
         caption=f"Grades of session {session}: models by raters",
@@ -38,10 +42,12 @@ def grade_grid(material: Material, session: str) -> tuple[Table, Drawing]:
             *(Column(key=rater, heading=rater, align="center") for rater in raters),
         ),
         rows=tuple(
-            (model, intended[model], *row)
+            (model, intended[model], *(", ".join(cell) or None for cell in row))
             for model, row in zip(models, grades, strict=True)
         ),
-        notes=(f"{n_missing} rating(s) missing, shown as –.",) if n_missing else (),
+        notes=(f"{counted(n_missing, 'rating')} missing, shown as –.",)
+        if n_missing
+        else (),
         data=material.data,
     )
 
@@ -70,9 +76,9 @@ def grade_grid(material: Material, session: str) -> tuple[Table, Drawing]:
 
 def _cells(
     material: Material, session: str
-) -> tuple[tuple[str, ...], tuple[str, ...], tuple[tuple[str | None, ...], ...]]:
+) -> tuple[tuple[str, ...], tuple[str, ...], _Grades]:
     table = material.ratings.table
-    rows = table[table["session"] == session]
+    rows = table[table["session"] == session].sort_values("repeat", kind="stable")
     present = set(rows["rater"])
     raters = tuple(r.id for r in material.protocol.raters if r.id in present)
     known = set(rows["model"])
@@ -83,21 +89,18 @@ def _cells(
     ):
         if isinstance(grade, str):
             given.setdefault((model, rater), []).append(grade)
-    grades = tuple(
-        tuple(", ".join(given[m, r]) if (m, r) in given else None for r in raters)
-        for m in models
-    )
+    grades = tuple(tuple(tuple(given.get((m, r), ())) for r in raters) for m in models)
     return raters, models, grades
 
 
 def _alt(
     models: tuple[str, ...],
-    grades: tuple[tuple[str | None, ...], ...],
+    grades: _Grades,
     intended: dict[str, str | None],
 ) -> str:
     parts = []
     for model, row in zip(models, grades, strict=True):
-        counts = {grade: row.count(grade) for grade in row if grade is not None}
+        counts = Counter(grade for cell in row for grade in cell)
         listed = ", ".join(f"{n} of grade {grade}" for grade, n in counts.items())
         aim = intended[model]
         meant = "" if aim is None else f" (intended {aim})"

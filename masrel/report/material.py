@@ -12,7 +12,7 @@ from masrel.report.tables import Table
 if TYPE_CHECKING:
     from masrel.report.figures import Drawn
 
-__all__ = ["Drawing", "Material", "Paragraph", "Section"]
+__all__ = ["Drawing", "Material", "Paragraph", "Section", "absent_section"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -135,3 +135,23 @@ class Section:
     name: str
     title: str
     blocks: tuple[Paragraph | Table | Drawing, ...]
+
+
+def absent_section(name: str, title: str, reason: str | None) -> Section:
+    """Make a section whose data are not there, and say why.
+
+    Parameters
+    ----------
+    name, title : str
+        Its name in the protocol's ``report.sections``, and its heading.
+    reason : str or None
+        Why, as a clause; None when it was not computed.
+
+    Returns
+    -------
+    Section
+        The section with one paragraph.
+    """
+    why = "this was not computed" if reason is None else reason
+    said = Paragraph(text=f"Not in these data: {why}.", absent=True)
+    return Section(name=name, title=title, blocks=(said,))

@@ -4,7 +4,13 @@ import math
 from typing import TYPE_CHECKING
 
 from masrel.analysis import Speeds, SpeedSummary
-from masrel.report.material import Drawing, Material, Paragraph, Section
+from masrel.report.material import (
+    Drawing,
+    Material,
+    Paragraph,
+    Section,
+    absent_section,
+)
 from masrel.report.tables import Column, Table, number, whole_or_tenths
 
 if TYPE_CHECKING:
@@ -28,18 +34,14 @@ def speeds_section(material: Material) -> Section:
     """
     found = material.analysis.speeds
     if found is None or not found.values:
-        why = "They were not computed." if found is None else str(found.reason)
-        text = f"Not in these data. {why}"
-        blocks: tuple[Paragraph | Table | Drawing, ...] = (
-            Paragraph(text=text, absent=True),
-        )
-        return Section(name="speeds", title="Stretching speeds", blocks=blocks)
+        why = None if found is None else found.reason
+        return absent_section("speeds", "Stretching speeds", why)
     about = (
         "Mean speed of the phase before the catch, which sets the catch angle by "
         "equation (2); below ν_L the catch angle no longer changes."
     )
     if found.n_missing:
-        about += f" The speed of {found.n_missing} rating(s) is not known."
+        about += f" Ratings whose speed is not known: {found.n_missing}."
     return Section(
         name="speeds",
         title="Stretching speeds",

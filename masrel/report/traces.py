@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING
 from masrel.analysis import Speed
 from masrel.elbow import ConstantSpeed, ElbowParameters, peak_torque, trace
 from masrel.protocol import elbow_parameters
-from masrel.report.material import Drawing, Material, Paragraph, Section
+from masrel.report.material import (
+    Drawing,
+    Material,
+    Paragraph,
+    Section,
+    absent_section,
+)
 from masrel.report.tables import Column, Table, number, whole_or_tenths
 
 if TYPE_CHECKING:
@@ -34,10 +40,8 @@ def traces_section(material: Material) -> Section:
     speeds = material.analysis.speeds
     title = "Torque traces"
     if speeds is None or not speeds.values:
-        why = "Speeds were not computed." if speeds is None else str(speeds.reason)
-        text = f"Not in these data: a trace needs a stretching speed. {why}"
-        absent = Paragraph(text=text, absent=True)
-        return Section(name="traces", title=title, blocks=(absent,))
+        why = None if speeds is None else speeds.reason
+        return absent_section("traces", title, why)
     session = next(s for s in material.sessions if s in _sessions_of(speeds.values))
     values = [value for value in speeds.values if value.session == session]
     models = [

@@ -1,0 +1,125 @@
+"""The table of estimates: narrow on a page, every field in the CSV."""
+
+from collections.abc import Sequence
+
+from masrel.estimates import Interval
+from masrel.report.estimate_rows import TARGETS, EstimateRow, interval_name
+from masrel.report.tables import (
+    ABSENT,
+    LANDIS_KOCH,
+    Column,
+    Table,
+    Value,
+    interval_words,
+    strength,
+)
+
+__all__ = ["estimate_table"]
+
+_MARKS = "ᵃᵇᶜᵈᵉᶠᵍʰⁱʲᵏˡᵐⁿᵒᵖʳˢᵗᵘᵛʷˣʸᶻ"
+
+_COLUMNS = (
+    Column(key="id", heading="Estimate", align="left"),
+    Column(key="coefficient", heading="Coefficient", align="left"),
+    Column(key="models", heading="Models", align="left"),
+    Column(key="sessions", heading="Session", align="left"),
+    Column(key="n_items", heading="n models"),
+    Column(key="n_raters", heading="n raters"),
+    Column(key="value", heading="Value", digits=3),
+    Column(key="interval_shown", heading="Interval", where="page"),
+    Column(key="low", heading="Low", digits=3, where="csv"),
+    Column(key="high", heading="High", digits=3, where="csv"),
+    Column(key="interval", heading="Interval", where="csv"),
+    Column(key="target", heading="Speaks of", where="csv"),
+    Column(key="strength", heading="Strength", align="left"),
+    Column(key="observed", heading="Observed", digits=3),
+    Column(key="chance", heading="By chance", digits=3),
+    Column(key="reason", heading="Reason", where="csv"),
+)
+
+
+def estimate_table(
+    rows: Sequence[EstimateRow], *, name: str, caption: str, data: str
+) -> Table:
+    """Make a table of estimates.
+
+    On a page an interval is one column, marked with a letter; a note below says
+    what each letter means: level, method, and of whom the interval speaks.
+
+    Parameters
+    ----------
+    rows : sequence of EstimateRow
+        The estimates.
+    name, caption : str
+        Name of its file and what it shows.
+    data : str
+        Where the data come from.
+
+    Returns
+    -------
+    Table
+        One row per estimate.
+    """
+    meant = (_meaning(row.interval) for row in rows if row.interval is not None)
+    marks = {text: _mark(i) for i, text in enumerate(dict.fromkeys(meant))}
+    notes = [f"{mark} {text}." for text, mark in marks.items()]
+    notes += [f"{row.name}: {remark}." for row in rows for remark in row.remarks]
+    if any(_word(row) is not None for row in rows):
+        notes.append(LANDIS_KOCH)
+    return Table(
+        name=name,
+        caption=caption,
+        columns=_COLUMNS,
+        rows=tuple(_cells(row, marks) for row in rows),
+        notes=tuple(notes),
+        data=data,
+    )
+
+
+def _meaning(interval: Interval) -> str:
+    return f"{interval_name(interval)}; speaks of {TARGETS[interval.target]}"
+
+
+def _mark(position: int) -> str:
+    # a, b, ..., z, aa, bb, ...: letters that stand high without any markup
+    rounds, letter = divmod(position, len(_MARKS))
+    return _MARKS[letter] * (rounds + 1)
+
+
+def _word(row: EstimateRow) -> str | None:
+    if row.estimate is None:
+        return None
+    word = strength(row.estimate.coefficient, row.estimate.value)
+    return None if word == ABSENT else word
+
+
+def _cells(row: EstimateRow, marks: dict[str, str]) -> tuple[Value, ...]:
+    head = (row.name, row.coefficient, row.models, row.sessions)
+    estimate = row.estimate
+    if estimate is None:
+        return (*head, None, None, None, row.text, *[None] * 7, row.reason)
+    return (
+        *head,
+        estimate.n_items,
+        row.n_raters,
+        estimate.value,
+        *_interval_cells(row.interval, marks),
+        _word(row),
+        estimate.observed,
+        estimate.chance,
+        estimate.reason,
+    )
+
+
+def _interval_cells(
+    interval: Interval | None, marks: dict[str, str]
+) -> tuple[Value, ...]:
+    if interval is None:
+        return (None,) * 5
+    return (
+        f"{interval_words(interval.low, interval.high)} {marks[_meaning(interval)]}",
+        interval.low,
+        interval.high,
+        interval_name(interval),
+        TARGETS[interval.target],
+    )
