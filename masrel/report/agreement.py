@@ -70,7 +70,7 @@ def _is_missing(entry: PlannedEstimate) -> bool:
 
 
 def _missing(entry: PlannedEstimate) -> Paragraph:
-    text = f"{entry.line.id}: not in these data: {entry.reason}."
+    text = f"{entry.line.id} is not in these data: {entry.reason}."
     return Paragraph(text=text, absent=True)
 
 

@@ -18,13 +18,19 @@ __all__ = ["estimate_table"]
 
 _MARKS = "ᵃᵇᶜᵈᵉᶠᵍʰⁱʲᵏˡᵐⁿᵒᵖʳˢᵗᵘᵛʷˣʸᶻ"
 
+_AGREEMENTS = (
+    "p_o: observed agreement; p_e: agreement expected by chance, 0 where the "
+    "coefficient takes none off."
+)
+
 _COLUMNS = (
     Column(key="id", heading="Estimate", align="left"),
     Column(key="coefficient", heading="Coefficient", align="left"),
-    Column(key="models", heading="Models", align="left"),
+    Column(key="models_shown", heading="Models", align="left", where="page"),
+    Column(key="models", heading="Models", where="csv"),
     Column(key="sessions", heading="Session", align="left"),
-    Column(key="n_items", heading="n models"),
-    Column(key="n_raters", heading="n raters"),
+    Column(key="n_items", heading="n models", where="csv"),
+    Column(key="n_raters", heading="Raters"),
     Column(key="value", heading="Value", digits=3),
     Column(key="interval_shown", heading="Interval", where="page"),
     Column(key="low", heading="Low", digits=3, where="csv"),
@@ -32,8 +38,8 @@ _COLUMNS = (
     Column(key="interval", heading="Interval", where="csv"),
     Column(key="target", heading="Speaks of", where="csv"),
     Column(key="strength", heading="Strength", align="left"),
-    Column(key="observed", heading="Observed", digits=3),
-    Column(key="chance", heading="By chance", digits=3),
+    Column(key="observed", heading="p_o", digits=3),
+    Column(key="chance", heading="p_e", digits=3),
     Column(key="reason", heading="Reason", where="csv"),
 )
 
@@ -63,7 +69,11 @@ def estimate_table(
     meant = (_meaning(row.interval) for row in rows if row.interval is not None)
     marks = {text: _mark(i) for i, text in enumerate(dict.fromkeys(meant))}
     notes = [f"{mark} {text}." for text, mark in marks.items()]
-    notes += [f"{row.name}: {remark}." for row in rows for remark in row.remarks]
+    notes += [
+        f"{row.name}: {remark.rstrip('.')}." for row in rows for remark in row.remarks
+    ]
+    if any(row.estimate is not None for row in rows):
+        notes.append(_AGREEMENTS)
     if any(_word(row) is not None for row in rows):
         notes.append(LANDIS_KOCH)
     return Table(
@@ -94,12 +104,16 @@ def _word(row: EstimateRow) -> str | None:
 
 
 def _cells(row: EstimateRow, marks: dict[str, str]) -> tuple[Value, ...]:
-    head = (row.name, row.coefficient, row.models, row.sessions)
     estimate = row.estimate
+    head = (row.name, row.coefficient)
     if estimate is None:
-        return (*head, None, None, None, row.text, *[None] * 7, row.reason)
+        used = (row.models, row.models, row.sessions, None, None)
+        return (*head, *used, None, row.text, *[None] * 7, row.reason)
     return (
         *head,
+        f"{estimate.n_items} {row.models}",
+        row.models,
+        row.sessions,
         estimate.n_items,
         row.n_raters,
         estimate.value,
