@@ -1,5 +1,6 @@
 """What a device is to the control loop, whichever hardware or simulation it is."""
 
+import math
 import warnings
 from abc import ABC, abstractmethod
 from types import TracebackType
@@ -32,8 +33,9 @@ class Device(ABC):
     """A one-joint device in torque mode.
 
     A device is opened once and closed once: what was closed, by a fault or on
-    purpose, stays closed, and going on needs a new one. `close` sends zero torque
-    first. A subclass provides the four hooks `_start`, `_read`, `_send`, `_stop`.
+    purpose, stays closed, and going on needs a new one. Opening an open device and
+    closing a closed one do nothing. `close` sends zero torque first. A subclass
+    provides the four hooks `_start`, `_read`, `_send`, `_stop`.
 
     Attributes
     ----------
@@ -98,10 +100,13 @@ class Device(ABC):
         Raises
         ------
         DeviceError
-            If the device is not open or does not take it.
+            If the device is not open or does not take it, or the torque is not
+            finite; the one before it is then held.
         """
         if self._state != "open":
             raise self._not_open("command")
+        if not math.isfinite(torque_nm):
+            raise DeviceError(f"{self.name}: needs a finite torque, got {torque_nm}")
         self._send(torque_nm)
 
     def close(self) -> None:
@@ -133,13 +138,15 @@ class Device(ABC):
 
     def __del__(self) -> None:
         if self._state == "open":
-            warnings.warn(
-                f"{self.name}: a device was never closed",
-                ResourceWarning,
-                stacklevel=2,
-                source=self,
-            )
-            self.close()
+            try:
+                warnings.warn(
+                    f"{self.name}: a device was never closed",
+                    ResourceWarning,
+                    stacklevel=2,
+                    source=self,
+                )
+            finally:  # also when warnings are errors
+                self.close()
 
     def _not_open(self, wish: str) -> DeviceError:
         return DeviceError(

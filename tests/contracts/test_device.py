@@ -1,0 +1,299 @@
+"""What every device does, whichever backend it is: one suite for all names."""
+
+import gc
+import math
+import warnings
+from collections.abc import Callable
+from itertools import pairwise
+from math import radians
+
+import pytest
+
+from masrel.elbow import STANDARD_MODELS
+from masrel.errors import DeviceError
+from masrel.hess import (
+    Controller,
+    Device,
+    DeviceLimits,
+    Hand,
+    Reading,
+    SimulatedClock,
+    SimulatedHand,
+    device_names,
+    open_device,
+    run_presentation,
+)
+from tests.hess.rig import ScriptedDevice
+
+START, END = radians(30.0), radians(146.0)
+
+Opener = Callable[[SimulatedClock, Hand], Device]
+
+
+def _scripted(clock: SimulatedClock, _hand: Hand) -> Device:
+    device = ScriptedDevice(clock)
+    device.open()
+    return device
+
+
+def _registered(name: str) -> Opener:
+    return lambda clock, hand: open_device(name, clock=clock, hand=hand)
+
+
+# Every registered name is held to the suite, without a line here; the device that the
+# other tests script is held to it too.
+OPENERS: dict[str, Opener] = {
+    **{name: _registered(name) for name in device_names()},
+    "scripted": _scripted,
+}
+registered = pytest.mark.parametrize("backend", device_names(), indirect=True)
+
+
+@pytest.fixture
+def clock() -> SimulatedClock:
+    return SimulatedClock()
+
+
+@pytest.fixture(params=sorted(OPENERS))
+def backend(request: pytest.FixtureRequest) -> str:
+    return request.param
+
+
+@pytest.fixture
+def opened(backend: str, clock: SimulatedClock):
+    hand = SimulatedHand(start=START, end=END, mean_speed=radians(90.0))
+    device = OPENERS[backend](clock, hand)
+    yield device
+    device.close()
+
+
+def tick(clock: SimulatedClock, n: int = 1) -> None:
+    clock.sleep_until_ns(clock.now_ns() + n * 1_000_000)
+
+
+def test_the_simulated_device_is_among_the_names() -> None:
+    assert "simulated" in device_names()
+
+
+# Who it is
+
+
+def test_it_says_its_name_and_whether_hardware_moves(
+    opened: Device, backend: str
+) -> None:
+    assert opened.name == backend
+    assert isinstance(opened.simulated, bool)
+
+
+# Opening and closing
+
+
+def test_it_is_open_when_it_has_been_opened(opened: Device) -> None:
+    assert opened.is_open
+
+
+def test_opening_it_again_does_nothing(opened: Device, clock: SimulatedClock) -> None:
+    tick(clock)
+    before = opened.read()
+    opened.open()
+    assert opened.is_open
+    assert opened.read() == before  # at the same time, where it was
+
+
+def test_closing_it_twice_does_nothing_more(opened: Device) -> None:
+    opened.close()
+    opened.close()
+    assert not opened.is_open
+
+
+def test_what_was_closed_is_not_opened_again(opened: Device, backend: str) -> None:
+    opened.close()
+    with pytest.raises(DeviceError, match=f"{backend}: needs a new device"):
+        opened.open()
+    assert not opened.is_open
+
+
+def test_a_with_block_gives_the_device_and_closes_it(opened: Device) -> None:
+    with opened as device:
+        assert device is opened
+        assert device.is_open
+    assert not opened.is_open
+
+
+@pytest.mark.parametrize("interruption", [ValueError, KeyboardInterrupt])
+def test_a_with_block_closes_it_after_an_exception_that_goes_on(
+    opened: Device, interruption: type[BaseException]
+) -> None:
+    with pytest.raises(interruption), opened:
+        raise interruption
+    assert not opened.is_open
+
+
+@pytest.mark.parametrize("wish", ["read", "command"])
+def test_a_closed_device_is_neither_read_nor_commanded(
+    opened: Device, backend: str, wish: str
+) -> None:
+    opened.close()
+    words = f"{backend}: needs an open device to {wish}, this one is closed"
+    with pytest.raises(DeviceError, match=words):
+        opened.read() if wish == "read" else opened.command(0.0)
+
+
+def forgotten(backend: str) -> Device:
+    hand = SimulatedHand(start=START, end=END, mean_speed=radians(90.0))
+    return OPENERS[backend](SimulatedClock(), hand)
+
+
+def test_a_forgotten_device_warns(backend: str) -> None:
+    with pytest.warns(ResourceWarning, match=f"{backend}: a device was never closed"):
+        forgotten(backend)  # the last reference goes with the statement
+
+
+def test_a_device_that_was_closed_is_forgotten_in_silence(backend: str) -> None:
+    device = forgotten(backend)
+    device.close()
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        del device
+        gc.collect()
+    assert not [warning for warning in caught if warning.category is ResourceWarning]
+
+
+@pytest.mark.parametrize("filtering", ["always", "ignore", "error"])
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_a_forgotten_device_is_left_with_zero_torque(filtering: str) -> None:
+    commands: list[tuple[int, float]] = []
+
+    def leave() -> None:
+        device = ScriptedDevice(SimulatedClock())
+        device.open()
+        device.commands = commands
+        device.command(3.0)
+
+    with warnings.catch_warnings(record=True):
+        warnings.simplefilter(filtering, ResourceWarning)
+        leave()
+        gc.collect()
+    assert commands == [(0, 3.0), (0, 0.0)]
+
+
+def test_closing_sends_zero_torque_before_it_lets_go() -> None:
+    acts = []
+
+    class Watched(ScriptedDevice):
+        def _send(self, torque_nm: float) -> None:
+            acts.append(torque_nm)
+
+        def _stop(self) -> None:
+            acts.append("stop")
+
+    with Watched(SimulatedClock()) as device:
+        device.command(2.0)
+    assert acts == [2.0, 0.0, "stop"]
+
+
+def test_an_opening_that_fails_leaves_nothing_to_close() -> None:
+    class Absent(ScriptedDevice):
+        def _start(self) -> None:
+            raise DeviceError("absent: nobody answers")
+
+        def _stop(self) -> None:
+            raise AssertionError("there is nothing to let go of")
+
+    device = Absent(SimulatedClock())
+    with pytest.raises(DeviceError, match="nobody answers"):
+        device.open()
+    assert not device.is_open
+    device.close()
+    assert device.commands == []
+
+
+# Reading
+
+
+def test_a_reading_is_a_time_on_the_clock_and_an_angle_in_the_range(
+    opened: Device, clock: SimulatedClock
+) -> None:
+    tick(clock, 7)
+    reading = opened.read()
+    assert isinstance(reading, Reading)
+    assert type(reading.time_ns) is int
+    assert type(reading.angle) is float  # a numpy scalar would slow the loop down
+    assert reading.time_ns == clock.now_ns()
+    assert 0.0 <= reading.angle <= math.pi
+
+
+def test_a_later_reading_has_a_later_time(
+    opened: Device, clock: SimulatedClock
+) -> None:
+    times = []
+    for _ in range(5):
+        tick(clock)
+        times.append(opened.read().time_ns)
+    assert times == sorted(set(times))
+
+
+# Commanding
+
+
+@pytest.mark.parametrize("torque", [math.nan, math.inf, -math.inf])
+def test_a_torque_that_is_not_finite_is_refused_and_the_device_stays_open(
+    opened: Device, backend: str, torque: float
+) -> None:
+    with pytest.raises(DeviceError, match=f"{backend}: needs a finite torque, got"):
+        opened.command(torque)
+    assert opened.is_open
+    opened.command(0.0)
+
+
+@registered
+def test_a_positive_torque_resists_extension(
+    backend: str, clock: SimulatedClock
+) -> None:
+    free = SimulatedHand(
+        start=radians(90.0), end=END, mean_speed=radians(90.0), slip_time=0.0
+    )
+    with open_device(backend, clock=clock, hand=free) as device:
+        before = device.read().angle
+        device.command(1.0)
+        tick(clock, 200)
+        assert device.read().angle < before - radians(1.0)
+
+
+@registered
+def test_a_torque_is_held_until_the_next_one(
+    backend: str, clock: SimulatedClock
+) -> None:
+    free = SimulatedHand(
+        start=radians(90.0), end=END, mean_speed=radians(90.0), slip_time=0.0
+    )
+    with open_device(backend, clock=clock, hand=free) as device:
+        device.read()
+        device.command(1.0)
+        angles = []
+        for _ in range(4):
+            tick(clock, 50)
+            angles.append(device.read().angle)
+        steps = [after - before for before, after in pairwise(angles)]
+        # It gains speed all the time.
+        assert all(later < earlier < 0.0 for earlier, later in pairwise(steps))
+
+
+# In the loop
+
+
+@registered
+def test_a_presentation_runs_on_it(
+    opened: Device, backend: str, clock: SimulatedClock
+) -> None:
+    presented = run_presentation(
+        opened,
+        Controller(STANDARD_MODELS["HM3"], start_angle=START),
+        clock=clock,
+        limits=DeviceLimits(torque=20.0, speed=radians(400.0), missed_ticks=20),
+    )
+    assert presented.fault is None
+    assert presented.recording.facts["device"] == backend
+    assert presented.recording.facts["simulated"] is opened.simulated
+    assert presented.recording.facts["ended"] == "arrived"
+    assert opened.is_open
