@@ -211,13 +211,15 @@ class MinimumJerk:
     def angle(self, time: Floats | float) -> Floats:
         """Angle at times within the duration, rad."""
         s = np.asarray(time) / self.duration
-        share = s**3 * (10.0 + s * (6.0 * s - 15.0))  # quintic of [1]
+        # quintic of [1]; products, as powers of a number and of an array may differ
+        share = s * s * s * (10.0 + s * (6.0 * s - 15.0))
         return np.asarray(self.start + (self.end - self.start) * share)
 
     def velocity(self, time: Floats | float) -> Floats:
         """Angular velocity at times within the duration, rad/s."""
         s = np.asarray(time) / self.duration
-        return np.asarray(30.0 * self.mean_speed * (s * (1.0 - s)) ** 2)
+        rest = s * (1.0 - s)
+        return np.asarray(30.0 * self.mean_speed * rest * rest)
 
     def acceleration(self, time: Floats | float) -> Floats:
         """Angular acceleration at times within the duration, rad/s²."""

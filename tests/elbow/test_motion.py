@@ -91,6 +91,15 @@ def test_acceleration_is_the_derivative_of_the_velocity(
     assert abs(float(motion.acceleration(time) - slope)) < 1e-13 * scale
 
 
+@given(motion=motions(), shares=st.lists(st.floats(0.0, 1.0), min_size=1))
+def test_many_times_at_once_give_the_same_bits_as_one_by_one(
+    motion: Motion, shares: list[float]
+) -> None:
+    times = [share * motion.duration for share in shares]
+    for law in (motion.angle, motion.velocity, motion.acceleration):
+        assert law(np.array(times)).tolist() == [float(law(time)) for time in times]
+
+
 @given(motion=motions(), share=st.floats(0.001, 0.999))
 def test_time_at_undoes_angle(motion: Motion, share: float) -> None:
     angle = motion.start + share * (motion.end - motion.start)
