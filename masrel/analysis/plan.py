@@ -11,8 +11,9 @@ from masrel.analysis.accuracy import in_person_agreement, intended_agreement
 from masrel.analysis.inter_rater import inter_rater
 from masrel.analysis.results import Analysis, PlannedEstimate
 from masrel.analysis.retest import retest_agreement
+from masrel.analysis.selection import check_known
 from masrel.analysis.speeds import stretching_speeds
-from masrel.errors import CountsError, ParameterError, ProtocolError
+from masrel.errors import CountsError, ParameterError, ProtocolError, RatingsError
 from masrel.protocol import EstimatePlan, Protocol, protocol_hash
 from masrel.ratings import InPerson, Ratings, ratings_hash
 
@@ -46,7 +47,8 @@ def analyze(
         If a coefficient or interval of the plan does not exist or does not fit its
         data; the message names the line.
     RatingsError
-        If in-person grades and ratings contradict each other.
+        If the ratings have a session, rater or model the protocol has not, or
+        contradict the in-person grades.
 
     Warns
     -----
@@ -55,6 +57,7 @@ def analyze(
     SmallSampleWarning
         If an interval rests on too little data.
     """
+    check_known(protocol, ratings)
     sections = set(protocol.report.sections)
     inputs = {
         "protocol_sha256": protocol_hash(protocol),
@@ -93,7 +96,7 @@ def _estimate(
     compute = inter_rater if line.kind == "inter-rater" else retest_agreement
     try:
         return compute(line, protocol, ratings)
-    except (ParameterError, CountsError) as error:
+    except (ParameterError, CountsError, RatingsError) as error:
         raise ProtocolError(f"analysis.estimates {line.id!r}: {error}") from error
 
 

@@ -1,9 +1,10 @@
-"""What a line of the plan means, and whether the data hold it."""
+"""What a line of the plan means, and whether the data hold and fit it."""
 
+from masrel.errors import RatingsError
 from masrel.protocol import EstimatePlan, Protocol
 from masrel.ratings import Ratings
 
-__all__ = ["absence", "rated_models"]
+__all__ = ["absence", "check_known", "rated_models"]
 
 
 def rated_models(
@@ -68,6 +69,39 @@ def absence(line: EstimatePlan, protocol: Protocol, ratings: Ratings) -> str | N
         if of_role and not rated.intersection(of_role):
             return f"no {role} model has ratings in session {sessions}"
     return None
+
+
+def check_known(protocol: Protocol, ratings: Ratings) -> None:
+    """Refuse ratings of sessions, raters or models the protocol does not have.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        The study's protocol.
+    ratings : Ratings
+        The ratings.
+
+    Raises
+    ------
+    RatingsError
+        If there are any: one estimate would use them, and another section drop them.
+    """
+    known = {
+        "session": [session.id for session in protocol.sessions],
+        "rater": [rater.id for rater in protocol.raters],
+        "model": [model.id for model in protocol.models],
+    }
+    where = "the ratings" if ratings.source_path is None else str(ratings.source_path)
+    problems = []
+    for column, ids in known.items():
+        strange = dict.fromkeys(x for x in ratings.table[column] if x not in ids)
+        problems += [
+            f"{where}: column {column!r}: needed one of the protocol's, "
+            f"{', '.join(ids)}, got {got!r}"
+            for got in strange
+        ]
+    if problems:
+        raise RatingsError("\n".join(problems))
 
 
 def _planned(line: EstimatePlan, protocol: Protocol) -> tuple[str, ...]:
