@@ -12,11 +12,23 @@ class Clock(Protocol):
     """What the loop and the simulated device ask of a clock."""
 
     def now_ns(self) -> int:
-        """Return the time in integer nanoseconds, from an arbitrary zero."""
+        """Return the time.
+
+        Returns
+        -------
+        int
+            Time from an arbitrary zero, ns; it never goes back.
+        """
         ...
 
     def sleep_until_ns(self, deadline_ns: int) -> None:
-        """Return when `deadline_ns` has come; at once when it has passed."""
+        """Sleep until an absolute time; return at once when it has passed.
+
+        Parameters
+        ----------
+        deadline_ns : int
+            When to return, ns on this clock.
+        """
         ...
 
 
@@ -35,7 +47,13 @@ class RealClock:
     __slots__ = ()
 
     def now_ns(self) -> int:
-        """Return the monotonic time, ns."""
+        """Return the monotonic time.
+
+        Returns
+        -------
+        int
+            Time from a zero that the system chose, ns.
+        """
         return time.monotonic_ns()
 
     def sleep_until_ns(self, deadline_ns: int) -> None:
@@ -80,7 +98,13 @@ class SimulatedClock:
         self._now_ns = start_ns
 
     def now_ns(self) -> int:
-        """Return the simulated time, ns."""
+        """Return the simulated time.
+
+        Returns
+        -------
+        int
+            Time, ns: `start_ns` and what has been slept since.
+        """
         return self._now_ns
 
     def sleep_until_ns(self, deadline_ns: int) -> None:

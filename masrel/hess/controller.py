@@ -10,11 +10,13 @@ from masrel.elbow.parameters import ElbowParameters
 from masrel.elbow.sampled import SampledJoint
 from masrel.errors import ParameterError
 from masrel.hess.friction import Friction, FrictionCompensation
+from masrel.recording import PHASES
 
 __all__ = ["Controller"]
 
-_SLIP_WINDOW_S = 0.010
-_RANGE_END_MARGIN = math.radians(3.0)
+_PRE_CATCH = PHASES.index("pre-catch")
+_SLIP_WINDOW_S = 0.010  # twice the delay of the estimated speed
+_RANGE_END_MARGIN = math.radians(3.0)  # what the loop takes for arrived, too
 
 
 class Controller:
@@ -35,16 +37,41 @@ class Controller:
     friction : Friction or None, optional
         Friction of the device; None for that of the source.
     compensation : float, optional
-        Share of the friction that is compensated, 0 to 1.
+        Share of the friction that is compensated, 0 to 1. The default leaves a
+        tenth, so that B and β may be wrong by as much before friction is
+        overcompensated.
     slip_speed_drop : float, optional
-        Fall of speed that means a lost grip, rad/s.
+        Fall of speed that means a lost grip, rad/s. The default, 40 deg/s, lies
+        between what a held arm does and a loose one: a minimum-jerk stretch at the
+        highest mean speed of Table V, 131 deg/s, brakes by 8.5 deg/s in 10 ms, and
+        10 N·m take 95 deg/s off an arm of 0.06 kg·m² in that time.
     rate_hz : int, optional
         Steps a second.
+
+    Attributes
+    ----------
+    model_torque : float
+        What the joint model alone asked for in the last step, N·m.
+    phase : int
+        Its phase, a position in `masrel.recording.PHASES`.
+    grip_lost : bool
+        Whether grip has been lost since the beginning.
+    is_new : bool
+        Whether it has never been stepped: one controller makes one presentation.
+    rate_hz : int
+        Steps a second.
+    speed_threshold : float
+        Speed ν_th of the joint, rad/s.
 
     Raises
     ------
     ParameterError
         If a value is outside its range.
+
+    References
+    ----------
+    .. [1] Park, H.-S., Kim, J., Damiano, D. L. (2012). IEEE TNSRE 20(3), 361-370,
+       Fig. 7 and section III.B. https://doi.org/10.1109/TNSRE.2012.2195330
 
     Examples
     --------
@@ -65,8 +92,10 @@ class Controller:
         "_released",
         "_slip_speed_drop",
         "grip_lost",
+        "is_new",
         "model_torque",
         "phase",
+        "rate_hz",
         "speed_threshold",
     )
 
@@ -99,14 +128,14 @@ class Controller:
         self.speed_threshold = parameters.speed_threshold
         self.grip_lost = False
         self.model_torque = 0.0
-        self.phase = 0
+        self.phase = _PRE_CATCH
+        self.rate_hz = rate_hz
+        self.is_new = True
 
     def step(self, time_s: float, angle: float, velocity: float) -> float:
         """Take one sample in and decide.
 
-        Afterwards `model_torque` holds what the model alone asks for, N·m, `phase`
-        its phase (position in `masrel.recording.PHASES`), and `grip_lost` whether
-        grip has been lost since the beginning.
+        Afterwards `model_torque`, `phase` and `grip_lost` belong to this sample.
 
         Parameters
         ----------
@@ -122,12 +151,13 @@ class Controller:
         float
             Torque to command, N·m; positive resists extension.
         """
+        self.is_new = False
         index = self._past_index
         drop = self._past[index] - velocity
         self._past[index] = velocity
         self._past_index = index + 1 if index + 1 < len(self._past) else 0
         joint = self._joint
-        if joint.phase != 0 and (
+        if joint.phase != _PRE_CATCH and (
             velocity < -self.speed_threshold
             or (drop > self._slip_speed_drop and angle < self._free_end)
         ):

@@ -61,7 +61,8 @@ class FrictionCompensation:
         energy into the hand and creep by itself, so it is refused; at 1 a slightly
         overestimated B or β does the same.
     dead_zone : float, optional
-        Speed below which the Coulomb part is 0, rad/s.
+        Speed below which the Coulomb part is 0, rad/s; one step of the encoder
+        makes 0.8 deg/s in the estimate and must not switch it on.
     full_speed : float, optional
         Speed above which it is whole, rad/s.
 
@@ -69,6 +70,11 @@ class FrictionCompensation:
     ------
     ParameterError
         If the share is outside [0, 1] or the speeds are not in order.
+
+    References
+    ----------
+    .. [1] Park, H.-S., Kim, J., Damiano, D. L. (2012). IEEE TNSRE 20(3), 361-370,
+       equation (7). https://doi.org/10.1109/TNSRE.2012.2195330
 
     Examples
     --------

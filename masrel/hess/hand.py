@@ -32,7 +32,18 @@ class Hand(Protocol):
         ...
 
     def intended(self, time_s: float) -> tuple[float, float]:
-        """Return the intended angle, rad, and speed, rad/s."""
+        """Return where the hand means to be.
+
+        Parameters
+        ----------
+        time_s : float
+            Time after the first reading, s.
+
+        Returns
+        -------
+        tuple of float
+            Intended angle, rad, and speed, rad/s.
+        """
         ...
 
 

@@ -22,7 +22,8 @@ class DeviceLimits:
     missed_ticks : int
         Missed ticks that a presentation may have; one more stops it.
     lowest_angle, highest_angle : float, optional
-        Angles outside which the encoder cannot be right, rad.
+        Angles outside which the encoder cannot be right, rad: 5 deg beyond full
+        flexion and a straight arm, because an end stop gives way a little.
 
     Raises
     ------
@@ -33,8 +34,8 @@ class DeviceLimits:
     torque: float
     speed: float
     missed_ticks: int
-    lowest_angle: float = 0.0
-    highest_angle: float = math.pi
+    lowest_angle: float = math.radians(-5.0)
+    highest_angle: float = math.radians(185.0)
 
     def __post_init__(self) -> None:
         for name in ("torque", "speed"):

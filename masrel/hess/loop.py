@@ -63,7 +63,7 @@ def run_presentation(
     device : Device
         An open device. It stays open unless the presentation ends with a fault.
     controller : Controller
-        A controller that has not been stepped.
+        A controller that has not been stepped, for the same `rate_hz`.
     clock : Clock
         The clock of the device.
     limits : DeviceLimits
@@ -83,7 +83,8 @@ def run_presentation(
     Raises
     ------
     ParameterError
-        If the rate or the duration is not above 0, or `end_angle` is not finite.
+        If the rate or the duration is not above 0, the rate is not the controller's,
+        the controller has been used, or `end_angle` is not finite.
     DeviceError
         If the device is not open to begin with.
 
@@ -114,6 +115,12 @@ def run_presentation(
         )
     if not math.isfinite(end_angle):
         raise ParameterError(f"end_angle: needs a finite angle, got {end_angle} rad")
+    if rate_hz != controller.rate_hz:
+        raise ParameterError(
+            f"rate_hz: needs the controller's {controller.rate_hz} Hz, got {rate_hz}"
+        )
+    if not controller.is_new:
+        raise ParameterError("controller: needs a new one for every presentation")
     if not device.is_open:
         raise DeviceError(f"{device.name}: needs an open device to present on")
     n_ticks = math.ceil(max_duration_s * rate_hz)

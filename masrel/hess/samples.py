@@ -51,7 +51,23 @@ class Samples:
         command_torque: float,
         phase: int,
     ) -> None:
-        """Write one sample, SI units; the columns must not be full."""
+        """Write one sample; the columns must not be full.
+
+        Parameters
+        ----------
+        time_s : float
+            Time since the presentation began, s.
+        angle : float
+            Elbow angle, rad.
+        velocity : float
+            Estimated speed, rad/s.
+        model_torque : float
+            What the joint model asks for, N·m.
+        command_torque : float
+            What was sent, N·m.
+        phase : int
+            Position in `masrel.recording.PHASES`.
+        """
         n = self.n
         self._time[n] = time_s
         self._angle[n] = angle
@@ -98,7 +114,7 @@ def movement_facts(
     columns : dict of str to ndarray
         Columns of a recording.
     speed_threshold : float
-        ν_th, rad/s.
+        Speed threshold ν_th, rad/s.
     fault : str or None
         What stopped the presentation.
 
@@ -164,7 +180,8 @@ def mean_speed_deg_s(columns: Columns, speed_threshold: float) -> float | None:
     columns : dict of str to ndarray
         Columns of a recording.
     speed_threshold : float
-        ν_th, rad/s: the movement begins when the speed first reaches it.
+        Speed threshold ν_th, rad/s: the movement begins when the speed first
+        reaches it.
 
     Returns
     -------

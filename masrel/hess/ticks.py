@@ -24,8 +24,14 @@ class Ticks:
 
     Parameters
     ----------
-    device, controller, clock, limits
-        As in `masrel.hess.run_presentation`.
+    device : Device
+        An open device.
+    controller : Controller
+        A controller that has not been stepped.
+    clock : Clock
+        The clock of the device.
+    limits : DeviceLimits
+        What the loop lets pass.
     rate_hz : int
         Ticks a second.
     n_ticks : int

@@ -43,6 +43,15 @@ def test_what_lies_on_the_limits_passes() -> None:
     assert LIMITS.saturate(20.0) == 20.0
 
 
+def test_by_default_an_end_stop_may_give_way_by_five_degrees() -> None:
+    limits = DeviceLimits(torque=20.0, speed=7.0, missed_ticks=3)
+    for angle_deg in (-4.9, 184.9):
+        limits.check_motion(math.radians(angle_deg), 0.0)
+    for angle_deg in (-5.1, 185.1):
+        with pytest.raises(LimitExceededError, match="range: needs -5.0 to 185.0 deg"):
+            limits.check_motion(math.radians(angle_deg), 0.0)
+
+
 def test_one_missed_tick_too_many_is_named() -> None:
     with pytest.raises(LimitExceededError, match=r"at most 3 .* missed 4"):
         LIMITS.check_missed(4)
@@ -55,7 +64,7 @@ def test_one_missed_tick_too_many_is_named() -> None:
         ({"torque": math.inf}, "torque: needs"),
         ({"speed": math.nan}, "speed: needs"),
         ({"missed_ticks": -1}, "missed_ticks: needs 0 or more, got -1"),
-        ({"lowest_angle": 3.2}, "lowest_angle, highest_angle: need"),
+        ({"lowest_angle": 3.3}, "lowest_angle, highest_angle: need"),
         ({"highest_angle": math.inf}, "lowest_angle, highest_angle: need"),
     ],
 )

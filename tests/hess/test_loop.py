@@ -46,9 +46,11 @@ class LateClock(SimulatedClock):
 def rest(clock, *, angle=lambda _time_s: START, limits=LIMITS, **options):
     # One presentation of HM3 on a scripted device -> device, presented
     device = ScriptedDevice(clock, angle)
-    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
+    options = {"max_duration_s": 0.02, "rate_hz": 1000, **options}
+    controller = Controller(
+        STANDARD_MODELS["HM3"], start_angle=START, rate_hz=options["rate_hz"]
+    )
     device.open()
-    options = {"max_duration_s": 0.02, **options}
     presented = run_presentation(
         device, controller, clock=clock, limits=limits, **options
     )
@@ -141,8 +143,9 @@ def test_too_fast_an_arm_is_a_fault_that_is_named_and_latched() -> None:
     for act in (device.open, device.read, lambda: device.command(0.0)):
         with pytest.raises(DeviceError):
             act()
+    fresh = Controller(STANDARD_MODELS["HM3"], start_angle=START)
     with pytest.raises(DeviceError, match="needs an open device to present on"):
-        run_presentation(device, controller, clock=clock, limits=LIMITS)
+        run_presentation(device, fresh, clock=clock, limits=LIMITS)
 
 
 def test_a_fault_leaves_the_recording_up_to_its_moment() -> None:
@@ -166,7 +169,7 @@ def test_at_a_fault_zero_is_the_last_torque_and_the_device_is_let_go() -> None:
     device, presented = rest(
         clock, angle=lambda t: START if t < 0.0095 else radians(-8.0)
     )
-    assert presented.fault == ("range: needs 0.0 to 180.0 deg, the arm is at -8.0 deg")
+    assert presented.fault == ("range: needs -5.0 to 185.0 deg, the arm is at -8.0 deg")
     assert device.commands[-1] == (10 * PERIOD_NS, 0.0)
     assert device.stopped
     assert len(device.commands) == 11  # ticks 0 to 9, and one zero
@@ -245,6 +248,19 @@ def test_a_reading_that_is_not_newer_than_the_last_one_is_a_fault() -> None:
     assert presented.fault is not None
     assert presented.fault.startswith("reading: needs one newer than the last")
     assert not device.is_open
+
+
+def test_a_device_that_never_answers_leaves_an_empty_recording(tmp_path) -> None:
+    clock = SimulatedClock()
+    device = ScriptedDevice(clock)
+    device.silent_after = 0
+    device.open()
+    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
+    presented = run_presentation(device, controller, clock=clock, limits=LIMITS)
+    assert presented.fault == "scripted: no answer"
+    assert presented.recording.n_samples == 0
+    assert presented.recording.facts["phases"] == ""
+    write_recording(presented.recording, tmp_path / "empty.npz")
 
 
 @pytest.mark.parametrize("angle", [math.nan, math.inf, -math.inf, radians(200.0)])
@@ -331,6 +347,20 @@ def test_it_ends_when_the_arm_has_rested_at_the_end() -> None:
     since = columns["time_s"].size - int(np.argmin(resting[::-1]))
     rested_s = columns["time_s"][-1] - columns["time_s"][since]
     assert rested_s == pytest.approx(0.1, abs=1e-9)
+
+
+@pytest.mark.parametrize(("start_deg", "end_deg"), [(0.0, 146.0), (30.0, 180.0)])
+def test_a_stretch_may_use_the_whole_range(start_deg: float, end_deg: float) -> None:
+    # The end stop gives way by 0.03 deg: beyond 180 deg, and no fault.
+    start, end, clock = radians(start_deg), radians(end_deg), SimulatedClock()
+    hand = SimulatedHand(start=start, end=end, mean_speed=radians(90.0))
+    controller = Controller(STANDARD_MODELS["HM3"], start_angle=start)
+    with open_device("simulated", clock=clock, hand=hand, range_end=end) as device:
+        presented = run_presentation(
+            device, controller, clock=clock, limits=LIMITS, end_angle=end
+        )
+    assert presented.fault is None
+    assert presented.recording.facts["ended"] == "arrived"
 
 
 def test_a_rest_before_the_end_does_not_end_it() -> None:
@@ -471,6 +501,26 @@ def test_what_cannot_be_run_is_refused_before_anything_moves(change) -> None:
             run_presentation(device, controller, clock=clock, limits=LIMITS, **options)
         assert device.n_reads == 0
         assert device.commands == []
+
+
+def test_a_rate_that_is_not_the_controllers_is_refused() -> None:
+    clock = SimulatedClock()
+    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START, rate_hz=250)
+    with (
+        ScriptedDevice(clock) as device,
+        pytest.raises(ParameterError, match="needs the controller's 250 Hz, got 1000"),
+    ):
+        run_presentation(device, controller, clock=clock, limits=LIMITS)
+
+
+def test_a_controller_that_has_been_used_is_refused() -> None:
+    clock = SimulatedClock()
+    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
+    with ScriptedDevice(clock, lambda _: radians(145.0)) as device:
+        run_presentation(device, controller, clock=clock, limits=LIMITS)
+        with pytest.raises(ParameterError, match="controller: needs a new one"):
+            run_presentation(device, controller, clock=clock, limits=LIMITS)
+        assert device.is_open
 
 
 def test_a_closed_device_is_refused() -> None:
