@@ -38,7 +38,13 @@ TRACE_COLUMNS = ("time_s", "angle_deg", "velocity_deg_s", "torque_nm", "phase")
     type=click.Path(path_type=Path),
     help="Take the model from this study's protocol.",
 )
-@click.option("--rate-hz", type=float, default=1000.0, show_default=True)
+@click.option(
+    "--rate-hz",
+    type=click.FloatRange(min=0.0, min_open=True),
+    default=1000.0,
+    show_default=True,
+    help="Samples a second of --csv.",
+)
 @click.option(
     "--csv", "csv_file", type=click.Path(path_type=Path), help="Write the samples here."
 )
