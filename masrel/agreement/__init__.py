@@ -1,23 +1,89 @@
 """Agreement statistics from any table of ratings; numpy is all they load.
 
-In: item × rater labels (or counts, or a contingency table). Out: an `Estimate`.
+In: item × rater labels (or counts, or a contingency table). Out: an `Estimate`, or a
+`Significance` from a test.
 """
 
+from masrel.agreement.bands import Band, BandScale, bands, benchmark
+from masrel.agreement.brennan_prediger import (
+    brennan_prediger,
+    brennan_prediger_from_counts,
+)
+from masrel.agreement.category import category_kappa, fleiss_null
+from masrel.agreement.coding import CodedRatings, code_ratings
 from masrel.agreement.cohen import cohen_kappa, cohen_kappa_from_table
+from masrel.agreement.conger import conger_kappa
 from masrel.agreement.fleiss import fleiss_kappa, fleiss_kappa_from_counts
+from masrel.agreement.gwet import gwet_ac, gwet_ac_from_counts
+from masrel.agreement.icc import icc, icc_f_test
+from masrel.agreement.indices import bias_index, kappa_max, prevalence_index
+from masrel.agreement.kendall import kendall_w, kendall_w_test
+from masrel.agreement.krippendorff import (
+    krippendorff_alpha,
+    krippendorff_alpha_from_counts,
+)
+from masrel.agreement.light import light_kappa
+from masrel.agreement.long import code_long
 from masrel.agreement.percent import percent_agreement, percent_agreement_from_counts
 from masrel.agreement.registry import COEFFICIENTS, Coefficient, coefficient
+from masrel.agreement.robinson import robinson_a
+from masrel.agreement.scott import scott_pi, scott_pi_from_table
+from masrel.agreement.significance import Significance, p_value
 from masrel.agreement.stratified import stratified_kappa
+from masrel.agreement.symmetry import (
+    bhapkar,
+    bowker,
+    contingency_table,
+    mcnemar,
+    stuart_maxwell,
+)
+from masrel.agreement.weights import Weights, declared_weights
 
 __all__ = [
     "COEFFICIENTS",
+    "Band",
+    "BandScale",
+    "CodedRatings",
     "Coefficient",
+    "Significance",
+    "Weights",
+    "bands",
+    "benchmark",
+    "bhapkar",
+    "bias_index",
+    "bowker",
+    "brennan_prediger",
+    "brennan_prediger_from_counts",
+    "category_kappa",
+    "code_long",
+    "code_ratings",
     "coefficient",
     "cohen_kappa",
     "cohen_kappa_from_table",
+    "conger_kappa",
+    "contingency_table",
+    "declared_weights",
     "fleiss_kappa",
     "fleiss_kappa_from_counts",
+    "fleiss_null",
+    "gwet_ac",
+    "gwet_ac_from_counts",
+    "icc",
+    "icc_f_test",
+    "kappa_max",
+    "kendall_w",
+    "kendall_w_test",
+    "krippendorff_alpha",
+    "krippendorff_alpha_from_counts",
+    "light_kappa",
+    "mcnemar",
+    "p_value",
     "percent_agreement",
     "percent_agreement_from_counts",
+    "prevalence_index",
+    "robinson_a",
+    "scott_pi",
+    "scott_pi_from_table",
     "stratified_kappa",
+    "stuart_maxwell",
 ]

@@ -7,14 +7,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from masrel.agreement.arrays import array_codes, frame_codes
+from masrel.agreement.labels import (
+    Label,
+    check_categories,
+    code_type,
+    labels_met,
+    lookup,
+)
 from masrel.errors import RatingsError
 
-__all__ = ["MISSING", "CodedRatings", "code_ratings"]
+__all__ = ["MISSING", "CodedRatings", "Codes", "Label", "code_ratings", "complete"]
 
 MISSING = -1
 """Code of a rating that was not given."""
 
-Label = str | int | float
+Codes = NDArray[np.signedinteger[Any]]
+"""Codes in the smallest integers that hold them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,24 +32,26 @@ class CodedRatings:
 
     Attributes
     ----------
-    codes : ndarray of int64, shape (n_items, n_raters)
+    codes : ndarray of signed integers, shape (n_items, n_raters)
         Position of each rating in `categories`; -1 where there is none.
     categories : tuple of str, int or float
         Declared categories in order.
     """
 
-    codes: NDArray[np.int64] = field(compare=False, repr=False)
+    codes: Codes = field(compare=False, repr=False)
     categories: tuple[Label, ...]
 
     @property
     def n_items(self) -> int:
         """Items with at least one rating."""
-        return int((self.codes != MISSING).any(axis=1).sum())
+        return int((self.codes.max(axis=1) != MISSING).sum())
 
     @property
     def n_raters(self) -> int:
         """Raters with at least one rating."""
-        return int((self.codes != MISSING).any(axis=0).sum())
+        if len(self.codes) == 0:
+            return 0
+        return int((self.codes.max(axis=0) != MISSING).sum())
 
     @property
     def n_categories(self) -> int:
@@ -79,98 +90,81 @@ def code_ratings(
     """
     if isinstance(ratings, CodedRatings):
         return ratings
-    rows = _rows(ratings)
-    declared = _declared(rows, categories)
-    position = {label: code for code, label in enumerate(declared)}
-    codes = np.empty((len(rows), len(rows[0])), dtype=np.int64)
-    for i, row in enumerate(rows):
-        for j, label in enumerate(row):
-            codes[i, j] = _code(label, position, i, j)
-    codes.setflags(write=False)
-    return CodedRatings(codes=codes, categories=declared)
-
-
-def _rows(ratings: Any) -> list[list[object]]:
-    # any table -> n_items lists of n_raters labels
+    declared = None if categories is None else check_categories(categories)
     if hasattr(ratings, "to_numpy"):  # a DataFrame, without importing pandas
-        ratings = ratings.to_numpy(dtype=object)
-    if isinstance(ratings, np.ndarray):
+        codes, found = frame_codes(ratings, declared)
+    elif isinstance(ratings, np.ndarray):
         if ratings.ndim != 2:
             raise RatingsError(
                 "ratings: needs two dimensions (items, raters), "
                 f"got {ratings.ndim} with shape {ratings.shape}"
             )
-        ratings = ratings.tolist()
+        if 0 in ratings.shape:
+            raise RatingsError(_NOTHING)
+        codes, found = array_codes(ratings, declared)
+    else:
+        codes, found = _row_codes(_rows(ratings), declared)
+    codes.setflags(write=False)
+    return CodedRatings(codes=codes, categories=found)
+
+
+def complete(coded: CodedRatings) -> CodedRatings:
+    """Keep the items that every rater rated.
+
+    Parameters
+    ----------
+    coded : CodedRatings
+        Any ratings.
+
+    Returns
+    -------
+    CodedRatings
+        The same categories, perhaps no item.
+    """
+    whole = (coded.codes >= 0).all(axis=1)
+    if whole.all():
+        return coded
+    return CodedRatings(codes=coded.codes[whole], categories=coded.categories)
+
+
+_NOTHING = "ratings: needs at least one item and one rater, got none"
+
+
+def _rows(ratings: Any) -> list[list[object]]:
+    # nested sequences -> n_items lists of n_raters labels
     if isinstance(ratings, str) or not isinstance(ratings, Iterable):
         raise RatingsError(
             f"ratings: needs an item × rater table, got {type(ratings).__name__}"
         )
-    rows = [_row(row, i) for i, row in enumerate(ratings)]
-    if not rows or not rows[0]:
-        raise RatingsError("ratings: needs at least one item and one rater, got none")
-    for i, row in enumerate(rows):
-        if len(row) != len(rows[0]):
+    rows = []
+    for i, row in enumerate(ratings):
+        if isinstance(row, str) or not isinstance(row, Iterable):
+            raise RatingsError(
+                f"ratings: row {i} needs one rating per rater, got {row!r}"
+            )
+        rows.append(list(row))
+        if len(rows[i]) != len(rows[0]):
             raise RatingsError(
                 f"ratings: row {i} needs {len(rows[0])} ratings as row 0 has, "
-                f"got {len(row)}"
+                f"got {len(rows[i])}"
             )
+    if not rows or not rows[0]:
+        raise RatingsError(_NOTHING)
     return rows
 
 
-def _row(row: object, i: int) -> list[object]:
-    if isinstance(row, str) or not isinstance(row, Iterable):
-        raise RatingsError(f"ratings: row {i} needs one rating per rater, got {row!r}")
-    return list(row)
-
-
-def _is_missing(label: object) -> bool:
-    # None, nan, and pandas' NA and NaT, which are not equal to themselves
-    if label is None:
-        return True
-    if isinstance(label, str):
-        return False
-    same = label == label  # not so for nan
-    return not isinstance(same, bool | np.bool_) or not bool(same)
-
-
-def _declared(
-    rows: list[list[object]], categories: Sequence[Label] | None
-) -> tuple[Label, ...]:
-    if categories is None:
-        met = {label for row in rows for label in row if not _is_missing(label)}
-        _one_kind(met, "ratings")
-        return tuple(sorted(met))  # type: ignore[arg-type]
-    declared = tuple(categories)
-    if not declared or isinstance(categories, str):
-        raise RatingsError(
-            f"categories: needs a sequence of at least one label, got {categories!r}"
-        )
-    if any(_is_missing(label) for label in declared):
-        raise RatingsError("categories: a missing value cannot be a category")
-    _one_kind(set(declared), "categories")
-    repeated = [label for i, label in enumerate(declared) if label in declared[:i]]
-    if repeated:
-        raise RatingsError(f"categories: each label once, repeated: {repeated}")
-    return declared
-
-
-def _one_kind(labels: set[Any], where: str) -> None:
-    texts = {label for label in labels if isinstance(label, str)}
-    if texts and len(texts) != len(labels):
-        other = next(label for label in labels if label not in texts)
-        raise RatingsError(
-            f"{where}: text and numbers cannot be mixed, got {min(texts)!r} "
-            f"and {other!r}"
-        )
-
-
-def _code(label: Any, position: dict[Label, int], i: int, j: int) -> int:
-    if _is_missing(label):
-        return MISSING
+def _row_codes(
+    rows: list[list[object]], declared: tuple[Label, ...] | None
+) -> tuple[Codes, tuple[Label, ...]]:
+    if declared is None:
+        declared = labels_met([label for row in rows for label in row])
+    position: dict[object, int] = {label: code for code, label in enumerate(declared)}
+    position[None] = MISSING
     try:
-        return position[label]
-    except (KeyError, TypeError) as error:
-        raise RatingsError(
-            f"ratings: row {i}, column {j}: needs one of "
-            f"{', '.join(map(repr, position))} or a missing value, got {label!r}"
-        ) from error
+        codes = [[position[label] for label in row] for row in rows]
+    except (KeyError, TypeError):  # nan, or a label of no category
+        codes = [
+            [lookup(label, position, i, j) for j, label in enumerate(row)]
+            for i, row in enumerate(rows)
+        ]
+    return np.array(codes, dtype=code_type(len(declared))), declared

@@ -2,31 +2,40 @@
 
 import math
 from collections.abc import Sequence
-from fractions import Fraction
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from masrel.agreement.coding import CodedRatings, Label, code_ratings
-from masrel.agreement.counts import check_table
+from masrel.agreement.coding import CodedRatings, Codes, Label, code_ratings
+from masrel.agreement.counts import check_table, column_categories
 from masrel.agreement.kernel import Floats, Kernel, divide
-from masrel.agreement.undefined import defined, kappa, ratio
+from masrel.agreement.pooled import check_population
+from masrel.agreement.undefined import NO_CHANCE, NO_PAIR, NO_WEIGHTS, undefined
+from masrel.agreement.weights import WeightName, Weights, declared_weights
 from masrel.errors import RatingsError
 from masrel.estimates import Estimate
 
 __all__ = [
     "COHEN_KERNEL",
+    "PairSums",
     "cohen_kappa",
     "cohen_kappa_from_table",
-    "pair_features",
     "pair_table",
+    "two_raters",
 ]
+
+Table = NDArray[np.int64]
 
 
 def cohen_kappa(
-    ratings: object, *, categories: Sequence[Label] | None = None
+    ratings: object,
+    *,
+    categories: Sequence[Label] | None = None,
+    weights: "WeightName | ArrayLike" = "identity",
+    population: int | None = None,
 ) -> Estimate:
-    """Estimate Cohen's kappa of two raters.
+    """Estimate Cohen's kappa of two raters, or weighted kappa.
 
     Parameters
     ----------
@@ -34,16 +43,22 @@ def cohen_kappa(
         Labels or numbers; None and ``nan`` are missing.
     categories : sequence of str, int or float, optional
         The declared scale in order; the labels met when not given.
+    weights : str or array_like, shape (n_categories, n_categories), optional
+        How much two categories agree; see `declared_weights`.
+    population : int, optional
+        Items there are in all, for the finite-population correction.
 
     Returns
     -------
     Estimate
-        The coefficient, with its delta-method standard error over items.
+        The coefficient with its standard error over items.
 
     Raises
     ------
     RatingsError
-        If the ratings are not such a table or of more than two raters.
+        If the ratings are not such a table or not of two raters.
+    ParameterError
+        If an option is none, or the weights do not fit the categories.
 
     Warns
     -----
@@ -53,35 +68,43 @@ def cohen_kappa(
 
     Notes
     -----
-    Only items with both ratings are used, for agreement and for the margins.
+    Only items with both ratings are used, for agreement and for the margins. The
+    standard error is that of Fleiss, Cohen and Everitt [2]_, over n - 1.
 
     References
     ----------
     .. [1] Cohen, J. (1960). A coefficient of agreement for nominal scales.
        Educational and Psychological Measurement, 20(1), 37-46.
        https://doi.org/10.1177/001316446002000104
+    .. [2] Fleiss, J. L., Cohen, J., Everitt, B. S. (1969). Large sample standard
+       errors of kappa and weighted kappa. Psychological Bulletin, 72(5), 323-327.
+       https://doi.org/10.1037/h0028106
 
     Examples
     --------
     >>> cohen_kappa([["a", "a"], ["a", "b"], ["b", "b"], ["b", "b"]]).value
     0.5
     """
-    coded = code_ratings(ratings, categories)
-    n_columns = coded.codes.shape[1]
-    if n_columns != 2:
-        raise RatingsError(
-            f"Cohen's kappa needs the ratings of two raters, got {n_columns}"
-        )
-    return _estimate(pair_table(coded.codes, coded.n_categories))
+    coded = two_raters(code_ratings(ratings, categories), "Cohen's kappa")
+    v = declared_weights(weights, coded.categories)
+    return _estimate(pair_table(coded.codes, coded.n_categories), v, population)
 
 
-def cohen_kappa_from_table(table: ArrayLike) -> Estimate:
+def cohen_kappa_from_table(
+    table: ArrayLike,
+    *,
+    categories: Sequence[Label] | None = None,
+    weights: "WeightName | ArrayLike" = "identity",
+    population: int | None = None,
+) -> Estimate:
     """Estimate Cohen's kappa from a contingency table.
 
     Parameters
     ----------
     table : array_like of int, shape (n_categories, n_categories)
         Items per category of the first (rows) and second rater (columns).
+    categories, weights, population : optional
+        As of `cohen_kappa`; categories are 1 to n_categories unless given.
 
     Returns
     -------
@@ -92,6 +115,8 @@ def cohen_kappa_from_table(table: ArrayLike) -> Estimate:
     ------
     CountsError
         If it is not a square table of counts.
+    ParameterError
+        As `cohen_kappa`.
 
     Warns
     -----
@@ -103,15 +128,43 @@ def cohen_kappa_from_table(table: ArrayLike) -> Estimate:
     >>> cohen_kappa_from_table([[1, 1], [0, 2]]).value
     0.5
     """
-    return _estimate(check_table(table))
+    checked = check_table(table)
+    labels = column_categories(categories, len(checked))
+    return _estimate(checked, declared_weights(weights, labels), population)
 
 
-def pair_table(codes: NDArray[np.int64], n_categories: int) -> NDArray[np.int64]:
+def two_raters(coded: CodedRatings, title: str) -> CodedRatings:
+    """Return ratings that are of two raters.
+
+    Parameters
+    ----------
+    coded : CodedRatings
+        Any ratings.
+    title : str
+        Who asks, for the message.
+
+    Returns
+    -------
+    CodedRatings
+        The same.
+
+    Raises
+    ------
+    RatingsError
+        If there are more or fewer columns than two.
+    """
+    n_columns = coded.codes.shape[1]
+    if n_columns != 2:
+        raise RatingsError(f"{title} needs the ratings of two raters, got {n_columns}")
+    return coded
+
+
+def pair_table(codes: Codes, n_categories: int) -> Table:
     """Count the pairs of two columns of codes.
 
     Parameters
     ----------
-    codes : ndarray of int64, shape (n_items, 2)
+    codes : ndarray of int, shape (n_items, 2)
         Codes of two ratings; pairs with a missing one are left out.
     n_categories : int
         Declared categories.
@@ -121,96 +174,142 @@ def pair_table(codes: NDArray[np.int64], n_categories: int) -> NDArray[np.int64]
     ndarray of int64, shape (n_categories, n_categories)
         Items per pair of categories.
     """
-    both = codes[(codes >= 0).all(axis=1)]
-    flat = both[:, 0] * n_categories + both[:, 1]
-    return (
-        np.bincount(flat, minlength=n_categories**2)
-        .reshape(n_categories, n_categories)
-        .astype(np.int64)
-    )
+    side = n_categories + 1
+    # Missing, -1, becomes the last row and column, which is cut off.
+    flat = codes[:, 0].astype(np.int32) * side + codes[:, 1] + side + 1
+    times = np.bincount(flat, minlength=side * side).reshape(side, side)
+    return times[1:, 1:].astype(np.int64)
 
 
-def _estimate(table: NDArray[np.int64]) -> Estimate:
+@dataclass(frozen=True, slots=True)
+class PairSums:
+    """What kappa of a table of pairs is made of, in integers.
+
+    With t the table and n its sum, D_o = `above` / (n · w) and D_e = `below` /
+    (n² · w), where w is the denominator of the weights.
+    """
+
+    cells: list[list[int]]
+    n: int
+    above: int  # Σ_kl v_kl t_kl
+    below: int  # Σ_kl v_kl t_k. t_.l
+    to_second: list[int]  # Σ_l v_kl t_.l
+    to_first: list[int]  # Σ_k v_kl t_k.
+
+    @classmethod
+    def of(cls, table: Table, v: Weights) -> "PairSums":
+        """Sum a table of pairs.
+
+        Parameters
+        ----------
+        table : ndarray of int64, shape (n_categories, n_categories)
+            Items per pair of categories.
+        v : Weights
+            Disagreement of two categories.
+
+        Returns
+        -------
+        PairSums
+            Its sums.
+        """
+        cells: list[list[int]] = table.tolist()
+        first = [sum(row) for row in cells]
+        second = [sum(column) for column in zip(*cells, strict=True)]
+        n = sum(first)
+        to_second = v.products(second)
+        if v.numerators is None:
+            above = n - sum([cells[k][k] for k in range(len(cells))])
+        else:
+            above = sum(
+                [
+                    sum([x * t for x, t in zip(of_v, row, strict=True) if t])
+                    for of_v, row in zip(v.numerators, cells, strict=True)
+                ]
+            )
+        below = sum([t * vt for t, vt in zip(first, to_second, strict=True)])
+        return cls(cells, n, above, below, to_second, v.products(first))
+
+    def influence(self, k: int, l: int, v: Weights) -> int:  # noqa: E741 - as in the formula
+        """Return the influence of an item in cell (k, l), times `below`² / n.
+
+        An item moves D_o by v_kl - D_o, and D_e by Σ_m (v_km p_.m + v_ml p_m.) - 2 D_e.
+        """
+        if v.numerators is None:
+            own = 0 if k == l else 1
+        else:
+            own = v.numerators[k][l]
+        margins = self.to_second[k] + self.to_first[l]
+        raised = self.n * self.above * margins
+        return raised - self.n * own * self.below - self.above * self.below
+
+
+def _estimate(table: Table, v: Weights, population: int | None) -> Estimate:
     # shape of table: (n_categories, n_categories)
-    cells: list[list[int]] = table.tolist()
-    n = sum(map(sum, cells))
-    observed = chance = None
-    if n > 0:
-        rows = [sum(row) for row in cells]
-        columns = [sum(column) for column in zip(*cells, strict=True)]
-        observed = Fraction(sum(cells[k][k] for k in range(len(cells))), n)
-        chance = Fraction(sum(r * c for r, c in zip(rows, columns, strict=True)), n * n)
-    value = kappa(observed, chance)
+    found = PairSums.of(table, v)
+    n = found.n
+    check_population(population, n)
+    reason = None
+    if n == 0:
+        reason = undefined("Cohen's kappa", NO_PAIR)
+    elif v.numerators is not None and len(table) == 1:
+        reason = undefined("Cohen's kappa", NO_WEIGHTS)
+    elif found.below == 0:
+        reason = undefined("Cohen's kappa", NO_CHANCE)
+    value = error = observed = chance = math.nan
+    if n:
+        w = v.denominator
+        observed = (n * w - found.above) / (n * w)
+        chance = (n * n * w - found.below) / (n * n * w)
+        if reason is None:
+            value = (found.below - n * found.above) / found.below
+            error = _standard_error(found, v, population)
     return Estimate(
         coefficient="cohen_kappa",
-        weights="identity",
-        value=ratio(value),
-        standard_error=_standard_error(table, n, observed, chance, value),
-        observed=ratio(observed),
-        chance=ratio(chance),
+        weights=v.name,
+        value=value,
+        standard_error=error,
+        observed=observed,
+        chance=chance,
         n_items=n,
         n_raters=2 if n else 0,
-        n_categories=len(cells),
-        reason=defined("Cohen's kappa", observed, chance),
+        n_categories=len(table),
+        reason=reason,
     )
 
 
-def _standard_error(
-    table: NDArray[np.int64],
-    n: int,
-    observed: Fraction | None,
-    chance: Fraction | None,
-    value: Fraction | None,
-) -> float:
-    if n < 2 or observed is None or chance is None or value is None:
+def _standard_error(found: PairSums, v: Weights, population: int | None) -> float:
+    n = found.n
+    if n < 2:
         return math.nan
-    first = table.sum(axis=1) / n  # margins
-    second = table.sum(axis=0) / n
-    agree = np.eye(table.shape[0])
-    # An item in cell (i, j) moves p_e by p_.i + p_j. - 2 p_e.
-    on_chance = second[:, None] + first[None, :] - 2 * float(chance)
-    influence = agree - float(observed) - float(1 - value) * on_chance
-    influence /= float(1 - chance)
+    squares = sum(
+        t * found.influence(k, l, v) ** 2
+        for k, row in enumerate(found.cells)
+        for l, t in enumerate(row)  # noqa: E741 - k, l as in the formula
+        if t
+    )
     # n - 1: items are a sample, as for the coefficients of many raters.
-    return float(np.sqrt((table * influence**2).sum() / (n * (n - 1))))
+    variance = squares * n / (found.below**4 * (n - 1))
+    if population is not None:
+        variance *= (population - n) / population
+    return math.sqrt(variance)
 
 
-def pair_features(codes: NDArray[np.int64], n_categories: int) -> Floats:
-    """Return what each pair adds to the sums Cohen's kappa needs.
-
-    Parameters
-    ----------
-    codes : ndarray of int64, shape (n_items, 2)
-        Codes of two ratings, -1 where missing.
-    n_categories : int
-        Declared categories.
-
-    Returns
-    -------
-    ndarray, shape (n_items, 2 + 2 n_categories)
-        Agreement, presence, and indicators of the two categories; zeros where one
-        is missing.
-    """
-    both = np.logical_and(codes[:, 0] >= 0, codes[:, 1] >= 0)
-    agree = both & (codes[:, 0] == codes[:, 1])
-    present = both.reshape(-1, 1)
-    ranks = np.arange(n_categories)
-    first = present & (codes[:, :1] == ranks)
-    second = present & (codes[:, 1:] == ranks)
-    return np.column_stack([agree, both, first, second]).astype(np.float64)
+def _features(coded: CodedRatings, v: Floats) -> Floats:
+    # (n_items, 2 + 2 n_categories): disagreement, presence, both categories; zeros
+    # where a rating is missing
+    codes, ranks = coded.codes, np.arange(len(v))
+    both = np.min(codes, axis=1) >= 0
+    apart = np.where(both, v[codes[:, 0], codes[:, 1]], 0.0)
+    first, second = (both[:, None] & (codes[:, [r]] == ranks) for r in (0, 1))
+    return np.column_stack([apart, both, first, second]).astype(np.float64)
 
 
-def _features(coded: CodedRatings) -> Floats:
-    return pair_features(coded.codes, coded.n_categories)
-
-
-def _value(sums: Floats, n_categories: int) -> Floats:
-    # sums (..., 2 + 2 n_categories) -> (...); times n² so that all are integers
-    agree, n = sums[..., 0], sums[..., 1]
-    first = sums[..., 2 : 2 + n_categories]
-    second = sums[..., 2 + n_categories :]
-    expected = (first * second).sum(axis=-1)
-    return divide(n * agree - expected, n * n - expected)
+def _value(sums: Floats, v: Floats) -> Floats:
+    # sums (..., 2 + 2 n_categories) -> (...); D_o and D_e times n²
+    q = len(v)
+    first, second = sums[..., 2 : 2 + q], sums[..., 2 + q :]
+    expected = ((first @ v) * second).sum(axis=-1)
+    return 1.0 - divide(sums[..., 1] * sums[..., 0], expected)
 
 
 COHEN_KERNEL = Kernel(features=_features, value=_value)

@@ -1,17 +1,32 @@
 """Tables of counts: how many raters put each item into each category."""
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from masrel.agreement.coding import CodedRatings
-from masrel.errors import CountsError
+from masrel.agreement.items import FewItems, ItemTable, item_table
+from masrel.agreement.labels import Label, check_categories
+from masrel.errors import CountsError, ParameterError
 
-__all__ = ["check_counts", "check_table", "distinct_rows", "item_counts"]
+__all__ = [
+    "check_counts",
+    "check_table",
+    "coded_items",
+    "column_categories",
+    "counted_items",
+    "item_counts",
+]
+
+Integers = NDArray[np.int64]
+
+_FEW = 2_000  # ratings that Python counts about as fast as numpy
+_MOST_KEYS = 1 << 22  # patterns that are counted in a table rather than sorted
+_BLOCK = 1 << 16  # items counted at once, so that they stay in the cache
 
 
-def item_counts(coded: CodedRatings) -> NDArray[np.int64]:
+def item_counts(coded: CodedRatings) -> Integers:
     """Count the raters of each category, item by item.
 
     Parameters
@@ -24,15 +39,88 @@ def item_counts(coded: CodedRatings) -> NDArray[np.int64]:
     ndarray of int64, shape (n_items, n_categories)
         Raters per item and category.
     """
-    n_items = coded.codes.shape[0]
+    n_items, n_raters = coded.codes.shape
+    if coded.n_categories <= n_raters:
+        parts = [(coded.codes == k).sum(axis=1) for k in range(coded.n_categories)]
+        return np.column_stack(parts)
     counts = np.zeros((n_items, coded.n_categories), dtype=np.int64)
-    given = coded.codes >= 0
-    items = np.nonzero(given)[0]
-    np.add.at(counts, (items, coded.codes[given]), 1)
+    every = np.arange(n_items)
+    for column in coded.codes.T:
+        given = column >= 0
+        counts[every[given], column[given]] += 1  # an item once a column
     return counts
 
 
-def check_counts(counts: ArrayLike) -> NDArray[np.int64]:
+def coded_items(coded: CodedRatings) -> ItemTable:
+    """Count the raters of each category, equal items together.
+
+    Parameters
+    ----------
+    coded : CodedRatings
+        The ratings; missing ones are not counted.
+
+    Returns
+    -------
+    FewItems or ManyItems
+        Distinct items with how often each occurs.
+    """
+    n_items, n_raters = coded.codes.shape
+    if coded.codes.size <= _FEW:
+        return _few(coded)
+    # An item is one number: Σ over its raters of (n_raters + 1) to the power code.
+    base, q = n_raters + 1, coded.n_categories
+    if base**q > min(_MOST_KEYS, 16 * n_items):
+        return item_table(item_counts(coded))
+    powers = base ** np.arange(q + 1, dtype=np.int64)
+    powers[-1] = 0  # code -1 is the last entry
+    powers = powers.astype(np.int32)
+    times = np.zeros(base**q, dtype=np.int64)
+    for start in range(0, n_items, _BLOCK):
+        block = coded.codes[start : start + _BLOCK]
+        keys = powers[block[:, 0]]
+        for column in block.T[1:]:
+            keys += powers[column]
+        times += np.bincount(keys, minlength=times.size)
+    met = np.flatnonzero(times)
+    counts = met[:, None] // powers[:-1].astype(np.int64) % base
+    return item_table(counts, times[met])
+
+
+def _few(coded: CodedRatings) -> FewItems:
+    found: dict[tuple[int, ...], int] = {}
+    width = coded.n_categories + 1
+    for codes in coded.codes.tolist():
+        row = [0] * width
+        for code in codes:
+            row[code] += 1  # code -1 is the last entry
+        item = tuple(row[:-1])
+        found[item] = found.get(item, 0) + 1
+    return FewItems(list(found), list(found.values()), coded.n_categories)
+
+
+def counted_items(counts: Integers) -> ItemTable:
+    """Put equal rows of a table of counts together.
+
+    Parameters
+    ----------
+    counts : ndarray of int64, shape (n_items, n_categories)
+        Raters per item and category.
+
+    Returns
+    -------
+    FewItems or ManyItems
+        Distinct items with how often each occurs.
+    """
+    base = int(counts.max()) + 1
+    if counts.size > _FEW and base ** counts.shape[1] <= _MOST_KEYS:
+        powers = base ** np.arange(counts.shape[1], dtype=np.int64)
+        times = np.bincount(counts @ powers)
+        met = np.flatnonzero(times)
+        return item_table(met[:, None] // powers % base, times[met])
+    return item_table(counts)
+
+
+def check_counts(counts: ArrayLike) -> Integers:
     """Check a table of counts.
 
     Parameters
@@ -48,7 +136,7 @@ def check_counts(counts: ArrayLike) -> NDArray[np.int64]:
     Raises
     ------
     CountsError
-        If it is not a table of whole numbers of at least 0.
+        If it is not a table of whole numbers of at least 0 and below 2^53.
     """
     table = np.asarray(counts)
     if table.ndim != 2 or 0 in table.shape:
@@ -58,17 +146,52 @@ def check_counts(counts: ArrayLike) -> NDArray[np.int64]:
         )
     if table.dtype.kind not in "iuf":
         raise CountsError(f"counts: needs whole numbers, got {table.dtype}")
-    wrong = ~((table >= 0) & (table == np.floor(table)) & (table < 2**62))
+    wrong = ~((table >= 0) & (table == np.floor(table)) & (table < 2**53))
     if wrong.any():
         row, column = np.argwhere(wrong)[0]
         raise CountsError(
-            f"counts: row {row}, column {column}: needs a whole number of at least 0, "
-            f"got {table[row, column]}"
+            f"counts: row {row}, column {column}: needs a whole number of at least 0 "
+            f"and below 2^53, got {table[row, column]}"
         )
     return table.astype(np.int64)
 
 
-def check_table(table: ArrayLike) -> NDArray[np.int64]:
+def column_categories(
+    categories: Sequence[Label] | None, n_columns: int
+) -> Sequence[Label]:
+    """Return the declared scale of a table of counts, 1 to n_columns unless given.
+
+    Parameters
+    ----------
+    categories : sequence of str, int or float, or None
+        The scale in order.
+    n_columns : int
+        Columns of the counts.
+
+    Returns
+    -------
+    sequence of str, int or float
+        One category a column.
+
+    Raises
+    ------
+    ParameterError
+        If there are not as many categories as columns.
+    RatingsError
+        If the categories are no scale.
+    """
+    if categories is None:
+        return range(1, n_columns + 1)
+    declared = check_categories(categories)
+    if len(declared) != n_columns:
+        raise ParameterError(
+            f"categories: needs {n_columns}, one per column of counts, got "
+            f"{len(declared)}"
+        )
+    return declared
+
+
+def check_table(table: ArrayLike) -> Integers:
     """Check a contingency table of two raters.
 
     Parameters
@@ -92,22 +215,3 @@ def check_table(table: ArrayLike) -> NDArray[np.int64]:
             f"table: needs as many rows as columns, got shape {checked.shape}"
         )
     return checked
-
-
-def distinct_rows(
-    counts: NDArray[np.int64],
-) -> Iterator[tuple[tuple[int, ...], int]]:
-    """Yield every distinct row as Python integers, with how often it occurs.
-
-    Parameters
-    ----------
-    counts : ndarray of int64, shape (n_items, n_columns)
-        Any table of integers.
-
-    Yields
-    ------
-    tuple of int, int
-        The row and its number of occurrences.
-    """
-    rows, times = np.unique(counts, axis=0, return_counts=True)
-    yield from zip(map(tuple, rows.tolist()), times.tolist(), strict=True)

@@ -1,28 +1,38 @@
-"""Fleiss' kappa: agreement of two or more raters on nominal categories."""
+"""Fleiss' kappa: agreement of two or more raters who are not told apart."""
 
-import math
 from collections.abc import Sequence
-from fractions import Fraction
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from masrel.agreement.coding import CodedRatings, Label, code_ratings
-from masrel.agreement.counts import check_counts, distinct_rows, item_counts
-from masrel.agreement.kernel import Floats, Kernel, divide
-from masrel.agreement.percent import (
-    item_agreement,
-    observed_agreement,
-    pairs_without_self,
+from masrel.agreement.coding import Label
+from masrel.agreement.kernel import Floats, pooled_kernel
+from masrel.agreement.pooled import (
+    Asked,
+    Expected,
+    Shares,
+    Variance,
+    estimate_counts,
+    estimate_ratings,
 )
-from masrel.agreement.undefined import defined, kappa, ratio
+from masrel.agreement.weights import WeightName, Weights
 from masrel.estimates import Estimate
 
-__all__ = ["FLEISS_KERNEL", "fleiss_kappa", "fleiss_kappa_from_counts"]
+__all__ = [
+    "FLEISS_KERNEL",
+    "expected_disagreement",
+    "fleiss_kappa",
+    "fleiss_kappa_from_counts",
+]
 
 
 def fleiss_kappa(
-    ratings: object, *, categories: Sequence[Label] | None = None
+    ratings: object,
+    *,
+    categories: Sequence[Label] | None = None,
+    weights: "WeightName | ArrayLike" = "identity",
+    variance: Variance = "delta",
+    population: int | None = None,
 ) -> Estimate:
     """Estimate Fleiss' kappa from an item × rater table.
 
@@ -32,16 +42,24 @@ def fleiss_kappa(
         Labels or numbers; None and ``nan`` are missing.
     categories : sequence of str, int or float, optional
         The declared scale in order; the labels met when not given.
+    weights : str or array_like, shape (n_categories, n_categories), optional
+        How much two categories agree; see `declared_weights`.
+    variance : {"delta", "irrcac"}, optional
+        Which standard error; irrCAC's is too large with single ratings.
+    population : int, optional
+        Items there are in all, for the finite-population correction.
 
     Returns
     -------
     Estimate
-        The coefficient, with its delta-method standard error over items.
+        The coefficient with its standard error over items.
 
     Raises
     ------
     RatingsError
         If the ratings are not such a table.
+    ParameterError
+        If an option is none, or the weights do not fit the categories.
 
     Warns
     -----
@@ -69,17 +87,26 @@ def fleiss_kappa(
     >>> round(fleiss_kappa([["a", "a"], ["b", "b"], ["a", "b"]]).value, 3)
     0.333
     """
-    coded = code_ratings(ratings, categories)
-    return _estimate(item_counts(coded), coded.n_raters)
+    asked = Asked(categories, weights, variance, population)
+    return estimate_ratings(_NAME, _TITLE, ratings, asked, expected_disagreement)
 
 
-def fleiss_kappa_from_counts(counts: ArrayLike) -> Estimate:
+def fleiss_kappa_from_counts(
+    counts: ArrayLike,
+    *,
+    categories: Sequence[Label] | None = None,
+    weights: "WeightName | ArrayLike" = "identity",
+    variance: Variance = "delta",
+    population: int | None = None,
+) -> Estimate:
     """Estimate Fleiss' kappa from how many raters chose each category.
 
     Parameters
     ----------
     counts : array_like of int, shape (n_items, n_categories)
         Raters per item and category; rows may have different sums.
+    categories, weights, variance, population : optional
+        As of `fleiss_kappa`; categories are 1 to n_categories unless given.
 
     Returns
     -------
@@ -90,6 +117,8 @@ def fleiss_kappa_from_counts(counts: ArrayLike) -> Estimate:
     ------
     CountsError
         If it is not a table of counts.
+    ParameterError
+        As `fleiss_kappa`.
 
     Warns
     -----
@@ -101,100 +130,41 @@ def fleiss_kappa_from_counts(counts: ArrayLike) -> Estimate:
     >>> round(fleiss_kappa_from_counts([[2, 0], [0, 2], [1, 1]]).value, 3)
     0.333
     """
-    table = check_counts(counts)
-    return _estimate(table, int(table.sum(axis=1).max()))
+    asked = Asked(categories, weights, variance, population)
+    return estimate_counts(_NAME, _TITLE, counts, asked, expected_disagreement)
 
 
-def _estimate(counts: NDArray[np.int64], n_raters: int) -> Estimate:
-    # shape of counts: (n_items, n_categories)
-    observed = observed_agreement(counts)  # P-bar in [1]
-    shares = _category_shares(counts)
-    chance = sum((p * p for p in shares), Fraction(0)) if shares else None
-    value = kappa(observed, chance)
-    return Estimate(
-        coefficient="fleiss_kappa",
-        weights="identity",
-        value=ratio(value),
-        standard_error=_standard_error(counts, shares, observed, value),
-        observed=ratio(observed),
-        chance=ratio(chance),
-        n_items=int((counts.sum(axis=1) > 0).sum()),
-        n_raters=n_raters,
-        n_categories=counts.shape[1],
-        reason=defined("Fleiss' kappa", observed, chance),
+_NAME, _TITLE = "fleiss_kappa", "Fleiss' kappa"
+
+
+def expected_disagreement(shares: Shares, weights: Weights) -> Expected:
+    """Return Σ_kl v_kl p_k p_l, 1 - P̄_e of [1] in `fleiss_kappa`.
+
+    Parameters
+    ----------
+    shares : Shares
+        Shares of the categories, p.
+    weights : Weights
+        Disagreement of two categories, v.
+
+    Returns
+    -------
+    Expected
+        The disagreement by chance, with its slopes 2 Σ_l v_kl p_l.
+    """
+    products = weights.products(shares.numerators)
+    total = shares.total
+    return Expected(
+        sum([p * vp for p, vp in zip(shares.numerators, products, strict=True)]),
+        total * total * weights.denominator,
+        [2 * vp for vp in products],
+        total * weights.denominator,
     )
 
 
-def _category_shares(counts: NDArray[np.int64]) -> list[Fraction]:
-    # p_j in [1]: mean over rated items of n_ij / n_i; empty without any rating
-    chosen: dict[int, list[int]] = {}  # raters of an item -> ratings per category
-    n_rated = 0
-    for row, times in distinct_rows(counts):
-        n = sum(row)
-        if n > 0:
-            totals = chosen.setdefault(n, [0] * len(row))
-            for k, count in enumerate(row):
-                totals[k] += times * count
-            n_rated += times
-    if n_rated == 0:
-        return []
-    return [
-        sum((Fraction(totals[k], n) for n, totals in chosen.items()), Fraction(0))
-        / n_rated
-        for k in range(counts.shape[1])
-    ]
+def _in_floats(shares: Floats, v: Floats) -> Floats:
+    # shares (..., n_categories) -> (...)
+    return np.asarray(((shares @ v) * shares).sum(axis=-1))
 
 
-def _standard_error(
-    counts: NDArray[np.int64],
-    shares: list[Fraction],
-    observed: Fraction | None,
-    value: Fraction | None,
-) -> float:
-    counts = counts[counts.sum(axis=1) > 0]
-    n_items = counts.shape[0]
-    if n_items < 2 or observed is None or value is None:
-        return math.nan
-    p = np.array([float(share) for share in shares])
-    chance = sum((share * share for share in shares), Fraction(0))
-    agreement, usable = item_agreement(counts)
-    # Influence of an item on P-bar, a ratio of two means, and on P-bar_e.
-    on_observed = usable * (agreement - float(observed)) / usable.mean()
-    item_shares = counts / counts.sum(axis=1, keepdims=True)
-    on_chance = 2 * (item_shares @ p - float(chance))
-    # d kappa = (d P-bar - (1 - kappa) d P-bar_e) / (1 - P-bar_e)
-    influence = on_observed - float(1 - value) * on_chance
-    influence /= float(1 - chance)
-    return float(np.sqrt((influence**2).sum() / (n_items * (n_items - 1))))
-
-
-def _features(coded: CodedRatings) -> Floats:
-    # (n_items, 3 + n_categories): agreement, usable, rated, shares of categories
-    counts = item_counts(coded)
-    agreement, usable = item_agreement(counts)
-    n = counts.sum(axis=1)
-    shares = np.where(n[:, None] > 0, counts / np.maximum(n, 1)[:, None], 0.0)
-    return np.column_stack([agreement, usable, (n > 0).astype(np.float64), shares])
-
-
-def _value(sums: Floats, n_categories: int) -> Floats:
-    # sums (..., 3 + n_categories) -> (...)
-    observed = divide(sums[..., 0], sums[..., 1])
-    rated = sums[..., 2]
-    shares = sums[..., 3 : 3 + n_categories]
-    # 1 - P-bar_e over one denominator, so that one category gives exactly 0.
-    disagreement = rated**2 - (shares**2).sum(axis=-1)
-    chance = divide((shares**2).sum(axis=-1), rated**2)
-    return divide(observed - chance, np.where(disagreement > 0, 1 - chance, 0.0))
-
-
-def _rater_sums(coded: CodedRatings, times: Floats) -> Floats:
-    # times (n_resamples, n_raters) -> (n_resamples, 3 + n_categories)
-    agreement, usable, taken = pairs_without_self(coded, times)
-    n = taken.sum(axis=-1)  # (n_resamples, n_items)
-    shares = np.where(n[..., None] > 0, taken / np.maximum(n, 1)[..., None], 0.0)
-    heads = [agreement.sum(axis=-1), usable.sum(axis=-1), (n > 0).sum(axis=-1)]
-    return np.column_stack([*heads, shares.sum(axis=-2)]).astype(np.float64)
-
-
-FLEISS_KERNEL = Kernel(features=_features, value=_value, rater_sums=_rater_sums)
+FLEISS_KERNEL = pooled_kernel(_in_floats)

@@ -2,22 +2,53 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from functools import partial
+from typing import Literal, get_args
 
+from numpy.typing import ArrayLike
+
+from masrel.agreement.brennan_prediger import BRENNAN_PREDIGER_KERNEL, brennan_prediger
 from masrel.agreement.coding import CodedRatings, Label, code_ratings
 from masrel.agreement.cohen import COHEN_KERNEL, cohen_kappa
+from masrel.agreement.conger import CONGER_KERNEL, conger_kappa
 from masrel.agreement.fleiss import FLEISS_KERNEL, fleiss_kappa
+from masrel.agreement.gwet import GWET_KERNEL, gwet_ac
+from masrel.agreement.icc import IccForm, icc
+from masrel.agreement.kendall import kendall_w
 from masrel.agreement.kernel import Kernel
+from masrel.agreement.krippendorff import KRIPPENDORFF_KERNEL, krippendorff_alpha
+from masrel.agreement.light import LIGHT_KERNEL, light_kappa
 from masrel.agreement.percent import PERCENT_KERNEL, percent_agreement
+from masrel.agreement.robinson import robinson_a
+from masrel.agreement.scott import SCOTT_KERNEL, scott_pi
 from masrel.agreement.stratified import (
     STRATIFIED_KERNEL,
     code_strata,
     stratified_kappa,
 )
+from masrel.agreement.weights import WeightName
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate
 
-__all__ = ["COEFFICIENTS", "Coefficient", "coefficient"]
+__all__ = ["COEFFICIENTS", "Coefficient", "Property", "coefficient"]
+
+Property = Literal[
+    "items in any order",
+    "raters in any order",
+    "categories in any order",
+    "unused category",
+    "items twice",
+    "two categories",
+    "perfect agreement",
+]
+"""What may be true of a coefficient; each has a test that all that claim it pass.
+
+An unused category, or every item twice, changes nothing; the order of categories does
+not matter with identity weights; linear and quadratic weights of two categories are
+identity weights; perfect agreement on two categories or more is 1.
+"""
+
+_EVERY: frozenset[Property] = frozenset(get_args(Property))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,15 +58,16 @@ class Coefficient:
     Attributes
     ----------
     name : str
-        Name of its public function.
+        Its name; that of its public function unless that has several forms.
     title : str
         Its name for a reader.
     function : callable
         The public function.
-    code : callable
-        Ratings and categories to the codes its kernel takes.
-    kernel : Kernel
-        The coefficient from sums over items.
+    kernel : Kernel or None
+        The coefficient from sums over items, for intervals; None where it has an
+        interval of its own or none.
+    properties : frozenset of str
+        What is true of it.
     shape : {"ratings", "pairs"}
         What the function takes: item × rater, or pairs per rater.
     n_raters : tuple of int or None
@@ -44,63 +76,153 @@ class Coefficient:
         Lower end of the parameter space.
     chance_corrected : bool
         Whether 0 is what chance gives.
+    weighted : bool
+        Whether it takes weights.
+    code : callable
+        Ratings and categories to the codes its kernel takes.
     """
 
     name: str
     title: str
     function: Callable[..., Estimate]
-    code: Callable[..., CodedRatings]
-    kernel: Kernel
+    kernel: Kernel | None
+    properties: frozenset[Property] = _EVERY
     shape: Literal["ratings", "pairs"] = "ratings"
     n_raters: tuple[int, int | None] = (2, None)
     lowest: float = -1.0
     chance_corrected: bool = True
+    weighted: bool = True
+    code: Callable[..., CodedRatings] = code_ratings
 
     def __call__(
-        self, ratings: object, *, categories: Sequence[Label] | None = None
+        self,
+        ratings: object,
+        *,
+        categories: Sequence[Label] | None = None,
+        weights: "WeightName | ArrayLike" = "identity",
     ) -> Estimate:
         """Estimate the coefficient, as its public function does."""
+        if self.weighted:
+            return self.function(ratings, categories=categories, weights=weights)
+        if not (isinstance(weights, str) and weights == "identity"):
+            raise ParameterError(f"weights: {self.title} takes none, got {weights!r}")
         return self.function(ratings, categories=categories)
 
 
-COEFFICIENTS: dict[str, Coefficient] = {
-    entry.name: entry
-    for entry in (
+_RANKS = frozenset[Property](
+    {"items in any order", "raters in any order", "unused category", "items twice"}
+)
+
+_ALL = (
+    Coefficient(
+        name="percent_agreement",
+        title="Percent agreement",
+        function=percent_agreement,
+        kernel=PERCENT_KERNEL,
+        lowest=0.0,
+        chance_corrected=False,
+    ),
+    Coefficient(
+        name="cohen_kappa",
+        title="Cohen's κ",
+        function=cohen_kappa,
+        kernel=COHEN_KERNEL,
+        n_raters=(2, 2),
+    ),
+    Coefficient(
+        name="conger_kappa",
+        title="Conger's κ",
+        function=conger_kappa,
+        kernel=CONGER_KERNEL,
+    ),
+    Coefficient(
+        name="fleiss_kappa",
+        title="Fleiss' κ",
+        function=fleiss_kappa,
+        kernel=FLEISS_KERNEL,
+    ),
+    Coefficient(
+        name="light_kappa",
+        title="Light's κ",
+        function=light_kappa,
+        kernel=LIGHT_KERNEL,
+    ),
+    Coefficient(
+        name="scott_pi",
+        title="Scott's π",
+        function=scott_pi,
+        kernel=SCOTT_KERNEL,
+        n_raters=(2, 2),
+    ),
+    Coefficient(
+        name="brennan_prediger",
+        title="Brennan-Prediger",
+        function=brennan_prediger,
+        kernel=BRENNAN_PREDIGER_KERNEL,
+        properties=_EVERY - {"unused category"},
+    ),
+    Coefficient(
+        name="gwet_ac",
+        title="Gwet's AC",
+        function=gwet_ac,
+        kernel=GWET_KERNEL,
+        properties=_EVERY - {"unused category"},
+    ),
+    Coefficient(
+        name="krippendorff_alpha",
+        title="Krippendorff's α",
+        function=krippendorff_alpha,
+        kernel=KRIPPENDORFF_KERNEL,
+        properties=_EVERY - {"items twice"},
+    ),
+    Coefficient(
+        name="stratified_kappa",
+        title="Stratified κ",
+        function=stratified_kappa,
+        code=code_strata,
+        kernel=STRATIFIED_KERNEL,
+        shape="pairs",
+        n_raters=(1, None),
+    ),
+    Coefficient(
+        name="kendall_w",
+        title="Kendall's W",
+        function=kendall_w,
+        kernel=None,
+        properties=(_RANKS - {"items twice"}) | {"perfect agreement"},
+        lowest=0.0,
+        chance_corrected=False,
+        weighted=False,
+    ),
+    Coefficient(
+        name="robinson_a",
+        title="Robinson's A",
+        function=robinson_a,
+        kernel=None,
+        properties=_RANKS | {"perfect agreement"},
+        lowest=0.0,
+        chance_corrected=False,
+        weighted=False,
+    ),
+    *(
         Coefficient(
-            name="percent_agreement",
-            title="Percent agreement",
-            function=percent_agreement,
-            code=code_ratings,
-            kernel=PERCENT_KERNEL,
-            lowest=0.0,
-            chance_corrected=False,
-        ),
-        Coefficient(
-            name="cohen_kappa",
-            title="Cohen's κ",
-            function=cohen_kappa,
-            code=code_ratings,
-            kernel=COHEN_KERNEL,
-            n_raters=(2, 2),
-        ),
-        Coefficient(
-            name="fleiss_kappa",
-            title="Fleiss' κ",
-            function=fleiss_kappa,
-            code=code_ratings,
-            kernel=FLEISS_KERNEL,
-        ),
-        Coefficient(
-            name="stratified_kappa",
-            title="Stratified κ",
-            function=stratified_kappa,
-            code=code_strata,
-            kernel=STRATIFIED_KERNEL,
-            shape="pairs",
-            n_raters=(1, None),
-        ),
-    )
-}
+            name=name,
+            title=form,
+            function=partial(icc, form=form),
+            kernel=None,
+            properties=(_RANKS - {"items twice"}) | {"perfect agreement"},
+            lowest=-float("inf"),
+            weighted=False,
+        )
+        for name, form in zip(
+            ("icc_1", "icc_1k", "icc_c1", "icc_ck", "icc_a1", "icc_ak"),
+            get_args(IccForm),
+            strict=True,
+        )
+    ),
+)
+
+COEFFICIENTS: dict[str, Coefficient] = {entry.name: entry for entry in _ALL}
 """Name to coefficient."""
 
 
@@ -110,7 +232,7 @@ def coefficient(name: str) -> Coefficient:
     Parameters
     ----------
     name : str
-        Name of its public function.
+        Its name in the register.
 
     Returns
     -------

@@ -5,12 +5,13 @@ from collections.abc import Iterable, Sequence
 from fractions import Fraction
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
-from masrel.agreement.coding import CodedRatings, Label, code_ratings
-from masrel.agreement.cohen import pair_features, pair_table
+from masrel.agreement.coding import CodedRatings, Codes, Label, code_ratings
+from masrel.agreement.cohen import COHEN_KERNEL, PairSums, pair_table
 from masrel.agreement.kernel import Floats, Kernel, divide
-from masrel.agreement.undefined import defined, kappa, ratio
+from masrel.agreement.undefined import NO_CHANCE, NO_PAIR, undefined
+from masrel.agreement.weights import WeightName, Weights, declared_weights
 from masrel.errors import RatingsError
 from masrel.estimates import Estimate
 
@@ -18,7 +19,10 @@ __all__ = ["STRATIFIED_KERNEL", "code_strata", "stratified_kappa"]
 
 
 def stratified_kappa(
-    pairs: object, *, categories: Sequence[Label] | None = None
+    pairs: object,
+    *,
+    categories: Sequence[Label] | None = None,
+    weights: "WeightName | ArrayLike" = "identity",
 ) -> Estimate:
     """Estimate one kappa over raters who each rated the same items twice.
 
@@ -33,6 +37,8 @@ def stratified_kappa(
         rater; None and ``nan`` are missing.
     categories : sequence of str, int or float, optional
         The declared scale in order; the labels met when not given.
+    weights : str or array_like, shape (n_categories, n_categories), optional
+        How much two categories agree; see `declared_weights`.
 
     Returns
     -------
@@ -44,6 +50,8 @@ def stratified_kappa(
     ------
     RatingsError
         If the pairs are not such a table.
+    ParameterError
+        If the weights are none, or do not fit the categories.
 
     Warns
     -----
@@ -69,27 +77,39 @@ def stratified_kappa(
     0.4
     """
     coded = code_strata(pairs, categories)
+    v = declared_weights(weights, coded.categories)
     strata = [
-        agreements
+        found
         for codes in _strata(coded)
-        if (agreements := _agreements(pair_table(codes, coded.n_categories)))
+        if (found := PairSums.of(pair_table(codes, coded.n_categories), v)).n
     ]
-    observed = chance = None
+    apart = sum([Fraction(s.above, s.n * v.denominator) for s in strata], Fraction(0))
+    by_chance = sum(
+        [Fraction(s.below, s.n * s.n * v.denominator) for s in strata], Fraction(0)
+    )
+    reason = None
+    if not strata:
+        reason = undefined("stratified kappa", NO_PAIR)
+    elif by_chance == 0:
+        reason = undefined("stratified kappa", NO_CHANCE)
+    value = error = observed = chance = math.nan
     if strata:
-        observed = sum((o for o, _ in strata), Fraction(0)) / len(strata)
-        chance = sum((e for _, e in strata), Fraction(0)) / len(strata)
-    value = kappa(observed, chance)
+        observed = float(1 - apart / len(strata))
+        chance = float(1 - by_chance / len(strata))
+    if reason is None:
+        value = float(1 - apart / by_chance)
+        error = _standard_error(coded, v, apart, by_chance)
     return Estimate(
         coefficient="stratified_kappa",
-        weights="identity",
-        value=ratio(value),
-        standard_error=_standard_error(coded, chance, value),
-        observed=ratio(observed),
-        chance=ratio(chance),
+        weights=v.name,
+        value=value,
+        standard_error=error,
+        observed=observed,
+        chance=chance,
         n_items=coded.n_items,
         n_raters=len(strata),
         n_categories=coded.n_categories,
-        reason=defined("stratified kappa", observed, chance),
+        reason=reason,
     )
 
 
@@ -149,67 +169,63 @@ def _plain(table: object, rater: int) -> list[list[object]]:
     return rows
 
 
-def _strata(coded: CodedRatings) -> list[NDArray[np.int64]]:
+def _strata(coded: CodedRatings) -> list[Codes]:
     # (n_items, 2 n_raters) -> n_raters times (n_items, 2)
     width = coded.codes.shape[1]
     return [coded.codes[:, start : start + 2] for start in range(0, width, 2)]
 
 
-def _agreements(table: NDArray[np.int64]) -> tuple[Fraction, Fraction] | None:
-    # table (n_categories, n_categories) -> p_o, p_e; None without a pair
-    cells: list[list[int]] = table.tolist()
-    n = sum(map(sum, cells))
-    if n == 0:
-        return None
-    margins = zip(map(sum, cells), map(sum, zip(*cells, strict=True)), strict=True)
-    expected = sum(first * second for first, second in margins)
-    agree = sum(cells[k][k] for k in range(len(cells)))
-    return Fraction(agree, n), Fraction(expected, n * n)
-
-
 def _standard_error(
-    coded: CodedRatings, chance: Fraction | None, value: Fraction | None
+    coded: CodedRatings, v: Weights, apart: Fraction, by_chance: Fraction
 ) -> float:
     n_items = coded.n_items
-    if n_items < 2 or chance is None or value is None:
+    if n_items < 2:
         return math.nan
-    q = coded.n_categories
+    # Σ_r D_o,r / Σ_r D_e,r: an item pulls at both sums in every stratum it is in
+    ratio = float(apart / by_chance)
+    weights = v.as_floats()
     influence = np.zeros(coded.codes.shape[0])
-    n_strata = 0
     for codes in _strata(coded):
-        features = pair_features(codes, q)
+        features = COHEN_KERNEL.features(
+            CodedRatings(codes=codes, categories=coded.categories), weights
+        )
         n = features[:, 1].sum()
         if n == 0:
             continue
-        n_strata += 1
+        q = coded.n_categories
         means = features.sum(axis=0) / n
-        first, second = means[2 : 2 + q], means[2 + q :]
-        # An item's pull on p_o and on p_e of this stratum (see cohen.py).
-        on_chance = features[:, 2 : 2 + q] @ second + features[:, 2 + q :] @ first
-        on_chance -= 2 * (first @ second) * features[:, 1]
+        first, second = features[:, 2 : 2 + q], features[:, 2 + q :]
+        to_second, to_first = weights @ means[2 + q :], weights @ means[2 : 2 + q]
+        expected = means[2 : 2 + q] @ to_second
+        on_chance = (
+            first @ to_second + second @ to_first - 2 * expected * features[:, 1]
+        )
         on_observed = features[:, 0] - means[0] * features[:, 1]
-        influence += (on_observed - float(1 - value) * on_chance) * n_items / n
-    influence /= n_strata * float(1 - chance)
+        influence += (ratio * on_chance - on_observed) * n_items / n
+    influence /= float(by_chance)
     return float(np.sqrt((influence**2).sum() / (n_items * (n_items - 1))))
 
 
-def _features(coded: CodedRatings) -> Floats:
+def _features(coded: CodedRatings, v: Floats) -> Floats:
     # (n_items, n_raters (2 + 2 n_categories)): each rater's pair features in turn
-    q = coded.n_categories
-    return np.hstack([pair_features(codes, q) for codes in _strata(coded)])
+    return np.hstack(
+        [
+            COHEN_KERNEL.features(
+                CodedRatings(codes=codes, categories=coded.categories), v
+            )
+            for codes in _strata(coded)
+        ]
+    )
 
 
-def _value(sums: Floats, n_categories: int) -> Floats:
+def _value(sums: Floats, v: Floats) -> Floats:
     # sums (..., n_raters (2 + 2 n_categories)) -> (...)
-    width = 2 + 2 * n_categories
-    parts = sums.reshape(*sums.shape[:-1], -1, width)
-    agree, n = parts[..., 0], parts[..., 1]
-    first = parts[..., 2 : 2 + n_categories]
-    second = parts[..., 2 + n_categories :]
-    expected = (first * second).sum(axis=-1)
-    scale = np.where(n > 0, n * n, 1.0)  # a stratum without pairs adds 0 to both sums
-    above = ((n * agree - expected) / scale).sum(axis=-1)
-    return divide(above, ((n * n - expected) / scale).sum(axis=-1))
+    q = len(v)
+    parts = sums.reshape(*sums.shape[:-1], -1, 2 + 2 * q)
+    n = np.where(parts[..., 1] > 0, parts[..., 1], 1.0)  # no pair adds 0 to both
+    first, second = parts[..., 2 : 2 + q], parts[..., 2 + q :]
+    expected = ((first @ v) * second).sum(axis=-1) / (n * n)
+    return 1.0 - divide((parts[..., 0] / n).sum(axis=-1), expected.sum(axis=-1))
 
 
 STRATIFIED_KERNEL = Kernel(features=_features, value=_value)

@@ -1,86 +1,37 @@
 """The one rule for undefined statistics: nan, a warning, and a reason."""
 
-import math
 import warnings
-from fractions import Fraction
 
 from masrel.errors import UndefinedStatisticWarning
 
-__all__ = [
-    "NO_CHANCE",
-    "NO_PAIR",
-    "defined",
-    "kappa",
-    "ratio",
-]
+__all__ = ["NO_CHANCE", "NO_PAIR", "NO_WEIGHTS", "undefined"]
 
 NO_PAIR = "no item has ratings of two raters"
 NO_CHANCE = "0/0: chance agreement is 1, all ratings are in one category"
+NO_WEIGHTS = "0/0: one category has no weights but identity"
 
 
-def ratio(value: Fraction | None) -> float:
-    """Return an exact ratio as the nearest float, ``nan`` for None.
-
-    Parameters
-    ----------
-    value : Fraction or None
-        The exact value.
-
-    Returns
-    -------
-    float
-        The float64 nearest to it.
-    """
-    return math.nan if value is None else float(value)
-
-
-def kappa(observed: Fraction | None, chance: Fraction | None) -> Fraction | None:
-    """Return (p_o - p_e) / (1 - p_e), or None where it is undefined.
+def undefined(title: str, reason: str) -> str:
+    """Warn that a statistic is undefined, and return why.
 
     Parameters
     ----------
-    observed, chance : Fraction or None
-        Observed and chance agreement; None when undefined.
+    title : str
+        The statistic, for the warning.
+    reason : str
+        Why; it goes into the result.
 
     Returns
     -------
-    Fraction or None
-        The coefficient, exact.
-    """
-    if observed is None or chance is None or chance == 1:
-        return None
-    return (observed - chance) / (1 - chance)
-
-
-def defined(
-    name: str, observed: Fraction | None, chance: Fraction | None
-) -> str | None:
-    """Return why a coefficient is undefined, with a warning; None when it is not.
-
-    Parameters
-    ----------
-    name : str
-        The coefficient, for the warning.
-    observed, chance : Fraction or None
-        Observed and chance agreement; `chance` is 0 for a coefficient without.
-
-    Returns
-    -------
-    str or None
+    str
         The reason.
 
     Warns
     -----
     UndefinedStatisticWarning
-        If there is a reason.
+        Always.
     """
-    if observed is None or chance is None:
-        reason = NO_PAIR
-    elif chance == 1:
-        reason = NO_CHANCE
-    else:
-        return None
     warnings.warn(
-        f"{name} is undefined: {reason}", UndefinedStatisticWarning, stacklevel=3
+        f"{title} is undefined: {reason}", UndefinedStatisticWarning, stacklevel=4
     )
     return reason

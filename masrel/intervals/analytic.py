@@ -5,7 +5,10 @@ import warnings
 from collections.abc import Sequence
 from typing import Literal, get_args
 
+from numpy.typing import ArrayLike
+
 from masrel.agreement.coding import Label
+from masrel.agreement.weights import WeightName
 from masrel.errors import ParameterError, UndefinedStatisticWarning
 from masrel.estimates import Interval, Target
 from masrel.intervals.case import (
@@ -28,6 +31,7 @@ def analytic(
     *,
     target: Target,
     categories: Sequence[Label] | None = None,
+    weights: "WeightName | ArrayLike" = "identity",
     level: float = 0.95,
     distribution: Distribution = "t",
 ) -> Interval:
@@ -43,6 +47,8 @@ def analytic(
         The standard error takes items as the sample; it says nothing of raters.
     categories : sequence, optional
         The declared scale in order.
+    weights : str or array_like, optional
+        How much two categories agree; see `declared_weights`.
     level : float, optional
         Nominal level.
     distribution : {"t", "normal", "logit"}, optional
@@ -85,7 +91,12 @@ def analytic(
             f"got {distribution!r}"
         )
     case = open_case(
-        coefficient, ratings, target=target, categories=categories, level=level
+        coefficient,
+        ratings,
+        target=target,
+        categories=categories,
+        weights=weights,
+        level=level,
     )
     if target != "items":
         raise ParameterError(
@@ -94,7 +105,7 @@ def analytic(
         )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UndefinedStatisticWarning)  # said below
-        estimate = case.entry(ratings, categories=categories)
+        estimate = case.entry(ratings, categories=categories, weights=weights)
     method = f"delta method, {_WORDS[distribution]}"
     error = estimate.standard_error
     if estimate.reason is not None or not error > 0.0:

@@ -4,9 +4,11 @@ from collections.abc import Sequence
 from typing import Literal, get_args
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from masrel.agreement.coding import Label
 from masrel.agreement.kernel import Floats
+from masrel.agreement.weights import WeightName
 from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target, Unit
 from masrel.intervals.case import (
@@ -29,6 +31,7 @@ def bootstrap(
     *,
     target: Target,
     categories: Sequence[Label] | None = None,
+    weights: "WeightName | ArrayLike" = "identity",
     level: float = 0.95,
     n_resamples: int = 10_000,
     kind: Kind = "percentile",
@@ -46,6 +49,8 @@ def bootstrap(
         What a new study would draw anew, and so what is resampled.
     categories : sequence, optional
         The declared scale in order.
+    weights : str or array_like, optional
+        How much two categories agree; see `declared_weights`.
     level : float, optional
         Nominal level.
     n_resamples : int, optional
@@ -101,7 +106,12 @@ def bootstrap(
     if n_resamples < 100:
         raise ParameterError(f"n_resamples: needs at least 100, got {n_resamples}")
     case = open_case(
-        coefficient, ratings, target=target, categories=categories, level=level
+        coefficient,
+        ratings,
+        target=target,
+        categories=categories,
+        weights=weights,
+        level=level,
     )
     unit = _unit(case)
     generator, seed = recorded_generator(rng)
@@ -151,7 +161,7 @@ def _unit(case: Case) -> Unit:
         )
     if case.target == "raters":
         fewest, most = case.entry.n_raters
-        if case.entry.kernel.rater_sums is None or most == fewest:
+        if case.kernel.rater_sums is None or most == fewest:
             raise ParameterError(
                 f"target: raters of {case.entry.title} cannot be resampled without "
                 "pairing a rater with a copy of itself"
@@ -209,7 +219,7 @@ def _resample_items(
 def _resample_raters(
     case: Case, n_resamples: int, generator: np.random.Generator
 ) -> Floats:
-    kernel = case.entry.kernel
+    kernel = case.kernel
     n_items, n_raters = case.coded.codes.shape
     drawn = np.empty(n_resamples)
     step = max(1, _CHUNK // (n_items * n_raters * case.coded.n_categories))
@@ -218,7 +228,9 @@ def _resample_raters(
         taken = generator.multinomial(
             n_raters, np.full(n_raters, 1.0 / n_raters), size=stop - start
         )
-        sums = kernel.rater_sums(case.coded, taken.astype(np.float64))  # type: ignore[misc]
+        sums = kernel.rater_sums(  # type: ignore[misc]
+            case.coded, taken.astype(np.float64), case.v
+        )
         drawn[start:stop] = case.values(sums)
     return drawn
 

@@ -6,15 +6,19 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import get_args
 
+from numpy.typing import ArrayLike
+
 from masrel.agreement.coding import CodedRatings, Label
-from masrel.agreement.kernel import Floats
+from masrel.agreement.kernel import Floats, Kernel
 from masrel.agreement.registry import Coefficient, coefficient
+from masrel.agreement.weights import WeightName, declared_weights
 from masrel.errors import ParameterError, SmallSampleWarning, UndefinedStatisticWarning
 from masrel.estimates import Estimate, Interval, Target, Unit
 
 __all__ = [
     "Case",
     "Statistic",
+    "kernel_of",
     "normal",
     "open_case",
     "student_t",
@@ -34,6 +38,8 @@ class Case:
         The coefficient.
     coded : CodedRatings
         The ratings.
+    v : ndarray, shape (n_categories, n_categories)
+        Disagreement of two categories.
     features : ndarray, shape (n_items, n_features)
         Features of every item with at least one rating.
     value : float
@@ -46,6 +52,7 @@ class Case:
 
     entry: Coefficient
     coded: CodedRatings
+    v: Floats = field(compare=False, repr=False)
     features: Floats = field(compare=False, repr=False)
     value: float
     target: Target
@@ -58,7 +65,12 @@ class Case:
 
     def values(self, sums: Floats) -> Floats:
         """Return the coefficient for sums of shape (..., n_features)."""
-        return self.entry.kernel.value(sums, self.coded.n_categories)
+        return self.kernel.value(sums, self.v)
+
+    @property
+    def kernel(self) -> Kernel:
+        """The coefficient from sums over items."""
+        return kernel_of(self.entry)
 
     def closed(
         self,
@@ -110,6 +122,7 @@ def open_case(
     *,
     target: Target,
     categories: Sequence[Label] | None,
+    weights: "WeightName | ArrayLike",
     level: float,
 ) -> Case:
     """Check a question and prepare its data.
@@ -124,6 +137,8 @@ def open_case(
         What a new study would draw anew.
     categories : sequence or None
         The declared scale.
+    weights : str or array_like
+        How much two categories agree.
     level : float
         Nominal level, within (0, 1).
 
@@ -135,7 +150,8 @@ def open_case(
     Raises
     ------
     ParameterError
-        If the coefficient, target or level is none.
+        If the coefficient, target, weights or level is none, or the coefficient has no
+        such interval.
     RatingsError
         If the ratings do not fit.
     """
@@ -160,16 +176,45 @@ def open_case(
         wanted = f"{fewest}" if most == fewest else f"at least {fewest}"
         raise ParameterError(f"{entry.title} needs {wanted} raters, got {columns}")
     rated = (coded.codes >= 0).any(axis=1)
-    features = entry.kernel.features(coded)[rated]
-    value = float(entry.kernel.value(features.sum(axis=0), coded.n_categories))
+    kernel = kernel_of(entry)
+    v = declared_weights(weights, coded.categories).as_floats()
+    features = kernel.features(coded, v)[rated]
+    value = float(kernel.value(features.sum(axis=0), v))
     return Case(
         entry=entry,
         coded=coded,
+        v=v,
         features=features,
         value=value,
         target=target,
         level=level,
     )
+
+
+def kernel_of(entry: Coefficient) -> Kernel:
+    """Return a coefficient as a function of sums over items.
+
+    Parameters
+    ----------
+    entry : Coefficient
+        The coefficient.
+
+    Returns
+    -------
+    Kernel
+        Its kernel.
+
+    Raises
+    ------
+    ParameterError
+        If it is no such function: it has an interval of its own, or none.
+    """
+    if entry.kernel is None:
+        raise ParameterError(
+            f"coefficient: {entry.title} is no function of sums over items, so there "
+            "is no such interval of it"
+        )
+    return entry.kernel
 
 
 def warn_small(count: int, least: int, what: str) -> tuple[str, ...]:

@@ -4,9 +4,11 @@ import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from masrel.agreement.coding import Label
 from masrel.agreement.kernel import Floats
+from masrel.agreement.weights import WeightName
 from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target
 from masrel.intervals.case import (
@@ -26,6 +28,7 @@ def jackknife(
     *,
     target: Target,
     categories: Sequence[Label] | None = None,
+    weights: "WeightName | ArrayLike" = "identity",
     level: float = 0.95,
 ) -> Interval:
     """Compute a jackknife interval with Student's t.
@@ -41,6 +44,8 @@ def jackknife(
         What a new study would draw anew, and so what is left out.
     categories : sequence, optional
         The declared scale in order.
+    weights : str or array_like, optional
+        How much two categories agree; see `declared_weights`.
     level : float, optional
         Nominal level.
 
@@ -88,7 +93,12 @@ def jackknife(
     (0.122, 0.878)
     """
     case = open_case(
-        coefficient, ratings, target=target, categories=categories, level=level
+        coefficient,
+        ratings,
+        target=target,
+        categories=categories,
+        weights=weights,
+        level=level,
     )
     units = {"items": ("items",), "raters": ("raters",), "both": ("items", "raters")}
     method = f"{'two-way' if target == 'both' else target.removesuffix('s')} jackknife"
@@ -146,8 +156,7 @@ def _without_rater(case: Case) -> Floats:
     values = []
     for rater in range(n_raters):
         rest = np.delete(codes, np.s_[rater * width : (rater + 1) * width], axis=1)
-        sums = case.entry.kernel.features(
-            dataclasses.replace(case.coded, codes=rest)
-        ).sum(axis=0)
+        left = dataclasses.replace(case.coded, codes=rest)
+        sums = case.kernel.features(left, case.v).sum(axis=0)
         values.append(float(case.values(sums)))
     return np.array(values)

@@ -79,7 +79,12 @@ def posterior(
     ('credible', True)
     """
     case = open_case(
-        coefficient, ratings, target=target, categories=categories, level=level
+        coefficient,
+        ratings,
+        target=target,
+        categories=categories,
+        weights="identity",
+        level=level,
     )
     if case.entry.name != "fleiss_kappa":
         raise ParameterError(

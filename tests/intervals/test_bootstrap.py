@@ -62,7 +62,7 @@ def test_item_resamples_follow_the_law_of_all_35() -> None:
 def test_a_rater_is_never_paired_with_a_copy_of_itself() -> None:
     # Three raters, all 27 resamples by hand: raters taken (a, b, c); a pair of places
     # with the same rater is left out of the agreement.
-    table = [["1", "1", "2"], ["2", "2", "2"], ["1", "2", "1"], ["2", "1", "1"]]
+    table = [["1", "1", "2"], ["2", "2", "2"], ["1", "2", "1"], ["2", "2", "1"]]
     values = []
     for taken in itertools.product(range(3), repeat=3):
         pairs = [
@@ -81,8 +81,8 @@ def test_a_rater_is_never_paired_with_a_copy_of_itself() -> None:
     found = bootstrap(
         "percent_agreement", table, target="raters", n_resamples=20_000, rng=2
     )
-    # Of 24, 6 are of three different raters (.5), 18 of two: .25, .25 or .75... the
-    # 2.5 % and 97.5 % quantiles are the least and the greatest.
+    # Of 24, 6 are of three different raters, agreeing .5, and 6 each of two raters:
+    # .75, .5, .25. A quarter each is at either end, so the quantiles are the ends.
     assert found.low == pytest.approx(min(values), abs=1e-12)
     assert found.high == pytest.approx(max(values), abs=1e-12)
     # 1/9 undefined: 2222, sd 44; beyond 4 sd once in 16 000 runs of other seeds

@@ -1,0 +1,210 @@
+"""Arrays and DataFrames of labels to codes, a block at a time."""
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from masrel.agreement.labels import Label, code_type, is_missing, labels_met, lookup
+from masrel.errors import RatingsError
+
+__all__ = ["array_codes", "frame_codes"]
+
+Codes = NDArray[np.signedinteger[Any]]
+Array = NDArray[Any]
+_Coder = Callable[[Array], Array]
+
+_BLOCK = 1 << 17  # labels coded at once, so that they stay in the cache
+_WIDEST = 1 << 16  # span of whole numbers for which a table of codes is made
+_MISSING, _UNKNOWN = -1, -2
+
+
+def array_codes(
+    labels: Array, declared: tuple[Label, ...] | None
+) -> tuple[Codes, tuple[Label, ...]]:
+    """Turn an array of labels into codes.
+
+    Parameters
+    ----------
+    labels : ndarray, shape (n_items, n_raters)
+        Numbers, text or objects.
+    declared : tuple or None
+        The scale; the labels met when None.
+
+    Returns
+    -------
+    tuple of ndarray and tuple
+        Codes, -1 where missing, shape (n_items, n_raters), and the scale.
+
+    Raises
+    ------
+    RatingsError
+        If a label is not among the categories.
+    """
+    kind = labels.dtype.kind
+    is_text = declared is not None and isinstance(declared[0], str)
+    if kind not in "iufU" or (declared is not None and is_text != (kind == "U")):
+        return _object_codes(labels, declared)
+    plain = _plain(labels)
+    if declared is None:
+        known = _labels_met(plain, labels.dtype)
+    else:
+        known = declared
+    codes = np.empty(labels.shape, dtype=code_type(len(known)))
+    coder = _coder(plain, labels.dtype, known)
+    for rows in _blocks(labels):
+        codes[rows] = coder(plain[rows])
+        if codes[rows].min() == _UNKNOWN:
+            i, j = np.argwhere(codes[rows] == _UNKNOWN)[0].tolist()
+            position: dict[object, int] = dict.fromkeys(known, 0)
+            lookup(labels[rows][i, j].item(), position, rows.start + i, j)
+    return codes, known
+
+
+def _blocks(labels: Array) -> Iterator[slice]:
+    rows = max(1, _BLOCK // labels.shape[1])
+    for start in range(0, len(labels), rows):
+        yield slice(start, min(start + rows, len(labels)))
+
+
+def _plain(labels: Array) -> Array:
+    # Text of one or two letters is compared as whole numbers, many times faster.
+    if labels.dtype.kind == "U" and labels.dtype.itemsize in (4, 8):
+        whole = np.uint32 if labels.dtype.itemsize == 4 else np.uint64
+        return np.ascontiguousarray(labels).view(whole)
+    return labels
+
+
+def _labels_met(plain: Array, dtype: np.dtype[Any]) -> tuple[Label, ...]:
+    met = np.empty(0, dtype=plain.dtype)
+    for rows in _blocks(plain):
+        block = plain[rows]
+        if met.size:
+            at = np.minimum(np.searchsorted(met, block), met.size - 1)
+            block = block[met[at] != block]
+        if block.size:
+            met = np.union1d(met, block)
+            if met.dtype.kind == "f":
+                met = met[~np.isnan(met)]
+    if dtype.kind == "U":
+        met = met.view(dtype)
+    return tuple(sorted(met.tolist()))
+
+
+def _coder(plain: Array, dtype: np.dtype[Any], known: tuple[Label, ...]) -> _Coder:
+    # a function of a block of labels to its codes
+    if dtype.kind in "iu":
+        lowest, highest = int(plain.min()), int(plain.max())
+        if highest - lowest < _WIDEST:
+            return _table_coder(lowest, highest, known)
+    if not known:
+        return lambda block: np.full(block.shape, _MISSING)
+    values = np.array(known, dtype=dtype if dtype.kind == "U" else None)
+    if dtype.kind == "U":
+        # a longer label of the scale would be cut to the width of the array
+        fits = np.array([len(str(label)) * 4 <= dtype.itemsize for label in known])
+        values = values.view(plain.dtype) if plain.dtype.kind == "u" else values
+    else:
+        fits = np.ones(len(known), dtype=bool)
+    order = np.argsort(values[fits], kind="stable")
+    return _search_coder(values[fits][order], np.flatnonzero(fits)[order])
+
+
+def _table_coder(lowest: int, highest: int, known: tuple[Label, ...]) -> _Coder:
+    table = np.full(highest - lowest + 1, _UNKNOWN, dtype=code_type(len(known)))
+    for code, label in enumerate(known):
+        if lowest <= float(label) <= highest and float(label).is_integer():
+            table[int(label) - lowest] = code
+    if (table == np.arange(table.size)).all():
+        return lambda block: block - lowest
+    return lambda block: table[block - lowest]
+
+
+def _search_coder(values: Array, codes: NDArray[np.intp]) -> _Coder:
+    def coder(block: Array) -> Array:
+        at = np.minimum(np.searchsorted(values, block), values.size - 1)
+        found = np.where(values[at] == block, codes[at], _UNKNOWN)
+        if block.dtype.kind == "f":
+            found[np.isnan(block)] = _MISSING
+        return found
+
+    if values.size == 0:
+        return lambda block: np.full(block.shape, _UNKNOWN)
+    return coder
+
+
+def _object_codes(
+    labels: Array, declared: tuple[Label, ...] | None
+) -> tuple[Codes, tuple[Label, ...]]:
+    flat = labels.ravel().tolist()
+    known = labels_met(flat) if declared is None else declared
+    position: dict[object, int] = {label: code for code, label in enumerate(known)}
+    position[None] = _MISSING
+    try:
+        codes = [position[label] for label in flat]
+    except (KeyError, TypeError):  # nan, or a label of no category
+        width = labels.shape[1]
+        codes = [
+            _MISSING
+            if is_missing(label)
+            else lookup(label, position, *divmod(i, width))
+            for i, label in enumerate(flat)
+        ]
+    return np.array(codes, dtype=code_type(len(known))).reshape(labels.shape), known
+
+
+def frame_codes(
+    frame: Any, declared: tuple[Label, ...] | None
+) -> tuple[Codes, tuple[Label, ...]]:
+    """Turn a DataFrame of labels into codes, without importing pandas.
+
+    Parameters
+    ----------
+    frame : DataFrame, shape (n_items, n_raters)
+        One column a rater.
+    declared : tuple or None
+        The scale; the labels met when None.
+
+    Returns
+    -------
+    tuple of ndarray and tuple
+        Codes, -1 where missing, shape (n_items, n_raters), and the scale.
+
+    Raises
+    ------
+    RatingsError
+        If it is empty, or a label is not among the categories.
+    """
+    if 0 in frame.shape:
+        raise RatingsError(
+            "ratings: needs at least one item and one rater, got shape "
+            f"{frame.shape[0]} × {frame.shape[1]}"
+        )
+    if all(hasattr(dtype, "categories") for dtype in frame.dtypes):
+        return _categorical_codes(frame, declared)
+    plain = all(isinstance(d, np.dtype) and d.kind in "iuf" for d in frame.dtypes)
+    return array_codes(frame.to_numpy(None if plain else object), declared)
+
+
+def _categorical_codes(
+    frame: Any, declared: tuple[Label, ...] | None
+) -> tuple[Codes, tuple[Label, ...]]:
+    columns = [frame.iloc[:, j].array for j in range(frame.shape[1])]
+    of_columns = [column.categories.tolist() for column in columns]
+    if declared is None:
+        # categories nobody was given are not labels met
+        declared = labels_met(
+            labels[code]
+            for column, labels in zip(columns, of_columns, strict=True)
+            for code in np.unique(column.codes[column.codes >= 0]).tolist()
+        )
+    position: dict[object, int] = {label: code for code, label in enumerate(declared)}
+    codes = np.empty(frame.shape, dtype=code_type(len(declared)))
+    for j, (column, labels) in enumerate(zip(columns, of_columns, strict=True)):
+        table = [position.get(label, _UNKNOWN) for label in labels] + [_MISSING]
+        codes[:, j] = np.array(table)[column.codes]
+        if codes[:, j].min() == _UNKNOWN:
+            i = int(np.argmin(codes[:, j]))
+            lookup(labels[int(column.codes[i])], position, i, j)
+    return codes, declared

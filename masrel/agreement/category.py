@@ -1,0 +1,179 @@
+"""Fleiss' kappa of each category against the others, and the test of no agreement."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from masrel.agreement.coding import Label, code_ratings
+from masrel.agreement.counts import item_counts
+from masrel.agreement.fleiss import fleiss_kappa_from_counts
+from masrel.agreement.significance import Significance
+from masrel.agreement.undefined import undefined
+from masrel.errors import ParameterError
+from masrel.estimates import Estimate
+
+__all__ = ["category_kappa", "fleiss_null"]
+
+
+def category_kappa(
+    ratings: object,
+    category: Label,
+    *,
+    categories: Sequence[Label] | None = None,
+) -> Estimate:
+    """Estimate Fleiss' kappa of one category against all others.
+
+    Parameters
+    ----------
+    ratings : nested sequence, array_like or DataFrame, shape (n_items, n_raters)
+        Labels or numbers; None and ``nan`` are missing.
+    category : str, int or float
+        One of the categories.
+    categories : sequence of str, int or float, optional
+        The declared scale in order; the labels met when not given.
+
+    Returns
+    -------
+    Estimate
+        How well raters tell this category from the rest; `weights` names it, and
+        `n_categories` is 2.
+
+    Raises
+    ------
+    RatingsError
+        If the ratings are not such a table.
+    ParameterError
+        If there is no such category.
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        If no item has two ratings, or nobody, or everybody, used the category.
+
+    Notes
+    -----
+    Fleiss' kappa is the mean of these over categories, weighed by p_k (1 - p_k).
+
+    References
+    ----------
+    .. [1] Fleiss, J. L. (1971). Measuring nominal scale agreement among many raters.
+       Psychological Bulletin, 76(5), 378-382. https://doi.org/10.1037/h0031619
+
+    Examples
+    --------
+    >>> ratings = [["a", "a"], ["b", "b"], ["c", "c"], ["a", "b"]]
+    >>> category_kappa(ratings, "c").value
+    1.0
+    """
+    coded = code_ratings(ratings, categories)
+    if category not in coded.categories:
+        raise ParameterError(
+            f"category: needs one of {', '.join(map(repr, coded.categories))}, "
+            f"got {category!r}"
+        )
+    counts = item_counts(coded)
+    own = counts[:, coded.categories.index(category)]
+    two = np.column_stack([own, counts.sum(axis=1) - own])
+    found = fleiss_kappa_from_counts(two)
+    return replace(
+        found,
+        coefficient="category_kappa",
+        weights=str(category),
+        n_raters=coded.n_raters,
+    )
+
+
+def fleiss_null(
+    ratings: object,
+    *,
+    category: Label | None = None,
+    categories: Sequence[Label] | None = None,
+) -> Significance:
+    """Test whether Fleiss' kappa is 0, by its standard error when it is.
+
+    Parameters
+    ----------
+    ratings : nested sequence, array_like or DataFrame, shape (n_items, n_raters)
+        Labels or numbers; items with a missing rating are left out.
+    category : str, int or float, optional
+        Test the kappa of this category against the others instead.
+    categories : sequence of str, int or float, optional
+        The declared scale in order; the labels met when not given.
+
+    Returns
+    -------
+    Significance
+        z with its two-sided p-value from the normal. The standard error under the
+        hypothesis belongs to this test: it makes no interval.
+
+    Raises
+    ------
+    RatingsError
+        If the ratings are not such a table.
+    ParameterError
+        If there is no such category.
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        If no item is complete, there is one rater, or kappa is undefined.
+
+    References
+    ----------
+    .. [1] Fleiss, J. L., Nee, J. C. M., Landis, J. R. (1979). Large sample variance of
+       kappa in the case of different sets of raters. Psychological Bulletin, 86(5),
+       974-977. https://doi.org/10.1037/0033-2909.86.5.974
+
+    Examples
+    --------
+    >>> print(fleiss_null([["a", "a"], ["b", "b"], ["a", "b"], ["b", "b"]]))
+    fleiss_null: 0.9333, normal, p = 0.351
+    """
+    coded = code_ratings(ratings, categories)
+    if category is not None and category not in coded.categories:
+        raise ParameterError(
+            f"category: needs one of {', '.join(map(repr, coded.categories))}, "
+            f"got {category!r}"
+        )
+    counts = item_counts(coded)
+    n_raters = coded.codes.shape[1]
+    counts = counts[counts.sum(axis=1) == n_raters]
+    if category is not None:
+        own = counts[:, coded.categories.index(category)]
+        counts = np.column_stack([own, n_raters - own])
+    statistic = p = math.nan
+    reason = None
+    if len(counts) == 0 or n_raters < 2:
+        reason = undefined("fleiss_null", "no item has ratings of two or more raters")
+    elif (counts.sum(axis=0) > 0).sum() < 2:
+        reason = undefined("fleiss_null", "0/0: all ratings are in one category")
+    else:
+        statistic, p = _z(counts, n_raters)
+    return Significance(
+        name="fleiss_null",
+        hypothesis="Fleiss' kappa is 0",
+        statistic=statistic,
+        distribution="normal",
+        df=(),
+        p_value=p,
+        n_items=len(counts),
+        reason=reason,
+    )
+
+
+def _z(counts: NDArray[np.int64], n_raters: int) -> tuple[float, float]:
+    # (12) of [1]: with p the shares and q = 1 - p,
+    #   SE0 = √2 / (Σpq √(N n (n - 1))) · √((Σpq)² - Σ pq (q - p))
+    from scipy.special import ndtr
+
+    total = counts.sum()
+    p = counts.sum(axis=0) / total
+    q = (total - counts.sum(axis=0)) / total
+    pq = (p * q).sum()
+    spread = pq**2 - (p * q * (q - p)).sum()
+    error = math.sqrt(2.0 * spread / (total * (n_raters - 1))) / pq
+    z = fleiss_kappa_from_counts(counts).value / error
+    return z, 2.0 * float(ndtr(-abs(z)))

@@ -1,0 +1,246 @@
+"""Conger's kappa: Cohen's kappa for two or more raters, each with its own margins."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from masrel.agreement.coding import CodedRatings, Label, code_ratings
+from masrel.agreement.counts import coded_items, item_counts
+from masrel.agreement.kernel import Floats, Kernel, divide, weighted_disagreement
+from masrel.agreement.patterns import distinct_patterns
+from masrel.agreement.pooled import Observed, check_population
+from masrel.agreement.undefined import NO_CHANCE, NO_PAIR, NO_WEIGHTS, undefined
+from masrel.agreement.weights import WeightName, Weights, declared_weights
+from masrel.estimates import Estimate
+
+__all__ = ["CONGER_KERNEL", "conger_kappa"]
+
+
+def conger_kappa(
+    ratings: object,
+    *,
+    categories: Sequence[Label] | None = None,
+    weights: "WeightName | ArrayLike" = "identity",
+    population: int | None = None,
+) -> Estimate:
+    """Estimate Conger's kappa from an item × rater table.
+
+    Parameters
+    ----------
+    ratings : nested sequence, array_like or DataFrame, shape (n_items, n_raters)
+        Labels or numbers; None and ``nan`` are missing.
+    categories : sequence of str, int or float, optional
+        The declared scale in order; the labels met when not given.
+    weights : str or array_like, shape (n_categories, n_categories), optional
+        How much two categories agree; see `declared_weights`.
+    population : int, optional
+        Items there are in all, for the finite-population correction.
+
+    Returns
+    -------
+    Estimate
+        The coefficient with its standard error over items.
+
+    Raises
+    ------
+    RatingsError
+        If the ratings are not such a table.
+    ParameterError
+        If an option is none, or the weights do not fit the categories.
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        If no item has ratings of two raters, a rater has no rating, or all ratings
+        are in one category; the value is then ``nan``.
+
+    Notes
+    -----
+    Chance agreement is that of two different raters, averaged over all pairs, each
+    with the shares of its own ratings. Of two raters with complete ratings it is
+    Cohen's kappa. A rater without any rating has no shares, so that the coefficient
+    is undefined: leave the rater out.
+
+    References
+    ----------
+    .. [1] Conger, A. J. (1980). Integration and generalization of kappas for multiple
+       raters. Psychological Bulletin, 88(2), 322-328.
+       https://doi.org/10.1037/0033-2909.88.2.322
+    .. [2] Gwet, K. L. (2014). Handbook of Inter-Rater Reliability, 4th ed., ch. 2.
+
+    Examples
+    --------
+    >>> conger_kappa([["a", "a"], ["a", "b"], ["b", "b"], ["b", "b"]]).value
+    0.5
+    """
+    coded = code_ratings(ratings, categories)
+    v = declared_weights(weights, coded.categories)
+    check_population(population, coded.n_items)
+    observed = Observed.of(coded_items(coded).groups(v), v)
+    margins = _Margins.of(coded, v)
+    reason = _reason(coded, observed, margins, v)
+    value = error = p_o = p_e = math.nan
+    if observed is not None:
+        d_o, over_o = observed.numerator, observed.denominator
+        d_e, over_e = margins.numerator, margins.denominator
+        p_o, p_e = (over_o - d_o) / over_o, (over_e - d_e) / over_e
+        if reason is None:
+            value = (d_e * over_o - d_o * over_e) / (d_e * over_o)
+            error = _standard_error(coded, v, observed, margins, population)
+    return Estimate(
+        coefficient="conger_kappa",
+        weights=v.name,
+        value=value,
+        standard_error=error,
+        observed=p_o,
+        chance=p_e,
+        n_items=coded.n_items,
+        n_raters=coded.n_raters,
+        n_categories=coded.n_categories,
+        reason=reason,
+    )
+
+
+def _reason(
+    coded: CodedRatings, observed: Observed | None, margins: "_Margins", v: Weights
+) -> str | None:
+    title = "Conger's kappa"
+    if observed is None:
+        return undefined(title, NO_PAIR)
+    if v.numerators is not None and v.n_categories == 1:
+        return undefined(title, NO_WEIGHTS)
+    if len(margins.raters) < coded.codes.shape[1]:
+        without = set(range(coded.codes.shape[1])).difference(margins.raters)
+        return undefined(title, f"0/0: no ratings in column {min(without)}")
+    if margins.numerator == 0:
+        return undefined(title, NO_CHANCE)
+    return None
+
+
+@dataclass(frozen=True, slots=True)
+class _Margins:
+    # D_e = Σ_{g≠h} Σ_kl v_kl p_gk p_hl / (r (r - 1)) over raters with ratings
+    raters: list[int]  # columns that have ratings
+    n_ratings: list[int]  # n_g
+    multiple: int  # of every n_g
+    shares: list[list[int]]  # p_gk times `multiple`
+    products: list[list[int]]  # Σ_l v_kl Σ_{h≠g} p_hl, over the same and w
+    numerator: int
+    denominator: int
+
+    @classmethod
+    def of(cls, coded: CodedRatings, v: Weights) -> "_Margins":
+        q = coded.n_categories
+        counts = [
+            np.bincount(column[column >= 0], minlength=q).tolist()
+            for column in coded.codes.T
+        ]
+        raters = [g for g, row in enumerate(counts) if any(row)]
+        n_ratings = [sum(counts[g]) for g in raters]
+        multiple = math.lcm(*n_ratings)
+        shares = [
+            [n * (multiple // n_g) for n in counts[g]]
+            for g, n_g in zip(raters, n_ratings, strict=True)
+        ]
+        total = [sum(column) for column in zip(*shares, strict=True)] or [0] * q
+        products = [
+            v.products([t - p for t, p in zip(total, row, strict=True)])
+            for row in shares
+        ]
+        r = len(raters)
+        return cls(
+            raters=raters,
+            n_ratings=n_ratings,
+            multiple=multiple,
+            shares=shares,
+            products=products,
+            numerator=sum(
+                sum([p * vp for p, vp in zip(row, of_row, strict=True)])
+                for row, of_row in zip(shares, products, strict=True)
+            ),
+            denominator=max(r * (r - 1), 1) * multiple**2 * v.denominator,
+        )
+
+
+def _standard_error(
+    coded: CodedRatings,
+    v: Weights,
+    observed: Observed,
+    margins: _Margins,
+    population: int | None,
+) -> float:
+    n = coded.n_items
+    if n < 2:
+        return math.nan
+    # With s_i = 1 for an item with a pair and d_i its disagreement,
+    #   -D_e u_i = (n/n') (d_i - D_o s_i) - (D_o/D_e) dD_e, where rater g who rated i k
+    #   moves D_e by (n/n_g) 2 (h_gk - Σ_l h_gl p_gl), h_gk = Σ_l v_kl Σ_{h≠g} p_hl.
+    over_e = margins.denominator
+    moves = []
+    for n_g, shares, h in zip(
+        margins.n_ratings, margins.shares, margins.products, strict=True
+    ):
+        mean = sum([p * x for p, x in zip(shares, h, strict=True)])
+        moves.append(
+            [2 * n * (x * margins.multiple - mean) / (n_g * over_e) for x in h]
+        )
+    d_o = observed.numerator / observed.denominator
+    d_e = margins.numerator / over_e
+    rows, times = distinct_patterns(coded.codes, coded.n_categories)
+    value = _influences(rows, v, np.array(moves), margins.raters)
+    apart, usable, moved = value
+    influence = n / observed.n_usable * (apart - d_o * usable) / d_e
+    influence -= d_o / d_e**2 * moved
+    influence[(rows < 0).all(axis=1)] = 0.0
+    variance = float((times * influence * influence).sum()) / (n * (n - 1))
+    if population is not None:
+        variance *= (population - n) / population
+    return math.sqrt(variance)
+
+
+def _influences(
+    rows: NDArray[np.int64], v: Weights, moves: Floats, raters: list[int]
+) -> tuple[Floats, Floats, Floats]:
+    # distinct rows (m, n_raters) -> d_i, s_i and dD_e, each (m,)
+    coded = CodedRatings(codes=rows, categories=tuple(range(v.n_categories)))
+    counts = item_counts(coded).astype(np.float64)
+    size = counts.sum(axis=1)
+    usable = (size > 1).astype(np.float64)
+    pairs = np.where(size > 1, size * (size - 1), 1.0)
+    apart = usable * weighted_disagreement(counts, v.as_floats()) / pairs
+    moved = np.zeros(len(rows))
+    for move, g in zip(moves, raters, strict=True):
+        moved += np.append(move, 0.0)[rows[:, g]]  # missing, -1, is the last
+    return apart, usable, moved
+
+
+def _features(coded: CodedRatings, v: Floats) -> Floats:
+    # (n_items, 2 + n_raters (1 + n_categories)): disagreement, whether it has a pair,
+    # then for each rater whether it rated and the category
+    counts = item_counts(coded).astype(np.float64)
+    size = counts.sum(axis=1)
+    pairs = np.where(size > 1, size * (size - 1), 1.0)
+    apart = np.where(size > 1, weighted_disagreement(counts, v), 0.0) / pairs
+    parts = [apart, size > 1]
+    for column in coded.codes.T:
+        parts += [column >= 0, column[:, None] == np.arange(len(v))]
+    return np.column_stack(parts).astype(np.float64)
+
+
+def _value(sums: Floats, v: Floats) -> Floats:
+    # sums (..., 2 + n_raters (1 + n_categories)) -> (...)
+    observed = divide(sums[..., 0], sums[..., 1])
+    of_raters = sums[..., 2:].reshape(*sums.shape[:-1], -1, 1 + len(v))
+    n_ratings = of_raters[..., :1]
+    shares = divide(of_raters[..., 1:], n_ratings)  # nan for a rater without any
+    total = shares.sum(axis=-2)
+    others = total[..., None, :] - shares
+    apart = ((others @ v) * shares).sum(axis=(-1, -2))
+    r = of_raters.shape[-2]
+    return 1.0 - divide(observed, apart / (r * (r - 1)))
+
+
+CONGER_KERNEL = Kernel(features=_features, value=_value)

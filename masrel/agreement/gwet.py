@@ -1,0 +1,158 @@
+"""Gwet's AC1 and, weighted, AC2: chance agreement among hard items only."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from masrel.agreement.coding import Label
+from masrel.agreement.kernel import Floats, pooled_kernel
+from masrel.agreement.pooled import (
+    Asked,
+    Expected,
+    Shares,
+    Variance,
+    estimate_counts,
+    estimate_ratings,
+)
+from masrel.agreement.weights import WeightName, Weights
+from masrel.estimates import Estimate
+
+__all__ = ["GWET_KERNEL", "gwet_ac", "gwet_ac_from_counts"]
+
+
+def gwet_ac(
+    ratings: object,
+    *,
+    categories: Sequence[Label] | None = None,
+    weights: "WeightName | ArrayLike" = "identity",
+    variance: Variance = "delta",
+    population: int | None = None,
+) -> Estimate:
+    """Estimate Gwet's AC1, or AC2 with weights.
+
+    Parameters
+    ----------
+    ratings : nested sequence, array_like or DataFrame, shape (n_items, n_raters)
+        Labels or numbers; None and ``nan`` are missing.
+    categories : sequence of str, int or float, optional
+        The declared scale in order; the labels met when not given.
+    weights : str or array_like, shape (n_categories, n_categories), optional
+        How much two categories agree; see `declared_weights`.
+    variance : {"delta", "irrcac"}, optional
+        Which standard error; irrCAC's is too large with single ratings.
+    population : int, optional
+        Items there are in all, for the finite-population correction.
+
+    Returns
+    -------
+    Estimate
+        The coefficient with its standard error over items.
+
+    Raises
+    ------
+    RatingsError
+        If the ratings are not such a table.
+    ParameterError
+        If an option is none, or the weights do not fit the categories.
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        If no item has ratings of two raters, or one category is declared; the value
+        is then ``nan``.
+
+    Notes
+    -----
+    Chance agreement is Σ_kl w_kl / (q (q - 1)) · Σ_k p_k (1 - p_k): the declared
+    categories count, used or not. It is small when nearly all ratings are in one
+    category, where kappa falls towards 0. Missing ratings as in `fleiss_kappa`.
+
+    References
+    ----------
+    .. [1] Gwet, K. L. (2008). Computing inter-rater reliability and its variance in
+       the presence of high agreement. British Journal of Mathematical and
+       Statistical Psychology, 61(1), 29-48. https://doi.org/10.1348/000711006X126600
+
+    Examples
+    --------
+    >>> round(gwet_ac([["a", "a"], ["b", "b"], ["a", "b"]]).value, 3)
+    0.333
+    """
+    asked = Asked(categories, weights, variance, population)
+    return estimate_ratings(_NAME, _TITLE, ratings, asked, _expected)
+
+
+def gwet_ac_from_counts(
+    counts: ArrayLike,
+    *,
+    categories: Sequence[Label] | None = None,
+    weights: "WeightName | ArrayLike" = "identity",
+    variance: Variance = "delta",
+    population: int | None = None,
+) -> Estimate:
+    """Estimate Gwet's AC from how many raters chose each category.
+
+    Parameters
+    ----------
+    counts : array_like of int, shape (n_items, n_categories)
+        Raters per item and category; rows may have different sums.
+    categories, weights, variance, population : optional
+        As of `gwet_ac`; categories are 1 to n_categories unless given.
+
+    Returns
+    -------
+    Estimate
+        As of `gwet_ac`; `n_raters` is the largest row sum.
+
+    Raises
+    ------
+    CountsError
+        If it is not a table of counts.
+    ParameterError
+        As `gwet_ac`.
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        As `gwet_ac`.
+
+    Examples
+    --------
+    >>> round(gwet_ac_from_counts([[2, 0], [2, 0], [1, 1]]).value, 3)
+    0.538
+    """
+    asked = Asked(categories, weights, variance, population)
+    return estimate_counts(_NAME, _TITLE, counts, asked, _expected)
+
+
+_NAME, _TITLE = "gwet_ac", "Gwet's AC"
+
+
+def _expected(shares: Shares, weights: Weights) -> Expected:
+    # 1 - p_e with p_e = T_w / (q (q - 1)) Σ_k p_k (1 - p_k), T_w = Σ_kl w_kl
+    q, total = weights.n_categories, shares.total
+    if q == 1:
+        return Expected(0, 1)  # one category leaves no room for chance: 0/0
+    t_w = q * q * weights.denominator - weights.total()
+    spread = sum([p * (total - p) for p in shares.numerators])
+    over = weights.denominator * q * (q - 1)
+    return Expected(
+        over * total * total - t_w * spread,
+        over * total * total,
+        [-t_w * (total - 2 * p) for p in shares.numerators],
+        over * total,
+    )
+
+
+def _in_floats(shares: Floats, v: Floats) -> Floats:
+    # shares (..., n_categories) -> (...)
+    q = len(v)
+    if q == 1:
+        return np.zeros(shares.shape[:-1])
+    t_w = q * q - v.sum()
+    spread = (shares * (1.0 - shares)).sum(axis=-1)
+    return np.asarray(1.0 - t_w / (q * (q - 1)) * spread)
+
+
+GWET_KERNEL = pooled_kernel(_in_floats)

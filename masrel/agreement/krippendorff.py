@@ -1,0 +1,291 @@
+"""Krippendorff's alpha: disagreement of pairable ratings against what chance gives."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from masrel.agreement.coding import CodedRatings, Label, code_ratings
+from masrel.agreement.counts import (
+    check_counts,
+    coded_items,
+    column_categories,
+    counted_items,
+    item_counts,
+)
+from masrel.agreement.items import ItemTable, Linear, SizeGroup
+from masrel.agreement.kernel import Floats, Kernel, divide, weighted_disagreement
+from masrel.agreement.metrics import Metric, metric_weights
+from masrel.agreement.pooled import check_population
+from masrel.agreement.undefined import NO_CHANCE, NO_PAIR, undefined
+from masrel.agreement.weights import WeightName, Weights, declared_weights
+from masrel.errors import ParameterError
+from masrel.estimates import Estimate
+
+__all__ = [
+    "KRIPPENDORFF_KERNEL",
+    "krippendorff_alpha",
+    "krippendorff_alpha_from_counts",
+]
+
+
+def krippendorff_alpha(
+    ratings: object,
+    *,
+    categories: Sequence[Label] | None = None,
+    weights: "WeightName | ArrayLike | None" = None,
+    metric: Metric | None = None,
+    population: int | None = None,
+) -> Estimate:
+    """Estimate Krippendorff's alpha from an item × rater table.
+
+    Parameters
+    ----------
+    ratings : nested sequence, array_like or DataFrame, shape (n_items, n_raters)
+        Labels or numbers; None and ``nan`` are missing.
+    categories : sequence of str, int or float, optional
+        The declared scale in order; the labels met when not given.
+    weights : str or array_like, shape (n_categories, n_categories), optional
+        How much two categories agree, as for the other coefficients; see
+        `declared_weights`. Identity unless `metric` is given.
+    metric : {"nominal", "ordinal", "interval", "ratio"}, optional
+        Krippendorff's own difference function instead of weights. His ordinal metric
+        counts the ratings between two grades and is not the weights "ordinal".
+    population : int, optional
+        Items there are in all, for the finite-population correction.
+
+    Returns
+    -------
+    Estimate
+        The coefficient with its standard error over items with at least two
+        ratings; `n_items` counts those. With the ordinal metric, which depends on
+        the ratings, the error takes it as it was found.
+
+    Raises
+    ------
+    RatingsError
+        If the ratings are not such a table.
+    ParameterError
+        If an option is none, both `weights` and `metric` are given, or they do not
+        fit the categories.
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        If no item has ratings of two raters, or all ratings are in one category;
+        the value is then ``nan``.
+
+    Notes
+    -----
+    Items with fewer than two ratings are left out altogether. Chance draws two
+    ratings without replacement, so duplicating all items changes the value; with
+    many items it tends to Fleiss' kappa.
+
+    References
+    ----------
+    .. [1] Krippendorff, K. (2004). Content Analysis, 2nd ed., ch. 11.
+    .. [2] Hayes, A. F., Krippendorff, K. (2007). Answering the call for a standard
+       reliability measure for coding data. Communication Methods and Measures,
+       1(1), 77-89. https://doi.org/10.1080/19312450709336664
+
+    Examples
+    --------
+    Two raters agree on two items and differ on a third:
+
+    >>> round(krippendorff_alpha([["a", "a"], ["b", "b"], ["a", "b"]]).value, 3)
+    0.444
+    """
+    coded = code_ratings(ratings, categories)
+    return _estimate(
+        coded_items(coded),
+        coded.n_raters,
+        coded.categories,
+        weights,
+        metric,
+        population,
+    )
+
+
+def krippendorff_alpha_from_counts(
+    counts: ArrayLike,
+    *,
+    categories: Sequence[Label] | None = None,
+    weights: "WeightName | ArrayLike | None" = None,
+    metric: Metric | None = None,
+    population: int | None = None,
+) -> Estimate:
+    """Estimate Krippendorff's alpha from how many raters chose each category.
+
+    Parameters
+    ----------
+    counts : array_like of int, shape (n_items, n_categories)
+        Raters per item and category; rows may have different sums.
+    categories, weights, metric, population : optional
+        As of `krippendorff_alpha`; categories are 1 to n_categories unless given.
+
+    Returns
+    -------
+    Estimate
+        As of `krippendorff_alpha`; `n_raters` is the largest row sum.
+
+    Raises
+    ------
+    CountsError
+        If it is not a table of counts.
+    ParameterError
+        As `krippendorff_alpha`.
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        As `krippendorff_alpha`.
+
+    Examples
+    --------
+    >>> round(krippendorff_alpha_from_counts([[2, 0], [0, 2], [1, 1]]).value, 3)
+    0.444
+    """
+    table = check_counts(counts)
+    labels = column_categories(categories, table.shape[1])
+    n_raters = int(table.sum(axis=1).max())
+    return _estimate(
+        counted_items(table), n_raters, labels, weights, metric, population
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Sums:
+    # α = 1 - (n - 1) A / B over the n ratings of items that have at least two
+    sizes: list[int]
+    n_items: int
+    n_ratings: int
+    totals: list[int]
+    pairs: int  # multiple of every n_i - 1
+    above: int  # A = Σ_i V_i / (n_i - 1), times `pairs`
+    products: list[int]  # Σ_l v_kl n_l
+    below: int  # B = Σ_kl v_kl n_k n_l
+
+    @classmethod
+    def of(cls, usable: list[SizeGroup], weights: Weights) -> "_Sums":
+        totals = [sum(parts) for parts in zip(*[g.totals for g in usable], strict=True)]
+        pairs = math.lcm(*[group.size - 1 for group in usable])
+        products = weights.products(totals)
+        return cls(
+            sizes=[group.size for group in usable],
+            n_items=sum([group.n_items for group in usable]),
+            n_ratings=sum(totals),
+            totals=totals,
+            pairs=pairs,
+            above=sum([g.disagreement * (pairs // (g.size - 1)) for g in usable]),
+            products=products,
+            below=sum([n * vn for n, vn in zip(totals, products, strict=True)]),
+        )
+
+
+def _estimate(
+    table: ItemTable,
+    n_raters: int,
+    categories: Sequence[Label],
+    weights: "WeightName | ArrayLike | None",
+    metric: Metric | None,
+    population: int | None,
+) -> Estimate:
+    v = _disagreement(table, categories, weights, metric)
+    usable = [group for group in table.groups(v) if group.size > 1]
+    found = _Sums.of(usable, v) if usable else None
+    check_population(population, 0 if found is None else found.n_items)
+    reason = None
+    if found is None:
+        reason = undefined("Krippendorff's alpha", NO_PAIR)
+    elif found.below == 0:
+        reason = undefined("Krippendorff's alpha", NO_CHANCE)
+    value = error = observed = chance = math.nan
+    if found is not None:
+        n, over = found.n_ratings, found.pairs * v.denominator
+        observed = (n * over - found.above) / (n * over)
+        over_e = n * (n - 1) * v.denominator
+        chance = (over_e - found.below) / over_e
+        if reason is None:
+            d_e = found.below * found.pairs
+            value = (d_e - (n - 1) * found.above) / d_e
+            error = _standard_error(table, v, found, population)
+    return Estimate(
+        coefficient="krippendorff_alpha",
+        weights=v.name,
+        value=value,
+        standard_error=error,
+        observed=observed,
+        chance=chance,
+        n_items=0 if found is None else found.n_items,
+        n_raters=n_raters,
+        n_categories=table.n_categories,
+        reason=reason,
+    )
+
+
+def _disagreement(
+    table: ItemTable,
+    categories: Sequence[Label],
+    weights: "WeightName | ArrayLike | None",
+    metric: Metric | None,
+) -> Weights:
+    if metric is None:
+        return declared_weights("identity" if weights is None else weights, categories)
+    if weights is not None:
+        raise ParameterError("weights, metric: needs one of them, got both")
+    totals = [0] * table.n_categories
+    if metric == "ordinal":
+        for group in table.groups(Weights(name="", n_categories=table.n_categories)):
+            if group.size > 1:
+                totals = [a + b for a, b in zip(totals, group.totals, strict=True)]
+    return metric_weights(metric, categories, totals)
+
+
+def _standard_error(
+    table: ItemTable, v: Weights, found: _Sums, population: int | None
+) -> float:
+    # With Q = 1 - α = (n - 1) A / B, the influence of item i among m is
+    #   -u_i = m Q [V_i / ((n_i - 1) A) + n_i / (n - 1) - 2 Σ_k h_k n_ik / B],
+    # h_k = Σ_l v_kl n_l.
+    m, n = found.n_items, found.n_ratings
+    if m < 2:
+        return math.nan
+    by_size = {
+        size: (
+            m * (n - 1) * (found.pairs // (size - 1)) * found.below,
+            m * size * found.above * found.below,
+            -2 * m * (n - 1) * found.above,
+        )
+        for size in found.sizes
+    }
+    by_size |= dict.fromkeys({1} - by_size.keys(), (0, 0, 0))
+    influence = Linear(
+        by_size=by_size,
+        slopes=found.products,
+        denominator=found.pairs * found.below**2,
+    )
+    squares, over = table.square_sum(v, influence)
+    variance = squares / (over * m * (m - 1))
+    if population is not None:
+        variance *= (population - m) / population
+    return math.sqrt(variance)
+
+
+def _features(coded: CodedRatings, v: Floats) -> Floats:
+    # (n_items, 1 + n_categories): V_i / (n_i - 1), and counts of items with a pair
+    counts = item_counts(coded).astype(np.float64)
+    counts[counts.sum(axis=1) < 2] = 0.0
+    others = np.maximum(counts.sum(axis=1) - 1.0, 1.0)
+    return np.column_stack([weighted_disagreement(counts, v) / others, counts])
+
+
+def _value(sums: Floats, v: Floats) -> Floats:
+    # sums (..., 1 + n_categories) -> (...)
+    totals = sums[..., 1:]
+    below = weighted_disagreement(totals, v)
+    return 1.0 - divide((totals.sum(axis=-1) - 1.0) * sums[..., 0], below)
+
+
+KRIPPENDORFF_KERNEL = Kernel(features=_features, value=_value)

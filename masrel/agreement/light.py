@@ -1,0 +1,186 @@
+"""Light's kappa: the mean of Cohen's kappa over all pairs of raters."""
+
+import itertools
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from masrel.agreement.coding import CodedRatings, Label, code_ratings, complete
+from masrel.agreement.cohen import COHEN_KERNEL, PairSums, pair_table
+from masrel.agreement.kernel import Floats, Kernel
+from masrel.agreement.patterns import distinct_patterns
+from masrel.agreement.pooled import check_population
+from masrel.agreement.undefined import undefined
+from masrel.agreement.weights import WeightName, Weights, declared_weights
+from masrel.errors import ParameterError, RatingsError
+from masrel.estimates import Estimate
+
+__all__ = ["LIGHT_KERNEL", "Missing", "light_kappa"]
+
+Missing = Literal["listwise", "pairwise"]
+"""Which items count when ratings are missing."""
+
+
+def light_kappa(
+    ratings: object,
+    *,
+    categories: Sequence[Label] | None = None,
+    weights: "WeightName | ArrayLike" = "identity",
+    missing: Missing = "listwise",
+    population: int | None = None,
+) -> Estimate:
+    """Estimate Light's kappa: the mean of Cohen's kappa over pairs of raters.
+
+    Parameters
+    ----------
+    ratings : nested sequence, array_like or DataFrame, shape (n_items, n_raters)
+        Labels or numbers; None and ``nan`` are missing.
+    categories : sequence of str, int or float, optional
+        The declared scale in order; the labels met when not given.
+    weights : str or array_like, shape (n_categories, n_categories), optional
+        How much two categories agree; see `declared_weights`.
+    missing : {"listwise", "pairwise"}, optional
+        Use the items that every rater rated, or for each pair of raters those that
+        both rated.
+    population : int, optional
+        Items there are in all, for the finite-population correction.
+
+    Returns
+    -------
+    Estimate
+        The coefficient with its standard error over items; `observed` and `chance`
+        are means over pairs of raters.
+
+    Raises
+    ------
+    RatingsError
+        If the ratings are not such a table or of fewer than two raters.
+    ParameterError
+        If an option is none, or the weights do not fit the categories.
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        If kappa is undefined for any pair of raters: no item has both ratings, or
+        both used one and the same category throughout. The value is then ``nan``.
+
+    References
+    ----------
+    .. [1] Light, R. J. (1971). Measures of response agreement for qualitative data.
+       Psychological Bulletin, 76(5), 365-377. https://doi.org/10.1037/h0031643
+
+    Examples
+    --------
+    >>> light_kappa([["a", "a"], ["a", "b"], ["b", "b"], ["b", "b"]]).value
+    0.5
+    """
+    coded = code_ratings(ratings, categories)
+    if missing not in get_args(Missing):
+        raise ParameterError(
+            f"missing: needs one of {', '.join(get_args(Missing))}, got {missing!r}"
+        )
+    if missing == "listwise":
+        coded = complete(coded)
+    v = declared_weights(weights, coded.categories)
+    check_population(population, coded.n_items)
+    n_raters = coded.codes.shape[1]
+    if n_raters < 2:
+        raise RatingsError(f"Light's kappa needs at least two raters, got {n_raters}")
+    pairs = list(itertools.combinations(range(n_raters), 2))
+    sums = [
+        PairSums.of(pair_table(coded.codes[:, pair], coded.n_categories), v)
+        for pair in pairs
+    ]
+    reason = _reason(pairs, sums)
+    value = error = observed = chance = math.nan
+    if all(s.n for s in sums):
+        w = v.denominator
+        observed = _mean([1 - Fraction(s.above, s.n * w) for s in sums])
+        chance = _mean([1 - Fraction(s.below, s.n * s.n * w) for s in sums])
+    if reason is None:
+        value = _mean([1 - Fraction(s.n * s.above, s.below) for s in sums])
+        error = _standard_error(coded, v, pairs, sums, population)
+    return Estimate(
+        coefficient="light_kappa",
+        weights=v.name,
+        value=value,
+        standard_error=error,
+        observed=observed,
+        chance=chance,
+        n_items=coded.n_items,
+        n_raters=coded.n_raters,
+        n_categories=coded.n_categories,
+        reason=reason,
+    )
+
+
+def _mean(values: list[Fraction]) -> float:
+    return float(sum(values, Fraction(0)) / len(values))
+
+
+def _reason(pairs: list[tuple[int, int]], sums: list[PairSums]) -> str | None:
+    for (first, second), found in zip(pairs, sums, strict=True):
+        of_pair = f"of the raters in columns {first} and {second}"
+        if found.n == 0:
+            return undefined("Light's kappa", f"no item has both ratings {of_pair}")
+        if found.below == 0:
+            return undefined("Light's kappa", f"0/0: one category is all {of_pair}")
+    return None
+
+
+def _standard_error(
+    coded: CodedRatings,
+    v: Weights,
+    pairs: list[tuple[int, int]],
+    sums: list[PairSums],
+    population: int | None,
+) -> float:
+    n = coded.n_items
+    if n < 2:
+        return math.nan
+    rows, times = distinct_patterns(coded.codes, coded.n_categories)
+    total = np.zeros(len(rows))
+    for pair, found in zip(pairs, sums, strict=True):
+        # of n items, an item with both ratings moves this pair's kappa n / n_pair times
+        total += n / found.n * _of_pair(rows[:, pair], found, v)
+    influence = total / len(pairs)
+    variance = float((times * influence * influence).sum()) / (n * (n - 1))
+    if population is not None:
+        variance *= (population - n) / population
+    return math.sqrt(variance)
+
+
+def _of_pair(rows: NDArray[np.int64], found: PairSums, v: Weights) -> Floats:
+    # influence of every pattern on the kappa of one pair; 0 where a rating is missing
+    q = v.n_categories
+    by_cell = np.zeros((q + 1, q + 1))
+    for k, cells in enumerate(found.cells):
+        for l, times in enumerate(cells):  # noqa: E741 - k, l as in the formula
+            if times:
+                by_cell[k, l] = found.n * found.influence(k, l, v) / found.below**2
+    return np.asarray(by_cell[rows[:, 0], rows[:, 1]])
+
+
+def _features(coded: CodedRatings, v: Floats) -> Floats:
+    # (n_items, n_pairs (2 + 2 n_categories)): each pair's features in turn, 0 for
+    # items that not every rater rated
+    parts = []
+    whole = np.min(coded.codes, axis=1) >= 0
+    codes = np.where(whole[:, None], coded.codes, -1)
+    for pair in itertools.combinations(range(codes.shape[1]), 2):
+        of_pair = CodedRatings(codes=codes[:, pair], categories=coded.categories)
+        parts.append(COHEN_KERNEL.features(of_pair, v))
+    return np.hstack(parts)
+
+
+def _value(sums: Floats, v: Floats) -> Floats:
+    # sums (..., n_pairs (2 + 2 n_categories)) -> (...)
+    of_pairs = sums.reshape(*sums.shape[:-1], -1, 2 + 2 * len(v))
+    return np.asarray(COHEN_KERNEL.value(of_pairs, v).mean(axis=-1))
+
+
+LIGHT_KERNEL = Kernel(features=_features, value=_value)

@@ -1,0 +1,84 @@
+"""Krippendorff's own difference functions, which grow without bound."""
+
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Literal, get_args
+
+from masrel.agreement.labels import Label
+from masrel.agreement.weights import (
+    Weights,
+    category_values,
+    every_pair,
+    over_one_denominator,
+)
+from masrel.errors import ParameterError
+
+__all__ = ["Metric", "metric_weights"]
+
+Metric = Literal["nominal", "ordinal", "interval", "ratio"]
+"""Names of the difference functions."""
+
+
+def metric_weights(
+    metric: Metric, categories: Sequence[Label], totals: Sequence[int]
+) -> Weights:
+    """Return squared differences of categories as weights of disagreement.
+
+    Parameters
+    ----------
+    metric : {"nominal", "ordinal", "interval", "ratio"}
+        The difference function.
+    categories : sequence of str, int or float
+        The declared scale in order. Numbers differ by value, text by rank.
+    totals : sequence of int, shape (n_categories,)
+        Pairable ratings per category; the ordinal metric counts those between.
+
+    Returns
+    -------
+    Weights
+        δ² of every pair of categories, exact.
+
+    Raises
+    ------
+    ParameterError
+        If the metric is none, or two values sum to 0 under "ratio".
+
+    References
+    ----------
+    .. [1] Krippendorff, K. (2004). Content Analysis, 2nd ed., pp. 232-236.
+
+    Examples
+    --------
+    From the middle of 2 ratings over 3 to the middle of 4 it is 1 + 3 + 2 = 6:
+
+    >>> float(metric_weights("ordinal", ["a", "b", "c"], [2, 3, 4]).as_floats()[0, 2])
+    36.0
+    """
+    if metric not in get_args(Metric):
+        raise ParameterError(
+            f"metric: needs one of {', '.join(get_args(Metric))}, got {metric!r}"
+        )
+    if metric == "nominal":
+        return Weights(name="nominal", n_categories=len(categories))
+    if metric == "ordinal":
+        return over_one_denominator("ordinal metric", _ordinal(totals))
+    values = category_values(categories)
+    if metric == "interval":
+        squares = every_pair(values, lambda x, y: (x - y) ** 2)
+        return over_one_denominator("interval", squares)
+    if any(x + y == 0 for i, x in enumerate(values) for y in values[:i]):
+        raise ParameterError(
+            "metric: ratio needs values of which no two sum to 0, got "
+            f"{', '.join(str(float(value)) for value in values)}"
+        )
+    ratios = every_pair(values, lambda x, y: ((x - y) / (x + y)) ** 2)
+    return over_one_denominator("ratio metric", ratios)
+
+
+def _ordinal(totals: Sequence[int]) -> list[list[Fraction]]:
+    # (Σ_{g=c}^{k} n_g - (n_c + n_k)/2)²: ratings up to the middle of each grade
+    middles, below = [], 0
+    for total in totals:
+        middles.append(Fraction(2 * below + total, 2))
+        below += total
+    return every_pair(middles, lambda x, y: (x - y) ** 2)

@@ -1,0 +1,154 @@
+"""Scott's pi: agreement of two raters who share their margins."""
+
+from collections.abc import Sequence
+
+from numpy.typing import ArrayLike
+
+from masrel.agreement.coding import CodedRatings, Label, code_ratings, complete
+from masrel.agreement.cohen import two_raters
+from masrel.agreement.counts import check_table, coded_items, column_categories
+from masrel.agreement.fleiss import FLEISS_KERNEL, expected_disagreement
+from masrel.agreement.items import FewItems
+from masrel.agreement.kernel import Floats, Kernel
+from masrel.agreement.pooled import Options, check_population, pooled_estimate
+from masrel.agreement.weights import WeightName, declared_weights
+from masrel.estimates import Estimate
+
+__all__ = ["SCOTT_KERNEL", "scott_pi", "scott_pi_from_table"]
+
+_NAME, _TITLE = "scott_pi", "Scott's pi"
+
+
+def scott_pi(
+    ratings: object,
+    *,
+    categories: Sequence[Label] | None = None,
+    weights: "WeightName | ArrayLike" = "identity",
+    population: int | None = None,
+) -> Estimate:
+    """Estimate Scott's pi of two raters.
+
+    Parameters
+    ----------
+    ratings : nested sequence, array_like or DataFrame, shape (n_items, 2)
+        Labels or numbers; None and ``nan`` are missing.
+    categories : sequence of str, int or float, optional
+        The declared scale in order; the labels met when not given.
+    weights : str or array_like, shape (n_categories, n_categories), optional
+        How much two categories agree; see `declared_weights`.
+    population : int, optional
+        Items there are in all, for the finite-population correction.
+
+    Returns
+    -------
+    Estimate
+        The coefficient with its standard error over items.
+
+    Raises
+    ------
+    RatingsError
+        If the ratings are not such a table or not of two raters.
+    ParameterError
+        If an option is none, or the weights do not fit the categories.
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        If no item has both ratings, or all ratings are in one category; the value
+        is then ``nan``.
+
+    Notes
+    -----
+    Only items with both ratings are used; on these it is Fleiss' kappa.
+
+    References
+    ----------
+    .. [1] Scott, W. A. (1955). Reliability of content analysis: the case of nominal
+       scale coding. Public Opinion Quarterly, 19(3), 321-325.
+       https://doi.org/10.1086/266577
+
+    Examples
+    --------
+    >>> round(scott_pi([["a", "a"], ["b", "b"], ["a", "b"]]).value, 3)
+    0.333
+    """
+    coded = complete(two_raters(code_ratings(ratings, categories), _TITLE))
+    check_population(population, coded.n_items)
+    return pooled_estimate(
+        coded_items(coded),
+        coded.n_raters,
+        declared_weights(weights, coded.categories),
+        expected_disagreement,
+        Options(_NAME, _TITLE, population=population),
+    )
+
+
+def scott_pi_from_table(
+    table: ArrayLike,
+    *,
+    categories: Sequence[Label] | None = None,
+    weights: "WeightName | ArrayLike" = "identity",
+    population: int | None = None,
+) -> Estimate:
+    """Estimate Scott's pi from a contingency table.
+
+    Parameters
+    ----------
+    table : array_like of int, shape (n_categories, n_categories)
+        Items per category of the first (rows) and second rater (columns).
+    categories, weights, population : optional
+        As of `scott_pi`; categories are 1 to n_categories unless given.
+
+    Returns
+    -------
+    Estimate
+        As of `scott_pi`.
+
+    Raises
+    ------
+    CountsError
+        If it is not a square table of counts.
+    ParameterError
+        As `scott_pi`.
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        As `scott_pi`.
+
+    Examples
+    --------
+    >>> round(scott_pi_from_table([[1, 1], [0, 1]]).value, 3)
+    0.333
+    """
+    cells = check_table(table).tolist()
+    q = len(cells)
+    check_population(population, sum(map(sum, cells)))
+    rows, times = [], []
+    for k in range(q):
+        for other in range(k, q):
+            row = [0] * q
+            row[k] += 1
+            row[other] += 1
+            rows.append(row)
+            both = cells[k][other] + cells[other][k]
+            times.append(cells[k][k] if k == other else both)
+    weights_made = declared_weights(weights, column_categories(categories, q))
+    met = [i for i, n in enumerate(times) if n]
+    items = FewItems([rows[i] for i in met], [times[i] for i in met], q)
+    return pooled_estimate(
+        items,
+        2 if met else 0,
+        weights_made,
+        expected_disagreement,
+        Options(_NAME, _TITLE, population=population),
+    )
+
+
+def _features(coded: CodedRatings, v: Floats) -> Floats:
+    features = FLEISS_KERNEL.features(coded, v)
+    features[(coded.codes < 0).any(axis=1)] = 0.0
+    return features
+
+
+SCOTT_KERNEL = Kernel(features=_features, value=FLEISS_KERNEL.value)

@@ -1,0 +1,53 @@
+"""Ratings as numbers, for statistics of means and ranks."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from masrel.agreement.coding import Label, code_ratings
+from masrel.agreement.weights import category_values
+from masrel.errors import RatingsError
+
+__all__ = ["complete_values"]
+
+
+def complete_values(
+    ratings: Any, categories: Sequence[Label] | None
+) -> NDArray[np.float64]:
+    """Return the values of items that every rater rated.
+
+    Parameters
+    ----------
+    ratings : nested sequence, array_like or DataFrame, shape (n_items, n_raters)
+        Labels or numbers; None and ``nan`` are missing.
+    categories : sequence or None
+        The declared scale in order: numbers count by value, text by rank from 1.
+        Without it the ratings must be numbers.
+
+    Returns
+    -------
+    ndarray, shape (n_complete_items, n_raters)
+        Values.
+
+    Raises
+    ------
+    RatingsError
+        If the ratings are not such a table, or text without declared categories.
+    """
+    if categories is None and isinstance(ratings, np.ndarray):
+        if ratings.ndim == 2 and ratings.dtype.kind in "iuf" and ratings.size:
+            values = ratings.astype(np.float64)
+            return values[~np.isnan(values).any(axis=1)]
+    coded = code_ratings(ratings, categories)
+    if not coded.categories:
+        return np.empty((0, coded.codes.shape[1]))
+    if categories is None and isinstance(coded.categories[0], str):
+        raise RatingsError(
+            "categories: needs the declared scale in order, because the ratings are "
+            f"text, such as {coded.categories[0]!r}"
+        )
+    known = [float(value) for value in category_values(coded.categories)]
+    values = np.array([*known, np.nan])[coded.codes]  # missing, -1, is the last
+    return values[~np.isnan(values).any(axis=1)]
