@@ -13,6 +13,7 @@ from masrel.agreement.category import category_kappa, fleiss_null
 from masrel.agreement.coding import CodedRatings, code_ratings
 from masrel.agreement.cohen import cohen_kappa, cohen_kappa_from_table
 from masrel.agreement.conger import conger_kappa
+from masrel.agreement.counts import CountedRatings, count_ratings
 from masrel.agreement.fleiss import fleiss_kappa, fleiss_kappa_from_counts
 from masrel.agreement.gwet import gwet_ac, gwet_ac_from_counts
 from masrel.agreement.icc import icc, icc_f_test
@@ -45,6 +46,7 @@ __all__ = [
     "BandScale",
     "CodedRatings",
     "Coefficient",
+    "CountedRatings",
     "Significance",
     "Weights",
     "bands",
@@ -62,6 +64,7 @@ __all__ = [
     "cohen_kappa_from_table",
     "conger_kappa",
     "contingency_table",
+    "count_ratings",
     "declared_weights",
     "fleiss_kappa",
     "fleiss_kappa_from_counts",

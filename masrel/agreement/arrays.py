@@ -15,7 +15,7 @@ Codes = NDArray[np.signedinteger[Any]]
 Array = NDArray[Any]
 _Coder = Callable[[Array], Array]
 
-_BLOCK = 1 << 17  # labels coded at once, so that they stay in the cache
+_BLOCK = 1 << 16  # labels coded at once, so that they stay in the cache
 _WIDEST = 1 << 16  # span of whole numbers for which a table of codes is made
 _MISSING, _UNKNOWN = -1, -2
 
@@ -47,10 +47,18 @@ def array_codes(
     if kind not in "iufU" or (declared is not None and is_text != (kind == "U")):
         return _object_codes(labels, declared)
     plain = _plain(labels)
-    if declared is None:
+    if declared is not None:
+        return _codes(labels, plain, declared), declared
+    # As a rule the first block has every label: the rest is then read only once.
+    known = _labels_met(plain[next(_blocks(plain))], labels.dtype)
+    try:
+        return _codes(labels, plain, known), known
+    except RatingsError:
         known = _labels_met(plain, labels.dtype)
-    else:
-        known = declared
+        return _codes(labels, plain, known), known
+
+
+def _codes(labels: Array, plain: Array, known: tuple[Label, ...]) -> Codes:
     codes = np.empty(labels.shape, dtype=code_type(len(known)))
     coder = _coder(plain, labels.dtype, known)
     for rows in _blocks(labels):
@@ -59,7 +67,7 @@ def array_codes(
             i, j = np.argwhere(codes[rows] == _UNKNOWN)[0].tolist()
             position: dict[object, int] = dict.fromkeys(known, 0)
             lookup(labels[rows][i, j].item(), position, rows.start + i, j)
-    return codes, known
+    return codes
 
 
 def _blocks(labels: Array) -> Iterator[slice]:
@@ -77,6 +85,8 @@ def _plain(labels: Array) -> Array:
 
 
 def _labels_met(plain: Array, dtype: np.dtype[Any]) -> tuple[Label, ...]:
+    if dtype.kind in "iu" and (span := _span(plain)) is not None:
+        return _whole_numbers_met(plain, *span)
     met = np.empty(0, dtype=plain.dtype)
     for rows in _blocks(plain):
         block = plain[rows]
@@ -92,14 +102,29 @@ def _labels_met(plain: Array, dtype: np.dtype[Any]) -> tuple[Label, ...]:
     return tuple(sorted(met.tolist()))
 
 
+def _span(plain: Array) -> tuple[int, int] | None:
+    # least and greatest whole number, if a table can have a place for each between
+    lowest, highest = int(plain.min()), int(plain.max())
+    return (lowest, highest) if highest - lowest < _WIDEST else None
+
+
+def _whole_numbers_met(plain: Array, lowest: int, highest: int) -> tuple[Label, ...]:
+    met = np.zeros(highest - lowest + 1, dtype=bool)
+    for rows in _blocks(plain):
+        met[plain[rows] - lowest] = True
+        if met.all():  # as a rule after the first block
+            break
+    return tuple((np.flatnonzero(met) + lowest).tolist())
+
+
 def _coder(plain: Array, dtype: np.dtype[Any], known: tuple[Label, ...]) -> _Coder:
     # a function of a block of labels to its codes
-    if dtype.kind in "iu":
-        lowest, highest = int(plain.min()), int(plain.max())
-        if highest - lowest < _WIDEST:
-            return _table_coder(lowest, highest, known)
+    if dtype.kind in "iu" and (span := _span(plain)) is not None:
+        return _table_coder(*span, known)
     if not known:
         return lambda block: np.full(block.shape, _MISSING)
+    if dtype.kind == "f":
+        return _float_coder(np.array(known, dtype=np.float64))
     values = np.array(known, dtype=dtype if dtype.kind == "U" else None)
     if dtype.kind == "U":
         # a longer label of the scale would be cut to the width of the array
@@ -117,8 +142,31 @@ def _table_coder(lowest: int, highest: int, known: tuple[Label, ...]) -> _Coder:
         if lowest <= float(label) <= highest and float(label).is_integer():
             table[int(label) - lowest] = code
     if (table == np.arange(table.size)).all():
+        if table.dtype == np.int8:  # modulo 256 the small difference stays what it is
+            low = np.int64(lowest).astype(np.int8)
+            return lambda block: np.subtract(block.astype(np.int8), low)
         return lambda block: block - lowest
     return lambda block: table[block - lowest]
+
+
+def _float_coder(known: Array) -> _Coder:
+    order = np.argsort(known)
+    slow = _search_coder(known[order], order)
+    lowest, span = known[order[0]], known[order[-1]] - known[order[0]]
+    if not (span < _WIDEST and (known == np.floor(known)).all()):
+        return slow
+    table = np.full(int(span) + 1, _UNKNOWN, dtype=code_type(len(known)))
+    table[(known - lowest).astype(np.intp)] = np.arange(len(known))
+
+    def coder(block: Array) -> Array:
+        missing = np.isnan(block)
+        place = np.where(missing, 0.0, block - lowest)
+        whole = place.astype(np.intp)
+        if (whole != place).any() or whole.min() < 0 or whole.max() > span:
+            return slow(block)
+        return np.where(missing, _MISSING, table[whole])
+
+    return coder
 
 
 def _search_coder(values: Array, codes: NDArray[np.intp]) -> _Coder:

@@ -22,6 +22,8 @@ __all__ = ["MISSING", "CodedRatings", "Codes", "Label", "code_ratings", "complet
 MISSING = -1
 """Code of a rating that was not given."""
 
+_FIRST = 100
+
 Codes = NDArray[np.signedinteger[Any]]
 """Codes in the smallest integers that hold them."""
 
@@ -44,14 +46,21 @@ class CodedRatings:
     @property
     def n_items(self) -> int:
         """Items with at least one rating."""
-        return int((self.codes.max(axis=1) != MISSING).sum())
+        given = self.codes[:, 0] != MISSING
+        for column in self.codes.T[1:]:
+            if given.all():  # as a rule after the first column
+                break
+            given |= column != MISSING
+        return int(given.sum())
 
     @property
     def n_raters(self) -> int:
         """Raters with at least one rating."""
-        if len(self.codes) == 0:
-            return 0
-        return int((self.codes.max(axis=0) != MISSING).sum())
+        # As a rule one of the first ratings is there, and no more are looked at.
+        return sum(
+            bool((column[:_FIRST] != MISSING).any() or (column != MISSING).any())
+            for column in self.codes.T
+        )
 
     @property
     def n_categories(self) -> int:
@@ -88,6 +97,7 @@ def code_ratings(
     >>> code_ratings([["1", "1+"], ["2", None]], ["1", "1+", "2"]).codes.tolist()
     [[0, 1], [2, -1]]
     """
+    ratings = getattr(ratings, "coded", ratings)  # ratings that are counted, too
     if isinstance(ratings, CodedRatings):
         return ratings
     declared = None if categories is None else check_categories(categories)

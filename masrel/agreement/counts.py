@@ -1,20 +1,23 @@
 """Tables of counts: how many raters put each item into each category."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from masrel.agreement.coding import CodedRatings
+from masrel.agreement.coding import CodedRatings, code_ratings
 from masrel.agreement.items import FewItems, ItemTable, item_table
 from masrel.agreement.labels import Label, check_categories
 from masrel.errors import CountsError, ParameterError
 
 __all__ = [
+    "CountedRatings",
     "check_counts",
     "check_table",
     "coded_items",
     "column_categories",
+    "count_ratings",
     "counted_items",
     "item_counts",
 ]
@@ -24,6 +27,62 @@ Integers = NDArray[np.int64]
 _FEW = 2_000  # ratings that Python counts about as fast as numpy
 _MOST_KEYS = 1 << 22  # patterns that are counted in a table rather than sorted
 _BLOCK = 1 << 16  # items counted at once, so that they stay in the cache
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CountedRatings:
+    """Ratings with their distinct items counted, for several coefficients at once.
+
+    Attributes
+    ----------
+    coded : CodedRatings
+        The ratings.
+    items : FewItems or ManyItems
+        Distinct items with how often each occurs.
+    n_raters : int
+        Raters with at least one rating.
+    """
+
+    coded: CodedRatings
+    items: ItemTable = field(compare=False, repr=False)
+    n_raters: int
+
+
+def count_ratings(
+    ratings: object, categories: Sequence[Label] | None = None
+) -> CountedRatings:
+    """Check ratings once, and count distinct items once, for several coefficients.
+
+    Parameters
+    ----------
+    ratings : nested sequence, array_like or DataFrame, shape (n_items, n_raters)
+        Labels or numbers; None and ``nan`` are missing.
+    categories : sequence of str, int or float, optional
+        The declared scale in order; the labels met when not given.
+
+    Returns
+    -------
+    CountedRatings
+        What every coefficient takes in place of ratings.
+
+    Raises
+    ------
+    RatingsError
+        If the ratings are not such a table.
+
+    Examples
+    --------
+    >>> from masrel.agreement import fleiss_kappa, gwet_ac
+    >>> counted = count_ratings([["a", "a"], ["b", "b"], ["a", "b"]])
+    >>> fleiss_kappa(counted).value == gwet_ac(counted).value
+    True
+    """
+    if isinstance(ratings, CountedRatings):
+        return ratings
+    coded = code_ratings(ratings, categories)
+    return CountedRatings(
+        coded=coded, items=coded_items(coded), n_raters=coded.n_raters
+    )
 
 
 def item_counts(coded: CodedRatings) -> Integers:

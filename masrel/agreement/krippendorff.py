@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from masrel.agreement.coding import CodedRatings, Label, code_ratings
+from masrel.agreement.coding import CodedRatings, Label
 from masrel.agreement.counts import (
     check_counts,
-    coded_items,
     column_categories,
+    count_ratings,
     counted_items,
     item_counts,
 )
@@ -97,11 +97,11 @@ def krippendorff_alpha(
     >>> round(krippendorff_alpha([["a", "a"], ["b", "b"], ["a", "b"]]).value, 3)
     0.444
     """
-    coded = code_ratings(ratings, categories)
+    counted = count_ratings(ratings, categories)
     return _estimate(
-        coded_items(coded),
-        coded.n_raters,
-        coded.categories,
+        counted.items,
+        counted.n_raters,
+        counted.coded.categories,
         weights,
         metric,
         population,

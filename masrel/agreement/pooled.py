@@ -11,11 +11,11 @@ from typing import Literal, get_args
 
 from numpy.typing import ArrayLike
 
-from masrel.agreement.coding import Label, code_ratings
+from masrel.agreement.coding import Label
 from masrel.agreement.counts import (
     check_counts,
-    coded_items,
     column_categories,
+    count_ratings,
     counted_items,
 )
 from masrel.agreement.items import ItemTable, Linear, SizeGroup
@@ -110,6 +110,7 @@ def pooled_estimate(
     """
     groups = table.groups(weights)
     n_rated = sum([group.n_items for group in groups])
+    check_population(options.population, n_rated)
     observed = Observed.of(groups, weights)
     reason = None
     value = error = p_o = p_e = math.nan
@@ -306,11 +307,10 @@ def estimate_ratings(
     Estimate
         The coefficient.
     """
-    coded = code_ratings(ratings, asked.categories)
-    weights = declared_weights(asked.weights, coded.categories)
-    table = coded_items(coded)
-    options = _options(name, title, asked, coded.n_items)
-    return pooled_estimate(table, coded.n_raters, weights, expected, options)
+    counted = count_ratings(ratings, asked.categories)
+    weights = declared_weights(asked.weights, counted.coded.categories)
+    options = _options(name, title, asked)
+    return pooled_estimate(counted.items, counted.n_raters, weights, expected, options)
 
 
 def estimate_counts(
@@ -337,20 +337,17 @@ def estimate_counts(
     table = check_counts(counts)
     categories = column_categories(asked.categories, table.shape[1])
     weights = declared_weights(asked.weights, categories)
-    sizes = table.sum(axis=1)
-    options = _options(name, title, asked, int((sizes > 0).sum()))
-    return pooled_estimate(
-        counted_items(table), int(sizes.max()), weights, expected, options
-    )
+    n_raters = int(table.sum(axis=1).max())
+    options = _options(name, title, asked)
+    return pooled_estimate(counted_items(table), n_raters, weights, expected, options)
 
 
-def _options(name: str, title: str, asked: Asked, n_items: int) -> Options:
+def _options(name: str, title: str, asked: Asked) -> Options:
     if asked.variance not in get_args(Variance):
         raise ParameterError(
             f"variance: needs one of {', '.join(get_args(Variance))}, "
             f"got {asked.variance!r}"
         )
-    check_population(asked.population, n_items)
     return Options(name, title, asked.variance, asked.population)
 
 

@@ -10,7 +10,7 @@ from masrel.agreement.counts import check_table, coded_items, column_categories
 from masrel.agreement.fleiss import FLEISS_KERNEL, expected_disagreement
 from masrel.agreement.items import FewItems
 from masrel.agreement.kernel import Floats, Kernel
-from masrel.agreement.pooled import Options, check_population, pooled_estimate
+from masrel.agreement.pooled import Options, pooled_estimate
 from masrel.agreement.weights import WeightName, declared_weights
 from masrel.estimates import Estimate
 
@@ -73,7 +73,6 @@ def scott_pi(
     0.333
     """
     coded = complete(two_raters(code_ratings(ratings, categories), _TITLE))
-    check_population(population, coded.n_items)
     return pooled_estimate(
         coded_items(coded),
         coded.n_raters,
@@ -123,7 +122,6 @@ def scott_pi_from_table(
     """
     cells = check_table(table).tolist()
     q = len(cells)
-    check_population(population, sum(map(sum, cells)))
     rows, times = [], []
     for k in range(q):
         for other in range(k, q):
