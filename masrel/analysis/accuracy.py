@@ -182,9 +182,10 @@ def _unpaired(session: str | None, reason: str) -> InPersonAgreement:
 def _grades_of(ratings: Ratings, session: str | None) -> dict[tuple[str, str], str]:
     table = ratings.table
     given = table[(table["session"] == session) & table["grade"].notna()]
+    # Last to first: of repeated presentations the first one counts.
+    given = given.sort_values("repeat", ascending=False, kind="stable")
     keys = zip(given["rater"], given["model"], strict=True)
-    # Reversed: of repeated presentations the first one counts.
-    return dict(reversed(list(zip(keys, given["grade"], strict=True))))
+    return dict(zip(keys, given["grade"], strict=True))
 
 
 def _check_haptic(in_person: InPerson, haptic: dict[tuple[str, str], str]) -> None:
