@@ -3,7 +3,7 @@
 from masrel.protocol import Protocol
 from masrel.report.grid import grade_grid
 from masrel.report.material import Drawing, Material, Paragraph, Section
-from masrel.report.tables import Column, Table, counted, decimals_given
+from masrel.report.tables import Column, Table, as_given, counted, decimals_given
 
 __all__ = ["design_section", "grades_section"]
 
@@ -57,11 +57,12 @@ def design_section(material: Material) -> Section:
 
 def _simulation(protocol: Protocol) -> str:
     settings = protocol.simulated_raters
+    accuracy, again = as_given(settings.accuracy), as_given(settings.retest_agreement)
     return (
         "The grades are simulated: every simulated rater gives the intended grade with "
-        f"probability {settings.accuracy:g} and repeats a grade at a retest with "
-        f"probability {settings.retest_agreement:g} (seed {settings.seed}). They show "
-        "that the study runs; they say nothing about people or about the models."
+        f"probability {accuracy} and repeats a grade at a retest with probability "
+        f"{again} (seed {settings.seed}). They show that the study runs; they say "
+        "nothing about people or about the models."
     )
 
 

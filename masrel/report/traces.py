@@ -14,7 +14,7 @@ from masrel.report.material import (
     Section,
     absent_section,
 )
-from masrel.report.tables import Column, Table, number, whole_or_tenths
+from masrel.report.tables import Column, Table, as_given, number, whole_or_tenths
 
 if TYPE_CHECKING:
     from masrel.report.figures import Drawn, TracePanel
@@ -73,9 +73,10 @@ def _about(material: Material, session: str) -> str:
         "published": "published mean speeds",
         "simulated": "mean speeds of the simulated hands",
     }.get(material.data, "recorded mean speeds")
+    start = as_given(material.protocol.stretch.start_deg)
     return (
         "These traces are reconstructions, not measurements: each model is stretched "
-        f"at constant speed from {material.protocol.stretch.start_deg:g}° to the end "
+        f"at constant speed from {start}° to the end "
         f"of the range at the {kind} of session {session}, one line a rater. Torque "
         "resists extension; the arm's own inertia is not in it. Torque and phases are "
         "what the control law sends at 1 kHz."
