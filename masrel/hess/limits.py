@@ -72,11 +72,11 @@ class DeviceLimits:
         >>> limits.check_torque(-31.5)
         Traceback (most recent call last):
             ...
-        masrel.errors.LimitExceededError: torque: needs at most 20.0 N·m, got -31.5 N·m
+        masrel.errors.LimitExceededError: torque: needs at most 20 N·m, got -31.500 N·m
         """
         if not -self.torque <= torque <= self.torque:
             raise LimitExceededError(
-                f"torque: needs at most {self.torque:.1f} N·m, got {torque:.1f} N·m"
+                f"torque: needs at most {self.torque:g} N·m, got {torque:.3f} N·m"
             )
 
     def check_motion(self, angle: float, velocity: float) -> None:

@@ -19,7 +19,7 @@ def test_a_torque_within_the_limit_passes(torque: float) -> None:
 
 @pytest.mark.parametrize("torque", [20.001, -20.001, math.inf, -math.inf, math.nan])
 def test_a_torque_beyond_it_either_way_is_named(torque: float) -> None:
-    with pytest.raises(LimitExceededError, match=r"torque: needs at most 20\.0 N·m"):
+    with pytest.raises(LimitExceededError, match="torque: needs at most 20 N·m"):
         LIMITS.check_torque(torque)
 
 

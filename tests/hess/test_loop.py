@@ -191,7 +191,7 @@ def test_a_torque_above_the_limit_is_never_sent_and_stops_the_presentation() -> 
     presented = present("HM4", 110.0, limits=limits_with(torque=5.0))
     columns = presented.recording.columns
     assert presented.fault is not None
-    assert presented.fault.startswith("torque: needs at most 5.0 N·m, got 1")
+    assert presented.fault.startswith("torque: needs at most 5 N·m, got 1")
     assert presented.recording.facts["ended"] == "fault"
     assert np.max(np.abs(columns["command_torque_nm"])) <= 5.0
     # The last sample keeps what the model asked for, in the first tick of the catch.
@@ -206,7 +206,7 @@ def test_a_torque_that_is_no_number_is_a_fault() -> None:
     controller = Controller(STANDARD_MODELS["HM3"], start_angle=math.nan)
     with device:
         presented = run_presentation(device, controller, clock=clock, limits=LIMITS)
-    assert presented.fault == "torque: needs at most 20.0 N·m, got nan N·m"
+    assert presented.fault == "torque: needs at most 20 N·m, got nan N·m"
     assert [torque for _, torque in device.commands] == [0.0]
 
 
