@@ -28,8 +28,9 @@ Sample = tuple[float, float, float]
 
 def samples(joint: ElbowParameters, motion: Motion, rate_hz: float) -> list[Sample]:
     end = events(joint, motion).end
-    times = [i / rate_hz for i in range(floor(end * rate_hz) + 1)]
-    return [(t, float(motion.angle(t)), float(motion.velocity(t))) for t in times]
+    times = np.arange(floor(end * rate_hz) + 1) / rate_hz
+    columns = (times, motion.angle(times), motion.velocity(times))
+    return list(zip(*(column.tolist() for column in columns), strict=True))
 
 
 def stepped(
