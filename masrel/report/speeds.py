@@ -1,6 +1,5 @@
 """Section `speeds`: how fast the raters stretched each model."""
 
-import math
 from typing import TYPE_CHECKING
 
 from masrel.analysis import Speeds, SpeedSummary
@@ -83,15 +82,16 @@ def _drawing(material: Material, found: Speeds) -> Drawing:
     def draw() -> "Drawn":
         from masrel.report import figures
 
-        known = {
-            (v.session, v.rater, v.model): v.mean_speed_deg_s for v in found.values
-        }
+        known: dict[tuple[str, str, str], list[float]] = {}
+        for v in found.values:
+            key = (v.session, v.rater, v.model)
+            known.setdefault(key, []).append(v.mean_speed_deg_s)
         columns = [
             figures.SpeedColumn(
                 model=summary.name,
                 session=summary.session,
                 speeds=tuple(
-                    known.get((summary.session, rater, summary.name), math.nan)
+                    tuple(known.get((summary.session, rater, summary.name), ()))
                     for rater in material.raters
                 ),
                 mean=summary.mean,
@@ -114,7 +114,7 @@ def _drawing(material: Material, found: Speeds) -> Drawing:
         name="speeds",
         caption=(
             "Mean stretching speed of every rater for every model, and the mean over "
-            "raters (bar). Dashed: ν_L."
+            "raters (bar). Dashed: ν_L, below which the catch angle stays the same."
         ),
         alt=f"Dot plot of speeds. {told}.",
         draw=draw,

@@ -66,6 +66,7 @@ def test_the_kappa_is_the_papers() -> None:
         float(observed),
         float(chance),
     )
+    assert found.estimate.n_categories == 6  # 0 and 4 are of the scale, though unused
     assert found.items == ("HM1", "HM2", "HM3", "HM4")
     assert found.raters == tuple(f"R{n}" for n in range(1, 9))
     assert (found.n_missing, found.reason) == (0, None)

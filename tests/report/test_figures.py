@@ -42,7 +42,11 @@ DRAWINGS = {
     "many raters": lambda stamp: figures.draw_grades(grid(14), stamp=stamp),
     "forest": lambda stamp: figures.draw_forest(forest(), axis_label="κ", stamp=stamp),
     "speeds": lambda stamp: figures.draw_speeds(
-        [SpeedColumn(model="HM1", session="first", speeds=(80.0, 90.0), mean=85.0)],
+        [
+            SpeedColumn(
+                model="HM1", session="first", speeds=((80.0,), (90.0, 95.0)), mean=85.0
+            )
+        ],
         raters=("R1", "R2"),
         slowest=60.0,
         stamp=stamp,

@@ -168,3 +168,31 @@ def test_many_models_are_drawn_four_to_a_figure() -> None:
     (section,) = build_sections(material(rows, "traces"))
     names = [block.name for block in section.blocks if isinstance(block, Drawing)]
     assert names == ["traces_1", "traces_2"]
+
+
+def test_a_speed_that_is_no_stretch_is_said_and_not_drawn() -> None:
+    still = ratings(*of_session("test", R1=("1",)), mean_speed_deg_s=0.0)
+    assert said(still, "traces") == ["Not in these data: every speed is below 1 deg/s."]
+    moved = ratings(*of_session("test", R2=("2",)), mean_speed_deg_s=80.0)
+    both = dataclasses.replace(still, table=pd.concat([still.table, moved.table]))
+    (about,) = said(both, "traces")
+    assert about.endswith("Speeds below 1 deg/s, which are not drawn: 1.")
+    assert "from 30° to 146°" in about
+    assert "at 1000 Hz" in about
+
+
+def test_of_repeated_presentations_every_speed_counts() -> None:
+    first = ratings(*of_session("test", R1=("1",)), mean_speed_deg_s=120.0)
+    again = ratings(*of_session("test", R1=("1",)), mean_speed_deg_s=80.0, repeat=2)
+    both = dataclasses.replace(first, table=pd.concat([first.table, again.table]))
+    made = material(both, "traces", "speeds")
+    traces, speeds = build_sections(made)
+    *_, peaks = traces.blocks
+    assert isinstance(peaks, Table)
+    quick = ConstantSpeed(start=radians(30), end=radians(146), speed=radians(120))
+    own = peak_torque(elbow_parameters(hess2012(), "HM1"), quick)
+    assert peaks.rows == (("HM1", own, own, own),)
+    assert peaks.notes[-1] == "Of repeated presentations the largest peak is given."
+    summary = speeds.blocks[1]
+    assert isinstance(summary, Table)
+    assert summary.rows[0][:4] == ("HM1", "test", 2, 100.0)
