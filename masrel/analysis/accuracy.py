@@ -143,16 +143,7 @@ def in_person_agreement(
     session = first_session(protocol, ratings)
     if in_person is None:
         return _unpaired(session, "no grades given in person belong to these ratings")
-    haptic = _grades_of(ratings, session)
-    rows: Sequence[InPersonRow] = in_person.rows
-    if any(row.haptic_grade is not None for row in rows):
-        _check_haptic(in_person, haptic)
-        # A table without any haptic grade repeats the in-person grades of another.
-        paired = {row.source_table for row in rows if row.haptic_grade is not None}
-        rows = [row for row in rows if row.source_table in paired]
-        found = [(row, row.haptic_grade) for row in rows]
-    else:
-        found = [(row, haptic.get((row.rater, row.model))) for row in rows]
+    found = _entries(in_person, _grades_of(ratings, session))
     pairs = tuple(
         InPersonPair(
             rater=row.rater,
@@ -182,9 +173,23 @@ def _unpaired(session: str | None, reason: str) -> InPersonAgreement:
 def _grades_of(ratings: Ratings, session: str | None) -> dict[tuple[str, str], str]:
     table = ratings.table
     given = table[(table["session"] == session) & table["grade"].notna()]
+    # Last to first: of repeated presentations the first one counts.
+    given = given.sort_values("repeat", ascending=False, kind="stable")
     keys = zip(given["rater"], given["model"], strict=True)
-    # Reversed: of repeated presentations the first one counts.
-    return dict(reversed(list(zip(keys, given["grade"], strict=True))))
+    return dict(zip(keys, given["grade"], strict=True))
+
+
+def _entries(
+    in_person: InPerson, haptic: dict[tuple[str, str], str]
+) -> list[tuple[InPersonRow, str | None]]:
+    # Every in-person entry with its haptic grade: the one printed beside, or the rated.
+    rows = in_person.rows
+    printed = {row.source_table for row in rows if row.haptic_grade is not None}
+    if not printed:
+        return [(row, haptic.get((row.rater, row.model))) for row in rows]
+    _check_haptic(in_person, haptic)
+    # A table without any haptic grade repeats the in-person grades of another.
+    return [(row, row.haptic_grade) for row in rows if row.source_table in printed]
 
 
 def _check_haptic(in_person: InPerson, haptic: dict[tuple[str, str], str]) -> None:

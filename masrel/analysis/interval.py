@@ -57,12 +57,9 @@ def planned_interval(
     # Imported here: asking for a kappa alone loads no interval.
     from masrel import intervals
 
-    if kind == "analytic":
-        return intervals.analytic(
-            coefficient, ratings, target=target, categories=categories, level=level
-        )
-    if kind == "jackknife":
-        return intervals.jackknife(
+    if kind in ("analytic", "jackknife"):
+        exact = intervals.analytic if kind == "analytic" else intervals.jackknife
+        return exact(
             coefficient, ratings, target=target, categories=categories, level=level
         )
     if kind == "bootstrap":

@@ -59,12 +59,6 @@ def analyze(
     """
     check_known(protocol, ratings)
     sections = set(protocol.report.sections)
-    inputs = {
-        "protocol_sha256": protocol_hash(protocol),
-        "ratings_sha256": _ratings_digest(ratings),
-    }
-    if in_person is not None:
-        inputs["in_person_sha256"] = _digest(in_person.source_path)
     return Analysis(
         study=protocol.study.id,
         level=protocol.analysis.level,
@@ -85,7 +79,7 @@ def analyze(
             else None
         ),
         simulated=ratings.simulated,
-        inputs=inputs,
+        inputs=_inputs(protocol, ratings, in_person),
         masrel_version=masrel.__version__,
     )
 
@@ -98,6 +92,18 @@ def _estimate(
         return compute(line, protocol, ratings)
     except (ParameterError, CountsError, RatingsError) as error:
         raise ProtocolError(f"analysis.estimates {line.id!r}: {error}") from error
+
+
+def _inputs(
+    protocol: Protocol, ratings: Ratings, in_person: InPerson | None
+) -> dict[str, str]:
+    inputs = {
+        "protocol_sha256": protocol_hash(protocol),
+        "ratings_sha256": _ratings_digest(ratings),
+    }
+    if in_person is not None:
+        inputs["in_person_sha256"] = _digest(in_person.source_path)
+    return inputs
 
 
 def _ratings_digest(ratings: Ratings) -> str:

@@ -1,6 +1,7 @@
 """``masrel analyze``: compute the agreement tables a study asks for."""
 
 import json
+import textwrap
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -73,7 +74,9 @@ def _show(material: StudyMaterial, analysis: "Analysis", *, as_csv_text: bool) -
             if isinstance(block, Table):
                 click.echo(as_csv(block) if as_csv_text else as_text(block) + "\n")
             elif isinstance(block, Paragraph) and block.absent:
-                click.echo(f"{name}: {block.text}", err=as_csv_text)
+                click.echo(f"{name}: {block.text}\n", err=as_csv_text)
+            elif isinstance(block, Paragraph) and not as_csv_text:
+                click.echo(textwrap.fill(block.text, 88) + "\n")
 
 
 def _computed(analysis: "Analysis") -> list[str]:

@@ -16,7 +16,11 @@ Floats = NDArray[np.float64]
 
 
 class Motion(Protocol):
-    """A stretch in extension as a function of time; SI units."""
+    """A stretch in extension as a function of time; SI units.
+
+    Events are sought for a speed that is constant, or that grows to one maximum in the
+    middle of the duration and falls again.
+    """
 
     @property
     def start(self) -> float:
@@ -34,29 +38,99 @@ class Motion(Protocol):
         ...
 
     def angle(self, time: Floats | float) -> Floats:
-        """Angle at times within the duration, rad."""
+        """Angle at times within the duration.
+
+        Parameters
+        ----------
+        time : float or ndarray of any shape
+            Times, s.
+
+        Returns
+        -------
+        ndarray, shape of `time`
+            Angles, rad; the same bits for one time as for many at once.
+        """
         ...
 
     def velocity(self, time: Floats | float) -> Floats:
-        """Angular velocity at times within the duration, rad/s."""
+        """Angular velocity at times within the duration.
+
+        Parameters
+        ----------
+        time : float or ndarray of any shape
+            Times, s.
+
+        Returns
+        -------
+        ndarray, shape of `time`
+            Velocities, rad/s; never negative.
+        """
         ...
 
     def acceleration(self, time: Floats | float) -> Floats:
-        """Angular acceleration at times within the duration, rad/s²."""
+        """Angular acceleration at times within the duration.
+
+        Parameters
+        ----------
+        time : float or ndarray of any shape
+            Times, s.
+
+        Returns
+        -------
+        ndarray, shape of `time`
+            Accelerations, rad/s².
+        """
         ...
 
     def time_at(self, angle: float) -> float:
-        """Time at which an angle between start and end is reached, s."""
+        """Time at which an angle is reached.
+
+        Parameters
+        ----------
+        angle : float
+            Angle between `start` and `end`, rad.
+
+        Returns
+        -------
+        float
+            Time, s.
+        """
         ...
 
     def times_above(self, speed: float) -> tuple[float, float] | None:
-        """First and last time at which the speed is at least `speed`, or None."""
+        """First and last time at which a speed is reached or exceeded.
+
+        Parameters
+        ----------
+        speed : float
+            Angular speed, rad/s.
+
+        Returns
+        -------
+        tuple of two float, or None
+            First and last time, s; None when the stretch is never that fast.
+        """
         ...
 
     def turning_times(
         self, stiffness: float, damping: float, inertia: float
     ) -> tuple[float, ...]:
-        """Return the times at which kθ + bω + mα is stationary, s."""
+        """Return times with all at which kθ + bω + mα is stationary.
+
+        Parameters
+        ----------
+        stiffness : float
+            Factor k of the angle, N·m/rad.
+        damping : float
+            Factor b of the velocity, N·m·s/rad.
+        inertia : float
+            Factor m of the acceleration, kg·m².
+
+        Returns
+        -------
+        tuple of float
+            Times within the duration, s; none for a stretch at constant speed.
+        """
         ...
 
 
@@ -104,7 +178,7 @@ def _check(start: float, end: float, speed: float, name: str) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ConstantSpeed:
-    """A stretch at one speed from the first instant to the last.
+    """A stretch at one speed from the first instant to the last, a `Motion`.
 
     Attributes
     ----------
@@ -169,7 +243,7 @@ class ConstantSpeed:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MinimumJerk:
-    """A stretch from rest to rest with the least integral of squared jerk.
+    """A stretch from rest to rest with the least squared jerk, a `Motion`.
 
     Attributes
     ----------

@@ -118,7 +118,7 @@ class ElbowParameters:
 
     @property
     def fastest_mean_speed(self) -> float:
-        """ν_H of (6), rad/s: above it the catch angle is the smallest."""
+        """Mean speed above which the catch angle is the smallest, ν_H of (6), rad/s."""
         span = self.catch_angle_constant - self.smallest_catch_angle
         return span / self.catch_slope
 

@@ -24,9 +24,9 @@ class Controller:
 
     Grip is lost when, in catch or post-catch, the speed falls by more than
     `slip_speed_drop` within 10 ms, or the arm moves backwards faster than ν_th. The
-    model is then released to pre-catch at once and stays there until the arm is
-    slower than ν_th. A fall of speed within 3 deg of the end of range does not count:
-    there it is the joint that stops the arm.
+    model is then released to pre-catch at once and stays there until the arm has been
+    moved back, faster than ν_th. A fall of speed within 3 deg of the end of range does
+    not count: there it is the joint that stops the arm.
 
     Parameters
     ----------
@@ -84,12 +84,10 @@ class Controller:
 
     __slots__ = (
         "_compensation",
-        "_damping",
         "_free_end",
         "_joint",
         "_past",
         "_past_index",
-        "_released",
         "_slip_speed_drop",
         "grip_lost",
         "is_new",
@@ -120,11 +118,9 @@ class Controller:
             friction or Friction(), share=compensation
         )
         self._slip_speed_drop = slip_speed_drop
-        self._damping = parameters.damping
         self._free_end = parameters.range_end - _RANGE_END_MARGIN
         self._past = [0.0] * max(1, round(_SLIP_WINDOW_S * rate_hz))
         self._past_index = 0
-        self._released = False
         self.speed_threshold = parameters.speed_threshold
         self.grip_lost = False
         self.model_torque = 0.0
@@ -162,15 +158,8 @@ class Controller:
             or (drop > self._slip_speed_drop and angle < self._free_end)
         ):
             joint.release()
-            self.grip_lost = self._released = True
-        if self._released and velocity > self.speed_threshold:
-            # The arm still runs on: at ν_th it cannot be caught again, and b of (1)
-            # gives the rest of the speed its resistance.
-            torque = joint.step(time_s, angle, self.speed_threshold)
-            torque += self._damping * (velocity - self.speed_threshold)
-        else:
-            self._released = False
-            torque = joint.step(time_s, angle, velocity)
+            self.grip_lost = True
+        torque = joint.step(time_s, angle, velocity)
         self.model_torque = torque
         self.phase = joint.phase
         return torque - self._compensation.torque(velocity)

@@ -1,4 +1,4 @@
-"""The limits around every device: torque is cut off, the others end in a fault."""
+"""The limits around every device: passing one stops the presentation."""
 
 import math
 from dataclasses import dataclass
@@ -15,8 +15,9 @@ class DeviceLimits:
     Attributes
     ----------
     torque : float
-        Largest torque sent either way, N·m. A larger one is cut off there and the
-        tick counted: a saturated torque is weaker than the model, not dangerous.
+        Largest torque sent either way, N·m. A larger one is not sent, and the
+        presentation is stopped: cut off there it would be another model that the
+        rater feels and grades.
     speed : float
         Speed at which the presentation is stopped, either way, rad/s.
     missed_ticks : int
@@ -52,34 +53,31 @@ class DeviceLimits:
                 f"got {self.lowest_angle} and {self.highest_angle}"
             )
 
-    def saturate(self, torque: float) -> float:
-        """Cut a torque off at the limit.
+    def check_torque(self, torque: float) -> None:
+        """Check a torque before it is sent; ``nan`` never passes.
 
         Parameters
         ----------
         torque : float
             What the controller asks for, N·m.
 
-        Returns
-        -------
-        float
-            What may be sent, N·m.
-
         Raises
         ------
         LimitExceededError
-            If the torque is not a number: there is nothing safe to send.
+            If it is above the limit, either way, or not a number.
 
         Examples
         --------
-        >>> DeviceLimits(torque=20.0, speed=7.0, missed_ticks=20).saturate(-31.5)
-        -20.0
+        >>> limits = DeviceLimits(torque=20.0, speed=7.0, missed_ticks=20)
+        >>> limits.check_torque(-31.5)
+        Traceback (most recent call last):
+            ...
+        masrel.errors.LimitExceededError: torque: needs at most 20 N·m, got -31.500 N·m
         """
-        if -self.torque <= torque <= self.torque:
-            return torque
-        if math.isnan(torque):
-            raise LimitExceededError("torque: needs a number, the controller gave nan")
-        return math.copysign(self.torque, torque)
+        if not -self.torque <= torque <= self.torque:
+            raise LimitExceededError(
+                f"torque: needs at most {self.torque:g} N·m, got {torque:.3f} N·m"
+            )
 
     def check_motion(self, angle: float, velocity: float) -> None:
         """Check one sample of the motion; ``nan`` never passes.

@@ -138,7 +138,6 @@ def run_presentation(
         "device": device.name,
         "rate_hz": rate_hz,
         "n_missed_ticks": ticks.n_missed,
-        "n_saturated_ticks": ticks.n_saturated,
         "fault": fault,
         "ended": ended,
         "grip_lost": controller.grip_lost,

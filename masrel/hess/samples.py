@@ -180,23 +180,24 @@ def mean_speed_deg_s(columns: Columns, speed_threshold: float) -> float | None:
     columns : dict of str to ndarray
         Columns of a recording.
     speed_threshold : float
-        Speed threshold ν_th, rad/s: the movement begins when the speed first
-        reaches it.
+        Speed threshold ν_th, rad/s: the movement begins when the speed reaches it.
 
     Returns
     -------
     float or None
-        Angle travelled over time, from the onset to the catch, deg/s; to the last
-        sample at ν_th or above when there was no catch; None without movement.
+        Angle travelled over time, deg/s, from the onset to the first catch: v̄ of (2).
+        An arm that was slower than ν_th in between has begun anew. Without a catch,
+        from the first to the last sample at ν_th or above; None without extension.
     """
-    threshold = math.degrees(speed_threshold)
-    moving = np.flatnonzero(np.abs(columns["velocity_deg_s"]) >= threshold)
-    if moving.size == 0:
-        return None
-    onset, last = int(moving[0]), int(moving[-1])
+    moving = columns["velocity_deg_s"] >= math.degrees(speed_threshold)
     caught = np.flatnonzero(columns["phase"] == _CATCH)
     if caught.size:
         last = int(caught[0])
+        slower = np.flatnonzero(~moving[:last])
+        onset = int(slower[-1]) + 1 if slower.size else 0
+    else:
+        fast = np.flatnonzero(moving)
+        onset, last = (int(fast[0]), int(fast[-1])) if fast.size else (0, 0)
     if last <= onset:
         return None
     travel = columns["angle_deg"][last] - columns["angle_deg"][onset]

@@ -43,8 +43,8 @@ class Ticks:
     ----------
     samples : Samples
         One per tick that was run.
-    n_missed, n_saturated : int
-        Ticks that were skipped, and ticks whose torque was cut off.
+    n_missed : int
+        Ticks that were skipped.
     """
 
     __slots__ = (
@@ -59,7 +59,6 @@ class Ticks:
         "_period_ns",
         "_start_ns",
         "n_missed",
-        "n_saturated",
         "samples",
     )
 
@@ -84,7 +83,6 @@ class Ticks:
         self._start_ns = 0
         self._latest: tuple[float, float, float] | None = None
         self.n_missed = 0
-        self.n_saturated = 0
         self.samples = Samples(n_ticks + 1)  # one more to mark a fault
 
     def run(self) -> str:
@@ -139,11 +137,9 @@ class Ticks:
         self._latest = latest = (time_s, angle, velocity)
         self._limits.check_motion(angle, velocity)
         controller = self._controller
-        wanted = controller.step(time_s, angle, velocity)
-        torque = self._limits.saturate(wanted)
+        torque = controller.step(time_s, angle, velocity)
+        self._limits.check_torque(torque)
         self._device.command(torque)
-        if torque != wanted:
-            self.n_saturated += 1
         self.samples.add(
             time_s, angle, velocity, controller.model_torque, torque, controller.phase
         )

@@ -1,5 +1,6 @@
 """Sections `intended` and `in-person`: grades against what they should equal."""
 
+from masrel.analysis import InPersonAgreement
 from masrel.report.material import Material, Paragraph, Section, absent_section
 from masrel.report.tables import Column, Table, counted, number
 
@@ -67,7 +68,19 @@ def in_person_section(material: Material) -> Section:
     if found is None or found.n_pairs == 0:
         why = None if found is None else found.reason
         return absent_section("in-person", title, why)
-    table = Table(
+    percent = number(100 * found.n_equal / found.n_pairs, 1)
+    said = f"{found.n_equal} of {found.n_pairs} pairs are equal ({percent} %)."
+    if found.n_unpaired:
+        said += f" Entries that lack one of the two grades: {found.n_unpaired}."
+    return Section(
+        name="in-person",
+        title=title,
+        blocks=(Paragraph(text=said), _pairs(material, found)),
+    )
+
+
+def _pairs(material: Material, found: InPersonAgreement) -> Table:
+    return Table(
         name="in_person",
         caption=(
             "Grade of the patient in person and of the model built from that patient, "
@@ -93,11 +106,6 @@ def in_person_section(material: Material) -> Section:
         notes=_remarks(material),
         data=material.data,
     )
-    percent = number(100 * found.n_equal / found.n_pairs, 1)
-    said = f"{found.n_equal} of {found.n_pairs} pairs are equal ({percent} %)."
-    if found.n_unpaired:
-        said += f" Entries that lack one of the two grades: {found.n_unpaired}."
-    return Section(name="in-person", title=title, blocks=(Paragraph(text=said), table))
 
 
 def _remarks(material: Material) -> tuple[str, ...]:

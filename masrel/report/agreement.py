@@ -91,13 +91,16 @@ def _forest(
             )
             for row in rows
         ]
-        axis = "agreement (1: perfect; for a κ, 0: as by chance)"
+        axis = "agreement (1 is perfect)"
         return figures.draw_forest(lines, axis_label=axis, stamp=material.stamp)
 
     told = "; ".join(f"{row.coefficient}, {row.name}: {row.text}" for row in rows)
     return Drawing(
         name=name,
-        caption=f"{caption}: estimates (diamonds) and their intervals (bars).",
+        caption=(
+            f"{caption}: estimates (diamonds) and their intervals (bars). Dashed: what "
+            "chance gives a κ."
+        ),
         alt=f"Forest plot. {told}.",
         draw=draw,
     )

@@ -1,9 +1,9 @@
 """Sections `design` and `grades`: what was presented to whom, and what they said."""
 
-from masrel.protocol import Protocol
+from masrel.protocol import Protocol, Session
 from masrel.report.grid import grade_grid
 from masrel.report.material import Drawing, Material, Paragraph, Section
-from masrel.report.tables import Column, Table, counted, decimals_given
+from masrel.report.tables import Column, Table, Value, as_given, counted, decimals_given
 
 __all__ = ["design_section", "grades_section"]
 
@@ -57,11 +57,12 @@ def design_section(material: Material) -> Section:
 
 def _simulation(protocol: Protocol) -> str:
     settings = protocol.simulated_raters
+    accuracy, again = as_given(settings.accuracy), as_given(settings.retest_agreement)
     return (
         "The grades are simulated: every simulated rater gives the intended grade with "
-        f"probability {settings.accuracy:g} and repeats a grade at a retest with "
-        f"probability {settings.retest_agreement:g} (seed {settings.seed}). They show "
-        "that the study runs; they say nothing about people or about the models."
+        f"probability {accuracy} and repeats a grade at a retest with probability "
+        f"{again} (seed {settings.seed}). They show that the study runs; they say "
+        "nothing about people or about the models."
     )
 
 
@@ -129,30 +130,9 @@ def _constants_table(material: Material) -> Table:
 
 
 def _sessions_table(material: Material) -> Table:
-    table = material.ratings.table
-    rows = []
-    for session in material.protocol.sessions:
-        of_session = table[table["session"] == session.id]
-        n_given = int(of_session["grade"].notna().sum())
-        n_planned = (
-            len(session.raters)
-            * len(material.protocol.models)
-            * material.protocol.schedule.repeats
-        )
-        rows.append(
-            (
-                session.id,
-                len(session.raters),
-                ", ".join(session.raters),
-                n_planned,
-                n_given,
-                session.note or None,
-            )
-        )
-    absent = [row[0] for row in rows if row[4] == 0]
-    notes: tuple[str, ...] = ()
-    if absent:
-        notes = (f"No ratings in these data: session {', '.join(map(str, absent))}.",)
+    rows = [_session_row(material, session) for session in material.protocol.sessions]
+    absent = [str(row[0]) for row in rows if row[4] == 0]
+    notes = [f"No ratings in these data: session {', '.join(absent)}."]
     return Table(
         name="sessions",
         caption="Sessions, their raters, and the ratings there are",
@@ -165,8 +145,22 @@ def _sessions_table(material: Material) -> Table:
             Column(key="note", heading="Note", align="left"),
         ),
         rows=tuple(rows),
-        notes=notes,
+        notes=tuple(notes if absent else ()),
         data=material.data,
+    )
+
+
+def _session_row(material: Material, session: Session) -> tuple[Value, ...]:
+    protocol, table = material.protocol, material.ratings.table
+    of_session = table[table["session"] == session.id]
+    n_raters = len(session.raters)
+    return (
+        session.id,
+        n_raters,
+        ", ".join(session.raters),
+        n_raters * len(protocol.models) * protocol.schedule.repeats,
+        int(of_session["grade"].notna().sum()),
+        session.note or None,
     )
 
 

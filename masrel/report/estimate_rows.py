@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from masrel.agreement import COEFFICIENTS
 from masrel.analysis import PlannedEstimate
 from masrel.estimates import Estimate, Interval
-from masrel.report.tables import counted, interval_words, number
+from masrel.report.tables import counted, interval_words, number, percent
 
 __all__ = [
     "TARGETS",
@@ -141,7 +141,7 @@ def interval_name(interval: Interval) -> str:
     str
         Such as ``"95 % confidence, rater jackknife, t(7)"``.
     """
-    return f"{number(100 * interval.level, 0)} % {interval.kind}, {interval.method}"
+    return f"{percent(interval.level)} % {interval.kind}, {interval.method}"
 
 
 def estimate_rows(planned: Sequence[PlannedEstimate]) -> tuple[EstimateRow, ...]:
@@ -203,18 +203,18 @@ def meanings(rows: Sequence[EstimateRow]) -> tuple[str, ...]:
     for row in rows:
         if row.interval is None:
             continue
-        percent = number(100 * row.interval.level, 0)
+        level = percent(row.interval.level)
         population = _POPULATIONS[row.interval.target]
         if row.interval.kind == "confidence":
             said.append(
                 f"Confidence interval: if {population}, again and again, about "
-                f"{percent} % of the intervals made this way would hold the value that "
+                f"{level} % of the intervals made this way would hold the value that "
                 "all such studies together would give."
             )
         else:
             said.append(
                 "Credible interval: given these ratings and the prior, the value that "
                 f"would be found if {population}, without end, lies inside with "
-                f"probability {percent} %."
+                f"probability {level} %."
             )
     return tuple(dict.fromkeys(said))

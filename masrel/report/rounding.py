@@ -12,6 +12,7 @@ __all__ = [
     "decimals_given",
     "interval_words",
     "number",
+    "percent",
     "whole_or_tenths",
 ]
 
@@ -74,6 +75,27 @@ def as_given(value: float) -> str:
         return UNDEFINED
     text = f"{Decimal(repr(float(value))):f}"  # no exponent
     return text.removesuffix(".0").replace("-", "−")
+
+
+def percent(share: float) -> str:
+    """Return a share somebody chose in percent, with the digits it was given.
+
+    Parameters
+    ----------
+    share : float
+        The share, 1 for all.
+
+    Returns
+    -------
+    str
+        What is printed, without the sign.
+
+    Examples
+    --------
+    >>> percent(0.95), percent(0.999), percent(0.57)
+    ('95', '99.9', '57')
+    """
+    return f"{(Decimal(repr(float(share))) * 100).normalize():f}"
 
 
 def decimals_given(values: Sequence[float]) -> int:

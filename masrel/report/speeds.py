@@ -1,6 +1,5 @@
 """Section `speeds`: how fast the raters stretched each model."""
 
-import math
 from typing import TYPE_CHECKING
 
 from masrel.analysis import Speeds, SpeedSummary
@@ -14,7 +13,7 @@ from masrel.report.material import (
 from masrel.report.tables import Column, Table, number, whole_or_tenths
 
 if TYPE_CHECKING:
-    from masrel.report.figures import Drawn
+    from masrel.report.figures import Drawn, SpeedColumn
 
 __all__ = ["speeds_section"]
 
@@ -83,23 +82,8 @@ def _drawing(material: Material, found: Speeds) -> Drawing:
     def draw() -> "Drawn":
         from masrel.report import figures
 
-        known = {
-            (v.session, v.rater, v.model): v.mean_speed_deg_s for v in found.values
-        }
-        columns = [
-            figures.SpeedColumn(
-                model=summary.name,
-                session=summary.session,
-                speeds=tuple(
-                    known.get((summary.session, rater, summary.name), math.nan)
-                    for rater in material.raters
-                ),
-                mean=summary.mean,
-            )
-            for summary in found.by_model
-        ]
         return figures.draw_speeds(
-            columns,
+            _columns(material, found),
             raters=material.raters,
             slowest=material.protocol.elbow.slowest_mean_speed_deg_s,
             stamp=material.stamp,
@@ -114,8 +98,29 @@ def _drawing(material: Material, found: Speeds) -> Drawing:
         name="speeds",
         caption=(
             "Mean stretching speed of every rater for every model, and the mean over "
-            "raters (bar). Dashed: ν_L."
+            "raters (bar). Dashed: ν_L, below which the catch angle stays the same."
         ),
         alt=f"Dot plot of speeds. {told}.",
         draw=draw,
     )
+
+
+def _columns(material: Material, found: Speeds) -> "list[SpeedColumn]":
+    from masrel.report.figures import SpeedColumn
+
+    known: dict[tuple[str, str, str], list[float]] = {}
+    for value in found.values:
+        key = (value.session, value.model, value.rater)
+        known.setdefault(key, []).append(value.mean_speed_deg_s)
+    return [
+        SpeedColumn(
+            model=summary.name,
+            session=summary.session,
+            speeds=tuple(
+                tuple(known.get((summary.session, summary.name, rater), ()))
+                for rater in material.raters
+            ),
+            mean=summary.mean,
+        )
+        for summary in found.by_model
+    ]

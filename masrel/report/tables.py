@@ -20,6 +20,7 @@ from masrel.report.rounding import (
     decimals_given,
     interval_words,
     number,
+    percent,
     whole_or_tenths,
 )
 from masrel.report.strength import LANDIS_KOCH, strength
@@ -32,12 +33,14 @@ __all__ = [
     "Table",
     "Value",
     "as_csv",
+    "as_given",
     "as_text",
     "counted",
     "decimals_given",
     "interval_words",
     "number",
     "on_page",
+    "percent",
     "shown",
     "strength",
     "whole_or_tenths",

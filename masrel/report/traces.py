@@ -14,7 +14,7 @@ from masrel.report.material import (
     Section,
     absent_section,
 )
-from masrel.report.tables import Column, Table, number, whole_or_tenths
+from masrel.report.tables import Column, Table, as_given, number, whole_or_tenths
 
 if TYPE_CHECKING:
     from masrel.report.figures import Drawn, TracePanel
@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 __all__ = ["traces_section"]
 
 PANELS_PER_FIGURE = 4
+
+SLOWEST_DRAWN_DEG_S = 1.0
+"""Slower is no stretch, and its trace would last for minutes."""
 
 
 def traces_section(material: Material) -> Section:
@@ -42,8 +45,12 @@ def traces_section(material: Material) -> Section:
     if speeds is None or not speeds.values:
         why = None if speeds is None else speeds.reason
         return absent_section("traces", title, why)
-    session = next(s for s in material.sessions if s in _sessions_of(speeds.values))
-    values = [value for value in speeds.values if value.session == session]
+    moved = [v for v in speeds.values if v.mean_speed_deg_s >= SLOWEST_DRAWN_DEG_S]
+    if not moved:
+        return absent_section("traces", title, f"every speed is {_TOO_SLOW}")
+    session = next(s for s in material.sessions if s in {v.session for v in moved})
+    values = [value for value in moved if value.session == session]
+    n_still = sum(v.session == session for v in speeds.values) - len(values)
     models = [
         model.id
         for model in material.protocol.models
@@ -57,37 +64,44 @@ def traces_section(material: Material) -> Section:
         name="traces",
         title=title,
         blocks=(
-            Paragraph(text=_about(material, session)),
+            Paragraph(text=_about(material, session, n_still)),
             *drawings,
             _peak_table(material, values, models, session),
         ),
     )
 
 
-def _sessions_of(values: Sequence[Speed]) -> set[str]:
-    return {value.session for value in values}
+_TOO_SLOW = f"below {as_given(SLOWEST_DRAWN_DEG_S)} deg/s"
 
 
-def _about(material: Material, session: str) -> str:
+def _about(material: Material, session: str, n_still: int) -> str:
     kind = {
         "published": "published mean speeds",
         "simulated": "mean speeds of the simulated hands",
     }.get(material.data, "recorded mean speeds")
-    return (
+    start = as_given(material.protocol.stretch.start_deg)
+    end, rate_hz = as_given(_end_deg(material)), material.protocol.device.rate_hz
+    about = (
         "These traces are reconstructions, not measurements: each model is stretched "
-        f"at constant speed from {material.protocol.stretch.start_deg:g}° to the end "
-        f"of the range at the {kind} of session {session}, one line a rater. Torque "
-        "resists extension; the arm's own inertia is not in it. Torque and phases are "
-        "what the control law sends at 1 kHz."
+        f"at constant speed from {start}° to {end}°, at the {kind} of session "
+        f"{session}, one line a rater. Torque resists extension; the arm's own inertia "
+        "is not in it. Torque and phases are what the control law sends at "
+        f"{as_given(rate_hz)} Hz."
     )
+    if n_still:
+        about += f" Speeds {_TOO_SLOW}, which are not drawn: {n_still}."
+    return about
+
+
+def _end_deg(material: Material) -> float:
+    protocol = material.protocol
+    return min(protocol.stretch.end_deg, protocol.elbow.range_end_deg)
 
 
 def _stretch(material: Material, speed: Speed) -> tuple[ElbowParameters, ConstantSpeed]:
-    stretch = material.protocol.stretch
-    end = min(stretch.end_deg, material.protocol.elbow.range_end_deg)
     motion = ConstantSpeed(
-        start=math.radians(stretch.start_deg),
-        end=math.radians(end),
+        start=math.radians(material.protocol.stretch.start_deg),
+        end=math.radians(_end_deg(material)),
         speed=math.radians(speed.mean_speed_deg_s),
     )
     return elbow_parameters(material.protocol, speed.model), motion
@@ -154,11 +168,15 @@ def _peak_table(
 ) -> Table:
     present = {value.rater for value in values}
     raters = [rater for rater in material.raters if rater in present]
-    peaks = {
-        (value.model, value.rater): peak_torque(*_stretch(material, value))
-        for value in values
-    }
+    peaks: dict[tuple[str, str], float] = {}
+    for value in values:
+        key = (value.model, value.rater)
+        peak = peak_torque(*_stretch(material, value))
+        peaks[key] = max(peak, peaks.get(key, peak))
     rows = []
+    notes = ["Computed from the exact events of the motion, not from the samples."]
+    if len(peaks) < len(values):
+        notes.append("Of repeated presentations the largest peak is given.")
     for model in models:
         own = [peaks.get((model, rater)) for rater in raters]
         known = [peak for peak in own if peak is not None]
@@ -175,6 +193,6 @@ def _peak_table(
             Column(key="most_nm", heading="Most", digits=2),
         ),
         rows=tuple(rows),
-        notes=("Computed from the exact events of the motion, not from the samples.",),
+        notes=tuple(notes),
         data=material.data,
     )

@@ -6,7 +6,7 @@ from math import floor, isnan, radians
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from masrel.elbow import (
@@ -28,8 +28,9 @@ Sample = tuple[float, float, float]
 
 def samples(joint: ElbowParameters, motion: Motion, rate_hz: float) -> list[Sample]:
     end = events(joint, motion).end
-    times = [i / rate_hz for i in range(floor(end * rate_hz) + 1)]
-    return [(t, float(motion.angle(t)), float(motion.velocity(t))) for t in times]
+    times = np.arange(floor(end * rate_hz) + 1) / rate_hz
+    columns = (times, motion.angle(times), motion.velocity(times))
+    return list(zip(*(column.tolist() for column in columns), strict=True))
 
 
 def stepped(
@@ -208,6 +209,7 @@ def test_a_pause_below_the_threshold_starts_the_mean_anew() -> None:
     speeds=st.lists(st.floats(-19.9, 20.0), min_size=1, max_size=50),
     model=st.sampled_from(list(STANDARD_MODELS)),
 )
+@example(speeds=[20.0] * 5, model="HM4")  # ν_th itself moves, and does not catch
 def test_slow_movement_is_a_damper_and_a_spring_and_never_catches(
     speeds: list[float], model: str
 ) -> None:
@@ -241,6 +243,16 @@ def test_release_returns_to_pre_catch_and_the_stretch_does_not_catch_again(
     assert value == 1.26 * velocity + 3.15 * (angle - radians(30.0))
     for i in range(1, 20):
         assert move(joint, 30.0 + 100.0 * time + i, 100.0, time + 0.01 * i) == PRE_CATCH
+
+
+def test_a_joint_released_before_its_catch_catches_only_after_flexing() -> None:
+    joint = SampledJoint(HM3, start_angle=radians(30.0))
+    joint.release()
+    for i in range(100):
+        assert move(joint, 30.0 + i, 100.0, 0.01 * i) == PRE_CATCH
+    move(joint, 30.0, -60.0, 2.0)
+    phases = [move(joint, 30.0 + i, 100.0, 3.0 + 0.01 * i) for i in range(100)]
+    assert CATCH in phases
 
 
 def test_flexing_ends_the_stretch_and_arms_the_next() -> None:

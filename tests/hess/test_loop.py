@@ -187,14 +187,17 @@ def test_more_missed_ticks_than_allowed_are_a_fault() -> None:
     assert presented.recording.columns["time_s"][-1] == pytest.approx(8.4e-3)
 
 
-def test_a_torque_above_the_limit_is_cut_off_counted_and_recorded() -> None:
+def test_a_torque_above_the_limit_is_never_sent_and_stops_the_presentation() -> None:
     presented = present("HM4", 110.0, limits=limits_with(torque=5.0))
-    columns, facts = presented.recording.columns, presented.recording.facts
-    assert presented.fault is None
-    assert np.max(np.abs(columns["command_torque_nm"])) == 5.0
-    assert np.max(columns["model_torque_nm"]) > 5.0
-    cut = np.count_nonzero(np.abs(columns["command_torque_nm"]) == 5.0)
-    assert facts["n_saturated_ticks"] == cut > 0
+    columns = presented.recording.columns
+    assert presented.fault is not None
+    assert presented.fault.startswith("torque: needs at most 5 N·m, got 1")
+    assert presented.recording.facts["ended"] == "fault"
+    assert np.max(np.abs(columns["command_torque_nm"])) <= 5.0
+    # The last sample keeps what the model asked for, in the first tick of the catch.
+    assert columns["model_torque_nm"][-1] > 5.0
+    assert columns["command_torque_nm"][-1] == 0.0
+    assert columns["phase"][-2:].tolist() == [0, 1]
 
 
 def test_a_torque_that_is_no_number_is_a_fault() -> None:
@@ -203,7 +206,7 @@ def test_a_torque_that_is_no_number_is_a_fault() -> None:
     controller = Controller(STANDARD_MODELS["HM3"], start_angle=math.nan)
     with device:
         presented = run_presentation(device, controller, clock=clock, limits=LIMITS)
-    assert presented.fault == "torque: needs a number, the controller gave nan"
+    assert presented.fault == "torque: needs at most 20 N·m, got nan N·m"
     assert [torque for _, torque in device.commands] == [0.0]
 
 
@@ -380,7 +383,7 @@ def test_a_rest_that_is_broken_off_begins_anew() -> None:
         SimulatedClock(),
         angle=angle,
         max_duration_s=1.0,
-        limits=limits_with(speed=1e5),
+        limits=limits_with(speed=1e5, torque=1e5),
     )
     # There again at 61 ms, at rest when the low-pass has forgotten the jump.
     assert presented.recording.facts["ended"] == "arrived"

@@ -151,3 +151,23 @@ def test_an_impossible_plant_is_refused(change: dict[str, float], words: str) ->
     hand = SimulatedHand(start=1.0, end=2.5, mean_speed=1.5)
     with pytest.raises(ParameterError, match=words):
         SimulatedDevice(clock=SimulatedClock(), hand=hand, **change)
+
+
+def test_the_hand_presses_as_hard_as_the_arm_resists() -> None:
+    # Between the stops, at rest: 10 N·m, of which friction carries up to 0.189.
+    clock, device = bench(slip_time=None)
+    with device:
+        device.command(10.0)
+        run(clock, device, 3.0)
+        assert device.hand_torque == pytest.approx(10.0, abs=0.1891)
+
+
+def test_a_hand_that_has_let_go_or_not_begun_gives_no_torque() -> None:
+    clock, device = bench(slip_time=0.4)
+    with device:
+        run(clock, device, 0.3)
+        assert device.hand_torque != 0.0
+        run(clock, device, 0.4)
+        assert device.hand_torque == 0.0
+    hand = SimulatedHand(start=1.0, end=2.5, mean_speed=1.5)
+    assert SimulatedDevice(clock=SimulatedClock(), hand=hand).hand_torque == 0.0

@@ -6,6 +6,7 @@ import pytest
 
 from masrel.report import figures
 from masrel.report.figures import ForestRow, GradeGrid, SpeedColumn, TracePanel
+from masrel.report.figures.style import STYLE
 
 PNG = b"\x89PNG\r\n\x1a\n"
 
@@ -15,7 +16,7 @@ def grid(n_raters: int = 2) -> GradeGrid:
         models=("HM1", "HM2"),
         raters=tuple(f"R{i}" for i in range(n_raters)),
         intended=("1", None),
-        grades=(("1",) * (n_raters - 1) + ("2",), (None,) * n_raters),
+        grades=((("1",),) * (n_raters - 1) + (("2",),), ((),) * n_raters),
         scale=("0", "1", "2"),
     )
 
@@ -41,7 +42,11 @@ DRAWINGS = {
     "many raters": lambda stamp: figures.draw_grades(grid(14), stamp=stamp),
     "forest": lambda stamp: figures.draw_forest(forest(), axis_label="κ", stamp=stamp),
     "speeds": lambda stamp: figures.draw_speeds(
-        [SpeedColumn(model="HM1", session="first", speeds=(80.0, 90.0), mean=85.0)],
+        [
+            SpeedColumn(
+                model="HM1", session="first", speeds=((80.0,), (90.0, 95.0)), mean=85.0
+            )
+        ],
         raters=("R1", "R2"),
         slowest=60.0,
         stamp=stamp,
@@ -77,7 +82,7 @@ def test_a_simulated_figure_carries_the_stamp(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # With text kept as text the SVG says what can be read in the figure.
-    monkeypatch.setitem(figures._STYLE, "svg.fonttype", "none")
+    monkeypatch.setitem(STYLE, "svg.fonttype", "none")
     assert b"SIMULATED DATA" in DRAWINGS[name]("SIMULATED DATA").svg
     assert b"SIMULATED DATA" not in DRAWINGS[name]("").svg
 
@@ -85,7 +90,7 @@ def test_a_simulated_figure_carries_the_stamp(
 def test_a_grade_is_written_in_its_cell_and_a_missing_one_is_a_dash(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setitem(figures._STYLE, "svg.fonttype", "none")
+    monkeypatch.setitem(STYLE, "svg.fonttype", "none")
     svg = figures.draw_grades(grid(), stamp="").svg.decode()
     assert svg.count(">1</text>") == 2  # intended, and the one rater who agrees
     assert svg.count(">2</text>") == 1
@@ -95,7 +100,7 @@ def test_a_grade_is_written_in_its_cell_and_a_missing_one_is_a_dash(
 def test_an_estimate_that_is_not_there_is_said_in_the_figure(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setitem(figures._STYLE, "svg.fonttype", "none")
+    monkeypatch.setitem(STYLE, "svg.fonttype", "none")
     svg = figures.draw_forest(forest(), axis_label="κ", stamp="").svg
     assert b"undefined" in svg
     assert b"not in these data" in svg

@@ -12,9 +12,14 @@ from masrel.report.tables import (
     Column,
     Table,
     as_csv,
+    as_given,
     as_text,
+    counted,
+    decimals_given,
     interval_words,
     number,
+    on_page,
+    percent,
     shown,
     strength,
     whole_or_tenths,
@@ -120,3 +125,47 @@ def test_a_csv_gives_every_digit_back(value: float) -> None:
     )
     (row,) = csv.DictReader(io.StringIO(as_csv(table)))
     assert float(row["value"]) == value
+
+
+def test_a_number_somebody_chose_keeps_its_digits() -> None:
+    assert [as_given(x) for x in (146.0, 0.35, -2.5, 1e-7, 0.1 + 0.2)] == [
+        "146",
+        "0.35",
+        "−2.5",
+        "0.0000001",
+        "0.30000000000000004",
+    ]
+    assert as_given(math.nan) == "undefined"
+    assert shown(146.0, Column(key="x", heading="x")) == "146"
+    assert decimals_given([130.0, 125.5, 0.125]) == 3
+
+
+def test_a_level_is_not_rounded_to_certainty() -> None:
+    assert [percent(x) for x in (0.95, 0.9, 0.999, 0.57, 1.0)] == [
+        "95",
+        "90",
+        "99.9",
+        "57",
+        "100",
+    ]
+
+
+def test_one_is_singular() -> None:
+    assert (counted(1, "rater"), counted(0, "rater")) == ("1 rater", "0 raters")
+
+
+def test_a_column_may_be_of_the_page_or_of_the_csv_alone() -> None:
+    table = Table(
+        name="one",
+        caption="One",
+        columns=(
+            Column(key="id", heading="Id"),
+            Column(key="both", heading="Interval", where="page"),
+            Column(key="low", heading="Low", digits=1, where="csv"),
+        ),
+        rows=(("a", "[0.1, 0.2]", 0.123),),
+        data="foreign",
+    )
+    assert as_csv(table) == "id,low,data\na,0.123,foreign\n"
+    assert on_page(table).rows == (("a", "[0.1, 0.2]"),)
+    assert "0.123" not in as_text(table)

@@ -61,7 +61,10 @@ def test_a_person_is_asked_and_may_be_corrected(small: Small) -> None:
     assert "Presentation 3 of 3" in out
     shown = read_schedule(study.schedule_file("R1", "test")).presentations[1]
     correction = ("--correct", shown.code, "--grade", "2", "--who", "Kim")
-    assert typed(*run, *correction, "--why", "misheard") == ("", "")
+    said, _ = typed(*run, *correction, "--why", "misheard")
+    assert f"{shown.code} of R1, session test, is now 2" in said
+    again = typed(*run, *correction, "--why", "misheard", "--quiet")
+    assert again == ("", "")
     typed("ratings", study.root)
     rows = study.ratings_file.read_text(encoding="utf-8").splitlines()
     (row,) = [row for row in rows if f",{shown.model}," in row]

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -36,15 +35,15 @@ class SpeedColumn:
     ----------
     model, session : str
         Where they were made.
-    speeds : tuple of float
-        One per rater, in the raters' order; ``nan`` is missing.
+    speeds : tuple of tuple of float
+        Those of every rater, in the raters' order; none is missing.
     mean : float
         Their mean.
     """
 
     model: str
     session: str
-    speeds: tuple[float, ...]
+    speeds: tuple[tuple[float, ...], ...]
     mean: float
 
 
@@ -130,9 +129,10 @@ def _column(
     width = 0.76 / n_sessions
     middle = centre - 0.38 + width * (session + 0.5)
     n_raters = len(column.speeds)
-    offsets = (np.arange(n_raters) + 0.5) / n_raters - 0.5
-    places = middle + 0.9 * width * offsets
-    axes.plot(places, column.speeds, marker, color=colour, markersize=5, alpha=0.9)
+    for rater, speeds in enumerate(column.speeds):
+        place = middle + 0.9 * width * ((rater + 0.5) / n_raters - 0.5)
+        places = [place] * len(speeds)
+        axes.plot(places, speeds, marker, color=colour, markersize=5, alpha=0.9)
     ends = [middle - 0.45 * width, middle + 0.45 * width]
     axes.plot(ends, [column.mean, column.mean], color=BLACK, linewidth=1.6)
 

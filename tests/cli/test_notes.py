@@ -1,0 +1,34 @@
+"""Warnings of masrel become notes, each once; all others stay warnings."""
+
+import warnings
+
+import pytest
+
+from masrel.cli.notes import notes
+from masrel.errors import SmallSampleWarning
+
+
+def test_a_note_is_said_once_on_stderr(capsys: pytest.CaptureFixture[str]) -> None:
+    with notes():
+        for _ in range(2):
+            warnings.warn("few raters", SmallSampleWarning, stacklevel=1)
+    assert capsys.readouterr() == ("", "note: few raters\n")
+
+
+def test_notes_are_said_even_when_an_error_ends_the_work(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def work() -> None:
+        with notes():
+            warnings.warn("few raters", SmallSampleWarning, stacklevel=1)
+            raise ValueError
+
+    with pytest.raises(ValueError, match=r"^$"):
+        work()
+    assert capsys.readouterr().err == "note: few raters\n"
+
+
+def test_a_foreign_warning_stays_a_warning(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.warns(DeprecationWarning, match="old"), notes():
+        warnings.warn("old", DeprecationWarning, stacklevel=1)
+    assert capsys.readouterr().err == ""

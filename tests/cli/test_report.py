@@ -1,0 +1,126 @@
+"""masrel report: writes pages, says where, and one sentence when it cannot."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from tests.architecture.test_imports import loaded_after
+from tests.cli.process import Caller
+
+STUDY = Path(__file__).parents[2] / "studies/hess2012"
+
+
+@pytest.fixture
+def masrel(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Caller:
+    return Caller(monkeypatch, capsys)
+
+
+@pytest.fixture
+def study(tmp_path: Path) -> Path:
+    """The published study: no estimates, one section with a figure and one without."""
+    root = tmp_path / "study"
+    shutil.copytree(STUDY, root)
+    protocol = root / "protocol.toml"
+    text = protocol.read_text(encoding="utf-8")
+    head = text.partition("[[analysis.estimates]]")[0]
+    sections = '\n[report]\nsections = ["intended", "grades"]\n'
+    protocol.write_text(head + sections, encoding="utf-8")
+    return root
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
+
+
+def test_the_page_is_written_and_its_place_printed(masrel: Caller, study: Path) -> None:
+    done = masrel("report", study, "--quiet")
+    page = study / "report" / "report.html"
+    assert (done.code, done.out, done.err) == (0, f"{page}\n", "")
+    assert set(contents(study / "report")) == {
+        "report.html",
+        "report.md",
+        "tables/intended.csv",
+        "tables/grades_test.csv",
+        "figures/grades_test.png",
+        "figures/grades_test.svg",
+    }
+
+
+def test_progress_is_on_stderr_unless_quiet(masrel: Caller, study: Path) -> None:
+    done = masrel("report", study)
+    assert done.out == f"{study / 'report' / 'report.html'}\n"
+    assert "report" in done.err
+
+
+def test_another_folder_gets_the_same_bytes(
+    masrel: Caller, study: Path, tmp_path: Path
+) -> None:
+    masrel("report", study, "--quiet")
+    elsewhere = tmp_path / "a" / "b"
+    assert masrel("report", study, "--quiet", "-o", elsewhere).code == 0
+    assert contents(elsewhere) == contents(study / "report")
+
+
+def test_ratings_can_be_named(masrel: Caller, study: Path) -> None:
+    text = (study / "ratings/published.csv").read_text(encoding="utf-8")
+    made = study / "simulated.csv"
+    made.write_text(text.replace("published", "simulated"), encoding="utf-8")
+    assert masrel("report", study, "--quiet", "--ratings", made).code == 0
+    page = (study / "report/report.html").read_text(encoding="utf-8")
+    assert "SIMULATED DATA" in page
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        ("protocol.toml", "protocol.toml"),
+        ("ratings/published.csv", "published.csv"),
+        ("ratings/in_person.csv", "in_person.csv"),
+    ],
+)
+def test_a_spoilt_file_is_named_and_nothing_is_written(
+    masrel: Caller, study: Path, spoil: str, said: str
+) -> None:
+    (study / spoil).write_text("spoilt\n", encoding="utf-8")
+    done = masrel("report", study, "--quiet")
+    assert (done.code, done.out) == (2, "")
+    assert said in done.err
+    assert done.err.startswith("masrel: ")
+    assert "Traceback" not in done.err
+    assert not (study / "report").exists()
+
+
+def test_a_missing_study_is_one_sentence(masrel: Caller, tmp_path: Path) -> None:
+    done = masrel("report", tmp_path / "nowhere")
+    assert (done.code, done.out) == (2, "")
+    assert str(tmp_path / "nowhere") in done.err
+    assert done.err.count("\n") == 1
+
+
+def test_a_missing_file_of_ratings_is_one_sentence(masrel: Caller, study: Path) -> None:
+    done = masrel("report", study, "--ratings", study / "none.csv")
+    assert (done.code, done.out) == (2, "")
+    assert str(study / "none.csv") in done.err
+    assert done.err.count("\n") == 1
+
+
+def test_an_output_that_is_a_file_is_refused(masrel: Caller, study: Path) -> None:
+    done = masrel("report", study, "--quiet", "-o", study / "protocol.toml")
+    assert (done.code, done.out) == (2, "")
+    assert "protocol.toml" in done.err
+
+
+def test_a_figure_is_what_loads_matplotlib(study: Path) -> None:
+    call = f"from masrel.cli import cli\ncli(['report', {str(study)!r}, '--quiet'])"
+    assert "matplotlib" in loaded_after(call)
+    protocol = study / "protocol.toml"
+    text = protocol.read_text(encoding="utf-8")
+    protocol.write_text(text.replace(', "grades"]', "]"), encoding="utf-8")
+    assert "matplotlib" not in loaded_after(call)

@@ -1,0 +1,81 @@
+"""What docs/driver.md says is what the driver does."""
+
+import subprocess
+import sys
+from math import degrees
+from pathlib import Path
+
+import pytest
+
+from masrel.elbow import STANDARD_MODELS, MinimumJerk, trace
+from masrel.hess import DeviceLimits, Friction, device_names
+from masrel.protocol.definition import DeviceSettings
+
+from .rig import END, START
+from .test_backdrive import felt
+from .test_controller import table_5
+
+PAGE = (Path(__file__).parents[2] / "docs" / "driver.md").read_text(encoding="utf-8")
+
+
+def row(first: str) -> list[str]:
+    # Cells of the table row that begins with a word
+    line = next(line for line in PAGE.splitlines() if line.startswith(f"| {first} |"))
+    return [cell.strip() for cell in line.strip("|").split("|")]
+
+
+def test_the_example_prints_what_the_page_says() -> None:
+    code = PAGE.split("```python\n")[1].split("```")[0]
+    printed = PAGE.split("```text\n")[1].split("```")[0]
+    done = subprocess.run(
+        [sys.executable, "-X", "utf8", "-c", code],
+        capture_output=True,
+        check=True,
+    )
+    assert done.stdout.decode("utf-8") == printed
+
+
+def test_the_only_device_is_the_simulated_one() -> None:
+    # When a backend is added, the page's first statement has to change.
+    assert device_names() == ("simulated",)
+    assert "It has not been tested on physical hardware" in PAGE
+
+
+def test_the_limits_are_the_defaults_of_a_protocol() -> None:
+    settings = DeviceSettings()
+    assert row("torque")[3] == f"{settings.torque_limit_nm:g}"
+    assert row("speed")[3] == f"{settings.speed_limit_deg_s:g} deg/s"
+    assert row("missed ticks")[3] == f"{settings.missed_ticks_limit}"
+    limits = DeviceLimits(torque=1.0, speed=1.0, missed_ticks=0)
+    low, high = degrees(limits.lowest_angle), degrees(limits.highest_angle)
+    assert row("range")[3] == f"{low:.0f} and {high:.0f} deg".replace("-", "−")
+
+
+def test_the_friction_is_the_default_one() -> None:
+    friction = Friction()
+    assert row("I, B, β")[1] == (
+        f"{friction.inertia} kg·m², {friction.viscous} N·m·s/rad, "
+        f"{friction.coulomb} N·m"
+    )
+
+
+def test_the_largest_torque_of_table_5_is_the_one_the_limit_is_explained_by() -> None:
+    largest = max(
+        (
+            trace(
+                STANDARD_MODELS[model],
+                MinimumJerk(start=START, end=END, mean_speed=speed),
+            ).torque.max(),
+            model,
+        )
+        for model, speed in (
+            (model, speed_deg_s * START / 30.0) for model, speed_deg_s in table_5()
+        )
+    )
+    assert largest == (pytest.approx(18.3, abs=0.05), "HM4")
+    assert "HM4 at a mean speed of 72 deg/s asks for most, 18.3 N·m" in PAGE
+
+
+def test_the_backdrive_figures_hold() -> None:
+    assert max(map(abs, felt(0.0))) == pytest.approx(0.52, abs=0.005)
+    assert max(map(abs, felt(0.9))) == pytest.approx(0.20, abs=0.005)
