@@ -1,5 +1,6 @@
 """A rating scale: its grades in order, as text, with the values weights use."""
 
+import math
 from dataclasses import dataclass
 
 from masrel.errors import ParameterError
@@ -46,6 +47,24 @@ class Scale:
             raise ParameterError(
                 f"scale {self.name!r}: grades must differ, repeated: {repeated}"
             )
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """What the grades weigh: their values if all are numbers, else 1, 2, 3, ...
+
+        Examples
+        --------
+        >>> Scale(name="pain", grades=("0", "2.5", "10")).values
+        (0.0, 2.5, 10.0)
+        >>> MODIFIED_ASHWORTH.values
+        (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+        """
+        try:
+            found = tuple(float(grade) for grade in self.grades)
+        except ValueError:
+            return tuple(float(rank) for rank in range(1, len(self.grades) + 1))
+        distinct = len(set(found)) == len(found) and all(map(math.isfinite, found))
+        return found if distinct else tuple(map(float, range(1, len(found) + 1)))
 
     def code(self, grade: str) -> int:
         """Return the rank of a grade, from 0.

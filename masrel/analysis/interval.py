@@ -15,7 +15,8 @@ def planned_interval(
     ratings: object,
     *,
     target: Target,
-    categories: Sequence[str],
+    categories: Sequence[Label],
+    weights: str = "identity",
     level: float,
     n_resamples: int,
     seed: int,
@@ -32,8 +33,10 @@ def planned_interval(
         What the coefficient takes; None is missing.
     target : {"items", "raters", "both"}
         What a new study would draw anew.
-    categories : sequence of str
+    categories : sequence of str, int or float
         The declared scale in order.
+    weights : str, optional
+        How much two categories agree.
     level : float
         Nominal level.
     n_resamples : int
@@ -68,6 +71,7 @@ def planned_interval(
             ratings,
             target=target,
             categories=categories,
+            weights=weights,
             level=level,
             n_resamples=n_resamples,
             rng=seed,
