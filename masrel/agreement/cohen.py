@@ -11,7 +11,7 @@ from masrel.agreement.coding import CodedRatings, Codes, Label, code_ratings
 from masrel.agreement.counts import check_table, column_categories
 from masrel.agreement.kernel import Floats, Kernel, divide
 from masrel.agreement.pooled import check_population
-from masrel.agreement.undefined import NO_CHANCE, NO_PAIR, NO_WEIGHTS, undefined
+from masrel.agreement.undefined import NO_CHANCE, NO_PAIR, undefined
 from masrel.agreement.weights import WeightName, Weights, declared_weights
 from masrel.errors import RatingsError
 from masrel.estimates import Estimate
@@ -251,8 +251,8 @@ def _estimate(table: Table, v: Weights, population: int | None) -> Estimate:
     reason = None
     if n == 0:
         reason = undefined("Cohen's kappa", NO_PAIR)
-    elif v.numerators is not None and len(table) == 1:
-        reason = undefined("Cohen's kappa", NO_WEIGHTS)
+    elif v.reason is not None:
+        reason = undefined("Cohen's kappa", v.reason)
     elif found.below == 0:
         reason = undefined("Cohen's kappa", NO_CHANCE)
     value = error = observed = chance = math.nan

@@ -12,7 +12,7 @@ from masrel.agreement.counts import coded_items, item_counts
 from masrel.agreement.kernel import Floats, Kernel, divide, weighted_disagreement
 from masrel.agreement.patterns import distinct_patterns
 from masrel.agreement.pooled import Observed, check_population
-from masrel.agreement.undefined import NO_CHANCE, NO_PAIR, NO_WEIGHTS, undefined
+from masrel.agreement.undefined import NO_CHANCE, NO_PAIR, undefined
 from masrel.agreement.weights import WeightName, Weights, declared_weights
 from masrel.estimates import Estimate
 
@@ -110,8 +110,8 @@ def _reason(
     title = "Conger's kappa"
     if observed is None:
         return undefined(title, NO_PAIR)
-    if v.numerators is not None and v.n_categories == 1:
-        return undefined(title, NO_WEIGHTS)
+    if v.reason is not None:
+        return undefined(title, v.reason)
     if len(margins.raters) < coded.codes.shape[1]:
         without = set(range(coded.codes.shape[1])).difference(margins.raters)
         return undefined(title, f"0/0: no ratings in column {min(without)}")

@@ -61,13 +61,14 @@ def icc(
     Warns
     -----
     UndefinedStatisticWarning
-        If there are fewer than two complete items or raters, or no variance, or an
-        estimate of the total variance that is not positive; the value is then
-        ``nan``.
+        If there are fewer than two complete items or raters, or no variance, or a
+        total variance estimated as 0; the value is then ``nan``.
 
     Notes
     -----
-    Items with a missing rating are left out. The interval of ICC(A,k) is that of
+    Items with a missing rating are left out. Where the total variance is estimated
+    as less than 0, which takes items that hardly differ, the formula's value lies
+    outside [-1, 1] and there is no interval. The interval of ICC(A,k) is that of
     ICC(A,1) stepped up by Spearman and Brown's formula.
 
     References
@@ -196,8 +197,8 @@ def _reason(
         return undefined(form, "fewer than two raters")
     if found.items == 0.0 and found.error(form) == 0.0:
         return undefined(form, "0/0: neither items nor ratings of an item differ")
-    if not found.below(form) > 0.0:
-        return undefined(form, "the estimate of the total variance is not positive")
+    if found.below(form) == 0.0:
+        return undefined(form, "division by 0: the total variance is estimated as 0")
     return None
 
 
@@ -255,7 +256,11 @@ class _Anova:
 
 
 def _interval(found: _Anova, form: IccForm, level: float) -> Interval:
-    if form.startswith("ICC(A"):
+    reason = None
+    if form.startswith("ICC(A") and not found.below("ICC(A,1)") > 0.0:
+        reason = "the total variance is estimated as less than 0"
+        low = high = math.nan
+    elif form.startswith("ICC(A"):
         low, high = _absolute(found, level)
     else:
         low, high = _ratio(found, form, level)
@@ -266,8 +271,9 @@ def _interval(found: _Anova, form: IccForm, level: float) -> Interval:
         high=high,
         level=level,
         kind="confidence",
-        method=f"F distribution, {form}",
+        method="F distribution",
         target="items" if form.startswith("ICC(C") else "both",
+        reason=reason,
     )
 
 

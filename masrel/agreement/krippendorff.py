@@ -199,6 +199,8 @@ def _estimate(
     reason = None
     if found is None:
         reason = undefined("Krippendorff's alpha", NO_PAIR)
+    elif v.reason is not None:
+        reason = undefined("Krippendorff's alpha", v.reason)
     elif found.below == 0:
         reason = undefined("Krippendorff's alpha", NO_CHANCE)
     value = error = observed = chance = math.nan

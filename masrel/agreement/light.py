@@ -95,7 +95,7 @@ def light_kappa(
         PairSums.of(pair_table(coded.codes[:, pair], coded.n_categories), v)
         for pair in pairs
     ]
-    reason = _reason(pairs, sums)
+    reason = _reason(pairs, sums, v)
     value = error = observed = chance = math.nan
     if all(s.n for s in sums):
         w = v.denominator
@@ -122,7 +122,11 @@ def _mean(values: list[Fraction]) -> float:
     return float(sum(values, Fraction(0)) / len(values))
 
 
-def _reason(pairs: list[tuple[int, int]], sums: list[PairSums]) -> str | None:
+def _reason(
+    pairs: list[tuple[int, int]], sums: list[PairSums], v: Weights
+) -> str | None:
+    if v.reason is not None:
+        return undefined("Light's kappa", v.reason)
     for (first, second), found in zip(pairs, sums, strict=True):
         of_pair = f"of the raters in columns {first} and {second}"
         if found.n == 0:

@@ -19,7 +19,7 @@ from masrel.agreement.counts import (
     counted_items,
 )
 from masrel.agreement.items import ItemTable, Linear, SizeGroup
-from masrel.agreement.undefined import NO_CHANCE, NO_PAIR, NO_WEIGHTS, undefined
+from masrel.agreement.undefined import NO_CHANCE, NO_PAIR, undefined
 from masrel.agreement.weights import WeightName, Weights, declared_weights
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate
@@ -122,10 +122,10 @@ def pooled_estimate(
         d_o, over_o = observed.numerator, observed.denominator
         d_e, over_e = chance.numerator, chance.denominator
         p_o, p_e = (over_o - d_o) / over_o, (over_e - d_e) / over_e
-        if d_e == 0:
+        if weights.reason is not None:
+            reason = undefined(options.title, weights.reason)
+        elif d_e == 0:
             reason = undefined(options.title, NO_CHANCE)
-        elif weights.numerators is not None and weights.n_categories == 1:
-            reason = undefined(options.title, NO_WEIGHTS)
         else:
             value = (d_e * over_o - d_o * over_e) / (d_e * over_o)
             scene = _Scene(table, weights, groups, n_rated, observed, shares, chance)

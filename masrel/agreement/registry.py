@@ -1,5 +1,6 @@
 """Every coefficient by name, with what is true of it."""
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -72,8 +73,8 @@ class Coefficient:
         What the function takes: item × rater, or pairs per rater.
     n_raters : tuple of int or None
         Fewest and most raters; None for any number.
-    lowest : float
-        Lower end of the parameter space.
+    lowest, highest : float
+        Ends of the parameter space.
     chance_corrected : bool
         Whether 0 is what chance gives.
     weighted : bool
@@ -90,6 +91,7 @@ class Coefficient:
     shape: Literal["ratings", "pairs"] = "ratings"
     n_raters: tuple[int, int | None] = (2, None)
     lowest: float = -1.0
+    highest: float = 1.0
     chance_corrected: bool = True
     weighted: bool = True
     code: Callable[..., CodedRatings] = code_ratings
@@ -211,7 +213,8 @@ _ALL = (
             function=partial(icc, form=form),
             kernel=None,
             properties=(_RANKS - {"items twice"}) | {"perfect agreement"},
-            lowest=-float("inf"),
+            lowest=-math.inf,
+            highest=math.inf if form == "ICC(A,k)" else 1.0,
             weighted=False,
         )
         for name, form in zip(

@@ -90,6 +90,8 @@ def stratified_kappa(
     reason = None
     if not strata:
         reason = undefined("stratified kappa", NO_PAIR)
+    elif v.reason is not None:
+        reason = undefined("stratified kappa", v.reason)
     elif by_chance == 0:
         reason = undefined("stratified kappa", NO_CHANCE)
     value = error = observed = chance = math.nan

@@ -4,11 +4,10 @@ import warnings
 
 from masrel.errors import UndefinedStatisticWarning
 
-__all__ = ["NO_CHANCE", "NO_PAIR", "NO_WEIGHTS", "undefined"]
+__all__ = ["NO_CHANCE", "NO_PAIR", "undefined"]
 
 NO_PAIR = "no item has ratings of two raters"
 NO_CHANCE = "0/0: chance agreement is 1, all ratings are in one category"
-NO_WEIGHTS = "0/0: one category has no weights but identity"
 
 
 def undefined(title: str, reason: str) -> str:

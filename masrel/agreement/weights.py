@@ -46,12 +46,15 @@ class Weights:
         None for identity weights, of which no matrix is ever made.
     denominator : int
         What the numerators are divided by.
+    reason : str or None
+        Why the scale has no such weights, or None; no coefficient is defined then.
     """
 
     name: str
     n_categories: int
     numerators: tuple[tuple[int, ...], ...] | None = None
     denominator: int = 1
+    reason: str | None = None
 
     def disagreement(self, counts: Sequence[int], size: int) -> int:
         """Return Σ_kl v_kl n_k n_l of the counts of one item, times the denominator."""
@@ -141,9 +144,9 @@ def declared_weights(
         )
     if weights == "identity":
         return Weights(name="identity", n_categories=n)
-    if n == 1:
-        return Weights(name=weights, n_categories=1, numerators=((0,),))
     values = category_values(categories)
+    if (reason := _absence(weights, values)) is not None:
+        return Weights(name=weights, n_categories=n, reason=reason)
     if weights == "ordinal":
         values = [Fraction(rank) for rank in range(1, n + 1)]
     matrix = _MAKERS[weights](values)
@@ -183,6 +186,16 @@ def category_values(categories: Sequence[Label]) -> list[Fraction]:
     return found
 
 
+def _absence(weights: str, values: list[Fraction]) -> str | None:
+    if len(values) == 1:
+        return "0/0: a scale of one category has no weights but identity"
+    if weights == "ratio" and any(
+        x + y == 0 for i, x in enumerate(values) for y in values[: i + 1]
+    ):
+        return "division by 0: ratio weights divide by sums of two values of the scale"
+    return None
+
+
 _Matrix = list[list[Fraction]]
 
 
@@ -216,11 +229,6 @@ def _ordinal(ranks: list[Fraction]) -> _Matrix:
 
 
 def _ratio(values: list[Fraction]) -> _Matrix:
-    if any(x + y == 0 for i, x in enumerate(values) for y in values[:i]):
-        raise ParameterError(
-            "weights: ratio needs values of which no two sum to 0, got "
-            f"{', '.join(str(float(value)) for value in values)}"
-        )
     return every_pair(values, lambda x, y: ((x - y) / (x + y)) ** 2)
 
 

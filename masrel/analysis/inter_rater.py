@@ -48,13 +48,16 @@ def inter_rater(
         reason = f"session {line.sessions[0]} has one rater; agreement needs two"
         return PlannedEstimate(line=line, reason=reason)
     categories = protocol.scale.grades
-    estimate = coefficient(line.coefficient)(matrix.grades, categories=categories)
+    estimate = coefficient(line.coefficient)(
+        matrix.grades, categories=categories, weights=line.weights
+    )
     interval = planned_interval(
         line.interval,
         line.coefficient,
         matrix.grades,
         target=line.target,
         categories=categories,
+        weights=line.weights,
         level=protocol.analysis.level,
         n_resamples=protocol.analysis.n_resamples,
         seed=stream_seed(protocol.analysis.seed, line.id),
@@ -64,5 +67,6 @@ def inter_rater(
         items=matrix.items,
         raters=matrix.raters,
         n_missing=matrix.n_missing,
-        estimate=dataclasses.replace(estimate, interval=interval),
+        # An intraclass correlation comes with an interval of its own.
+        estimate=dataclasses.replace(estimate, interval=interval or estimate.interval),
     )

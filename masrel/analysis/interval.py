@@ -3,6 +3,8 @@
 import hashlib
 from collections.abc import Sequence
 
+from masrel.agreement.coding import Label
+from masrel.agreement.weights import WeightName
 from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target
 
@@ -16,7 +18,7 @@ def planned_interval(
     *,
     target: Target,
     categories: Sequence[Label],
-    weights: str = "identity",
+    weights: WeightName = "identity",
     level: float,
     n_resamples: int,
     seed: int,
@@ -63,7 +65,12 @@ def planned_interval(
     if kind in ("analytic", "jackknife"):
         exact = intervals.analytic if kind == "analytic" else intervals.jackknife
         return exact(
-            coefficient, ratings, target=target, categories=categories, level=level
+            coefficient,
+            ratings,
+            target=target,
+            categories=categories,
+            weights=weights,
+            level=level,
         )
     if kind == "bootstrap":
         return intervals.bootstrap(
@@ -77,6 +84,10 @@ def planned_interval(
             rng=seed,
         )
     if kind == "posterior":
+        if weights != "identity":
+            raise ParameterError(
+                f"weights: the posterior is of unweighted agreement, got {weights!r}"
+            )
         return intervals.posterior(
             coefficient,
             ratings,

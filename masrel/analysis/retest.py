@@ -69,13 +69,18 @@ def _stratified(
     line: EstimatePlan, protocol: Protocol, pairs: RetestPairs
 ) -> PlannedEstimate:
     categories = protocol.scale.grades
-    estimate = stratified_kappa(pairs.pairs, categories=categories)
+    estimate = stratified_kappa(
+        pairs.pairs, categories=categories, weights=line.weights
+    )
     return PlannedEstimate(
         line=line,
         estimate=_with_interval(estimate, line, protocol, pairs.pairs, line.id),
         by_rater=tuple(
             RaterEstimate(
-                rater=rater, estimate=cohen_kappa(of_rater, categories=categories)
+                rater=rater,
+                estimate=cohen_kappa(
+                    of_rater, categories=categories, weights=line.weights
+                ),
             )
             for rater, of_rater in zip(pairs.raters, pairs.pairs, strict=True)
         ),
@@ -93,7 +98,7 @@ def _each_rater(
             RaterEstimate(
                 rater=rater,
                 estimate=_with_interval(
-                    own(of_rater, categories=categories),
+                    own(of_rater, categories=categories, weights=line.weights),
                     line,
                     protocol,
                     of_rater,
@@ -118,8 +123,9 @@ def _with_interval(
         pairs,
         target=line.target,
         categories=protocol.scale.grades,
+        weights=line.weights,
         level=protocol.analysis.level,
         n_resamples=protocol.analysis.n_resamples,
         seed=stream_seed(protocol.analysis.seed, purpose),
     )
-    return dataclasses.replace(estimate, interval=interval)
+    return dataclasses.replace(estimate, interval=interval or estimate.interval)

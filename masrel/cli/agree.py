@@ -163,7 +163,8 @@ def _write(
         return
     if json_file is not None:
         json_file.write_text(text + "\n", encoding="utf-8", newline="\n")
-    from masrel.report.tables import as_csv, as_latex, as_text
+    from masrel.report.latex import as_latex
+    from masrel.report.tables import as_csv, as_text
 
     table = agreement_table(rows, file, by, wanted)
     shown = {"csv": as_csv, "latex": as_latex}.get(form or "", as_text)(table)

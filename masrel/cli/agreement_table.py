@@ -233,30 +233,40 @@ def _cells(row: Row, by: str | None, wanted: Wanted) -> tuple["Value", ...]:
 
 
 def _notes(rows: list[Row], wanted: Wanted) -> tuple[str, ...]:
-    # How each interval was made, what to know of it, and why a value is undefined.
-    said = ["SE: delta method, items as the sample."]
+    # How each interval was made, what to know of it, and why a value is undefined;
+    # what holds for every interval is said without their names.
+    said: dict[str, list[str]] = {}
     for row in rows:
-        interval = row.estimate.interval
-        if row.estimate.reason is not None:
-            said.append(f"{row.title}: undefined: {row.estimate.reason}.")
-        if row.without is not None:
-            said.append(f"{row.title}: no interval: {row.without}.")
-        if interval is None:
-            continue
-        said.append(
-            f"Interval: {100 * interval.level:g} % {interval.kind}, {interval.method}; "
-            f"speaks of other {_OTHERS[interval.target]}."
-        )
-        said += [f"{row.title}: {note}." for note in interval.notes]
-        if interval.reason not in (None, row.estimate.reason):
-            said.append(f"{row.title}: no interval: {interval.reason}.")
+        for text in _of_row(row):
+            said.setdefault(text, []).append(row.title)
+    n_intervals = sum(row.estimate.interval is not None for row in rows)
+    notes = ["SE: delta method, items as the sample."]
+    for text, titles in said.items():
+        names = "" if len(titles) >= n_intervals > 1 else f"{'; '.join(titles)}: "
+        notes.append(f"{names}{text}.")
     if wanted.words is not None:
-        said.append(
+        notes.append(
             "At least: the best word of "
             f"{_WORDS[wanted.words]} that the true value earns with a probability of "
             "95 %, normal law around the estimate; the words are conventions."
         )
-    return tuple(dict.fromkeys(said))
+    return tuple(notes)
+
+
+def _of_row(row: Row) -> list[str]:
+    estimate, interval = row.estimate, row.estimate.interval
+    said = [] if estimate.reason is None else [f"undefined: {estimate.reason}"]
+    if row.without is not None:
+        said.append(f"no interval: {row.without}")
+    if interval is not None:
+        said.append(
+            f"{100 * interval.level:g} % {interval.kind} interval, {interval.method}; "
+            f"it speaks of other {_OTHERS[interval.target]}"
+        )
+        said += interval.notes
+        if interval.reason not in (None, estimate.reason):
+            said.append(f"no interval: {interval.reason}")
+    return said
 
 
 _OTHERS = {"items": "items", "raters": "raters", "both": "items and raters"}

@@ -141,6 +141,16 @@ class EstimatePlan(Table, frozen=True, kw_only=True):
     id: Identifier
     kind: Literal["inter-rater", "test-retest"]
     coefficient: Text
+    weights: Literal[
+        "identity",
+        "linear",
+        "quadratic",
+        "ordinal",
+        "radical",
+        "ratio",
+        "circular",
+        "bipolar",
+    ] = "identity"
     models: Literal["standard", "dummy", "all"] = "standard"
     sessions: Annotated[tuple[str, ...], Meta(min_length=1, max_length=2)]
     target: Target

@@ -110,20 +110,29 @@ class EstimateRow:
         return tuple(dict.fromkeys(text for text in said if text))
 
 
-def coefficient_name(coefficient: str) -> str:
+def coefficient_name(coefficient: str, weights: str = "identity") -> str:
     """Return a coefficient's name for a reader.
 
     Parameters
     ----------
     coefficient : str
         Its name in code.
+    weights : str, optional
+        Name of its weights.
 
     Returns
     -------
     str
         Its name in print.
+
+    Examples
+    --------
+    >>> coefficient_name("fleiss_kappa", "quadratic")
+    "Fleiss' κ, quadratic weights"
     """
     title = COEFFICIENTS[coefficient].title
+    if weights != "identity":
+        title = f"{title}, {weights} weights"
     # A share as all others are: 1 is all, not 100.
     return f"{title} (0–1)" if coefficient == "percent_agreement" else title
 
@@ -164,7 +173,9 @@ def estimate_rows(planned: Sequence[PlannedEstimate]) -> tuple[EstimateRow, ...]
             rows.append(
                 EstimateRow(
                     name=entry.line.id,
-                    coefficient=coefficient_name(entry.line.coefficient),
+                    coefficient=coefficient_name(
+                        entry.line.coefficient, entry.line.weights
+                    ),
                     models=entry.line.models,
                     sessions=sessions,
                     estimate=entry.estimate,
@@ -174,7 +185,9 @@ def estimate_rows(planned: Sequence[PlannedEstimate]) -> tuple[EstimateRow, ...]
         rows.extend(
             EstimateRow(
                 name=f"{entry.line.id}: {own.rater}",
-                coefficient=coefficient_name(own.estimate.coefficient),
+                coefficient=coefficient_name(
+                    own.estimate.coefficient, entry.line.weights
+                ),
                 models=entry.line.models,
                 sessions=sessions,
                 estimate=own.estimate,

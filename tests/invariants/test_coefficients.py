@@ -93,7 +93,7 @@ def test_value_is_within_its_parameter_space(
     if found.reason is not None:
         assert math.isnan(found.value)
         return
-    assert found.value <= 1.0
+    assert found.value <= entry.highest
     # Ratings without a partner move chance alone: with them a sample can fall lower;
     # so can a weighted one, or one against a chance of few categories.
     complete = all(grade is not None for row in table for grade in row)
