@@ -12,6 +12,7 @@ from masrel.errors import MasrelWarning, ParameterError, RatingsError
 from masrel.estimates import Target, as_document
 
 if TYPE_CHECKING:
+    from masrel.agreement.weights import WeightName
     from masrel.ratings import Ratings
 
 __all__ = ["command"]
@@ -78,7 +79,7 @@ def command(
     grade: str | None,
     categories: str | None,
     coefficients: str,
-    weights: str,
+    weights: "WeightName",  # checked where the weights are made
     target: Target | None,
     interval: str,
     level: float,

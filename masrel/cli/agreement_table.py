@@ -10,6 +10,7 @@ from masrel.estimates import Estimate, Interval, Target
 
 if TYPE_CHECKING:
     from masrel.agreement import Coefficient
+    from masrel.agreement.weights import WeightName
     from masrel.ratings import RatingMatrix, Ratings
     from masrel.report.tables import Table, Value
 
@@ -41,7 +42,7 @@ class Wanted:
     """
 
     coefficients: tuple[str, ...]
-    weights: str
+    weights: "WeightName"
     target: Target | None
     interval: str
     level: float
@@ -98,7 +99,7 @@ def estimate_session(ratings: "Ratings", session: str, wanted: Wanted) -> list[R
     )
     rows = []
     for entry in _entries(wanted, matrix):
-        weights = wanted.weights if entry.weighted else "identity"
+        weights: WeightName = wanted.weights if entry.weighted else "identity"
         estimate = entry(counted, categories=values, weights=weights)
         without = None
         if wanted.target is not None and estimate.interval is None:
@@ -142,7 +143,7 @@ def _interval(
     entry: "Coefficient",
     ratings: object,
     categories: tuple[float, ...],
-    weights: str,
+    weights: "WeightName",
     wanted: Wanted,
 ) -> Interval | None:
     from masrel.analysis.interval import planned_interval

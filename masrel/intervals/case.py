@@ -211,8 +211,8 @@ def kernel_of(entry: Coefficient) -> Kernel:
     """
     if entry.kernel is None:
         raise ParameterError(
-            f"coefficient: {entry.title} is no function of sums over items: there is no "
-            "such interval of it"
+            f"coefficient: {entry.title} is no function of sums over items: there is "
+            "no such interval of it"
         )
     return entry.kernel
 

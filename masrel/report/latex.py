@@ -24,7 +24,7 @@ _ESCAPES = {
 
 
 def as_latex(table: Table) -> str:
-    """Return a table as LaTeX that needs the package `booktabs` and no other.
+    r"""Return a table as LaTeX that needs the package `booktabs` and no other.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def as_latex(table: Table) -> str:
     >>> print(as_latex(Table(
     ...     name="x", caption="50 %", columns=(Column(key="a", heading="κ"),),
     ...     rows=((0.5,),), data="foreign")).splitlines()[2])
-    \\caption{50 \\%}
+    \caption{50 \%}
     """
     page = on_page(table)
     caption = f"SIMULATED DATA. {page.caption}" if page.simulated else page.caption
