@@ -56,11 +56,11 @@ class CodedRatings:
     @property
     def n_raters(self) -> int:
         """Raters with at least one rating."""
-        # As a rule one of the first ratings is there, and no more are looked at.
-        return sum(
-            bool((column[:_FIRST] != MISSING).any() or (column != MISSING).any())
-            for column in self.codes.T
-        )
+        # As a rule every rater has one of the first ratings: look no further.
+        given = (self.codes[:_FIRST] != MISSING).any(axis=0)
+        if not given.all():
+            given = (self.codes != MISSING).any(axis=0)
+        return int(given.sum())
 
     @property
     def n_categories(self) -> int:

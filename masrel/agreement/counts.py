@@ -80,9 +80,11 @@ def count_ratings(
     if isinstance(ratings, CountedRatings):
         return ratings
     coded = code_ratings(ratings, categories)
-    return CountedRatings(
-        coded=coded, items=coded_items(coded), n_raters=coded.n_raters
-    )
+    items = coded_items(coded)
+    # An item with all ratings there could be shows that every rater has one.
+    full = isinstance(items, FewItems) and max(map(sum, items.rows))
+    n_raters = full if full == coded.codes.shape[1] else coded.n_raters
+    return CountedRatings(coded=coded, items=items, n_raters=n_raters)
 
 
 def item_counts(coded: CodedRatings) -> Integers:

@@ -7,6 +7,9 @@ integers, many in numpy; both give the same sums.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
+from operator import mul
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +24,7 @@ Floats = NDArray[np.float64]
 _FEW = 4_000  # counts that Python sums about as fast as numpy
 
 
-@dataclass(frozen=True, slots=True)
-class SizeGroup:
+class SizeGroup(NamedTuple):
     """Sums over the items that have the same number of ratings.
 
     Attributes
@@ -43,12 +45,20 @@ class SizeGroup:
     disagreement: int
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Linear:
+class Linear(NamedTuple):
     """A linear function of an item: a[n] V + b[n] + e[n] Σ_k slopes_k n_k.
 
     V is the item's disagreement Σ_kl v_kl n_k n_l and n its number of ratings. All
     numbers are integers, to be divided by `denominator`.
+
+    Attributes
+    ----------
+    by_size : mapping of int to tuple of int
+        n to a, b and e.
+    slopes : sequence of int, shape (n_categories,)
+        The slopes; may be empty where every e is 0.
+    denominator : int
+        What all is divided by.
     """
 
     by_size: Mapping[int, tuple[int, int, int]]
@@ -56,45 +66,108 @@ class Linear:
     denominator: int
 
 
-@dataclass(frozen=True, slots=True)
+class _Alike(NamedTuple):
+    # distinct items of one number of ratings
+    rows: list[Sequence[int]]
+    times: list[int]
+    squares: list[int]  # Σ_k n_k² of each
+
+
+@dataclass(frozen=True)
 class FewItems:
-    """Distinct items as Python integers; all sums are exact."""
+    """Distinct items as Python integers; all sums are exact.
+
+    Attributes
+    ----------
+    rows : sequence of sequence of int, shape (n_distinct, n_categories)
+        Raters per category.
+    times : sequence of int, shape (n_distinct,)
+        How often each occurs.
+    n_categories : int
+        Declared categories.
+    """
 
     rows: Sequence[Sequence[int]]
     times: Sequence[int]
     n_categories: int
 
     def groups(self, weights: Weights) -> list[SizeGroup]:
-        """Return the sums of each number of ratings there is."""
-        found: dict[int, list[list[int]]] = {}
-        for row, times in zip(self.rows, self.times, strict=True):
-            size = sum(row)
-            if size:
-                v = weights.disagreement(row, size) if size > 1 else 0
-                found.setdefault(size, []).append(
-                    [times, times * v, *[times * n for n in row]]
-                )
-        groups = []
-        for size, parts in sorted(found.items()):
-            n_items, disagreement, *totals = map(sum, zip(*parts, strict=True))
-            groups.append(SizeGroup(size, n_items, totals, disagreement))
-        return groups
+        """Return the sums of each number of ratings there is.
+
+        Parameters
+        ----------
+        weights : Weights
+            Disagreement of two categories.
+
+        Returns
+        -------
+        list of SizeGroup
+            By number of ratings, items without any left out.
+        """
+        if weights.numerators is None:
+            return self._plain_groups
+        weighted = []
+        for group in self._plain_groups:
+            alike = self._by_size[group.size]
+            v = [weights.disagreement(row, group.size) for row in alike.rows]
+            apart = sum(map(mul, alike.times, v))
+            weighted.append(group._replace(disagreement=apart))
+        return weighted
 
     def square_sum(self, weights: Weights, function: Linear) -> tuple[int, int]:
-        """Return Σ_i function(item)² as numerator and denominator."""
+        """Return Σ_i function(item)² as numerator and denominator.
+
+        Parameters
+        ----------
+        weights : Weights
+            Disagreement of two categories.
+        function : Linear
+            A function of an item.
+
+        Returns
+        -------
+        tuple of int
+            Numerator and denominator.
+        """
         total = 0
-        for row, times in zip(self.rows, self.times, strict=True):
-            size = sum(row)
-            if size:
-                a, b, e = function.by_size[size]
-                value = b
-                if a and size > 1:
-                    value += a * weights.disagreement(row, size)
-                if e:
-                    slopes = function.slopes
-                    value += e * sum([n * s for n, s in zip(row, slopes, strict=True)])
+        for size, alike in self._by_size.items():
+            a, b, e = function.by_size[size]
+            slopes = [e * slope for slope in function.slopes]
+            if weights.numerators is None:
+                v = [size * size - square for square in alike.squares]
+            else:
+                v = [weights.disagreement(row, size) for row in alike.rows]
+            for row, times, apart in zip(alike.rows, alike.times, v, strict=True):
+                value = a * apart + b + sum(map(mul, slopes, row))
                 total += times * value * value
         return total, function.denominator**2
+
+    @cached_property
+    def _by_size(self) -> dict[int, _Alike]:
+        found: dict[int, _Alike] = {}
+        for row, times in zip(self.rows, self.times, strict=True):
+            size = sum(row)
+            if size not in found:
+                found[size] = _Alike([], [], [])
+            alike = found[size]
+            alike.rows.append(row)
+            alike.times.append(times)
+            alike.squares.append(sum(map(mul, row, row)))
+        found.pop(0, None)
+        return dict(sorted(found.items()))
+
+    @cached_property
+    def _plain_groups(self) -> list[SizeGroup]:
+        # identity weights: all pairs of ratings of an item less those alike
+        groups = []
+        for size, (rows, times, squares) in self._by_size.items():
+            n_items = sum(times)
+            totals = [
+                sum(map(mul, times, column)) for column in zip(*rows, strict=True)
+            ]
+            apart = n_items * size * size - sum(map(mul, times, squares))
+            groups.append(SizeGroup(size, n_items, totals, apart))
+        return groups
 
 
 @dataclass(frozen=True, slots=True)

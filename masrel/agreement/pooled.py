@@ -6,8 +6,7 @@ what chance would give. Coefficients differ in D_e alone.
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal, NamedTuple, get_args
 
 from numpy.typing import ArrayLike
 
@@ -41,9 +40,10 @@ __all__ = [
 Variance = Literal["delta", "irrcac"]
 """Which standard error: the delta method's, or the one irrCAC prints."""
 
+_VARIANCES = get_args(Variance)
 
-@dataclass(frozen=True, slots=True)
-class Shares:
+
+class Shares(NamedTuple):
     """Shares of the categories, p_k = numerators_k / total.
 
     A share is the mean over rated items of the part of an item's raters who chose it.
@@ -53,8 +53,7 @@ class Shares:
     total: int
 
 
-@dataclass(frozen=True, slots=True)
-class Expected:
+class Expected(NamedTuple):
     """Disagreement by chance, numerator / denominator, and its slope in each share.
 
     ∂D_e / ∂p_k is slopes_k / slope_denominator.
@@ -66,8 +65,7 @@ class Expected:
     slope_denominator: int = 1
 
 
-@dataclass(frozen=True, slots=True)
-class Options:
+class Options(NamedTuple):
     """Who asks, and which standard error: its kind, and the population's size."""
 
     name: str
@@ -144,8 +142,7 @@ def pooled_estimate(
     )
 
 
-@dataclass(frozen=True, slots=True)
-class Observed:
+class Observed(NamedTuple):
     """Disagreement observed, D_o = numerator / denominator, and what it is made of.
 
     Attributes
@@ -192,14 +189,15 @@ class Observed:
 
 
 def _shares(groups: list[SizeGroup], n_rated: int) -> Shares:
+    if len(groups) == 1:
+        return Shares(groups[0].totals, n_rated * groups[0].size)
     common = math.lcm(*[group.size for group in groups])
     weighed = [[t * (common // g.size) for t in g.totals] for g in groups]
     numerators = [sum(parts) for parts in zip(*weighed, strict=True)]
     return Shares(numerators, n_rated * common)
 
 
-@dataclass(frozen=True, slots=True)
-class _Scene:
+class _Scene(NamedTuple):
     # what the standard error is computed from
     table: ItemTable
     weights: Weights
@@ -245,11 +243,29 @@ def _influence(scene: _Scene) -> Linear:
             b -= n * observed.numerator * scale
         if slopes:  # x_ik = n_ik / size, and the shares' total divides by every size
             e = -observed.numerator * n_usable * over_e * (shares.total // size)
-        by_size[size] = (a * over_e, b * over_e, e * over_e)
+        by_size[size] = (a, b, e)
+    denominator = n_usable * observed.denominator * scale * chance.numerator
+    return _reduced(by_size, slopes, over_e, denominator)
+
+
+def _reduced(
+    by_size: dict[int, tuple[int, int, int]],
+    slopes: Sequence[int],
+    numerator: int,
+    denominator: int,
+) -> Linear:
+    # a, b and e times numerator / denominator, in the smallest integers
+    common = math.gcd(*[part for parts in by_size.values() for part in parts])
+    numerator *= common
+    less = math.gcd(numerator, denominator)
+    factor, common = numerator // less, common or 1
     return Linear(
-        by_size=by_size,
-        slopes=slopes,
-        denominator=n_usable * observed.denominator * scale * chance.numerator,
+        {
+            size: (a // common * factor, b // common * factor, e // common * factor)
+            for size, (a, b, e) in by_size.items()
+        },
+        slopes,
+        denominator // less,
     )
 
 
@@ -272,8 +288,7 @@ def _as_irrcac(influence: Linear, scene: _Scene) -> Linear:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class Asked:
+class Asked(NamedTuple):
     """The options of a public function, as they were given."""
 
     categories: Sequence[Label] | None
@@ -343,7 +358,7 @@ def estimate_counts(
 
 
 def _options(name: str, title: str, asked: Asked) -> Options:
-    if asked.variance not in get_args(Variance):
+    if asked.variance not in _VARIANCES:
         raise ParameterError(
             f"variance: needs one of {', '.join(get_args(Variance))}, "
             f"got {asked.variance!r}"

@@ -31,6 +31,8 @@ WeightName = Literal[
 ]
 """Names of the weights there are."""
 
+_NAMES = get_args(WeightName)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Weights:
@@ -137,10 +139,9 @@ def declared_weights(
     n = len(categories)
     if not isinstance(weights, str):
         return _given(weights, n)
-    if weights not in get_args(WeightName):
+    if weights not in _NAMES:
         raise ParameterError(
-            f"weights: needs one of {', '.join(get_args(WeightName))} or a matrix, "
-            f"got {weights!r}"
+            f"weights: needs one of {', '.join(_NAMES)} or a matrix, got {weights!r}"
         )
     if weights == "identity":
         return Weights(name="identity", n_categories=n)
