@@ -111,10 +111,18 @@ def _span(plain: Array) -> tuple[int, int] | None:
 def _whole_numbers_met(plain: Array, lowest: int, highest: int) -> tuple[Label, ...]:
     met = np.zeros(highest - lowest + 1, dtype=bool)
     for rows in _blocks(plain):
-        met[plain[rows] - lowest] = True
+        met[_above(plain[rows], lowest)] = True
         if met.all():  # as a rule after the first block
             break
-    return tuple((np.flatnonzero(met) + lowest).tolist())
+    return tuple(lowest + place for place in np.flatnonzero(met).tolist())
+
+
+def _above(block: Array, lowest: int) -> Array:
+    # block - lowest, which need not fit the small integers of the block
+    if block.dtype.kind == "u":
+        above: Array = block - block.dtype.type(lowest)
+        return above
+    return np.subtract(block, lowest, dtype=np.int64)
 
 
 def _coder(plain: Array, dtype: np.dtype[Any], known: tuple[Label, ...]) -> _Coder:
@@ -125,33 +133,47 @@ def _coder(plain: Array, dtype: np.dtype[Any], known: tuple[Label, ...]) -> _Cod
         return lambda block: np.full(block.shape, _MISSING)
     if dtype.kind == "f":
         return _float_coder(np.array(known, dtype=np.float64))
-    values = np.array(known, dtype=dtype if dtype.kind == "U" else None)
+    # a label that the type of the array cannot hold is not in it
     if dtype.kind == "U":
-        # a longer label of the scale would be cut to the width of the array
-        fits = np.array([len(str(label)) * 4 <= dtype.itemsize for label in known])
+        fits = [len(str(label)) * 4 <= dtype.itemsize for label in known]
+    else:
+        held = np.iinfo(dtype)
+        fits = [_is_whole(label, int(held.min), int(held.max)) for label in known]
+    codes = np.flatnonzero(fits)
+    own = [known[code] for code in codes.tolist()]
+    if dtype.kind == "U":
+        values = np.array(own, dtype=dtype)
         values = values.view(plain.dtype) if plain.dtype.kind == "u" else values
     else:
-        fits = np.ones(len(known), dtype=bool)
-    order = np.argsort(values[fits], kind="stable")
-    return _search_coder(values[fits][order], np.flatnonzero(fits)[order])
+        values = np.array([int(label) for label in own], dtype=dtype)
+    order = np.argsort(values, kind="stable")
+    return _search_coder(values[order], codes[order])
+
+
+def _is_whole(label: Label, lowest: int, highest: int) -> bool:
+    # as it is and not as a float, which large integers do not fit
+    number = label if isinstance(label, int) else float(label)
+    return lowest <= number <= highest and number == int(number)
 
 
 def _table_coder(lowest: int, highest: int, known: tuple[Label, ...]) -> _Coder:
     table = np.full(highest - lowest + 1, _UNKNOWN, dtype=code_type(len(known)))
     for code, label in enumerate(known):
-        if lowest <= float(label) <= highest and float(label).is_integer():
+        if _is_whole(label, lowest, highest):
             table[int(label) - lowest] = code
     if (table == np.arange(table.size)).all():
         if table.dtype == np.int8:  # modulo 256 the small difference stays what it is
             low = np.int64(lowest).astype(np.int8)
             return lambda block: np.subtract(block.astype(np.int8), low)
-        return lambda block: block - lowest
-    return lambda block: table[block - lowest]
+        return lambda block: _above(block, lowest)
+    return lambda block: table[_above(block, lowest)]
 
 
 def _float_coder(known: Array) -> _Coder:
     order = np.argsort(known)
     slow = _search_coder(known[order], order)
+    if (np.abs(known) > 2**53).any():  # also infinite: no table
+        return slow
     lowest, span = known[order[0]], known[order[-1]] - known[order[0]]
     if not (span < _WIDEST and (known == np.floor(known)).all()):
         return slow
@@ -161,7 +183,8 @@ def _float_coder(known: Array) -> _Coder:
     def coder(block: Array) -> Array:
         missing = np.isnan(block)
         place = np.where(missing, 0.0, block - lowest)
-        whole = place.astype(np.intp)
+        with np.errstate(invalid="ignore"):  # infinite, or beyond whole numbers
+            whole = place.astype(np.intp)
         if (whole != place).any() or whole.min() < 0 or whole.max() > span:
             return slow(block)
         return np.where(missing, _MISSING, table[whole])
