@@ -1,0 +1,1 @@
+"""Estimates against exact fractions, where floating point would lose digits."""
