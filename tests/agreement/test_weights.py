@@ -1,0 +1,229 @@
+"""Weights by hand on uneven scales, and what is true of every one of them."""
+
+import math
+from fractions import Fraction
+from typing import get_args
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from masrel.agreement import (
+    COEFFICIENTS,
+    cohen_kappa,
+    declared_weights,
+    fleiss_kappa,
+    percent_agreement,
+)
+from masrel.agreement.weights import WeightName
+from masrel.errors import ParameterError, UndefinedStatisticWarning
+
+NAMES = get_args(WeightName)
+UNEVEN = [1, 2, 4]  # range 3; differences 1, 2, 3
+TEXT = ["1", "1+", "2", "3"]
+
+
+def agreement(name: object, scale: list[float] | list[str]) -> list[list[float]]:
+    """Return w = 1 - v."""
+    made = declared_weights(name, scale)  # type: ignore[arg-type]
+    return (1.0 - made.as_floats()).tolist()  # type: ignore[no-any-return]
+
+
+def exact(name: str, scale: list[object]) -> list[list[Fraction]]:
+    """Return v without rounding."""
+    made = declared_weights(name, scale)  # type: ignore[arg-type]
+    assert made.numerators is not None
+    return [[Fraction(v, made.denominator) for v in row] for row in made.numerators]
+
+
+# v above the diagonal of UNEVEN: of 1 and 2, of 1 and 4, of 2 and 4
+@pytest.mark.parametrize(
+    ("name", "by_hand"),
+    [
+        ("linear", (Fraction(1, 3), Fraction(1), Fraction(2, 3))),
+        ("quadratic", (Fraction(1, 9), Fraction(1), Fraction(4, 9))),
+        # ranks 1, 2, 3: C(2, 2) = 1 and C(3, 2) = 3 of C(3, 2) = 3
+        ("ordinal", (Fraction(1, 3), Fraction(1), Fraction(1, 3))),
+        # (1/3)², (3/5)², (2/6)² over 9/25: 25/81, 1, 25/81
+        ("ratio", (Fraction(25, 81), Fraction(1), Fraction(25, 81))),
+        # sin² of π/4, 3π/4, 2π/4: 1/2, 1/2, 1: R + 1 = 4
+        ("circular", (Fraction(1, 2), Fraction(1, 2), Fraction(1))),
+        # 1/((3 - 2)(8 - 3)) = 1/5, 9/((5 - 2)(8 - 5)) = 1, 4/((6 - 2)(8 - 6)) = 1/2
+        ("bipolar", (Fraction(1, 5), Fraction(1), Fraction(1, 2))),
+    ],
+)
+def test_weights_of_an_uneven_scale_by_hand(
+    name: str, by_hand: tuple[Fraction, ...]
+) -> None:
+    a, b, c = by_hand
+    assert exact(name, UNEVEN) == [[0, a, b], [a, 0, c], [b, c, 0]]
+
+
+def test_radical_weights_by_hand() -> None:
+    # √(1/3), √(3/3), √(2/3); the square root of 1/4 is exactly 1/2
+    v = np.sqrt(np.array([[0, 1, 3], [1, 0, 2], [3, 2, 0]]) / 3)
+    assert agreement("radical", UNEVEN) == pytest.approx(1 - v, abs=1e-15)
+    assert exact("radical", [0, 1, 4])[0][1] == Fraction(1, 2)
+
+
+def test_identity_weights_make_no_matrix() -> None:
+    made = declared_weights("identity", UNEVEN)
+    assert made.numerators is None
+    assert made.as_floats().tolist() == [[0, 1, 1], [1, 0, 1], [1, 1, 0]]
+    assert made.total() == 6
+    assert made.products([5, 7, 11]) == [18, 16, 12]
+    assert made.disagreement([2, 1, 3], 6) == 36 - (4 + 1 + 9)
+
+
+def test_four_grades_of_text_weigh_by_rank_and_not_by_their_letters() -> None:
+    assert agreement("linear", TEXT)[0] == pytest.approx([1, 2 / 3, 1 / 3, 0])
+    assert agreement("quadratic", TEXT)[0] == pytest.approx([1, 8 / 9, 5 / 9, 0])
+    # C(2, 2), C(3, 2), C(4, 2) = 1, 3, 6 of 6
+    assert agreement("ordinal", TEXT)[0] == pytest.approx([1, 5 / 6, 1 / 2, 0])
+    # sin² of π/4, π/2, 3π/4
+    assert agreement("circular", TEXT)[0] == pytest.approx([1, 0.5, 0, 0.5])
+    # ranks 1, 4: (1/3)², (2/4)², (3/5)²
+    assert agreement("ratio", TEXT)[0] == pytest.approx(
+        [1, 1 - (1 / 9) / 0.36, 1 - 0.25 / 0.36, 0]
+    )
+
+
+def test_ordinal_weights_go_by_rank_even_of_numbers() -> None:
+    assert exact("ordinal", [1, 2, 100, 101]) == exact("ordinal", TEXT)
+
+
+def test_scale_of_the_declared_order_and_not_of_the_values() -> None:
+    # numbers weigh by value in whatever order they are declared
+    assert agreement("linear", [4, 1, 2]) == pytest.approx(
+        np.array([[1, 0, 1 / 3], [0, 1, 2 / 3], [1 / 3, 2 / 3, 1]])
+    )
+
+
+def test_sums_with_weights_are_those_of_the_matrix() -> None:
+    made = declared_weights("quadratic", [1, 2, 4, 8])
+    v = np.array(made.numerators)
+    n = np.array([3, 0, 2, 5])
+    assert made.products(n.tolist()) == (v @ n).tolist()
+    assert made.disagreement(n.tolist(), 10) == n @ v @ n
+    assert made.total() == v.sum()
+
+
+values = st.lists(
+    st.one_of(st.integers(-50, 50), st.floats(-50, 50, width=32)),
+    min_size=2,
+    max_size=6,
+    unique=True,
+)
+
+
+@given(values, st.sampled_from(NAMES))
+def test_every_weight_is_symmetric_zero_on_the_diagonal_and_at_most_one(
+    scale: list[float], name: str
+) -> None:
+    made = declared_weights(name, scale)  # type: ignore[arg-type]
+    if made.reason is not None:
+        assert name == "ratio"
+        return
+    v = made.as_floats()
+    assert (v == v.T).all()
+    assert (np.diagonal(v) == 0).all()
+    # bipolar and ratio weights of numbers of both signs aside, v lies within [0, 1]
+    assert v.max() == 1.0
+    if name != "bipolar":
+        assert v.min() >= 0.0
+
+
+@given(values, st.integers(-20, 20), st.integers(1, 9))
+def test_linear_and_quadratic_weights_have_no_unit_and_no_origin(
+    scale: list[float], shift: int, factor: int
+) -> None:
+    moved = [Fraction(x) * factor + shift for x in scale]
+    for name in ("linear", "quadratic"):
+        made = declared_weights(name, moved)  # type: ignore[arg-type]
+        assert made.as_floats() == pytest.approx(
+            declared_weights(name, scale).as_floats(), abs=1e-14
+        )
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_two_categories_have_but_one_kind_of_weights(name: WeightName) -> None:
+    assert declared_weights(name, [2, 7]).as_floats().tolist() == [[0, 1], [1, 0]]
+
+
+@pytest.mark.parametrize("name", ["identity", "linear", "quadratic", "ordinal"])
+@pytest.mark.parametrize("coefficient", ["cohen_kappa", "conger_kappa", "gwet_ac"])
+def test_a_matrix_of_the_caller_is_the_named_weights(
+    name: WeightName, coefficient: str
+) -> None:
+    ratings = [[1, 2], [2, 2], [4, 4], [4, 1], [2, 1], [1, 1], [9, 9]]
+    scale = [1, 2, 4, 9]  # of range 8: linear and quadratic weights are exact floats
+    entry = COEFFICIENTS[coefficient]
+    named = entry(ratings, categories=scale, weights=name)
+    given_ = entry(ratings, categories=scale, weights=agreement(name, scale))
+    assert given_.weights == "custom"
+    assert given_.value == pytest.approx(named.value, rel=1e-14)
+    assert given_.standard_error == pytest.approx(named.standard_error, rel=1e-12)
+
+
+def test_a_matrix_may_be_of_truth_values_and_weigh_below_zero() -> None:
+    ratings = [["a", "a"], ["b", "b"], ["a", "b"]]
+    as_truths = cohen_kappa(ratings, weights=np.eye(2, dtype=bool))
+    assert as_truths.value == cohen_kappa(ratings).value
+    # -1 for a disagreement doubles D_o and D_e: kappa does not move
+    assert cohen_kappa(ratings, weights=[[1, -1], [-1, 1]]).value == as_truths.value
+
+
+@pytest.mark.parametrize(
+    ("weights", "scale", "said"),
+    [
+        ("square", UNEVEN, "weights: needs one of identity, linear, .* or a matrix"),
+        ("", UNEVEN, "got ''"),
+        ("Linear", UNEVEN, "got 'Linear'"),
+        ([[1, 0], [0, 1]], UNEVEN, r"needs 3 × 3 numbers.*shape \(2, 2\) of int"),
+        ([1, 0, 0], UNEVEN, r"got shape \(3,\)"),
+        ([["1", "0"], ["0", "1"]], [1, 2], "of <U1"),
+        ([[1, 0], [0.5, 1]], [1, 2], "needs a symmetric matrix with 1 on its diagonal"),
+        ([[1, 0], [0, 0.9]], [1, 2], "with 1 on its diagonal"),
+        ([[1, 1.5], [1.5, 1]], [1, 2], "finite numbers of at most 1"),
+        ([[1, math.nan], [math.nan, 1]], [1, 2], "finite numbers"),
+        ([[1, -math.inf], [-math.inf, 1]], [1, 2], "finite numbers"),
+        ("linear", [1, math.inf], "categories: weights need finite numbers, got inf"),
+    ],
+)
+def test_what_are_no_weights_is_refused(
+    weights: object, scale: list[float], said: str
+) -> None:
+    with pytest.raises(ParameterError, match=said):
+        declared_weights(weights, scale)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("scale", [[0, 1, 2], [-1, 0.5, 1]])
+def test_ratio_weights_of_values_that_sum_to_zero_are_undefined(
+    scale: list[float],
+) -> None:
+    # (x - y)/(x + y) of -1 and 1 is a division by 0, of 0 and 0 itself 0/0
+    ratings = [[scale[0], scale[1]], [scale[2], scale[2]], [scale[1], scale[1]]]
+    with pytest.warns(UndefinedStatisticWarning, match="division by 0"):
+        found = fleiss_kappa(ratings, categories=scale, weights="ratio")
+    assert math.isnan(found.value)
+    assert found.reason is not None
+    assert "ratio weights divide by sums of two values" in found.reason
+
+
+def test_values_of_both_signs_have_ratio_weights_if_no_two_sum_to_zero() -> None:
+    # (-1, 2): (3/1)² = 9; (-1, 4): (5/3)²; (2, 4): (1/3)²; over 9
+    assert exact("ratio", [-1, 2, 4])[0] == [0, 1, Fraction(25, 81)]
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if name != "identity"])
+@pytest.mark.parametrize("function", [fleiss_kappa, cohen_kappa, percent_agreement])
+def test_one_category_has_no_weights(function: object, name: str) -> None:
+    with pytest.warns(UndefinedStatisticWarning, match="one category"):
+        found = function([["a", "a"], ["a", "a"]], weights=name)  # type: ignore[operator]
+    assert math.isnan(found.value)
+    assert found.reason
+
+
+def test_percent_agreement_of_one_category_is_one() -> None:
+    assert percent_agreement([["a", "a"], ["a", "a"]]).value == 1.0
