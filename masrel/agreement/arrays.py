@@ -97,7 +97,7 @@ def _labels_met(plain: Array, dtype: np.dtype[Any]) -> tuple[Label, ...]:
             met = np.union1d(met, block)
             if met.dtype.kind == "f":
                 met = met[~np.isnan(met)]
-    if dtype.kind == "U":
+    if dtype.kind == "U" and met.dtype.kind == "u":
         met = met.view(dtype)
     return tuple(sorted(met.tolist()))
 

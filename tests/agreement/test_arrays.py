@@ -199,7 +199,7 @@ def test_an_unknown_label_in_the_last_row_is_named_with_its_place(dtype: str) ->
     labels = np.full((40_000, 2), 1).astype(dtype)
     labels[-1, 1] = np.array(7).astype(dtype).item()
     scale = ["1", "2"] if dtype in ("<U1", "<U9") else [1, 2]
-    with pytest.raises(RatingsError, match="row 39999, column 1.*got '?7"):
+    with pytest.raises(RatingsError, match=r"row 39999, column 1.*got '?7"):
         code_ratings(labels, scale)
 
 
