@@ -222,8 +222,9 @@ class ManyItems:
         rated = sizes > 0
         at = np.array([place[int(size)] for size in np.unique(sizes[rated])])
         a, b, e = parts[at[np.unique(sizes[rated], return_inverse=True)[1]]].T
-        sloped = counts[rated] @ np.array([float(s) for s in function.slopes])
-        value = a * v[rated] + b + e * sloped
+        value = a * v[rated] + b
+        if function.slopes:  # agreement alone has none
+            value += e * (counts[rated] @ np.array(function.slopes, dtype=np.float64))
         return float((self.times[rated] * value * value).sum()), 1
 
     def _unbounded(self) -> tuple[Integers, Integers]:

@@ -129,6 +129,7 @@ def _refuse_repeats(
     if len(places) == 0 or times.max() < 2:
         return
     met = [divmod(int(place), len(raters)) for place in np.flatnonzero(times > 1)[:5]]
+    items, raters = items.tolist(), raters.tolist()  # without numpy's types
     named = "; ".join(f"{items[i]!r} by {raters[r]!r}" for i, r in met)
     more = int((times > 1).sum()) - len(met)
     raise RatingsError(
