@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from masrel.agreement.coding import CodedRatings, code_ratings
+from masrel.agreement.coding import CodedRatings, Codes, code_ratings
 from masrel.agreement.items import FewItems, ItemTable, item_table
 from masrel.agreement.labels import Label, check_categories
 from masrel.errors import CountsError, ParameterError
@@ -24,8 +24,9 @@ __all__ = [
 
 Integers = NDArray[np.int64]
 
-_FEW = 2_000  # ratings that Python counts about as fast as numpy
+_FEW = 200  # ratings that Python counts about as fast as numpy
 _MOST_KEYS = 1 << 22  # patterns that are counted in a table rather than sorted
+_MOST_SORTED = 20_000  # items that are sorted to find those alike
 _BLOCK = 1 << 16  # items counted at once, so that they stay in the cache
 
 
@@ -130,21 +131,31 @@ def coded_items(coded: CodedRatings) -> ItemTable:
         return _few(coded)
     # An item is one number: Σ over its raters of (n_raters + 1) to the power code.
     base, q = n_raters + 1, coded.n_categories
-    if base**q > min(_MOST_KEYS, 16 * n_items):
+    n_keys = base**q
+    if n_keys <= min(_MOST_KEYS, 16 * n_items):
+        times = np.zeros(n_keys, dtype=np.int64)
+        for start in range(0, n_items, _BLOCK):
+            keys = _keys(coded.codes[start : start + _BLOCK], base, q)
+            times += np.bincount(keys, minlength=n_keys)
+        met = np.flatnonzero(times)
+        times = times[met]
+    elif n_keys < 2**62 and n_items <= _MOST_SORTED:
+        met, times = np.unique(_keys(coded.codes, base, q), return_counts=True)
+    else:
         return item_table(item_counts(coded))
-    powers = base ** np.arange(q + 1, dtype=np.int64)
+    powers = base ** np.arange(q, dtype=np.int64)
+    return item_table(met[:, None] // powers % base, times)
+
+
+def _keys(codes: Codes, base: int, n_categories: int) -> Integers:
+    powers = base ** np.arange(n_categories + 1, dtype=np.int64)
     powers[-1] = 0  # code -1 is the last entry
-    powers = powers.astype(np.int32)
-    times = np.zeros(base**q, dtype=np.int64)
-    for start in range(0, n_items, _BLOCK):
-        block = coded.codes[start : start + _BLOCK]
-        keys = powers[block[:, 0]]
-        for column in block.T[1:]:
-            keys += powers[column]
-        times += np.bincount(keys, minlength=times.size)
-    met = np.flatnonzero(times)
-    counts = met[:, None] // powers[:-1].astype(np.int64) % base
-    return item_table(counts, times[met])
+    if base**n_categories < 2**31:
+        powers = powers.astype(np.int32)
+    keys = powers[codes[:, 0]]
+    for column in codes.T[1:]:
+        keys += powers[column]
+    return keys
 
 
 def _few(coded: CodedRatings) -> FewItems:

@@ -1,0 +1,65 @@
+"""Timing of several functions turn by turn, so that all meet the same load."""
+
+import gc
+import statistics
+import time
+import tracemalloc
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+Work = Callable[[], object]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Timing:
+    """Seconds a call took, turn by turn."""
+
+    seconds: tuple[float, ...]
+
+    @property
+    def median(self) -> float:
+        """The middle one."""
+        return statistics.median(self.seconds)
+
+    @property
+    def spread(self) -> float:
+        """Half the distance of the quartiles, over the median."""
+        if len(self.seconds) < 4:
+            return (max(self.seconds) - min(self.seconds)) / (2 * self.median)
+        low, _, high = statistics.quantiles(self.seconds, n=4)
+        return (high - low) / (2 * self.median)
+
+
+def side_by_side(
+    works: Mapping[str, Work], *, turns: int, least_s: float = 0.02
+) -> dict[str, Timing]:
+    """Time every function in turn, each call repeated until it takes `least_s`."""
+    repeats = {}
+    for name, work in works.items():
+        start = time.perf_counter()
+        work()
+        repeats[name] = max(1, int(least_s / max(time.perf_counter() - start, 1e-9)))
+    seconds: dict[str, list[float]] = {name: [] for name in works}
+    gc.collect()
+    gc.disable()
+    try:
+        for _ in range(turns):
+            for name, work in works.items():
+                start = time.perf_counter()
+                for _ in range(repeats[name]):
+                    work()
+                seconds[name].append((time.perf_counter() - start) / repeats[name])
+    finally:
+        gc.enable()
+    return {name: Timing(seconds=tuple(found)) for name, found in seconds.items()}
+
+
+def peak_megabytes(work: Work) -> float:
+    """Return the most memory that was allocated at once during a call, in MB."""
+    gc.collect()
+    tracemalloc.start()
+    try:
+        work()
+        return tracemalloc.get_traced_memory()[1] / 1e6
+    finally:
+        tracemalloc.stop()
