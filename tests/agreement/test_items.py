@@ -1,0 +1,260 @@
+"""Distinct items and patterns, counted in whichever way, are those of a plain count."""
+
+from collections import Counter
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from masrel.agreement import (
+    COEFFICIENTS,
+    code_ratings,
+    count_ratings,
+    declared_weights,
+    fleiss_kappa,
+    fleiss_kappa_from_counts,
+    items,
+    krippendorff_alpha_from_counts,
+    percent_agreement_from_counts,
+)
+from masrel.agreement.coding import CodedRatings
+from masrel.agreement.counts import (
+    check_counts,
+    check_table,
+    coded_items,
+    column_categories,
+    counted_items,
+    item_counts,
+)
+from masrel.agreement.items import FewItems, ItemTable, Linear, ManyItems, item_table
+from masrel.agreement.patterns import distinct_patterns
+from masrel.errors import CountsError, ParameterError
+
+Codes = NDArray[np.int8]
+
+
+def coded(codes: Codes, n_categories: int) -> CodedRatings:
+    return CodedRatings(codes=codes, categories=tuple(range(n_categories)))
+
+
+def random_codes(
+    n_items: int, n_raters: int, n_categories: int, seed: int = 1
+) -> Codes:
+    rng = np.random.Generator(np.random.PCG64(seed))
+    return rng.integers(-1, n_categories, (n_items, n_raters)).astype(np.int8)
+
+
+def plain_count(codes: Codes, n_categories: int) -> Counter[tuple[int, ...]]:
+    """Count items by what the word means: rating after rating."""
+    return Counter(
+        tuple(row.count(k) for k in range(n_categories)) for row in codes.tolist()
+    )
+
+
+def found(table: ItemTable) -> Counter[tuple[int, ...]]:
+    if isinstance(table, FewItems):
+        rows, times = table.rows, table.times
+    else:
+        rows, times = table.counts.tolist(), table.times.tolist()
+    counted: Counter[tuple[int, ...]] = Counter()
+    for row, n in zip(rows, times, strict=True):
+        counted[tuple(row)] += n
+    return counted
+
+
+SHAPES = [
+    # items, raters, categories; n_raters + 1 to the power n_categories keys
+    (1, 1, 1),
+    (30, 3, 4),  # few: counted in Python
+    (2_001, 1, 3),  # just more than few
+    (5_000, 3, 4),  # 4⁴ keys: a table of keys
+    (70_000, 2, 3),  # more than one block
+    (1_000, 8, 4),  # 9⁴ keys of at most 16 000
+    (1_000, 5, 9),  # 6⁹ keys: too many, counted category by category
+    (1_000, 3, 30),  # more categories than raters
+    (900, 40, 12),  # 41¹² keys are more than 64 bits hold
+]
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_distinct_items_are_those_of_a_plain_count(
+    shape: tuple[int, int, int],
+) -> None:
+    codes = random_codes(*shape)
+    table = coded_items(coded(codes, shape[2]))
+    assert table.n_categories == shape[2]
+    assert found(table) == plain_count(codes, shape[2])
+
+
+@given(
+    st.lists(st.lists(st.integers(-1, 2), min_size=3, max_size=3), min_size=1),
+)
+def test_counts_of_items_are_those_of_a_plain_count(rows: list[list[int]]) -> None:
+    codes = np.array(rows, dtype=np.int8)
+    counts = item_counts(coded(codes, 3))
+    assert [tuple(row) for row in counts.tolist()] == [
+        tuple(row.count(k) for k in range(3)) for row in rows
+    ]
+    assert found(counted_items(counts)) == plain_count(codes, 3)
+
+
+@pytest.mark.parametrize("largest", [1, 9, 40, 10_000])
+def test_equal_rows_of_a_table_of_counts_are_put_together(largest: int) -> None:
+    # bases 2, 10 (10⁴ keys), and 41 and 10 001, beyond the table of keys in 5 columns
+    rng = np.random.Generator(np.random.PCG64(2))
+    counts = rng.integers(0, largest + 1, (1_500, 5))
+    counts[0, 0] = largest
+    assert found(counted_items(counts)) == Counter(map(tuple, counts.tolist()))
+
+
+@pytest.mark.parametrize("shape", [*SHAPES[:6], (300, 40, 4), (300, 70, 126)])
+def test_distinct_patterns_are_those_of_a_plain_count(
+    shape: tuple[int, int, int],
+) -> None:
+    codes = random_codes(*shape)
+    rows, times = distinct_patterns(codes, shape[2])
+    assert rows.dtype == times.dtype == np.int64
+    pairs = zip(map(tuple, rows.tolist()), times.tolist(), strict=True)
+    assert dict(pairs) == Counter(map(tuple, codes.tolist()))
+
+
+def test_a_pattern_of_missing_ratings_and_of_the_last_category_come_back() -> None:
+    codes = np.array([[-1, -1, -1], [3, 3, 3], [-1, 3, -1], [3, 3, 3]], dtype=np.int8)
+    rows, times = distinct_patterns(codes, 4)
+    assert sorted(zip(rows.tolist(), times.tolist(), strict=True)) == [
+        ([-1, -1, -1], 1),
+        ([-1, 3, -1], 1),
+        ([3, 3, 3], 2),
+    ]
+
+
+NAMES = ["identity", "linear", "quadratic", "radical"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_few_and_many_items_have_the_same_sums(name: str) -> None:
+    counts = item_counts(coded(random_codes(200, 4, 3), 3))
+    times = np.arange(200) % 5 + 1
+    few = FewItems(counts.tolist(), times.tolist(), 3)
+    many = ManyItems(counts, times)
+    weights = declared_weights(name, [1, 2, 4])  # type: ignore[arg-type]
+    exact, in_arrays = few.groups(weights), many.groups(weights)
+    # an item of one rating has no disagreement, weighted or not
+    assert exact == in_arrays
+    assert [group.size for group in exact] == [1, 2, 3, 4]
+    slopes = [3, -1, 2]
+    function = Linear(
+        by_size={n: (n, 1 - n, 2) for n in range(1, 5)}, slopes=slopes, denominator=7
+    )
+    above, below = few.square_sum(weights, function)
+    as_float, one = many.square_sum(weights, function)
+    assert one == 1
+    assert as_float == pytest.approx(float(Fraction(above, below)), rel=1e-12)
+
+
+def test_sums_of_groups_by_hand() -> None:
+    # (2, 0), (1, 1) twice, (0, 1), and nothing: pairs that differ: 0, 2, 2
+    table = FewItems([[2, 0], [1, 1], [0, 1], [0, 0]], [1, 2, 1, 4], 2)
+    one, two = table.groups(declared_weights("identity", ["a", "b"]))
+    assert (one.size, one.n_items, one.totals, one.disagreement) == (1, 1, [0, 1], 0)
+    assert (two.size, two.n_items, two.totals, two.disagreement) == (2, 3, [4, 2], 4)
+
+
+def test_sums_that_pass_64_bits_stay_exact() -> None:
+    # sizes of 2³², squared 2⁶⁴: n² Σ t = 3 · 2⁶⁴, of which a² + b² agree
+    a, b = 2**32 - 1, 1
+    table = ManyItems(np.array([[a, b]]), np.array([3]))
+    (group,) = table.groups(declared_weights("identity", ["a", "b"]))
+    assert group.disagreement == 3 * 2 * a * b
+    assert group.totals == [3 * a, 3 * b]
+    (linear,) = table.groups(declared_weights("linear", [0, 1]))
+    assert linear.disagreement == 3 * 2 * a * b
+
+
+def test_coefficients_of_huge_counts_are_exact() -> None:
+    # P of (a, a) is 2 (a choose 2)/(2a choose 2) = (a - 1)/(2a - 1)
+    a = 2**40
+    counts = [[a, a]] * 2_500  # many
+    assert percent_agreement_from_counts(counts).value == (a - 1) / (2 * a - 1)
+    few = percent_agreement_from_counts(counts[:2])
+    assert few.value == (a - 1) / (2 * a - 1)
+
+
+def test_the_table_is_chosen_by_its_size() -> None:
+    counts = np.ones((items._FEW // 2, 2), dtype=np.int64)
+    assert isinstance(item_table(counts), FewItems)
+    assert isinstance(item_table(np.vstack([counts, counts])), ManyItems)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        entry.name
+        for entry in COEFFICIENTS.values()
+        if entry.weighted and entry.shape == "ratings" and entry.n_raters[1] is None
+    ],
+)
+def test_items_in_arrays_and_in_integers_give_the_same(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rows = coded(random_codes(1_000, 7, 6, seed=3), 6)
+    for weights in ("identity", "quadratic"):
+        both = []
+        for few, kind in ((0, ManyItems), (10**9, FewItems)):
+            with monkeypatch.context() as patched:
+                patched.setattr(items, "_FEW", few)
+                assert isinstance(coded_items(rows), kind)
+                both.append(COEFFICIENTS[name](rows, weights=weights))  # type: ignore[arg-type]
+        in_arrays, exact = both
+        assert in_arrays.value == exact.value
+        assert in_arrays.standard_error == pytest.approx(
+            exact.standard_error, rel=1e-12
+        )
+
+
+def test_counts_and_ratings_give_the_same() -> None:
+    rows = random_codes(25, 3, 3, seed=4)
+    counts = item_counts(coded(rows, 3))
+    from_counts = fleiss_kappa_from_counts(counts)
+    from_ratings = fleiss_kappa(coded(rows, 3))
+    assert from_counts == from_ratings
+
+
+def test_counted_ratings_are_counted_once() -> None:
+    counted = count_ratings([["a", "b"], ["b", "b"]])
+    assert count_ratings(counted) is counted
+    assert code_ratings(counted) is counted.coded
+    assert (counted.n_raters, counted.coded.n_items) == (2, 2)
+
+
+@pytest.mark.parametrize(
+    ("counts", "said"),
+    [
+        ([[1, 2.5]], "row 0, column 1: needs a whole number of at least 0 .* got 2.5"),
+        ([[1, 2], [0, -3]], "row 1, column 1.*got -3"),
+        ([[1, float("inf")]], "got inf"),
+        ([[1, 2.0**53]], r"below 2\^53"),
+        ([[True, False]], "needs whole numbers, got bool"),
+        (np.zeros((0, 2)), r"at least one of each, got shape \(0, 2\)"),
+        ([1, 2, 3], "needs a table"),
+    ],
+)
+def test_what_are_no_counts_is_refused_with_its_place(
+    counts: object, said: str
+) -> None:
+    with pytest.raises(CountsError, match=said):
+        check_counts(counts)  # type: ignore[arg-type]
+
+
+def test_whole_floats_are_counts() -> None:
+    assert check_counts([[1.0, 2.0]]).dtype == np.int64
+    assert check_table(np.eye(2)).tolist() == [[1, 0], [0, 1]]
+
+
+def test_as_many_categories_as_columns() -> None:
+    assert list(column_categories(None, 3)) == [1, 2, 3]
+    with pytest.raises(ParameterError, match=r"needs 2, one per column.*got 3"):
+        krippendorff_alpha_from_counts([[1, 1]], categories=["a", "b", "c"])
