@@ -11,7 +11,12 @@ from masrel.agreement.coding import CodedRatings, Label, code_ratings
 from masrel.agreement.counts import coded_items, item_counts
 from masrel.agreement.kernel import Floats, Kernel, divide, weighted_disagreement
 from masrel.agreement.patterns import distinct_patterns
-from masrel.agreement.pooled import Observed, check_population
+from masrel.agreement.pooled import (
+    Observed,
+    Variance,
+    check_population,
+    check_variance,
+)
 from masrel.agreement.undefined import NO_CHANCE, NO_PAIR, undefined
 from masrel.agreement.weights import WeightName, Weights, declared_weights
 from masrel.estimates import Estimate
@@ -24,6 +29,7 @@ def conger_kappa(
     *,
     categories: Sequence[Label] | None = None,
     weights: "WeightName | ArrayLike" = "identity",
+    variance: Variance = "delta",
     population: int | None = None,
 ) -> Estimate:
     """Estimate Conger's kappa from an item × rater table.
@@ -36,6 +42,8 @@ def conger_kappa(
         The declared scale in order; the labels met when not given.
     weights : str or array_like, shape (n_categories, n_categories), optional
         How much two categories agree; see `declared_weights`.
+    variance : {"delta", "irrcac"}, optional
+        Which standard error; irrCAC's is too large with single ratings.
     population : int, optional
         Items there are in all, for the finite-population correction.
 
@@ -78,6 +86,7 @@ def conger_kappa(
     """
     coded = code_ratings(ratings, categories)
     v = declared_weights(weights, coded.categories)
+    check_variance(variance)
     check_population(population, coded.n_items)
     observed = Observed.of(coded_items(coded).groups(v), v)
     margins = _Margins.of(coded, v)
@@ -89,7 +98,12 @@ def conger_kappa(
         p_o, p_e = (over_o - d_o) / over_o, (over_e - d_e) / over_e
         if reason is None:
             value = (d_e * over_o - d_o * over_e) / (d_e * over_o)
-            error = _standard_error(coded, v, observed, margins, population)
+            rows, times = distinct_patterns(coded.codes, coded.n_categories)
+            influence, usable = _influence(rows, coded.n_items, v, observed, margins)
+            if variance == "irrcac":  # an item without a pair stays as it is
+                influence += value * (usable * coded.n_items / observed.n_usable - 1.0)
+            influence[(rows < 0).all(axis=1)] = 0.0
+            error = _standard_error(influence, times, coded.n_items, population)
     return Estimate(
         coefficient="conger_kappa",
         weights=v.name,
@@ -166,45 +180,29 @@ class _Margins:
 
 
 def _standard_error(
-    coded: CodedRatings,
-    v: Weights,
-    observed: Observed,
-    margins: _Margins,
-    population: int | None,
+    influence: Floats, times: NDArray[np.int64], n: int, population: int | None
 ) -> float:
-    n = coded.n_items
     if n < 2:
         return math.nan
-    # With s_i = 1 for an item with a pair and d_i its disagreement,
-    #   -D_e u_i = (n/n') (d_i - D_o s_i) - (D_o/D_e) dD_e, where rater g who rated i k
-    #   moves D_e by (n/n_g) 2 (h_gk - Σ_l h_gl p_gl), h_gk = Σ_l v_kl Σ_{h≠g} p_hl.
-    over_e = margins.denominator
-    moves = []
-    for n_g, shares, h in zip(
-        margins.n_ratings, margins.shares, margins.products, strict=True
-    ):
-        mean = sum([p * x for p, x in zip(shares, h, strict=True)])
-        moves.append(
-            [2 * n * (x * margins.multiple - mean) / (n_g * over_e) for x in h]
-        )
-    d_o = observed.numerator / observed.denominator
-    d_e = margins.numerator / over_e
-    rows, times = distinct_patterns(coded.codes, coded.n_categories)
-    value = _influences(rows, v, np.array(moves), margins.raters)
-    apart, usable, moved = value
-    influence = n / observed.n_usable * (apart - d_o * usable) / d_e
-    influence -= d_o / d_e**2 * moved
-    influence[(rows < 0).all(axis=1)] = 0.0
     variance = float((times * influence * influence).sum()) / (n * (n - 1))
     if population is not None:
         variance *= (population - n) / population
     return math.sqrt(variance)
 
 
-def _influences(
-    rows: NDArray[np.int64], v: Weights, moves: Floats, raters: list[int]
-) -> tuple[Floats, Floats, Floats]:
-    # distinct rows (m, n_raters) -> d_i, s_i and dD_e, each (m,)
+def _influence(
+    rows: NDArray[np.int64],
+    n: int,
+    v: Weights,
+    observed: Observed,
+    margins: _Margins,
+) -> tuple[Floats, Floats]:
+    # distinct rows (m, n_raters) -> u_i and s_i = 1 for an item with a pair, each (m,).
+    # With d_i an item's disagreement,
+    #   D_e u_i = (D_o/D_e) dD_e - (n/n') (d_i - D_o s_i), where rater g who rated i k
+    #   moves D_e by (n/n_g) 2 (h_gk - Σ_l h_gl p_gl), h_gk = Σ_l v_kl Σ_{h≠g} p_hl.
+    d_o = observed.numerator / observed.denominator
+    d_e = margins.numerator / margins.denominator
     coded = CodedRatings(codes=rows, categories=tuple(range(v.n_categories)))
     counts = item_counts(coded).astype(np.float64)
     size = counts.sum(axis=1)
@@ -212,9 +210,16 @@ def _influences(
     pairs = np.where(size > 1, size * (size - 1), 1.0)
     apart = usable * weighted_disagreement(counts, v.as_floats()) / pairs
     moved = np.zeros(len(rows))
-    for move, g in zip(moves, raters, strict=True):
-        moved += np.append(move, 0.0)[rows[:, g]]  # missing, -1, is the last
-    return apart, usable, moved
+    for column, n_g, shares, h in zip(
+        rows.T, margins.n_ratings, margins.shares, margins.products, strict=True
+    ):
+        mean = sum([p * x for p, x in zip(shares, h, strict=True)])
+        over = n_g * margins.denominator
+        of_g = [2 * n * (x * margins.multiple - mean) / over for x in h]
+        moved += np.array([*of_g, 0.0])[column]  # missing, -1, is the last
+    influence = d_o / d_e**2 * moved
+    influence -= n / observed.n_usable * (apart - d_o * usable) / d_e
+    return influence, usable
 
 
 def _features(coded: CodedRatings, v: Floats) -> Floats:

@@ -32,6 +32,7 @@ __all__ = [
     "Shares",
     "Variance",
     "check_population",
+    "check_variance",
     "estimate_counts",
     "estimate_ratings",
     "pooled_estimate",
@@ -358,12 +359,27 @@ def estimate_counts(
 
 
 def _options(name: str, title: str, asked: Asked) -> Options:
-    if asked.variance not in _VARIANCES:
-        raise ParameterError(
-            f"variance: needs one of {', '.join(get_args(Variance))}, "
-            f"got {asked.variance!r}"
-        )
+    check_variance(asked.variance)
     return Options(name, title, asked.variance, asked.population)
+
+
+def check_variance(variance: str) -> None:
+    """Check the name of a standard error.
+
+    Parameters
+    ----------
+    variance : str
+        A name.
+
+    Raises
+    ------
+    ParameterError
+        If there is none of that name.
+    """
+    if variance not in _VARIANCES:
+        raise ParameterError(
+            f"variance: needs one of {', '.join(_VARIANCES)}, got {variance!r}"
+        )
 
 
 def check_population(population: int | None, n_items: int) -> None:

@@ -62,7 +62,13 @@ def test_standard_error_is_that_of_the_delta_method(dataset: Dataset, key: str) 
     assert found == pytest.approx(float(expected), rel=1e-12, abs=1e-15)
 
 
-POOLED = ("percent_agreement", "fleiss_kappa", "gwet_ac", "brennan_prediger")
+POOLED = (
+    "percent_agreement",
+    "conger_kappa",
+    "fleiss_kappa",
+    "gwet_ac",
+    "brennan_prediger",
+)
 
 
 @pytest.mark.parametrize(("dataset", "key"), cases(*POOLED, field="se"))
