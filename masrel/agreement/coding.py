@@ -97,7 +97,12 @@ def code_ratings(
     >>> code_ratings([["1", "1+"], ["2", None]], ["1", "1+", "2"]).codes.tolist()
     [[0, 1], [2, -1]]
     """
-    ratings = getattr(ratings, "coded", ratings)  # ratings that are counted, too
+    if hasattr(ratings, "coded"):  # ratings that are counted
+        if ratings.coded is None:
+            raise RatingsError(
+                "ratings: needs to know who rated what, got counts of a table"
+            )
+        ratings = ratings.coded
     if isinstance(ratings, CodedRatings):
         return ratings
     declared = None if categories is None else check_categories(categories)

@@ -18,6 +18,7 @@ __all__ = [
     "coded_items",
     "column_categories",
     "count_ratings",
+    "count_table",
     "counted_items",
     "item_counts",
 ]
@@ -36,17 +37,20 @@ class CountedRatings:
 
     Attributes
     ----------
-    coded : CodedRatings
-        The ratings.
+    categories : tuple of str, int or float
+        Declared categories in order.
     items : FewItems or ManyItems
         Distinct items with how often each occurs.
     n_raters : int
         Raters with at least one rating.
+    coded : CodedRatings or None
+        The ratings; None where only counts are known, and not who rated what.
     """
 
-    coded: CodedRatings
+    categories: tuple[Label, ...]
     items: ItemTable = field(compare=False, repr=False)
     n_raters: int
+    coded: CodedRatings | None
 
 
 def count_ratings(
@@ -85,7 +89,59 @@ def count_ratings(
     # An item with all ratings there could be shows that every rater has one.
     full = isinstance(items, FewItems) and max(map(sum, items.rows))
     n_raters = full if full == coded.codes.shape[1] else coded.n_raters
-    return CountedRatings(coded=coded, items=items, n_raters=n_raters)
+    return CountedRatings(
+        categories=coded.categories, items=items, n_raters=n_raters, coded=coded
+    )
+
+
+def count_table(
+    table: ArrayLike, *, categories: Sequence[Label] | None = None
+) -> CountedRatings:
+    """Take a contingency table of two raters as counted ratings.
+
+    Parameters
+    ----------
+    table : array_like of int, shape (n_categories, n_categories)
+        Items per category of the first (rows) and of the second rater (columns).
+    categories : sequence of str, int or float, optional
+        The declared scale in order; 1 to n_categories unless given.
+
+    Returns
+    -------
+    CountedRatings
+        What coefficients of unnamed raters take in place of ratings. For Cohen's
+        kappa and Scott's pi see `cohen_kappa_from_table` and `scott_pi_from_table`.
+
+    Raises
+    ------
+    CountsError
+        If it is not a square table of counts.
+    ParameterError
+        If there are not as many categories as columns.
+
+    Examples
+    --------
+    >>> from masrel.agreement import gwet_ac
+    >>> gwet_ac(count_table([[20, 5], [10, 15]])).value
+    0.40594059405940597
+    """
+    cells: list[list[int]] = check_table(table).tolist()
+    q = len(cells)
+    found: dict[tuple[int, ...], int] = {}
+    for first in range(q):
+        for second in range(q):
+            if cells[first][second]:
+                row = [0] * q
+                row[first] += 1
+                row[second] += 1
+                item = tuple(row)
+                found[item] = found.get(item, 0) + cells[first][second]
+    return CountedRatings(
+        categories=tuple(column_categories(categories, q)),
+        items=FewItems(list(found), list(found.values()), q),
+        n_raters=2 if found else 0,
+        coded=None,
+    )
 
 
 def item_counts(coded: CodedRatings) -> Integers:

@@ -22,6 +22,7 @@ Integers = NDArray[np.int64]
 Floats = NDArray[np.float64]
 
 _FEW = 4_000  # counts that Python sums about as fast as numpy
+_CANCELLED = 1_000  # times less than its terms, a sum in floats has lost three digits
 
 
 class SizeGroup(NamedTuple):
@@ -207,29 +208,51 @@ class ManyItems:
             groups.append(SizeGroup(size, n_items, totals, disagreement))
         return groups
 
-    def square_sum(self, weights: Weights, function: Linear) -> tuple[float, int]:
-        """Return Σ_i function(item)² and 1; each item is computed in floats."""
+    def square_sum(
+        self, weights: Weights, function: Linear
+    ) -> tuple[float, int] | tuple[int, int]:
+        """Return Σ_i function(item)² as numerator and denominator.
+
+        Each item is computed in floats, unless its terms cancel; then in integers.
+        """
         counts = self.counts.astype(np.float64)
-        sizes = self.counts.sum(axis=1)
-        v = weights.denominator * ((counts @ weights.as_floats()) * counts).sum(axis=1)
-        place = {size: i for i, size in enumerate(function.by_size)}
-        parts = np.array(
-            [
-                [part / function.denominator for part in abe]
-                for abe in function.by_size.values()
-            ]
-        )
-        rated = sizes > 0
-        at = np.array([place[int(size)] for size in np.unique(sizes[rated])])
-        a, b, e = parts[at[np.unique(sizes[rated], return_inverse=True)[1]]].T
-        value = a * v[rated] + b
-        if function.slopes:  # agreement alone has none
-            value += e * (counts[rated] @ np.array(function.slopes, dtype=np.float64))
-        return float((self.times[rated] * value * value).sum()), 1
+        sizes = self._sizes()
+        # Only ratios of integers become floats: integers may be too large for one.
+        largest = max(map(abs, function.slopes), default=0) or 1
+        slopes = np.zeros(self.n_categories)
+        slopes[: len(function.slopes)] = [s / largest for s in function.slopes]
+        by_size = {
+            size: (
+                a * weights.denominator / function.denominator,
+                b / function.denominator,
+                e * largest / function.denominator,
+            )
+            for size, (a, b, e) in function.by_size.items()
+        }
+        met, at = np.unique(sizes, return_inverse=True)
+        nothing = (0.0, 0.0, 0.0)
+        parts = np.array([by_size[int(n)] if n else nothing for n in met])
+        a, b, e = parts[at.reshape(-1)].T
+        v = a * ((counts @ weights.as_floats()) * counts).sum(axis=1)
+        sloped = e * (counts @ slopes)
+        value = v + b + sloped
+        terms = np.abs(v) + np.abs(b) + np.abs(e) * (counts @ np.abs(slopes))
+        squares = float((self.times * value * value).sum())
+        if float((self.times * terms * terms).sum()) > _CANCELLED**2 * squares:
+            rows, times = self.counts.tolist(), self.times.tolist()
+            few = FewItems(rows, times, self.n_categories)
+            return few.square_sum(weights, function)
+        return squares, 1
+
+    def _sizes(self) -> Integers:
+        # ratings of each item, (n_distinct,); a row may sum to more than 64 bits hold
+        small = int(self.counts.max()) * self.n_categories < 2**62
+        sizes: Integers = self.counts.sum(axis=1, dtype=None if small else object)
+        return sizes
 
     def _unbounded(self) -> tuple[Integers, Integers]:
         # Python integers where a sum of squares could pass 64 bits
-        largest = int(self.counts.sum(axis=1).max()) ** 2 * int(self.times.sum())
+        largest = int(self._sizes().max()) ** 2 * int(self.times.sum())
         if largest < 2**62:
             return self.counts, self.times
         return self.counts.astype(object), self.times.astype(object)

@@ -101,7 +101,7 @@ def krippendorff_alpha(
     return _estimate(
         counted.items,
         counted.n_raters,
-        counted.coded.categories,
+        counted.categories,
         weights,
         metric,
         population,

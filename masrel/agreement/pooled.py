@@ -324,7 +324,7 @@ def estimate_ratings(
         The coefficient.
     """
     counted = count_ratings(ratings, asked.categories)
-    weights = declared_weights(asked.weights, counted.coded.categories)
+    weights = declared_weights(asked.weights, counted.categories)
     options = _options(name, title, asked)
     return pooled_estimate(counted.items, counted.n_raters, weights, expected, options)
 

@@ -6,9 +6,8 @@ from numpy.typing import ArrayLike
 
 from masrel.agreement.coding import CodedRatings, Label, code_ratings, complete
 from masrel.agreement.cohen import two_raters
-from masrel.agreement.counts import check_table, coded_items, column_categories
+from masrel.agreement.counts import coded_items, count_table
 from masrel.agreement.fleiss import FLEISS_KERNEL, expected_disagreement
-from masrel.agreement.items import FewItems
 from masrel.agreement.kernel import Floats, Kernel
 from masrel.agreement.pooled import Options, pooled_estimate
 from masrel.agreement.weights import WeightName, declared_weights
@@ -120,24 +119,11 @@ def scott_pi_from_table(
     >>> round(scott_pi_from_table([[1, 1], [0, 1]]).value, 3)
     0.333
     """
-    cells = check_table(table).tolist()
-    q = len(cells)
-    rows, times = [], []
-    for k in range(q):
-        for other in range(k, q):
-            row = [0] * q
-            row[k] += 1
-            row[other] += 1
-            rows.append(row)
-            both = cells[k][other] + cells[other][k]
-            times.append(cells[k][k] if k == other else both)
-    weights_made = declared_weights(weights, column_categories(categories, q))
-    met = [i for i, n in enumerate(times) if n]
-    items = FewItems([rows[i] for i in met], [times[i] for i in met], q)
+    counted = count_table(table, categories=categories)
     return pooled_estimate(
-        items,
-        2 if met else 0,
-        weights_made,
+        counted.items,
+        counted.n_raters,
+        declared_weights(weights, counted.categories),
         expected_disagreement,
         Options(_NAME, _TITLE, population=population),
     )
