@@ -95,8 +95,8 @@ def test_one_estimate_from_an_array_loads_numpy_alone(name: str) -> None:
         f"from masrel.agreement import {name}\n"
         f"{name}(numpy.array([[1, 1], [1, 2], [2, 2]]), weights='quadratic')\n"
         "after = {m.split('.')[0] for m in sys.modules} - before\n"
-        "print(sorted(after & {'pandas', 'scipy', 'statsmodels', 'matplotlib', 'emcee', "
-        "'click', 'msgspec'}), 'masrel.intervals' in sys.modules)"
+        "print(sorted(after & {'pandas', 'scipy', 'statsmodels', 'matplotlib', "
+        "'emcee', 'click', 'msgspec'}), 'masrel.intervals' in sys.modules)"
     )
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True

@@ -1,0 +1,226 @@
+"""Intraclass correlations: Shrout and Fleiss' table, scipy's F, hand-worked means."""
+
+import math
+from typing import get_args
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import stats
+
+from masrel.agreement import icc, icc_f_test
+from masrel.agreement.icc import IccForm
+from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
+
+FORMS = get_args(IccForm)
+
+# Shrout and Fleiss (1979), Table 2: six targets, four judges.
+TABLE_2 = [
+    [9, 2, 5, 8],
+    [6, 1, 3, 2],
+    [8, 4, 6, 8],
+    [7, 1, 2, 6],
+    [10, 5, 6, 9],
+    [6, 2, 4, 7],
+]
+
+
+@pytest.mark.parametrize(
+    ("form", "published"),
+    [
+        # Table 4 there: ICC(1,1), (2,1), (3,1), (1,4), (2,4), (3,4)
+        ("ICC(1)", 0.17),
+        ("ICC(A,1)", 0.29),
+        ("ICC(C,1)", 0.71),
+        ("ICC(1,k)", 0.44),
+        ("ICC(A,k)", 0.62),
+        ("ICC(C,k)", 0.91),
+    ],
+)
+def test_shrout_and_fleiss_table_4(form: IccForm, published: float) -> None:
+    assert icc(TABLE_2, form=form).value == pytest.approx(published, abs=0.005)
+
+
+def test_shrout_and_fleiss_worked_in_whole_numbers() -> None:
+    # Row sums 24, 12, 26, 16, 30, 19 (127), column sums 46, 15, 26, 40, Σx² = 841.
+    # With 127²/24 = 16129/24: SS_rows = (576 + 144 + 676 + 256 + 900 + 361)/4 - C
+    # = 2913/4 - C = 1349/24; SS_columns = (2116 + 225 + 676 + 1600)/6 - C
+    # = 4617/6 - C = 2339/24; SS_total = 841 - C = 4055/24; residual 367/24.
+    rows, columns, residual = 1349 / 24 / 5, 2339 / 24 / 3, 367 / 24 / 15
+    within = (2339 + 367) / 24 / 18
+    by_hand = {
+        "ICC(1)": (rows - within) / (rows + 3 * within),
+        "ICC(1,k)": (rows - within) / rows,
+        "ICC(C,1)": (rows - residual) / (rows + 3 * residual),
+        "ICC(C,k)": (rows - residual) / rows,
+        "ICC(A,1)": (rows - residual)
+        / (rows + 3 * residual + 4 * (columns - residual) / 6),
+        "ICC(A,k)": (rows - residual) / (rows + (columns - residual) / 6),
+    }
+    for form, value in by_hand.items():
+        found = icc(TABLE_2, form=form)  # type: ignore[arg-type]
+        assert found.value == pytest.approx(value, rel=1e-14)
+        assert (found.n_items, found.n_raters) == (6, 4)
+        assert found.weights == form
+
+
+def test_intervals_from_the_quantiles_of_f() -> None:
+    # one-way, of Shrout and Fleiss: F/F(.975; 5, 18) and F · F(.975; 18, 5)
+    f = icc_f_test(TABLE_2, form="ICC(1)").statistic
+    low, high = f / stats.f.ppf(0.975, 5, 18), f * stats.f.ppf(0.975, 18, 5)
+    found = icc(TABLE_2, form="ICC(1)").interval
+    assert found is not None
+    assert found.low == pytest.approx((low - 1) / (low + 3), rel=1e-9)
+    assert found.high == pytest.approx((high - 1) / (high + 3), rel=1e-9)
+    # of the mean of k: 1 - 1/F
+    found = icc(TABLE_2, form="ICC(1,k)").interval
+    assert found is not None
+    assert found.low == pytest.approx(1 - 1 / low, rel=1e-9)
+    f = icc_f_test(TABLE_2, form="ICC(C,1)").statistic
+    low = f / stats.f.ppf(0.95, 5, 15)
+    found = icc(TABLE_2, form="ICC(C,1)", level=0.9).interval
+    assert found is not None
+    assert found.low == pytest.approx((low - 1) / (low + 3), rel=1e-9)
+    assert (found.level, found.kind, found.target) == (0.9, "confidence", "items")
+
+
+def test_published_interval_of_absolute_agreement() -> None:
+    # as R's psych and irr print it for Table 2: ICC(A,1) 0.29 (0.019, 0.761)
+    found = icc(TABLE_2).interval
+    assert found is not None
+    assert (found.low, found.high) == pytest.approx((0.0188, 0.7611), abs=5e-4)
+    assert found.target == "both"
+
+
+tables = st.integers(2, 4).flatmap(
+    lambda k: st.lists(
+        st.lists(st.integers(0, 9), min_size=k, max_size=k), min_size=3, max_size=7
+    ).map(np.array)
+)
+
+
+@given(tables.filter(lambda table: table.var(axis=1).sum() > 0))
+def test_one_way_f_against_scipy(table: "np.ndarray[tuple[int, int]]") -> None:  # type: ignore[type-var]
+    if (table.mean(axis=1) == table.mean()).all():
+        table = table + np.arange(len(table))[:, None]
+    other = stats.f_oneway(*table)
+    found = icc_f_test(table, form="ICC(1)")
+    assert found.statistic == pytest.approx(other.statistic, rel=1e-9)
+    assert found.p_value == pytest.approx(other.pvalue, rel=1e-8)
+    n, k = table.shape
+    assert found.df == (n - 1, n * (k - 1))
+
+
+def test_two_way_f_is_that_of_a_paired_t_test() -> None:
+    # two conditions (here: items) rated by seven raters: F = t²
+    first, second = [3, 5, 4, 6, 7, 5, 2], [4, 5, 6, 6, 9, 8, 2]
+    t = stats.ttest_rel(first, second)
+    found = icc_f_test([first, second], form="ICC(C,1)")
+    assert found.statistic == pytest.approx(t.statistic**2, rel=1e-12)
+    assert found.p_value == pytest.approx(t.pvalue, rel=1e-10)
+
+
+@pytest.mark.parametrize("form", ["ICC(1)", "ICC(C,1)", "ICC(A,1)"])
+def test_that_of_the_mean_is_spearman_browns_image(form: IccForm) -> None:
+    single, mean = (
+        icc(TABLE_2, form=form),
+        icc(TABLE_2, form=form[:-2] + "k)")
+        if (form != "ICC(1)")
+        else icc(TABLE_2, form="ICC(1,k)"),
+    )
+    assert single.interval is not None
+    assert mean.interval is not None
+
+    def stepped_up(rho: float) -> float:
+        return 4 * rho / (1 + 3 * rho)
+
+    assert mean.value == pytest.approx(stepped_up(single.value), rel=1e-13)
+    for end in ("low", "high"):
+        of_single, of_mean = (getattr(e.interval, end) for e in (single, mean))
+        assert of_mean == pytest.approx(stepped_up(of_single), rel=1e-13)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_neither_origin_nor_unit_matters(form: IccForm) -> None:
+    table = np.array(TABLE_2)
+    for moved in (table + 2.0**40, table * 0.125 - 3, -table):
+        assert icc(moved, form=form).value == pytest.approx(
+            icc(table, form=form).value, rel=1e-13
+        )
+
+
+def test_a_rater_who_is_stricter_matters_to_agreement_alone() -> None:
+    table = np.array(TABLE_2)
+    stricter = table + np.array([0, 3, -2, 7])
+    for form in ("ICC(C,1)", "ICC(C,k)"):
+        same = icc(table, form=form).value  # type: ignore[arg-type]
+        assert icc(stricter, form=form).value == pytest.approx(same, rel=1e-13)  # type: ignore[arg-type]
+    for form in ("ICC(A,1)", "ICC(1)"):
+        assert icc(stricter, form=form).value < icc(table, form=form).value  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_perfect_agreement_is_one_and_so_is_its_interval(form: IccForm) -> None:
+    found = icc([[1, 1, 1], [2, 2, 2], [5, 5, 5]], form=form)
+    assert found.value == 1.0
+    assert found.interval is not None
+    assert found.interval.low == found.interval.high == 1.0
+    test = icc_f_test([[1, 1, 1], [2, 2, 2], [5, 5, 5]], form=form)
+    assert (test.statistic, test.p_value) == (math.inf, 0.0)
+
+
+def test_text_counts_by_rank_and_numbers_by_value() -> None:
+    scale = ["1", "1+", "2"]
+    text = [["1", "1+"], ["2", "2"], ["1+", "1"]]
+    assert icc(text, categories=scale).value == icc([[1, 2], [3, 3], [2, 1]]).value
+    uneven = icc([[1, 2], [4, 4], [2, 1]], categories=[1, 2, 4])
+    assert uneven.value == icc(np.array([[1, 2], [4, 4], [2, 1]])).value
+    with pytest.raises(RatingsError, match=r"declared scale in order.*text"):
+        icc(text)
+
+
+def test_items_with_a_missing_rating_are_left_out() -> None:
+    holed = [*TABLE_2, [5, None, 5, 5], [float("nan"), 1, 1, 1]]
+    assert icc(holed) == icc(TABLE_2)
+    frame = pd.DataFrame(holed)
+    assert icc(frame).value == icc(TABLE_2).value
+    assert icc(np.array(holed, dtype=float)).value == icc(TABLE_2).value
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize(
+    ("table", "why"),
+    [
+        ([[1, 2]], "fewer than two items"),
+        ([[1], [2]], "fewer than two raters"),
+        ([[3, 3], [3, 3]], "0/0: neither items nor ratings"),
+        ([[1, None], [None, 2]], "fewer than two items"),
+    ],
+)
+def test_undefined_with_a_reason(
+    form: IccForm, table: list[list[int]], why: str
+) -> None:
+    for function in (icc, icc_f_test):
+        with pytest.warns(UndefinedStatisticWarning, match=why):
+            found = function(table, form=form)  # type: ignore[operator]
+        assert why in found.reason
+    assert math.isnan(found.p_value)
+
+
+def test_mean_of_raters_on_items_that_do_not_differ_is_a_division_by_zero() -> None:
+    # items' means are equal, ratings within are not: (0 - W)/0
+    with pytest.warns(UndefinedStatisticWarning, match="division by 0"):
+        assert math.isnan(icc([[1, 2], [2, 1]], form="ICC(1,k)").value)
+    # F is 0 and says: no difference
+    found = icc_f_test([[1, 2], [2, 1]], form="ICC(1,k)")
+    assert (found.statistic, found.p_value) == (0.0, 1.0)
+
+
+def test_wrong_options_are_one_sentence() -> None:
+    with pytest.raises(ParameterError, match=r"form: needs one of ICC\(1\), .*'ICC2'"):
+        icc(TABLE_2, form="ICC2")  # type: ignore[arg-type]
+    for level in (0.0, 1.0, 95, math.nan):
+        with pytest.raises(ParameterError, match=r"level: needs \(0, 1\), got"):
+            icc(TABLE_2, level=level)
