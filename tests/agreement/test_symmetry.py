@@ -152,14 +152,14 @@ def test_equal_margins_of_a_sparse_table_by_hand() -> None:
 
 
 def test_a_category_of_equal_margins_stays_in() -> None:
-    # d = (1, 0, -1): all of category 2 is equal, but it carries changes.
-    # Pairs 1-2: 3, 1-3: 1, 2-3: 3. Without category 3: d = (1, 0),
-    # V = [[4, -3], [-3, 6]], its inverse's corner 6/15: X = 2/5 with 2 degrees.
-    # Dropping category 2 as well would give 1/4 with 1.
-    table = [[5, 2, 0], [1, 5, 2], [1, 1, 5]]
+    # d = (2, 0, -2): the margins of category 2 are equal, but it carries changes.
+    # Pairs 1-2: 3, 1-3: 1, 2-3: 3. Without category 3: d = (2, 0),
+    # V = [[4, -3], [-3, 6]], its inverse's corner 6/15: X = 4 · 6/15 with 2 degrees.
+    # Dropping category 2 as well would give 4/4 with 1.
+    table = [[5, 2, 1], [1, 5, 2], [0, 1, 5]]
     found = stuart_maxwell(table)
     assert np.sum(table, axis=0)[1] == np.sum(table, axis=1)[1]
-    assert found.statistic == pytest.approx(2 / 5, rel=1e-13)
+    assert found.statistic == pytest.approx(8 / 5, rel=1e-13)
     assert found.df == (2.0,)
 
 
