@@ -147,11 +147,11 @@ def test_margins_without_a_category_in_common_allow_no_agreement() -> None:
 
 
 def test_many_items_cost_no_digits() -> None:
-    # n = 2·10⁹ + 1, so that n² is beyond 64 bits: margins differ by one item of them.
-    n = 2 * 10**9 + 1
-    cells = [[10**9, 1], [0, 10**9]]
-    by_chance = Fraction((10**9 + 1) * 10**9 + 10**9 * (10**9 + 1), n)
-    assert kappa_max(cells) == float((n - 1 - by_chance) / (n - by_chance))
+    # Margins N + 2, 1 and N + 1, 2: at most N + 2 of N + 3 agree. (N + 3)(N + 2) less
+    # (N + 2)(N + 1) + 2 is 2N + 2, and (N + 3)² less it 3N + 5: of 20 digits the first
+    # ten cancel.
+    n = 10**9 + 1
+    assert kappa_max([[n, 2], [1, 0]]) == (2 * n + 2) / (3 * n + 5)
 
 
 @pytest.mark.parametrize("function", [prevalence_index, bias_index, kappa_max])
