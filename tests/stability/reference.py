@@ -280,14 +280,9 @@ def _coincidences(item: Item, w: Agreement) -> Sums:
 def _alpha(sums: Sums, w: Agreement, q: int) -> Any:
     n_of = [sums.get(("n", k), Fraction(0)) for k in range(q)]
     n = sum(n_of)
-    expected = sum(
-        (
-            n_of[c] * n_of[k] * (1 - w.get((c, k), 0))
-            for c, k in itertools.product(range(q), repeat=2)
-            if w.get((c, k), 0) != 1 and n_of[c] != 0 and n_of[k] != 0
-        ),
-        Fraction(0),
-    )
+    # Σ_ck n_c n_k (1 - w_ck), and w_ck is 0 for most pairs of many categories
+    alike = sum(of_w * n_of[c] * n_of[k] for (c, k), of_w in w.items())
+    expected = n * n - alike
     return 1 - (sums["apart"] / n) / (expected / (n * (n - 1)))
 
 

@@ -1,0 +1,152 @@
+"""Percent agreement and its standard errors by hand, with single ratings and without."""
+
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+
+import pytest
+from hypothesis import given
+
+from masrel.agreement import (
+    fleiss_kappa,
+    gwet_ac,
+    percent_agreement,
+    percent_agreement_from_counts,
+)
+from masrel.errors import ParameterError, UndefinedStatisticWarning
+from tests.agreement.slopes import delta_error
+from tests.strategies import LABELS, Table, tables
+
+# Krippendorff (2011), four observers of twelve units; the last has a single rating.
+UNITS: Table = [
+    [None if grade == "." else grade for grade in row.split()]
+    for row in (
+        "1 1 . 1,2 2 3 2,3 3 3 3,3 3 3 3,2 2 2 2,1 2 3 4,4 4 4 4,1 1 2 1,2 2 2 2,"
+        ". 5 5 5,. . 1 1,. 3 . ."
+    ).split(",")
+]
+
+# Agreement 1, 1/3, none: n = 3 items, n' = 2 with a pair, their mean 2/3.
+SINGLE: Table = [["a", "a", "a"], ["a", "a", "b"], ["a", None, None]]
+
+
+def test_krippendorffs_units_by_hand() -> None:
+    # Eleven with a pair: eight agree in all, two in 3 of 6 and one in 0 of 6.
+    found = percent_agreement(UNITS)
+    assert found.value == 9 / 11
+    assert (found.n_items, found.n_raters, found.n_categories) == (12, 4, 5)
+
+
+def test_linear_weights_count_how_far_apart_by_hand() -> None:
+    # 1 and 2 of a scale of 1 to 3 are half in agreement, 1 and 3 are not at all:
+    # items (1 2), (1 3), (2 2): 1/2, 0, 1.
+    table = [[1, 2], [1, 3], [2, 2]]
+    assert percent_agreement(table, weights="linear").value == 0.5
+    assert percent_agreement(table, weights="quadratic").value == pytest.approx(7 / 12)
+    # On a declared scale to 5 they are closer: 3/4, 1/2, 1.
+    wide = percent_agreement(table, categories=range(1, 6), weights="linear")
+    assert wide.value == 0.75
+
+
+def test_single_ratings_make_the_number_of_pairs_random_by_hand() -> None:
+    # u_i = (n/n') s_i (P_i - 2/3): 3/2 (1/3), 3/2 (-1/3), 0;
+    # SE² = (1/4 + 1/4)/(3 · 2) = 1/12.
+    assert percent_agreement(SINGLE).value == 2 / 3
+    error = percent_agreement(SINGLE).standard_error
+    assert error == pytest.approx(math.sqrt(1 / 12), rel=1e-14)
+
+
+def test_irrcacs_error_takes_a_single_rating_for_disagreement_by_hand() -> None:
+    # u_i + (2/3)(s_i n/n' - 1): 1/2 + 1/3, -1/2 + 1/3, 0 - 2/3;
+    # SE² = (25 + 1 + 16)/36 / 6 = 7/36, and not 3/36.
+    error = percent_agreement(SINGLE, variance="irrcac").standard_error
+    assert error == pytest.approx(math.sqrt(7 / 36), rel=1e-14)
+
+
+def test_irrcacs_errors_of_krippendorffs_units_are_those_it_prints() -> None:
+    # As R prints them, for a percentage, AC1 and Fleiss' kappa; the delta method's are
+    # smaller, by what the one single rating does.
+    for function, printed in (
+        (percent_agreement, 0.12561),
+        (gwet_ac, 0.14295),
+        (fleiss_kappa, 0.15302),
+    ):
+        found = function(UNITS, variance="irrcac").standard_error
+        assert found == pytest.approx(printed, abs=5e-6)
+        assert function(UNITS).standard_error < 0.9 * found
+
+
+@given(tables())
+def test_error_is_the_slope_of_the_plain_mean(table: Table) -> None:
+    agreement = []
+    for row in table:
+        grades = [g for g in row if g is not None]
+        pairs = len(grades) * (len(grades) - 1)
+        alike = sum(grades.count(g) - 1 for g in grades)
+        agreement.append(
+            (len(grades), Fraction(alike, pairs) if pairs else Fraction(0))
+        )
+    rated = [(n > 1, share) for n, share in agreement if n]
+    if len(rated) < 2 or not any(usable for usable, _ in rated):
+        return
+
+    def mean(w: Sequence[Fraction]) -> Fraction:
+        whole = sum(x for x, (usable, _) in zip(w, rated, strict=True) if usable)
+        return Fraction(
+            sum(x * share for x, (_, share) in zip(w, rated, strict=True)) / whole
+        )
+
+    found = percent_agreement(table, categories=LABELS)
+    assert found.value == float(mean([Fraction(1)] * len(rated)))
+    expected = delta_error(mean, len(rated))
+    assert found.standard_error == pytest.approx(expected, rel=1e-12, abs=1e-15)
+
+
+@given(tables(missing=False))
+def test_without_a_missing_rating_both_errors_are_one(table: Table) -> None:
+    one, other = (
+        percent_agreement(table, categories=LABELS, variance=name)  # type: ignore[arg-type]
+        for name in ("delta", "irrcac")
+    )
+    assert one.standard_error == pytest.approx(
+        other.standard_error, rel=1e-12, abs=1e-15, nan_ok=True
+    )
+
+
+@pytest.mark.parametrize("variance", ["delta", "irrcac"])
+def test_of_a_finite_population_the_items_rated_are_known(variance: str) -> None:
+    # 1 - f with f = 3/12, and f = 1: all there is to know was seen
+    plain, some, whole = (
+        percent_agreement(SINGLE, variance=variance, population=n).standard_error  # type: ignore[arg-type]
+        for n in (None, 12, 3)
+    )
+    assert some == pytest.approx(plain * math.sqrt(3 / 4), rel=1e-14)
+    assert whole == 0.0
+
+
+def test_a_population_holds_the_items_rated() -> None:
+    # three have a rating, the fourth has none
+    holed = [*SINGLE, [None, None, None]]
+    assert percent_agreement(holed, population=3).standard_error == 0.0
+    with pytest.raises(ParameterError, match="at least the 3 items rated, got 2"):
+        percent_agreement(holed, population=2)
+
+
+def test_a_mistyped_variance_gets_one_sentence() -> None:
+    said = "variance: needs one of delta, irrcac, got 'jackknife'"
+    with pytest.raises(ParameterError, match=said):
+        percent_agreement(SINGLE, variance="jackknife")  # type: ignore[arg-type]
+    with pytest.raises(ParameterError, match=said):
+        percent_agreement_from_counts([[2, 0]], variance="jackknife")  # type: ignore[arg-type]
+
+
+def test_is_not_corrected_for_chance_even_of_one_category() -> None:
+    found = percent_agreement([["a", "a"], ["a", "a"]])
+    assert (found.value, found.chance, found.reason) == (1.0, 0.0, None)
+
+
+def test_without_a_pair_there_is_none() -> None:
+    with pytest.warns(UndefinedStatisticWarning, match="no item has ratings of two"):
+        found = percent_agreement([["a", None], [None, "a"]], variance="irrcac")
+    assert math.isnan(found.value)
+    assert math.isnan(found.standard_error)

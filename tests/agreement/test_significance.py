@@ -1,0 +1,172 @@
+"""P-values of estimates: by hand, against 450 digits, and against a test of a mean."""
+
+import dataclasses
+import math
+
+import mpmath
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import stats
+
+from masrel.agreement import (
+    Significance,
+    cohen_kappa_from_table,
+    fleiss_kappa,
+    icc,
+    kendall_w,
+    p_value,
+    percent_agreement,
+)
+from masrel.errors import UndefinedStatisticWarning
+from masrel.estimates import Estimate
+
+
+def estimate(value: float, error: float, n_items: int = 20) -> Estimate:
+    """Make an estimate of which only value, error and items matter."""
+    return Estimate(
+        coefficient="fleiss_kappa",
+        weights="identity",
+        value=value,
+        standard_error=error,
+        observed=math.nan,
+        chance=math.nan,
+        n_items=n_items,
+        n_raters=2,
+        n_categories=2,
+    )
+
+
+def both_tails(t: float, df: int) -> float:
+    # P(|T| ≥ t) by the finite sums of Abramowitz and Stegun (1964), 26.7.3 and 26.7.4,
+    # with tan θ = t/√df: 1 - sin θ (1 + 1/2 cos²θ + 1·3/(2·4) cos⁴θ + ...) for even df,
+    # 1 - 2/π (θ + sin θ (cos θ + 2/3 cos³θ + 2·4/(3·5) cos⁵θ + ...)) for odd. Digits
+    # enough that the difference from 1 keeps some.
+    with mpmath.workdps(450):
+        square = mpmath.mpf(df) / (df + mpmath.mpf(t) ** 2)
+        sine, odd = mpmath.sqrt(1 - square), df % 2
+        term = mpmath.sqrt(square) if odd else mpmath.mpf(1)
+        total = mpmath.mpf(0)
+        for k in range(2 + odd, df + 1, 2):
+            total += term
+            term *= square * (k - 1) / k
+        if odd:
+            angle = mpmath.atan(mpmath.mpf(t) / mpmath.sqrt(df))
+            return float(1 - 2 / mpmath.pi * (angle + sine * total))
+        return float(1 - sine * total)
+
+
+def test_of_two_items_it_is_an_angle() -> None:
+    # One degree of freedom is Cauchy's law: P(|T| ≥ t) = 1 - (2/π) atan t; t = 1: 1/2.
+    assert p_value(estimate(0.5, 0.5, n_items=2)) == pytest.approx(0.5, rel=1e-14)
+    expected = 1.0 - 2.0 / math.pi * math.atan(3.0)
+    assert p_value(estimate(0.75, 0.25, n_items=2)) == pytest.approx(expected)
+
+
+def test_of_three_items_it_is_a_root() -> None:
+    # Two degrees of freedom: P(|T| ≥ t) = 1 - t/√(t² + 2); t = √2: 1 - 1/√2.
+    found = p_value(estimate(math.sqrt(2.0), 1.0, n_items=3))
+    assert found == pytest.approx(1.0 - math.sqrt(0.5), rel=1e-14)
+
+
+def test_of_a_table_of_two_raters_by_hand() -> None:
+    # [[20, 5], [10, 15]]: kappa 0.4, ASE² = 0.2016/12.5 over 50, ours over 49;
+    # t = 0.4/√(0.2016/12.5 · 50/49) = 3.1180, P(|t(49)| ≥ 3.1180) = 0.003045.
+    t = 0.4 / math.sqrt(0.2016 / 12.5 * 50 / 49)
+    found = p_value(cohen_kappa_from_table([[20, 5], [10, 15]]))
+    assert found == pytest.approx(both_tails(t, 49), rel=1e-10)
+    assert found == pytest.approx(0.003045, abs=5e-7)
+
+
+@pytest.mark.parametrize("df", [1, 2, 3, 4, 7, 29, 100, 1000, 20_000])
+@pytest.mark.parametrize("t", [1e-9, 0.1, 1.0, 1.96, 5.0, 12.0, 25.0, 40.0])
+def test_every_tail_has_its_digits(t: float, df: int) -> None:
+    # 40 with 1000 degrees is 1e-209: what 2 · (1 - P(T < t)) would call 0. Below
+    # 1e-307 a float has no more digits to be right in.
+    found = p_value(estimate(t, 1.0, n_items=df + 1))
+    assert found == pytest.approx(both_tails(t, df), rel=1e-9, abs=1e-307)
+
+
+@given(
+    grades=st.lists(st.tuples(*[st.sampled_from("abc")] * 3), min_size=2, max_size=30)
+)
+def test_of_percent_agreement_it_is_the_t_test_of_a_mean(
+    grades: list[tuple[str, str, str]],
+) -> None:
+    # Every item complete: its agreement is 0, 1/3 or 1, their mean has Student's law.
+    shares = [((a == b) + (a == c) + (b == c)) / 3 for a, b, c in grades]
+    if len(set(shares)) == 1:
+        return
+    other = stats.ttest_1samp(shares, 0.0)
+    assert p_value(percent_agreement(grades)) == pytest.approx(other.pvalue, rel=1e-9)
+
+
+@given(
+    value=st.floats(-1, 1),
+    error=st.floats(0, 10),
+    n_items=st.integers(2, 10_000),
+)
+def test_is_a_probability_whatever_the_sign(
+    value: float, error: float, n_items: int
+) -> None:
+    found = p_value(estimate(value, error, n_items))
+    assert 0.0 <= found <= 1.0
+    assert p_value(estimate(-value, error, n_items)) == found
+
+
+@given(st.floats(0, 50), st.floats(0, 50), st.integers(2, 200))
+def test_falls_as_the_coefficient_rises(one: float, other: float, n_items: int) -> None:
+    low, high = sorted((one, other))
+    more = p_value(estimate(high, 1.0, n_items))
+    assert more <= p_value(estimate(low, 1.0, n_items)) * (1 + 1e-12)
+
+
+def test_of_exactly_nothing_is_one() -> None:
+    assert p_value(estimate(0.0, 0.3)) == 1.0
+    assert p_value(estimate(-0.0, 0.3)) == 1.0
+
+
+def test_without_any_doubt_it_is_none_or_certain() -> None:
+    # An error of 0: whatever is not 0 cannot be.
+    assert p_value(estimate(0.0, 0.0)) == 1.0
+    assert p_value(estimate(1.0, 0.0)) == 0.0
+    assert p_value(estimate(-1e-300, 0.0)) == 0.0
+    perfect = fleiss_kappa([["a", "a"], ["b", "b"]])
+    assert (perfect.standard_error, p_value(perfect)) == (0.0, 0.0)
+
+
+def test_an_error_too_small_to_divide_by_is_no_fault() -> None:
+    assert p_value(estimate(0.5, 5e-324)) == 0.0
+
+
+def test_is_undefined_where_the_estimate_or_its_error_is() -> None:
+    assert math.isnan(p_value(estimate(math.nan, math.nan)))
+    assert math.isnan(p_value(estimate(0.5, math.nan)))
+    with pytest.warns(UndefinedStatisticWarning):
+        assert math.isnan(p_value(fleiss_kappa([["a", "a"]] * 3)))
+    one_item = fleiss_kappa([["a", "b"]], categories=["a", "b"])
+    assert one_item.reason is None
+    assert math.isnan(p_value(one_item))
+
+
+def test_coefficients_with_tests_of_their_own_have_none_here() -> None:
+    table = [[1, 2], [2, 3], [4, 4]]
+    assert math.isnan(p_value(kendall_w(table)))
+    assert math.isnan(p_value(icc(table)))
+
+
+def test_a_test_is_no_interval_and_cannot_be_changed() -> None:
+    fields = {field.name for field in dataclasses.fields(Significance)}
+    assert not fields & {"low", "high", "interval", "level", "standard_error"}
+    found = Significance(
+        name="bowker",
+        hypothesis="the table is symmetric",
+        statistic=3.25,
+        distribution="chi-squared",
+        df=(2.0,),
+        p_value=0.1969,
+        n_items=40,
+    )
+    assert str(found) == "bowker: 3.25, chi-squared(2), p = 0.197"
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        found.p_value = 0.04  # type: ignore[misc]
