@@ -1,4 +1,4 @@
-"""Percent agreement and its standard errors by hand, with single ratings and without."""
+"""Percent agreement and its standard errors: by hand, with and without lone ratings."""
 
 import math
 from collections.abc import Sequence

@@ -1,0 +1,157 @@
+"""Light's kappa: the mean of pairs by hand, gaps either way, errors by slopes."""
+
+import itertools
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+
+import pytest
+from hypothesis import given
+
+from masrel.agreement import cohen_kappa, conger_kappa, light_kappa
+from masrel.agreement.light import Missing
+from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
+from tests.agreement.slopes import delta_error
+from tests.strategies import LABELS, Table, tables
+
+SMALL: Table = [["a", "a", "a"], ["b", "b", "b"], ["a", "b", "b"]]
+
+
+def plain(table: Table, w: Sequence[Fraction]) -> Fraction | None:
+    # the mean over pairs of raters of Cohen's kappa on items that both rated
+    kappas = []
+    for g, h in itertools.combinations(range(len(table[0])), 2):
+        pairs = [
+            (row[g], row[h], x)
+            for row, x in zip(table, w, strict=True)
+            if row[g] is not None and row[h] is not None
+        ]
+        n = sum((x for *_, x in pairs), Fraction(0))
+        if not n:
+            return None
+        observed = sum(x for a, b, x in pairs if a == b) / n
+        chance = sum(
+            sum(x for a, _, x in pairs if a == k)
+            * sum(x for _, b, x in pairs if b == k)
+            for k in LABELS
+        ) / (n * n)
+        if chance == 1:
+            return None
+        kappas.append((observed - chance) / (1 - chance))
+    return Fraction(sum(kappas) / len(kappas))
+
+
+def test_three_raters_by_hand() -> None:
+    # First with second, and with third: p_o = 2/3, p_e = 2/9 + 2/9: 2/5. Second with
+    # third: 1. Their mean is 3/5; Conger's, of means, 4/7.
+    found = light_kappa(SMALL)
+    assert found.value == 0.6
+    assert found.value != conger_kappa(SMALL).value
+    # means over pairs: (2/3 + 2/3 + 1)/3 and (4/9 + 4/9 + 5/9)/3
+    assert (found.observed, found.chance) == (7 / 9, 13 / 27)
+    assert (found.n_items, found.n_raters, found.n_categories) == (3, 3, 2)
+
+
+def test_error_of_three_raters_by_hand() -> None:
+    # Pair 1, 2 at a a: [1 - 2/3 - (3/5)(1/3 + 2/3 - 8/9)]/(5/9) = (4/15)(9/5) = 12/25,
+    # at b b the same, at a b: [-2/3 - (3/5)(2/3 - 8/9)]/(5/9) = -24/25; pair 1, 3 the
+    # same; pair 2, 3 is perfect and does not move. u = (2/3)(12, 12, -24)/25; SE² =
+    # (64 + 64 + 256)/625 / 6 = 64/625.
+    assert light_kappa(SMALL).standard_error == pytest.approx(8 / 25, rel=1e-13)
+
+
+def test_pairs_that_share_a_rater_are_not_taken_for_independent() -> None:
+    # The same rater twice more tells nothing new: the error stays, and does not fall.
+    pairs: Table = [["a", "a"], ["b", "b"], ["a", "b"], ["b", "b"]]
+    twice = [[a, b, b] for a, b in pairs]
+    cohen = cohen_kappa(pairs)
+    found = light_kappa(twice)
+    # its pairs: the two of the first rater, and one that always agrees
+    assert found.value == pytest.approx((2 * cohen.value + 1) / 3, rel=1e-15)
+    assert found.standard_error == pytest.approx(cohen.standard_error * 2 / 3)
+
+
+def test_missing_ratings_listwise_and_pairwise_by_hand() -> None:
+    # The last two items are not whole. Pairwise, raters 1, 2 also have (a b), so that
+    # p_o = 2/4, shares of a 3/4 and 1/4, p_e = 6/16: 1/5; raters 2, 3 also have (a b):
+    # p_o = 3/4, shares of a 2/4 and 1/4, p_e = 8/16: 1/2; raters 1, 3 as before: 2/5.
+    holed: Table = [*SMALL, ["a", "b", None], [None, "a", "b"]]
+    assert light_kappa(holed).value == 0.6
+    assert light_kappa(holed).n_items == 3
+    found = light_kappa(holed, missing="pairwise")
+    assert found.value == float((Fraction(1, 5) + Fraction(1, 2) + Fraction(2, 5)) / 3)
+    assert found.n_items == 5
+
+
+@pytest.mark.filterwarnings("ignore::masrel.errors.UndefinedStatisticWarning")
+@pytest.mark.parametrize("missing", ["listwise", "pairwise"])
+@given(table=tables(n_raters=(2, 4)))
+def test_value_and_error_are_those_of_the_plain_formula(
+    missing: Missing, table: Table
+) -> None:
+    found = light_kappa(table, categories=LABELS, missing=missing)
+    least = len(table[0]) if missing == "listwise" else 1
+    rows = [r for r in table if sum(g is not None for g in r) >= least]
+    expected = plain(rows, [Fraction(1)] * len(rows)) if rows else None
+    if expected is None:
+        assert found.reason
+        return
+    assert found.value == float(expected)
+    if len(rows) > 1:
+        error = delta_error(lambda w: plain(rows, w) or Fraction(0), len(rows))
+        assert found.standard_error == pytest.approx(error, rel=1e-10, abs=1e-13)
+
+
+@given(tables(n_raters=(3, 3), missing=False))
+def test_is_the_mean_of_cohens_kappa(table: Table) -> None:
+    pairs = [[[r[g], r[h]] for r in table] for g, h in ((0, 1), (0, 2), (1, 2))]
+    if any(len({g for row in pair for g in row}) < 2 for pair in pairs):
+        return
+    values = [cohen_kappa(pair, categories=LABELS).value for pair in pairs]
+    found = light_kappa(table, categories=LABELS).value
+    assert found == pytest.approx(sum(values) / 3, rel=1e-13, abs=1e-15)
+
+
+def test_weights_are_those_of_every_pair() -> None:
+    table = [[1, 1, 2], [3, 3, 3], [1, 2, 1], [2, 2, 3]]
+    pairs = [[[r[g], r[h]] for r in table] for g, h in ((0, 1), (0, 2), (1, 2))]
+    for weights in ("linear", "quadratic"):
+        values = [
+            cohen_kappa(pair, categories=[1, 2, 3], weights=weights).value  # type: ignore[arg-type]
+            for pair in pairs
+        ]
+        found = light_kappa(table, weights=weights)  # type: ignore[arg-type]
+        assert found.value == pytest.approx(sum(values) / 3, rel=1e-14)
+
+
+def test_of_a_finite_population_the_items_rated_are_known() -> None:
+    some = light_kappa(SMALL, population=12).standard_error
+    assert some == pytest.approx(8 / 25 * math.sqrt(3 / 4), rel=1e-13)
+    assert light_kappa(SMALL, population=3).standard_error == 0.0
+    with pytest.raises(ParameterError, match="at least the 3 items rated, got 2"):
+        light_kappa(SMALL, population=2)
+
+
+def test_one_pair_without_a_kappa_is_named_and_none_is_given() -> None:
+    # Raters 2 and 3 chose b throughout: the mean of the others is not the mean.
+    with pytest.warns(UndefinedStatisticWarning, match="columns 1 and 2"):
+        found = light_kappa([["a", "b", "b"], ["b", "b", "b"], ["a", "b", "b"]])
+    assert math.isnan(found.value)
+    assert found.reason == "0/0: one category is all of the raters in columns 1 and 2"
+    # with what chance gives all the same
+    assert not math.isnan(found.observed)
+
+
+def test_a_pair_without_a_common_item_is_named() -> None:
+    table: Table = [["a", "a", None], ["b", "b", None], ["a", None, "b"]]
+    with pytest.warns(UndefinedStatisticWarning, match="columns 1 and 2"):
+        found = light_kappa(table, missing="pairwise")
+    assert "no item has both ratings" in (found.reason or "")
+
+
+def test_wrong_calls_are_one_sentence() -> None:
+    said = "missing: needs one of listwise, pairwise, got 'omit'"
+    with pytest.raises(ParameterError, match=said):
+        light_kappa(SMALL, missing="omit")  # type: ignore[arg-type]
+    with pytest.raises(RatingsError, match="at least two raters, got 1"):
+        light_kappa([["a"], ["b"]])

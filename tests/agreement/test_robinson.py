@@ -1,0 +1,161 @@
+"""Robinson's A: sums of squares by hand, and what it has in common with others."""
+
+import math
+from fractions import Fraction
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from masrel.agreement import icc, kendall_w, robinson_a
+from masrel.errors import RatingsError, UndefinedStatisticWarning
+
+Rows = list[list[int]]
+
+# Shrout and Fleiss (1979), Table 2: six targets, four judges.
+TABLE_2 = [
+    [9, 2, 5, 8],
+    [6, 1, 3, 2],
+    [8, 4, 6, 8],
+    [7, 1, 2, 6],
+    [10, 5, 6, 9],
+    [6, 2, 4, 7],
+]
+
+rows = st.integers(2, 5).flatmap(
+    lambda k: st.lists(
+        st.lists(st.integers(-9, 9), min_size=k, max_size=k), min_size=2, max_size=8
+    )
+)
+
+
+def plain(table: Rows) -> Fraction | None:
+    # squares between items, over all but those between raters
+    n, k = len(table), len(table[0])
+    mean = Fraction(sum(map(sum, table)), n * k)
+    items = sum(k * (Fraction(sum(row), k) - mean) ** 2 for row in table)
+    raters = sum(
+        n * (Fraction(sum(column), n) - mean) ** 2
+        for column in zip(*table, strict=True)
+    )
+    rest = sum((x - mean) ** 2 for row in table for x in row) - raters
+    return Fraction(items / rest) if rest else None
+
+
+def test_two_raters_by_hand() -> None:
+    # Levels 2 and 3 set aside: deviations -1, 0, 1 and -1, 1, 0. Items' means -1, 1/2,
+    # 1/2: SS = 2 (1 + 1/4 + 1/4) = 3; of all squares, 2 + 2 = 4.
+    found = robinson_a([[1, 2], [2, 4], [3, 3]])
+    assert found.value == 0.75
+    assert (found.n_items, found.n_raters, found.n_categories) == (3, 2, 4)
+    assert math.isnan(found.standard_error)
+    assert math.isnan(found.observed)
+    assert math.isnan(found.chance)
+
+
+def test_shrout_and_fleiss_table_worked_in_whole_numbers() -> None:
+    # SS of items 1349/24, of the residual 367/24; derived where ICC is tested.
+    assert robinson_a(TABLE_2).value == 1349 / (1349 + 367)
+
+
+@given(rows)
+def test_is_the_quotient_of_plain_sums(table: Rows) -> None:
+    expected = plain(table)
+    if expected is not None:
+        assert robinson_a(table).value == pytest.approx(float(expected), rel=1e-15)
+        assert 0 <= expected <= 1
+
+
+@given(rows)
+def test_of_two_raters_it_is_a_correlation(table: Rows) -> None:
+    # 1/2 + S_xy/(S_xx + S_yy): Robinson's A of two is (1 + r)/2 with the intraclass r
+    two = np.array([row[:2] for row in table], dtype=float)
+    if plain([row[:2] for row in table]) is None:
+        return
+    (s_xx, s_xy), (_, s_yy) = np.cov(two.T)
+    found = robinson_a(two).value
+    assert found == pytest.approx(0.5 + s_xy / (s_xx + s_yy), rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.filterwarnings("ignore::masrel.errors.UndefinedStatisticWarning")
+@given(rows)
+def test_is_consistency_on_another_scale(table: Rows) -> None:
+    # ICC(C,1) = (k A - 1)/(k - 1)
+    single = icc(table, form="ICC(C,1)")
+    if single.reason is not None:
+        return
+    k = len(table[0])
+    found = robinson_a(table).value
+    assert (k * found - 1) / (k - 1) == pytest.approx(single.value, abs=1e-12)
+
+
+@given(rows)
+def test_of_ranks_it_is_kendalls_w(table: Rows) -> None:
+    # Ranks have one sum for every rater: nothing is left between raters.
+    ranks = [
+        [2 * sum(y < x for y in column) + column.count(x) for x in column]
+        for column in (list(c) for c in zip(*table, strict=True))
+    ]
+    of_items = [list(row) for row in zip(*ranks, strict=True)]
+    if plain(of_items) is None:
+        return
+    w = kendall_w(table).value
+    assert robinson_a(of_items).value == pytest.approx(w, rel=1e-14, abs=1e-15)
+
+
+@given(rows, st.lists(st.integers(-50, 50), min_size=5, max_size=5))
+def test_neither_levels_of_raters_nor_units_matter(
+    table: Rows, levels: list[int]
+) -> None:
+    expected = plain(table)
+    if expected is None:
+        return
+    moved = [
+        [-4.0 * x + level for x, level in zip(row, levels, strict=False)]
+        for row in table
+    ]
+    assert robinson_a(moved).value == pytest.approx(float(expected), abs=1e-13)
+
+
+def test_one_grade_higher_throughout_loses_nothing() -> None:
+    assert robinson_a([[1, 2, 5], [2, 3, 6], [4, 5, 8]]).value == 1.0
+
+
+def test_numbers_far_from_zero_keep_their_digits() -> None:
+    far = np.array(TABLE_2) + 2.0**40
+    assert robinson_a(far).value == robinson_a(TABLE_2).value
+
+
+def test_items_with_a_missing_rating_are_left_out() -> None:
+    holed = [*TABLE_2, [5, None, 5, 5], [float("nan"), 1, 1, 1]]
+    for table in (holed, np.array(holed, dtype=float), pd.DataFrame(holed)):
+        found = robinson_a(table)
+        assert found.value == robinson_a(TABLE_2).value
+        assert found.n_items == 6
+
+
+def test_text_counts_by_its_place_in_the_declared_scale() -> None:
+    scale = ["1", "1+", "2", "3"]
+    text = [["1", "1+"], ["1+", "3"], ["2", "2"]]
+    assert robinson_a(text, categories=scale).value == 0.75
+    with pytest.raises(RatingsError, match=r"declared scale in order.*text"):
+        robinson_a(text)
+
+
+@pytest.mark.parametrize(
+    ("table", "why"),
+    [
+        ([[1, 2]], "fewer than two items or raters"),
+        ([[1], [2]], "fewer than two items or raters"),
+        ([[1, None], [None, 2]], "fewer than two items or raters"),
+        ([[1, 2], [1, 2], [1, 2]], "0/0: no variance but between raters"),
+        ([[3, 3], [3, 3]], "0/0: no variance but between raters"),
+    ],
+)
+def test_undefined_with_a_reason(table: Rows, why: str) -> None:
+    with pytest.warns(UndefinedStatisticWarning, match=why):
+        found = robinson_a(table)
+    assert math.isnan(found.value)
+    assert why in (found.reason or "")
