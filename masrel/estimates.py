@@ -2,10 +2,11 @@
 
 import dataclasses
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Generic, Literal, TypeVar
 
-__all__ = ["Estimate", "Interval", "Target", "Unit", "as_document"]
+__all__ = ["Estimate", "Interval", "OnDemand", "Target", "Unit", "as_document"]
 
 Target = Literal["items", "raters", "both"]
 """What a new study would draw anew: the population an interval speaks of."""
@@ -61,7 +62,28 @@ class Interval:
     reason: str | None = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+T = TypeVar("T")
+
+
+class OnDemand(Generic[T]):
+    """A field of a dataclass, or a call that computes it when it is first read."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    def __get__(self, instance: object, owner: type) -> T:
+        if instance is None:  # asked for a default: there is none
+            raise AttributeError(self._name)
+        value: T | Callable[[], T] = instance.__dict__[self._name]
+        if callable(value):
+            value = instance.__dict__[self._name] = value()
+        return value
+
+    def __set__(self, instance: object, value: T | Callable[[], T]) -> None:
+        instance.__dict__[self._name] = value
+
+
+@dataclass(frozen=True, kw_only=True)
 class Estimate:
     """An agreement coefficient with what it was computed from.
 
@@ -74,7 +96,8 @@ class Estimate:
     value : float
         The coefficient; ``nan`` when undefined.
     standard_error : float
-        Delta-method standard error, items random; ``nan`` when undefined.
+        Delta-method standard error, items random; ``nan`` when undefined. Computed
+        when it is first read.
     interval : Interval or None
         Only when one was asked for.
     observed, chance : float
@@ -89,7 +112,7 @@ class Estimate:
     coefficient: str
     weights: str
     value: float
-    standard_error: float
+    standard_error: OnDemand[float] = OnDemand()
     interval: Interval | None = None
     observed: float
     chance: float

@@ -13,7 +13,7 @@ from masrel.agreement.category import category_kappa, fleiss_null
 from masrel.agreement.coding import CodedRatings, code_ratings
 from masrel.agreement.cohen import cohen_kappa, cohen_kappa_from_table
 from masrel.agreement.conger import conger_kappa
-from masrel.agreement.counts import CountedRatings, count_ratings, count_table
+from masrel.agreement.counting import CountedRatings, count_ratings, count_table
 from masrel.agreement.fleiss import fleiss_kappa, fleiss_kappa_from_counts
 from masrel.agreement.gwet import gwet_ac, gwet_ac_from_counts
 from masrel.agreement.icc import icc, icc_f_test

@@ -8,8 +8,9 @@ from numpy.typing import ArrayLike
 from masrel.agreement.coding import Label
 from masrel.agreement.kernel import Floats, pooled_kernel
 from masrel.agreement.pooled import (
-    Asked,
     Expected,
+    Options,
+    PooledCoefficient,
     Shares,
     Variance,
     estimate_counts,
@@ -83,8 +84,8 @@ def brennan_prediger(
     >>> round(brennan_prediger([["a", "a"], ["b", "b"], ["a", "b"]]).value, 3)
     0.333
     """
-    asked = Asked(categories, weights, variance, population)
-    return estimate_ratings(_NAME, _TITLE, ratings, asked, _expected)
+    options = Options(categories, weights, variance, population)
+    return estimate_ratings(_COEFFICIENT, ratings, options)
 
 
 def brennan_prediger_from_counts(
@@ -126,16 +127,18 @@ def brennan_prediger_from_counts(
     >>> round(brennan_prediger_from_counts([[2, 0], [2, 0], [1, 1]]).value, 3)
     0.333
     """
-    asked = Asked(categories, weights, variance, population)
-    return estimate_counts(_NAME, _TITLE, counts, asked, _expected)
-
-
-_NAME, _TITLE = "brennan_prediger", "the Brennan-Prediger coefficient"
+    options = Options(categories, weights, variance, population)
+    return estimate_counts(_COEFFICIENT, counts, options)
 
 
 def _expected(shares: Shares, weights: Weights) -> Expected:  # noqa: ARG001 - no share matters
     # 1 - Σ_kl w_kl / q² = Σ_kl v_kl / q²
     return Expected(weights.total(), weights.n_categories**2 * weights.denominator)
+
+
+_COEFFICIENT = PooledCoefficient(
+    "brennan_prediger", "the Brennan-Prediger coefficient", _expected
+)
 
 
 def _in_floats(shares: Floats, v: Floats) -> Floats:  # noqa: ARG001 - no share matters

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.agreement.coding import Label, code_ratings
-from masrel.agreement.counts import item_counts
+from masrel.agreement.counting import item_counts
 from masrel.agreement.fleiss import fleiss_kappa_from_counts
 from masrel.agreement.significance import Significance
 from masrel.agreement.undefined import undefined

@@ -1,5 +1,6 @@
 """From any item × rater table of labels to integer codes."""
 
+import itertools
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -17,7 +18,15 @@ from masrel.agreement.labels import (
 )
 from masrel.errors import RatingsError
 
-__all__ = ["MISSING", "CodedRatings", "Codes", "Label", "code_ratings", "complete"]
+__all__ = [
+    "MISSING",
+    "CodedRatings",
+    "Codes",
+    "Label",
+    "code_ratings",
+    "complete",
+    "label_rows",
+]
 
 MISSING = -1
 """Code of a rating that was not given."""
@@ -105,22 +114,24 @@ def code_ratings(
         ratings = ratings.coded
     if isinstance(ratings, CodedRatings):
         return ratings
+    if not (hasattr(ratings, "to_numpy") or isinstance(ratings, np.ndarray)):
+        return _coded(*_row_codes(ratings, categories))
     declared = None if categories is None else check_categories(categories)
-    if hasattr(ratings, "to_numpy"):  # a DataFrame, without importing pandas
-        codes, found = frame_codes(ratings, declared)
-    elif isinstance(ratings, np.ndarray):
-        if ratings.ndim != 2:
-            raise RatingsError(
-                "ratings: needs two dimensions (items, raters), "
-                f"got {ratings.ndim} with shape {ratings.shape}"
-            )
-        if 0 in ratings.shape:
-            raise RatingsError(_NOTHING)
-        codes, found = array_codes(ratings, declared)
-    else:
-        codes, found = _row_codes(_rows(ratings), declared)
+    if not isinstance(ratings, np.ndarray):  # a DataFrame, without importing pandas
+        return _coded(*frame_codes(ratings, declared))
+    if ratings.ndim != 2:
+        raise RatingsError(
+            "ratings: needs two dimensions (items, raters), "
+            f"got {ratings.ndim} with shape {ratings.shape}"
+        )
+    if 0 in ratings.shape:
+        raise RatingsError(_NOTHING)
+    return _coded(*array_codes(ratings, declared))
+
+
+def _coded(codes: Codes, categories: tuple[Label, ...]) -> CodedRatings:
     codes.setflags(write=False)
-    return CodedRatings(codes=codes, categories=found)
+    return CodedRatings(codes=codes, categories=categories)
 
 
 def complete(coded: CodedRatings) -> CodedRatings:
@@ -147,32 +158,65 @@ _NOTHING = "ratings: needs at least one item and one rater, got none"
 
 def _rows(ratings: Any) -> list[list[object]]:
     # nested sequences -> n_items lists of n_raters labels
-    if isinstance(ratings, str) or not isinstance(ratings, Iterable):
+    if not _is_row(ratings):
         raise RatingsError(
             f"ratings: needs an item × rater table, got {type(ratings).__name__}"
         )
-    rows = []
-    for i, row in enumerate(ratings):
-        if isinstance(row, str) or not isinstance(row, Iterable):
+    rows: list[list[object]] = []
+    for row in ratings:
+        if type(row) is not list and not _is_row(row):
             raise RatingsError(
-                f"ratings: row {i} needs one rating per rater, got {row!r}"
+                f"ratings: row {len(rows)} needs one rating per rater, got {row!r}"
             )
         rows.append(list(row))
-        if len(rows[i]) != len(rows[0]):
-            raise RatingsError(
-                f"ratings: row {i} needs {len(rows[0])} ratings as row 0 has, "
-                f"got {len(rows[i])}"
-            )
     if not rows or not rows[0]:
         raise RatingsError(_NOTHING)
+    n_raters = len(rows[0])
+    for i, row in enumerate(rows):
+        if len(row) != n_raters:
+            raise RatingsError(
+                f"ratings: row {i} needs {n_raters} ratings as row 0 has, "
+                f"got {len(row)}"
+            )
     return rows
 
 
+def _is_row(row: object) -> bool:
+    return isinstance(row, Iterable) and not isinstance(row, str)
+
+
+def label_rows(
+    ratings: object, categories: Sequence[Label] | None
+) -> tuple[list[list[object]], tuple[Label, ...]]:
+    """Check the shape of a nested sequence of labels and find its scale.
+
+    Parameters
+    ----------
+    ratings : nested sequence, shape (n_items, n_raters)
+        Labels.
+    categories : sequence of str, int or float, or None
+        The declared scale in order; the labels met when None.
+
+    Returns
+    -------
+    tuple of list and tuple
+        The rows, and the scale; labels may not be of it.
+
+    Raises
+    ------
+    RatingsError
+        If it is no such table, or the categories are no scale.
+    """
+    rows = _rows(ratings)
+    if categories is None:
+        return rows, labels_met(itertools.chain.from_iterable(rows))
+    return rows, check_categories(categories)
+
+
 def _row_codes(
-    rows: list[list[object]], declared: tuple[Label, ...] | None
+    ratings: object, categories: Sequence[Label] | None
 ) -> tuple[Codes, tuple[Label, ...]]:
-    if declared is None:
-        declared = labels_met([label for row in rows for label in row])
+    rows, declared = label_rows(ratings, categories)
     position: dict[object, int] = {label: code for code, label in enumerate(declared)}
     position[None] = MISSING
     try:

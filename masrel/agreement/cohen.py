@@ -1,8 +1,9 @@
 """Cohen's kappa: agreement of two raters, each with margins of their own."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from masrel.agreement.coding import CodedRatings, Codes, Label, code_ratings
 from masrel.agreement.counts import check_table, column_categories
 from masrel.agreement.kernel import Floats, Kernel, divide
-from masrel.agreement.pooled import check_population
+from masrel.agreement.standard_error import check_population, standard_error
 from masrel.agreement.undefined import NO_CHANCE, NO_PAIR, undefined
 from masrel.agreement.weights import WeightName, Weights, declared_weights
 from masrel.errors import RatingsError
@@ -255,14 +256,15 @@ def _estimate(table: Table, v: Weights, population: int | None) -> Estimate:
         reason = undefined("Cohen's kappa", v.reason)
     elif found.below == 0:
         reason = undefined("Cohen's kappa", NO_CHANCE)
-    value = error = observed = chance = math.nan
+    value = observed = chance = math.nan
+    error: float | Callable[[], float] = math.nan
     if n:
         w = v.denominator
         observed = (n * w - found.above) / (n * w)
         chance = (n * n * w - found.below) / (n * n * w)
         if reason is None:
             value = (found.below - n * found.above) / found.below
-            error = _standard_error(found, v, population)
+            error = partial(_error, found, v, population)
     return Estimate(
         coefficient="cohen_kappa",
         weights=v.name,
@@ -277,21 +279,14 @@ def _estimate(table: Table, v: Weights, population: int | None) -> Estimate:
     )
 
 
-def _standard_error(found: PairSums, v: Weights, population: int | None) -> float:
-    n = found.n
-    if n < 2:
-        return math.nan
+def _error(found: PairSums, v: Weights, population: int | None) -> float:
     squares = sum(
         t * found.influence(k, l, v) ** 2
         for k, row in enumerate(found.cells)
         for l, t in enumerate(row)  # noqa: E741 - k, l as in the formula
         if t
     )
-    # n - 1: items are a sample, as for the coefficients of many raters.
-    variance = squares * n / (found.below**4 * (n - 1))
-    if population is not None:
-        variance *= (population - n) / population
-    return math.sqrt(variance)
+    return standard_error(squares * found.n**2, found.below**4, found.n, population)
 
 
 def _features(coded: CodedRatings, v: Floats) -> Floats:

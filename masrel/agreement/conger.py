@@ -1,22 +1,24 @@
 """Conger's kappa: Cohen's kappa for two or more raters, each with its own margins."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from masrel.agreement.coding import CodedRatings, Label, code_ratings
-from masrel.agreement.counts import coded_items, item_counts
+from masrel.agreement.counting import coded_items, item_counts
 from masrel.agreement.kernel import Floats, Kernel, divide, weighted_disagreement
 from masrel.agreement.patterns import distinct_patterns
-from masrel.agreement.pooled import (
-    Observed,
+from masrel.agreement.standard_error import (
     Variance,
     check_population,
     check_variance,
+    standard_error,
 )
+from masrel.agreement.tally import Observed
 from masrel.agreement.undefined import NO_CHANCE, NO_PAIR, undefined
 from masrel.agreement.weights import WeightName, Weights, declared_weights
 from masrel.estimates import Estimate
@@ -88,22 +90,19 @@ def conger_kappa(
     v = declared_weights(weights, coded.categories)
     check_variance(variance)
     check_population(population, coded.n_items)
-    observed = Observed.of(coded_items(coded).groups(v), v)
+    observed = coded_items(coded).tally(v).observed
     margins = _Margins.of(coded, v)
     reason = _reason(coded, observed, margins, v)
-    value = error = p_o = p_e = math.nan
+    value = p_o = p_e = math.nan
+    error: float | Callable[[], float] = math.nan
     if observed is not None:
         d_o, over_o = observed.numerator, observed.denominator
         d_e, over_e = margins.numerator, margins.denominator
         p_o, p_e = (over_o - d_o) / over_o, (over_e - d_e) / over_e
         if reason is None:
             value = (d_e * over_o - d_o * over_e) / (d_e * over_o)
-            rows, times = distinct_patterns(coded.codes, coded.n_categories)
-            influence, usable = _influence(rows, coded.n_items, v, observed, margins)
-            if variance == "irrcac":  # an item without a pair stays as it is
-                influence += value * (usable * coded.n_items / observed.n_usable - 1.0)
-            influence[(rows < 0).all(axis=1)] = 0.0
-            error = _standard_error(influence, times, coded.n_items, population)
+            as_irrcac = variance == "irrcac"
+            error = partial(_error, coded, v, observed, margins, as_irrcac, population)
     return Estimate(
         coefficient="conger_kappa",
         weights=v.name,
@@ -179,15 +178,24 @@ class _Margins:
         )
 
 
-def _standard_error(
-    influence: Floats, times: NDArray[np.int64], n: int, population: int | None
+def _error(
+    coded: CodedRatings,
+    v: Weights,
+    observed: Observed,
+    margins: _Margins,
+    as_irrcac: bool,
+    population: int | None,
 ) -> float:
-    if n < 2:
-        return math.nan
-    variance = float((times * influence * influence).sum()) / (n * (n - 1))
-    if population is not None:
-        variance *= (population - n) / population
-    return math.sqrt(variance)
+    rows, times = distinct_patterns(coded.codes, coded.n_categories)
+    n = coded.n_items
+    influence, usable = _influence(rows, n, v, observed, margins)
+    if as_irrcac:  # an item without a pair stays as it is
+        d_o = observed.numerator / observed.denominator
+        kappa = 1.0 - d_o * margins.denominator / margins.numerator
+        influence += kappa * (usable * n / observed.n_usable - 1.0)
+    influence[(rows < 0).all(axis=1)] = 0.0
+    squares = float((times * influence * influence).sum())
+    return standard_error(squares, 1.0, n, population)
 
 
 def _influence(

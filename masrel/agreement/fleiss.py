@@ -1,6 +1,7 @@
 """Fleiss' kappa: agreement of two or more raters who are not told apart."""
 
 from collections.abc import Sequence
+from operator import mul
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -8,9 +9,11 @@ from numpy.typing import ArrayLike
 from masrel.agreement.coding import Label
 from masrel.agreement.kernel import Floats, pooled_kernel
 from masrel.agreement.pooled import (
-    Asked,
     Expected,
+    Options,
+    PooledCoefficient,
     Shares,
+    Slopes,
     Variance,
     estimate_counts,
     estimate_ratings,
@@ -21,6 +24,7 @@ from masrel.estimates import Estimate
 __all__ = [
     "FLEISS_KERNEL",
     "expected_disagreement",
+    "expected_slopes",
     "fleiss_kappa",
     "fleiss_kappa_from_counts",
 ]
@@ -87,8 +91,8 @@ def fleiss_kappa(
     >>> round(fleiss_kappa([["a", "a"], ["b", "b"], ["a", "b"]]).value, 3)
     0.333
     """
-    asked = Asked(categories, weights, variance, population)
-    return estimate_ratings(_NAME, _TITLE, ratings, asked, expected_disagreement)
+    options = Options(categories, weights, variance, population)
+    return estimate_ratings(_COEFFICIENT, ratings, options)
 
 
 def fleiss_kappa_from_counts(
@@ -130,11 +134,8 @@ def fleiss_kappa_from_counts(
     >>> round(fleiss_kappa_from_counts([[2, 0], [0, 2], [1, 1]]).value, 3)
     0.333
     """
-    asked = Asked(categories, weights, variance, population)
-    return estimate_counts(_NAME, _TITLE, counts, asked, expected_disagreement)
-
-
-_NAME, _TITLE = "fleiss_kappa", "Fleiss' kappa"
+    options = Options(categories, weights, variance, population)
+    return estimate_counts(_COEFFICIENT, counts, options)
 
 
 def expected_disagreement(shares: Shares, weights: Weights) -> Expected:
@@ -150,16 +151,39 @@ def expected_disagreement(shares: Shares, weights: Weights) -> Expected:
     Returns
     -------
     Expected
-        The disagreement by chance, with its slopes 2 Σ_l v_kl p_l.
+        The disagreement by chance.
     """
     products = weights.products(shares.numerators)
-    total = shares.total
     return Expected(
-        sum([p * vp for p, vp in zip(shares.numerators, products, strict=True)]),
-        total * total * weights.denominator,
-        [2 * vp for vp in products],
-        total * weights.denominator,
+        sum(map(mul, shares.numerators, products)),
+        shares.total * shares.total * weights.denominator,
     )
+
+
+def expected_slopes(shares: Shares, weights: Weights) -> Slopes:
+    """Return 2 Σ_l v_kl p_l, the slope of `expected_disagreement` in p_k.
+
+    Parameters
+    ----------
+    shares : Shares
+        Shares of the categories, p.
+    weights : Weights
+        Disagreement of two categories, v.
+
+    Returns
+    -------
+    Slopes
+        One a category.
+    """
+    return Slopes(
+        [2 * vp for vp in weights.products(shares.numerators)],
+        shares.total * weights.denominator,
+    )
+
+
+_COEFFICIENT = PooledCoefficient(
+    "fleiss_kappa", "Fleiss' kappa", expected_disagreement, expected_slopes
+)
 
 
 def _in_floats(shares: Floats, v: Floats) -> Floats:

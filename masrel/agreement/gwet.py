@@ -8,9 +8,11 @@ from numpy.typing import ArrayLike
 from masrel.agreement.coding import Label
 from masrel.agreement.kernel import Floats, pooled_kernel
 from masrel.agreement.pooled import (
-    Asked,
     Expected,
+    Options,
+    PooledCoefficient,
     Shares,
+    Slopes,
     Variance,
     estimate_counts,
     estimate_ratings,
@@ -79,8 +81,8 @@ def gwet_ac(
     >>> round(gwet_ac([["a", "a"], ["b", "b"], ["a", "b"]]).value, 3)
     0.333
     """
-    asked = Asked(categories, weights, variance, population)
-    return estimate_ratings(_NAME, _TITLE, ratings, asked, _expected)
+    options = Options(categories, weights, variance, population)
+    return estimate_ratings(_COEFFICIENT, ratings, options)
 
 
 def gwet_ac_from_counts(
@@ -122,11 +124,8 @@ def gwet_ac_from_counts(
     >>> round(gwet_ac_from_counts([[2, 0], [2, 0], [1, 1]]).value, 3)
     0.538
     """
-    asked = Asked(categories, weights, variance, population)
-    return estimate_counts(_NAME, _TITLE, counts, asked, _expected)
-
-
-_NAME, _TITLE = "gwet_ac", "Gwet's AC"
+    options = Options(categories, weights, variance, population)
+    return estimate_counts(_COEFFICIENT, counts, options)
 
 
 def _expected(shares: Shares, weights: Weights) -> Expected:
@@ -136,13 +135,21 @@ def _expected(shares: Shares, weights: Weights) -> Expected:
         return Expected(0, 1)  # one category leaves no room for chance: 0/0
     t_w = q * q * weights.denominator - weights.total()
     spread = sum([p * (total - p) for p in shares.numerators])
-    over = weights.denominator * q * (q - 1)
-    return Expected(
-        over * total * total - t_w * spread,
-        over * total * total,
+    over = weights.denominator * q * (q - 1) * total * total
+    return Expected(over - t_w * spread, over)
+
+
+def _slopes(shares: Shares, weights: Weights) -> Slopes:
+    # -T_w / (q (q - 1)) (1 - 2 p_k)
+    q, total = weights.n_categories, shares.total
+    t_w = q * q * weights.denominator - weights.total()
+    return Slopes(
         [-t_w * (total - 2 * p) for p in shares.numerators],
-        over * total,
+        weights.denominator * q * (q - 1) * total,
     )
+
+
+_COEFFICIENT = PooledCoefficient("gwet_ac", "Gwet's AC", _expected, _slopes)
 
 
 def _in_floats(shares: Floats, v: Floats) -> Floats:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.agreement.coding import CodedRatings
-from masrel.agreement.counts import item_counts
+from masrel.agreement.counting import item_counts
 
 __all__ = ["Floats", "Kernel", "divide", "pooled_kernel", "weighted_disagreement"]
 

@@ -1,26 +1,30 @@
 """Krippendorff's alpha: disagreement of pairable ratings against what chance gives."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from functools import partial
+from operator import mul
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from masrel.agreement.coding import CodedRatings, Label
-from masrel.agreement.counts import (
-    check_counts,
-    column_categories,
-    count_ratings,
-    counted_items,
-    item_counts,
-)
-from masrel.agreement.items import ItemTable, Linear, SizeGroup
+from masrel.agreement.counting import count_ratings, counted_items, item_counts
+from masrel.agreement.counts import check_counts, column_categories
+from masrel.agreement.influence import Linear
+from masrel.agreement.items import ItemTable
 from masrel.agreement.kernel import Floats, Kernel, divide, weighted_disagreement
 from masrel.agreement.metrics import Metric, metric_weights
-from masrel.agreement.pooled import check_population
+from masrel.agreement.standard_error import check_population, standard_error
+from masrel.agreement.tally import SizeGroup
 from masrel.agreement.undefined import NO_CHANCE, NO_PAIR, undefined
-from masrel.agreement.weights import WeightName, Weights, declared_weights
+from masrel.agreement.weights import (
+    WeightName,
+    Weights,
+    declared_weights,
+    identity_weights,
+)
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate
 
@@ -155,13 +159,10 @@ def krippendorff_alpha_from_counts(
     )
 
 
-@dataclass(frozen=True, slots=True)
-class _Sums:
+class _Sums(NamedTuple):
     # α = 1 - (n - 1) A / B over the n ratings of items that have at least two
-    sizes: list[int]
     n_items: int
     n_ratings: int
-    totals: list[int]
     pairs: int  # multiple of every n_i - 1
     above: int  # A = Σ_i V_i / (n_i - 1), times `pairs`
     products: list[int]  # Σ_l v_kl n_l
@@ -169,19 +170,16 @@ class _Sums:
 
     @classmethod
     def of(cls, usable: list[SizeGroup], weights: Weights) -> "_Sums":
-        totals = [sum(parts) for parts in zip(*[g.totals for g in usable], strict=True)]
-        pairs = math.lcm(*[group.size - 1 for group in usable])
+        size, n_items, totals, above = usable[0]
+        pairs = size - 1
+        for size, n_alike, of_size, apart in usable[1:]:
+            common = math.lcm(pairs, size - 1)
+            above = above * (common // pairs) + apart * (common // (size - 1))
+            n_items, pairs = n_items + n_alike, common
+            totals = [a + b for a, b in zip(totals, of_size, strict=True)]
         products = weights.products(totals)
-        return cls(
-            sizes=[group.size for group in usable],
-            n_items=sum([group.n_items for group in usable]),
-            n_ratings=sum(totals),
-            totals=totals,
-            pairs=pairs,
-            above=sum([g.disagreement * (pairs // (g.size - 1)) for g in usable]),
-            products=products,
-            below=sum([n * vn for n, vn in zip(totals, products, strict=True)]),
-        )
+        below = sum(map(mul, totals, products))
+        return cls(n_items, sum(totals), pairs, above, products, below)
 
 
 def _estimate(
@@ -193,7 +191,7 @@ def _estimate(
     population: int | None,
 ) -> Estimate:
     v = _disagreement(table, categories, weights, metric)
-    usable = [group for group in table.groups(v) if group.size > 1]
+    usable = [group for group in table.tally(v).groups if group.size > 1]
     found = _Sums.of(usable, v) if usable else None
     check_population(population, 0 if found is None else found.n_items)
     reason = None
@@ -203,7 +201,8 @@ def _estimate(
         reason = undefined("Krippendorff's alpha", v.reason)
     elif found.below == 0:
         reason = undefined("Krippendorff's alpha", NO_CHANCE)
-    value = error = observed = chance = math.nan
+    value = observed = chance = math.nan
+    error: float | Callable[[], float] = math.nan
     if found is not None:
         n, over = found.n_ratings, found.pairs * v.denominator
         observed = (n * over - found.above) / (n * over)
@@ -212,7 +211,7 @@ def _estimate(
         if reason is None:
             d_e = found.below * found.pairs
             value = (d_e - (n - 1) * found.above) / d_e
-            error = _standard_error(table, v, found, population)
+            error = partial(_error, table, v, found, population)
     return Estimate(
         coefficient="krippendorff_alpha",
         weights=v.name,
@@ -239,40 +238,34 @@ def _disagreement(
         raise ParameterError("weights, metric: needs one of them, got both")
     totals = [0] * table.n_categories
     if metric == "ordinal":
-        for group in table.groups(Weights(name="", n_categories=table.n_categories)):
+        for group in table.tally(identity_weights(table.n_categories)).groups:
             if group.size > 1:
                 totals = [a + b for a, b in zip(totals, group.totals, strict=True)]
     return metric_weights(metric, categories, totals)
 
 
-def _standard_error(
-    table: ItemTable, v: Weights, found: _Sums, population: int | None
-) -> float:
+def _error(table: ItemTable, v: Weights, found: _Sums, population: int | None) -> float:
     # With Q = 1 - α = (n - 1) A / B, the influence of item i among m is
     #   -u_i = m Q [V_i / ((n_i - 1) A) + n_i / (n - 1) - 2 Σ_k h_k n_ik / B],
     # h_k = Σ_l v_kl n_l.
     m, n = found.n_items, found.n_ratings
-    if m < 2:
-        return math.nan
     by_size = {
         size: (
             m * (n - 1) * (found.pairs // (size - 1)) * found.below,
             m * size * found.above * found.below,
             -2 * m * (n - 1) * found.above,
         )
-        for size in found.sizes
+        for size in table.sizes
+        if size > 1
     }
-    by_size |= dict.fromkeys({1} - by_size.keys(), (0, 0, 0))
+    by_size[1] = (0, 0, 0)
     influence = Linear(
         by_size=by_size,
         slopes=found.products,
         denominator=found.pairs * found.below**2,
     )
     squares, over = table.square_sum(v, influence)
-    variance = squares / (over * m * (m - 1))
-    if population is not None:
-        variance *= (population - m) / population
-    return math.sqrt(variance)
+    return standard_error(squares, over, m, population)
 
 
 def _features(coded: CodedRatings, v: Floats) -> Floats:

@@ -101,8 +101,9 @@ def labels_met(labels: Iterable[object]) -> tuple[Label, ...]:
         raise RatingsError(
             f"ratings: labels need to be text or numbers ({error})"
         ) from error
-    met = {label for label in met if not is_missing(label)}
-    _one_kind(met, "ratings")
+    if set(map(type, met)) != {str}:  # text alone needs no more care
+        met = {label for label in met if not is_missing(label)}
+        _one_kind(met, "ratings")
     return tuple(sorted(met))
 
 

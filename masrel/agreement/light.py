@@ -2,8 +2,9 @@
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
+from functools import partial
 from typing import Literal, get_args
 
 import numpy as np
@@ -13,7 +14,7 @@ from masrel.agreement.coding import CodedRatings, Label, code_ratings, complete
 from masrel.agreement.cohen import COHEN_KERNEL, PairSums, pair_table
 from masrel.agreement.kernel import Floats, Kernel
 from masrel.agreement.patterns import distinct_patterns
-from masrel.agreement.pooled import check_population
+from masrel.agreement.standard_error import check_population, standard_error
 from masrel.agreement.undefined import undefined
 from masrel.agreement.weights import WeightName, Weights, declared_weights
 from masrel.errors import ParameterError, RatingsError
@@ -96,14 +97,15 @@ def light_kappa(
         for pair in pairs
     ]
     reason = _reason(pairs, sums, v)
-    value = error = observed = chance = math.nan
+    value = observed = chance = math.nan
+    error: float | Callable[[], float] = math.nan
     if all(s.n for s in sums):
         w = v.denominator
         observed = _mean([1 - Fraction(s.above, s.n * w) for s in sums])
         chance = _mean([1 - Fraction(s.below, s.n * s.n * w) for s in sums])
     if reason is None:
         value = _mean([1 - Fraction(s.n * s.above, s.below) for s in sums])
-        error = _standard_error(coded, v, pairs, sums, population)
+        error = partial(_error, coded, v, pairs, sums, population)
     return Estimate(
         coefficient="light_kappa",
         weights=v.name,
@@ -136,7 +138,7 @@ def _reason(
     return None
 
 
-def _standard_error(
+def _error(
     coded: CodedRatings,
     v: Weights,
     pairs: list[tuple[int, int]],
@@ -144,18 +146,14 @@ def _standard_error(
     population: int | None,
 ) -> float:
     n = coded.n_items
-    if n < 2:
-        return math.nan
     rows, times = distinct_patterns(coded.codes, coded.n_categories)
     total = np.zeros(len(rows))
     for pair, found in zip(pairs, sums, strict=True):
         # of n items, an item with both ratings moves this pair's kappa n / n_pair times
         total += n / found.n * _of_pair(rows[:, pair], found, v)
     influence = total / len(pairs)
-    variance = float((times * influence * influence).sum()) / (n * (n - 1))
-    if population is not None:
-        variance *= (population - n) / population
-    return math.sqrt(variance)
+    squares = float((times * influence * influence).sum())
+    return standard_error(squares, 1.0, n, population)
 
 
 def _of_pair(rows: NDArray[np.int64], found: PairSums, v: Weights) -> Floats:

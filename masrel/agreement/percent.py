@@ -7,8 +7,9 @@ from numpy.typing import ArrayLike
 from masrel.agreement.coding import Label
 from masrel.agreement.kernel import pooled_kernel
 from masrel.agreement.pooled import (
-    Asked,
     Expected,
+    Options,
+    PooledCoefficient,
     Shares,
     Variance,
     estimate_counts,
@@ -75,8 +76,8 @@ def percent_agreement(
     >>> percent_agreement([["a", "a"], ["a", "b"]]).value
     0.5
     """
-    asked = Asked(categories, weights, variance, population)
-    return estimate_ratings(_NAME, _TITLE, ratings, asked, _expected)
+    options = Options(categories, weights, variance, population)
+    return estimate_ratings(_COEFFICIENT, ratings, options)
 
 
 def percent_agreement_from_counts(
@@ -118,16 +119,16 @@ def percent_agreement_from_counts(
     >>> percent_agreement_from_counts([[2, 0], [1, 1]]).value
     0.5
     """
-    asked = Asked(categories, weights, variance, population)
-    return estimate_counts(_NAME, _TITLE, counts, asked, _expected)
-
-
-_NAME, _TITLE = "percent_agreement", "percent agreement"
+    options = Options(categories, weights, variance, population)
+    return estimate_counts(_COEFFICIENT, counts, options)
 
 
 def _expected(shares: Shares, weights: Weights) -> Expected:  # noqa: ARG001 - chance is not asked
     # 1 - D_o / 1: what is observed, as it is
     return Expected(1, 1)
+
+
+_COEFFICIENT = PooledCoefficient("percent_agreement", "percent agreement", _expected)
 
 
 PERCENT_KERNEL = pooled_kernel(lambda shares, v: 1.0)  # noqa: ARG005 - chance is not asked

@@ -6,16 +6,22 @@ from numpy.typing import ArrayLike
 
 from masrel.agreement.coding import CodedRatings, Label, code_ratings, complete
 from masrel.agreement.cohen import two_raters
-from masrel.agreement.counts import coded_items, count_table
-from masrel.agreement.fleiss import FLEISS_KERNEL, expected_disagreement
+from masrel.agreement.counting import coded_items, count_table
+from masrel.agreement.fleiss import (
+    FLEISS_KERNEL,
+    expected_disagreement,
+    expected_slopes,
+)
 from masrel.agreement.kernel import Floats, Kernel
-from masrel.agreement.pooled import Options, pooled_estimate
+from masrel.agreement.pooled import Options, PooledCoefficient, pooled_estimate
 from masrel.agreement.weights import WeightName, declared_weights
 from masrel.estimates import Estimate
 
 __all__ = ["SCOTT_KERNEL", "scott_pi", "scott_pi_from_table"]
 
-_NAME, _TITLE = "scott_pi", "Scott's pi"
+_COEFFICIENT = PooledCoefficient(
+    "scott_pi", "Scott's pi", expected_disagreement, expected_slopes
+)
 
 
 def scott_pi(
@@ -71,13 +77,14 @@ def scott_pi(
     >>> round(scott_pi([["a", "a"], ["b", "b"], ["a", "b"]]).value, 3)
     0.333
     """
-    coded = complete(two_raters(code_ratings(ratings, categories), _TITLE))
+    coded = code_ratings(ratings, categories)
+    coded = complete(two_raters(coded, _COEFFICIENT.title))
     return pooled_estimate(
+        _COEFFICIENT,
         coded_items(coded),
         coded.n_raters,
         declared_weights(weights, coded.categories),
-        expected_disagreement,
-        Options(_NAME, _TITLE, population=population),
+        Options(population=population),
     )
 
 
@@ -121,11 +128,11 @@ def scott_pi_from_table(
     """
     counted = count_table(table, categories=categories)
     return pooled_estimate(
+        _COEFFICIENT,
         counted.items,
         counted.n_raters,
         declared_weights(weights, counted.categories),
-        expected_disagreement,
-        Options(_NAME, _TITLE, population=population),
+        Options(population=population),
     )
 
 

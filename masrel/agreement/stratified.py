@@ -1,8 +1,9 @@
 """Stratified kappa: agreement of raters with themselves, over several raters."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,6 +11,7 @@ from numpy.typing import ArrayLike
 from masrel.agreement.coding import CodedRatings, Codes, Label, code_ratings
 from masrel.agreement.cohen import COHEN_KERNEL, PairSums, pair_table
 from masrel.agreement.kernel import Floats, Kernel, divide
+from masrel.agreement.standard_error import standard_error
 from masrel.agreement.undefined import NO_CHANCE, NO_PAIR, undefined
 from masrel.agreement.weights import WeightName, Weights, declared_weights
 from masrel.errors import RatingsError
@@ -94,13 +96,14 @@ def stratified_kappa(
         reason = undefined("stratified kappa", v.reason)
     elif by_chance == 0:
         reason = undefined("stratified kappa", NO_CHANCE)
-    value = error = observed = chance = math.nan
+    value = observed = chance = math.nan
+    error: float | Callable[[], float] = math.nan
     if strata:
         observed = float(1 - apart / len(strata))
         chance = float(1 - by_chance / len(strata))
     if reason is None:
         value = float(1 - apart / by_chance)
-        error = _standard_error(coded, v, apart, by_chance)
+        error = partial(_error, coded, v, apart, by_chance)
     return Estimate(
         coefficient="stratified_kappa",
         weights=v.name,
@@ -177,12 +180,10 @@ def _strata(coded: CodedRatings) -> list[Codes]:
     return [coded.codes[:, start : start + 2] for start in range(0, width, 2)]
 
 
-def _standard_error(
+def _error(
     coded: CodedRatings, v: Weights, apart: Fraction, by_chance: Fraction
 ) -> float:
     n_items = coded.n_items
-    if n_items < 2:
-        return math.nan
     # Σ_r D_o,r / Σ_r D_e,r: an item pulls at both sums in every stratum it is in
     ratio = float(apart / by_chance)
     weights = v.as_floats()
@@ -205,7 +206,7 @@ def _standard_error(
         on_observed = features[:, 0] - means[0] * features[:, 1]
         influence += (ratio * on_chance - on_observed) * n_items / n
     influence /= float(by_chance)
-    return float(np.sqrt((influence**2).sum() / (n_items * (n_items - 1))))
+    return standard_error(float((influence**2).sum()), 1.0, n_items, None)
 
 
 def _features(coded: CodedRatings, v: Floats) -> Floats:

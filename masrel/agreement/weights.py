@@ -8,6 +8,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cache
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -17,7 +18,7 @@ from masrel.agreement.coding import Label
 from masrel.agreement.irrational import sine_squared, square_root
 from masrel.errors import ParameterError
 
-__all__ = ["WeightName", "Weights", "declared_weights"]
+__all__ = ["WeightName", "Weights", "declared_weights", "identity_weights"]
 
 WeightName = Literal[
     "identity",
@@ -89,6 +90,23 @@ class Weights:
         )
 
 
+@cache
+def identity_weights(n_categories: int) -> Weights:
+    """Return the weights that count two different categories as a full miss.
+
+    Parameters
+    ----------
+    n_categories : int
+        Declared categories.
+
+    Returns
+    -------
+    Weights
+        Without a matrix.
+    """
+    return Weights(name="identity", n_categories=n_categories)
+
+
 def declared_weights(
     weights: "WeightName | ArrayLike", categories: Sequence[Label]
 ) -> Weights:
@@ -144,7 +162,7 @@ def declared_weights(
             f"weights: needs one of {', '.join(_NAMES)} or a matrix, got {weights!r}"
         )
     if weights == "identity":
-        return Weights(name="identity", n_categories=n)
+        return identity_weights(n)
     values = category_values(categories)
     if (reason := _absence(weights, values)) is not None:
         return Weights(name=weights, n_categories=n, reason=reason)

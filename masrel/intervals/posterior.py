@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from masrel.agreement.coding import Label
-from masrel.agreement.counts import item_counts
+from masrel.agreement.counting import item_counts
 from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target
 from masrel.intervals.bootstrap import recorded_generator

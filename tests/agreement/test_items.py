@@ -21,15 +21,10 @@ from masrel.agreement import (
     percent_agreement_from_counts,
 )
 from masrel.agreement.coding import CodedRatings
-from masrel.agreement.counts import (
-    check_counts,
-    check_table,
-    coded_items,
-    column_categories,
-    counted_items,
-    item_counts,
-)
-from masrel.agreement.items import FewItems, ItemTable, Linear, ManyItems, item_table
+from masrel.agreement.counting import coded_items, counted_items, item_counts
+from masrel.agreement.counts import check_counts, check_table, column_categories
+from masrel.agreement.influence import Linear
+from masrel.agreement.items import FewItems, ItemTable, ManyItems, item_table
 from masrel.agreement.patterns import distinct_patterns
 from masrel.errors import CountsError, ParameterError
 
@@ -141,7 +136,7 @@ def test_few_and_many_items_have_the_same_sums(name: str) -> None:
     few = FewItems(counts.tolist(), times.tolist(), 3)
     many = ManyItems(counts, times)
     weights = declared_weights(name, [1, 2, 4])  # type: ignore[arg-type]
-    exact, in_arrays = few.groups(weights), many.groups(weights)
+    exact, in_arrays = few.tally(weights).groups, many.tally(weights).groups
     # an item of one rating has no disagreement, weighted or not
     assert exact == in_arrays
     assert [group.size for group in exact] == [1, 2, 3, 4]
@@ -158,7 +153,7 @@ def test_few_and_many_items_have_the_same_sums(name: str) -> None:
 def test_sums_of_groups_by_hand() -> None:
     # (2, 0), (1, 1) twice, (0, 1), and nothing: pairs that differ: 0, 2, 2
     table = FewItems([[2, 0], [1, 1], [0, 1], [0, 0]], [1, 2, 1, 4], 2)
-    one, two = table.groups(declared_weights("identity", ["a", "b"]))
+    one, two = table.tally(declared_weights("identity", ["a", "b"])).groups
     assert (one.size, one.n_items, one.totals, one.disagreement) == (1, 1, [0, 1], 0)
     assert (two.size, two.n_items, two.totals, two.disagreement) == (2, 3, [4, 2], 4)
 
@@ -167,10 +162,10 @@ def test_sums_that_pass_64_bits_stay_exact() -> None:
     # sizes of 2³², squared 2⁶⁴: n² Σ t = 3 · 2⁶⁴, of which a² + b² agree
     a, b = 2**32 - 1, 1
     table = ManyItems(np.array([[a, b]]), np.array([3]))
-    (group,) = table.groups(declared_weights("identity", ["a", "b"]))
+    (group,) = table.tally(declared_weights("identity", ["a", "b"])).groups
     assert group.disagreement == 3 * 2 * a * b
     assert group.totals == [3 * a, 3 * b]
-    (linear,) = table.groups(declared_weights("linear", [0, 1]))
+    (linear,) = table.tally(declared_weights("linear", [0, 1])).groups
     assert linear.disagreement == 3 * 2 * a * b
 
 

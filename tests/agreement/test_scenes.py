@@ -12,11 +12,12 @@ from masrel.agreement import (
     COEFFICIENTS,
     arrays,
     count_ratings,
-    counts,
+    counting,
+    few_items,
     fleiss_kappa,
     gwet_ac,
-    items,
     krippendorff_alpha,
+    pooled,
     weights,
 )
 
@@ -61,7 +62,7 @@ def test_several_coefficients_of_counted_ratings_look_at_the_ratings_once(
     meter: Meter,
 ) -> None:
     meter.watch(arrays, "_codes")
-    meter.watch(counts, "_keys")
+    meter.watch(counting, "_keys")
     counted = count_ratings(RATINGS)
     once = meter.calls.copy()
     assert once["_codes"] == 1
@@ -71,12 +72,20 @@ def test_several_coefficients_of_counted_ratings_look_at_the_ratings_once(
 
 
 def test_work_after_counting_grows_with_distinct_items_only(meter: Meter) -> None:
-    meter.watch(items, "mul")
     small, large = count_ratings(RATINGS), count_ratings(np.repeat(RATINGS, 40, axis=0))
-    fleiss_kappa(small)
+    meter.watch(few_items, "mul")
+    assert fleiss_kappa(small).standard_error > 0
     first = meter.calls["mul"]
-    fleiss_kappa(large)
+    assert fleiss_kappa(large).standard_error > 0
     assert meter.calls["mul"] == 2 * first > 0
+
+
+def test_a_standard_error_is_computed_once_and_when_it_is_read(meter: Meter) -> None:
+    meter.watch(pooled, "pooled_influence")
+    found = fleiss_kappa(RATINGS)
+    assert meter.calls == {}
+    assert found.standard_error == found.standard_error > 0
+    assert meter.calls["pooled_influence"] == 1
 
 
 def test_an_estimate_has_no_interval_unless_it_is_its_own() -> None:

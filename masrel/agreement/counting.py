@@ -1,0 +1,278 @@
+"""From ratings to distinct items, each with how often it occurs."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from masrel.agreement.coding import (
+    CodedRatings,
+    Codes,
+    code_ratings,
+    label_rows,
+)
+from masrel.agreement.counts import check_table, column_categories
+from masrel.agreement.items import FewItems, ItemTable, item_table
+from masrel.agreement.labels import Label
+from masrel.estimates import OnDemand
+
+__all__ = [
+    "CountedRatings",
+    "coded_items",
+    "count_ratings",
+    "count_table",
+    "counted_items",
+    "item_counts",
+]
+
+Integers = NDArray[np.int64]
+
+_FEW = 200  # ratings that Python counts about as fast as numpy
+_MOST_KEYS = 1 << 22  # patterns that are counted in a table rather than sorted
+_MOST_SORTED = 20_000  # items that are sorted to find those alike
+_BLOCK = 1 << 16  # items counted at once, so that they stay in the cache
+
+
+@dataclass(frozen=True, kw_only=True)
+class CountedRatings:
+    """Ratings with their distinct items counted, for several coefficients at once.
+
+    Attributes
+    ----------
+    categories : tuple of str, int or float
+        Declared categories in order.
+    items : FewItems or ManyItems
+        Distinct items with how often each occurs.
+    n_raters : int
+        Raters with at least one rating.
+    coded : CodedRatings or None
+        The ratings; None where only counts are known, and not who rated what.
+    """
+
+    categories: tuple[Label, ...]
+    items: ItemTable = field(compare=False, repr=False)
+    n_raters: int
+    coded: OnDemand[CodedRatings | None] = OnDemand()
+
+
+def count_ratings(
+    ratings: object, categories: Sequence[Label] | None = None
+) -> CountedRatings:
+    """Check ratings once, and count distinct items once, for several coefficients.
+
+    Parameters
+    ----------
+    ratings : nested sequence, array_like or DataFrame, shape (n_items, n_raters)
+        Labels or numbers; None and ``nan`` are missing.
+    categories : sequence of str, int or float, optional
+        The declared scale in order; the labels met when not given.
+
+    Returns
+    -------
+    CountedRatings
+        What every coefficient takes in place of ratings.
+
+    Raises
+    ------
+    RatingsError
+        If the ratings are not such a table.
+
+    Examples
+    --------
+    >>> from masrel.agreement import fleiss_kappa, gwet_ac
+    >>> counted = count_ratings([["a", "a"], ["b", "b"], ["a", "b"]])
+    >>> fleiss_kappa(counted).value == gwet_ac(counted).value
+    True
+    """
+    if isinstance(ratings, CountedRatings):
+        return ratings
+    if isinstance(ratings, list) and len(ratings) <= _FEW:
+        rows, declared = label_rows(ratings, categories)
+        items = _count_complete(rows, declared)
+        if items is not None:
+            return CountedRatings(
+                categories=declared,
+                items=items,
+                n_raters=len(rows[0]),
+                coded=partial(code_ratings, rows, declared),
+            )
+    coded = code_ratings(ratings, categories)
+    return CountedRatings(
+        categories=coded.categories,
+        items=coded_items(coded),
+        n_raters=coded.n_raters,
+        coded=coded,
+    )
+
+
+def count_table(
+    table: ArrayLike, *, categories: Sequence[Label] | None = None
+) -> CountedRatings:
+    """Take a contingency table of two raters as counted ratings.
+
+    Parameters
+    ----------
+    table : array_like of int, shape (n_categories, n_categories)
+        Items per category of the first (rows) and of the second rater (columns).
+    categories : sequence of str, int or float, optional
+        The declared scale in order; 1 to n_categories unless given.
+
+    Returns
+    -------
+    CountedRatings
+        What coefficients of unnamed raters take in place of ratings. For Cohen's
+        kappa and Scott's pi see `cohen_kappa_from_table` and `scott_pi_from_table`.
+
+    Raises
+    ------
+    CountsError
+        If it is not a square table of counts.
+    ParameterError
+        If there are not as many categories as columns.
+
+    Examples
+    --------
+    >>> from masrel.agreement import gwet_ac
+    >>> gwet_ac(count_table([[20, 5], [10, 15]])).value
+    0.40594059405940597
+    """
+    cells: list[list[int]] = check_table(table).tolist()
+    q = len(cells)
+    found: dict[tuple[int, ...], int] = {}
+    for first in range(q):
+        for second in range(q):
+            if cells[first][second]:
+                row = [0] * q
+                row[first] += 1
+                row[second] += 1
+                item = tuple(row)
+                found[item] = found.get(item, 0) + cells[first][second]
+    return CountedRatings(
+        categories=tuple(column_categories(categories, q)),
+        items=FewItems(list(found), list(found.values()), q),
+        n_raters=2 if found else 0,
+        coded=None,
+    )
+
+
+def item_counts(coded: CodedRatings) -> Integers:
+    """Count the raters of each category, item by item.
+
+    Parameters
+    ----------
+    coded : CodedRatings
+        The ratings; missing ones are not counted.
+
+    Returns
+    -------
+    ndarray of int64, shape (n_items, n_categories)
+        Raters per item and category.
+    """
+    n_items, n_raters = coded.codes.shape
+    if coded.n_categories <= n_raters:
+        parts = [(coded.codes == k).sum(axis=1) for k in range(coded.n_categories)]
+        return np.column_stack(parts)
+    counts = np.zeros((n_items, coded.n_categories), dtype=np.int64)
+    every = np.arange(n_items)
+    for column in coded.codes.T:
+        given = column >= 0
+        counts[every[given], column[given]] += 1  # an item once a column
+    return counts
+
+
+def coded_items(coded: CodedRatings) -> ItemTable:
+    """Count the raters of each category, equal items together.
+
+    Parameters
+    ----------
+    coded : CodedRatings
+        The ratings; missing ones are not counted.
+
+    Returns
+    -------
+    FewItems or ManyItems
+        Distinct items with how often each occurs.
+    """
+    n_items, n_raters = coded.codes.shape
+    if coded.codes.size <= _FEW:
+        return _few(coded.codes.tolist(), coded.n_categories)
+    # An item is one number: Σ over its raters of (n_raters + 1) to the power code.
+    base, q = n_raters + 1, coded.n_categories
+    n_keys = base**q
+    if n_keys <= min(_MOST_KEYS, 16 * n_items):
+        times = np.zeros(n_keys, dtype=np.int64)
+        for start in range(0, n_items, _BLOCK):
+            keys = _keys(coded.codes[start : start + _BLOCK], base, q)
+            times += np.bincount(keys, minlength=n_keys)
+        met = np.flatnonzero(times)
+        times = times[met]
+    elif n_keys < 2**62 and n_items <= _MOST_SORTED:
+        met, times = np.unique(_keys(coded.codes, base, q), return_counts=True)
+    else:
+        return item_table(item_counts(coded))
+    powers = base ** np.arange(q, dtype=np.int64)
+    return item_table(met[:, None] // powers % base, times)
+
+
+def _keys(codes: Codes, base: int, n_categories: int) -> Integers:
+    powers = base ** np.arange(n_categories + 1, dtype=np.int64)
+    powers[-1] = 0  # code -1 is the last entry
+    if base**n_categories < 2**31:
+        powers = powers.astype(np.int32)
+    keys = powers[codes[:, 0]]
+    for column in codes.T[1:]:
+        keys += powers[column]
+    return keys
+
+
+def _count_complete(
+    rows: list[list[object]], declared: tuple[Label, ...]
+) -> FewItems | None:
+    # few labels of a scale of few, without codes; None if one is missing or no label
+    n_raters, q = len(rows[0]), len(declared)
+    if len(rows) * n_raters > _FEW or q > n_raters:
+        return None
+    try:
+        counts = [tuple(map(row.count, declared)) for row in rows]
+    except (TypeError, ValueError):  # something that is neither equal nor unequal
+        return None
+    times: dict[tuple[int, ...], int] = {}
+    for item in counts:
+        times[item] = times.get(item, 0) + 1
+    items = FewItems(list(times), list(times.values()), q)
+    return items if items.sizes == [n_raters] else None
+
+
+def _few(codes: list[list[int]], n_categories: int) -> FewItems:
+    found: dict[tuple[int, ...], int] = {}
+    for row in codes:
+        counts = [0] * (n_categories + 1)
+        for code in row:
+            counts[code] += 1  # code -1 is the last entry
+        item = tuple(counts[:n_categories])
+        found[item] = found.get(item, 0) + 1
+    return FewItems(list(found), list(found.values()), n_categories)
+
+
+def counted_items(counts: Integers) -> ItemTable:
+    """Put equal rows of a table of counts together.
+
+    Parameters
+    ----------
+    counts : ndarray of int64, shape (n_items, n_categories)
+        Raters per item and category.
+
+    Returns
+    -------
+    FewItems or ManyItems
+        Distinct items with how often each occurs.
+    """
+    base = int(counts.max()) + 1
+    if counts.size > _FEW and base ** counts.shape[1] <= _MOST_KEYS:
+        powers = base ** np.arange(counts.shape[1], dtype=np.int64)
+        times = np.bincount(counts @ powers)
+        met = np.flatnonzero(times)
+        return item_table(met[:, None] // powers % base, times[met])
+    return item_table(counts)

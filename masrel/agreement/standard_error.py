@@ -1,0 +1,81 @@
+"""The standard error of an estimate whose items are a sample."""
+
+import math
+from typing import Literal, get_args
+
+from masrel.errors import ParameterError
+
+__all__ = ["Variance", "check_population", "check_variance", "standard_error"]
+
+Variance = Literal["delta", "irrcac"]
+"""Which standard error: the delta method's, or the one irrCAC prints."""
+
+_VARIANCES = get_args(Variance)
+
+
+def standard_error(
+    squares: float, over: float, n_items: int, population: int | None
+) -> float:
+    """Return the standard error of an estimate from how much each item moves it.
+
+    Parameters
+    ----------
+    squares, over : int or float
+        Σ_i u_i² is `squares` / `over`, u_i being n times what the estimate changes by
+        when item i counts a little more.
+    n_items : int
+        How many items, n.
+    population : int or None
+        Items there are in all, N.
+
+    Returns
+    -------
+    float
+        √[(1 - n/N) Σ_i u_i² / (n (n - 1))]; ``nan`` of a single item.
+    """
+    if n_items < 2:
+        return math.nan
+    variance = squares / (over * n_items * (n_items - 1))
+    if population is not None:
+        variance *= (population - n_items) / population
+    return math.sqrt(variance)
+
+
+def check_variance(variance: str) -> None:
+    """Check the name of a standard error.
+
+    Parameters
+    ----------
+    variance : str
+        A name.
+
+    Raises
+    ------
+    ParameterError
+        If there is none of that name.
+    """
+    if variance not in _VARIANCES:
+        raise ParameterError(
+            f"variance: needs one of {', '.join(_VARIANCES)}, got {variance!r}"
+        )
+
+
+def check_population(population: int | None, n_items: int) -> None:
+    """Check the size of a finite population.
+
+    Parameters
+    ----------
+    population : int or None
+        Items there are in all.
+    n_items : int
+        Items that were rated.
+
+    Raises
+    ------
+    ParameterError
+        If there are fewer items than were rated.
+    """
+    if population is not None and population < max(n_items, 1):
+        raise ParameterError(
+            f"population: needs at least the {n_items} items rated, got {population}"
+        )
