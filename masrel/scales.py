@@ -1,6 +1,7 @@
 """A rating scale: its grades in order, as text, with the values weights use."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from masrel.errors import ParameterError
@@ -65,6 +66,28 @@ class Scale:
             return tuple(float(rank) for rank in range(1, len(self.grades) + 1))
         distinct = len(set(found)) == len(found) and all(map(math.isfinite, found))
         return found if distinct else tuple(map(float, range(1, len(found) + 1)))
+
+    def weigh(self, rows: Iterable[Iterable[str | None]]) -> list[list[float | None]]:
+        """Replace grades by their values.
+
+        Parameters
+        ----------
+        rows : iterable of iterable of str or None
+            Grades of the scale; None is missing.
+
+        Returns
+        -------
+        list of list of float or None
+            Their values, missing ones as they were.
+
+        Examples
+        --------
+        >>> Scale(name="pain", grades=("0", "2.5", "10")).weigh([["10", None]])
+        [[10.0, None]]
+        """
+        value: dict[str | None, float | None] = {None: None}
+        value |= zip(self.grades, self.values, strict=True)
+        return [[value[grade] for grade in row] for row in rows]
 
     def code(self, grade: str) -> int:
         """Return the rank of a grade, from 0.

@@ -102,3 +102,9 @@ def test_every_sub_package_is_reachable_and_warns_of_nothing() -> None:
         warnings.simplefilter("error")
         for name in masrel.__all__:
             assert getattr(masrel, name).__doc__
+
+
+def test_grades_become_their_values_and_missing_ones_stay() -> None:
+    pain = Scale(name="pain", grades=("0", "1", "10"))
+    assert pain.weigh([["10", None], ["0", "1"]]) == [[10.0, None], [0.0, 1.0]]
+    assert MODIFIED_ASHWORTH.weigh([["1+", "4"]]) == [[3.0, 6.0]]

@@ -1,4 +1,4 @@
-"""Arrays and DataFrames of labels to codes, a block at a time."""
+"""Arrays of labels to codes, a block at a time."""
 
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from masrel.agreement.labels import Label, code_type, is_missing, labels_met, lookup
 from masrel.errors import RatingsError
 
-__all__ = ["array_codes", "frame_codes"]
+__all__ = ["array_codes"]
 
 Codes = NDArray[np.signedinteger[Any]]
 Array = NDArray[Any]
@@ -223,59 +223,3 @@ def _object_codes(
             for i, label in enumerate(flat)
         ]
     return np.array(codes, dtype=code_type(len(known))).reshape(labels.shape), known
-
-
-def frame_codes(
-    frame: Any, declared: tuple[Label, ...] | None
-) -> tuple[Codes, tuple[Label, ...]]:
-    """Turn a DataFrame of labels into codes, without importing pandas.
-
-    Parameters
-    ----------
-    frame : DataFrame, shape (n_items, n_raters)
-        One column a rater.
-    declared : tuple or None
-        The scale; the labels met when None.
-
-    Returns
-    -------
-    tuple of ndarray and tuple
-        Codes, -1 where missing, shape (n_items, n_raters), and the scale.
-
-    Raises
-    ------
-    RatingsError
-        If it is empty, or a label is not among the categories.
-    """
-    if 0 in frame.shape:
-        raise RatingsError(
-            "ratings: needs at least one item and one rater, got shape "
-            f"{frame.shape[0]} × {frame.shape[1]}"
-        )
-    if all(hasattr(dtype, "categories") for dtype in frame.dtypes):
-        return _categorical_codes(frame, declared)
-    plain = all(isinstance(d, np.dtype) and d.kind in "iuf" for d in frame.dtypes)
-    return array_codes(frame.to_numpy(None if plain else object), declared)
-
-
-def _categorical_codes(
-    frame: Any, declared: tuple[Label, ...] | None
-) -> tuple[Codes, tuple[Label, ...]]:
-    columns = [frame.iloc[:, j].array for j in range(frame.shape[1])]
-    of_columns = [column.categories.tolist() for column in columns]
-    if declared is None:
-        # categories nobody was given are not labels met
-        declared = labels_met(
-            labels[code]
-            for column, labels in zip(columns, of_columns, strict=True)
-            for code in np.unique(column.codes[column.codes >= 0]).tolist()
-        )
-    position: dict[object, int] = {label: code for code, label in enumerate(declared)}
-    codes = np.empty(frame.shape, dtype=code_type(len(declared)))
-    for j, (column, labels) in enumerate(zip(columns, of_columns, strict=True)):
-        table = [position.get(label, _UNKNOWN) for label in labels] + [_MISSING]
-        codes[:, j] = np.array(table)[column.codes]
-        if codes[:, j].min() == _UNKNOWN:
-            i = int(np.argmin(codes[:, j]))
-            lookup(labels[int(column.codes[i])], position, i, j)
-    return codes, declared

@@ -1,14 +1,15 @@
 """From any item × rater table of labels to integer codes."""
 
 import itertools
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement.arrays import array_codes, frame_codes
+from masrel.agreement.arrays import array_codes
+from masrel.agreement.frames import frame_codes
 from masrel.agreement.labels import (
     Label,
     check_categories,
@@ -16,16 +17,18 @@ from masrel.agreement.labels import (
     labels_met,
     lookup,
 )
-from masrel.errors import RatingsError
+from masrel.errors import ParameterError, RatingsError
 
 __all__ = [
     "MISSING",
     "CodedRatings",
     "Codes",
     "Label",
+    "check_scale",
     "code_ratings",
     "complete",
     "label_rows",
+    "unmasked",
 ]
 
 MISSING = -1
@@ -113,10 +116,13 @@ def code_ratings(
             )
         ratings = ratings.coded
     if isinstance(ratings, CodedRatings):
+        check_scale(ratings.categories, categories)
         return ratings
     if not (hasattr(ratings, "to_numpy") or isinstance(ratings, np.ndarray)):
         return _coded(*_row_codes(ratings, categories))
     declared = None if categories is None else check_categories(categories)
+    if isinstance(ratings, np.ma.MaskedArray):
+        ratings = unmasked(ratings)
     if not isinstance(ratings, np.ndarray):  # a DataFrame, without importing pandas
         return _coded(*frame_codes(ratings, declared))
     if ratings.ndim != 2:
@@ -127,6 +133,48 @@ def code_ratings(
     if 0 in ratings.shape:
         raise RatingsError(_NOTHING)
     return _coded(*array_codes(ratings, declared))
+
+
+def check_scale(known: tuple[Label, ...], categories: Sequence[Label] | None) -> None:
+    """Check that ratings which have a scale are asked for on no other.
+
+    Parameters
+    ----------
+    known : tuple of str, int or float
+        Their scale.
+    categories : sequence of str, int or float, or None
+        The scale asked for, if one is.
+
+    Raises
+    ------
+    ParameterError
+        If it is another.
+    """
+    if categories is not None and check_categories(categories) != known:
+        raise ParameterError(
+            f"categories: the ratings are on the scale {known}, got {tuple(categories)}"
+        )
+
+
+def unmasked(ratings: Any) -> NDArray[Any]:
+    """Make what is masked missing.
+
+    Parameters
+    ----------
+    ratings : MaskedArray
+        Labels.
+
+    Returns
+    -------
+    ndarray
+        The labels; None where one is masked, or ``nan`` among floats.
+    """
+    masked = np.ma.getmaskarray(ratings)
+    if not masked.any():
+        return np.asarray(ratings.data)
+    plain = ratings.data.astype(float if ratings.dtype.kind == "f" else object)
+    plain[masked] = None  # nan among floats
+    return np.asarray(plain)
 
 
 def _coded(codes: Codes, categories: tuple[Label, ...]) -> CodedRatings:
@@ -182,7 +230,10 @@ def _rows(ratings: Any) -> list[list[object]]:
 
 
 def _is_row(row: object) -> bool:
-    return isinstance(row, Iterable) and not isinstance(row, str)
+    # a mapping would give its keys, a set its labels in any order
+    return isinstance(row, Iterable) and not isinstance(
+        row, str | bytes | Mapping | Set
+    )
 
 
 def label_rows(

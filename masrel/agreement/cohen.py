@@ -258,7 +258,7 @@ def _estimate(table: Table, v: Weights, population: int | None) -> Estimate:
         reason = undefined("Cohen's kappa", NO_CHANCE)
     value = observed = chance = math.nan
     error: float | Callable[[], float] = math.nan
-    if n:
+    if n and v.reason is None:
         w = v.denominator
         observed = (n * w - found.above) / (n * w)
         chance = (n * n * w - found.below) / (n * n * w)

@@ -95,7 +95,7 @@ def conger_kappa(
     reason = _reason(coded, observed, margins, v)
     value = p_o = p_e = math.nan
     error: float | Callable[[], float] = math.nan
-    if observed is not None:
+    if observed is not None and v.reason is None:
         d_o, over_o = observed.numerator, observed.denominator
         d_e, over_e = margins.numerator, margins.denominator
         p_o, p_e = (over_o - d_o) / over_o, (over_e - d_e) / over_e

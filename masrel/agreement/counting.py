@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from masrel.agreement.coding import (
     CodedRatings,
     Codes,
+    check_scale,
     code_ratings,
     label_rows,
 )
@@ -87,6 +88,7 @@ def count_ratings(
     True
     """
     if isinstance(ratings, CountedRatings):
+        check_scale(ratings.categories, categories)
         return ratings
     if isinstance(ratings, list) and len(ratings) <= _FEW:
         rows, declared = label_rows(ratings, categories)

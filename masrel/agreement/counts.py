@@ -31,7 +31,10 @@ def check_counts(counts: ArrayLike) -> Integers:
     CountsError
         If it is not a table of whole numbers of at least 0 and below 2^53.
     """
-    table = np.asarray(counts)
+    try:
+        table = np.asarray(counts)
+    except ValueError as error:
+        raise CountsError("counts: needs rows of the same length") from error
     if table.ndim != 2 or 0 in table.shape:
         raise CountsError(
             "counts: needs a table (items, categories) of at least one of each, "

@@ -108,7 +108,7 @@ def icc(
         chance=math.nan,
         n_items=n_items,
         n_raters=n_raters,
-        n_categories=len(categories) if categories else len(np.unique(values)),
+        n_categories=len(np.unique(values)) if categories is None else len(categories),
         reason=reason,
     )
 
@@ -257,15 +257,15 @@ class _Anova:
 
 def _interval(found: _Anova, form: IccForm, level: float) -> Interval:
     reason = None
-    if form.startswith("ICC(A") and not found.below("ICC(A,1)") > 0.0:
-        reason = "the total variance is estimated as less than 0"
-        low = high = math.nan
-    elif form.startswith("ICC(A"):
-        low, high = _absolute(found, level)
+    if form.startswith("ICC(A"):
+        reason = _without_interval(found, form)
+        low, high = (math.nan, math.nan) if reason else _absolute(found, level)
+        if reason is None and math.isnan(low):
+            reason = "Satterthwaite's degrees of freedom are too few"
     else:
         low, high = _ratio(found, form, level)
-    if form.endswith("k)"):  # Spearman and Brown: k ρ / (1 + (k - 1) ρ)
-        low, high = (found.k * x / (1.0 + (found.k - 1) * x) for x in (low, high))
+    if form.endswith("k)"):
+        low, high = _stepped_up(low, found.k), _stepped_up(high, found.k)
     return Interval(
         low=low,
         high=high,
@@ -275,6 +275,22 @@ def _interval(found: _Anova, form: IccForm, level: float) -> Interval:
         target="items" if form.startswith("ICC(C") else "both",
         reason=reason,
     )
+
+
+def _without_interval(found: _Anova, form: str) -> str | None:
+    # why absolute agreement has no interval, or None
+    if not found.below("ICC(A,1)") > 0.0:
+        return "the total variance is estimated as less than 0"
+    if form == "ICC(A,k)" and not found.below(form) > 0.0:
+        return "the variance of the raters' mean is estimated as less than 0"
+    return None
+
+
+def _stepped_up(rho: float, k: int) -> float:
+    # Spearman and Brown's k ρ / (1 + (k - 1) ρ), which falls to -∞ at ρ = -1/(k - 1);
+    # an end of the interval that lies beyond is no bound
+    below = 1.0 + (k - 1) * rho
+    return -math.inf if below <= 0.0 else k * rho / below
 
 
 def _ratio(found: _Anova, form: str, level: float) -> tuple[float, float]:
@@ -301,6 +317,8 @@ def _absolute(found: _Anova, level: float) -> tuple[float, float]:
     a = k * rho / (n * (1 - rho))
     b = 1 + k * rho * (n - 1) / (n * (1 - rho))
     both = a * columns + b * error
+    if both == 0.0:
+        return math.nan, math.nan
     df = both**2 / (
         (a * columns) ** 2 / (k - 1) + (b * error) ** 2 / ((n - 1) * (k - 1))
     )
@@ -308,6 +326,8 @@ def _absolute(found: _Anova, level: float) -> tuple[float, float]:
     rest = k * columns + (k * n - k - n) * error
     f_low = _f_quantile(n - 1, df, upper)
     f_high = _f_quantile(df, n - 1, upper)
+    if not (f_low >= 1.0 and f_high >= 1.0):  # nan, or the ends would leave ρ out
+        return math.nan, math.nan
     low = n * (rows - f_low * error) / (f_low * rest + n * rows)
     high = n * (f_high * rows - error) / (rest + n * f_high * rows)
     return low, high

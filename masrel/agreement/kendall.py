@@ -78,7 +78,7 @@ def kendall_w(
         chance=math.nan,
         n_items=found.n,
         n_raters=found.m,
-        n_categories=len(categories) if categories else len(np.unique(values)),
+        n_categories=len(np.unique(values)) if categories is None else len(categories),
         reason=reason,
     )
 

@@ -203,7 +203,7 @@ def _estimate(
         reason = undefined("Krippendorff's alpha", NO_CHANCE)
     value = observed = chance = math.nan
     error: float | Callable[[], float] = math.nan
-    if found is not None:
+    if found is not None and v.reason is None:
         n, over = found.n_ratings, found.pairs * v.denominator
         observed = (n * over - found.above) / (n * over)
         over_e = n * (n - 1) * v.denominator

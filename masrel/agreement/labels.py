@@ -38,7 +38,9 @@ def is_missing(label: object) -> bool:
     if isinstance(label, str):
         return False
     same = label == label
-    return not isinstance(same, bool | np.bool_) or not bool(same)
+    if isinstance(same, bool | np.bool_):
+        return not same
+    return same is label  # pandas' NA, which does not know whether it is itself
 
 
 def check_categories(categories: Sequence[Label]) -> tuple[Label, ...]:
@@ -59,7 +61,7 @@ def check_categories(categories: Sequence[Label]) -> tuple[Label, ...]:
     RatingsError
         If there is none, one is missing or repeated, or text and numbers mix.
     """
-    if isinstance(categories, str):
+    if isinstance(categories, str) or not isinstance(categories, Iterable):
         raise RatingsError(
             f"categories: needs a sequence of at least one label, got {categories!r}"
         )

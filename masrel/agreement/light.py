@@ -99,7 +99,7 @@ def light_kappa(
     reason = _reason(pairs, sums, v)
     value = observed = chance = math.nan
     error: float | Callable[[], float] = math.nan
-    if all(s.n for s in sums):
+    if v.reason is None and all(s.n for s in sums):
         w = v.denominator
         observed = _mean([1 - Fraction(s.above, s.n * w) for s in sums])
         chance = _mean([1 - Fraction(s.below, s.n * s.n * w) for s in sums])

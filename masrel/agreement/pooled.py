@@ -166,14 +166,14 @@ def pooled_estimate(
     error: float | Callable[[], float] = math.nan
     if observed is None:
         reason = undefined(coefficient.title, NO_PAIR)
+    elif weights.reason is not None:
+        reason = undefined(coefficient.title, weights.reason)
     else:
         chance = coefficient.expected(tally.shares, weights)
         d_o, over_o = observed.numerator, observed.denominator
         d_e, over_e = chance.numerator, chance.denominator
         p_o, p_e = (over_o - d_o) / over_o, (over_e - d_e) / over_e
-        if weights.reason is not None:
-            reason = undefined(coefficient.title, weights.reason)
-        elif d_e == 0:
+        if d_e == 0:
             reason = undefined(coefficient.title, NO_CHANCE)
         else:
             value = (d_e * over_o - d_o * over_e) / (d_e * over_o)

@@ -82,6 +82,6 @@ def robinson_a(
         chance=math.nan,
         n_items=n,
         n_raters=k,
-        n_categories=len(categories) if categories else len(np.unique(values)),
+        n_categories=len(np.unique(values)) if categories is None else len(categories),
         reason=reason,
     )

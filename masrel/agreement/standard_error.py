@@ -3,6 +3,8 @@
 import math
 from typing import Literal, get_args
 
+import numpy as np
+
 from masrel.errors import ParameterError
 
 __all__ = ["Variance", "check_population", "check_variance", "standard_error"]
@@ -75,7 +77,10 @@ def check_population(population: int | None, n_items: int) -> None:
     ParameterError
         If there are fewer items than were rated.
     """
-    if population is not None and population < max(n_items, 1):
+    if population is None:
+        return
+    if not isinstance(population, int | np.integer) or population < max(n_items, 1):
         raise ParameterError(
-            f"population: needs at least the {n_items} items rated, got {population}"
+            f"population: needs a whole number of at least the {n_items} items rated, "
+            f"got {population!r}"
         )

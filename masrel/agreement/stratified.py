@@ -8,7 +8,13 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from masrel.agreement.coding import CodedRatings, Codes, Label, code_ratings
+from masrel.agreement.coding import (
+    CodedRatings,
+    Codes,
+    Label,
+    check_scale,
+    code_ratings,
+)
 from masrel.agreement.cohen import COHEN_KERNEL, PairSums, pair_table
 from masrel.agreement.kernel import Floats, Kernel, divide
 from masrel.agreement.standard_error import standard_error
@@ -98,7 +104,7 @@ def stratified_kappa(
         reason = undefined("stratified kappa", NO_CHANCE)
     value = observed = chance = math.nan
     error: float | Callable[[], float] = math.nan
-    if strata:
+    if strata and v.reason is None:
         observed = float(1 - apart / len(strata))
         chance = float(1 - by_chance / len(strata))
     if reason is None:
@@ -141,6 +147,7 @@ def code_strata(
         If the pairs are not such a table.
     """
     if isinstance(pairs, CodedRatings):
+        check_scale(pairs.categories, categories)
         return pairs
     if isinstance(pairs, str) or not isinstance(pairs, Iterable):
         raise RatingsError(
@@ -165,11 +172,17 @@ def _plain(table: object, rater: int) -> list[list[object]]:
     # one rater's table -> n_items lists of 2 labels
     if not isinstance(table, Iterable) or isinstance(table, str):
         raise RatingsError(f"pairs: rater {rater} needs a table, got {table!r}")
-    rows = [list(pair) for pair in table]
-    for item, pair in enumerate(rows):
-        if len(pair) != 2:
+    rows = []
+    for item, pair in enumerate(table):
+        if isinstance(pair, str) or not isinstance(pair, Iterable):
             raise RatingsError(
-                f"pairs: rater {rater}, item {item}: needs two grades, got {len(pair)}"
+                f"pairs: rater {rater}, item {item}: needs two grades, got {pair!r}"
+            )
+        rows.append(list(pair))
+        if len(rows[-1]) != 2:
+            raise RatingsError(
+                f"pairs: rater {rater}, item {item}: needs two grades, got "
+                f"{len(rows[-1])}"
             )
     return rows
 

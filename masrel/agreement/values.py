@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement.coding import Label, code_ratings
+from masrel.agreement.coding import Label, code_ratings, unmasked
 from masrel.agreement.weights import category_values
 from masrel.errors import RatingsError
 
@@ -36,9 +36,17 @@ def complete_values(
     RatingsError
         If the ratings are not such a table, or text without declared categories.
     """
+    if isinstance(ratings, np.ma.MaskedArray):
+        ratings = unmasked(ratings)
     if categories is None and isinstance(ratings, np.ndarray):
         if ratings.ndim == 2 and ratings.dtype.kind in "iuf" and ratings.size:
             values = ratings.astype(np.float64)
+            if np.isinf(values).any():
+                row, column = np.argwhere(np.isinf(values))[0].tolist()
+                raise RatingsError(
+                    f"ratings: row {row}, column {column}: needs a finite number, got "
+                    f"{values[row, column]}"
+                )
             return values[~np.isnan(values).any(axis=1)]
     coded = code_ratings(ratings, categories)
     if not coded.categories:

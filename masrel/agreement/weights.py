@@ -82,7 +82,9 @@ class Weights:
         return sum(map(sum, self.numerators))
 
     def as_floats(self) -> NDArray[np.float64]:
-        """Return v as floats, shape (n_categories, n_categories)."""
+        """Return v as floats, (n_categories, n_categories); ``nan`` for a reason."""
+        if self.reason is not None:
+            return np.full((self.n_categories, self.n_categories), np.nan)
         if self.numerators is None:
             return 1.0 - np.eye(self.n_categories)
         return np.array(
@@ -290,7 +292,10 @@ def over_one_denominator(name: str, matrix: _Matrix) -> Weights:
 
 
 def _given(weights: Any, n_categories: int) -> Weights:
-    table = np.asarray(weights)
+    try:
+        table = np.asarray(weights)
+    except ValueError as error:
+        raise ParameterError("weights: needs rows of the same length") from error
     if table.shape != (n_categories, n_categories) or table.dtype.kind not in "iufb":
         raise ParameterError(
             f"weights: needs {n_categories} × {n_categories} numbers, one per pair of "

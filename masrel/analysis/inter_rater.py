@@ -6,7 +6,7 @@ from masrel.agreement import coefficient
 from masrel.analysis.interval import planned_interval, stream_seed
 from masrel.analysis.results import PlannedEstimate
 from masrel.analysis.selection import absence, rated_models
-from masrel.protocol import EstimatePlan, Protocol
+from masrel.protocol import EstimatePlan, Protocol, scale_of
 from masrel.ratings import Ratings, rating_matrix
 
 __all__ = ["inter_rater"]
@@ -47,14 +47,15 @@ def inter_rater(
     if len(matrix.raters) < 2:
         reason = f"session {line.sessions[0]} has one rater; agreement needs two"
         return PlannedEstimate(line=line, reason=reason)
-    categories = protocol.scale.grades
+    categories = scale_of(protocol).values
+    grades = scale_of(protocol).weigh(matrix.grades)
     estimate = coefficient(line.coefficient)(
-        matrix.grades, categories=categories, weights=line.weights
+        grades, categories=categories, weights=line.weights
     )
     interval = planned_interval(
         line.interval,
         line.coefficient,
-        matrix.grades,
+        grades,
         target=line.target,
         categories=categories,
         weights=line.weights,

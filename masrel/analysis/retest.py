@@ -7,7 +7,7 @@ from masrel.analysis.interval import planned_interval, stream_seed
 from masrel.analysis.results import PlannedEstimate, RaterEstimate
 from masrel.analysis.selection import absence, rated_models
 from masrel.estimates import Estimate
-from masrel.protocol import EstimatePlan, Protocol
+from masrel.protocol import EstimatePlan, Protocol, scale_of
 from masrel.ratings import Ratings, RetestPairs, retest_pairs
 
 __all__ = ["retest_agreement"]
@@ -68,13 +68,12 @@ def retest_agreement(
 def _stratified(
     line: EstimatePlan, protocol: Protocol, pairs: RetestPairs
 ) -> PlannedEstimate:
-    categories = protocol.scale.grades
-    estimate = stratified_kappa(
-        pairs.pairs, categories=categories, weights=line.weights
-    )
+    categories = scale_of(protocol).values
+    weighed = [scale_of(protocol).weigh(of_rater) for of_rater in pairs.pairs]
+    estimate = stratified_kappa(weighed, categories=categories, weights=line.weights)
     return PlannedEstimate(
         line=line,
-        estimate=_with_interval(estimate, line, protocol, pairs.pairs, line.id),
+        estimate=_with_interval(estimate, line, protocol, weighed, line.id),
         by_rater=tuple(
             RaterEstimate(
                 rater=rater,
@@ -82,7 +81,7 @@ def _stratified(
                     of_rater, categories=categories, weights=line.weights
                 ),
             )
-            for rater, of_rater in zip(pairs.raters, pairs.pairs, strict=True)
+            for rater, of_rater in zip(pairs.raters, weighed, strict=True)
         ),
     )
 
@@ -91,7 +90,8 @@ def _each_rater(
     line: EstimatePlan, protocol: Protocol, pairs: RetestPairs
 ) -> PlannedEstimate:
     own = coefficient(line.coefficient)
-    categories = protocol.scale.grades
+    categories = scale_of(protocol).values
+    weighed = [scale_of(protocol).weigh(of_rater) for of_rater in pairs.pairs]
     return PlannedEstimate(
         line=line,
         by_rater=tuple(
@@ -105,7 +105,7 @@ def _each_rater(
                     f"{line.id}/{rater}",
                 ),
             )
-            for rater, of_rater in zip(pairs.raters, pairs.pairs, strict=True)
+            for rater, of_rater in zip(pairs.raters, weighed, strict=True)
         ),
     )
 
@@ -122,7 +122,7 @@ def _with_interval(
         line.coefficient,
         pairs,
         target=line.target,
-        categories=protocol.scale.grades,
+        categories=scale_of(protocol).values,
         weights=line.weights,
         level=protocol.analysis.level,
         n_resamples=protocol.analysis.n_resamples,

@@ -70,8 +70,8 @@ NO_INTERVAL = (
     type=click.Path(path_type=Path, allow_dash=True),
     help="Write the estimates here; - prints them, and nothing else, on stdout.",
 )
-@click.option("--csv", "form", flag_value="csv", help="Print every digit as CSV.")
-@click.option("--latex", "form", flag_value="latex", help="Print a LaTeX table.")
+@click.option("--csv", "csv", is_flag=True, help="Print every digit as CSV.")
+@click.option("--latex", "latex", is_flag=True, help="Print a LaTeX table.")
 def command(
     file: Path,
     item: str | None,
@@ -88,7 +88,8 @@ def command(
     words: str | None,
     by: str | None,
     json_file: Path | None,
-    form: str | None,
+    csv: bool,
+    latex: bool,
 ) -> None:
     """Estimate the agreement of the raters in FILE.
 
@@ -96,8 +97,10 @@ def command(
     named) or one row an item and one column a rater. Missing grades are empty or NA.
     Grades that are all numbers weigh by value, others by their place in the scale.
     """
-    if form is not None and json_file == Path("-"):
-        raise ParameterError(f"--json - and --{form} both want stdout: choose one")
+    forms = {"--csv": csv, "--latex": latex, "--json -": json_file == Path("-")}
+    printed = [name for name, wanted in forms.items() if wanted]
+    if len(printed) > 1:
+        raise ParameterError(f"{' and '.join(printed)} all want stdout: choose one")
     wanted = Wanted(
         coefficients=tuple(name.strip() for name in coefficients.split(",")),
         weights=weights,
@@ -125,7 +128,7 @@ def command(
             for session in _sessions(ratings, file, by)
             for row in estimate_session(ratings, session, wanted)
         ]
-    _write(rows, file, by, wanted, json_file, form)
+    _write(rows, file, by, wanted, json_file, printed)
     if target is None:
         click.echo(NO_INTERVAL, err=True)
 
@@ -150,7 +153,7 @@ def _write(
     by: str | None,
     wanted: Wanted,
     json_file: Path | None,
-    form: str | None,
+    printed: list[str],
 ) -> None:
     documents = [
         {**({} if by is None else {by: row.session}), **as_document(row.estimate)}
@@ -168,5 +171,6 @@ def _write(
     from masrel.report.tables import as_csv, as_text
 
     table = agreement_table(rows, file, by, wanted)
-    shown = {"csv": as_csv, "latex": as_latex}.get(form or "", as_text)(table)
+    form = {"--csv": as_csv, "--latex": as_latex}
+    shown = form[printed[0]](table) if printed else as_text(table)
     click.echo(shown.rstrip("\n"))

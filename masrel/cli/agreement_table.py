@@ -53,12 +53,25 @@ class Wanted:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Row:
-    """One estimate, and why it has no interval where one was asked for."""
+    """One estimate, and what it lacks of what was asked for.
+
+    Attributes
+    ----------
+    session, title : str
+        Of what, and which coefficient.
+    estimate : Estimate
+        The estimate.
+    without : str or None
+        Why it has no interval where one was asked for.
+    unweighted : bool
+        Whether weights were asked for that the coefficient does not take.
+    """
 
     session: str
     title: str
     estimate: Estimate
     without: str | None = None
+    unweighted: bool = False
 
 
 def estimate_session(ratings: "Ratings", session: str, wanted: Wanted) -> list[Row]:
@@ -92,11 +105,7 @@ def estimate_session(ratings: "Ratings", session: str, wanted: Wanted) -> list[R
 
     matrix = rating_matrix(ratings, session=session)
     values = ratings.scale.values
-    place = dict(zip(ratings.scale.grades, values, strict=True))
-    counted = count_ratings(
-        [[None if g is None else place[g] for g in row] for row in matrix.grades],
-        values,
-    )
+    counted = count_ratings(ratings.scale.weigh(matrix.grades), values)
     rows = []
     for entry in _entries(wanted, matrix):
         weights: WeightName = wanted.weights if entry.weighted else "identity"
@@ -114,7 +123,14 @@ def estimate_session(ratings: "Ratings", session: str, wanted: Wanted) -> list[R
         if weights != "identity":
             title += f", {weights}"
         rows.append(
-            Row(session=session, title=title, estimate=estimate, without=without)
+            Row(
+                session=session,
+                title=title,
+                estimate=estimate,
+                without=without,
+                unweighted=weights != wanted.weights
+                and wanted.coefficients != _ANY_ORDER,
+            )
         )
     return rows
 
@@ -239,11 +255,14 @@ def _notes(rows: list[Row], wanted: Wanted) -> tuple[str, ...]:
     said: dict[str, list[str]] = {}
     for row in rows:
         for text in _of_row(row):
-            said.setdefault(text, []).append(row.title)
-    n_intervals = sum(row.estimate.interval is not None for row in rows)
+            titles = said.setdefault(text, [])
+            if row.title not in titles:  # of several sessions
+                titles.append(row.title)
+    with_interval = {row.title for row in rows if row.estimate.interval is not None}
     notes = ["SE: delta method, items as the sample."]
     for text, titles in said.items():
-        names = "" if len(titles) >= n_intervals > 1 else f"{'; '.join(titles)}: "
+        every = len(titles) > 1 and set(titles) == with_interval
+        names = "" if every else f"{'; '.join(titles)}: "
         notes.append(f"{names}{text}.")
     if wanted.words is not None:
         notes.append(
@@ -257,6 +276,8 @@ def _notes(rows: list[Row], wanted: Wanted) -> tuple[str, ...]:
 def _of_row(row: Row) -> list[str]:
     estimate, interval = row.estimate, row.estimate.interval
     said = [] if estimate.reason is None else [f"undefined: {estimate.reason}"]
+    if row.unweighted:
+        said.append("unweighted, there are no weights for it")
     if row.without is not None:
         said.append(f"no interval: {row.without}")
     if interval is not None:

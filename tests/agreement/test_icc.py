@@ -1,6 +1,7 @@
 """Intraclass correlations: Shrout and Fleiss' table, scipy's F, hand-worked means."""
 
 import math
+import warnings
 from typing import get_args
 
 import numpy as np
@@ -8,6 +9,7 @@ import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
 from scipy import stats
 
 from masrel.agreement import icc, icc_f_test
@@ -224,3 +226,51 @@ def test_wrong_options_are_one_sentence() -> None:
     for level in (0.0, 1.0, 95, math.nan):
         with pytest.raises(ParameterError, match=r"level: needs \(0, 1\), got"):
             icc(TABLE_2, level=level)
+
+
+def test_the_interval_of_a_mean_has_no_end_beyond_its_pole() -> None:
+    # Spearman and Brown's 2 ρ / (1 + ρ) falls to -∞ at ρ = -1; the low end of
+    # ICC(A,1) lies below that here, so that of ICC(A,2) has no bound.
+    ratings = np.array([[2, 2], [5, 4], [2, 3]])
+    single, mean = icc(ratings, form="ICC(A,1)"), icc(ratings, form="ICC(A,k)")
+    assert single.interval is not None
+    assert mean.interval is not None
+    assert single.interval.low < -1 < single.interval.high < 1
+    high = single.interval.high
+    assert mean.interval.low == -math.inf
+    assert mean.interval.high == pytest.approx(2 * high / (1 + high), rel=1e-14)
+
+
+def test_absolute_agreement_without_degrees_of_freedom_says_so() -> None:
+    # every item has the same mean and every rater too: a = -1/3, b = 0 of Table 7
+    found = icc(np.array([[1, 4], [4, 1], [2, 3], [3, 2]]), form="ICC(A,1)")
+    assert found.value == -2.0  # (0 - e)/(0 + e - 2e/4)
+    assert found.interval is not None
+    assert math.isnan(found.interval.low)
+    assert math.isnan(found.interval.high)
+    assert found.interval.reason == "Satterthwaite's degrees of freedom are too few"
+
+
+@given(
+    hnp.arrays(
+        np.int64,
+        st.tuples(st.integers(2, 6), st.integers(2, 4)),
+        elements=st.integers(1, 5),
+    ),
+    st.sampled_from(get_args(IccForm)),
+)
+def test_an_interval_holds_its_estimate_or_says_why_it_is_none(
+    ratings: np.ndarray, form: IccForm
+) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UndefinedStatisticWarning)
+        found = icc(ratings, form=form)
+    if found.interval is None:
+        assert found.reason
+    elif math.isnan(found.interval.low):
+        assert math.isnan(found.interval.high)
+        assert found.interval.reason
+    else:
+        slack = 1e-12 * abs(found.value)
+        assert found.interval.low <= found.value + slack
+        assert found.interval.high >= found.value - slack

@@ -2,7 +2,9 @@
 
 import itertools
 import warnings
+from fractions import Fraction
 
+import msgspec
 import pytest
 
 from masrel.agreement import COEFFICIENTS
@@ -15,8 +17,8 @@ from masrel.errors import (
     RatingsError,
     UndefinedStatisticWarning,
 )
-from masrel.protocol import EstimatePlan
-from masrel.ratings import Ratings
+from masrel.protocol import EstimatePlan, ScaleDefinition, scale_of
+from masrel.ratings import Ratings, ratings_from_rows
 from tests.analysis.studies import of_session, plan, protocol_with, ratings, table_v
 
 TWO = ratings(
@@ -155,3 +157,32 @@ def test_a_line_more_moves_no_other_lines_numbers() -> None:
     assert stream_seed(1, "a") != stream_seed(1, "b")
     # fits a signed integer of 64 bits, as other readers of the JSON have them
     assert 0 <= stream_seed(1, "a") < 2**63
+
+
+@pytest.mark.parametrize("kind", ["inter-rater", "test-retest"])
+def test_a_scale_of_numbers_weighs_by_value(kind: str) -> None:
+    # as `masrel agree` does: 0 and 1 nearly agree on a scale that goes to 10
+    line = plan(
+        kind=kind,
+        coefficient="cohen_kappa",
+        weights="linear",
+        sessions=["test"] if kind == "inter-rater" else ["test", "retest"],
+    )
+    grades = ("0", "1", "10")
+    protocol = msgspec.structs.replace(
+        protocol_with(line), scale=ScaleDefinition(name="pain", grades=grades)
+    )
+    first, second = ("0", "1", "10", "0"), ("1", "1", "10", "10")
+    if kind == "inter-rater":
+        rows = of_session("test", R1=first, R2=second)
+    else:
+        rows = [*of_session("test", R1=first), *of_session("retest", R1=second)]
+    names = ("session", "rater", "model", "grade")
+    given = ratings_from_rows(
+        [dict(zip(names, row, strict=True)) for row in rows],
+        scale=scale_of(protocol),
+    )
+    (found,) = analyze(protocol, given).estimates
+    estimate = found.estimate or found.by_rater[0].estimate
+    # D_o = (1 + 0 + 0 + 10)/40; D_e = [2 (2·1 + 2·10) + (2·0 + 2·9) + (2·9 + 2·0)]/160
+    assert estimate.value == float(1 - Fraction(11, 40) / Fraction(80, 160))

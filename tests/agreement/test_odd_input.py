@@ -1,0 +1,139 @@
+"""Input that is nearly ratings: read as what it says, or refused by name."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from masrel.agreement import (
+    cohen_kappa_from_table,
+    count_ratings,
+    fleiss_kappa,
+    fleiss_kappa_from_counts,
+    gwet_ac,
+    icc,
+    kendall_w,
+    robinson_a,
+    stratified_kappa,
+)
+from masrel.errors import CountsError, ParameterError, RatingsError
+
+PLAIN = [["a", "b"], ["b", "b"], [None, "a"], ["a", "a"]]
+NUMBERS = [[1.0, 2.0], [2.0, 2.0], [None, 1.0], [1.0, 1.0]]
+
+
+def test_what_an_array_masks_is_missing() -> None:
+    mask = [[False, False], [False, False], [True, False], [False, False]]
+    text = np.ma.array([["a", "b"], ["b", "b"], ["b", "a"], ["a", "a"]], mask=mask)
+    assert fleiss_kappa(text) == fleiss_kappa(PLAIN)
+    for dtype in (np.int8, np.int64, np.float64):
+        numbers = np.ma.array([[1, 2], [2, 2], [2, 1], [1, 1]], mask=mask, dtype=dtype)
+        assert fleiss_kappa(numbers).value == fleiss_kappa(NUMBERS).value
+        assert icc(numbers).value == icc(NUMBERS, categories=[1, 2]).value
+    whole = np.ma.array([[1, 2], [2, 2]])
+    assert fleiss_kappa(whole) == fleiss_kappa([[1, 2], [2, 2]])
+
+
+@pytest.mark.parametrize("function", [icc, kendall_w, robinson_a])
+@pytest.mark.parametrize("infinite", [np.inf, -np.inf])
+def test_statistics_of_numbers_refuse_infinite_ones(
+    function: Callable[..., object], infinite: float
+) -> None:
+    with pytest.raises(RatingsError, match=r"row 1, column 0: needs a finite.*inf"):
+        function(np.array([[1.0, 2.0], [infinite, 2.0]]))
+
+
+@pytest.mark.parametrize(
+    "rows", [[{"r1": 1, "r2": 2}], [{1, 2}], [b"ab"], ["ab"], [3], [None]]
+)
+def test_a_row_without_order_is_refused(rows: list[object]) -> None:
+    with pytest.raises(RatingsError, match="row 0 needs one rating per rater"):
+        fleiss_kappa(rows)
+
+
+def test_an_array_in_place_of_a_label_is_not_a_missing_rating() -> None:
+    label = np.array([2, 3])
+    with pytest.raises(RatingsError, match=r"row 0, column 1.*array"):
+        fleiss_kappa([[1, label], [1, 1]], categories=[1, 2])
+    with pytest.raises(RatingsError, match="labels need to be text or numbers"):
+        fleiss_kappa([[1, label], [1, 1]])
+
+
+def test_missing_in_the_ways_of_pandas_is_missing() -> None:
+    plain = gwet_ac([["a", None], ["b", "b"], ["a", "b"]])
+    for missing in (pd.NA, float("nan"), np.float64("nan"), pd.NaT):
+        assert gwet_ac([["a", missing], ["b", "b"], ["a", "b"]]) == plain
+
+
+def test_ragged_tables_are_refused_as_what_they_are() -> None:
+    with pytest.raises(CountsError, match="counts: needs rows of the same length"):
+        fleiss_kappa_from_counts([[1, 2], [1]])
+    with pytest.raises(CountsError, match="rows of the same length"):
+        cohen_kappa_from_table([[1, 2], [1]])
+    with pytest.raises(ParameterError, match="weights: needs rows of the same length"):
+        fleiss_kappa([[1, 2], [2, 2]], weights=[[1, 0], [1]])
+    with pytest.raises(RatingsError, match=r"two dimensions .* got shape 3"):
+        fleiss_kappa(pd.Series([1, 2, 3]))
+
+
+def test_categories_may_be_an_array_and_must_be_many() -> None:
+    numbers = [[1, 2], [2, 3], [3, 3]]
+    for function in (icc, kendall_w, robinson_a, fleiss_kappa):
+        declared = function(numbers, categories=np.array([1, 2, 3]))
+        assert declared.value == function(numbers, categories=[1, 2, 3]).value
+        assert declared.n_categories == 3
+        with pytest.raises(RatingsError, match="categories: needs a sequence"):
+            function(numbers, categories=5)
+
+
+@pytest.mark.parametrize("population", [1, 2.5, float("nan"), "many", -3])
+def test_a_population_is_a_whole_number_of_items(population: object) -> None:
+    with pytest.raises(ParameterError, match="population: needs a whole number"):
+        fleiss_kappa([[1, 2], [2, 2]], population=population)  # type: ignore[arg-type]
+
+
+def test_counted_ratings_have_the_scale_they_were_counted_on() -> None:
+    counted = count_ratings(PLAIN, ["a", "b", "c"])
+    assert gwet_ac(counted, categories=["a", "b", "c"]) == gwet_ac(counted)
+    for other in (["a", "b"], ["b", "a", "c"]):
+        with pytest.raises(ParameterError, match=r"on the scale \('a', 'b', 'c'\)"):
+            gwet_ac(counted, categories=other)
+        with pytest.raises(ParameterError, match=r"on the scale \('a', 'b', 'c'\)"):
+            gwet_ac(counted.coded, categories=other)
+
+
+def test_ordered_categories_of_a_frame_are_its_scale() -> None:
+    scale = ["mild", "bad", "awful", "worst"]
+    rows = [["mild", "bad"], ["bad", "bad"], ["awful", "mild"]]
+    frame = pd.DataFrame(rows).astype(pd.CategoricalDtype(scale, ordered=True))
+    weighed = gwet_ac(frame, weights="linear")
+    assert weighed == gwet_ac(rows, categories=scale, weights="linear")
+    # not where pandas has no order, or columns have scales of their own
+    unordered = pd.DataFrame(rows).astype(pd.CategoricalDtype(scale))
+    assert gwet_ac(unordered).n_categories == 3
+    mixed = frame.assign(
+        **{"1": pd.Categorical(["bad", "bad", "mild"], scale[:2], ordered=True)}
+    )
+    assert gwet_ac(mixed).n_categories == 3
+
+
+class Frame:
+    """A table of another library: it gives an array, and knows no pandas."""
+
+    shape = (2, 2)
+
+    def to_numpy(self) -> np.ndarray:
+        """Return the labels."""
+        return np.array([["a", None], ["b", "b"]], dtype=object)
+
+
+def test_a_frame_of_another_library_is_its_array() -> None:
+    assert gwet_ac(Frame()) == gwet_ac([["a", None], ["b", "b"]])
+
+
+def test_pairs_of_a_rater_need_two_grades_each() -> None:
+    with pytest.raises(RatingsError, match=r"rater 0, item 1: needs two grades, got 3"):
+        stratified_kappa([[["a", "b"], 3]])
+    with pytest.raises(RatingsError, match="rater 1, item 0: needs two grades, got 1"):
+        stratified_kappa([[["a", "b"]], [["a"]]])
