@@ -1,18 +1,22 @@
-"""Differences of coefficients against loops, coverage, and what is refused."""
+"""Differences of coefficients by hand, against loops, t-tests, coverage; refusals."""
 
 import math
+from fractions import Fraction
 
 import numpy as np
 import pytest
+from scipy import stats
 
-from masrel.agreement import cohen_kappa, fleiss_kappa
+from masrel.agreement import COEFFICIENTS, cohen_kappa, fleiss_kappa
 from masrel.errors import (
     ParameterError,
     RatingsError,
     SmallSampleWarning,
     UndefinedStatisticWarning,
 )
+from masrel.estimates import Estimate
 from masrel.intervals import difference, jackknife
+from masrel.intervals.difference import Design
 from tests.intervals.data import dirichlet_multinomial
 
 CATEGORIES = range(3)
@@ -25,6 +29,153 @@ def two(n: int) -> tuple[list[list[int]], list[list[int]]]:
     grades = np.array(first)
     again = np.where(rng.random(grades.shape) < 0.7, grades, rng.integers(0, 3, (n, 4)))
     return first, again.tolist()
+
+
+def shares(table: list[list[int]]) -> list[float]:
+    """Agreement of each item: how many pairs of its raters agree."""
+    k = len(table[0])
+    return [sum(row.count(g) - 1 for g in row) / (k * (k - 1)) for row in table]
+
+
+def test_two_independent_kappas_by_hand() -> None:
+    # (a a) (b b) (a b): p_o = 2/3, p_e = 4/9: 2/5. Without one: 0, 0 (one rater has one
+    # category) and 1 about 1/3: SE² = (2/3)(1/9 + 1/9 + 4/9) = 4/9. The other is 1
+    # whichever is left out. So -3/5 ± t · 2/3 with (4/9)²/((4/9)²/2) = 2 degrees, whose
+    # quantile of two sides is L √(2/(1 - L²)) at level L: √(2/3) at 1/2.
+    first = [["a", "a"], ["b", "b"], ["a", "b"]]
+    second = [["a", "a"], ["b", "b"], ["a", "a"], ["b", "b"]]
+    with pytest.warns(SmallSampleWarning):
+        found = difference(
+            "cohen_kappa", first, second, design="independent", level=0.5
+        )
+    assert found.value == float(Fraction(2, 5)) - 1.0
+    assert found.standard_error == pytest.approx(2 / 3, rel=1e-14)
+    assert found.interval is not None
+    half = math.sqrt(2 / 3) * 2 / 3
+    assert found.interval.low == pytest.approx(-0.6 - half, rel=1e-12)
+    assert found.interval.high == pytest.approx(-0.6 + half, rel=1e-12)
+    assert (found.n_items, found.n_raters) == (3, 2)
+    # 2/3 - 1 and 4/9 - 1/2
+    assert found.observed == pytest.approx(-1 / 3, rel=1e-15)
+    assert found.chance == pytest.approx(-1 / 18, rel=1e-14)
+
+
+def test_of_percent_agreement_of_the_same_items_it_is_the_paired_t_test() -> None:
+    first, second = two(25)
+    other = stats.ttest_rel(shares(first), shares(second))
+    found = difference("percent_agreement", first, second, design="dependent")
+    assert found.value / found.standard_error == pytest.approx(other.statistic)
+    interval = other.confidence_interval(0.95)
+    assert found.interval is not None
+    assert (found.interval.low, found.interval.high) == pytest.approx(
+        (interval.low, interval.high), rel=1e-9
+    )
+
+
+def test_of_percent_agreement_of_other_items_it_is_welchs_t_test() -> None:
+    first, second = two(40)
+    second = second[:15]
+    other = stats.ttest_ind(shares(first), shares(second), equal_var=False)
+    found = difference(
+        "percent_agreement", first, second, design="independent", level=0.9
+    )
+    assert found.value / found.standard_error == pytest.approx(other.statistic)
+    interval = other.confidence_interval(0.9)
+    assert found.interval is not None
+    assert (found.interval.low, found.interval.high) == pytest.approx(
+        (interval.low, interval.high), rel=1e-9
+    )
+
+
+@pytest.mark.parametrize("design", ["dependent", "independent"])
+@pytest.mark.parametrize("weights", ["identity", "quadratic"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "conger_kappa",
+        "gwet_ac",
+        "brennan_prediger",
+        "krippendorff_alpha",
+        "light_kappa",
+    ],
+)
+def test_every_coefficient_is_left_out_of_item_by_item(
+    name: str, weights: str, design: Design
+) -> None:
+    first, second = two(14)
+    if design == "independent":
+        second = second[:11]
+
+    def value(table: list[list[int]]) -> float:
+        found = COEFFICIENTS[name](table, categories=CATEGORIES, weights=weights)  # type: ignore[arg-type]
+        return found.value
+
+    def without(table: list[list[int]]) -> list[float]:
+        return [value(table[:i] + table[i + 1 :]) for i in range(len(table))]
+
+    def jackknifed(left: list[float]) -> float:
+        n, mean = len(left), sum(left) / len(left)
+        return (n - 1) / n * sum((x - mean) ** 2 for x in left)
+
+    one, other = without(first), without(second)
+    if design == "dependent":
+        variance = jackknifed([x - y for x, y in zip(one, other, strict=True)])
+    else:
+        variance = jackknifed(one) + jackknifed(other)
+    found = difference(
+        name,
+        first,
+        second,
+        design=design,
+        categories=CATEGORIES,
+        weights=weights,  # type: ignore[arg-type]
+    )
+    assert found.value == pytest.approx(value(first) - value(second), abs=1e-14)
+    assert found.standard_error == pytest.approx(math.sqrt(variance), rel=1e-9)
+    assert found.coefficient == f"difference of {name}"
+    assert found.weights == weights
+
+
+def test_items_that_nobody_rated_in_either_are_no_items() -> None:
+    first, second = two(12)
+    none: list[int | None] = [None] * 4
+    found, holed = (
+        difference("fleiss_kappa", *both, design="dependent", categories=CATEGORIES)
+        for both in ((first, second), ([none, *first], [none, *second]))
+    )
+    assert holed == found
+
+
+@pytest.mark.parametrize("design", ["dependent", "independent"])
+def test_the_other_way_round_it_is_the_negative(design: Design) -> None:
+    first, second = two(20)
+
+    def of(one: list[list[int]], other: list[list[int]]) -> Estimate:
+        return difference(
+            "fleiss_kappa", one, other, design=design, categories=CATEGORIES
+        )
+
+    found, turned = of(first, second), of(second, first)
+    assert turned.value == -found.value
+    assert turned.standard_error == found.standard_error
+    assert found.interval is not None
+    assert turned.interval is not None
+    assert turned.interval.low == pytest.approx(-found.interval.high, rel=1e-14)
+
+
+def test_a_difference_lies_within_what_two_coefficients_can_differ_by() -> None:
+    # One pair of four agrees, and three of four: of so few items t · SE goes beyond -2
+    # of kappa, and beyond -1 of a share.
+    first = [["a", "b"], ["b", "a"], ["a", "b"], ["b", "b"]]
+    second = [["a", "a"], ["b", "b"], ["a", "a"], ["b", "a"]]
+    with pytest.warns(SmallSampleWarning):
+        found = difference("fleiss_kappa", first, second, design="independent")
+    assert found.interval is not None
+    assert found.interval.low == -2.0
+    with pytest.warns(SmallSampleWarning):
+        share = difference("percent_agreement", first, second, design="independent")
+    assert share.interval is not None
+    assert share.interval.low == -1.0
 
 
 def test_same_items_are_left_out_of_both_at_once() -> None:
@@ -129,6 +280,39 @@ def test_design_has_no_default_and_is_checked() -> None:
         difference("fleiss_kappa", first, second, design="paired")  # type: ignore[arg-type]
     with pytest.raises(ParameterError, match="no function of sums"):
         difference("kendall_w", first, second, design="dependent")
+
+
+def test_level_coefficient_and_ratings_are_checked() -> None:
+    first, second = two(12)
+    with pytest.raises(ParameterError, match=r"level: needs \(0, 1\), got 95"):
+        difference("fleiss_kappa", first, second, design="dependent", level=95)
+    with pytest.raises(ParameterError, match=r"coefficient: needs one of .*'kappa'"):
+        difference("kappa", first, second, design="dependent")
+    with pytest.raises(ParameterError, match="needs 2 raters, got 4"):
+        difference("cohen_kappa", first, second, design="dependent")
+    with pytest.raises(RatingsError, match="needs one of 0, 1, 2"):
+        difference(
+            *("fleiss_kappa", first, [[3] * 4] * 12),
+            design="independent",
+            categories=CATEGORIES,
+        )
+
+
+@pytest.mark.filterwarnings("ignore::masrel.errors.UndefinedStatisticWarning")
+def test_with_one_item_left_out_undefined_has_a_value_and_no_interval() -> None:
+    # Without its last item the first has one category only: 0/0.
+    found = difference(
+        "fleiss_kappa",
+        [["a", "a"]] * 11 + [["a", "b"]],
+        [["a", "a"], ["b", "b"]] * 6,
+        design="dependent",
+        categories=["a", "b"],
+    )
+    # 11/12 of pairs, shares 23/24 and 1/24: kappa -1/23; the other is 1
+    assert found.value == pytest.approx(-1 / 23 - 1, rel=1e-14)
+    assert math.isnan(found.standard_error)
+    assert found.interval is not None
+    assert "one item left out" in (found.interval.reason or "")
 
 
 def test_undefined_and_small_are_said() -> None:

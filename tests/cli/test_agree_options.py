@@ -1,0 +1,403 @@
+"""masrel agree by its options: what is estimated, how it is shown, what is refused."""
+
+import csv
+import dataclasses
+import io
+import json
+import re
+from pathlib import Path
+from typing import Any, get_args
+
+import pytest
+
+from masrel.agreement import COEFFICIENTS, BandScale
+from masrel.agreement.weights import WeightName
+from masrel.estimates import Estimate, Interval
+from tests.cli.process import Caller, Done
+
+# Four patients by three raters, one gap.
+WIDE = "patient,Kim,Lee,Ann\nA,1,1+,1\nB,2,NA,2\nC,1,1,2\nD,3,3,3\n"
+SCALE = ("1", "1+", "2", "3")
+ROWS = [["1", "1+", "1"], ["2", None, "2"], ["1", "1", "2"], ["3", "3", "3"]]
+
+# Sessions of names that CSV and LaTeX must not take for their own.
+NAMES = ["a_b&c%", 'x,"y"', "50~^$#{}\\"]
+
+OF_ANY_NUMBER = (
+    "percent_agreement",
+    "conger_kappa",
+    "fleiss_kappa",
+    "light_kappa",
+    "brennan_prediger",
+    "gwet_ac",
+    "krippendorff_alpha",
+    "kendall_w",
+    "robinson_a",
+    *["icc"] * 6,
+)
+
+
+@pytest.fixture
+def masrel(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Caller:
+    return Caller(monkeypatch, capsys)
+
+
+@pytest.fixture
+def wide(tmp_path: Path) -> Path:
+    path = tmp_path / "wide.csv"
+    path.write_text(WIDE, encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def sessions(tmp_path: Path) -> Path:
+    path = tmp_path / "sessions.csv"
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(["session", "item", "rater", "grade"])
+        for number, name in enumerate(NAMES):
+            for item in range(4):
+                for rater in range(2):
+                    grade = 1 + (item + rater * (item <= number)) % 3
+                    writer.writerow([name, item, f"R{rater}", grade])
+    return path
+
+
+def estimates(done: Done) -> list[dict[str, Any]]:
+    """Read the document on stdout; it must be JSON to the letter, without nan."""
+
+    def refuse(constant: str) -> None:
+        raise AssertionError(constant)
+
+    assert done.code == 0, done.err
+    found: list[dict[str, Any]] = json.loads(done.out, parse_constant=refuse)[
+        "estimates"
+    ]
+    return found
+
+
+def refused(done: Done) -> str:
+    """Check that a call was refused in words, and return them."""
+    assert done.code == 2
+    assert done.out == ""
+    assert "Traceback" not in done.err
+    return done.err
+
+
+# What is estimated.
+
+
+def test_all_are_those_for_any_number_of_raters(masrel: Caller, wide: Path) -> None:
+    found = estimates(masrel("agree", wide, "--coefficients", "all", "--json", "-"))
+    assert tuple(e["coefficient"] for e in found) == OF_ANY_NUMBER
+
+
+def test_all_of_two_raters_has_those_for_two(masrel: Caller, tmp_path: Path) -> None:
+    path = tmp_path / "two.csv"
+    path.write_text("item,A,B\nx,1,1\ny,2,1\nz,2,2\n", encoding="utf-8")
+    found = estimates(masrel("agree", path, "--coefficients", "all", "--json", "-"))
+    names = [e["coefficient"] for e in found]
+    assert sorted(names) == sorted([*OF_ANY_NUMBER, "cohen_kappa", "scott_pi"])
+    # p_o = 2/3; margins 1/3, 2/3 and 2/3, 1/3: p_e = 4/9, kappa 2/5
+    assert found[names.index("cohen_kappa")]["value"] == 0.4
+
+
+def test_several_come_in_the_order_asked_for(masrel: Caller, wide: Path) -> None:
+    asked = "gwet_ac, icc_ck,percent_agreement"
+    found = estimates(masrel("agree", wide, "--coefficients", asked, "--json", "-"))
+    assert [(e["coefficient"], e["weights"]) for e in found] == [
+        ("gwet_ac", "identity"),
+        ("icc", "ICC(C,k)"),
+        ("percent_agreement", "identity"),
+    ]
+    # pairs that agree: 1 of 3, 1 of 1, 1 of 3, 3 of 3
+    assert found[2]["value"] == pytest.approx(2 / 3, rel=1e-15)
+
+
+def test_an_unknown_coefficient_is_named_with_those_there_are(
+    masrel: Caller, wide: Path
+) -> None:
+    said = refused(masrel("agree", wide, "--coefficients", "gwet_ac,flies_kappa"))
+    assert "'flies_kappa'" in said
+    for name in COEFFICIENTS:
+        assert name in said
+
+
+@pytest.mark.parametrize("weights", get_args(WeightName))
+def test_weights_are_those_of_the_declared_scale(
+    masrel: Caller, wide: Path, weights: WeightName
+) -> None:
+    names = ("fleiss_kappa", "gwet_ac", "krippendorff_alpha")
+    call = ("--categories", ",".join(SCALE), "--weights", weights, "--json", "-")
+    found = estimates(masrel("agree", wide, "--coefficients", ",".join(names), *call))
+    for name, document in zip(names, found, strict=True):
+        ours = COEFFICIENTS[name](ROWS, categories=SCALE, weights=weights)
+        assert document["value"] == ours.value
+        assert document["standard_error"] == ours.standard_error
+        assert document["weights"] == weights
+
+
+def test_numbers_weigh_by_value_and_ten_comes_after_two(
+    masrel: Caller, tmp_path: Path
+) -> None:
+    # (1 1), (1 2), (10 10): D_o = (1/9)/3, D_e = (2 + 18 + 9 + 8)/81: 1 - 3/37
+    path = tmp_path / "ten.csv"
+    path.write_text("item,A,B\nx,1,1\ny,1,2\nz,10,10\n", encoding="utf-8")
+    asked = ("--coefficients", "cohen_kappa", "--weights", "linear", "--json", "-")
+    (found,) = estimates(masrel("agree", path, *asked))
+    assert found["value"] == 34 / 37
+
+
+def test_weights_are_named_beside_the_coefficient(masrel: Caller, wide: Path) -> None:
+    done = masrel("agree", wide, "--weights", "quadratic")
+    assert "Fleiss' κ, quadratic" in done.out
+    said = refused(masrel("agree", wide, "--weights", "squared"))
+    assert "needs one of identity, linear, quadratic" in said
+    assert "'squared'" in said
+
+
+@pytest.mark.parametrize(
+    ("scale", "best", "who"),
+    [
+        ("landis_koch", "almost perfect", "Landis and Koch (1977)"),
+        ("altman", "very good", "Altman (1991)"),
+        ("fleiss", "excellent", "Fleiss (1981)"),
+        ("cicchetti", "excellent", "Cicchetti and Sparrow (1981)"),
+    ],
+)
+def test_perfect_agreement_earns_the_best_word(
+    masrel: Caller, tmp_path: Path, scale: BandScale, best: str, who: str
+) -> None:
+    path = tmp_path / "perfect.csv"
+    path.write_text("item,A,B\nx,1,1\ny,2,2\nz,1,1\n", encoding="utf-8")
+    done = masrel("agree", path, "--words", scale, "--csv")
+    percent, kappa = csv.DictReader(io.StringIO(done.out))
+    assert kappa["words"] == best
+    assert percent["words"] == ""  # not against chance: no word was meant for it
+    assert who in masrel("agree", path, "--words", scale).out
+
+
+def test_a_word_is_the_one_that_is_certain(masrel: Caller, wide: Path) -> None:
+    # kappa 9/17 = 0.529 ± 0.274: above 0 with 97 %, above 0.2 with 88 % of [-1, 1]
+    (row,) = csv.DictReader(
+        io.StringIO(
+            masrel(
+                *("agree", wide, "--coefficients", "fleiss_kappa"),
+                *("--words", "landis_koch", "--csv"),
+            ).out
+        )
+    )
+    assert float(row["value"]) == 9 / 17
+    assert row["words"] == "slight"
+
+
+# How it is shown.
+
+
+@pytest.mark.parametrize("more", [(), ("--target", "items"), ("--target", "raters")])
+def test_csv_has_every_digit_of_the_json(
+    masrel: Caller, wide: Path, more: tuple[str, ...]
+) -> None:
+    call = ("agree", wide, "--coefficients", "all", *more)
+    rows = list(csv.DictReader(io.StringIO(masrel(*call, "--csv").out)))
+    found = estimates(masrel(*call, "--json", "-"))
+    assert len(rows) == len(found) == len(OF_ANY_NUMBER)
+    for row, document in zip(rows, found, strict=True):
+        interval = document["interval"] or {"low": None, "high": None}
+        for key, number in (
+            ("value", document["value"]),
+            ("standard_error", document["standard_error"]),
+            ("low", interval["low"]),
+            ("high", interval["high"]),
+        ):
+            assert row[key] == "" if number is None else float(row[key]) == number
+        assert int(row["n_items"]) == document["n_items"]
+        assert int(row["n_raters"]) == document["n_raters"]
+        assert row["coefficient"].isprintable()
+
+
+def test_csv_on_stdout_is_a_table_and_no_word_more(masrel: Caller, wide: Path) -> None:
+    done = masrel("agree", wide, "--csv")
+    lengths = {len(row) for row in csv.reader(io.StringIO(done.out))}
+    assert len(lengths) == 1
+    assert "--target" in done.err
+
+
+def test_csv_keeps_the_name_of_every_session(masrel: Caller, sessions: Path) -> None:
+    done = masrel("agree", sessions, "--by", "session", "--csv")
+    rows = list(csv.DictReader(io.StringIO(done.out)))
+    assert [row["session"] for row in rows[::2]] == NAMES
+
+
+def lacking_escape(latex: str) -> str:
+    """Return what TeX would take for its own and is no command, cell or group."""
+    rest = re.sub(r"\\[&%$#_{}]", "", latex)  # escaped
+    rest = re.sub(r"\$(-|\\kappa|\\pi|\\alpha)\$", "", rest)  # formulas there are
+    rest = re.sub(r"\\(begin|end)\{(table|tabular)\}", "", rest)
+    rest = re.sub(r"\\text\w+\{\}", "", rest)
+    return "".join(re.findall(r"[%$#_~^&]", rest))
+
+
+def test_latex_is_one_balanced_table_of_escaped_text(
+    masrel: Caller, sessions: Path
+) -> None:
+    out = masrel("agree", sessions, "--by", "session", "--latex").out
+    opened = re.findall(r"\\begin\{(\w+)\}", out)
+    closed = re.findall(r"\\end\{(\w+)\}", out)
+    assert opened == closed[::-1] == ["table", "tabular"]
+    plain = re.sub(r"\\[{}]", "", out)
+    assert plain.count("{") == plain.count("}")
+    (letters,) = re.findall(r"\\begin\{tabular\}\{([lcr]+)\}", out)
+    body = out.split(r"\toprule")[1].split(r"\bottomrule")[0]
+    lines = [line for line in body.splitlines() if line and line != r"\midrule"]
+    assert len(lines) == 1 + 2 * len(NAMES)
+    for line in lines:
+        assert line.endswith(r" \\")
+        assert lacking_escape(line) == "&" * (len(letters) - 1)
+    for line in set(out.splitlines()) - set(lines):
+        assert lacking_escape(line) == ""
+    assert r"a\_b\&c\% & Percent agreement & " in out
+    assert (
+        r"50\textasciitilde{}\textasciicircum{}\$\#\{\}\textbackslash{} & Fleiss'"
+        in out
+    )
+    assert r"Fleiss' $\kappa$ & $-$" in out
+
+
+def test_latex_escapes_the_name_of_the_file(masrel: Caller, tmp_path: Path) -> None:
+    path = tmp_path / "od&d_100%.csv"
+    path.write_text(WIDE, encoding="utf-8")
+    out = masrel("agree", path, "--latex").out
+    assert r"od\&d\_100\%.csv}" in out
+
+
+def test_each_session_is_estimated_for_itself(masrel: Caller, sessions: Path) -> None:
+    found = estimates(
+        masrel(
+            *("agree", sessions, "--by", "session", "--json", "-"),
+            *("--coefficients", "percent_agreement"),
+        )
+    )
+    # the second rater differs on 1, 2 and 3 of 4 items
+    assert [(e["session"], e["value"]) for e in found] == [
+        (name, 1 - n / 4) for n, name in enumerate(NAMES, start=1)
+    ]
+
+
+def test_json_has_the_fields_of_an_estimate_and_of_its_interval(
+    masrel: Caller, wide: Path
+) -> None:
+    def names(kind: type) -> list[str]:
+        return [field.name for field in dataclasses.fields(kind)]
+
+    call = ("--target", "items", "--level", "0.9", "--json", "-")
+    found = estimates(masrel("agree", wide, "--coefficients", "all", *call))
+    for document in found:
+        assert list(document) == names(Estimate)
+        if document["interval"] is not None:
+            assert list(document["interval"]) == names(Interval)
+    fleiss = next(e for e in found if e["coefficient"] == "fleiss_kappa")
+    assert fleiss["interval"]["level"] == 0.9
+    assert fleiss["interval"]["kind"] == "confidence"
+    assert (fleiss["n_items"], fleiss["n_raters"], fleiss["n_categories"]) == (4, 3, 4)
+
+
+def test_json_in_a_file_leaves_the_table_on_stdout(
+    masrel: Caller, wide: Path, tmp_path: Path
+) -> None:
+    path = tmp_path / "out.json"
+    done = masrel("agree", wide, "--json", path, "--csv")
+    assert done.out.startswith("coefficient,")
+    both = masrel("agree", wide, "--json", "-")
+    assert json.loads(path.read_text(encoding="utf-8")) == json.loads(both.out)
+
+
+@pytest.mark.parametrize("form", [(), ("--latex",)])
+def test_an_undefined_coefficient_says_why(
+    masrel: Caller, tmp_path: Path, form: tuple[str, ...]
+) -> None:
+    path = tmp_path / "same.csv"
+    path.write_text("item,A,B\nx,1,1\ny,1,1\n", encoding="utf-8")
+    done = masrel("agree", path, "--coefficients", "all", *form)
+    assert done.code == 0
+    assert "undefined: 0/0: chance agreement is 1" in done.out
+    assert "undefined: 0/0: every rater gives all items one rating" in done.out
+
+
+def test_an_undefined_coefficient_is_empty_in_csv_and_null_in_json(
+    masrel: Caller, tmp_path: Path
+) -> None:
+    path = tmp_path / "same.csv"
+    path.write_text("item,A,B\nx,1,1\ny,1,1\n", encoding="utf-8")
+    _, kappa = csv.DictReader(io.StringIO(masrel("agree", path, "--csv").out))
+    assert (kappa["value"], kappa["standard_error"]) == ("", "")
+    _, document = estimates(masrel("agree", path, "--json", "-"))
+    assert document["value"] is document["standard_error"] is None
+    assert document["observed"] == document["chance"] == 1.0
+
+
+def test_all_say_which_has_no_such_interval_and_one_alone_is_refused(
+    masrel: Caller, wide: Path
+) -> None:
+    call = ("--target", "raters", "--interval", "jackknife")
+    done = masrel("agree", wide, "--coefficients", "all", *call)
+    assert done.code == 0
+    assert "Kendall's W: no interval: " in done.out
+    said = refused(masrel("agree", wide, "--coefficients", "kendall_w", *call))
+    assert "Kendall's W is no function of sums" in said
+
+
+# What is refused.
+
+
+@pytest.mark.parametrize("form", ["--csv", "--latex"])
+def test_stdout_is_promised_once(masrel: Caller, wide: Path, form: str) -> None:
+    said = refused(masrel("agree", wide, form, "--json", "-"))
+    assert f"--json - and {form} both want stdout" in said
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--words", "landis"], "landis_koch"),
+        (["--target", "patients"], "items"),
+        (["--interval", "exact"], "jackknife"),
+        (["--by", "rater"], "session"),
+        (["--level", "high"], "high"),
+        (["--target", "items", "--level", "95"], "level: needs (0, 1), got 95"),
+        (["--seed", "x"], "x"),
+        (["--coefficients", ""], "fleiss_kappa"),
+        (["--categories", "1,1,2"], "repeated: ['1']"),
+        (["--categories", ""], "got ''"),
+        (["--colour"], "--colour"),
+    ],
+)
+def test_a_wrong_option_is_refused_by_name(
+    masrel: Caller, wide: Path, arguments: list[str], said: str
+) -> None:
+    assert said in refused(masrel("agree", wide, *arguments))
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "needed a header"),
+        ("item,A,B\n", "at least one"),
+        ("item,A,B\nx,1\n", "line 2"),
+        ("item,A,B\nx,1,2\nx,2,2\n", "'x'"),
+    ],
+)
+def test_what_is_no_table_is_refused_with_its_file(
+    masrel: Caller, tmp_path: Path, text: str, said: str
+) -> None:
+    path = tmp_path / "wrong.csv"
+    path.write_text(text, encoding="utf-8")
+    words = refused(masrel("agree", path))
+    assert "wrong.csv" in words
+    assert said in words
+
+
+def test_a_file_that_is_not_there_is_named(masrel: Caller, tmp_path: Path) -> None:
+    assert "nowhere.csv" in refused(masrel("agree", tmp_path / "nowhere.csv"))
