@@ -219,12 +219,12 @@ NEAR_ONE = [
 
 FEW_DISAGREE = [
     Case(
-        "Ten million items, five disagreements",
+        "Ten million items, few disagreements",
         "2 raters, as a table",
         table=[[MANY // 2, 3], [2, MANY // 2 - 5]],
     ),
     Case(
-        "Ten million items, five disagreements",
+        "Ten million items, few disagreements",
         "2 raters, as ratings",
         rows=[
             ((0, 0), MANY // 2),
@@ -233,8 +233,14 @@ FEW_DISAGREE = [
             ((1, 1), MANY // 2 - 5),
         ],
     ),
+    # the two items' influences cancel: what they disagree by is what chance gives
     Case(
-        "Ten million items, five disagreements",
+        "Ten million items, few disagreements",
+        "3 raters, two disagree, nothing else in the rare category",
+        rows=[((0, 0, 0), MANY - 2), ((0, 0, 1), 1), ((1, 0, 0), 1)],
+    ),
+    Case(
+        "Ten million items, few disagreements",
         "3 raters, nearly all in one category",
         rows=[((0, 0, 0), MANY - 5), ((0, 0, 1), 2), ((1, 0, 0), 2), ((0, 1, 1), 1)],
     ),
@@ -249,8 +255,8 @@ CATEGORIES = [
     ),
     Case(
         "Many categories",
-        "200 categories, 40 items × 3 raters",
-        rows=_rated(3, (40, 3), 200, alike=0.7),
+        "200 categories, 20 items × 3 raters",
+        rows=_rated(3, (20, 3), 200, alike=0.7),
         n_categories=200,
     ),
     Case(

@@ -20,7 +20,7 @@ from tests.stability.scenes import Exact, exact
 
 IRRATIONAL = ("radical", "circular")
 ERROR = 1e-12  # relative, of a standard error
-_ROUNDINGS = 8  # of each item's influence, where they are summed in floats
+_ROUNDINGS = 4  # of each item's influence, where they are summed in floats
 
 
 def units_allowed(weights: str) -> float:
