@@ -12,29 +12,34 @@ __all__ = ["Band", "BandScale", "bands", "benchmark"]
 BandScale = Literal["landis_koch", "altman", "fleiss", "cicchetti"]
 """Whose words."""
 
-# Lower ends, best first; the last band goes down to the end of the parameter space.
-_SCALES: dict[str, tuple[tuple[float, str], ...]] = {
-    "landis_koch": (
-        (0.8, "almost perfect"),
-        (0.6, "substantial"),
-        (0.4, "moderate"),
-        (0.2, "fair"),
-        (0.0, "slight"),
-        (-1.0, "poor"),
+# Lower ends, best first, and whether a value equal to it is in the band. The last band
+# goes down to the end of the parameter space.
+_SCALES: dict[str, tuple[tuple[float, bool, str], ...]] = {
+    "landis_koch": (  # poor below 0, slight to 0.20, fair 0.21 to 0.40, ...
+        (0.8, False, "almost perfect"),
+        (0.6, False, "substantial"),
+        (0.4, False, "moderate"),
+        (0.2, False, "fair"),
+        (0.0, True, "slight"),
+        (-1.0, True, "poor"),
     ),
-    "altman": (
-        (0.8, "very good"),
-        (0.6, "good"),
-        (0.4, "moderate"),
-        (0.2, "fair"),
-        (-1.0, "poor"),
+    "altman": (  # poor to 0.20, fair 0.21 to 0.40, ...
+        (0.8, False, "very good"),
+        (0.6, False, "good"),
+        (0.4, False, "moderate"),
+        (0.2, False, "fair"),
+        (-1.0, True, "poor"),
     ),
-    "fleiss": ((0.75, "excellent"), (0.4, "intermediate to good"), (-1.0, "poor")),
-    "cicchetti": (
-        (0.75, "excellent"),
-        (0.6, "good"),
-        (0.4, "fair"),
-        (-1.0, "poor"),
+    "fleiss": (  # poor below 0.40, excellent above 0.75
+        (0.75, False, "excellent"),
+        (0.4, True, "intermediate to good"),
+        (-1.0, True, "poor"),
+    ),
+    "cicchetti": (  # poor below 0.40, fair 0.40 to 0.59, good 0.60 to 0.74, ...
+        (0.75, True, "excellent"),
+        (0.6, True, "good"),
+        (0.4, True, "fair"),
+        (-1.0, True, "poor"),
     ),
 }
 
@@ -46,8 +51,9 @@ class Band:
     Attributes
     ----------
     low, high : float
-        Its ends; a value equal to `high` belongs to the band above in all scales but
-        the first, whose bands are 0.61 to 0.80 and so on.
+        Its ends. Which band a value at an end belongs to is as published: below for
+        0.2, 0.4, 0.6 and 0.8 of Landis and Koch and of Altman and for 0.75 of Fleiss,
+        above for the others. It matters where the standard error is 0.
     word : str
         Its name.
     probability : float
@@ -87,7 +93,8 @@ def bands(estimate: Estimate, *, scale: BandScale = "landis_koch") -> tuple[Band
     Notes
     -----
     Gwet's interval membership probability [1]_: the normal law around the estimate,
-    cut to [-1, 1]. The words themselves [2-5]_ are conventions and no more.
+    cut to [-1, 1]. An estimate below -1, which weights and few ratings allow, has a
+    law that is not cut there. The words themselves [2-5]_ are conventions and no more.
 
     References
     ----------
@@ -111,20 +118,16 @@ def bands(estimate: Estimate, *, scale: BandScale = "landis_koch") -> tuple[Band
         raise ParameterError(
             f"scale: needs one of {', '.join(get_args(BandScale))}, got {scale!r}"
         )
-    found, high, cumulative = [], 1.0, 0.0
-    for low, word in _SCALES[scale]:
-        inside = _probability(estimate, low, high)
-        cumulative += inside
-        found.append(
-            Band(
-                low=low,
-                high=high,
-                word=word,
-                probability=inside,
-                cumulative=min(cumulative, 1.0),
-            )
+    found: list[Band] = []
+    high, better = 1.0, 0.0
+    for low, closed, word in _SCALES[scale]:
+        end = -math.inf if low == -1.0 > estimate.value else low
+        inside, cumulative = _probabilities(estimate, end, high, closed, better)
+        band = Band(
+            low=end, high=high, word=word, probability=inside, cumulative=cumulative
         )
-        high = low
+        found.append(band)
+        high, better = low, cumulative
     return tuple(found)
 
 
@@ -166,18 +169,26 @@ def benchmark(
     return next((b.word for b in found if b.cumulative >= level), found[-1].word)
 
 
-def _probability(estimate: Estimate, low: float, high: float) -> float:
+def _probabilities(
+    estimate: Estimate, low: float, high: float, closed: bool, better: float
+) -> tuple[float, float]:
+    # of a band, and of it and the better ones, whose probability is `better`
     value, error = estimate.value, estimate.standard_error
     if math.isnan(value) or math.isnan(error):
-        return math.nan
+        return math.nan, math.nan
     if error == 0.0:  # no doubt at all, as far as the error goes
-        return 1.0 if low < value <= high or value == low == -1.0 else 0.0
+        reached = float(value > low or (closed and value == low))
+        return reached - better, reached
+    every = _between(value, error, -math.inf if value < -1.0 else -1.0, 1.0)
+    inside = _between(value, error, low, high) / every
+    return inside, min(better + inside, 1.0)
+
+
+def _between(value: float, error: float, low: float, high: float) -> float:
+    # probability of [low, high] under the normal law, taken in the tail where the
+    # difference of two small numbers is exact
     from scipy.special import ndtr
 
-    def between(first: float, second: float) -> float:
-        # in the tail where the difference of two small numbers is exact
-        if first > value:
-            return float(ndtr((value - first) / error) - ndtr((value - second) / error))
-        return float(ndtr((second - value) / error) - ndtr((first - value) / error))
-
-    return between(low, high) / between(-1.0, 1.0)
+    if low > value:
+        return float(ndtr((value - low) / error) - ndtr((value - high) / error))
+    return float(ndtr((high - value) / error) - ndtr((low - value) / error))

@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Iterable, Mapping, Sequence, Set
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -50,10 +50,13 @@ class CodedRatings:
         Position of each rating in `categories`; -1 where there is none.
     categories : tuple of str, int or float
         Declared categories in order.
+    declared : bool
+        False if nobody declared them, and they are the labels met.
     """
 
     codes: Codes = field(compare=False, repr=False)
     categories: tuple[Label, ...]
+    declared: bool = True
 
     @property
     def n_items(self) -> int:
@@ -119,7 +122,7 @@ def code_ratings(
         check_scale(ratings.categories, categories)
         return ratings
     if not (hasattr(ratings, "to_numpy") or isinstance(ratings, np.ndarray)):
-        return _coded(*_row_codes(ratings, categories))
+        return _coded(*_row_codes(ratings, categories), categories is not None)
     declared = None if categories is None else check_categories(categories)
     if isinstance(ratings, np.ma.MaskedArray):
         ratings = unmasked(ratings)
@@ -132,7 +135,7 @@ def code_ratings(
         )
     if 0 in ratings.shape:
         raise RatingsError(_NOTHING)
-    return _coded(*array_codes(ratings, declared))
+    return _coded(*array_codes(ratings, declared), declared is not None)
 
 
 def check_scale(known: tuple[Label, ...], categories: Sequence[Label] | None) -> None:
@@ -177,9 +180,9 @@ def unmasked(ratings: Any) -> NDArray[Any]:
     return np.asarray(plain)
 
 
-def _coded(codes: Codes, categories: tuple[Label, ...]) -> CodedRatings:
+def _coded(codes: Codes, categories: tuple[Label, ...], declared: bool) -> CodedRatings:
     codes.setflags(write=False)
-    return CodedRatings(codes=codes, categories=categories)
+    return CodedRatings(codes=codes, categories=categories, declared=declared)
 
 
 def complete(coded: CodedRatings) -> CodedRatings:
@@ -198,7 +201,7 @@ def complete(coded: CodedRatings) -> CodedRatings:
     whole = (coded.codes >= 0).all(axis=1)
     if whole.all():
         return coded
-    return CodedRatings(codes=coded.codes[whole], categories=coded.categories)
+    return replace(coded, codes=coded.codes[whole])
 
 
 _NOTHING = "ratings: needs at least one item and one rater, got none"

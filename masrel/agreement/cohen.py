@@ -87,7 +87,7 @@ def cohen_kappa(
     0.5
     """
     coded = two_raters(code_ratings(ratings, categories), "Cohen's kappa")
-    v = declared_weights(weights, coded.categories)
+    v = declared_weights(weights, coded.categories, declared=coded.declared)
     return _estimate(pair_table(coded.codes, coded.n_categories), v, population)
 
 

@@ -87,7 +87,7 @@ def conger_kappa(
     0.5
     """
     coded = code_ratings(ratings, categories)
-    v = declared_weights(weights, coded.categories)
+    v = declared_weights(weights, coded.categories, declared=coded.declared)
     check_variance(variance)
     check_population(population, coded.n_items)
     observed = coded_items(coded).tally(v).observed

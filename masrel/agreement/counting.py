@@ -14,7 +14,7 @@ from masrel.agreement.coding import (
     code_ratings,
     label_rows,
 )
-from masrel.agreement.counts import check_table, column_categories
+from masrel.agreement.counts import check_counts, check_table, column_categories
 from masrel.agreement.items import FewItems, ItemTable, item_table
 from masrel.agreement.labels import Label
 from masrel.estimates import OnDemand
@@ -24,8 +24,8 @@ __all__ = [
     "coded_items",
     "count_ratings",
     "count_table",
-    "counted_items",
     "item_counts",
+    "take_counts",
 ]
 
 Integers = NDArray[np.int64]
@@ -44,6 +44,8 @@ class CountedRatings:
     ----------
     categories : tuple of str, int or float
         Declared categories in order.
+    declared : bool
+        False if nobody declared them, and they are the labels met.
     items : FewItems or ManyItems
         Distinct items with how often each occurs.
     n_raters : int
@@ -53,6 +55,7 @@ class CountedRatings:
     """
 
     categories: tuple[Label, ...]
+    declared: bool = True
     items: ItemTable = field(compare=False, repr=False)
     n_raters: int
     coded: OnDemand[CodedRatings | None] = OnDemand()
@@ -96,13 +99,15 @@ def count_ratings(
         if items is not None:
             return CountedRatings(
                 categories=declared,
+                declared=categories is not None,
                 items=items,
                 n_raters=len(rows[0]),
-                coded=partial(code_ratings, rows, declared),
+                coded=partial(code_ratings, rows, categories),
             )
     coded = code_ratings(ratings, categories)
     return CountedRatings(
         categories=coded.categories,
+        declared=coded.declared,
         items=coded_items(coded),
         n_raters=coded.n_raters,
         coded=coded,
@@ -258,19 +263,40 @@ def _few(codes: list[list[int]], n_categories: int) -> FewItems:
     return FewItems(list(found), list(found.values()), n_categories)
 
 
-def counted_items(counts: Integers) -> ItemTable:
-    """Put equal rows of a table of counts together.
+def take_counts(
+    counts: ArrayLike, categories: Sequence[Label] | None
+) -> CountedRatings:
+    """Take a table of counts as counted ratings, equal rows together.
 
     Parameters
     ----------
-    counts : ndarray of int64, shape (n_items, n_categories)
+    counts : array_like of int, shape (n_items, n_categories)
         Raters per item and category.
+    categories : sequence of str, int or float, or None
+        The declared scale in order; 1 to n_categories when None.
 
     Returns
     -------
-    FewItems or ManyItems
-        Distinct items with how often each occurs.
+    CountedRatings
+        As many raters as the largest row sum.
+
+    Raises
+    ------
+    CountsError
+        If it is not a table of counts.
+    ParameterError
+        If there are not as many categories as columns.
     """
+    table = check_counts(counts)
+    return CountedRatings(
+        categories=tuple(column_categories(categories, table.shape[1])),
+        items=_rows_alike(table),
+        n_raters=int(table.sum(axis=1).max()),
+        coded=None,
+    )
+
+
+def _rows_alike(counts: Integers) -> ItemTable:
     base = int(counts.max()) + 1
     if counts.size > _FEW and base ** counts.shape[1] <= _MOST_KEYS:
         powers = base ** np.arange(counts.shape[1], dtype=np.int64)

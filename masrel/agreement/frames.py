@@ -24,7 +24,7 @@ _MISSING, _UNKNOWN = -1, -2
 
 def frame_codes(
     frame: Any, declared: tuple[Label, ...] | None
-) -> tuple[Codes, tuple[Label, ...]]:
+) -> tuple[Codes, tuple[Label, ...], bool]:
     """Turn a DataFrame of labels into codes, without importing pandas.
 
     Parameters
@@ -37,8 +37,9 @@ def frame_codes(
 
     Returns
     -------
-    tuple of ndarray and tuple
-        Codes, -1 where missing, shape (n_items, n_raters), and the scale.
+    tuple of ndarray, tuple and bool
+        Codes, -1 where missing, shape (n_items, n_raters), the scale, and whether
+        it was declared.
 
     Raises
     ------
@@ -56,34 +57,37 @@ def frame_codes(
             f"{frame.shape[0]} × {frame.shape[1]}"
         )
     if not hasattr(frame, "iloc"):  # not pandas, whose own types are told apart here
-        return array_codes(np.asarray(frame.to_numpy()), declared)
+        codes, known = array_codes(np.asarray(frame.to_numpy()), declared)
+        return codes, known, declared is not None
     if all(hasattr(dtype, "categories") for dtype in frame.dtypes):
         return _categorical_codes(frame, declared)
     plain = all(isinstance(d, np.dtype) and d.kind in "iuf" for d in frame.dtypes)
-    return array_codes(frame.to_numpy(None if plain else object), declared)
+    codes, known = array_codes(frame.to_numpy(None if plain else object), declared)
+    return codes, known, declared is not None
 
 
 def _categorical_codes(
     frame: Any, declared: tuple[Label, ...] | None
-) -> tuple[Codes, tuple[Label, ...]]:
+) -> tuple[Codes, tuple[Label, ...], bool]:
     columns = [frame.iloc[:, j].array for j in range(frame.shape[1])]
     of_columns = [column.categories.tolist() for column in columns]
     ordered = all(column.ordered for column in columns)
     if declared is None and ordered and all(c == of_columns[0] for c in of_columns):
         declared = check_categories(of_columns[0])
-    if declared is None:
+    known = declared
+    if known is None:
         # categories nobody was given are not labels met
-        declared = labels_met(
+        known = labels_met(
             labels[code]
             for column, labels in zip(columns, of_columns, strict=True)
             for code in np.unique(column.codes[column.codes >= 0]).tolist()
         )
-    position: dict[object, int] = {label: code for code, label in enumerate(declared)}
-    codes = np.empty(frame.shape, dtype=code_type(len(declared)))
+    position: dict[object, int] = {label: code for code, label in enumerate(known)}
+    codes = np.empty(frame.shape, dtype=code_type(len(known)))
     for j, (column, labels) in enumerate(zip(columns, of_columns, strict=True)):
         table = [position.get(label, _UNKNOWN) for label in labels] + [_MISSING]
         codes[:, j] = np.array(table)[column.codes]
         if codes[:, j].min() == _UNKNOWN:
             i = int(np.argmin(codes[:, j]))
             lookup(labels[int(column.codes[i])], position, i, j)
-    return codes, declared
+    return codes, known, declared is not None

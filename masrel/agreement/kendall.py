@@ -46,8 +46,8 @@ def kendall_w(
     Warns
     -----
     UndefinedStatisticWarning
-        If there are fewer than two complete items, or every rater ties all items;
-        the value is then ``nan``.
+        If there are fewer than two complete items or two raters, or every rater ties
+        all items; the value is then ``nan``.
 
     Notes
     -----
@@ -142,6 +142,8 @@ def _reason(values: NDArray[np.float64], found: "_Ranks", *, ties: bool) -> str 
     if values.shape[0] < 2:
         why = "fewer than two items are rated by every rater"
         return undefined("Kendall's W", why)
+    if values.shape[1] < 2:
+        return undefined("Kendall's W", "fewer than two raters")
     if found.below(ties=ties) == 0:
         return undefined("Kendall's W", "0/0: every rater gives all items one rating")
     return None

@@ -10,8 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from masrel.agreement.coding import CodedRatings, Label
-from masrel.agreement.counting import count_ratings, counted_items, item_counts
-from masrel.agreement.counts import check_counts, column_categories
+from masrel.agreement.counting import (
+    CountedRatings,
+    count_ratings,
+    item_counts,
+    take_counts,
+)
 from masrel.agreement.influence import Linear
 from masrel.agreement.items import ItemTable
 from masrel.agreement.kernel import Floats, Kernel, divide, weighted_disagreement
@@ -23,7 +27,6 @@ from masrel.agreement.weights import (
     WeightName,
     Weights,
     declared_weights,
-    identity_weights,
 )
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate
@@ -102,14 +105,8 @@ def krippendorff_alpha(
     0.444
     """
     counted = count_ratings(ratings, categories)
-    return _estimate(
-        counted.items,
-        counted.n_raters,
-        counted.categories,
-        weights,
-        metric,
-        population,
-    )
+    v = _disagreement(counted, weights, metric)
+    return _estimate(counted, v, population)
 
 
 def krippendorff_alpha_from_counts(
@@ -151,12 +148,9 @@ def krippendorff_alpha_from_counts(
     >>> round(krippendorff_alpha_from_counts([[2, 0], [0, 2], [1, 1]]).value, 3)
     0.444
     """
-    table = check_counts(counts)
-    labels = column_categories(categories, table.shape[1])
-    n_raters = int(table.sum(axis=1).max())
-    return _estimate(
-        counted_items(table), n_raters, labels, weights, metric, population
-    )
+    counted = take_counts(counts, categories)
+    v = _disagreement(counted, weights, metric)
+    return _estimate(counted, v, population)
 
 
 class _Sums(NamedTuple):
@@ -182,15 +176,8 @@ class _Sums(NamedTuple):
         return cls(n_items, sum(totals), pairs, above, products, below)
 
 
-def _estimate(
-    table: ItemTable,
-    n_raters: int,
-    categories: Sequence[Label],
-    weights: "WeightName | ArrayLike | None",
-    metric: Metric | None,
-    population: int | None,
-) -> Estimate:
-    v = _disagreement(table, categories, weights, metric)
+def _estimate(counted: CountedRatings, v: Weights, population: int | None) -> Estimate:
+    table = counted.items
     usable = [group for group in table.tally(v).groups if group.size > 1]
     found = _Sums.of(usable, v) if usable else None
     check_population(population, 0 if found is None else found.n_items)
@@ -220,28 +207,23 @@ def _estimate(
         observed=observed,
         chance=chance,
         n_items=0 if found is None else found.n_items,
-        n_raters=n_raters,
+        n_raters=counted.n_raters,
         n_categories=table.n_categories,
         reason=reason,
     )
 
 
 def _disagreement(
-    table: ItemTable,
-    categories: Sequence[Label],
+    counted: CountedRatings,
     weights: "WeightName | ArrayLike | None",
     metric: Metric | None,
 ) -> Weights:
     if metric is None:
-        return declared_weights("identity" if weights is None else weights, categories)
+        asked = "identity" if weights is None else weights
+        return declared_weights(asked, counted.categories, declared=counted.declared)
     if weights is not None:
         raise ParameterError("weights, metric: needs one of them, got both")
-    totals = [0] * table.n_categories
-    if metric == "ordinal":
-        for group in table.tally(identity_weights(table.n_categories)).groups:
-            if group.size > 1:
-                totals = [a + b for a, b in zip(totals, group.totals, strict=True)]
-    return metric_weights(metric, categories, totals)
+    return metric_weights(metric, counted)
 
 
 def _error(table: ItemTable, v: Weights, found: _Sums, population: int | None) -> float:

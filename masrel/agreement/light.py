@@ -86,7 +86,7 @@ def light_kappa(
         )
     if missing == "listwise":
         coded = complete(coded)
-    v = declared_weights(weights, coded.categories)
+    v = declared_weights(weights, coded.categories, declared=coded.declared)
     check_population(population, coded.n_items)
     n_raters = coded.codes.shape[1]
     if n_raters < 2:

@@ -92,7 +92,9 @@ def code_long(
     table[places] = grades
     codes = table.reshape(-1, n_raters)
     codes.setflags(write=False)
-    return CodedRatings(codes=codes, categories=declared)
+    return CodedRatings(
+        codes=codes, categories=declared, declared=categories is not None
+    )
 
 
 def _factors(column: Any, name: str) -> tuple[NDArray[np.intp], Any]:

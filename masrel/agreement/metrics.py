@@ -4,11 +4,12 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import Literal, get_args
 
-from masrel.agreement.labels import Label
+from masrel.agreement.counting import CountedRatings
 from masrel.agreement.weights import (
     Weights,
     category_values,
     every_pair,
+    identity_weights,
     over_one_denominator,
 )
 from masrel.errors import ParameterError
@@ -19,19 +20,16 @@ Metric = Literal["nominal", "ordinal", "interval", "ratio"]
 """Names of the difference functions."""
 
 
-def metric_weights(
-    metric: Metric, categories: Sequence[Label], totals: Sequence[int]
-) -> Weights:
+def metric_weights(metric: Metric, counted: CountedRatings) -> Weights:
     """Return squared differences of categories as weights of disagreement.
 
     Parameters
     ----------
     metric : {"nominal", "ordinal", "interval", "ratio"}
         The difference function.
-    categories : sequence of str, int or float
-        The declared scale in order. Numbers differ by value, text by rank.
-    totals : sequence of int, shape (n_categories,)
-        Pairable ratings per category; the ordinal metric counts those between.
+    counted : CountedRatings
+        The ratings. Numbers differ by value, text by rank in the declared scale; the
+        ordinal metric counts the pairable ratings between two categories.
 
     Returns
     -------
@@ -41,7 +39,8 @@ def metric_weights(
     Raises
     ------
     ParameterError
-        If the metric is none, or two values sum to 0 under "ratio".
+        If the metric is none, two values sum to 0 under "ratio", or the scale of
+        text was not declared: its order is not known.
 
     References
     ----------
@@ -51,7 +50,9 @@ def metric_weights(
     --------
     From the middle of 2 ratings over 3 to the middle of 4 it is 1 + 3 + 2 = 6:
 
-    >>> float(metric_weights("ordinal", ["a", "b", "c"], [2, 3, 4]).as_floats()[0, 2])
+    >>> from masrel.agreement.counting import take_counts
+    >>> counted = take_counts([[2, 3, 4]], ["a", "b", "c"])
+    >>> float(metric_weights("ordinal", counted).as_floats()[0, 2])
     36.0
     """
     if metric not in get_args(Metric):
@@ -59,10 +60,15 @@ def metric_weights(
             f"metric: needs one of {', '.join(get_args(Metric))}, got {metric!r}"
         )
     if metric == "nominal":
-        return Weights(name="nominal", n_categories=len(categories))
+        return Weights(name="nominal", n_categories=len(counted.categories))
+    if not counted.declared and isinstance(counted.categories[0], str):
+        raise ParameterError(
+            f"categories: the {metric} metric needs the declared scale in order, the "
+            f"ratings are text: {', '.join(map(str, counted.categories))}"
+        )
     if metric == "ordinal":
-        return over_one_denominator("ordinal metric", _ordinal(totals))
-    values = category_values(categories)
+        return over_one_denominator("ordinal metric", _ordinal(_pairable(counted)))
+    values = category_values(counted.categories)
     if metric == "interval":
         squares = every_pair(values, lambda x, y: (x - y) ** 2)
         return over_one_denominator("interval", squares)
@@ -73,6 +79,15 @@ def metric_weights(
         )
     ratios = every_pair(values, lambda x, y: ((x - y) / (x + y)) ** 2)
     return over_one_denominator("ratio metric", ratios)
+
+
+def _pairable(counted: CountedRatings) -> list[int]:
+    # ratings per category of the items that have at least two
+    totals = [0] * len(counted.categories)
+    for group in counted.items.tally(identity_weights(len(totals))).groups:
+        if group.size > 1:
+            totals = [a + b for a, b in zip(totals, group.totals, strict=True)]
+    return totals
 
 
 def _ordinal(totals: Sequence[int]) -> list[list[Fraction]]:

@@ -12,8 +12,7 @@ from typing import NamedTuple
 from numpy.typing import ArrayLike
 
 from masrel.agreement.coding import Label
-from masrel.agreement.counting import count_ratings, counted_items
-from masrel.agreement.counts import check_counts, column_categories
+from masrel.agreement.counting import count_ratings, take_counts
 from masrel.agreement.influence import Expected, Slopes, as_irrcac, pooled_influence
 from masrel.agreement.items import ItemTable
 from masrel.agreement.standard_error import (
@@ -88,7 +87,9 @@ def estimate_ratings(
         The coefficient.
     """
     counted = count_ratings(ratings, options.categories)
-    weights = declared_weights(options.weights, counted.categories)
+    weights = declared_weights(
+        options.weights, counted.categories, declared=counted.declared
+    )
     return pooled_estimate(
         coefficient, counted.items, counted.n_raters, weights, options
     )
@@ -113,12 +114,8 @@ def estimate_counts(
     Estimate
         The coefficient.
     """
-    table = check_counts(counts)
-    categories = column_categories(options.categories, table.shape[1])
-    weights = declared_weights(options.weights, categories)
-    n_raters = int(table.sum(axis=1).max())
-    items = counted_items(table)
-    return pooled_estimate(coefficient, items, n_raters, weights, options)
+    counted = take_counts(counts, options.categories)
+    return estimate_ratings(coefficient, counted, options._replace(categories=None))
 
 
 def pooled_estimate(

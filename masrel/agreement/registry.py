@@ -79,6 +79,8 @@ class Coefficient:
         Whether 0 is what chance gives.
     weighted : bool
         Whether it takes weights.
+    own_interval : bool
+        Whether it comes with an interval, and takes its level.
     code : callable
         Ratings and categories to the codes its kernel takes.
     """
@@ -94,6 +96,7 @@ class Coefficient:
     highest: float = 1.0
     chance_corrected: bool = True
     weighted: bool = True
+    own_interval: bool = False
     code: Callable[..., CodedRatings] = code_ratings
 
     def __call__(
@@ -102,12 +105,18 @@ class Coefficient:
         *,
         categories: Sequence[Label] | None = None,
         weights: "WeightName | ArrayLike" = "identity",
+        level: float = 0.95,
     ) -> Estimate:
-        """Estimate the coefficient, as its public function does."""
+        """Estimate the coefficient, as its public function does.
+
+        The level is that of an interval which comes with it.
+        """
         if self.weighted:
             return self.function(ratings, categories=categories, weights=weights)
         if not (isinstance(weights, str) and weights == "identity"):
             raise ParameterError(f"weights: {self.title} takes none, got {weights!r}")
+        if self.own_interval:
+            return self.function(ratings, categories=categories, level=level)
         return self.function(ratings, categories=categories)
 
 
@@ -216,6 +225,7 @@ _ALL = (
             lowest=-math.inf,
             highest=math.inf if form == "ICC(A,k)" else 1.0,
             weighted=False,
+            own_interval=True,
         )
         for name, form in zip(
             ("icc_1", "icc_1k", "icc_c1", "icc_ck", "icc_a1", "icc_ak"),

@@ -83,7 +83,7 @@ def scott_pi(
         _COEFFICIENT,
         coded_items(coded),
         coded.n_raters,
-        declared_weights(weights, coded.categories),
+        declared_weights(weights, coded.categories, declared=coded.declared),
         Options(population=population),
     )
 

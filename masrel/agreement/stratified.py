@@ -85,7 +85,7 @@ def stratified_kappa(
     0.4
     """
     coded = code_strata(pairs, categories)
-    v = declared_weights(weights, coded.categories)
+    v = declared_weights(weights, coded.categories, declared=coded.declared)
     strata = [
         found
         for codes in _strata(coded)

@@ -110,7 +110,10 @@ def identity_weights(n_categories: int) -> Weights:
 
 
 def declared_weights(
-    weights: "WeightName | ArrayLike", categories: Sequence[Label]
+    weights: "WeightName | ArrayLike",
+    categories: Sequence[Label],
+    *,
+    declared: bool = True,
 ) -> Weights:
     r"""Make the weights of a declared scale.
 
@@ -121,6 +124,8 @@ def declared_weights(
         elsewhere at most 1. A number is taken as the exact binary value it is.
     categories : sequence of str, int or float
         The declared scale in order. Numbers weigh by value, text by rank.
+    declared : bool, optional
+        False if nobody declared it, and it is the labels met.
 
     Returns
     -------
@@ -130,8 +135,9 @@ def declared_weights(
     Raises
     ------
     ParameterError
-        If the name is none, the matrix is no such matrix, or the values of the
-        categories do not fit the weights.
+        If the name is none, the matrix is no such matrix, the values of the
+        categories do not fit the weights, or text was not declared: its order is not
+        known.
 
     Notes
     -----
@@ -157,14 +163,20 @@ def declared_weights(
     (((0, 1, 2), (1, 0, 1), (2, 1, 0)), 2)
     """
     n = len(categories)
-    if not isinstance(weights, str):
-        return _given(weights, n)
-    if weights not in _NAMES:
+    named = isinstance(weights, str)
+    if named and weights not in _NAMES:
         raise ParameterError(
             f"weights: needs one of {', '.join(_NAMES)} or a matrix, got {weights!r}"
         )
-    if weights == "identity":
+    if named and weights == "identity":
         return identity_weights(n)
+    if not declared and n > 1 and isinstance(categories[0], str):
+        raise ParameterError(
+            "categories: weights need the declared scale in order, the ratings are "
+            f"text: {', '.join(map(str, categories))}"
+        )
+    if not isinstance(weights, str):
+        return _given(weights, n)
     values = category_values(categories)
     if (reason := _absence(weights, values)) is not None:
         return Weights(name=weights, n_categories=n, reason=reason)

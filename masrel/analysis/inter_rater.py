@@ -50,7 +50,10 @@ def inter_rater(
     categories = scale_of(protocol).values
     grades = scale_of(protocol).weigh(matrix.grades)
     estimate = coefficient(line.coefficient)(
-        grades, categories=categories, weights=line.weights
+        grades,
+        categories=categories,
+        weights=line.weights,
+        level=protocol.analysis.level,
     )
     interval = planned_interval(
         line.interval,

@@ -98,7 +98,12 @@ def _each_rater(
             RaterEstimate(
                 rater=rater,
                 estimate=_with_interval(
-                    own(of_rater, categories=categories, weights=line.weights),
+                    own(
+                        of_rater,
+                        categories=categories,
+                        weights=line.weights,
+                        level=protocol.analysis.level,
+                    ),
                     line,
                     protocol,
                     of_rater,

@@ -7,13 +7,15 @@ from typing import TYPE_CHECKING
 
 import click
 
-from masrel.cli.agreement_table import Row, Wanted, agreement_table, estimate_session
+from masrel.cli.agreement_rows import Row, Wanted, estimate_session, scale_notes
+from masrel.cli.agreement_table import agreement_table
 from masrel.errors import MasrelWarning, ParameterError, RatingsError
 from masrel.estimates import Target, as_document
 
 if TYPE_CHECKING:
     from masrel.agreement.weights import WeightName
     from masrel.ratings import Ratings
+    from masrel.report.tables import Table
 
 __all__ = ["command"]
 
@@ -97,10 +99,11 @@ def command(
     named) or one row an item and one column a rater. Missing grades are empty or NA.
     Grades that are all numbers weigh by value, others by their place in the scale.
     """
-    forms = {"--csv": csv, "--latex": latex, "--json -": json_file == Path("-")}
+    forms = {"--json -": json_file == Path("-"), "--csv": csv, "--latex": latex}
     printed = [name for name, wanted in forms.items() if wanted]
     if len(printed) > 1:
-        raise ParameterError(f"{' and '.join(printed)} all want stdout: choose one")
+        both = " and ".join(printed)
+        raise ParameterError(f"{both} want the same stdout: choose one")
     wanted = Wanted(
         coefficients=tuple(name.strip() for name in coefficients.split(",")),
         weights=weights,
@@ -120,6 +123,7 @@ def command(
         grade=grade,
         categories=None if categories is None else _listed(categories),
     )
+    about = scale_notes(ratings, wanted.weights)
     with warnings.catch_warnings():
         # Every note is in the result, and so below the table or in the JSON.
         warnings.simplefilter("ignore", MasrelWarning)
@@ -128,7 +132,12 @@ def command(
             for session in _sessions(ratings, file, by)
             for row in estimate_session(ratings, session, wanted)
         ]
-    _write(rows, file, by, wanted, json_file, printed)
+    if json_file is not None:
+        _write_json(rows, by, json_file)
+    if json_file == Path("-"):
+        click.echo("".join(f"{note}\n" for note in about), err=True, nl=False)
+    else:
+        _print(agreement_table(rows, file, by, wanted, about), printed)
     if target is None:
         click.echo(NO_INTERVAL, err=True)
 
@@ -147,14 +156,7 @@ def _sessions(ratings: "Ratings", file: Path, by: str | None) -> list[str]:
     return sessions
 
 
-def _write(
-    rows: list[Row],
-    file: Path,
-    by: str | None,
-    wanted: Wanted,
-    json_file: Path | None,
-    printed: list[str],
-) -> None:
+def _write_json(rows: list[Row], by: str | None, file: Path) -> None:
     documents = [
         {**({} if by is None else {by: row.session}), **as_document(row.estimate)}
         for row in rows
@@ -162,15 +164,19 @@ def _write(
     text = json.dumps(
         {"estimates": documents}, indent=1, ensure_ascii=False, allow_nan=False
     )
-    if json_file == Path("-"):
+    if file == Path("-"):
         click.echo(text)
-        return
-    if json_file is not None:
-        json_file.write_text(text + "\n", encoding="utf-8", newline="\n")
+    else:
+        file.write_text(text + "\n", encoding="utf-8", newline="\n")
+
+
+def _print(table: "Table", printed: list[str]) -> None:
     from masrel.report.latex import as_latex
     from masrel.report.tables import as_csv, as_text
 
-    table = agreement_table(rows, file, by, wanted)
     form = {"--csv": as_csv, "--latex": as_latex}
     shown = form[printed[0]](table) if printed else as_text(table)
     click.echo(shown.rstrip("\n"))
+    if printed == ["--csv"]:  # which has no place for notes
+        for note in table.notes:
+            click.echo(note, err=True)

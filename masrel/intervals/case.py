@@ -68,6 +68,14 @@ class Case:
         return self.kernel.value(sums, self.v)
 
     @property
+    def lowest(self) -> float:
+        """Where intervals are cut: -∞ for an estimate below the usual least value.
+
+        Weights, or items of a single rating, can bring a coefficient below -1.
+        """
+        return self.entry.lowest if self.value >= self.entry.lowest else -math.inf
+
+    @property
     def kernel(self) -> Kernel:
         """The coefficient from sums over items."""
         return kernel_of(self.entry)
@@ -83,7 +91,7 @@ class Case:
     ) -> Interval:
         """Return a confidence interval, cut at the ends of the parameter space."""
         said = list(notes)
-        lowest = self.entry.lowest
+        lowest = self.lowest
         if low < lowest or high > 1.0:
             said.append(f"cut at the end of the parameter space [{lowest:g}, 1]")
         return Interval(
@@ -177,7 +185,7 @@ def open_case(
         raise ParameterError(f"{entry.title} needs {wanted} raters, got {columns}")
     rated = (coded.codes >= 0).any(axis=1)
     kernel = kernel_of(entry)
-    v = declared_weights(weights, coded.categories).as_floats()
+    v = declared_weights(weights, coded.categories, declared=coded.declared).as_floats()
     features = kernel.features(coded, v)[rated]
     value = float(kernel.value(features.sum(axis=0), v))
     return Case(

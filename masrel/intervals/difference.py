@@ -119,7 +119,7 @@ def difference(
         weights=before.weights,
         value=value,
         standard_error=math.sqrt(variance),
-        interval=_interval(one, value, variance, df, reason),
+        interval=_interval(cases, value, variance, df, reason),
         observed=before.observed - after.observed,
         chance=before.chance - after.chance,
         n_items=min(before.n_items, after.n_items),
@@ -167,29 +167,28 @@ def _without_each(case: Case) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
 
 
 def _interval(
-    case: Case, value: float, variance: float, df: float, reason: str | None
+    cases: list[Case], value: float, variance: float, df: float, reason: str | None
 ) -> Interval:
     method = "item jackknife of the difference, t"
+    fewest = min(cases, key=lambda case: case.n_items)
     if reason is None and math.isnan(variance):
         reason = "with one item left out an estimate is undefined"
     elif reason is None and variance == 0.0:
         reason = "leaving out any item leaves the difference as it is"
     if reason is not None:
-        low = high = math.nan
-        notes: tuple[str, ...] = ()
-    else:
-        half = student_t(case.level, df) * math.sqrt(variance)
-        width = 1.0 - case.entry.lowest  # of the parameter space
-        low, high = max(value - half, -width), min(value + half, width)
-        notes = warn_small(case.n_items, 10, "items")
+        return fewest.undefined(reason, method=method, unit="items")
+    half = student_t(fewest.level, df) * math.sqrt(variance)
+    notes = warn_small(fewest.n_items, 10, "items")
+    width = 1.0 - min(case.lowest for case in cases)  # that of the parameter space
+    if value - half < -width or value + half > width:
+        notes += (f"cut at the ends of the parameter space [{-width:g}, {width:g}]",)
     return Interval(
-        low=low,
-        high=high,
-        level=case.level,
+        low=max(value - half, -width),
+        high=min(value + half, width),
+        level=fewest.level,
         kind="confidence",
         method=method,
         target="items",
         unit="items",
         notes=notes,
-        reason=reason,
     )

@@ -14,7 +14,7 @@ from masrel.ratings.table import (
     Ratings,
     assemble,
 )
-from masrel.scales import Scale
+from masrel.scales import MODIFIED_ASHWORTH, Scale
 
 __all__ = ["read_ratings"]
 
@@ -58,7 +58,8 @@ def read_ratings(
         Names of columns, where the file's own names do not say it.
     categories : sequence of str, optional
         The grades a rater may give, in order, instead of `scale`. With neither, the
-        scale is the grades found, by value when all are numbers, else as text.
+        scale is the grades found, by value when all are numbers, else as text; with
+        a grade 1+ it is the Modified Ashworth Scale.
 
     Returns
     -------
@@ -228,6 +229,9 @@ def _observed_scale(rows: CsvRows, cells: list[_Cell]) -> Scale:
     try:
         values = {grade: float(grade) for grade in grades}
     except ValueError:
+        # No other scale has a grade 1+: its order is known, and its other grades.
+        if "1+" in grades and set(grades) <= set(MODIFIED_ASHWORTH.grades):
+            return MODIFIED_ASHWORTH
         return Scale(name="observed", grades=tuple(grades))
     return Scale(name="observed", grades=tuple(sorted(grades, key=values.__getitem__)))
 

@@ -9,7 +9,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from masrel.agreement import BandScale, bands, benchmark, fleiss_kappa
+from masrel.agreement import (
+    BandScale,
+    bands,
+    benchmark,
+    brennan_prediger,
+    brennan_prediger_from_counts,
+    fleiss_kappa,
+)
 from masrel.errors import ParameterError, UndefinedStatisticWarning
 from masrel.estimates import Estimate
 
@@ -220,3 +227,42 @@ def test_a_mistyped_scale_gets_one_sentence() -> None:
 def test_a_level_is_a_probability(level: float) -> None:
     with pytest.raises(ParameterError, match=r"level: needs \(0, 1\), got"):
         benchmark(estimate(0.5, 0.1), level=level)
+
+
+@pytest.mark.parametrize(
+    ("counts", "scale", "word"),
+    [
+        # four raters of two categories, κ_BP = 2 P - 1: all items alike, no error
+        ([3, 1], "landis_koch", "slight"),  # 0 is slight, below it is poor
+        ([3, 1], "altman", "poor"),
+        ([4, 0], "landis_koch", "almost perfect"),
+        # 15 and 1 of 16: P = 105/120, κ_BP = 0.75
+        ([15, 1], "fleiss", "intermediate to good"),  # excellent is above 0.75
+        ([15, 1], "cicchetti", "excellent"),  # 0.75 and more
+        ([15, 1], "landis_koch", "substantial"),
+    ],
+)
+def test_a_value_at_an_end_has_the_published_word(
+    counts: list[int], scale: BandScale, word: str
+) -> None:
+    found = brennan_prediger_from_counts([counts] * 5)
+    assert found.standard_error == 0.0
+    of_bands = bands(found, scale=scale)
+    assert [band.probability for band in of_bands if band.word == word] == [1.0]
+    assert sum(band.probability for band in of_bands) == 1.0
+    assert benchmark(found, scale=scale) == word
+
+
+@pytest.mark.parametrize("n_other", [0, 1, 300])
+def test_an_estimate_below_minus_one_has_probabilities_too(n_other: int) -> None:
+    # Linear weights of three categories have T_w = 5, p_e = 5/9: all ratings at the
+    # ends give (0 - 5/9)/(4/9) = -5/4.
+    ratings = [["1", "3"]] * 999 + [["1", "2"]] * n_other
+    found = brennan_prediger(ratings, categories=["1", "2", "3"], weights="linear")
+    assert (found.value < -1) == (n_other < 300)
+    for scale in get_args(BandScale):
+        of_bands = bands(found, scale=scale)
+        assert sum(band.probability for band in of_bands) == pytest.approx(1, rel=1e-14)
+        assert of_bands[-1].cumulative == pytest.approx(1, rel=1e-14)
+        assert of_bands[-1].low == (-math.inf if found.value < -1 else -1.0)
+        assert benchmark(found, scale=scale) == "poor"

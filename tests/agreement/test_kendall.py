@@ -117,7 +117,7 @@ def test_chi_squared_of_three_items_by_hand() -> None:
     assert found.name == "kendall_w_test"
 
 
-@given(rows((2, 9), (1, 5)), st.booleans())
+@given(rows((2, 9), (2, 5)), st.booleans())
 def test_is_the_quotient_of_plain_sums(table: Rows, ties: bool) -> None:
     expected = plain_w(table, ties=ties)
     if expected is None:
@@ -218,3 +218,11 @@ def test_many_items_cost_no_digits() -> None:
     # rho = 1 - 6 · 2 / (n³ - n), W = (rho + 1)/2
     found = kendall_w(np.column_stack([order, swapped])).value
     assert found == float(1 - Fraction(6, 300_000**3 - 300_000))
+
+
+def test_one_rater_agrees_with_nobody() -> None:
+    with pytest.warns(UndefinedStatisticWarning, match="fewer than two raters"):
+        found = kendall_w([[1], [2], [3]])
+    assert math.isnan(found.value)
+    with pytest.warns(UndefinedStatisticWarning, match="fewer than two raters"):
+        assert math.isnan(kendall_w_test([[1], [2], [3]]).p_value)

@@ -12,8 +12,10 @@ from hypothesis import strategies as st
 from masrel.agreement import (
     COEFFICIENTS,
     cohen_kappa,
+    count_ratings,
     declared_weights,
     fleiss_kappa,
+    krippendorff_alpha,
     percent_agreement,
 )
 from masrel.agreement.weights import WeightName
@@ -168,10 +170,33 @@ def test_a_matrix_of_the_caller_is_the_named_weights(
 
 def test_a_matrix_may_be_of_truth_values_and_weigh_below_zero() -> None:
     ratings = [["a", "a"], ["b", "b"], ["a", "b"]]
-    as_truths = cohen_kappa(ratings, weights=np.eye(2, dtype=bool))
+    scale = ["a", "b"]
+    as_truths = cohen_kappa(ratings, categories=scale, weights=np.eye(2, dtype=bool))
     assert as_truths.value == cohen_kappa(ratings).value
     # -1 for a disagreement doubles D_o and D_e: kappa does not move
-    assert cohen_kappa(ratings, weights=[[1, -1], [-1, 1]]).value == as_truths.value
+    below = cohen_kappa(ratings, categories=scale, weights=[[1, -1], [-1, 1]])
+    assert below.value == as_truths.value
+
+
+@pytest.mark.parametrize("weights", ["linear", "circular", [[1, 0], [0, 1]]])
+def test_text_that_was_not_declared_has_no_weights(weights: object) -> None:
+    # Sorted as text, 10 would come before 2.
+    ratings = [["2", "10"], ["10", "10"], ["2", "2"]]
+    for entry in COEFFICIENTS.values():
+        if entry.weighted and entry.shape == "ratings":
+            with pytest.raises(ParameterError, match=r"declared scale in order.*10, 2"):
+                entry(ratings, weights=weights)
+            assert entry(ratings, categories=["2", "10"], weights=weights).value
+    for metric in ("ordinal", "interval", "ratio"):
+        with pytest.raises(ParameterError, match=f"{metric} metric needs the declared"):
+            krippendorff_alpha(ratings, metric=metric)  # type: ignore[arg-type]
+    assert krippendorff_alpha(ratings, metric="nominal").value
+    # Ratings keep whether their scale was declared, counted, coded or complete.
+    counted = count_ratings(ratings)
+    assert not counted.declared
+    assert not counted.coded.declared
+    with pytest.raises(ParameterError, match="declared scale in order"):
+        fleiss_kappa(counted, weights=weights)
 
 
 @pytest.mark.parametrize(

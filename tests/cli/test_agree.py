@@ -71,7 +71,12 @@ def test_json_on_stdout_is_one_document_and_the_target_is_in_it(wide: Path) -> N
     # to 0.097, times 2/3 the error is 0.25, times t(2) = 4.30 more than 2/3 or 1/3.
     assert percent["interval"]["low"] == 0.0
     assert any("cut" in note for note in percent["interval"]["notes"])
-    assert done.stderr == ""
+    assert "told by its grade 1+" in done.stderr
+    declared = agree(
+        wide, "--target", "raters", "--categories", "0,1,1+,2,3,4", "--json", "-"
+    )
+    assert json.loads(declared.stdout) == json.loads(done.stdout)
+    assert declared.stderr == ""
 
 
 def test_undefined_is_null_with_a_reason(tmp_path: Path) -> None:

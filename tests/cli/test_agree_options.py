@@ -301,7 +301,7 @@ def test_json_has_the_fields_of_an_estimate_and_of_its_interval(
     fleiss = next(e for e in found if e["coefficient"] == "fleiss_kappa")
     assert fleiss["interval"]["level"] == 0.9
     assert fleiss["interval"]["kind"] == "confidence"
-    assert (fleiss["n_items"], fleiss["n_raters"], fleiss["n_categories"]) == (4, 3, 4)
+    assert (fleiss["n_items"], fleiss["n_raters"], fleiss["n_categories"]) == (4, 3, 6)
 
 
 def test_json_in_a_file_leaves_the_table_on_stdout(
@@ -355,7 +355,9 @@ def test_all_say_which_has_no_such_interval_and_one_alone_is_refused(
 @pytest.mark.parametrize("form", ["--csv", "--latex"])
 def test_stdout_is_promised_once(masrel: Caller, wide: Path, form: str) -> None:
     said = refused(masrel("agree", wide, form, "--json", "-"))
-    assert f"--json - and {form} both want stdout" in said
+    assert f"--json - and {form} want the same stdout" in said
+    said = refused(masrel("agree", wide, "--csv", "--latex"))
+    assert "--csv and --latex want the same stdout" in said
 
 
 @pytest.mark.parametrize(
@@ -401,3 +403,81 @@ def test_what_is_no_table_is_refused_with_its_file(
 
 def test_a_file_that_is_not_there_is_named(masrel: Caller, tmp_path: Path) -> None:
     assert "nowhere.csv" in refused(masrel("agree", tmp_path / "nowhere.csv"))
+
+
+# What is taken where nothing was said.
+
+
+def test_the_grade_1_plus_tells_the_modified_ashworth_scale(
+    masrel: Caller, wide: Path
+) -> None:
+    asked = ("--coefficients", "gwet_ac", "--weights", "linear", "--json", "-")
+    (told,) = estimates(masrel("agree", wide, *asked))
+    declared = ("--categories", "0,1,1+,2,3,4")
+    (same,) = estimates(masrel("agree", wide, *declared, *asked))
+    assert told == same
+    assert told["n_categories"] == 6
+    done = masrel("agree", wide)
+    assert "Modified Ashworth Scale, 0, 1, 1+, 2, 3, 4, told by its grade" in done.out
+    assert "Ashworth" not in masrel("agree", wide, *declared).out
+
+
+def test_weights_of_undeclared_text_are_refused_and_of_numbers_told(
+    masrel: Caller, tmp_path: Path
+) -> None:
+    text, numbers = tmp_path / "text.csv", tmp_path / "numbers.csv"
+    text.write_text("item,A,B\nx,low,mid\ny,high,high\n", encoding="utf-8")
+    numbers.write_text("item,A,B\nx,2,10\ny,10,10\n", encoding="utf-8")
+    said = refused(masrel("agree", text, "--weights", "linear"))
+    assert "--weights linear: needs --categories" in said
+    assert "high, low, mid" in said
+    assert masrel("agree", text).code == 0
+    done = masrel("agree", numbers, "--weights", "linear")
+    assert "The scale is the grades met, 2, 10; --categories declares" in done.out
+    assert "grades met" not in masrel("agree", numbers).out
+
+
+def test_a_level_is_that_of_every_interval(masrel: Caller, wide: Path) -> None:
+    call = ("--target", "items", "--level", "0.8", "--json", "-")
+    names = "icc_1,fleiss_kappa"
+    found = estimates(masrel("agree", wide, "--coefficients", names, *call))
+    assert [e["interval"]["level"] for e in found] == [0.8, 0.8]
+    said = refused(
+        masrel("agree", wide, "--coefficients", names, "--interval", "bootstrap", *call)
+    )
+    assert "ICC(1) is no function of sums" in said
+    # under "all" it keeps the interval that it comes with
+    every = ("--coefficients", "all", "--interval", "jackknife")
+    (icc, *_) = (
+        e
+        for e in estimates(masrel("agree", wide, *every, *call))
+        if "ICC" in e["weights"]
+    )
+    assert icc["interval"]["method"] == "F distribution"
+
+
+def test_weights_that_a_named_coefficient_does_not_take_are_said(
+    masrel: Caller, wide: Path
+) -> None:
+    call = ("agree", wide, "--weights", "linear", "--coefficients")
+    done = masrel(*call, "kendall_w,fleiss_kappa")
+    assert "Kendall's W: unweighted, there are no weights for it." in done.out
+    assert "unweighted" not in masrel(*call, "all").out
+
+
+def test_notes_name_the_session_where_it_is_not_all(
+    masrel: Caller, tmp_path: Path
+) -> None:
+    path = tmp_path / "two.csv"
+    rows = ["session,item,rater,grade"]
+    for session, grades in (("one", "aaaa"), ("two", "abba")):
+        for i, grade in enumerate(grades):
+            rows.append(f"{session},{i // 2},{'AB'[i % 2]},{grade}")
+    path.write_text("\n".join(rows) + "\n", encoding="utf-8")
+    call = ("agree", path, "--by", "session", "--coefficients", "fleiss_kappa,gwet_ac")
+    done = masrel(*call)
+    assert "Fleiss' κ (one): undefined: 0/0" in done.out
+    # a CSV has no place for the reason: it is on stderr
+    table = masrel(*call, "--csv")
+    assert "undefined" not in table.out
+    assert "Fleiss' κ (one): undefined: 0/0" in table.err

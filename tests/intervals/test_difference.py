@@ -219,9 +219,10 @@ def test_independent_variances_add() -> None:
 
 def test_the_same_ratings_do_not_differ_and_it_says_so() -> None:
     first, _ = two(20)
-    found = difference(
-        "fleiss_kappa", first, first, design="dependent", categories=CATEGORIES
-    )
+    with pytest.warns(UndefinedStatisticWarning, match="leaves the difference as it"):
+        found = difference(
+            "fleiss_kappa", first, first, design="dependent", categories=CATEGORIES
+        )
     assert (found.value, found.standard_error) == (0.0, 0.0)
     assert found.interval is not None
     assert "leaves the difference as it is" in (found.interval.reason or "")
@@ -331,3 +332,45 @@ def test_undefined_and_small_are_said() -> None:
         difference(
             "fleiss_kappa", first, second, design="dependent", categories=CATEGORIES
         )
+
+
+def test_the_smaller_of_two_samples_is_warned_of() -> None:
+    large, small = two(40)[0], two(4)[0]
+    for pair in ((large, small), (small, large)):
+        with pytest.warns(SmallSampleWarning, match="4 items"):
+            found = difference(
+                "fleiss_kappa", *pair, design="independent", categories=CATEGORIES
+            )
+        assert found.interval is not None
+        assert any("4 items" in note for note in found.interval.notes)
+
+
+def test_a_difference_that_loses_a_category_without_an_item_says_so() -> None:
+    once = [["a", "a"]] * 11 + [["a", "b"]]
+    with pytest.warns(UndefinedStatisticWarning, match="one item left out"):
+        found = difference(
+            "fleiss_kappa",
+            once,
+            [["a", "a"], ["b", "b"]] * 6,
+            design="dependent",
+            categories=["a", "b"],
+        )
+    assert found.interval is not None
+    assert found.interval.reason == "with one item left out an estimate is undefined"
+
+
+def test_an_interval_cut_at_the_ends_says_so() -> None:
+    apart = [["a", "b"], ["b", "a"], ["a", "a"]] * 2
+    alike = [["a", "a"], ["b", "b"], ["a", "b"]] * 2
+    with pytest.warns(SmallSampleWarning):
+        found = difference(
+            "fleiss_kappa",
+            alike,
+            apart,
+            design="independent",
+            categories=["a", "b"],
+            level=0.999,
+        )
+    assert found.interval is not None
+    assert found.interval.high == 2.0
+    assert any("cut at the ends" in note for note in found.interval.notes)

@@ -1,0 +1,217 @@
+"""The estimates of one session of a file of ratings."""
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from masrel.errors import MasrelError, ParameterError
+from masrel.estimates import Estimate, Interval, Target
+from masrel.scales import MODIFIED_ASHWORTH
+
+if TYPE_CHECKING:
+    from masrel.agreement import Coefficient
+    from masrel.agreement.weights import WeightName
+    from masrel.ratings import RatingMatrix, Ratings
+
+__all__ = ["Row", "Wanted", "estimate_session", "scale_notes"]
+
+_ANY_ORDER = ("all",)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wanted:
+    """What the caller wants of every session.
+
+    Attributes
+    ----------
+    coefficients : tuple of str
+        Names of the register, or ``("all",)``.
+    weights : str
+        Name of the weights, for coefficients that take any.
+    target : {"items", "raters", "both"} or None
+        What a new study would draw anew; no interval when None.
+    interval : str
+        Kind of interval, or ``"default"``.
+    level : float
+        Its level.
+    n_resamples, seed : int
+        For intervals that draw.
+    words : str or None
+        Whose words for values.
+    """
+
+    coefficients: tuple[str, ...]
+    weights: "WeightName"
+    target: Target | None
+    interval: str
+    level: float
+    n_resamples: int
+    seed: int
+    words: str | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Row:
+    """One estimate, and what to say of it that is not in it.
+
+    Attributes
+    ----------
+    session, title : str
+        Of what, and which coefficient.
+    estimate : Estimate
+        The estimate.
+    notes : tuple of str
+        What it lacks of what was asked for, and what was assumed.
+    """
+
+    session: str
+    title: str
+    estimate: Estimate
+    notes: tuple[str, ...] = ()
+
+
+def estimate_session(ratings: "Ratings", session: str, wanted: Wanted) -> list[Row]:
+    """Estimate the coefficients of one session.
+
+    Parameters
+    ----------
+    ratings : Ratings
+        The ratings.
+    session : str
+        One of its sessions.
+    wanted : Wanted
+        What of it.
+
+    Returns
+    -------
+    list of Row
+        One per coefficient, in the order asked for.
+
+    Raises
+    ------
+    ParameterError
+        If a coefficient, weights or an interval does not exist or does not fit. Under
+        ``"all"`` what does not fit two raters, or has no such interval, is left out or
+        said instead.
+    RatingsError
+        If the ratings do not fit a coefficient.
+    """
+    from masrel.agreement import count_ratings
+    from masrel.ratings import rating_matrix
+
+    matrix = rating_matrix(ratings, session=session)
+    values = ratings.scale.values
+    counted = count_ratings(ratings.scale.weigh(matrix.grades), values)
+    rows = []
+    for entry in _entries(wanted, matrix):
+        title, notes = entry.title, []
+        weights: WeightName = wanted.weights if entry.weighted else "identity"
+        if weights != "identity":
+            title += f", {weights}"
+        elif weights != wanted.weights and wanted.coefficients != _ANY_ORDER:
+            notes.append("unweighted, there are no weights for it")
+        estimate = entry(
+            counted, categories=values, weights=weights, level=wanted.level
+        )
+        try:
+            interval = _interval(entry, counted, values, weights, wanted)
+            estimate = replace(estimate, interval=interval or estimate.interval)
+        except MasrelError as error:
+            if wanted.coefficients != _ANY_ORDER:
+                raise
+            notes.append(f"no interval: {error}")
+        rows.append(
+            Row(session=session, title=title, estimate=estimate, notes=tuple(notes))
+        )
+    return rows
+
+
+def scale_notes(ratings: "Ratings", weights: str) -> tuple[str, ...]:
+    """Say which scale was taken where none was declared.
+
+    Parameters
+    ----------
+    ratings : Ratings
+        The ratings of a file.
+    weights : str
+        Name of the weights asked for.
+
+    Returns
+    -------
+    tuple of str
+        Sentences for the reader of the table.
+
+    Raises
+    ------
+    ParameterError
+        If weights are asked for of text, whose order is not known.
+    """
+    scale, met = ratings.scale, ", ".join(ratings.scale.grades)
+    if scale == MODIFIED_ASHWORTH:
+        return (
+            f"The scale is the Modified Ashworth Scale, {met}, told by its grade 1+; "
+            "--categories declares another.",
+        )
+    if weights == "identity" or scale.name != "observed":
+        return ()
+    if not all(map(_is_number, scale.grades)):
+        raise ParameterError(
+            f"--weights {weights}: needs --categories with every grade of the scale in "
+            f"order, the grades met are text: {met}"
+        )
+    return (f"The scale is the grades met, {met}; --categories declares another.",)
+
+
+def _is_number(grade: str) -> bool:
+    try:
+        return math.isfinite(float(grade))
+    except ValueError:
+        return False
+
+
+def _entries(wanted: Wanted, matrix: "RatingMatrix") -> list["Coefficient"]:
+    from masrel.agreement import COEFFICIENTS, coefficient
+
+    if wanted.coefficients == _ANY_ORDER:
+        n_raters = len(matrix.raters)
+        return [
+            entry
+            for entry in COEFFICIENTS.values()
+            if entry.shape == "ratings" and n_raters <= (entry.n_raters[1] or n_raters)
+        ]
+    entries = [coefficient(name) for name in wanted.coefficients]
+    for entry in entries:
+        if entry.shape == "pairs":
+            raise ParameterError(
+                f"--coefficients: {entry.name} takes each rater's grades of two "
+                "sessions; masrel analyze computes it from a study's plan"
+            )
+    return entries
+
+
+def _interval(
+    entry: "Coefficient",
+    ratings: object,
+    categories: tuple[float, ...],
+    weights: "WeightName",
+    wanted: Wanted,
+) -> Interval | None:
+    from masrel.analysis.interval import planned_interval
+
+    comes_with_one = entry.own_interval and (
+        wanted.interval == "default" or wanted.coefficients == _ANY_ORDER
+    )
+    if wanted.target is None or comes_with_one:
+        return None
+    usual = "analytic" if wanted.target == "items" else "jackknife"
+    return planned_interval(
+        usual if wanted.interval == "default" else wanted.interval,
+        entry.name,
+        ratings,
+        target=wanted.target,
+        categories=categories,
+        weights=weights,
+        level=wanted.level,
+        n_resamples=wanted.n_resamples,
+        seed=wanted.seed,
+    )
