@@ -119,7 +119,8 @@ def code_ratings(
             )
         ratings = ratings.coded
     if isinstance(ratings, CodedRatings):
-        check_scale(ratings.categories, categories)
+        if categories is not None:
+            check_scale(ratings.categories, categories)
         return ratings
     if not (hasattr(ratings, "to_numpy") or isinstance(ratings, np.ndarray)):
         return _coded(*_row_codes(ratings, categories), categories is not None)
@@ -138,22 +139,22 @@ def code_ratings(
     return _coded(*array_codes(ratings, declared), declared is not None)
 
 
-def check_scale(known: tuple[Label, ...], categories: Sequence[Label] | None) -> None:
+def check_scale(known: tuple[Label, ...], categories: Sequence[Label]) -> None:
     """Check that ratings which have a scale are asked for on no other.
 
     Parameters
     ----------
     known : tuple of str, int or float
         Their scale.
-    categories : sequence of str, int or float, or None
-        The scale asked for, if one is.
+    categories : sequence of str, int or float
+        The scale asked for.
 
     Raises
     ------
     ParameterError
         If it is another.
     """
-    if categories is not None and check_categories(categories) != known:
+    if check_categories(categories) != known:
         raise ParameterError(
             f"categories: the ratings are on the scale {known}, got {tuple(categories)}"
         )

@@ -1,7 +1,6 @@
 """From ratings to distinct items, each with how often it occurs."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
@@ -17,7 +16,6 @@ from masrel.agreement.coding import (
 from masrel.agreement.counts import check_counts, check_table, column_categories
 from masrel.agreement.items import FewItems, ItemTable, item_table
 from masrel.agreement.labels import Label
-from masrel.estimates import OnDemand
 
 __all__ = [
     "CountedRatings",
@@ -36,29 +34,51 @@ _MOST_SORTED = 20_000  # items that are sorted to find those alike
 _BLOCK = 1 << 16  # items counted at once, so that they stay in the cache
 
 
-@dataclass(frozen=True, kw_only=True)
 class CountedRatings:
     """Ratings with their distinct items counted, for several coefficients at once.
 
-    Attributes
+    Parameters
     ----------
     categories : tuple of str, int or float
         Declared categories in order.
-    declared : bool
-        False if nobody declared them, and they are the labels met.
     items : FewItems or ManyItems
         Distinct items with how often each occurs.
     n_raters : int
         Raters with at least one rating.
-    coded : CodedRatings or None
-        The ratings; None where only counts are known, and not who rated what.
+    coded : CodedRatings, callable or None
+        The ratings, or a call that gives them; None where only counts are known, and
+        not who rated what.
+    declared : bool, optional
+        False if nobody declared the categories, and they are the labels met.
+
+    Attributes
+    ----------
+    categories, items, n_raters, declared
+        As given.
     """
 
-    categories: tuple[Label, ...]
-    declared: bool = True
-    items: ItemTable = field(compare=False, repr=False)
-    n_raters: int
-    coded: OnDemand[CodedRatings | None] = OnDemand()
+    __slots__ = ("_coded", "categories", "declared", "items", "n_raters")
+
+    def __init__(
+        self,
+        categories: tuple[Label, ...],
+        items: ItemTable,
+        n_raters: int,
+        coded: CodedRatings | Callable[[], CodedRatings] | None,
+        declared: bool = True,
+    ) -> None:
+        self.categories = categories
+        self.items = items
+        self.n_raters = n_raters
+        self.declared = declared
+        self._coded = coded
+
+    @property
+    def coded(self) -> CodedRatings | None:
+        """The ratings; None where only counts are known, and not who rated what."""
+        if callable(self._coded):
+            self._coded = self._coded()
+        return self._coded
 
 
 def count_ratings(
@@ -91,7 +111,8 @@ def count_ratings(
     True
     """
     if isinstance(ratings, CountedRatings):
-        check_scale(ratings.categories, categories)
+        if categories is not None:
+            check_scale(ratings.categories, categories)
         return ratings
     if isinstance(ratings, list) and len(ratings) <= _FEW:
         rows, declared = label_rows(ratings, categories)

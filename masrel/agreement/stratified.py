@@ -147,7 +147,8 @@ def code_strata(
         If the pairs are not such a table.
     """
     if isinstance(pairs, CodedRatings):
-        check_scale(pairs.categories, categories)
+        if categories is not None:
+            check_scale(pairs.categories, categories)
         return pairs
     if isinstance(pairs, str) or not isinstance(pairs, Iterable):
         raise RatingsError(
