@@ -3,16 +3,50 @@
 import dataclasses
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Generic, Literal, TypeVar
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Generic, Literal, TypeVar
 
-__all__ = ["Estimate", "Interval", "OnDemand", "Target", "Unit", "as_document"]
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+__all__ = [
+    "Distribution",
+    "Estimate",
+    "Interval",
+    "OnDemand",
+    "Target",
+    "Unit",
+    "as_document",
+]
 
 Target = Literal["items", "raters", "both"]
 """What a new study would draw anew: the population an interval speaks of."""
 
 Unit = Literal["items", "raters", "both"]
 """What is resampled or left out."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Distribution:
+    """How a coefficient is distributed: over resamples, or in a posterior.
+
+    Attributes
+    ----------
+    values : ndarray, shape (n_values,)
+        Ascending values.
+    weights : ndarray, shape (n_values,)
+        Their probabilities, which sum to 1; the density at each of a continuous one.
+    continuous : bool
+        Whether the values are points of a continuous distribution.
+    words : str
+        What it is, such as "exact bootstrap distribution, 35 resamples".
+    """
+
+    values: "NDArray[np.float64]" = field(repr=False)
+    weights: "NDArray[np.float64]" = field(repr=False)
+    continuous: bool
+    words: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,6 +79,8 @@ class Interval:
         What the reader must know before relying on it.
     reason : str or None
         Why it is undefined, or None.
+    distribution : Distribution or None
+        What the ends are quantiles of, where the method has it.
     """
 
     low: float
@@ -60,6 +96,7 @@ class Interval:
     seed: int | None = None
     notes: tuple[str, ...] = ()
     reason: str | None = None
+    distribution: Distribution | None = field(default=None, compare=False, repr=False)
 
 
 T = TypeVar("T")
@@ -138,7 +175,7 @@ def as_document(result: Estimate | Interval) -> dict[str, object]:
     Returns
     -------
     dict
-        Field name to value, in the order of the fields.
+        Field name to value, in the order of the fields; without a distribution.
 
     Examples
     --------
@@ -150,8 +187,9 @@ def as_document(result: Estimate | Interval) -> dict[str, object]:
     True
     """
     return {
-        field.name: _plain(getattr(result, field.name))
-        for field in dataclasses.fields(result)
+        of.name: _plain(getattr(result, of.name))
+        for of in dataclasses.fields(result)
+        if of.name != "distribution"
     }
 
 
