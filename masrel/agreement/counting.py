@@ -114,8 +114,11 @@ def count_ratings(
         if categories is not None:
             check_scale(ratings.categories, categories)
         return ratings
-    if isinstance(ratings, list) and len(ratings) <= _FEW:
-        rows, declared = label_rows(ratings, categories)
+    few = ratings
+    if type(ratings) is np.ndarray and ratings.ndim == 2 and ratings.size <= _FEW:
+        few = ratings.tolist()
+    if isinstance(few, list) and len(few) <= _FEW:
+        rows, declared = label_rows(few, categories)
         items = _count_complete(rows, declared)
         if items is not None:
             return CountedRatings(
