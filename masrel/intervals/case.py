@@ -3,13 +3,15 @@
 import math
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import get_args
 
-from numpy.typing import ArrayLike
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from masrel.agreement.coding import CodedRatings, Label
 from masrel.agreement.kernel import Floats, Kernel
+from masrel.agreement.patterns import distinct_patterns
 from masrel.agreement.registry import Coefficient, coefficient
 from masrel.agreement.weights import WeightName, declared_weights
 from masrel.errors import ParameterError, SmallSampleWarning, UndefinedStatisticWarning
@@ -38,10 +40,14 @@ class Case:
         The coefficient.
     coded : CodedRatings
         The ratings.
+    patterns : CodedRatings
+        The distinct rows of ratings, rater by rater, of items with any rating.
+    times : ndarray of int64, shape (n_patterns,)
+        How often each occurs.
+    rows : ndarray, shape (n_patterns, n_features)
+        Features of each.
     v : ndarray, shape (n_categories, n_categories)
         Disagreement of two categories.
-    features : ndarray, shape (n_items, n_features)
-        Features of every item with at least one rating.
     value : float
         The estimate; ``nan`` when undefined.
     target : {"items", "raters", "both"}
@@ -52,8 +58,10 @@ class Case:
 
     entry: Coefficient
     coded: CodedRatings
+    patterns: CodedRatings
+    times: NDArray[np.int64] = field(compare=False, repr=False)
+    rows: Floats = field(compare=False, repr=False)
     v: Floats = field(compare=False, repr=False)
-    features: Floats = field(compare=False, repr=False)
     value: float
     target: Target
     level: float
@@ -61,7 +69,18 @@ class Case:
     @property
     def n_items(self) -> int:
         """Items with at least one rating."""
-        return int(self.features.shape[0])
+        return int(self.times.sum())
+
+    @property
+    def features(self) -> Floats:
+        """Features of every item with a rating, in order, (n_items, n_features)."""
+        rated = (self.coded.codes >= 0).any(axis=1)
+        return self.kernel.features(self.coded, self.v)[rated]
+
+    @property
+    def sums(self) -> Floats:
+        """Sums of the features over all items, (n_features,)."""
+        return np.asarray(self.times @ self.rows)
 
     def values(self, sums: Floats) -> Floats:
         """Return the coefficient for sums of shape (..., n_features)."""
@@ -183,17 +202,20 @@ def open_case(
     ):
         wanted = f"{fewest}" if most == fewest else f"at least {fewest}"
         raise ParameterError(f"{entry.title} needs {wanted} raters, got {columns}")
-    rated = (coded.codes >= 0).any(axis=1)
     kernel = kernel_of(entry)
     v = declared_weights(weights, coded.categories, declared=coded.declared).as_floats()
-    features = kernel.features(coded, v)[rated]
-    value = float(kernel.value(features.sum(axis=0), v))
+    codes, times = distinct_patterns(coded.codes, coded.n_categories)
+    rated = (codes >= 0).any(axis=1)
+    patterns = replace(coded, codes=codes[rated])
+    rows = kernel.features(patterns, v)
     return Case(
         entry=entry,
         coded=coded,
+        patterns=patterns,
+        times=times[rated],
+        rows=rows,
         v=v,
-        features=features,
-        value=value,
+        value=float(kernel.value(times[rated] @ rows, v)),
         target=target,
         level=level,
     )

@@ -12,6 +12,7 @@ from masrel.agreement.weights import WeightName
 from masrel.errors import ParameterError, RatingsError
 from masrel.estimates import Estimate, Interval
 from masrel.intervals.case import Case, Statistic, open_case, student_t, warn_small
+from masrel.intervals.jackknife import jackknife_variance, without_item
 
 __all__ = ["Design", "difference"]
 
@@ -143,27 +144,23 @@ def _dependent(one: Case, other: Case) -> tuple[float, float]:
             f"design: dependent ratings need both for every item, row {row} has "
             "ratings in one of them only"
         )
-    apart = _without_each(one) - _without_each(other)
     n = one.n_items
-    return (n - 1) * float(apart.var()), float(n - 1)
+    if n < 2:
+        return math.nan, 0.0
+    # the coefficients without item i, from the sums less its features
+    first, second = (case.values(case.sums - case.features) for case in (one, other))
+    return jackknife_variance(first - second, np.ones(n, dtype=np.int64)), float(n - 1)
 
 
 def _independent(one: Case, other: Case) -> tuple[float, float]:
     parts = [
-        ((case.n_items - 1) * float(_without_each(case).var()), case.n_items - 1)
+        (jackknife_variance(*without_item(case)), case.n_items - 1)
         for case in (one, other)
     ]
     variance = sum(part for part, _ in parts)
     if not variance > 0.0:
         return variance, float(min(df for _, df in parts))
     return variance, variance**2 / sum(part**2 / max(df, 1) for part, df in parts)
-
-
-def _without_each(case: Case) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    # the coefficient without item i, from the sums less its features
-    if case.n_items < 2:
-        return np.array([np.nan])
-    return case.values(case.features.sum(axis=0) - case.features)
 
 
 def _interval(

@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from masrel.agreement.coding import Label
 from masrel.agreement.kernel import Floats
@@ -19,7 +19,7 @@ from masrel.intervals.case import (
     warn_small,
 )
 
-__all__ = ["jackknife"]
+__all__ = ["jackknife", "jackknife_variance", "without_item"]
 
 
 def jackknife(
@@ -109,13 +109,12 @@ def jackknife(
     parts: list[tuple[float, int]] = []
     notes: list[str] = []
     for unit in units[target]:
-        replicates = _without_item(case) if unit == "items" else _without_rater(case)
+        replicates, times = (without_item if unit == "items" else _without_rater)(case)
         if np.isnan(replicates).any():
             reason = f"with one of the {unit} left out the estimate is undefined"
             return case.undefined(reason, method=method, unit=target)
-        n = replicates.size
-        # (n - 1)/n times the sum of squared deviations, (1.1) of [1]
-        parts.append(((n - 1) * float(replicates.var()), n - 1))
+        n = int(times.sum())
+        parts.append((jackknife_variance(replicates, times), n - 1))
         notes += warn_small(n, 10 if unit == "items" else 5, unit)
     variance = sum(part for part, _ in parts)
     if not variance > 0.0:
@@ -135,17 +134,54 @@ def jackknife(
     )
 
 
-def _without_item(case: Case) -> Floats:
-    # (n_items,): sums without an item are the total less its features
+Integers = NDArray[np.int64]
+
+
+def jackknife_variance(replicates: Floats, times: Integers) -> float:
+    """Return the jackknife's variance of an estimate.
+
+    Parameters
+    ----------
+    replicates : ndarray, shape (n_distinct,)
+        The estimate without a unit of each kind.
+    times : ndarray of int64, shape (n_distinct,)
+        Units of each kind.
+
+    Returns
+    -------
+    float
+        (n - 1)/n times the sum of squared deviations from their mean, (1.1) of [1] in
+        `jackknife`.
+    """
+    n = int(times.sum())
+    moved = replicates - replicates[0]  # so that no change at all is exactly 0
+    deviations = moved - times @ moved / n
+    return float((n - 1) / n * (times @ deviations**2))
+
+
+def without_item(case: Case) -> tuple[Floats, Integers]:
+    """Return the estimate without an item of each pattern, and how many there are.
+
+    Parameters
+    ----------
+    case : Case
+        A question.
+
+    Returns
+    -------
+    tuple of ndarray
+        Values, ``nan`` of a single item, and items, both (n_patterns,).
+    """
     if case.n_items < 2:
-        return np.array([np.nan])
-    return case.values(case.features.sum(axis=0) - case.features)
+        return np.full(1, np.nan), np.ones(1, dtype=np.int64)
+    # sums without an item are the total less its features
+    return case.values(case.sums - case.rows), case.times
 
 
-def _without_rater(case: Case) -> Floats:
-    # (n_raters,): features are made anew, because pairs of raters go
+def _without_rater(case: Case) -> tuple[Floats, Integers]:
+    # features are made anew, because pairs of raters go
     width = 2 if case.entry.shape == "pairs" else 1  # columns of a rater
-    codes = case.coded.codes
+    codes = case.patterns.codes
     n_raters = codes.shape[1] // width
     fewest = 2 if width == 2 else 3
     if n_raters < fewest:
@@ -156,7 +192,7 @@ def _without_rater(case: Case) -> Floats:
     values = []
     for rater in range(n_raters):
         rest = np.delete(codes, np.s_[rater * width : (rater + 1) * width], axis=1)
-        left = dataclasses.replace(case.coded, codes=rest)
-        sums = case.kernel.features(left, case.v).sum(axis=0)
+        left = dataclasses.replace(case.patterns, codes=rest)
+        sums = case.times @ case.kernel.features(left, case.v)
         values.append(float(case.values(sums)))
-    return np.array(values)
+    return np.array(values), np.ones(n_raters, dtype=np.int64)
