@@ -116,6 +116,13 @@ def _chosen(*rows: str) -> list[tuple[Row, int]]:
     ]
 
 
+def _split(seed: int, n_items: int, n_raters: int) -> list[list[int]]:
+    # so many distinct items that masrel sums their squares in floats
+    draw, half = random.Random(seed), n_raters // 2
+    more = [draw.randrange(-half // 10**4, half // 10**4) for _ in range(n_items)]
+    return [[half + d, half - d] for d in more]
+
+
 E15, E14, E12 = 10**15, 10**14, 10**12
 MOST = 2**53 - 1  # the largest count that is taken
 
@@ -164,6 +171,11 @@ LARGE = [
         "Counts up to 10¹⁵",
         "items of 2 to 10¹⁵ raters",
         counts=[[E15, 1], [3, E15 - 7], [1, 1], [E12 + 1, E12]],
+    ),
+    Case(
+        "Counts up to 10¹⁵",
+        "2 100 items × 10¹² raters, nearly evenly split",
+        counts=_split(9, 2100, E12),
     ),
 ]
 
@@ -233,11 +245,16 @@ FEW_DISAGREE = [
             ((1, 1), MANY // 2 - 5),
         ],
     ),
-    # the two items' influences cancel: what they disagree by is what chance gives
+    # what the two items disagree by is nearly what chance gives: influences cancel
     Case(
         "Ten million items, few disagreements",
-        "3 raters, two disagree, nothing else in the rare category",
+        "3 raters, one of them sees the rare category",
         rows=[((0, 0, 0), MANY - 2), ((0, 0, 1), 1), ((1, 0, 0), 1)],
+    ),
+    Case(
+        "Ten million items, few disagreements",
+        "3 raters, two of them see the rare category",
+        rows=[((0, 0, 0), MANY - 2), ((1, 1, 0), 1), ((0, 1, 1), 1)],
     ),
     Case(
         "Ten million items, few disagreements",

@@ -50,6 +50,11 @@ def ask(package: str, case: Case, name: str, weights: str) -> Answer:
         return Answer(note=f"crash: {type(error).__name__}")
 
 
+def offers_errors(package: str, name: str) -> bool:
+    """Tell whether a package offers standard errors of a coefficient."""
+    return package == "irrCAC" or (package, name) == ("statsmodels", "cohen_kappa")
+
+
 def installed(names: list[str]) -> dict[str, str]:
     """Return the versions of those packages that there are."""
     found = {}
@@ -129,7 +134,11 @@ _OF_TABLES = {
 def _irrcac(case: Case, name: str, weights: str) -> Answer:
     if weights in METRICS:
         raise NotOfferedError
-    if case.table or name in OF_PAIRS:
+    # it weighs the categories of a table by position alone
+    by_position = weights == "identity" or not case.values
+    if name in OF_PAIRS or (case.table and name in _OF_TABLES and by_position):
+        if not by_position:
+            raise NotOfferedError
         return _irrcac_of_table(case, name, weights)
     import pandas as pd
     from irrCAC.raw import CAC
@@ -150,8 +159,6 @@ def _irrcac_of_table(case: Case, name: str, weights: str) -> Answer:
     import pandas as pd
     from irrCAC.table import CAC
 
-    if name not in _OF_TABLES or (weights != "identity" and case.values):
-        raise NotOfferedError  # it weighs the categories of a table by position alone
     table = CAC(pd.DataFrame(_table(case)), weights=weights, digits=_DECIMALS)
     return _of_dict(getattr(table, _OF_TABLES[name])(), name, over_n=True)
 
@@ -194,9 +201,16 @@ def _counts(case: Case) -> NDArray[np.int64]:
 
 
 def _labels(case: Case) -> NDArray[Any]:
-    if case.counts and max(map(sum, case.counts)) > _MOST_ROWS:
+    # every item's labels, rater by rater
+    if case.counts:
         raise NoAnswerError("a column per rater")
-    return case.labels()
+    if sum(item.times for item in case.items) > _MOST_ROWS:
+        raise NoAnswerError("a row per item")
+    if case.rows:
+        return case.labels()
+    pairs = np.array([item.raters for item in case.items], dtype=np.intp)
+    times = [item.times for item in case.items]
+    return np.repeat(np.array(case.scale)[pairs], times, axis=0)
 
 
 PACKAGES: dict[str, Callable[[Case, str, str], Answer]] = {
