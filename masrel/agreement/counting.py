@@ -29,6 +29,7 @@ __all__ = [
 Integers = NDArray[np.int64]
 
 _FEW = 200  # ratings that Python counts about as fast as numpy
+_FEW_PLACES = 1 << 15  # ratings times categories that are counted one by one
 _MOST_KEYS = 1 << 22  # patterns that are counted in a table rather than sorted
 _MOST_SORTED = 20_000  # items that are sorted to find those alike
 _BLOCK = 1 << 16  # items counted at once, so that they stay in the cache
@@ -202,6 +203,9 @@ def item_counts(coded: CodedRatings) -> Integers:
         Raters per item and category.
     """
     n_items, n_raters = coded.codes.shape
+    if coded.codes.size * coded.n_categories <= _FEW_PLACES:
+        one_each = np.eye(coded.n_categories + 1, dtype=np.int64)[coded.codes]
+        return np.asarray(one_each.sum(axis=1)[:, :-1])  # code -1 is the last
     if coded.n_categories <= n_raters:
         parts = [(coded.codes == k).sum(axis=1) for k in range(coded.n_categories)]
         return np.column_stack(parts)

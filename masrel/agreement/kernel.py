@@ -56,10 +56,7 @@ def divide(numerator: Floats, denominator: Floats) -> Floats:
     ndarray, shape (...)
         The ratios.
     """
-    shape = np.broadcast_shapes(np.shape(numerator), np.shape(denominator))
-    out = np.full(shape, np.nan)
-    np.divide(numerator, denominator, out=out, where=np.not_equal(denominator, 0))
-    return out
+    return np.asarray(numerator / np.where(denominator == 0.0, np.nan, denominator))
 
 
 def weighted_disagreement(counts: Floats, v: Floats) -> Floats:
@@ -113,11 +110,13 @@ def pooled_kernel(expected: Callable[[Floats, Floats], Floats | float]) -> Kerne
 def _of_counts(counts: Floats, v: Floats) -> Floats:
     # (n_items, n_categories) -> (n_items, 3 + n_categories)
     n = counts.sum(axis=1)
-    usable, rated = n > 1, n > 0
-    pairs = np.where(usable, n * (n - 1), 1.0)
-    disagreement = np.where(usable, weighted_disagreement(counts, v), 0.0) / pairs
-    shares = counts / np.where(rated, n, 1.0)[:, None]
-    return np.column_stack([disagreement, usable, rated, shares])
+    features = np.empty((len(counts), 3 + counts.shape[1]))
+    # a single rating, or none, has no disagreement
+    features[:, 0] = weighted_disagreement(counts, v) / np.maximum(n * (n - 1), 1.0)
+    features[:, 1] = n > 1
+    features[:, 2] = n > 0
+    features[:, 3:] = counts / np.maximum(n, 1.0)[:, None]
+    return features
 
 
 def _of_resampled_raters(coded: CodedRatings, times: Floats, v: Floats) -> Floats:
