@@ -12,17 +12,18 @@ from masrel.agreement.weights import WeightName
 from masrel.errors import ParameterError, UndefinedStatisticWarning
 from masrel.estimates import Interval, Target
 from masrel.intervals.case import (
-    Case,
     Statistic,
     normal,
     open_case,
     student_t,
     warn_small,
 )
+from masrel.intervals.transforms import Transform, around
 
 __all__ = ["Distribution", "analytic"]
 
-Distribution = Literal["t", "normal", "logit"]
+Distribution = Literal["t", "normal", "logit", "fisher"]
+"""What an interval is taken from, and on which scale."""
 
 
 def analytic(
@@ -51,9 +52,9 @@ def analytic(
         How much two categories agree; see `declared_weights`.
     level : float, optional
         Nominal level.
-    distribution : {"t", "normal", "logit"}, optional
+    distribution : {"t", "normal", "logit", "fisher"}, optional
         Student's t with n - 1 degrees, the normal, or t on the logit of the
-        position between the ends of the parameter space.
+        position between the ends of the parameter space or on Fisher's z.
 
     Returns
     -------
@@ -117,28 +118,22 @@ def analytic(
             reason = "one item has no standard error"
         return case.undefined(reason, method=method, unit=None)
     notes = warn_small(estimate.n_items, 10, "items")
-    low, high = _ends(case, estimate.value, error, estimate.n_items, distribution)
+    if distribution == "normal":
+        half = normal(level) * error
+    else:
+        half = student_t(level, estimate.n_items - 1) * error
+    transform = _TRANSFORMS.get(distribution, "none")
+    low, high = around(estimate.value, half, transform, case.entry.lowest)
+    if math.isnan(low):
+        reason = "the estimate is not inside the ends of the parameter space"
+        return case.undefined(reason, method=method, unit=None)
     return case.closed(low, high, method=method, unit=None, notes=notes)
 
 
-_WORDS = {"t": "t(n-1)", "normal": "normal", "logit": "t(n-1) on the logit"}
-
-
-def _ends(
-    case: Case, value: float, error: float, n_items: int, distribution: Distribution
-) -> tuple[float, float]:
-    if distribution == "normal":
-        half = normal(case.level) * error
-        return value - half, value + half
-    quantile = student_t(case.level, n_items - 1)
-    lowest = case.entry.lowest
-    if distribution == "t" or not lowest < value < 1.0:
-        return value - quantile * error, value + quantile * error
-    # x = (value - lowest) / (1 - lowest); the error of logit x is error / (...)
-    width = 1.0 - lowest
-    share = (value - lowest) / width
-    half = quantile * error / (width * share * (1.0 - share))
-    odds = math.log(share / (1.0 - share))
-    return tuple(
-        lowest + width / (1.0 + math.exp(-o)) for o in (odds - half, odds + half)
-    )  # type: ignore[return-value]
+_WORDS = {
+    "t": "t(n-1)",
+    "normal": "normal",
+    "logit": "t(n-1) on the logit",
+    "fisher": "t(n-1) on Fisher's z",
+}
+_TRANSFORMS: dict[Distribution, Transform] = {"logit": "logit", "fisher": "fisher"}
