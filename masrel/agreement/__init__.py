@@ -26,6 +26,7 @@ from masrel.agreement.krippendorff import (
 from masrel.agreement.light import light_kappa
 from masrel.agreement.long import code_long
 from masrel.agreement.percent import percent_agreement, percent_agreement_from_counts
+from masrel.agreement.pooled_pairs import pooled_kappa
 from masrel.agreement.registry import COEFFICIENTS, Coefficient, coefficient
 from masrel.agreement.robinson import robinson_a
 from masrel.agreement.scott import scott_pi, scott_pi_from_table
@@ -84,6 +85,7 @@ __all__ = [
     "p_value",
     "percent_agreement",
     "percent_agreement_from_counts",
+    "pooled_kappa",
     "prevalence_index",
     "robinson_a",
     "scott_pi",

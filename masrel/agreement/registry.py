@@ -19,14 +19,12 @@ from masrel.agreement.kendall import kendall_w
 from masrel.agreement.kernel import Kernel
 from masrel.agreement.krippendorff import KRIPPENDORFF_KERNEL, krippendorff_alpha
 from masrel.agreement.light import LIGHT_KERNEL, light_kappa
+from masrel.agreement.pairs import code_strata
 from masrel.agreement.percent import PERCENT_KERNEL, percent_agreement
+from masrel.agreement.pooled_pairs import POOLED_PAIRS_KERNEL, pooled_kappa
 from masrel.agreement.robinson import robinson_a
 from masrel.agreement.scott import SCOTT_KERNEL, scott_pi
-from masrel.agreement.stratified import (
-    STRATIFIED_KERNEL,
-    code_strata,
-    stratified_kappa,
-)
+from masrel.agreement.stratified import STRATIFIED_KERNEL, stratified_kappa
 from masrel.agreement.weights import WeightName
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate
@@ -192,6 +190,15 @@ _ALL = (
         function=stratified_kappa,
         code=code_strata,
         kernel=STRATIFIED_KERNEL,
+        shape="pairs",
+        n_raters=(1, None),
+    ),
+    Coefficient(
+        name="pooled_kappa",
+        title="Pooled κ",
+        function=pooled_kappa,
+        code=code_strata,
+        kernel=POOLED_PAIRS_KERNEL,
         shape="pairs",
         n_raters=(1, None),
     ),

@@ -1,29 +1,23 @@
 """Stratified kappa: agreement of raters with themselves, over several raters."""
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from masrel.agreement.coding import (
-    CodedRatings,
-    Codes,
-    Label,
-    check_scale,
-    code_ratings,
-)
+from masrel.agreement.coding import CodedRatings, Label
 from masrel.agreement.cohen import COHEN_KERNEL, PairSums, pair_table
 from masrel.agreement.kernel import Floats, Kernel, divide
+from masrel.agreement.pairs import code_strata, strata_of
 from masrel.agreement.standard_error import standard_error
 from masrel.agreement.undefined import NO_CHANCE, NO_PAIR, undefined
 from masrel.agreement.weights import WeightName, Weights, declared_weights
-from masrel.errors import RatingsError
 from masrel.estimates import Estimate
 
-__all__ = ["STRATIFIED_KERNEL", "code_strata", "stratified_kappa"]
+__all__ = ["STRATIFIED_KERNEL", "stratified_kappa"]
 
 
 def stratified_kappa(
@@ -69,7 +63,7 @@ def stratified_kappa(
     Notes
     -----
     A rater without any pair of grades is left out. Pooling the pairs of all raters
-    into one Cohen's kappa is another estimand, and not this one.
+    into one Cohen's kappa is another estimand: `pooled_kappa`.
 
     References
     ----------
@@ -88,7 +82,7 @@ def stratified_kappa(
     v = declared_weights(weights, coded.categories, declared=coded.declared)
     strata = [
         found
-        for codes in _strata(coded)
+        for codes in strata_of(coded)
         if (found := PairSums.of(pair_table(codes, coded.n_categories), v)).n
     ]
     apart = sum([Fraction(s.above, s.n * v.denominator) for s in strata], Fraction(0))
@@ -124,76 +118,6 @@ def stratified_kappa(
     )
 
 
-def code_strata(
-    pairs: object, categories: Sequence[Label] | None = None
-) -> CodedRatings:
-    """Check pairs of ratings per rater and lay them side by side as codes.
-
-    Parameters
-    ----------
-    pairs : nested sequence or array_like, shape (n_raters, n_items, 2)
-        Per rater, the grades of both sessions.
-    categories : sequence of str, int or float, optional
-        The declared scale in order.
-
-    Returns
-    -------
-    CodedRatings
-        Codes of shape (n_items, 2 n_raters), the two of a rater beside each other.
-
-    Raises
-    ------
-    RatingsError
-        If the pairs are not such a table.
-    """
-    if isinstance(pairs, CodedRatings):
-        if categories is not None:
-            check_scale(pairs.categories, categories)
-        return pairs
-    if isinstance(pairs, str) or not isinstance(pairs, Iterable):
-        raise RatingsError(
-            f"pairs: needs one table (items, 2) per rater, got {type(pairs).__name__}"
-        )
-    tables = [_plain(table, rater) for rater, table in enumerate(pairs)]
-    if not tables:
-        raise RatingsError("pairs: needs the pairs of at least one rater, got none")
-    if len({len(table) for table in tables}) > 1:
-        raise RatingsError(
-            "pairs: every rater needs the same items, got "
-            f"{', '.join(str(len(table)) for table in tables)} items"
-        )
-    rows = [
-        [grade for pair in of_item for grade in pair]
-        for of_item in zip(*tables, strict=True)
-    ]
-    return code_ratings(rows, categories)
-
-
-def _plain(table: object, rater: int) -> list[list[object]]:
-    # one rater's table -> n_items lists of 2 labels
-    if not isinstance(table, Iterable) or isinstance(table, str):
-        raise RatingsError(f"pairs: rater {rater} needs a table, got {table!r}")
-    rows = []
-    for item, pair in enumerate(table):
-        if isinstance(pair, str) or not isinstance(pair, Iterable):
-            raise RatingsError(
-                f"pairs: rater {rater}, item {item}: needs two grades, got {pair!r}"
-            )
-        rows.append(list(pair))
-        if len(rows[-1]) != 2:
-            raise RatingsError(
-                f"pairs: rater {rater}, item {item}: needs two grades, got "
-                f"{len(rows[-1])}"
-            )
-    return rows
-
-
-def _strata(coded: CodedRatings) -> list[Codes]:
-    # (n_items, 2 n_raters) -> n_raters times (n_items, 2)
-    width = coded.codes.shape[1]
-    return [coded.codes[:, start : start + 2] for start in range(0, width, 2)]
-
-
 def _error(
     coded: CodedRatings, v: Weights, apart: Fraction, by_chance: Fraction
 ) -> float:
@@ -202,7 +126,7 @@ def _error(
     ratio = float(apart / by_chance)
     weights = v.as_floats()
     influence = np.zeros(coded.codes.shape[0])
-    for codes in _strata(coded):
+    for codes in strata_of(coded):
         features = COHEN_KERNEL.features(
             CodedRatings(codes=codes, categories=coded.categories), weights
         )
@@ -230,7 +154,7 @@ def _features(coded: CodedRatings, v: Floats) -> Floats:
             COHEN_KERNEL.features(
                 CodedRatings(codes=codes, categories=coded.categories), v
             )
-            for codes in _strata(coded)
+            for codes in strata_of(coded)
         ]
     )
 

@@ -2,7 +2,7 @@
 
 import dataclasses
 
-from masrel.agreement import coefficient, cohen_kappa, stratified_kappa
+from masrel.agreement import coefficient, cohen_kappa
 from masrel.analysis.interval import planned_interval, stream_seed
 from masrel.analysis.results import PlannedEstimate, RaterEstimate
 from masrel.analysis.selection import absence, rated_models
@@ -19,8 +19,8 @@ def retest_agreement(
     """Estimate agreement of every rater with him- or herself.
 
     ``stratified_kappa`` gives one estimate over all raters, each a stratum, and
-    every rater's Cohen's kappa beside it; any other coefficient is computed for
-    every rater alone. Pairs of different raters are never pooled.
+    ``pooled_kappa`` one of all their pairs in one table, both with every rater's
+    Cohen's kappa beside it; any other coefficient is computed for every rater alone.
 
     Parameters
     ----------
@@ -56,7 +56,8 @@ def retest_agreement(
     if not pairs.raters:
         reason = f"no rater has ratings in both {first} and {second}"
         return PlannedEstimate(line=line, reason=reason)
-    found = _stratified if line.coefficient == "stratified_kappa" else _each_rater
+    over_raters = coefficient(line.coefficient).shape == "pairs"
+    found = _over_raters if over_raters else _each_rater
     return dataclasses.replace(
         found(line, protocol, pairs),
         items=pairs.items,
@@ -65,12 +66,13 @@ def retest_agreement(
     )
 
 
-def _stratified(
+def _over_raters(
     line: EstimatePlan, protocol: Protocol, pairs: RetestPairs
 ) -> PlannedEstimate:
     categories = scale_of(protocol).values
     weighed = [scale_of(protocol).weigh(of_rater) for of_rater in pairs.pairs]
-    estimate = stratified_kappa(weighed, categories=categories, weights=line.weights)
+    over_raters = coefficient(line.coefficient)
+    estimate = over_raters(weighed, categories=categories, weights=line.weights)
     return PlannedEstimate(
         line=line,
         estimate=_with_interval(estimate, line, protocol, weighed, line.id),
