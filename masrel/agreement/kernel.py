@@ -11,12 +11,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement.coding import CodedRatings
+from masrel.agreement.coding import CodedRatings, Codes
 from masrel.agreement.counting import item_counts
 
 __all__ = ["Floats", "Kernel", "divide", "pooled_kernel", "weighted_disagreement"]
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+RaterSums = Callable[[Floats], Floats]
+
+_BLOCK = 1 << 14  # items whose categories are spread out at once
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,14 +37,15 @@ class Kernel:
         Sums of shape (..., n_features) and v to values of shape (...), ``nan``
         where undefined.
     rater_sums : callable or None
-        CodedRatings, how often each rater is taken, shape (n_resamples, n_raters),
-        and v, to sums of shape (n_resamples, n_features). A rater is never paired
-        with a copy of itself. None where raters cannot be resampled.
+        Distinct rows of CodedRatings, how often each occurs, and v, to a callable: how
+        often each rater is taken, shape (..., n_raters), to sums of shape
+        (..., n_features). A rater is never paired with a copy of itself. None where
+        raters cannot be resampled.
     """
 
     features: Callable[[CodedRatings, Floats], Floats]
     value: Callable[[Floats, Floats], Floats]
-    rater_sums: Callable[[CodedRatings, Floats, Floats], Floats] | None = None
+    rater_sums: Callable[[CodedRatings, Integers, Floats], RaterSums] | None = None
 
 
 def divide(numerator: Floats, denominator: Floats) -> Floats:
@@ -101,10 +106,7 @@ def pooled_kernel(expected: Callable[[Floats, Floats], Floats | float]) -> Kerne
         shares = divide(sums[..., 3:], sums[..., 2:3])
         return 1.0 - divide(observed, np.asarray(expected(shares, v)))
 
-    def rater_sums(coded: CodedRatings, times: Floats, v: Floats) -> Floats:
-        return _of_resampled_raters(coded, times, v)
-
-    return Kernel(features=features, value=value, rater_sums=rater_sums)
+    return Kernel(features=features, value=value, rater_sums=_of_resampled_raters)
 
 
 def _of_counts(counts: Floats, v: Floats) -> Floats:
@@ -119,20 +121,52 @@ def _of_counts(counts: Floats, v: Floats) -> Floats:
     return features
 
 
-def _of_resampled_raters(coded: CodedRatings, times: Floats, v: Floats) -> Floats:
-    # (n_resamples, n_raters) -> (n_resamples, 3 + n_categories)
-    chosen = (coded.codes[:, :, None] == np.arange(len(v))).astype(np.float64)
-    taken = np.einsum("br,irk->bik", times, chosen, optimize=True)
-    itself = np.einsum("br,ir->bi", times**2, chosen.sum(axis=-1), optimize=True)
-    n = taken.sum(axis=-1)
-    # Pairs of a rater with its own copies always agree: they are left out.
-    pairs = n * n - itself
-    usable, rated = pairs > 0, n > 0
-    disagreement = weighted_disagreement(taken, v) / np.where(usable, pairs, 1.0)
-    shares = taken / np.where(rated, n, 1.0)[..., None]
-    heads = [
-        np.where(usable, disagreement, 0.0).sum(axis=-1),
-        usable.sum(axis=-1),
-        rated.sum(axis=-1),
+def _of_resampled_raters(coded: CodedRatings, items: Integers, v: Floats) -> RaterSums:
+    # Items that the same raters rated are summed once, pair of raters by pair: Σ_i v of
+    # their categories is a quadratic form in how often each rater is taken.
+    given, kind = np.unique(coded.codes >= 0, axis=0, return_inverse=True)
+    groups = [
+        (rated.astype(np.float64), *_pair_sums(coded.codes[of], items[of], v))
+        for rated, of in zip(
+            given, kind.ravel() == np.arange(len(given))[:, None], strict=True
+        )
     ]
-    return np.column_stack([*heads, shares.sum(axis=-2)])
+
+    def sums(taken: Floats) -> Floats:
+        # (..., n_raters) -> (..., 3 + n_categories)
+        found = np.zeros((*taken.shape[:-1], 3 + len(v)), dtype=taken.dtype)
+        for rated, n_items, apart, chosen in groups:
+            of = taken * rated
+            n = of.sum(axis=-1)
+            # Pairs of a rater with its own copies always agree: they are left out.
+            pairs = n * n - (of * of).sum(axis=-1)
+            found[..., 0] += _over((of @ apart * of).sum(axis=-1), pairs)
+            found[..., 1] += n_items * (pairs != 0)
+            found[..., 2] += n_items * (n != 0)
+            found[..., 3:] += _over(of @ chosen, n[..., None])
+        return found
+
+    return sums
+
+
+def _pair_sums(codes: Codes, items: Integers, v: Floats) -> tuple[int, Floats, Floats]:
+    # how many items; Σ_i v of two raters' categories, (n_raters, n_raters); how often
+    # each rater chose each category, (n_raters, n_categories)
+    n_items, n_raters = codes.shape
+    side = (n_raters, len(v))
+    both = np.zeros(side * 2)
+    chosen = np.zeros(side)
+    for start in range(0, n_items, _BLOCK):
+        block = slice(start, start + _BLOCK)
+        each = (codes[block, :, None] == np.arange(len(v))).astype(np.float64)
+        weighed = each * items[block, None, None]
+        flat = weighed.reshape(len(each), -1).T @ each.reshape(len(each), -1)
+        both += flat.reshape(side * 2)
+        chosen += weighed.sum(axis=0)
+    return int(items.sum()), np.einsum("rksl,kl->rs", both, v), chosen
+
+
+def _over(numerator: Floats, denominator: Floats) -> Floats:
+    # 0 where there is nothing to divide by
+    empty = denominator == 0
+    return np.where(empty, 0.0, numerator) / np.where(empty, 1.0, denominator)

@@ -1,5 +1,6 @@
-"""Bootstrap intervals by Monte Carlo, over items or raters."""
+"""Bootstrap intervals over items or raters: exact, or by Monte Carlo."""
 
+import dataclasses
 from collections.abc import Sequence
 from typing import Literal, get_args
 
@@ -7,22 +8,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from masrel.agreement.coding import Label
-from masrel.agreement.kernel import Floats
 from masrel.agreement.weights import WeightName
 from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target, Unit
-from masrel.intervals.case import (
-    Case,
-    Statistic,
-    open_case,
-    warn_small,
-)
+from masrel.intervals.case import Case, Statistic, open_case, warn_small
+from masrel.intervals.compositions import n_compositions
+from masrel.intervals.endpoints import Kind, Replicates, bca_levels
+from masrel.intervals.pool import Pool, acceleration, item_pool, rater_pool
+from masrel.intervals.resamples import draw_resamples, enumerate_resamples
 
-__all__ = ["Kind", "bootstrap", "recorded_generator"]
+__all__ = ["Exact", "Kind", "bootstrap", "recorded_generator"]
 
-Kind = Literal["percentile", "basic", "bca"]
+Exact = Literal["auto"] | bool
 
-_CHUNK = 2_000_000  # numbers held at once while resampling
+_MOST_EXACT = 300_000  # distinct resamples that are enumerated rather than drawn
 
 
 def bootstrap(
@@ -35,6 +34,7 @@ def bootstrap(
     level: float = 0.95,
     n_resamples: int = 10_000,
     kind: Kind = "percentile",
+    exact: Exact = "auto",
     rng: np.random.Generator | int | None = None,
 ) -> Interval:
     """Compute a bootstrap interval.
@@ -54,23 +54,28 @@ def bootstrap(
     level : float, optional
         Nominal level.
     n_resamples : int, optional
-        Resamples, at least 100.
+        Resamples where they are drawn, at least 100.
     kind : {"percentile", "basic", "bca"}, optional
         How endpoints come from the resamples.
+    exact : {"auto", True, False}, optional
+        Whether every distinct resample is taken with its probability, instead of
+        drawing some. "auto" does so up to 300 000 of them; then nothing is random.
     rng : Generator or int, optional
         Where randomness comes from; an integer is recorded as the seed. Without
-        it a fresh seed is drawn and recorded.
+        it a fresh seed is drawn and recorded. An exact interval needs none.
 
     Returns
     -------
     Interval
-        A confidence interval with the Monte Carlo error of each endpoint; ``nan``
-        with a reason when undefined.
+        A confidence interval with the distribution of the resamples, and the Monte
+        Carlo error of each endpoint if they were drawn; ``nan`` with a reason when
+        undefined.
 
     Raises
     ------
     ParameterError
-        If an option is none, or raters of this coefficient cannot be resampled.
+        If an option is none, raters of this coefficient cannot be resampled, or there
+        are too many resamples for `exact` to be True.
     RatingsError
         If the ratings do not fit the coefficient.
 
@@ -84,7 +89,9 @@ def bootstrap(
     Notes
     -----
     Resamples on which the coefficient is undefined, such as one item drawn n times,
-    are left out and counted in `n_undefined`. When raters are resampled, a rater is
+    are left out and counted in `n_undefined`; the probabilities of the others are
+    scaled up to 1. An exact interval counts distinct resamples there, and a note says
+    how probable they are. When raters are resampled, a rater is
     never paired with a copy of itself: such pairs agree always and say nothing.
 
     References
@@ -94,17 +101,23 @@ def bootstrap(
 
     Examples
     --------
+    Of 20 items of three kinds there are 231 different resamples:
+
     >>> ratings = [["a", "a"], ["a", "b"], ["b", "b"], ["b", "b"]] * 5
-    >>> found = bootstrap("cohen_kappa", ratings, target="items", rng=1)
+    >>> found = bootstrap("cohen_kappa", ratings, target="items")
+    >>> found.method, found.distribution.words
+    ('percentile bootstrap, exact', 'exact bootstrap distribution, 231 resamples')
+    >>> found.n_resamples, round(found.low, 3), round(found.high, 3)
+    (None, 0.174, 0.802)
+
+    Drawing some of them instead:
+
+    >>> found = bootstrap("cohen_kappa", ratings, target="items", exact=False, rng=1)
     >>> found.seed, found.n_resamples, found.low < 0.5 < found.high
     (1, 10000, True)
     """
-    if kind not in get_args(Kind):
-        raise ParameterError(
-            f"kind: needs one of {', '.join(get_args(Kind))}, got {kind!r}"
-        )
-    if n_resamples < 100:
-        raise ParameterError(f"n_resamples: needs at least 100, got {n_resamples}")
+    _check(kind, n_resamples, exact)
+    _check_rng(rng)
     case = open_case(
         coefficient,
         ratings,
@@ -114,43 +127,72 @@ def bootstrap(
         level=level,
     )
     unit = _unit(case)
-    generator, seed = recorded_generator(rng)
     method = f"{kind} bootstrap"
     if np.isnan(case.value):
         return case.undefined(
             "the estimate itself is undefined", method=method, unit=unit
         )
     if unit == "items":
-        notes = warn_small(case.n_items, 16, "items")
-        drawn = _resample_items(case, n_resamples, generator)
+        pool, notes = item_pool(case), warn_small(case.n_items, 16, "items")
     else:
-        notes = warn_small(case.coded.codes.shape[1], 5, "raters")
-        drawn = _resample_raters(case, n_resamples, generator)
-    values = np.sort(drawn[~np.isnan(drawn)])
-    if values.size == 0 or values[0] == values[-1]:
+        pool = rater_pool(case)
+        notes = warn_small(pool.n, 5, "raters")
+    if _is_exact(exact, pool):
+        method, found, seed = f"{method}, exact", enumerate_resamples(pool), None
+    else:
+        generator, seed = recorded_generator(rng)
+        found = draw_resamples(pool, n_resamples, generator)
+    if not found.replicates.has_spread:
         reason = "every resample gives the same value or none, so there is no spread"
         return case.undefined(reason, method=method, unit=unit)
-    low_at, high_at = _positions(case, values, kind)
-    low, high = np.quantile(values, [low_at, high_at]).tolist()
-    errors = (_quantile_error(values, low_at), _quantile_error(values, high_at))
+    low_at, high_at = _levels(case, pool, found.replicates, kind)
+    ends = [found.replicates.quantile(at) for at in (low_at, high_at)]
+    errors = found.errors(low_at, high_at)
     if kind == "basic":
-        low, high = 2 * case.value - high, 2 * case.value - low
-        errors = errors[::-1]
-    closed = case.closed(low, high, method=method, unit=unit, notes=notes)
-    return Interval(
-        low=closed.low,
-        high=closed.high,
-        level=level,
-        kind="confidence",
-        method=method,
-        target=target,
-        unit=unit,
-        n_resamples=n_resamples,
-        n_undefined=n_resamples - values.size,
+        ends = [2 * case.value - end for end in reversed(ends)]
+        errors = None if errors is None else errors[::-1]
+    return dataclasses.replace(
+        case.closed(*ends, method=method, unit=unit, notes=(*notes, *found.notes)),
+        n_resamples=found.n_resamples,
+        n_undefined=found.n_undefined,
         monte_carlo_error=errors,
         seed=seed,
-        notes=closed.notes,
+        distribution=found.distribution,
     )
+
+
+def _check(kind: Kind, n_resamples: int, exact: Exact) -> None:
+    if kind not in get_args(Kind):
+        raise ParameterError(
+            f"kind: needs one of {', '.join(get_args(Kind))}, got {kind!r}"
+        )
+    if n_resamples < 100:
+        raise ParameterError(f"n_resamples: needs at least 100, got {n_resamples}")
+    if exact not in ("auto", True, False):
+        raise ParameterError(f'exact: needs "auto", True or False, got {exact!r}')
+
+
+def _is_exact(exact: Exact, pool: Pool) -> bool:
+    if exact is False:
+        return False
+    n_distinct = n_compositions(pool.n, pool.times.size)
+    if exact is True and n_distinct > _MOST_EXACT:
+        raise ParameterError(
+            f"exact: there are {n_distinct} distinct resamples, and at most "
+            f"{_MOST_EXACT} are enumerated; leave it out to draw some"
+        )
+    return n_distinct <= _MOST_EXACT
+
+
+def _levels(
+    case: Case, pool: Pool, replicates: Replicates, kind: Kind
+) -> tuple[float, float]:
+    # which quantiles of the resamples are the endpoints
+    tail = 0.5 * (1.0 - case.level)
+    if kind != "bca":
+        return tail, 1.0 - tail
+    share = replicates.share_below(case.value)
+    return bca_levels(case.level, share, acceleration(pool))
 
 
 def _unit(case: Case) -> Unit:
@@ -190,86 +232,18 @@ def recorded_generator(
     ParameterError
         If it is neither.
     """
+    _check_rng(rng)
     if isinstance(rng, np.random.Generator):
         return rng, None  # its owner knows where it began
     if rng is None:
         rng = int(np.random.SeedSequence().generate_state(1, np.uint64)[0] >> 1)
+    return np.random.default_rng(int(rng)), int(rng)
+
+
+def _check_rng(rng: object) -> None:
+    if rng is None or isinstance(rng, np.random.Generator):
+        return
     if isinstance(rng, bool) or not isinstance(rng, int | np.integer) or rng < 0:
         raise ParameterError(
             f"rng: needs a numpy Generator or an integer of at least 0, got {rng!r}"
         )
-    return np.random.default_rng(int(rng)), int(rng)
-
-
-def _resample_items(
-    case: Case, n_resamples: int, generator: np.random.Generator
-) -> Floats:
-    # Items with equal features are alike: draw how often each kind occurs.
-    rows, times = np.unique(case.features, axis=0, return_counts=True)
-    shares = times / times.sum()
-    drawn = np.empty(n_resamples)
-    step = max(1, _CHUNK // rows.shape[0])
-    for start in range(0, n_resamples, step):
-        stop = min(start + step, n_resamples)
-        taken = generator.multinomial(case.n_items, shares, size=stop - start)
-        drawn[start:stop] = case.values(taken @ rows)
-    return drawn
-
-
-def _resample_raters(
-    case: Case, n_resamples: int, generator: np.random.Generator
-) -> Floats:
-    kernel = case.kernel
-    n_items, n_raters = case.coded.codes.shape
-    drawn = np.empty(n_resamples)
-    step = max(1, _CHUNK // (n_items * n_raters * case.coded.n_categories))
-    for start in range(0, n_resamples, step):
-        stop = min(start + step, n_resamples)
-        taken = generator.multinomial(
-            n_raters, np.full(n_raters, 1.0 / n_raters), size=stop - start
-        )
-        sums = kernel.rater_sums(  # type: ignore[misc]
-            case.coded, taken.astype(np.float64), case.v
-        )
-        drawn[start:stop] = case.values(sums)
-    return drawn
-
-
-def _positions(case: Case, values: Floats, kind: Kind) -> tuple[float, float]:
-    # which quantiles of the resamples are the endpoints
-    tail = 0.5 * (1.0 - case.level)
-    if kind != "bca":
-        return tail, 1.0 - tail
-    from scipy.special import ndtr, ndtri
-
-    below = np.searchsorted(values, case.value, side="left")
-    equal = np.searchsorted(values, case.value, side="right") - below
-    share = (below + 0.5 * equal) / values.size  # ties count half
-    if not 0.0 < share < 1.0:
-        return tail, 1.0 - tail
-    bias = float(ndtri(share))  # z0, (14.14) of [1]
-    skew = _acceleration(case)
-    ends = []
-    for z in (float(ndtri(tail)), float(ndtri(1.0 - tail))):
-        moved = bias + (bias + z) / (1.0 - skew * (bias + z))  # (14.10)
-        ends.append(float(ndtr(moved)))
-    return ends[0], ends[1]
-
-
-def _acceleration(case: Case) -> float:
-    # (14.15): a third of the skewness of the leave-one-out values
-    if case.target == "raters":
-        return 0.0
-    left = case.values(case.features.sum(axis=0) - case.features)
-    left = left[~np.isnan(left)]
-    deviation = left.mean() - left
-    spread = float((deviation**2).sum())
-    return float((deviation**3).sum() / (6.0 * spread**1.5)) if spread > 0.0 else 0.0
-
-
-def _quantile_error(values: Floats, position: float) -> float:
-    # half the distance between the quantiles one binomial error to either side
-    error = float(np.sqrt(position * (1.0 - position) / values.size))
-    ends = np.clip([position - error, position + error], 0.0, 1.0)
-    low, high = np.quantile(values, ends)
-    return float(0.5 * (high - low))

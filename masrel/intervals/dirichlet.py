@@ -23,8 +23,10 @@ class DirichletMultinomial:
     ----------
     prior : ndarray, shape (n_parts,)
         Parameters of the Dirichlet prior of π. Categories nobody used enter the
-        likelihood nowhere, so they are one part, whose parameter is the sum of
-        theirs (the Dirichlet's aggregation property).
+        likelihood nowhere, so they are one part, the last, whose parameter is the
+        sum of theirs (the Dirichlet's aggregation property).
+    shape : float
+        The prior of ρ is Beta(shape, shape): 1 is uniform.
     above, depth : ndarray of int64, shape (n_above,)
         Part k and depth j of every factor A π_k + j there is.
     times : ndarray, shape (n_above,)
@@ -39,39 +41,51 @@ class DirichletMultinomial:
     """
 
     prior: Floats = field(compare=False, repr=False)
+    shape: float
     above: NDArray[np.int64] = field(compare=False, repr=False)
     depth: NDArray[np.int64] = field(compare=False, repr=False)
     times: Floats = field(compare=False, repr=False)
     times_below: Floats = field(compare=False, repr=False)
 
     @classmethod
-    def of_counts(cls, counts: NDArray[np.int64]) -> "DirichletMultinomial":
-        """Compress counts of shape (n_items, n_categories) to all that matters.
+    def of_counts(
+        cls,
+        counts: NDArray[np.int64],
+        *,
+        concentration: float = 1.0,
+        shape: float = 1.0,
+    ) -> "DirichletMultinomial":
+        """Compress counts to all that matters.
 
         Parameters
         ----------
         counts : ndarray of int64, shape (n_items, n_categories)
-            Raters per item and category, at least two categories.
+            Raters per item and category, at least two categories and one rating.
+        concentration : float, optional
+            The prior of π is Dirichlet(concentration, ...) over all categories.
+        shape : float, optional
+            The prior of ρ is Beta(shape, shape).
 
         Returns
         -------
         DirichletMultinomial
-            The model with π ~ Dirichlet(1, ..., 1) over all categories.
+            The model.
         """
         used = counts.any(axis=0)
-        prior = np.ones(int(used.sum()))
+        prior = np.full(int(used.sum()), concentration)
         if not used.all():
-            prior = np.append(prior, float((~used).sum()))
+            prior = np.append(prior, concentration * float((~used).sum()))
         n = counts.sum(axis=1)
-        depths = np.arange(int(n.max()))
-        deep = (counts[:, used, None] > depths).sum(axis=0)  # N_kj
+        n_depths = int(n.max())
+        deep = np.array([_items_above(column, n_depths) for column in counts.T[used]])
         above, depth = np.nonzero(deep)
         return cls(
             prior=prior,
+            shape=shape,
             above=above,
             depth=depth,
             times=deep[above, depth].astype(np.float64),
-            times_below=(n[:, None] > depths).sum(axis=0).astype(np.float64),
+            times_below=_items_above(n, n_depths).astype(np.float64),
         )
 
     @property
@@ -122,8 +136,8 @@ class DirichletMultinomial:
     def log_density(self, position: Floats) -> Floats:
         """Return the log posterior density of unbounded positions.
 
-        Prior ρ ~ U(0, 1) and π ~ Dirichlet(`prior`); the Jacobian is ρ (1 - ρ) of
-        the logit and Π π_k of the log-ratios.
+        Prior ρ ~ Beta(`shape`, `shape`) and π ~ Dirichlet(`prior`); the Jacobian is
+        ρ (1 - ρ) of the logit and Π π_k of the log-ratios.
 
         Parameters
         ----------
@@ -137,8 +151,15 @@ class DirichletMultinomial:
         """
         rho, rest, pi = self.parts(position)
         with np.errstate(divide="ignore", invalid="ignore"):  # far out a part is 0
-            of_rho = np.log(rho) + np.log(rest)
+            # Beta density (ρ (1 - ρ))^(shape - 1), times the Jacobian ρ (1 - ρ)
+            of_rho = self.shape * (np.log(rho) + np.log(rest))
             # Dirichlet density Π π_k^(a_k - 1), times the Jacobian Π π_k
             of_pi = np.log(pi) @ self.prior
             density = self.log_likelihood(rho, rest, pi) + of_rho + of_pi
         return np.where(np.isfinite(density), density, -np.inf)
+
+
+def _items_above(counts: NDArray[np.int64], n_depths: int) -> NDArray[np.int64]:
+    # (n_items,) -> (n_depths,): items with more than j ratings, j = 0, 1, ...
+    met = np.bincount(counts, minlength=n_depths + 1)
+    return np.asarray(met[:0:-1].cumsum()[::-1])
