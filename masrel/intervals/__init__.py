@@ -5,9 +5,10 @@ In: a coefficient's name, its ratings, and the `target` population. Out: an
 """
 
 from masrel.intervals.analytic import analytic
+from masrel.intervals.auto import estimate
 from masrel.intervals.bootstrap import bootstrap
 from masrel.intervals.difference import difference
 from masrel.intervals.jackknife import jackknife
 from masrel.intervals.posterior import posterior
 
-__all__ = ["analytic", "bootstrap", "difference", "jackknife", "posterior"]
+__all__ = ["analytic", "bootstrap", "difference", "estimate", "jackknife", "posterior"]

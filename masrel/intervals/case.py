@@ -20,6 +20,7 @@ from masrel.estimates import Estimate, Interval, Target, Unit
 __all__ = [
     "Case",
     "Statistic",
+    "find_entry",
     "kernel_of",
     "normal",
     "open_case",
@@ -143,6 +144,31 @@ class Case:
         )
 
 
+def find_entry(statistic: Statistic) -> Coefficient:
+    """Find a coefficient in the register.
+
+    Parameters
+    ----------
+    statistic : str, callable or Coefficient
+        Name of a coefficient, or its public function.
+
+    Returns
+    -------
+    Coefficient
+        Its entry.
+
+    Raises
+    ------
+    ParameterError
+        If it is none.
+    """
+    if isinstance(statistic, Coefficient):
+        return statistic
+    if isinstance(statistic, str):
+        return coefficient(statistic)
+    return coefficient(getattr(statistic, "__name__", repr(statistic)))
+
+
 def open_case(
     statistic: Statistic,
     ratings: object,
@@ -182,12 +208,7 @@ def open_case(
     RatingsError
         If the ratings do not fit.
     """
-    if isinstance(statistic, Coefficient):
-        entry = statistic
-    elif isinstance(statistic, str):
-        entry = coefficient(statistic)
-    else:
-        entry = coefficient(getattr(statistic, "__name__", repr(statistic)))
+    entry = find_entry(statistic)
     if target not in get_args(Target):
         raise ParameterError(
             f"target: needs one of {', '.join(get_args(Target))}, got {target!r}"

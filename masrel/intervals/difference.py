@@ -12,7 +12,7 @@ from masrel.agreement.weights import WeightName
 from masrel.errors import ParameterError, RatingsError
 from masrel.estimates import Estimate, Interval
 from masrel.intervals.case import Case, Statistic, open_case, student_t, warn_small
-from masrel.intervals.jackknife import jackknife_variance, without_item
+from masrel.intervals.spread import jackknife_variance, without_item
 
 __all__ = ["Design", "difference"]
 

@@ -1,25 +1,22 @@
 """Jackknife intervals: leave out items, raters, or both, one at a time."""
 
-import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from masrel.agreement.coding import Label
-from masrel.agreement.kernel import Floats
 from masrel.agreement.weights import WeightName
-from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target
 from masrel.intervals.case import (
     Case,
     Statistic,
     open_case,
     student_t,
-    warn_small,
 )
+from masrel.intervals.spread import Spread, spread
 
-__all__ = ["jackknife", "jackknife_variance", "without_item"]
+__all__ = ["around_estimate", "jackknife"]
 
 
 def jackknife(
@@ -100,99 +97,34 @@ def jackknife(
         weights=weights,
         level=level,
     )
-    units = {"items": ("items",), "raters": ("raters",), "both": ("items", "raters")}
-    method = f"{'two-way' if target == 'both' else target.removesuffix('s')} jackknife"
-    if np.isnan(case.value):
-        return case.undefined(
-            "the estimate itself is undefined", method=method, unit=target
-        )
-    parts: list[tuple[float, int]] = []
-    notes: list[str] = []
-    for unit in units[target]:
-        replicates, times = (without_item if unit == "items" else _without_rater)(case)
-        if np.isnan(replicates).any():
-            reason = f"with one of the {unit} left out the estimate is undefined"
-            return case.undefined(reason, method=method, unit=target)
-        n = int(times.sum())
-        parts.append((jackknife_variance(replicates, times), n - 1))
-        notes += warn_small(n, 10 if unit == "items" else 5, unit)
-    variance = sum(part for part, _ in parts)
-    if not variance > 0.0:
-        reason = (
-            f"leaving out any of the {' or '.join(units[target])} leaves the estimate "
-            "as it is, so the jackknife cannot say how uncertain it is"
-        )
-        return case.undefined(reason, method=method, unit=target)
-    df = variance**2 / sum(part**2 / n for part, n in parts)  # Satterthwaite [2]
-    half = student_t(level, df) * float(np.sqrt(variance))
-    return case.closed(
-        case.value - half,
-        case.value + half,
-        method=f"{method}, t({df:g})" if target != "both" else f"{method}, t",
-        unit=target,
-        notes=notes,
-    )
+    return around_estimate(case, spread(case))
 
 
-Integers = NDArray[np.int64]
-
-
-def jackknife_variance(replicates: Floats, times: Integers) -> float:
-    """Return the jackknife's variance of an estimate.
-
-    Parameters
-    ----------
-    replicates : ndarray, shape (n_distinct,)
-        The estimate without a unit of each kind.
-    times : ndarray of int64, shape (n_distinct,)
-        Units of each kind.
-
-    Returns
-    -------
-    float
-        (n - 1)/n times the sum of squared deviations from their mean, (1.1) of [1] in
-        `jackknife`.
-    """
-    n = int(times.sum())
-    moved = replicates - replicates[0]  # so that no change at all is exactly 0
-    deviations = moved - times @ moved / n
-    return float((n - 1) / n * (times @ deviations**2))
-
-
-def without_item(case: Case) -> tuple[Floats, Integers]:
-    """Return the estimate without an item of each pattern, and how many there are.
+def around_estimate(case: Case, found: Spread) -> Interval:
+    """Make the interval of a spread.
 
     Parameters
     ----------
     case : Case
         A question.
+    found : Spread
+        Its spread.
 
     Returns
     -------
-    tuple of ndarray
-        Values, ``nan`` of a single item, and items, both (n_patterns,).
+    Interval
+        Student's t around the estimate; ``nan`` with a reason when undefined.
     """
-    if case.n_items < 2:
-        return np.full(1, np.nan), np.ones(1, dtype=np.int64)
-    # sums without an item are the total less its features
-    return case.values(case.sums - case.rows), case.times
-
-
-def _without_rater(case: Case) -> tuple[Floats, Integers]:
-    # features are made anew, because pairs of raters go
-    width = 2 if case.entry.shape == "pairs" else 1  # columns of a rater
-    codes = case.patterns.codes
-    n_raters = codes.shape[1] // width
-    fewest = 2 if width == 2 else 3
-    if n_raters < fewest:
-        raise ParameterError(
-            f'target: "{case.target}" needs at least {fewest} raters, because one is '
-            f"left out; got {n_raters}"
-        )
-    values = []
-    for rater in range(n_raters):
-        rest = np.delete(codes, np.s_[rater * width : (rater + 1) * width], axis=1)
-        left = dataclasses.replace(case.patterns, codes=rest)
-        sums = case.times @ case.kernel.features(left, case.v)
-        values.append(float(case.values(sums)))
-    return np.array(values), np.ones(n_raters, dtype=np.int64)
+    target = case.target
+    words = "two-way" if target == "both" else target.removesuffix("s")
+    if found.reason is not None:
+        return case.undefined(found.reason, method=f"{words} jackknife", unit=target)
+    half = student_t(case.level, found.df) * float(np.sqrt(found.variance))
+    t = "t" if target == "both" else f"t({found.df:g})"
+    return case.closed(
+        case.value - half,
+        case.value + half,
+        method=f"{words} jackknife, {t}",
+        unit=target,
+        notes=found.notes,
+    )

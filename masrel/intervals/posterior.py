@@ -18,7 +18,10 @@ from masrel.intervals.prior import Prior, PriorName
 if TYPE_CHECKING:
     from masrel.agreement.weights import WeightName
 
-__all__ = ["posterior"]
+__all__ = ["SPOKEN_OF", "posterior"]
+
+SPOKEN_OF = ("fleiss_kappa", "scott_pi", "krippendorff_alpha")
+"""Coefficients whose value in the population is the model's ρ."""
 
 Method = Literal["exact", "emcee"]
 
@@ -140,11 +143,8 @@ def posterior(
     return dataclasses.replace(found, notes=notes)
 
 
-_SPOKEN_OF = ("fleiss_kappa", "scott_pi", "krippendorff_alpha")
-
-
 def _check_model(case: Case, weights: "WeightName | ArrayLike") -> None:
-    if case.entry.name not in _SPOKEN_OF:
+    if case.entry.name not in SPOKEN_OF:
         raise ParameterError(
             "coefficient: the Dirichlet-multinomial model speaks of fleiss_kappa and "
             "of scott_pi and krippendorff_alpha, whose value in the population is the "

@@ -1,0 +1,184 @@
+"""An estimate with the interval that its question and its size call for."""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from masrel.agreement.coding import Label
+from masrel.agreement.registry import Coefficient
+from masrel.errors import ParameterError
+from masrel.estimates import Estimate, Interval, Target
+from masrel.intervals.analytic import analytic
+from masrel.intervals.case import Statistic, find_entry, open_case
+from masrel.intervals.jackknife import around_estimate, jackknife
+from masrel.intervals.posterior import SPOKEN_OF
+from masrel.intervals.spread import spread
+
+if TYPE_CHECKING:
+    from masrel.agreement.weights import WeightName
+
+__all__ = ["Method", "estimate"]
+
+Method = Literal["auto", "analytic", "jackknife", "bootstrap", "posterior"]
+"""Kinds of intervals; "auto" chooses one by target and size."""
+
+_FEW_ITEMS = 30  # below, the posterior holds what it says and the delta method less
+
+
+def estimate(
+    coefficient: Statistic,
+    ratings: object,
+    *,
+    target: Target,
+    method: Method = "auto",
+    categories: Sequence[Label] | None = None,
+    weights: "WeightName | ArrayLike" = "identity",
+    level: float = 0.95,
+    rng: np.random.Generator | int | None = None,
+) -> Estimate:
+    """Estimate a coefficient with an interval that answers a stated question.
+
+    Parameters
+    ----------
+    coefficient : str or callable
+        Name of a coefficient, or its public function.
+    ratings : nested sequence, array_like or DataFrame
+        What the coefficient takes.
+    target : {"items", "raters", "both"}
+        What a new study would draw anew. There is no default.
+    method : {"auto", "analytic", "jackknife", "bootstrap", "posterior"}, optional
+        Kind of interval; "auto" chooses by target and size, and a note says what and
+        why. The functions of the same names have more options.
+    categories : sequence, optional
+        The declared scale in order.
+    weights : str or array_like, optional
+        How much two categories agree; see `declared_weights`.
+    level : float, optional
+        Nominal level.
+    rng : Generator or int, optional
+        Where randomness comes from, for methods that draw.
+
+    Returns
+    -------
+    Estimate
+        The coefficient with its interval.
+
+    Raises
+    ------
+    ParameterError
+        If an option is none, or the coefficient has no such interval.
+    RatingsError
+        If the ratings do not fit the coefficient.
+
+    Warns
+    -----
+    SmallSampleWarning
+        If the interval rests on too little.
+    UndefinedStatisticWarning
+        If the estimate or the interval is undefined.
+
+    Examples
+    --------
+    >>> ratings = [["a", "a", "a"], ["a", "b", "a"], ["b", "b", "b"]] * 4
+    >>> found = estimate("fleiss_kappa", ratings, target="items")
+    >>> found.interval.method
+    'Dirichlet-multinomial posterior, exact'
+    """
+    if method not in get_args(Method):
+        raise ParameterError(
+            f"method: needs one of {', '.join(get_args(Method))}, got {method!r}"
+        )
+    entry = find_entry(coefficient)
+    found = entry(ratings, categories=categories, weights=weights, level=level)
+    if method == "auto" and entry.own_interval:
+        return found
+    asked = _Asked(entry, ratings, target, categories, weights, level)
+    interval = _chosen(asked) if method == "auto" else _by(method, asked, rng)
+    return dataclasses.replace(found, interval=interval)
+
+
+class _Asked(NamedTuple):
+    # what every method takes
+    coefficient: Coefficient
+    ratings: object
+    target: Target
+    categories: Sequence[Label] | None
+    weights: "WeightName | ArrayLike"
+    level: float
+
+
+def _by(method: str, asked: _Asked, rng: np.random.Generator | int | None) -> Interval:
+    entry, ratings, target, categories, weights, level = asked
+    if method in ("analytic", "jackknife"):
+        exact = analytic if method == "analytic" else jackknife
+        return exact(
+            entry,
+            ratings,
+            target=target,
+            categories=categories,
+            weights=weights,
+            level=level,
+        )
+    # Imported here: asking for the others loads no scipy.
+    from masrel.intervals.bootstrap import bootstrap
+    from masrel.intervals.posterior import posterior
+
+    return (bootstrap if method == "bootstrap" else posterior)(
+        entry,
+        ratings,
+        target=target,
+        categories=categories,
+        weights=weights,
+        level=level,
+        rng=rng,
+    )
+
+
+def _chosen(asked: _Asked) -> Interval:
+    entry, ratings, target, categories, weights, level = asked
+    case = open_case(
+        entry,
+        ratings,
+        target=target,
+        categories=categories,
+        weights=weights,
+        level=level,
+    )
+    modelled = entry.name in SPOKEN_OF and isinstance(weights, str)
+    modelled = modelled and weights == "identity"
+    if target == "items" and modelled and case.n_items < _FEW_ITEMS:
+        why = f"exact, and holds its level with few items ({case.n_items})"
+        return _with_note(_by("posterior", asked, None), why)
+    if target == "items":
+        found = analytic(
+            entry,
+            ratings,
+            target=target,
+            categories=categories,
+            weights=weights,
+            level=level,
+            distribution="logit",
+        )
+        return _with_note(found, "the standard error holds, on a scale without ends")
+    moved = spread(case)
+    if moved.variance == 0.0 and modelled:
+        # No spread says nothing: the model bounds what perfect agreement can hide.
+        found = _by("posterior", asked._replace(target="items"), None)
+        why = "no rater or item left out moves the estimate, so that a model must say"
+        return _with_note(dataclasses.replace(found, target=target), why)
+    found = around_estimate(case, moved)
+    return _with_note(found, f"leaves out {_LEFT_OUT[target]}, one at a time")
+
+
+_LEFT_OUT = {"raters": "raters", "both": "items and raters"}
+
+
+def _with_note(interval: Interval, why: str) -> Interval:
+    note = f"chosen for other {_OTHERS[interval.target]}: {why}"
+    return dataclasses.replace(interval, notes=(note, *interval.notes))
+
+
+_OTHERS = {"items": "items", "raters": "raters", "both": "items and raters"}

@@ -1,0 +1,143 @@
+"""How much an estimate moves when items or raters are left out, one at a time."""
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from masrel.agreement.kernel import Floats
+from masrel.errors import ParameterError
+from masrel.intervals.case import Case, warn_small
+
+__all__ = ["Spread", "jackknife_variance", "spread", "without_item"]
+
+Integers = NDArray[np.int64]
+
+_UNITS = {"items": ("items",), "raters": ("raters",), "both": ("items", "raters")}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Spread:
+    """How much an estimate moves when units are left out.
+
+    Attributes
+    ----------
+    variance : float
+        The jackknife's; ``nan`` when undefined.
+    df : float
+        Its degrees of freedom, Satterthwaite's for "both".
+    notes : tuple of str
+        What is small.
+    reason : str or None
+        Why it makes no interval, or None.
+    """
+
+    variance: float
+    df: float
+    notes: tuple[str, ...] = ()
+    reason: str | None = None
+
+
+def spread(case: Case) -> Spread:
+    """Leave out items, raters, or both, as the target says.
+
+    Parameters
+    ----------
+    case : Case
+        A question.
+
+    Returns
+    -------
+    Spread
+        The variance, or why there is none.
+
+    Raises
+    ------
+    ParameterError
+        If there are too few raters to leave one out.
+    """
+    if np.isnan(case.value):
+        reason = "the estimate itself is undefined"
+        return Spread(variance=np.nan, df=np.nan, reason=reason)
+    parts: list[tuple[float, int]] = []
+    notes: tuple[str, ...] = ()
+    units = _UNITS[case.target]
+    for unit in units:
+        replicates, times = (without_item if unit == "items" else _without_rater)(case)
+        if np.isnan(replicates).any():
+            reason = f"with one of the {unit} left out the estimate is undefined"
+            return Spread(variance=np.nan, df=np.nan, reason=reason)
+        n = int(times.sum())
+        parts.append((jackknife_variance(replicates, times), n - 1))
+        notes += warn_small(n, 10 if unit == "items" else 5, unit)
+    variance = sum(part for part, _ in parts)
+    if not variance > 0.0:
+        reason = (
+            f"leaving out any of the {' or '.join(units)} leaves the estimate as it "
+            "is, so the jackknife cannot say how uncertain it is"
+        )
+        return Spread(variance=0.0, df=np.nan, notes=notes, reason=reason)
+    df = variance**2 / sum(part**2 / n for part, n in parts)  # Satterthwaite [2]
+    return Spread(variance=variance, df=df, notes=notes)
+
+
+def jackknife_variance(replicates: Floats, times: Integers) -> float:
+    """Return the jackknife's variance of an estimate.
+
+    Parameters
+    ----------
+    replicates : ndarray, shape (n_distinct,)
+        The estimate without a unit of each kind.
+    times : ndarray of int64, shape (n_distinct,)
+        Units of each kind.
+
+    Returns
+    -------
+    float
+        (n - 1)/n times the sum of squared deviations from their mean, (1.1) of [1] in
+        `jackknife`.
+    """
+    n = int(times.sum())
+    moved = replicates - replicates[0]  # so that no change at all is exactly 0
+    deviations = moved - times @ moved / n
+    return float((n - 1) / n * (times @ deviations**2))
+
+
+def without_item(case: Case) -> tuple[Floats, Integers]:
+    """Return the estimate without an item of each pattern, and how many there are.
+
+    Parameters
+    ----------
+    case : Case
+        A question.
+
+    Returns
+    -------
+    tuple of ndarray
+        Values, ``nan`` of a single item, and items, both (n_patterns,).
+    """
+    if case.n_items < 2:
+        return np.full(1, np.nan), np.ones(1, dtype=np.int64)
+    # sums without an item are the total less its features
+    return case.values(case.sums - case.rows), case.times
+
+
+def _without_rater(case: Case) -> tuple[Floats, Integers]:
+    # features are made anew, because pairs of raters go
+    width = 2 if case.entry.shape == "pairs" else 1  # columns of a rater
+    codes = case.patterns.codes
+    n_raters = codes.shape[1] // width
+    fewest = 2 if width == 2 else 3
+    if n_raters < fewest:
+        raise ParameterError(
+            f'target: "{case.target}" needs at least {fewest} raters, because one is '
+            f"left out; got {n_raters}"
+        )
+    values = []
+    for rater in range(n_raters):
+        rest = np.delete(codes, np.s_[rater * width : (rater + 1) * width], axis=1)
+        left = dataclasses.replace(case.patterns, codes=rest)
+        sums = case.times @ case.kernel.features(left, case.v)
+        values.append(float(case.values(sums)))
+    return np.array(values), np.ones(n_raters, dtype=np.int64)
