@@ -116,7 +116,7 @@ def _off_value(answer: Answer, true: Exact) -> Off:
 
 def _off_error(answer: Answer, true: Exact, case: Case) -> Off:
     if answer.note:
-        return Off(note=answer.note)
+        return Off(note=answer.note.split(":")[0])  # the value says of what kind
     if answer.standard_error is None:
         return Off(note="not offered")
     if answer.other_error:

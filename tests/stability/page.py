@@ -1,11 +1,11 @@
 """The page of accuracy: every number on it comes from the lines measured."""
 
 import math
+import string
 import textwrap
 from collections.abc import Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
-from string import Template
 from typing import TYPE_CHECKING
 
 from masrel.agreement import COEFFICIENTS
@@ -45,14 +45,15 @@ _WHY = {
 def page(lines: Lines, versions: Mapping[str, str]) -> str:
     """Write the page in Markdown."""
     groups = groupby(lines, key=lambda line: line.case.group)
-    return Template(_TEMPLATE.read_text(encoding="utf-8")).substitute(
+    return string.Template(_TEMPLATE.read_text(encoding="utf-8")).substitute(
         versions=textwrap.fill(
             ", ".join(f"{name} {version}" for name, version in versions.items()), 118
         ),
         tally=_tally(lines),
         worst=_worst(lines),
         groups="\n\n".join(
-            f"### {group}\n\n{_WHY[group]}\n\n{_of_group(list(of_group))}"
+            f"### {group}\n\n{textwrap.fill(_WHY[group], 118)}\n\n"
+            f"{_of_group(list(of_group))}"
             for group, of_group in groups
         ),
         **_seen(lines),
@@ -159,26 +160,38 @@ def _largest(lines: Lines, package: str, what: str) -> str:
 
 
 def _of_group(lines: Lines) -> str:
+    letters = dict(
+        zip(
+            dict.fromkeys(line.case.name for line in lines),
+            string.ascii_lowercase,
+            strict=False,
+        )
+    )
+    cases = "\n".join(f"- {letter}: {name}" for name, letter in letters.items())
     packages, with_error = (_offering(lines, w) for w in ("value", "standard error"))
-    head = ["case", "coefficient", "exact", *packages, *(f"SE {p}" for p in with_error)]
-    alike: dict[tuple[str, str], list[Line]] = {}
-    for line in lines:
-        alike.setdefault(_row(line), []).append(line)
+    head = ["", "coefficient", *packages, *(f"SE {p}" for p in with_error)]
+    weighted = len(lines[0].case.weights) > 1  # a row is of several coefficients
+    if not weighted:
+        head.insert(2, "exact")
     rows, last = [], ""
-    for (case, title), of_row in alike.items():
-        exact = cells.exact(of_row[0].true.value) if len(of_row) == 1 else ""
-        values = [[line.values[p] for line in of_row] for p in packages]
-        errors = [[line.errors[p] for line in of_row] for p in with_error]
-        row = ["" if case == last else case, title, exact]
-        row += [cells.error(offs, relative=False) for offs in values]
-        row += [cells.error(offs, relative=True) for offs in errors]
+    for (case, title), of_row in _alike(lines).items():
+        row = ["" if case == last else letters[case], title]
+        row += [] if weighted else [cells.exact(of_row[0].true.value)]
+        for packages_of, what in ((packages, "value"), (with_error, "standard error")):
+            for package in packages_of:
+                offs = [line.off(what)[package] for line in of_row]
+                row.append(cells.error(offs, relative=what != "value"))
         rows.append(row)
         last = case
-    return cells.table(head, rows, n_text=2)
+    return f"{cases}\n\n{cells.table(head, rows, n_text=2)}"
 
 
-def _row(line: "Line") -> tuple[str, str]:
-    if len(line.case.weights) == 1:
-        return line.case.name, _title(line)
-    metrics = ", metrics" if line.weights in METRICS else ""
-    return line.case.name, _title(line) + metrics
+def _alike(lines: Lines) -> "dict[tuple[str, str], list[Line]]":
+    # a case's lines of one coefficient, with all weights or all metrics
+    found: dict[tuple[str, str], list[Line]] = {}
+    for line in lines:
+        several, title = len(line.case.weights) > 1, _title(line)
+        if several and line.weights in METRICS:
+            title += ", metrics"
+        found.setdefault((line.case.name, title), []).append(line)
+    return found
