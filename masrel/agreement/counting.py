@@ -319,9 +319,16 @@ def take_counts(
     return CountedRatings(
         categories=tuple(column_categories(categories, table.shape[1])),
         items=_rows_alike(table),
-        n_raters=int(table.sum(axis=1).max()),
+        n_raters=_largest_sum(table),
         coded=None,
     )
+
+
+def _largest_sum(table: Integers) -> int:
+    # in Python's integers where a row may sum to more than 64 bits hold
+    if int(table.max()) * table.shape[1] < 2**62:
+        return int(table.sum(axis=1).max())
+    return max(map(sum, table.tolist()))
 
 
 def _rows_alike(counts: Integers) -> ItemTable:

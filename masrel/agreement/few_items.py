@@ -4,7 +4,10 @@ from collections.abc import Sequence
 from operator import mul
 from typing import NamedTuple
 
-from masrel.agreement.influence import Linear
+import numpy as np
+
+from masrel.agreement.float_sums import float_square_sum
+from masrel.agreement.influence import Linear, RoundedLinear
 from masrel.agreement.tally import SizeGroup, Tally, add_up
 from masrel.agreement.weights import Weights, identity_weights
 
@@ -102,6 +105,28 @@ class FewItems:
                 value = a * apart + b + sum(map(mul, slopes, row))
                 total += times * value * value
         return total, function.denominator**2
+
+    def rounded_square_sum(
+        self, weights: Weights, function: RoundedLinear
+    ) -> float | None:
+        """Return Σ_i function(item)² from floats, or None if its terms cancel.
+
+        Parameters
+        ----------
+        weights : Weights
+            Disagreement of two categories.
+        function : RoundedLinear
+            A function of an item.
+
+        Returns
+        -------
+        float or None
+            The sum.
+        """
+        counts = np.array(self.rows, dtype=np.int64)
+        times = np.array(self.times, dtype=np.int64)
+        sizes = np.array(list(map(sum, self.rows)), dtype=object)
+        return float_square_sum(counts, times, sizes, weights, function)
 
 
 def _alike(

@@ -7,7 +7,15 @@ from typing import NamedTuple
 
 from masrel.agreement.tally import Observed, Tally
 
-__all__ = ["Expected", "Linear", "Slopes", "as_irrcac", "pooled_influence"]
+__all__ = [
+    "Expected",
+    "Linear",
+    "RoundedLinear",
+    "Slopes",
+    "as_irrcac",
+    "pooled_influence",
+    "rounded_influence",
+]
 
 
 class Expected(NamedTuple):
@@ -46,6 +54,21 @@ class Linear(NamedTuple):
     by_size: Mapping[int, tuple[int, int, int]]
     slopes: Sequence[int]
     denominator: int
+
+
+class RoundedLinear(NamedTuple):
+    """A linear function of an item as `Linear`, in floats, and V as it is.
+
+    Attributes
+    ----------
+    by_size : mapping of int to tuple of float
+        n to a, b and e.
+    slopes : sequence of float, shape (n_categories,)
+        The slopes; may be empty where every e is 0.
+    """
+
+    by_size: Mapping[int, tuple[float, float, float]]
+    slopes: Sequence[float]
 
 
 def pooled_influence(
@@ -132,3 +155,40 @@ def as_irrcac(
         moved *= kappa * influence.denominator
         by_size[size] = (a * below, b * below - moved, e * below)
     return Linear(by_size, influence.slopes, influence.denominator * below)
+
+
+def rounded_influence(
+    tally: Tally, observed: Observed, chance: Expected, slopes: Slopes, as_irrcac: bool
+) -> RoundedLinear:
+    """Return how much an item moves 1 - D_o / D_e, from floats.
+
+    Parameters
+    ----------
+    tally, observed, chance, slopes
+        As of `pooled_influence`.
+    as_irrcac : bool
+        Whether to return what `as_irrcac` does.
+
+    Returns
+    -------
+    RoundedLinear
+        The same function, where the whole numbers would be too long.
+    """
+    n, n_usable = tally.n_rated, observed.n_usable
+    d_e = chance.numerator / chance.denominator
+    ratio = (observed.numerator * chance.denominator) / (
+        observed.denominator * chance.numerator
+    )
+    h = [slope / slopes.denominator for slope in slopes.numerators]
+    p = [share / tally.shares.total for share in tally.shares.numerators]
+    mean_h = sum(map(mul, h, p))
+    by_size = {}
+    for size, *_ in tally.groups:
+        a, b = 0.0, ratio * mean_h / d_e
+        if size > 1:
+            a = n / n_usable / (size * (size - 1)) / d_e
+            b -= n / n_usable * ratio
+        if as_irrcac:
+            b -= (1.0 - ratio) * ((n / n_usable if size > 1 else 0.0) - 1.0)
+        by_size[size] = (a, b, -ratio / (size * d_e) if h else 0.0)
+    return RoundedLinear(by_size, h)

@@ -6,16 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.agreement.few_items import FewItems
-from masrel.agreement.influence import Linear
+from masrel.agreement.float_sums import float_square_sum, rounded
+from masrel.agreement.influence import Linear, RoundedLinear
 from masrel.agreement.tally import SizeGroup, Tally, add_up
 from masrel.agreement.weights import Weights
 
 __all__ = ["ManyItems"]
 
 Integers = NDArray[np.int64]
-Floats = NDArray[np.float64]
-
-_CANCELLED = 1_000  # times less than its terms, a sum in floats has lost three digits
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,21 +65,21 @@ class ManyItems:
 
         Each item is computed in floats, unless its terms cancel; then in integers.
         """
-        by_size, slopes = _in_floats(function, weights.denominator, self.n_categories)
-        met, at = np.unique(self._ratings(), return_inverse=True)
-        nothing = (0.0, 0.0, 0.0)
-        parts = np.array([by_size[int(n)] if n else nothing for n in met])
-        a, b, e = parts[at.reshape(-1)].T
-        counts = self.counts.astype(np.float64)
-        v = a * ((counts @ weights.as_floats()) * counts).sum(axis=1)
-        value = v + b + e * (counts @ slopes)
-        terms = np.abs(v) + np.abs(b) + np.abs(e) * (counts @ np.abs(slopes))
-        squares = float((self.times * value * value).sum())
-        if float((self.times * terms * terms).sum()) > _CANCELLED**2 * squares:
+        function_in_floats = rounded(function, weights.denominator)
+        squares = self.rounded_square_sum(weights, function_in_floats)
+        if squares is None:
             rows, times = self.counts.tolist(), self.times.tolist()
-            few = FewItems(rows, times, self.n_categories)
-            return few.square_sum(weights, function)
+            return FewItems(rows, times, self.n_categories).square_sum(
+                weights, function
+            )
         return squares, 1
+
+    def rounded_square_sum(
+        self, weights: Weights, function: RoundedLinear
+    ) -> float | None:
+        """Return Σ_i function(item)² from floats, or None if its terms cancel."""
+        sizes = self._ratings()
+        return float_square_sum(self.counts, self.times, sizes, weights, function)
 
     def _ratings(self) -> Integers:
         # ratings of each item, (n_distinct,); a row may sum to more than 64 bits hold
@@ -95,21 +93,3 @@ class ManyItems:
         if largest < 2**62:
             return self.counts, self.times
         return self.counts.astype(object), self.times.astype(object)
-
-
-def _in_floats(
-    function: Linear, denominator: int, n_categories: int
-) -> tuple[dict[int, tuple[float, float, float]], Floats]:
-    # Only ratios of integers become floats: the integers may be too large for one.
-    largest = max(map(abs, function.slopes), default=0) or 1
-    slopes = np.zeros(n_categories)
-    slopes[: len(function.slopes)] = [s / largest for s in function.slopes]
-    by_size = {
-        size: (
-            a * denominator / function.denominator,
-            b / function.denominator,
-            e * largest / function.denominator,
-        )
-        for size, (a, b, e) in function.by_size.items()
-    }
-    return by_size, slopes

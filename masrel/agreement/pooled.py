@@ -13,7 +13,13 @@ from numpy.typing import ArrayLike
 
 from masrel.agreement.coding import Label
 from masrel.agreement.counting import count_ratings, take_counts
-from masrel.agreement.influence import Expected, Slopes, as_irrcac, pooled_influence
+from masrel.agreement.influence import (
+    Expected,
+    Slopes,
+    as_irrcac,
+    pooled_influence,
+    rounded_influence,
+)
 from masrel.agreement.items import ItemTable
 from masrel.agreement.standard_error import (
     Variance,
@@ -37,6 +43,9 @@ __all__ = [
     "estimate_ratings",
     "pooled_estimate",
 ]
+
+
+_LONG = 500  # bits of a multiple of all numbers of ratings that integers are slow with
 
 
 class PooledCoefficient(NamedTuple):
@@ -207,8 +216,14 @@ def _error(scene: _Scene, options: Options) -> float:
     slopes = Slopes()
     if coefficient.slopes is not None:
         slopes = coefficient.slopes(tally.shares, weights)
+    theirs, n = options.variance == "irrcac", tally.n_rated
+    if observed.multiple.bit_length() > _LONG:
+        nearly = rounded_influence(tally, observed, chance, slopes, theirs)
+        rounded = items.rounded_square_sum(weights, nearly)
+        if rounded is not None:
+            return standard_error(rounded, 1, n, options.population)
     influence = pooled_influence(tally, observed, chance, slopes)
-    if options.variance == "irrcac":
+    if theirs:
         influence = as_irrcac(influence, tally, observed, chance)
     squares, over = items.square_sum(weights, influence)
-    return standard_error(squares, over, tally.n_rated, options.population)
+    return standard_error(squares, over, n, options.population)

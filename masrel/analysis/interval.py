@@ -27,8 +27,8 @@ def planned_interval(
 
     Parameters
     ----------
-    kind : {"none", "analytic", "jackknife", "bootstrap", "posterior"}
-        Which one.
+    kind : {"none", "auto", "analytic", "jackknife", "bootstrap", "posterior"}
+        Which one; "auto" chooses by target and size.
     coefficient : str
         Name of the coefficient.
     ratings : nested sequence
@@ -62,6 +62,15 @@ def planned_interval(
     # Imported here: asking for a kappa alone loads no interval.
     from masrel import intervals
 
+    if kind == "auto":
+        return intervals.estimate(
+            coefficient,
+            ratings,
+            target=target,
+            categories=categories,
+            weights=weights,
+            level=level,
+        ).interval
     if kind in ("analytic", "jackknife"):
         exact = intervals.analytic if kind == "analytic" else intervals.jackknife
         return exact(
@@ -97,7 +106,7 @@ def planned_interval(
             rng=seed,
         )
     raise ParameterError(
-        "interval: needs one of none, analytic, jackknife, bootstrap, posterior, "
+        "interval: needs one of none, auto, analytic, jackknife, bootstrap, posterior, "
         f"got {kind!r}"
     )
 

@@ -52,10 +52,10 @@ NO_INTERVAL = (
 )
 @click.option(
     "--interval",
-    type=click.Choice(["default", "analytic", "jackknife", "bootstrap", "posterior"]),
-    default="default",
+    type=click.Choice(["auto", "analytic", "jackknife", "bootstrap", "posterior"]),
+    default="auto",
     show_default=True,
-    help="Kind of interval; default: jackknife, for items analytic.",
+    help="Kind of interval; auto chooses by target and size.",
 )
 @click.option("--level", default=0.95, show_default=True, help="Level of intervals.")
 @click.option("--resamples", "n_resamples", default=10_000, show_default=True)

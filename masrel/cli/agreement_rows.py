@@ -31,7 +31,7 @@ class Wanted:
     target : {"items", "raters", "both"} or None
         What a new study would draw anew; no interval when None.
     interval : str
-        Kind of interval, or ``"default"``.
+        Kind of interval; ``"auto"`` chooses one.
     level : float
         Its level.
     n_resamples, seed : int
@@ -199,13 +199,12 @@ def _interval(
     from masrel.analysis.interval import planned_interval
 
     comes_with_one = entry.own_interval and (
-        wanted.interval == "default" or wanted.coefficients == _ANY_ORDER
+        wanted.interval == "auto" or wanted.coefficients == _ANY_ORDER
     )
     if wanted.target is None or comes_with_one:
         return None
-    usual = "analytic" if wanted.target == "items" else "jackknife"
     return planned_interval(
-        usual if wanted.interval == "default" else wanted.interval,
+        wanted.interval,
         entry.name,
         ratings,
         target=wanted.target,

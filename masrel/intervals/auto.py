@@ -162,7 +162,7 @@ def _chosen(asked: _Asked) -> Interval:
             level=level,
             distribution="logit",
         )
-        return _with_note(found, "the standard error holds, on a scale without ends")
+        return _with_note(found, "the delta method, on a scale without ends")
     moved = spread(case)
     if moved.variance == 0.0 and modelled:
         # No spread says nothing: the model bounds what perfect agreement can hide.

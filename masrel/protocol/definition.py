@@ -154,9 +154,9 @@ class EstimatePlan(Table, frozen=True, kw_only=True):
     models: Literal["standard", "dummy", "all"] = "standard"
     sessions: Annotated[tuple[str, ...], Meta(min_length=1, max_length=2)]
     target: Target
-    interval: Literal["none", "analytic", "jackknife", "bootstrap", "posterior"] = (
-        "none"
-    )
+    interval: Literal[
+        "none", "auto", "analytic", "jackknife", "bootstrap", "posterior"
+    ] = "none"
 
 
 class Analysis(Table, frozen=True, kw_only=True):
