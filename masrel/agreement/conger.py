@@ -2,16 +2,15 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from masrel.agreement.coding import CodedRatings, Label, code_ratings
+from masrel.agreement.conger_influence import Margins, influence_squares
 from masrel.agreement.counting import coded_items, item_counts
 from masrel.agreement.kernel import Floats, Kernel, divide, weighted_disagreement
-from masrel.agreement.patterns import distinct_patterns
 from masrel.agreement.standard_error import (
     Variance,
     check_population,
@@ -91,7 +90,7 @@ def conger_kappa(
     check_variance(variance)
     check_population(population, coded.n_items)
     observed = coded_items(coded).tally(v).observed
-    margins = _Margins.of(coded, v)
+    margins = Margins.of(coded, v)
     reason = _reason(coded, observed, margins, v)
     value = p_o = p_e = math.nan
     error: float | Callable[[], float] = math.nan
@@ -118,7 +117,7 @@ def conger_kappa(
 
 
 def _reason(
-    coded: CodedRatings, observed: Observed | None, margins: "_Margins", v: Weights
+    coded: CodedRatings, observed: Observed | None, margins: Margins, v: Weights
 ) -> str | None:
     title = "Conger's kappa"
     if observed is None:
@@ -133,101 +132,16 @@ def _reason(
     return None
 
 
-@dataclass(frozen=True, slots=True)
-class _Margins:
-    # D_e = Σ_{g≠h} Σ_kl v_kl p_gk p_hl / (r (r - 1)) over raters with ratings
-    raters: list[int]  # columns that have ratings
-    n_ratings: list[int]  # n_g
-    multiple: int  # of every n_g
-    shares: list[list[int]]  # p_gk times `multiple`
-    products: list[list[int]]  # Σ_l v_kl Σ_{h≠g} p_hl, over the same and w
-    numerator: int
-    denominator: int
-
-    @classmethod
-    def of(cls, coded: CodedRatings, v: Weights) -> "_Margins":
-        q = coded.n_categories
-        counts = [
-            np.bincount(column[column >= 0], minlength=q).tolist()
-            for column in coded.codes.T
-        ]
-        raters = [g for g, row in enumerate(counts) if any(row)]
-        n_ratings = [sum(counts[g]) for g in raters]
-        multiple = math.lcm(*n_ratings)
-        shares = [
-            [n * (multiple // n_g) for n in counts[g]]
-            for g, n_g in zip(raters, n_ratings, strict=True)
-        ]
-        total = [sum(column) for column in zip(*shares, strict=True)] or [0] * q
-        products = [
-            v.products([t - p for t, p in zip(total, row, strict=True)])
-            for row in shares
-        ]
-        r = len(raters)
-        return cls(
-            raters=raters,
-            n_ratings=n_ratings,
-            multiple=multiple,
-            shares=shares,
-            products=products,
-            numerator=sum(
-                sum([p * vp for p, vp in zip(row, of_row, strict=True)])
-                for row, of_row in zip(shares, products, strict=True)
-            ),
-            denominator=max(r * (r - 1), 1) * multiple**2 * v.denominator,
-        )
-
-
 def _error(
     coded: CodedRatings,
     v: Weights,
     observed: Observed,
-    margins: _Margins,
+    margins: Margins,
     as_irrcac: bool,
     population: int | None,
 ) -> float:
-    rows, times = distinct_patterns(coded.codes, coded.n_categories)
-    n = coded.n_items
-    influence, usable = _influence(rows, n, v, observed, margins)
-    if as_irrcac:  # an item without a pair stays as it is
-        d_o = observed.numerator / observed.denominator
-        kappa = 1.0 - d_o * margins.denominator / margins.numerator
-        influence += kappa * (usable * n / observed.n_usable - 1.0)
-    influence[(rows < 0).all(axis=1)] = 0.0
-    squares = float((times * influence * influence).sum())
-    return standard_error(squares, 1.0, n, population)
-
-
-def _influence(
-    rows: NDArray[np.int64],
-    n: int,
-    v: Weights,
-    observed: Observed,
-    margins: _Margins,
-) -> tuple[Floats, Floats]:
-    # distinct rows (m, n_raters) -> u_i and s_i = 1 for an item with a pair, each (m,).
-    # With d_i an item's disagreement,
-    #   D_e u_i = (D_o/D_e) dD_e - (n/n') (d_i - D_o s_i), where rater g who rated i k
-    #   moves D_e by (n/n_g) 2 (h_gk - Σ_l h_gl p_gl), h_gk = Σ_l v_kl Σ_{h≠g} p_hl.
-    d_o = observed.numerator / observed.denominator
-    d_e = margins.numerator / margins.denominator
-    coded = CodedRatings(codes=rows, categories=tuple(range(v.n_categories)))
-    counts = item_counts(coded).astype(np.float64)
-    size = counts.sum(axis=1)
-    usable = (size > 1).astype(np.float64)
-    pairs = np.where(size > 1, size * (size - 1), 1.0)
-    apart = usable * weighted_disagreement(counts, v.as_floats()) / pairs
-    moved = np.zeros(len(rows))
-    for column, n_g, shares, h in zip(
-        rows.T, margins.n_ratings, margins.shares, margins.products, strict=True
-    ):
-        mean = sum([p * x for p, x in zip(shares, h, strict=True)])
-        over = n_g * margins.denominator
-        of_g = [2 * n * (x * margins.multiple - mean) / over for x in h]
-        moved += np.array([*of_g, 0.0])[column]  # missing, -1, is the last
-    influence = d_o / d_e**2 * moved
-    influence -= n / observed.n_usable * (apart - d_o * usable) / d_e
-    return influence, usable
+    squares = influence_squares(coded, v, observed, margins, as_irrcac)
+    return standard_error(squares, 1.0, coded.n_items, population)
 
 
 def _features(coded: CodedRatings, v: Floats) -> Floats:

@@ -8,10 +8,11 @@ from functools import partial
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from masrel.agreement.coding import CodedRatings, Label, code_ratings, complete
 from masrel.agreement.cohen import COHEN_KERNEL, PairSums, pair_table
+from masrel.agreement.float_sums import cancelled
 from masrel.agreement.kernel import Floats, Kernel
 from masrel.agreement.patterns import distinct_patterns
 from masrel.agreement.standard_error import check_population, standard_error
@@ -147,24 +148,35 @@ def _error(
 ) -> float:
     n = coded.n_items
     rows, times = distinct_patterns(coded.codes, coded.n_categories)
-    total = np.zeros(len(rows))
-    for pair, found in zip(pairs, sums, strict=True):
-        # of n items, an item with both ratings moves this pair's kappa n / n_pair times
-        total += n / found.n * _of_pair(rows[:, pair], found, v)
-    influence = total / len(pairs)
-    squares = float((times * influence * influence).sum())
-    return standard_error(squares, 1.0, n, population)
+    every = [_moves(found, n, len(pairs), v) for found in sums]
+    parts = []
+    for (g, h), cells in zip(pairs, every, strict=True):
+        in_floats = np.array([[float(x) for x in of_k] for of_k in cells])
+        parts.append(in_floats[rows[:, g], rows[:, h]])
+    value, size = np.sum(parts, axis=0), np.sum(np.abs(parts), axis=0)
+    if not cancelled(value, size, times):
+        squares = float((times * value * value).sum())
+        return standard_error(squares, 1.0, n, population)
+    exact = Fraction(0)
+    for row, often in zip(rows.tolist(), times.tolist(), strict=True):
+        of_pairs = zip(every, pairs, strict=True)
+        moved = sum((cells[row[g]][row[h]] for cells, (g, h) in of_pairs), Fraction(0))
+        exact += often * moved**2
+    return standard_error(float(exact), 1.0, n, population)
 
 
-def _of_pair(rows: NDArray[np.int64], found: PairSums, v: Weights) -> Floats:
-    # influence of every pattern on the kappa of one pair; 0 where a rating is missing
+def _moves(found: PairSums, n: int, n_pairs: int, v: Weights) -> list[list[Fraction]]:
+    # What an item in cell (k, l) moves the mean of the pairs' kappas by, times n items:
+    # its influence of n_pair items on one kappa, n / n_pair times as often. The last
+    # row and column are those of missing ratings, -1.
     q = v.n_categories
-    by_cell = np.zeros((q + 1, q + 1))
+    by_cell = [[Fraction(0)] * (q + 1) for _ in range(q + 1)]
     for k, cells in enumerate(found.cells):
         for l, times in enumerate(cells):  # noqa: E741 - k, l as in the formula
             if times:
-                by_cell[k, l] = found.n * found.influence(k, l, v) / found.below**2
-    return np.asarray(by_cell[rows[:, 0], rows[:, 1]])
+                moved = n * found.influence(k, l, v)
+                by_cell[k][l] = Fraction(moved, found.below**2 * n_pairs)
+    return by_cell
 
 
 def _features(coded: CodedRatings, v: Floats) -> Floats:
