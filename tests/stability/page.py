@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from masrel.agreement import COEFFICIENTS
 from tests.stability import cells
-from tests.stability.cases import METRICS, OF_RATERS
+from tests.stability.cases import METRICS
 from tests.stability.peers import PACKAGES
 
 if TYPE_CHECKING:
@@ -66,14 +66,11 @@ def _seen(lines: Lines) -> dict[str, str]:
     ours = [line.values["masrel"] for line in defined]
     known = [off for off in ours if not off.note and off.absolute is None]
     nearest = sum(off.absolute == 0 or off.units <= NEAREST for off in ours)
-    in_integers = [line for line in lines if line.coefficient not in OF_RATERS]
-    worst = max((x for x in lines if x.coefficient in OF_RATERS), key=_error)
+    worst = max(lines, key=_error)
     return {
         "n_values": str(len(ours)),
         "n_nearest": str(nearest),
         "largest_value": f"{max(off.units for off in known):.2f}",
-        "largest_exact_error": cells.power(max(map(_error, in_integers))),
-        "in_floats": " and ".join(COEFFICIENTS[name].title for name in OF_RATERS),
         "largest_error": cells.power(_error(worst)),
         "where": f"{_title(worst)}, {worst.case.name}",
         "ordinary": cells.units(_largest_of_others(lines)),
