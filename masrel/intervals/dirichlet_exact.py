@@ -10,47 +10,18 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import gammaln, xlogy
+from scipy.special import gammaln
 
 from masrel.agreement.kernel import Floats
 from masrel.errors import ConvergenceError
 from masrel.intervals.dirichlet import DirichletMultinomial
+from masrel.intervals.dirichlet_powers import TRIMMED, Category, Powers
 from masrel.intervals.dirichlet_saddle import Factors, Region
 
 __all__ = ["ExactDensity"]
 
-# Relative to the largest, what is dropped of a category's polynomial, of its product
-# with the moments, and of the convolution; each far below what the one before loses.
-_DROPPED, _TRIMMED, _KEPT = 1e-250, 1e-120, 1e-100
+_KEPT = 1e-100  # of the convolution: what the categories dropped is far below
 _NEGLIGIBLE = -43.0  # logarithm of a term at the edge, relative to the sum
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Powers:
-    """Coefficients of λ^t for consecutive powers t, as value times exp(scale)."""
-
-    first: int
-    values: Floats = field(compare=False, repr=False)
-    scale: float = 0.0
-
-    def above(self, least: float) -> "_Powers":
-        """Drop both ends as far as they are below a share of the largest."""
-        high = np.flatnonzero(self.values > least * self.values.max())
-        return _Powers(
-            first=self.first + int(high[0]),
-            values=self.values[high[0] : high[-1] + 1],
-            scale=self.scale,
-        )
-
-    def times(self, other: "_Powers") -> "_Powers":
-        """Multiply; all values are positive, so the sums lose no digits."""
-        values = np.convolve(self.values, other.values)
-        largest = float(values.max())
-        return _Powers(
-            first=self.first + other.first,
-            values=values / largest,
-            scale=self.scale + other.scale + float(np.log(largest)),
-        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,6 +69,12 @@ class ExactDensity:
     def __init__(self, model: DirichletMultinomial) -> None:
         self._factors = Factors.of(model)
         self.region = Region.of(self._factors)
+        self._categories = [
+            Category(powers, a)
+            for powers, a in zip(
+                self._factors.powers, self._factors.a.tolist(), strict=True
+            )
+        ]
         self._tilted = [self._expand(self.region.mode)]
 
     def __call__(self, logit: Floats) -> Floats:
@@ -135,47 +112,17 @@ class ExactDensity:
         of = self._factors
         log_tilt = self.region.log_tilt(logit)
         x, _ = of.saddle(np.exp([log_tilt]))
-        product = _Powers(first=0, values=np.ones(1))
-        for powers, a, at in zip(of.powers, of.a, x[0], strict=True):
-            one = _category(powers, float(a), float(at), log_tilt)
-            product = product.times(one).above(_TRIMMED)
+        product = Powers(first=0, values=np.ones(1))
+        for category, at in zip(self._categories, x[0].tolist(), strict=True):
+            product = product.times(category.tilted(at, log_tilt)).above(TRIMMED)
         product = product.above(_KEPT)
-        t = product.first + np.arange(product.values.size)
+        t = product.exponents
         return _Tilted(
             log_tilt=log_tilt,
-            powers=t.astype(np.float64),
+            powers=t,
             terms=np.log(product.values) + product.scale - gammaln(of.a_total + t),
             whole=(
                 bool(t[0] == of.powers[:, 0].sum()),
                 bool(t[-1] == of.powers.sum()),
             ),
         )
-
-
-def _category(powers: Floats, a: float, x: float, log_tilt: float) -> _Powers:
-    # Π_j (x + j)^N_j divided by its value at x is the law of a sum of binomials with
-    # chances x / (x + j); from it the coefficient of each power, times its moment
-    law = _Powers(first=int(powers[0]), values=np.ones(1))
-    for j, n in enumerate(powers.tolist()):
-        if j and n:
-            law = law.times(_binomial(int(n), x, j)).above(_DROPPED)
-    t = law.first + np.arange(law.values.size)
-    log = np.log(law.values) + gammaln(a + t) + t * (log_tilt - np.log(x))
-    largest = float(log.max())
-    value = float(powers @ np.log(x + np.arange(powers.size)))
-    return _Powers(
-        first=law.first,
-        values=np.exp(log - largest),
-        scale=law.scale + largest + value,
-    ).above(_TRIMMED)
-
-
-def _binomial(n: int, x: float, j: int) -> _Powers:
-    # chances x / (x + j); only as far out as Bernstein's inequality says is kept
-    p, q = x / (x + j), j / (x + j)
-    nats = -np.log(_DROPPED)
-    reach = nats / 3.0 + np.sqrt(nats**2 / 9.0 + 2.0 * nats * n * p * q)
-    k = np.arange(max(0, int(n * p - reach)), min(n, int(n * p + reach) + 1) + 1)
-    log = gammaln(n + 1.0) - gammaln(k + 1.0) - gammaln(n - k + 1.0)
-    log += xlogy(k, p) + xlogy(n - k, q)
-    return _Powers(first=int(k[0]), values=np.exp(log))

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.special import gammaln
 
 from masrel.agreement.kernel import Floats
+from masrel.errors import ConvergenceError
 from masrel.intervals.dirichlet import DirichletMultinomial
 
 __all__ = ["Factors", "Region"]
@@ -149,7 +150,7 @@ class Region:
     def of(cls, factors: Factors) -> "Region":
         """Narrow a grid of tilts until a dozen of them lie where the density does."""
         grid = np.linspace(_WIDEST, -_WIDEST, 65)
-        while True:
+        for _ in range(30):
             logits, density = factors.profile(np.exp(grid))
             best = int(density.argmax())
             high = np.flatnonzero(density > density[best] - _NATS)
@@ -162,6 +163,7 @@ class Region:
                     mode=float(logits[best]),
                 )
             grid = np.linspace(grid[first], grid[last], 33)
+        raise ConvergenceError("the posterior is too narrow to be found")
 
     def log_tilt(self, logit: float) -> float:
         """Return log λ at a logit."""

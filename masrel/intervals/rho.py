@@ -28,11 +28,14 @@ class ExactPosterior:
         Ends.
     logit : SincDistribution
         The distribution of logit ρ.
+    log_density : ExactDensity
+        What it was integrated from.
     """
 
     low: float
     high: float
     logit: SincDistribution = field(compare=False, repr=False)
+    log_density: ExactDensity = field(compare=False, repr=False)
 
     @classmethod
     def of(
@@ -62,7 +65,8 @@ class ExactPosterior:
         tail = 0.5 * (1.0 - level)
         first, last = density.region.logits[[0, -1]].tolist()
         logit, ends = sinc_distribution(density, first, last, (tail, 1.0 - tail))
-        return cls(low=float(expit(ends[0])), high=float(expit(ends[1])), logit=logit)
+        low, high = expit(ends).tolist()
+        return cls(low=low, high=high, logit=logit, log_density=density)
 
     def distribution(self, words: str) -> Distribution:
         """Return the density of ρ at points between its outermost quantiles.
@@ -75,14 +79,18 @@ class ExactPosterior:
         Returns
         -------
         Distribution
-            Continuous; the points are equally spaced in logit ρ, between the
-            quantiles at 1e-6 and 1 - 1e-6.
+            Continuous; the points are equally spaced in logit ρ, from about the
+            quantile at 1e-6 to that at 1 - 1e-6.
         """
-        low, high = (self.logit.quantile(share) for share in (1e-6, 1.0 - 1e-6))
+        below = self.logit.masses.cumsum()
+        ends = np.searchsorted(below, (1e-6, 1.0 - 1e-6)) + np.array([-1, 1])
+        low, high = self.logit.points[ends.clip(0, below.size - 1)]
         logits = np.linspace(low, high, _SHOWN)
         rho, rest = expit(logits), expit(-logits)
-        density = self.logit.density(logits) / (rho * rest)
-        return Distribution(values=rho, weights=density, continuous=True, words=words)
+        density = np.exp(self.log_density(logits) - self.logit.log_total)
+        return Distribution(
+            values=rho, weights=density / (rho * rest), continuous=True, words=words
+        )
 
 
 def prior_notes(

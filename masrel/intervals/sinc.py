@@ -17,6 +17,7 @@ from masrel.errors import ConvergenceError
 __all__ = ["SincDistribution", "sinc_distribution"]
 
 _SETTLED = 1e-7  # halving moves a quantile less: its own error is about the square
+_FALLEN_OFF = 1e-14  # what an end may hold
 _FIRST, _MOST = 32, 1 << 15  # steps
 
 
@@ -30,6 +31,8 @@ class SincDistribution:
         Ascending, equally spaced.
     masses : ndarray, shape (n,)
         The density at each, times the step; they sum to 1.
+    log_total : float
+        Logarithm of the integral that the density was divided by.
 
     References
     ----------
@@ -43,6 +46,18 @@ class SincDistribution:
 
     points: Floats = field(compare=False, repr=False)
     masses: Floats = field(compare=False, repr=False)
+    log_total: float = 0.0
+
+    @classmethod
+    def of_logs(cls, points: Floats, log: Floats) -> "SincDistribution":
+        """Take log-densities (n,) at equally spaced points (n,), up to a constant."""
+        masses = np.exp(log - log.max())
+        total = float(masses.sum())
+        return cls(
+            points=points,
+            masses=masses / total,
+            log_total=float(log.max() + np.log(total * (points[1] - points[0]))),
+        )
 
     @property
     def step(self) -> float:
@@ -54,10 +69,10 @@ class SincDistribution:
         away = (point - self.points) * (np.pi / self.step)
         return float(self.masses @ (0.5 + sici(away)[0] / np.pi))
 
-    def density(self, at: Floats) -> Floats:
-        """Return the density at points (n,), never below 0."""
-        away = np.subtract.outer(at, self.points) / self.step
-        return np.maximum(np.sinc(away) @ self.masses / self.step, 0.0)
+    def density(self, at: float) -> float:
+        """Return the density at a point, never below 0."""
+        away = np.sinc((at - self.points) / self.step)
+        return max(float(self.masses @ away) / self.step, 0.0)
 
     def quantile(self, share: float, start: float | None = None) -> float:
         """Solve for the point below which a share lies.
@@ -82,7 +97,7 @@ class SincDistribution:
         for _ in range(100):
             missing = self.probability(at) - share
             low, high = (low, at) if missing > 0.0 else (at, high)
-            slope = float(self.density(np.array([at]))[0])
+            slope = self.density(at)
             ahead = at - missing / slope if slope > 0.0 else low
             if not low < ahead < high:
                 ahead = 0.5 * (low + high)
@@ -117,17 +132,19 @@ def sinc_distribution(
     Raises
     ------
     ConvergenceError
-        If the quantiles still move at a step of 1/32768 of the range.
+        If the quantiles still move at a step of 1/32768 of the range, or the density
+        is not negligible at an end.
     """
     points = np.linspace(low, high, _FIRST + 1)
     log = log_density(points)
     before: list[float] = []
     while points.size <= _MOST + 1:
-        masses = np.exp(log - log.max())
-        found = SincDistribution(points=points, masses=masses / masses.sum())
+        found = SincDistribution.of_logs(points, log)
         starts: Sequence[float | None] = before or [None] * len(shares)
         after = [found.quantile(p, at) for p, at in zip(shares, starts, strict=True)]
         if before and np.allclose(after, before, rtol=0.0, atol=_SETTLED):
+            if max(found.masses[0], found.masses[-1]) > _FALLEN_OFF:
+                raise ConvergenceError("the posterior reaches beyond its quadrature")
             return found, after
         before = after
         between = 0.5 * (points[:-1] + points[1:])
