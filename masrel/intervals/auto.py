@@ -13,9 +13,8 @@ from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Interval, Target
 from masrel.intervals.analytic import analytic
 from masrel.intervals.case import Statistic, find_entry, open_case
-from masrel.intervals.jackknife import around_estimate, jackknife
+from masrel.intervals.jackknife import jackknife
 from masrel.intervals.posterior import SPOKEN_OF
-from masrel.intervals.spread import spread
 
 if TYPE_CHECKING:
     from masrel.agreement.weights import WeightName
@@ -24,8 +23,6 @@ __all__ = ["Method", "estimate"]
 
 Method = Literal["auto", "analytic", "jackknife", "bootstrap", "posterior"]
 """Kinds of intervals; "auto" chooses one by target and size."""
-
-_FEW_ITEMS = 30  # below, the posterior holds what it says and the delta method less
 
 
 def estimate(
@@ -85,7 +82,7 @@ def estimate(
     >>> ratings = [["a", "a", "a"], ["a", "b", "a"], ["b", "b", "b"]] * 4
     >>> found = estimate("fleiss_kappa", ratings, target="items")
     >>> found.interval.method
-    'Dirichlet-multinomial posterior, exact'
+    'item jackknife, t(11) on the logit'
     """
     if method not in get_args(Method):
         raise ParameterError(
@@ -147,38 +144,8 @@ def _chosen(asked: _Asked) -> Interval:
         weights=weights,
         level=level,
     )
-    modelled = entry.name in SPOKEN_OF and isinstance(weights, str)
-    modelled = modelled and weights == "identity"
-    if target == "items" and modelled and case.n_items < _FEW_ITEMS:
-        why = f"exact, and holds its level with few items ({case.n_items})"
-        return _with_note(_by("posterior", asked, None), why)
-    if target == "items":
-        found = analytic(
-            entry,
-            ratings,
-            target=target,
-            categories=categories,
-            weights=weights,
-            level=level,
-            distribution="logit",
-        )
-        return _with_note(found, "the delta method, on a scale without ends")
-    moved = spread(case)
-    if moved.variance == 0.0 and modelled:
-        # No spread says nothing: the model bounds what perfect agreement can hide.
-        found = _by("posterior", asked._replace(target="items"), None)
-        why = "no rater or item left out moves the estimate, so that a model must say"
-        return _with_note(dataclasses.replace(found, target=target), why)
-    found = around_estimate(case, moved)
-    return _with_note(found, f"leaves out {_LEFT_OUT[target]}, one at a time")
+    identity = isinstance(weights, str) and weights == "identity"
+    # Imported here: the other methods load no scipy.
+    from masrel.intervals.defaults import Choice, choose
 
-
-_LEFT_OUT = {"raters": "raters", "both": "items and raters"}
-
-
-def _with_note(interval: Interval, why: str) -> Interval:
-    note = f"chosen for other {_OTHERS[interval.target]}: {why}"
-    return dataclasses.replace(interval, notes=(note, *interval.notes))
-
-
-_OTHERS = {"items": "items", "raters": "raters", "both": "items and raters"}
+    return choose(Choice(case, entry.name in SPOKEN_OF and identity))

@@ -1,6 +1,7 @@
 """How much an estimate moves when items or raters are left out, one at a time."""
 
 import dataclasses
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,7 @@ from masrel.agreement.kernel import Floats
 from masrel.errors import ParameterError
 from masrel.intervals.case import Case, warn_small
 
-__all__ = ["Spread", "jackknife_variance", "spread", "without_item"]
+__all__ = ["Spread", "excess_of_raters", "jackknife_variance", "spread", "without_item"]
 
 Integers = NDArray[np.int64]
 
@@ -123,8 +124,41 @@ def without_item(case: Case) -> tuple[Floats, Integers]:
     return case.values(case.sums - case.rows), case.times
 
 
+def excess_of_raters(case: Case) -> float:
+    """Return what raters differ by beyond single ratings.
+
+    Parameters
+    ----------
+    case : Case
+        A question.
+
+    Returns
+    -------
+    float
+        max(0, V_R - V_C), with V_R the jackknife variance over raters and V_C that of
+        leaving out a rater on an item,
+        (n - 1)(r - 1)/(n r) Σ_ij (κ_-i-j - κ_-i - κ_-j + κ)². 0 where undefined.
+    """
+    without, n = case.values(case.sums - case.rows), case.n_items
+    raters, cells = [], 0.0
+    for rows in _rows_without_each_rater(case):
+        sums = case.times @ rows
+        raters.append(float(case.values(sums)))
+        own = case.values(sums - rows) - without - raters[-1] + case.value
+        cells += float(case.times @ own**2)
+    r = len(raters)
+    of_raters = jackknife_variance(np.array(raters), np.ones(r, dtype=np.int64))
+    excess = of_raters - (n - 1) * (r - 1) / (n * r) * cells
+    return max(0.0, excess) if np.isfinite(excess) else 0.0
+
+
 def _without_rater(case: Case) -> tuple[Floats, Integers]:
-    # features are made anew, because pairs of raters go
+    values = [case.values(case.times @ row) for row in _rows_without_each_rater(case)]
+    return np.array(values, dtype=np.float64), np.ones(len(values), dtype=np.int64)
+
+
+def _rows_without_each_rater(case: Case) -> Iterator[Floats]:
+    # features are made anew, because pairs of raters go; each (n_patterns, n_features)
     width = 2 if case.entry.shape == "pairs" else 1  # columns of a rater
     codes = case.patterns.codes
     n_raters = codes.shape[1] // width
@@ -134,10 +168,7 @@ def _without_rater(case: Case) -> tuple[Floats, Integers]:
             f'target: "{case.target}" needs at least {fewest} raters, because one is '
             f"left out; got {n_raters}"
         )
-    values = []
     for rater in range(n_raters):
         rest = np.delete(codes, np.s_[rater * width : (rater + 1) * width], axis=1)
         left = dataclasses.replace(case.patterns, codes=rest)
-        sums = case.times @ case.kernel.features(left, case.v)
-        values.append(float(case.values(sums)))
-    return np.array(values), np.ones(n_raters, dtype=np.int64)
+        yield case.kernel.features(left, case.v)

@@ -90,8 +90,12 @@ def test_undefined_is_null_with_a_reason(tmp_path: Path) -> None:
     assert "undefined: 0/0" in shown.stdout
 
 
-def test_seeded_intervals_repeat(wide: Path) -> None:
-    asked = (wide, "--target", "items", "--interval", "bootstrap", "--json", "-")
+def test_seeded_intervals_repeat(tmp_path: Path) -> None:
+    # so many different items that not every resample can be taken
+    path = tmp_path / "many.csv"
+    rows = [f"{i},{i % 5},{i % 7 % 5},{i % 11 % 5},{i % 13 % 5}" for i in range(80)]
+    path.write_text("\n".join(["item,A,B,C,D", *rows]) + "\n", encoding="utf-8")
+    asked = (path, "--target", "items", "--interval", "bootstrap", "--json", "-")
     assert agree(*asked, "--seed", "4").stdout == agree(*asked, "--seed", "4").stdout
     assert agree(*asked, "--seed", "4").stdout != agree(*asked, "--seed", "5").stdout
 

@@ -300,7 +300,7 @@ def test_json_has_the_fields_of_an_estimate_and_of_its_interval(
             assert [*document["interval"], "distribution"] == names(Interval)
     fleiss = next(e for e in found if e["coefficient"] == "fleiss_kappa")
     assert fleiss["interval"]["level"] == 0.9
-    assert fleiss["interval"]["kind"] == "confidence"
+    assert fleiss["interval"]["kind"] == "credible"
     assert (fleiss["n_items"], fleiss["n_raters"], fleiss["n_categories"]) == (4, 3, 6)
 
 

@@ -1,0 +1,254 @@
+"""An estimate with the interval that its question and size call for."""
+
+import dataclasses
+import itertools
+import math
+import subprocess
+import sys
+import warnings
+
+import numpy as np
+import pytest
+from scipy.special import expit, logit
+from scipy.stats import t as student
+
+from masrel.agreement import COEFFICIENTS, fleiss_kappa, stratified_kappa
+from masrel.errors import MasrelWarning, ParameterError, SmallSampleWarning
+from masrel.estimates import Estimate, Interval, Target
+from masrel.intervals import bootstrap, estimate, jackknife, posterior
+from tests.intervals.data import dirichlet_multinomial
+from tests.intervals.test_analytic import SCALE, TABLE_V
+
+MEDIUM = dirichlet_multinomial(np.random.default_rng(3), 25, 4, 0.6)
+LABELS = sorted({grade for row in MEDIUM for grade in row})
+PERFECT = [["a", "a", "a"], ["b", "b", "b"]] * 8
+
+
+def chosen(ratings: object, target: Target, **options: object) -> Interval:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", MasrelWarning)
+        found = estimate("fleiss_kappa", ratings, target=target, **options)  # type: ignore[arg-type]
+    assert found.interval is not None
+    assert found.interval.target == target
+    assert found.interval.notes[0].startswith("chosen for other ")
+    return found.interval
+
+
+def without(ratings: list[list[str]], item: int | None, rater: int | None) -> float:
+    rows = [
+        [grade for r, grade in enumerate(row) if r != rater]
+        for i, row in enumerate(ratings)
+        if i != item
+    ]
+    return fleiss_kappa(rows, categories=LABELS).value
+
+
+def variances(ratings: list[list[str]]) -> tuple[float, float, float]:
+    """V_I, V_R and V_C by leaving out one by one."""
+    n, r = len(ratings), len(ratings[0])
+    kappa = without(ratings, None, None)
+    items = [without(ratings, i, None) for i in range(n)]
+    raters = [without(ratings, None, j) for j in range(r)]
+    cells = sum(
+        (without(ratings, i, j) - items[i] - raters[j] + kappa) ** 2
+        for i, j in itertools.product(range(n), range(r))
+    )
+    return (
+        (n - 1) * float(np.var(items)),
+        (r - 1) * float(np.var(raters)),
+        (n - 1) * (r - 1) / (n * r) * cells,
+    )
+
+
+def on_logit(value: float, half: float, n_raters: int) -> tuple[float, float]:
+    """Symmetric on the logit of the position between -1/(r - 1) and 1."""
+    low = -1 / (n_raters - 1)
+    share = (value - low) / (1 - low)
+    half /= (1 - low) * share * (1 - share)
+    return tuple(  # type: ignore[return-value]
+        low + (1 - low) * float(expit(logit(share) + x)) for x in (-half, half)
+    )
+
+
+def test_other_items_leave_items_out_on_a_scale_without_ends() -> None:
+    of_items, _, _ = variances(MEDIUM)
+    kappa = fleiss_kappa(MEDIUM).value
+    half = student.ppf(0.975, 24) * math.sqrt(of_items)
+    found = chosen(MEDIUM, "items", categories=LABELS)
+    assert (found.low, found.high) == pytest.approx(on_logit(kappa, half, 4), rel=1e-9)
+    assert found.method == "item jackknife, t(24) on the logit"
+
+
+def test_other_raters_leave_raters_out() -> None:
+    found = chosen(MEDIUM, "raters", categories=LABELS)
+    with pytest.warns(SmallSampleWarning, match="4 raters"):
+        plain = jackknife("fleiss_kappa", MEDIUM, target="raters", categories=LABELS)
+    assert (found.low, found.high, found.method) == (
+        plain.low,
+        plain.high,
+        plain.method,
+    )
+
+
+def test_both_add_what_raters_differ_by_beyond_single_ratings() -> None:
+    of_items, of_raters, of_cells = variances(MEDIUM)
+    kappa = fleiss_kappa(MEDIUM).value
+    excess = max(0.0, of_raters - of_cells)
+    t_items, t_raters = student.ppf(0.975, [24, 3])
+    half = math.sqrt(t_items**2 * of_items + t_raters**2 * excess)
+    found = chosen(MEDIUM, "both", categories=LABELS)
+    assert (found.low, found.high) == pytest.approx(on_logit(kappa, half, 4), rel=1e-9)
+
+
+@pytest.mark.parametrize("biased", [False, True])
+def test_few_items_and_raters_have_the_posterior(biased: bool) -> None:
+    table = [row[:4] for row in TABLE_V]
+    if biased:  # the last rater is two grades up: raters differ by more than chance
+        table = [[*row[:3], up] for row, up in zip(table, "2344", strict=True)]
+    items = chosen(table, "items", categories=SCALE)
+    plain = posterior("fleiss_kappa", table, target="items", categories=SCALE)
+    assert (items.low, items.high) == (plain.low, plain.high)
+    assert items.distribution is not None
+    assert items.distribution.continuous
+    both = chosen(table, "both", categories=SCALE)
+    assert (both.low < items.low) == biased
+    assert (both.high > items.high) == biased
+    assert (both.kind, items.kind) == (
+        "confidence" if biased else "credible",
+        "credible",
+    )
+
+
+@pytest.mark.parametrize("target", ["items", "raters", "both"])
+@pytest.mark.parametrize("level", [0.9, 0.95])
+def test_perfect_agreement_is_bounded_from_below_by_the_model(
+    target: Target, level: float
+) -> None:
+    found = chosen(PERFECT, target, level=level)
+    central = posterior("fleiss_kappa", PERFECT, target="items", level=2 * level - 1)
+    assert found.low == pytest.approx(central.low, rel=1e-9)
+    assert found.high == 1.0
+    assert found.kind == "credible"
+    assert found.method == "Dirichlet-multinomial posterior, one-sided"
+    assert "rests on the prior" in found.notes[1]
+
+
+def test_one_category_has_a_bound_though_no_estimate() -> None:
+    found = chosen([["a"] * 3] * 6, "raters", categories=["a", "b"])
+    assert 0 < found.low < 0.5
+    assert found.high == 1.0
+
+
+def test_a_posterior_is_widened_to_an_estimate_that_it_leaves_out() -> None:
+    # every item splits: κ < 0, where no ρ can be
+    found = chosen([["a", "b"], ["b", "a"], ["a", "b"]], "items")
+    assert found.low == -1.0
+    assert found.high > 0
+
+
+def test_a_spread_that_is_an_accident_is_none() -> None:
+    # 40 items alike and one that splits evenly: any rater left out leaves κ nearly
+    # where it was, which says nothing of raters
+    ratings = [["a"] * 4, ["b"] * 4] * 20 + [["a", "a", "b", "b"]]
+    plain = jackknife("fleiss_kappa", ratings, target="items")
+    assert plain.reason is None
+    moved = [
+        fleiss_kappa(
+            [[g for j, g in enumerate(row) if j != r] for row in ratings]
+        ).value
+        for r in range(4)
+    ]
+    assert max(moved) - min(moved) < 1e-3
+    assert chosen(ratings, "raters").high == 1.0
+
+
+@pytest.mark.parametrize("name", ["gwet_ac", "percent_agreement", "conger_kappa"])
+@pytest.mark.parametrize("target", ["items", "raters", "both"])
+def test_other_coefficients_have_no_model_and_say_so(name: str, target: Target) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", MasrelWarning)
+        found = estimate(name, MEDIUM, target=target, categories=LABELS)
+        none = estimate(name, PERFECT, target=target)
+    assert found.interval is not None
+    assert found.interval.low < found.value < found.interval.high
+    assert "posterior" not in found.interval.method
+    assert none.interval is not None
+    assert math.isnan(none.interval.low)
+    assert "leaves the estimate as it is" in (none.interval.reason or "")
+
+
+def test_retest_agreement_leaves_items_out_with_all_their_raters() -> None:
+    pairs = [
+        [[a, b] for a, b in zip(x, y, strict=True)]
+        for x, y in (("aabbabba" * 2, "aabbabab" * 2), ("ababbbba" * 2, "aabbbbba" * 2))
+    ]
+    found = estimate("stratified_kappa", pairs, target="items")
+    alone = jackknife("stratified_kappa", pairs, target="items")
+    assert found.value == stratified_kappa(pairs).value
+    assert found.interval is not None
+    assert (found.interval.low, found.interval.high) == (alone.low, alone.high)
+
+
+@pytest.mark.parametrize("method", ["analytic", "jackknife", "bootstrap", "posterior"])
+def test_a_method_by_name_is_that_method(method: str) -> None:
+    found = estimate(
+        "fleiss_kappa",
+        MEDIUM,
+        target="items",
+        method=method,
+        categories=LABELS,
+        rng=1,  # type: ignore[arg-type]
+    )
+    assert found.interval is not None
+    if method == "bootstrap":
+        alone = bootstrap(
+            "fleiss_kappa", MEDIUM, target="items", categories=LABELS, rng=1
+        )
+        assert found.interval == alone
+    assert method in found.interval.method or method == "analytic"
+    assert dataclasses.replace(found, interval=None) == fleiss_kappa(
+        MEDIUM, categories=LABELS
+    )
+
+
+def test_a_coefficient_with_its_own_interval_keeps_it() -> None:
+    numbers = [[int(grade == LABELS[0]) for grade in row] for row in MEDIUM]
+    found: Estimate = estimate("icc_1", numbers, target="items", level=0.9)
+    assert found.interval is not None
+    assert (found.interval.method, found.interval.level) == ("F distribution", 0.9)
+
+
+def test_wrong_options_and_two_raters_are_refused() -> None:
+    with pytest.raises(ParameterError, match="method: needs one of auto, analytic"):
+        estimate("fleiss_kappa", MEDIUM, target="items", method="best")  # type: ignore[arg-type]
+    two = [row[:2] for row in MEDIUM]
+    for target in ("raters", "both"):
+        with pytest.raises(ParameterError, match="needs at least 3 raters"):
+            estimate("fleiss_kappa", two, target=target)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="target"):
+        estimate("fleiss_kappa", MEDIUM)  # type: ignore[call-arg]
+
+
+def test_every_coefficient_has_an_answer_or_a_reason() -> None:
+    for entry in COEFFICIENTS.values():
+        if entry.shape == "ratings" and entry.kernel is not None:
+            rows = [row[: entry.n_raters[1] or 4] for row in MEDIUM]
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", MasrelWarning)
+                found = estimate(entry, rows, target="items", categories=LABELS)
+            assert found.interval is not None
+            assert found.interval.low < found.value < found.interval.high
+
+
+def test_nothing_is_drawn_and_no_sampler_is_loaded() -> None:
+    code = (
+        "import sys\nfrom masrel.intervals import estimate\n"
+        "rows = [['a', 'b', 'a'], ['a', 'a', 'a'], ['b', 'b', 'b']] * 4\n"
+        "found = estimate('fleiss_kappa', rows, target='items')\n"
+        "print(found.interval.seed, sorted({'emcee', 'arviz_stats', 'matplotlib', "
+        "'scipy.stats', 'pandas'} & set(sys.modules)))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "None []"
