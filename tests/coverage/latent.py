@@ -15,8 +15,8 @@ STEP = 0.04
 def severities(step: float) -> tuple[Floats, Floats]:
     """Nodes and weights of the trapezoid rule under the normal density.
 
-    Its error falls as exp(-2 π² (width/step)²) in the width of the smoothest part; the
-    noise that makes kappa 0.9 is three steps wide.
+    Its error falls as fast as the Fourier transform of what is integrated: below
+    1e-9 for grades of noise one step wide, which is less than kappa 0.9 needs.
     """
     nodes = np.arange(-7.0, 7.0 + step / 2, step)
     weights = np.exp(-0.5 * nodes**2)

@@ -19,9 +19,9 @@ def irrcac(case: Case) -> Bounds:
 
 
 def null_error(case: Case) -> Bounds:
-    """The error under kappa = 0, as SPSS, Stata and R's irr take it, and the normal.
+    """The error under kappa = 0, and the normal.
 
-    irr prints that error's z and no interval; whoever makes one of it gets this.
+    R's irr prints the z of that error; whoever makes an interval of it gets this.
     """
     half = _NORMAL * null_standard_error(case)
     return Bounds(low=case.value - half, high=case.value + half)
