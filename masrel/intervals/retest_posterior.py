@@ -16,7 +16,7 @@ __all__ = ["RetestPosterior"]
 
 _WIDEST = 48.0  # logit m beyond which a uniform prior has no mass that matters
 _NEGLIGIBLE = 45.0  # log-density below its largest
-_LEAST_MASS = 1e-9  # of a term of the mixture that a rater's kappa is
+_LEFT_OUT = 1e-6  # probability of the smallest terms of a rater's mixture, together
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,7 +104,7 @@ class RetestPosterior:
         Returns
         -------
         list of float
-            Quantiles, to about 1e-6.
+            Quantiles, to about 1e-4.
         """
         pairs = self.raters[rater]
         mass, up, down = self._mixture(pairs)
@@ -119,17 +119,19 @@ class RetestPosterior:
 
     def _mixture(self, pairs: RaterPairs) -> tuple[Floats, Floats, Floats]:
         # -> probability and both parameters of every Beta that weighs, all (n,)
-        at, of = np.nonzero(self.masses > _LEAST_MASS)
-        mean, spread = self.mean.points[at], GRID[of]
+        # every other mean: the lattice before the last halving, which moved nothing
+        masses, points = self.masses[::2], self.mean.points[::2]
+        at, of = np.nonzero(_weighs(masses))
+        mean, spread = points[at], GRID[of]
         terms = pairs.log_terms(Risen.of(mean, spread, pairs.agree + pairs.differ))
         terms -= _log_sum(terms)[:, None]
-        mass = self.masses[at, of, None] * np.exp(terms)  # (n, agree + 1)
-        node, j = np.nonzero(mass > _LEAST_MASS)
+        mass = masses[at, of, None] * np.exp(terms)  # (n, agree + 1)
+        node, j = np.nonzero(_weighs(mass))
         size = 3.0 / expit(spread[node]) - 1.0  # 1 / g - 1, what the population weighs
         up = expit(mean[node]) * size + pairs.agree - j
         down = expit(-mean[node]) * size + pairs.differ + j
-        weighs = mass[node, j]
-        return weighs / weighs.sum(), up, down
+        weight = mass[node, j]
+        return weight / weight.sum(), up, down
 
     def spread_quantiles(self, shares: Sequence[float]) -> list[float]:
         """Return quantiles of the standard deviation of kappa over raters.
@@ -182,6 +184,13 @@ def _log_joint(
     of_mean = shape * (_log_expit(mean) + _log_expit(-mean))
     of_spread = _log_expit(spread) + _log_expit(-spread)
     return likelihood.reshape(mean.size, -1) + of_mean[:, None] + of_spread
+
+
+def _weighs(masses: Floats) -> NDArray[np.bool_]:
+    # False for the smallest, which together are next to nothing
+    ascending = np.sort(masses, axis=None)
+    few = np.searchsorted(ascending.cumsum(), _LEFT_OUT)
+    return np.asarray(masses >= ascending[few])
 
 
 def _log_sum(logs: Floats) -> Floats:

@@ -159,34 +159,36 @@ def textbook_log(table: Table, kappa: float) -> float:
 
 def test_on_many_pairs_of_alike_raters_it_is_stratified_kappa() -> None:
     rng = np.random.default_rng(11)
-    shares = np.tile([0.1, 0.2, 0.4, 0.3], (10, 1))
-    study = drawn_pairs(rng, np.full(10, 0.7), shares, 200)
+    shares = np.tile([0.1, 0.2, 0.4, 0.3], (6, 1))
+    study = drawn_pairs(rng, np.full(6, 0.7), shares, 150)
     found = retest_model(study, categories=[0, 1, 2, 3])
     kappa = stratified_kappa(study, categories=[0, 1, 2, 3])
     # same margins for all: the mean of raters' kappas is the stratified one
-    assert found.kappa.value == pytest.approx(kappa.value, abs=0.005)
-    # 3 standard errors of .014 around the truth: once in 370 runs of other seeds
-    assert found.kappa.value == pytest.approx(0.7, abs=0.042)
-    assert found.spread.value < 0.05
+    assert found.kappa.value == pytest.approx(kappa.value, abs=0.01)
+    # 3 standard errors of .021 around the truth: once in 370 runs of other seeds
+    assert found.kappa.value == pytest.approx(0.7, abs=0.063)
+    assert found.spread.value < 0.07
 
 
 def test_raters_who_differ_are_told_apart_and_pulled_together() -> None:
     rng = np.random.default_rng(12)
     kappas = np.array([0.3, 0.5, 0.7, 0.9] * 2)
-    study = drawn_pairs(rng, kappas, np.full((8, 3), 1 / 3), 150)
+    study = drawn_pairs(rng, kappas, np.full((8, 3), 1 / 3), 100)
     found = retest_model(study, categories=[0, 1, 2])
     truth = np.mean(kappas)
     assert found.kappa.interval.low < truth < found.kappa.interval.high
     assert found.spread.value == pytest.approx(np.std(kappas), abs=0.06)
     for of_rater, kappa in zip(found.raters, kappas, strict=True):
-        assert of_rater.value == pytest.approx(kappa, abs=0.17)
+        assert of_rater.value == pytest.approx(kappa, abs=0.2)
     few = retest_model([pairs[:6] for pairs in study], categories=[0, 1, 2])
     assert np.ptp([q.value for q in few.raters]) < np.ptp(
         [q.value for q in found.raters]
     )
 
 
-@pytest.mark.parametrize(("n_raters", "n_items"), [(3, 4), (5, 12)])
+@pytest.mark.parametrize(
+    ("n_raters", "n_items"), [(3, 4), pytest.param(5, 12, marks=pytest.mark.slow)]
+)
 def test_ranks_of_what_made_the_data_are_uniform(n_raters: int, n_items: int) -> None:
     # Simulation-based calibration with exact posteriors: the share of the posterior
     # below the true mean is U(0, 1). 100 studies; p < 1e-4 by chance once in 10 000.
