@@ -10,5 +10,14 @@ from masrel.intervals.bootstrap import bootstrap
 from masrel.intervals.difference import difference
 from masrel.intervals.jackknife import jackknife
 from masrel.intervals.posterior import posterior
+from masrel.intervals.retest_model import retest_model
 
-__all__ = ["analytic", "bootstrap", "difference", "estimate", "jackknife", "posterior"]
+__all__ = [
+    "analytic",
+    "bootstrap",
+    "difference",
+    "estimate",
+    "jackknife",
+    "posterior",
+    "retest_model",
+]

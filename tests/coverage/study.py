@@ -1,0 +1,39 @@
+"""How often intervals of Fleiss' kappa hold what they ask for, cell by cell.
+
+``python -m tests.coverage.study`` writes ``docs/coverage.md`` and its figure.
+"""
+
+import argparse
+from pathlib import Path
+
+from tqdm import tqdm
+
+from tests.coverage.figure import draw
+from tests.coverage.page import page
+from tests.coverage.simulate import Cell, all_cells, simulate
+
+DOCS = Path(__file__).parents[2] / "docs"
+SIZE, QUICK = 4_000, 200
+
+
+def main() -> None:
+    """Simulate, and write the page and the figure."""
+    parser = argparse.ArgumentParser(description="Coverage of intervals of kappa.")
+    parser.add_argument(
+        "--quick", action="store_true", help=f"{QUICK} studies a cell, not {SIZE}"
+    )
+    parser.add_argument("--quiet", action="store_true", help="say nothing")
+    parser.add_argument("--into", type=Path, default=DOCS, help="folder of the page")
+    options = parser.parse_args()
+    size = QUICK if options.quick else SIZE
+    questions = tqdm(list(all_cells()), disable=options.quiet, unit="cell")
+    cells: list[Cell] = [simulate(*question, size) for question in questions]
+    (options.into / "figures").mkdir(parents=True, exist_ok=True)
+    draw(cells, options.into / "figures" / "coverage.png")
+    (options.into / "coverage.md").write_text(page(cells), encoding="utf-8")
+    if not options.quiet:
+        print(f"wrote {options.into / 'coverage.md'}")
+
+
+if __name__ == "__main__":
+    main()
