@@ -1,32 +1,21 @@
 """Cohen's kappa: agreement of two raters, each with margins of their own."""
 
-import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from masrel.agreement.coding import CodedRatings, Codes, Label, code_ratings
+from masrel.agreement.coding import CodedRatings, Label, code_ratings
 from masrel.agreement.counts import check_table, column_categories
 from masrel.agreement.kernel import Floats, Kernel, divide
+from masrel.agreement.pair_sums import PairSums, Table, kappa_of_sums, pair_table
 from masrel.agreement.standard_error import check_population, standard_error
-from masrel.agreement.undefined import NO_CHANCE, NO_PAIR, undefined
 from masrel.agreement.weights import WeightName, Weights, declared_weights
 from masrel.errors import RatingsError
 from masrel.estimates import Estimate
 
-__all__ = [
-    "COHEN_KERNEL",
-    "PairSums",
-    "cohen_kappa",
-    "cohen_kappa_from_table",
-    "pair_table",
-    "two_raters",
-]
-
-Table = NDArray[np.int64]
+__all__ = ["COHEN_KERNEL", "cohen_kappa", "cohen_kappa_from_table", "two_raters"]
 
 
 def cohen_kappa(
@@ -160,122 +149,18 @@ def two_raters(coded: CodedRatings, title: str) -> CodedRatings:
     return coded
 
 
-def pair_table(codes: Codes, n_categories: int) -> Table:
-    """Count the pairs of two columns of codes.
-
-    Parameters
-    ----------
-    codes : ndarray of int, shape (n_items, 2)
-        Codes of two ratings; pairs with a missing one are left out.
-    n_categories : int
-        Declared categories.
-
-    Returns
-    -------
-    ndarray of int64, shape (n_categories, n_categories)
-        Items per pair of categories.
-    """
-    side = n_categories + 1
-    # Missing, -1, becomes the last row and column, which is cut off.
-    flat = codes[:, 0].astype(np.int32) * side + codes[:, 1] + side + 1
-    times = np.bincount(flat, minlength=side * side).reshape(side, side)
-    return times[1:, 1:].astype(np.int64)
-
-
-@dataclass(frozen=True, slots=True)
-class PairSums:
-    """What kappa of a table of pairs is made of, in integers.
-
-    With t the table and n its sum, D_o = `above` / (n · w) and D_e = `below` /
-    (n² · w), where w is the denominator of the weights.
-    """
-
-    cells: list[list[int]]
-    n: int
-    above: int  # Σ_kl v_kl t_kl
-    below: int  # Σ_kl v_kl t_k. t_.l
-    to_second: list[int]  # Σ_l v_kl t_.l
-    to_first: list[int]  # Σ_k v_kl t_k.
-
-    @classmethod
-    def of(cls, table: Table, v: Weights) -> "PairSums":
-        """Sum a table of pairs.
-
-        Parameters
-        ----------
-        table : ndarray of int64, shape (n_categories, n_categories)
-            Items per pair of categories.
-        v : Weights
-            Disagreement of two categories.
-
-        Returns
-        -------
-        PairSums
-            Its sums.
-        """
-        cells: list[list[int]] = table.tolist()
-        first = [sum(row) for row in cells]
-        second = [sum(column) for column in zip(*cells, strict=True)]
-        n = sum(first)
-        to_second = v.products(second)
-        if v.numerators is None:
-            above = n - sum([cells[k][k] for k in range(len(cells))])
-        else:
-            above = sum(
-                [
-                    sum([x * t for x, t in zip(of_v, row, strict=True) if t])
-                    for of_v, row in zip(v.numerators, cells, strict=True)
-                ]
-            )
-        below = sum([t * vt for t, vt in zip(first, to_second, strict=True)])
-        return cls(cells, n, above, below, to_second, v.products(first))
-
-    def influence(self, k: int, l: int, v: Weights) -> int:  # noqa: E741 - as in the formula
-        """Return the influence of an item in cell (k, l), times `below`² / n.
-
-        An item moves D_o by v_kl - D_o, and D_e by Σ_m (v_km p_.m + v_ml p_m.) - 2 D_e.
-        """
-        if v.numerators is None:
-            own = 0 if k == l else 1
-        else:
-            own = v.numerators[k][l]
-        margins = self.to_second[k] + self.to_first[l]
-        raised = self.n * self.above * margins
-        return raised - self.n * own * self.below - self.above * self.below
-
-
 def _estimate(table: Table, v: Weights, population: int | None) -> Estimate:
     # shape of table: (n_categories, n_categories)
     found = PairSums.of(table, v)
-    n = found.n
-    check_population(population, n)
-    reason = None
-    if n == 0:
-        reason = undefined("Cohen's kappa", NO_PAIR)
-    elif v.reason is not None:
-        reason = undefined("Cohen's kappa", v.reason)
-    elif found.below == 0:
-        reason = undefined("Cohen's kappa", NO_CHANCE)
-    value = observed = chance = math.nan
-    error: float | Callable[[], float] = math.nan
-    if n and v.reason is None:
-        w = v.denominator
-        observed = (n * w - found.above) / (n * w)
-        chance = (n * n * w - found.below) / (n * n * w)
-        if reason is None:
-            value = (found.below - n * found.above) / found.below
-            error = partial(_error, found, v, population)
-    return Estimate(
-        coefficient="cohen_kappa",
-        weights=v.name,
-        value=value,
-        standard_error=error,
-        observed=observed,
-        chance=chance,
-        n_items=n,
-        n_raters=2 if n else 0,
-        n_categories=len(table),
-        reason=reason,
+    check_population(population, found.n)
+    return kappa_of_sums(
+        found,
+        v,
+        "cohen_kappa",
+        "Cohen's kappa",
+        partial(_error, found, v, population),
+        n_items=found.n,
+        n_raters=2 if found.n else 0,
     )
 
 

@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from masrel.agreement.coding import CodedRatings, Label, code_ratings, complete
-from masrel.agreement.cohen import COHEN_KERNEL, PairSums, pair_table
+from masrel.agreement.cohen import COHEN_KERNEL
 from masrel.agreement.float_sums import cancelled
 from masrel.agreement.kernel import Floats, Kernel
+from masrel.agreement.pair_sums import PairSums, pair_table
 from masrel.agreement.patterns import distinct_patterns
 from masrel.agreement.standard_error import check_population, standard_error
 from masrel.agreement.undefined import undefined

@@ -1,20 +1,19 @@
 """Pooled kappa: pairs of all raters in one table, as if one rater had made them."""
 
-import math
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from masrel.agreement.coding import CodedRatings, Label
-from masrel.agreement.cohen import COHEN_KERNEL, PairSums, pair_table
+from masrel.agreement.cohen import COHEN_KERNEL
 from masrel.agreement.kernel import Floats, Kernel
+from masrel.agreement.pair_sums import PairSums, kappa_of_sums, pair_table
 from masrel.agreement.pairs import code_strata, strata_of
 from masrel.agreement.patterns import distinct_patterns
 from masrel.agreement.standard_error import standard_error
-from masrel.agreement.undefined import NO_CHANCE, NO_PAIR, undefined
 from masrel.agreement.weights import WeightName, Weights, declared_weights
 from masrel.estimates import Estimate
 
@@ -81,33 +80,14 @@ def pooled_kappa(
     q = coded.n_categories
     tables = [pair_table(codes, q) for codes in strata_of(coded)]
     found = PairSums.of(np.asarray(sum(tables[1:], tables[0])), v)
-    n, reason = found.n, None
-    if n == 0:
-        reason = undefined("pooled kappa", NO_PAIR)
-    elif v.reason is not None:
-        reason = undefined("pooled kappa", v.reason)
-    elif found.below == 0:
-        reason = undefined("pooled kappa", NO_CHANCE)
-    value = observed = chance = math.nan
-    error: float | Callable[[], float] = math.nan
-    if n and v.reason is None:
-        w = v.denominator
-        observed = (n * w - found.above) / (n * w)
-        chance = (n * n * w - found.below) / (n * n * w)
-    if reason is None:
-        value = (found.below - n * found.above) / found.below
-        error = partial(_error, coded, found, v)
-    return Estimate(
-        coefficient="pooled_kappa",
-        weights=v.name,
-        value=value,
-        standard_error=error,
-        observed=observed,
-        chance=chance,
+    return kappa_of_sums(
+        found,
+        v,
+        "pooled_kappa",
+        "pooled kappa",
+        partial(_error, coded, found, v),
         n_items=coded.n_items,
         n_raters=sum(1 for table in tables if table.any()),
-        n_categories=q,
-        reason=reason,
     )
 
 

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from masrel.agreement.coding import CodedRatings, Label
-from masrel.agreement.cohen import COHEN_KERNEL, PairSums, pair_table
+from masrel.agreement.cohen import COHEN_KERNEL
 from masrel.agreement.kernel import Floats, Kernel, divide
+from masrel.agreement.pair_sums import PairSums, pair_table
 from masrel.agreement.pairs import code_strata, strata_of
 from masrel.agreement.standard_error import standard_error
 from masrel.agreement.undefined import NO_CHANCE, NO_PAIR, undefined

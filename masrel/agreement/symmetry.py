@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from masrel.agreement.coding import Label, code_ratings
-from masrel.agreement.cohen import pair_table, two_raters
+from masrel.agreement.cohen import two_raters
 from masrel.agreement.counts import check_table
+from masrel.agreement.pair_sums import pair_table
 from masrel.agreement.significance import Significance
 from masrel.agreement.undefined import undefined
 from masrel.errors import CountsError, ParameterError

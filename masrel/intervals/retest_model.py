@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.agreement.coding import Label
-from masrel.agreement.cohen import pair_table
+from masrel.agreement.pair_sums import pair_table
 from masrel.agreement.pairs import code_strata, strata_of
 from masrel.errors import ParameterError, UndefinedStatisticWarning
 from masrel.estimates import Interval, Target
