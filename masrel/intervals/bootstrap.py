@@ -2,26 +2,27 @@
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Literal, get_args
+from functools import partial
+from typing import Any, Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from masrel.agreement.coding import Label
 from masrel.agreement.weights import WeightName
 from masrel.errors import ParameterError
-from masrel.estimates import Interval, Target, Unit
+from masrel.estimates import Interval, Target
 from masrel.intervals.case import Case, Statistic, open_case, warn_small
-from masrel.intervals.compositions import n_compositions
-from masrel.intervals.endpoints import Kind, Replicates, bca_levels
-from masrel.intervals.pool import Pool, acceleration, item_pool, rater_pool
-from masrel.intervals.resamples import draw_resamples, enumerate_resamples
+from masrel.intervals.draws import draw_resamples, sampler_of
+from masrel.intervals.endpoints import Kind, Rule
+from masrel.intervals.exact import enumerate_resamples
+from masrel.intervals.pool import Pool, cluster_pool, item_pool, rater_pool
+from masrel.intervals.slopes import acceleration, standard_errors, studentized
 
 __all__ = ["Exact", "Kind", "bootstrap", "recorded_generator"]
 
 Exact = Literal["auto"] | bool
-
-_MOST_EXACT = 300_000  # distinct resamples that are enumerated rather than drawn
+"""Whether all resamples are taken: always, never, or if there are few enough."""
 
 
 def bootstrap(
@@ -35,6 +36,9 @@ def bootstrap(
     n_resamples: int = 10_000,
     kind: Kind = "percentile",
     exact: Exact = "auto",
+    clusters: Sequence[object] | NDArray[Any] | None = None,
+    tolerance: float | None = None,
+    most_resamples: int = 10_000_000,
     rng: np.random.Generator | int | None = None,
 ) -> Interval:
     """Compute a bootstrap interval.
@@ -55,11 +59,19 @@ def bootstrap(
         Nominal level.
     n_resamples : int, optional
         Resamples where they are drawn, at least 100.
-    kind : {"percentile", "basic", "bca"}, optional
+    kind : {"percentile", "basic", "bca", "studentized"}, optional
         How endpoints come from the resamples.
     exact : {"auto", True, False}, optional
         Whether every distinct resample is taken with its probability, instead of
-        drawing some. "auto" does so up to 300 000 of them; then nothing is random.
+        drawing some: then nothing is random. "auto" does so up to 300 000 resamples, or
+        different sums of features, if that takes a fraction of a second.
+    clusters : sequence, shape (n_items,), optional
+        Label of the cluster each item belongs to, for target "items": clusters are
+        drawn whole. Several stretches of one haptic model are such a cluster.
+    tolerance : float, optional
+        The largest Monte Carlo error of an end: resamples are drawn until it is met.
+    most_resamples : int, optional
+        How many are drawn for it at most.
     rng : Generator or int, optional
         Where randomness comes from; an integer is recorded as the seed. Without
         it a fresh seed is drawn and recorded. An exact interval needs none.
@@ -74,30 +86,46 @@ def bootstrap(
     Raises
     ------
     ParameterError
-        If an option is none, raters of this coefficient cannot be resampled, or there
-        are too many resamples for `exact` to be True.
+        If an option is none, raters of this coefficient cannot be resampled, there are
+        too many resamples for `exact` to be True, or not as many labels of clusters as
+        items.
     RatingsError
         If the ratings do not fit the coefficient.
+    ConvergenceError
+        If `tolerance` takes more than `most_resamples`; it says how many more.
 
     Warns
     -----
     SmallSampleWarning
-        Below 16 items, or 5 raters.
+        Below 16 items or clusters, or 5 raters.
     UndefinedStatisticWarning
-        If the estimate is undefined or all resamples are alike.
+        If the estimate is undefined, or has no standard error to studentize by, or all
+        resamples are alike.
 
     Notes
     -----
     Resamples on which the coefficient is undefined, such as one item drawn n times,
     are left out and counted in `n_undefined`; the probabilities of the others are
     scaled up to 1. An exact interval counts distinct resamples there, and a note says
-    how probable they are. When raters are resampled, a rater is
-    never paired with a copy of itself: such pairs agree always and say nothing.
+    how probable they are. When raters are resampled, a rater is never paired with a
+    copy of itself: such pairs agree always and say nothing.
+
+    A quantile is the least value whose probability adds up to it, and where it adds up
+    to just that, the middle between this value and the next. Ties with the estimate
+    count half in the bias of BCa. "studentized" divides by the delta-method standard
+    error of every resample, from exact derivatives; a resample that is off without any
+    spread is infinitely many standard errors off.
+
+    What is drawn has a linear function of the resample as its control: its distribution
+    is computed, and says how far the sample is off [2]_. The Monte Carlo error is what
+    the control leaves.
 
     References
     ----------
     .. [1] Efron, B., Tibshirani, R. J. (1993). An Introduction to the Bootstrap,
-       ch. 13 and 14.
+       ch. 12 to 14.
+    .. [2] Davison, A. C., Hinkley, D. V. (1997). Bootstrap Methods and their
+       Application, ch. 5 and 9.
 
     Examples
     --------
@@ -116,8 +144,7 @@ def bootstrap(
     >>> found.seed, found.n_resamples, found.low < 0.5 < found.high
     (1, 10000, True)
     """
-    _check(kind, n_resamples, exact)
-    _check_rng(rng)
+    _check(kind, exact, n_resamples, tolerance, most_resamples, rng)
     case = open_case(
         coefficient,
         ratings,
@@ -126,89 +153,113 @@ def bootstrap(
         weights=weights,
         level=level,
     )
-    unit = _unit(case)
-    method = f"{kind} bootstrap"
+    pool, notes, what = _pool(case, clusters)
+    method = f"{kind} bootstrap{what}"
     if np.isnan(case.value):
         return case.undefined(
-            "the estimate itself is undefined", method=method, unit=unit
+            "the estimate itself is undefined", method=method, unit=target
         )
-    if unit == "items":
-        pool, notes = item_pool(case), warn_small(case.n_items, 16, "items")
-    else:
-        pool = rater_pool(case)
-        notes = warn_small(pool.n, 5, "raters")
-    if _is_exact(exact, pool):
-        method, found, seed = f"{method}, exact", enumerate_resamples(pool), None
-    else:
+    rule = _rule(case, pool, kind)
+    statistic = None
+    if kind == "studentized":
+        if not rule.error > 0.0:
+            reason = "the estimate has no standard error to studentize by"
+            return case.undefined(reason, method=method, unit=target)
+        statistic = partial(studentized, pool, value=rule.value, error=rule.error)
+    seed = None
+    found = None
+    if exact is not False:
+        found = enumerate_resamples(pool, statistic, insist=exact is True)
+    if found is None:
         generator, seed = recorded_generator(rng)
-        found = draw_resamples(pool, n_resamples, generator)
-    if not found.replicates.has_spread:
+        found = draw_resamples(
+            sampler_of(pool, statistic),
+            rule,
+            generator,
+            n_resamples=n_resamples,
+            tolerance=tolerance,
+            most_resamples=most_resamples,
+        )
+    else:
+        method += ", exact"
+    if not found.has_spread:
         reason = "every resample gives the same value or none, so there is no spread"
-        return case.undefined(reason, method=method, unit=unit)
-    low_at, high_at = _levels(case, pool, found.replicates, kind)
-    ends = [found.replicates.quantile(at) for at in (low_at, high_at)]
-    errors = found.errors(low_at, high_at)
-    if kind == "basic":
-        ends = [2 * case.value - end for end in reversed(ends)]
-        errors = None if errors is None else errors[::-1]
+        return case.undefined(reason, method=method, unit=target)
+    ends = rule.ends(found.source)
+    if ends is None:
+        reason = "all resamples lie on one side of the estimate, so BCa has no bias"
+        return case.undefined(reason, method=method, unit=target)
     return dataclasses.replace(
-        case.closed(*ends, method=method, unit=unit, notes=(*notes, *found.notes)),
+        case.closed(
+            ends.low,
+            ends.high,
+            method=method,
+            unit=target,
+            notes=(*notes, *found.notes),
+        ),
         n_resamples=found.n_resamples,
         n_undefined=found.n_undefined,
-        monte_carlo_error=errors,
+        monte_carlo_error=ends.errors,
         seed=seed,
         distribution=found.distribution,
     )
 
 
-def _check(kind: Kind, n_resamples: int, exact: Exact) -> None:
+def _check(
+    kind: Kind,
+    exact: Exact,
+    n_resamples: int,
+    tolerance: float | None,
+    most_resamples: int,
+    rng: object,
+) -> None:
     if kind not in get_args(Kind):
         raise ParameterError(
             f"kind: needs one of {', '.join(get_args(Kind))}, got {kind!r}"
         )
+    if not (exact is True or exact is False or exact == "auto"):
+        raise ParameterError(f'exact: needs "auto", True or False, got {exact!r}')
     if n_resamples < 100:
         raise ParameterError(f"n_resamples: needs at least 100, got {n_resamples}")
-    if exact not in ("auto", True, False):
-        raise ParameterError(f'exact: needs "auto", True or False, got {exact!r}')
-
-
-def _is_exact(exact: Exact, pool: Pool) -> bool:
-    if exact is False:
-        return False
-    n_distinct = n_compositions(pool.n, pool.times.size)
-    if exact is True and n_distinct > _MOST_EXACT:
+    if tolerance is not None and not tolerance > 0.0:
+        raise ParameterError(f"tolerance: needs a number above 0, got {tolerance}")
+    if most_resamples < n_resamples:
         raise ParameterError(
-            f"exact: there are {n_distinct} distinct resamples, and at most "
-            f"{_MOST_EXACT} are enumerated; leave it out to draw some"
+            f"most_resamples: needs at least the {n_resamples} of n_resamples, got "
+            f"{most_resamples}"
         )
-    return n_distinct <= _MOST_EXACT
+    _check_rng(rng)
 
 
-def _levels(
-    case: Case, pool: Pool, replicates: Replicates, kind: Kind
-) -> tuple[float, float]:
-    # which quantiles of the resamples are the endpoints
-    tail = 0.5 * (1.0 - case.level)
-    if kind != "bca":
-        return tail, 1.0 - tail
-    share = replicates.share_below(case.value)
-    return bca_levels(case.level, share, acceleration(pool))
-
-
-def _unit(case: Case) -> Unit:
+def _pool(
+    case: Case, clusters: Sequence[object] | NDArray[Any] | None
+) -> tuple[Pool, tuple[str, ...], str]:
+    # what is resampled, what to say of it, and its name where it is not the unit
     if case.target == "both":
         raise ParameterError(
             'target: the bootstrap resamples "items" or "raters"; for both use the '
             "jackknife"
         )
     if case.target == "raters":
-        fewest, most = case.entry.n_raters
-        if case.kernel.rater_sums is None or most == fewest:
-            raise ParameterError(
-                f"target: raters of {case.entry.title} cannot be resampled without "
-                "pairing a rater with a copy of itself"
-            )
-    return case.target
+        if clusters is not None:
+            raise ParameterError('clusters: are of items, and need target="items"')
+        pool = rater_pool(case)
+        return pool, warn_small(pool.n, 5, "raters"), ""
+    if clusters is None:
+        pool = item_pool(case)
+        return pool, warn_small(pool.n, 16, "items"), ""
+    pool = cluster_pool(case, clusters)
+    return pool, warn_small(pool.n, 16, "clusters"), f" of {pool.n} clusters"
+
+
+def _rule(case: Case, pool: Pool, kind: Kind) -> Rule:
+    rule = Rule(kind=kind, level=case.level, value=case.value)
+    if kind == "bca":
+        return dataclasses.replace(rule, skew=acceleration(pool))
+    if kind == "studentized":
+        (error,) = standard_errors(pool, pool.times[None].astype(np.float64))
+        return dataclasses.replace(rule, error=float(error))
+    return rule
 
 
 def recorded_generator(

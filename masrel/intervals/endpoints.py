@@ -1,128 +1,121 @@
-"""From the values of resamples to the ends of an interval."""
+"""From resamples to the ends of an interval."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from statistics import NormalDist
 from typing import Literal
 
-import numpy as np
+from masrel.intervals.replicates import Drawn, Enumerated
 
-from masrel.agreement.kernel import Floats
+__all__ = ["Ends", "Kind", "Rule", "bca_levels"]
 
-__all__ = ["Kind", "Replicates", "bca_levels"]
-
-Kind = Literal["percentile", "basic", "bca"]
-
-_ROUNDING = 1e-12  # values and probabilities nearer than this are the same
+Kind = Literal["percentile", "basic", "bca", "studentized"]
+"""How the ends of an interval come from resamples."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Replicates:
-    """Values of resamples with their probabilities.
+class Ends:
+    """The ends of an interval.
 
     Attributes
     ----------
-    values : ndarray, shape (n_values,)
-        Ascending, none undefined.
-    weights : ndarray, shape (n_values,)
-        Their probabilities, which sum to 1.
-    upto : ndarray, shape (n_values,)
-        The probability of a value at most as large.
+    low, high : float
+        Where it begins and ends.
+    errors : tuple of float or None
+        Monte Carlo errors of both; None if nothing was drawn.
     """
 
-    values: Floats = field(compare=False, repr=False)
-    weights: Floats = field(compare=False, repr=False)
-    upto: Floats = field(compare=False, repr=False)
+    low: float
+    high: float
+    errors: tuple[float, float] | None
 
-    @classmethod
-    def weighted(cls, values: Floats, weights: Floats) -> "Replicates":
-        """Sort values of known probability and put equal ones together.
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rule:
+    """How the ends come from resamples.
+
+    Attributes
+    ----------
+    kind : {"percentile", "basic", "bca", "studentized"}
+        Which way.
+    level : float
+        Nominal level.
+    value : float
+        The estimate.
+    error : float
+        Its standard error, where it is studentized.
+    skew : float
+        The acceleration of BCa.
+
+    References
+    ----------
+    .. [1] Efron, B., Tibshirani, R. J. (1993). An Introduction to the Bootstrap.
+    .. [2] Davison, A. C., Hinkley, D. V. (1997). Bootstrap Methods and their
+       Application.
+    """
+
+    kind: Kind
+    level: float
+    value: float
+    error: float = math.nan
+    skew: float = 0.0
+
+    def ends(self, source: Enumerated | Drawn) -> Ends | None:
+        """Return the ends.
 
         Parameters
         ----------
-        values, weights : ndarray, shape (n_resamples,)
-            Values, none undefined, and weights of any sum.
+        source : Enumerated or Drawn
+            Values of resamples; how many standard errors each is off for "studentized".
 
         Returns
         -------
-        Replicates
-            Distinct values.
+        Ends or None
+            None if BCa has no bias to go by: all resamples lie on one side.
         """
-        order = np.argsort(values)
-        values, weights = values[order], weights[order] / weights.sum()
-        if values.size:
-            apart = np.diff(values) > _ROUNDING * np.maximum(1.0, np.abs(values[1:]))
-            first = np.flatnonzero(np.concatenate([[True], apart]))
-            values, weights = values[first], np.add.reduceat(weights, first)
-        return cls(values=values, weights=weights, upto=np.cumsum(weights))
+        tail = 0.5 * (1.0 - self.level)
+        levels, pulls = (tail, 1.0 - tail), (0.0, 0.0)
+        if self.kind == "bca":
+            share = source.share_below(self.value)
+            if not 0.0 < share < 1.0:
+                return None
+            levels = bca_levels(self.level, share, self.skew)
+            pulls = self._pulls(share)
+        first, last = (source.quantile(at) for at in levels)
+        errors = None
+        if isinstance(source, Drawn):
+            low, high = (
+                source.error(at, pull, self.value)
+                for at, pull in zip(levels, pulls, strict=True)
+            )
+            errors = (low, high)
+        return self._turned(first, last, errors)
 
-    @classmethod
-    def drawn(cls, values: Floats) -> "Replicates":
-        """Sort values that were drawn.
+    def _pulls(self, share: float) -> tuple[float, float]:
+        # how fast the levels move with the share below the estimate
+        step = 1e-4 * min(share, 1.0 - share)
+        above = bca_levels(self.level, share + step, self.skew)
+        below = bca_levels(self.level, share - step, self.skew)
+        low, high = ((a - b) / (2 * step) for a, b in zip(above, below, strict=True))
+        return low, high
 
-        Parameters
-        ----------
-        values : ndarray, shape (n_resamples,)
-            Values, none undefined.
-
-        Returns
-        -------
-        Replicates
-            As many values, each of the same probability.
-        """
-        n = values.size
-        return cls(
-            values=np.sort(values),
-            weights=np.broadcast_to(1.0 / max(n, 1), (n,)),
-            upto=np.arange(1, n + 1) / max(n, 1),
+    def _turned(
+        self, first: float, last: float, errors: tuple[float, float] | None
+    ) -> Ends:
+        if self.kind in ("percentile", "bca"):  # (13.3) and (14.9) of [1]
+            return Ends(low=first, high=last, errors=errors)
+        back = None if errors is None else errors[::-1]
+        if self.kind == "basic":  # (5.6) of [2]
+            return Ends(
+                low=2 * self.value - last, high=2 * self.value - first, errors=back
+            )
+        return Ends(  # (12.22) of [1]
+            low=self.value - self.error * last,
+            high=self.value - self.error * first,
+            errors=None
+            if back is None
+            else (self.error * back[0], self.error * back[1]),
         )
-
-    @property
-    def has_spread(self) -> bool:
-        """Whether there are two different values."""
-        return bool(self.values.size) and bool(self.values[0] < self.values[-1])
-
-    def quantile(self, position: float) -> float:
-        """Return the least value whose probability adds up to a position.
-
-        Where it adds up to just that, any value up to the next would do: it is the
-        middle of the two, so that the mirror image has the mirrored quantiles. This is
-        definition 2 of Hyndman and Fan (1996), https://doi.org/10.2307/2684934.
-
-        Parameters
-        ----------
-        position : float
-            A probability.
-
-        Returns
-        -------
-        float
-            The quantile.
-        """
-        last = self.values.size - 1
-        at = min(int(np.searchsorted(self.upto, position - _ROUNDING)), last)
-        value = float(self.values[at])
-        if at < last and abs(self.upto[at] - position) <= _ROUNDING:
-            return 0.5 * (value + float(self.values[at + 1]))
-        return value
-
-    def share_below(self, value: float) -> float:
-        """Return the probability of less than a value, and half that of the value.
-
-        Parameters
-        ----------
-        value : float
-            Any value.
-
-        Returns
-        -------
-        float
-            The probability; values are the same if only rounding sets them apart.
-        """
-        near = _ROUNDING * max(1.0, abs(value))
-        ends = np.searchsorted(self.values, [value - near, value + near])
-        below, upto = (float(self.upto[at - 1]) if at else 0.0 for at in ends)
-        return 0.5 * (below + upto)
 
 
 def bca_levels(level: float, share: float, skew: float) -> tuple[float, float]:
@@ -146,6 +139,11 @@ def bca_levels(level: float, share: float, skew: float) -> tuple[float, float]:
     ----------
     .. [1] Efron, B., Tibshirani, R. J. (1993). An Introduction to the Bootstrap,
        ch. 14.
+
+    Examples
+    --------
+    >>> [round(at, 6) for at in bca_levels(0.95, 0.5, 0.0)]
+    [0.025, 0.975]
     """
     normal = NormalDist()
     bias = normal.inv_cdf(share)  # z0, (14.14) of [1]

@@ -1,21 +1,24 @@
 """What resamples are drawn from: items, clusters of items, or raters."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from masrel.agreement.kernel import Floats
+from masrel.errors import ParameterError
 from masrel.intervals.case import Case
+from masrel.intervals.lattice import Integers, Lattice, lattice_of
 
-__all__ = ["Pool", "acceleration", "item_pool", "rater_pool"]
+__all__ = ["Pool", "cluster_pool", "item_pool", "rater_pool"]
 
-_BLOCK = 4_000_000  # numbers held at once while values are computed
+_FEW = 2_000  # rows that are sorted column by column
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Pool:
     """Distinct members, of which as many are drawn as there are.
 
@@ -31,27 +34,34 @@ class Pool:
         Sums (..., n_features) to the coefficient (...), ``nan`` where undefined.
     """
 
-    times: NDArray[np.int64] = field(compare=False, repr=False)
+    times: Integers = field(compare=False, repr=False)
     rows: Floats | None = field(compare=False, repr=False)
     sums: Callable[[Floats], Floats]
     values: Callable[[Floats], Floats]
 
-    @property
+    @cached_property
     def n(self) -> int:
         """How many are drawn."""
         return int(self.times.sum())
 
-    @property
+    @cached_property
+    def lattice(self) -> Lattice | None:
+        """The rows as points of a lattice; None where they are none."""
+        if self.rows is None:
+            return None
+        return lattice_of(self.rows, self.shares, self.n)
+
+    @cached_property
     def shares(self) -> Floats:
         """Probability of each at a draw, (n_members,)."""
         return np.asarray(self.times / self.n)
 
-    def of_counts(self, counts: NDArray[np.integer[Any]]) -> Floats:
-        """Return the coefficient of resamples, a block of them at a time.
+    def of_counts(self, counts: Floats) -> Floats:
+        """Return the coefficient of resamples.
 
         Parameters
         ----------
-        counts : ndarray of int, shape (n_resamples, n_members)
+        counts : ndarray, shape (n_resamples, n_members)
             How often each member is drawn.
 
         Returns
@@ -59,19 +69,13 @@ class Pool:
         ndarray, shape (n_resamples,)
             Values, ``nan`` where undefined.
         """
-        found = np.empty(len(counts))
-        width = max(counts.shape[1], 1 if self.rows is None else self.rows.shape[1])
-        step = max(1, _BLOCK // width)
-        for start in range(0, len(counts), step):
-            block = counts[start : start + step].astype(np.float64)
-            found[start : start + step] = self.values(self.sums(block))
-        return found
+        return self.values(self.sums(counts))
 
     def without(self) -> Floats:
         """Return the coefficient with one of each member left out, (n_members,)."""
         if self.rows is not None:
             return self.values(self.times @ self.rows - self.rows)
-        return self.values(self.sums(self.times - np.eye(self.times.size)))
+        return self.of_counts(self.times - np.eye(self.times.size))
 
 
 def item_pool(case: Case) -> Pool:
@@ -87,11 +91,50 @@ def item_pool(case: Case) -> Pool:
     Pool
         Distinct rows of features.
     """
-    rows, kind = np.unique(case.rows, axis=0, return_inverse=True)
-    times = np.bincount(kind.ravel(), weights=case.times).astype(np.int64)
-    return Pool(
-        times=times, rows=rows, sums=lambda taken: taken @ rows, values=case.values
-    )
+    return _pool(case, case.rows, case.times)
+
+
+def cluster_pool(case: Case, clusters: Sequence[object] | NDArray[Any]) -> Pool:
+    """Return clusters of items, those with equal sums of features together.
+
+    Parameters
+    ----------
+    case : Case
+        A question.
+    clusters : sequence, shape (n_items,)
+        To which cluster each row of the ratings belongs.
+
+    Returns
+    -------
+    Pool
+        Distinct sums of the features of a cluster's items.
+
+    Raises
+    ------
+    ParameterError
+        If there is not one label for each row of the ratings.
+    """
+    labels = list(clusters)
+    n_items = case.coded.codes.shape[0]
+    if len(labels) != n_items:
+        raise ParameterError(
+            f"clusters: needs one label for each of {n_items} items, got {len(labels)}"
+        )
+    rated = np.any(case.coded.codes >= 0, axis=1).tolist()
+    try:
+        number: dict[object, int] = {}
+        of = [
+            number.setdefault(label, len(number))
+            for label, is_rated in zip(labels, rated, strict=True)
+            if is_rated
+        ]
+    except TypeError as error:
+        raise ParameterError(f"clusters: needs plain labels, {error}") from error
+    if any(label is None or label != label for label in number):
+        raise ParameterError("clusters: every item needs a label, got a missing one")
+    sums = np.zeros((len(number), case.rows.shape[1]))
+    np.add.at(sums, of, case.features)
+    return _pool(case, sums, np.ones(len(number), dtype=np.int64))
 
 
 def rater_pool(case: Case) -> Pool:
@@ -106,39 +149,48 @@ def rater_pool(case: Case) -> Pool:
     -------
     Pool
         Every rater once: two who always agree are still two.
+
+    Raises
+    ------
+    ParameterError
+        If raters of the coefficient cannot be resampled.
     """
-    if case.kernel.rater_sums is None:
-        raise TypeError(f"{case.entry.name} has no sums over raters")
-    n_raters = case.patterns.codes.shape[1]
+    fewest, most = case.entry.n_raters
+    if case.kernel.rater_sums is None or most == fewest:
+        raise ParameterError(
+            f"target: raters of {case.entry.title} cannot be resampled without "
+            "pairing a rater with a copy of itself"
+        )
     return Pool(
-        times=np.ones(n_raters, dtype=np.int64),
+        times=np.ones(case.patterns.codes.shape[1], dtype=np.int64),
         rows=None,
         sums=case.kernel.rater_sums(case.patterns, case.times, case.v),
         values=case.values,
     )
 
 
-def acceleration(pool: Pool) -> float:
-    """Return how the spread of an estimate changes with its size.
+def _pool(case: Case, rows: Floats, times: Integers) -> Pool:
+    rows, kind = _distinct(rows)
+    return Pool(
+        times=np.bincount(kind, weights=times).astype(np.int64),
+        rows=rows,
+        sums=lambda taken: taken @ rows,
+        values=case.values,
+    )
 
-    Parameters
-    ----------
-    pool : Pool
-        What is resampled.
 
-    Returns
-    -------
-    float
-        A sixth of the skewness of the values with one member left out, equation
-        (14.15) of Efron and Tibshirani (1993); those undefined are passed over.
-    """
-    left = pool.without()
-    known = ~np.isnan(left)
-    left, times = left[known], pool.times[known]
-    if left.size == 0:
-        return 0.0
-    deviation = times @ left / times.sum() - left
-    spread = float(times @ deviation**2)
-    if spread <= 0.0:
-        return 0.0
-    return float(times @ deviation**3 / (6.0 * spread**1.5))
+def _distinct(rows: Floats) -> tuple[Floats, Integers]:
+    # distinct rows, and which of them each row is
+    if len(rows) <= _FEW:
+        found, kind = np.unique(rows, axis=0, return_inverse=True)
+        return found, kind.ravel()
+    # Equal rows have equal polynomials at any place; should different rows too, all
+    # are compared column by column.
+    key = np.zeros(len(rows))
+    for column in rows.T:
+        key = key * 0.7390851332151607 + column
+    _, first, kind = np.unique(key, return_index=True, return_inverse=True)
+    found = rows[first]
+    if not np.array_equal(found[kind.ravel()], rows):
+        found, kind = np.unique(rows, axis=0, return_inverse=True)
+    return found, kind.ravel()

@@ -1,0 +1,239 @@
+"""Resamples that are drawn: in counts, or as packed sums of a few items at once."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from masrel.agreement.kernel import Floats
+from masrel.errors import ConvergenceError
+from masrel.intervals.control import Control, control_of, whole_scores
+from masrel.intervals.endpoints import Rule
+from masrel.intervals.lattice import Integers, Lattice
+from masrel.intervals.pool import Pool
+from masrel.intervals.replicates import Drawn
+from masrel.intervals.resamples import Resamples
+from masrel.intervals.slopes import influence
+
+__all__ = ["Sampler", "draw_resamples", "sampler_of"]
+
+_CHUNK = 500_000  # numbers held at once while resampling
+_LEAST = 30  # draws from which on a control is worth its time
+_TABLE = 1 << 16  # sums of a few items that are looked up at once
+_MOST_BITS = 62
+_BINOMIAL = 20  # lookups that take as long as one binomial number
+
+Batch = tuple[Floats, Integers | None]
+"""Values of resamples, ``nan`` where undefined, and their scores on the control."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sampler:
+    """How resamples of one pool are drawn.
+
+    Attributes
+    ----------
+    draw : callable
+        A number of resamples and a generator to a batch. What is drawn does not depend
+        on how it is cut into batches.
+    control : Control or None
+        The distribution of the scores; None where there are none.
+    width : int
+        Numbers a resample takes while it is drawn.
+    """
+
+    draw: Callable[[int, np.random.Generator], Batch]
+    control: Control | None = field(default=None, repr=False)
+    width: int
+
+    def batches(self, n_resamples: int, generator: np.random.Generator) -> Batch:
+        """Draw resamples, a few at a time."""
+        step = max(1, _CHUNK // self.width)
+        parts = [
+            self.draw(min(step, n_resamples - start), generator)
+            for start in range(0, n_resamples, step)
+        ]
+        values = np.concatenate([values for values, _ in parts])
+        scores = [scores for _, scores in parts if scores is not None]
+        return values, np.concatenate(scores) if scores else None
+
+
+def draw_resamples(
+    sampler: Sampler,
+    rule: Rule,
+    generator: np.random.Generator,
+    *,
+    n_resamples: int,
+    tolerance: float | None,
+    most_resamples: int,
+) -> Resamples:
+    """Draw resamples, more of them while an end is less certain than asked for.
+
+    Parameters
+    ----------
+    sampler : Sampler
+        How they are drawn.
+    rule : Rule
+        What is asked of them.
+    generator : Generator
+        Where randomness comes from.
+    n_resamples : int
+        How many at least.
+    tolerance : float or None
+        The largest Monte Carlo error of an end; None for any.
+    most_resamples : int
+        How many at most.
+
+    Returns
+    -------
+    Resamples
+        As many values, less the undefined ones.
+
+    Raises
+    ------
+    ConvergenceError
+        If the tolerance takes more; the message says how many.
+    """
+    values, scores = sampler.batches(n_resamples, generator)
+    while True:
+        found = _resamples(sampler, values, scores)
+        if tolerance is None or not found.has_spread:
+            return found
+        ends = rule.ends(found.source)
+        error = max(ends.errors) if ends is not None and ends.errors else 0.0
+        if error <= tolerance:
+            return found
+        wanted = values.size * (error / tolerance) ** 2
+        if wanted > most_resamples:
+            raise ConvergenceError(
+                f"tolerance: with {values.size} resamples an end has an error of "
+                f"{error:.2g}; {tolerance:g} takes about {wanted - values.size:.2g} "
+                f"more, and most_resamples is {most_resamples}"
+            )
+        size = min(math.ceil(1.05 * wanted), most_resamples) - values.size
+        if size <= 0:
+            raise ConvergenceError(
+                f"tolerance: with all {most_resamples} resamples an end has an error "
+                f"of {error:.2g}; {tolerance:g} takes a few more"
+            )
+        more, more_scores = sampler.batches(size, generator)
+        values = np.concatenate([values, more])
+        if scores is not None and more_scores is not None:
+            scores = np.concatenate([scores, more_scores])
+
+
+def _resamples(sampler: Sampler, drawn: Floats, scores: Integers | None) -> Resamples:
+    known = ~np.isnan(drawn)
+    values, control = drawn[known], sampler.control
+    if values.size < drawn.size:
+        control = scores = None  # its distribution is that of all resamples
+    return Resamples(
+        source=Drawn(
+            values=values, ordered=np.sort(values), control=control, scores=scores
+        ),
+        n_resamples=drawn.size,
+        n_undefined=drawn.size - values.size,
+        words=f"bootstrap distribution, {values.size} resamples",
+    )
+
+
+def sampler_of(pool: Pool, statistic: Callable[[Floats], Floats] | None) -> Sampler:
+    """Choose how resamples of a pool are drawn.
+
+    Parameters
+    ----------
+    pool : Pool
+        What is resampled.
+    statistic : callable or None
+        As of `enumerate_resamples`.
+
+    Returns
+    -------
+    Sampler
+        The faster of two, which draw different resamples from the same distribution.
+    """
+    slopes = _slopes(pool)
+    n, n_members = pool.n, pool.times.size
+    at_once = max(1, int(math.log(_TABLE, max(n, 2)) + 1e-9))
+    if pool.rows is not None and statistic is None:
+        if n / at_once < _BINOMIAL * n_members:
+            lattice = pool.lattice
+            if lattice is not None and _bits(lattice, n).sum() <= _MOST_BITS:
+                return _packed(pool, lattice, slopes, at_once)
+    return _counted(pool, statistic or pool.of_counts, slopes)
+
+
+def _slopes(pool: Pool) -> tuple[Floats, float] | None:
+    # influence of each member on the estimate, and its standard deviation over a draw
+    if pool.n < _LEAST:
+        return None
+    (slopes,) = influence(pool, pool.times[None].astype(np.float64))
+    slopes = slopes - pool.shares @ slopes
+    spread = math.sqrt(float(pool.shares @ slopes**2))
+    if not math.isfinite(spread) or spread <= 1e-12 * float(np.abs(slopes).max()):
+        return None
+    return slopes, spread
+
+
+def _counted(
+    pool: Pool,
+    statistic: Callable[[Floats], Floats],
+    slopes: tuple[Floats, float] | None,
+) -> Sampler:
+    n, shares = pool.n, pool.shares
+    scores = control = None
+    if slopes is not None:
+        scores = whole_scores(*slopes, n)
+        control = control_of(scores, shares, n)
+
+    def draw(size: int, generator: np.random.Generator) -> Batch:
+        counts = generator.multinomial(n, shares, size=size)
+        values = statistic(counts.astype(np.float64))
+        return values, None if scores is None else counts @ scores
+
+    features = 0 if pool.rows is None else pool.rows.shape[1]
+    return Sampler(draw=draw, control=control, width=3 * shares.size + 4 * features)
+
+
+def _bits(lattice: Lattice, n: int) -> Integers:
+    # (n_dimensions,): bits that hold each coordinate of a sum
+    most = (n * lattice.steps.max(axis=0)).tolist()
+    return np.array([number.bit_length() for number in most], dtype=np.int64)
+
+
+def _packed(
+    pool: Pool,
+    lattice: Lattice,
+    slopes: tuple[Floats, float] | None,
+    at_once: int,
+) -> Sampler:
+    # The steps of an item are bit fields of one integer, and so are those of a sum.
+    # A table of the sums of any `at_once` items makes so many draws one lookup.
+    n = pool.n
+    bits = _bits(lattice, n)
+    places, masks = np.cumsum(bits) - bits, (1 << bits) - 1
+    keys = np.repeat((lattice.steps << places).sum(axis=1), pool.times)
+    table, last = np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64)
+    rest = n % at_once or at_once
+    for digit in range(at_once):
+        table = (keys[:, None] + table).ravel()
+        last = np.repeat(last, n) if digit >= rest else (keys[:, None] + last).ravel()
+    n_lookups = -(-n // at_once)
+    scores = control = None
+    if slopes is not None:
+        slope, *_ = np.linalg.lstsq(
+            np.column_stack([lattice.steps, np.ones(len(lattice.steps))]), slopes[0]
+        )
+        scores = whole_scores(slope[:-1].astype(np.float64), slopes[1], n)
+        control = control_of(lattice.steps @ scores, pool.shares, n)
+
+    def draw(size: int, generator: np.random.Generator) -> Batch:
+        at = generator.integers(0, table.size, size=(size, n_lookups))
+        packed = table[at[:, :-1]].sum(axis=1) + last[at[:, -1]]
+        steps = packed[:, None] >> places & masks
+        values = pool.values(lattice.sums(steps, n))
+        return values, None if scores is None else steps @ scores
+
+    width = 3 * n_lookups + 4 * lattice.origin.size
+    return Sampler(draw=draw, control=control, width=width)

@@ -1,0 +1,161 @@
+"""Rows of features as points of a lattice, so that equal sums are equal integers."""
+
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from masrel.agreement.kernel import Floats
+
+__all__ = ["Integers", "Lattice", "lattice_of"]
+
+Integers = NDArray[np.int64]
+
+_LARGEST = 10**5  # denominators above this are taken for irrational numbers
+_MOST = 2.0**52  # integers that a float still holds
+_DIMENSIONS = 12  # a lattice of more helps nobody
+_TURNS = 50
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lattice:
+    """Rows as integer steps: a sum of n rows is n · origin + steps @ basis, exactly.
+
+    Attributes
+    ----------
+    steps : ndarray of int64, shape (n_rows, n_dimensions)
+        Where each row is; the least of every coordinate is 0.
+    origin : ndarray of int64, shape (n_features,)
+        Numerators of the features at 0.
+    basis : ndarray of int64, shape (n_dimensions, n_features)
+        What a step adds to the numerators.
+    denominators : ndarray, shape (n_features,)
+        What the numerators are divided by.
+    """
+
+    steps: Integers = field(compare=False, repr=False)
+    origin: Integers = field(compare=False, repr=False)
+    basis: Integers = field(compare=False, repr=False)
+    denominators: Floats = field(compare=False, repr=False)
+
+    def sums(self, steps: Integers | Floats, n: int) -> Floats:
+        """Return sums of features.
+
+        Parameters
+        ----------
+        steps : ndarray of integers, shape (..., n_dimensions)
+            Sums of steps.
+        n : int
+            Over how many rows.
+
+        Returns
+        -------
+        ndarray, shape (..., n_features)
+            The sums, each rounded once.
+        """
+        whole = steps.astype(np.float64) @ self.basis.astype(np.float64)
+        return np.asarray((whole + n * self.origin) / self.denominators)
+
+
+def lattice_of(rows: Floats, shares: Floats, n: int) -> Lattice | None:
+    """Find the lattice of distinct rows, with short steps.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (n_rows, n_features)
+        Rows of rational numbers.
+    shares : ndarray, shape (n_rows,)
+        How often each occurs, in parts of 1.
+    n : int
+        How many rows are added at most.
+
+    Returns
+    -------
+    Lattice or None
+        None if some features are not rational, their numerators are too large, or
+        the rows span too many dimensions.
+    """
+    denominators = _denominators(rows)
+    if denominators is None:
+        return None
+    numerators = np.rint(rows * denominators)
+    if np.abs(numerators).max() * max(n, 1) > _MOST:
+        return None
+    whole = numerators.astype(np.int64)
+    basis = _echelon(whole - whole[0])
+    if basis is None:
+        return None
+    steps = _shorten(_coordinates(whole - whole[0], basis), basis, shares)
+    if np.abs(steps).max(initial=0) * max(n, 1) > _MOST:
+        return None
+    least = steps.min(axis=0)
+    return Lattice(
+        steps=steps - least,
+        origin=whole[0] + least @ basis,
+        basis=basis,
+        denominators=denominators,
+    )
+
+
+def _denominators(rows: Floats) -> Floats | None:
+    # (n_features,): the least common denominator of each column
+    common = [1] * rows.shape[1]
+    while True:
+        scaled = rows * common
+        off = np.abs(scaled - np.rint(scaled)) > 1e-9 * np.maximum(1.0, np.abs(scaled))
+        if not off.any():
+            return np.array(common, dtype=np.float64)
+        for column in np.flatnonzero(off.any(axis=0)).tolist():
+            first = float(scaled[np.argmax(off[:, column]), column])
+            part = Fraction(first).limit_denominator(_LARGEST).denominator
+            common[column] *= part
+            if part == 1 or common[column] > _LARGEST**2:
+                return None
+
+
+def _echelon(rows: Integers) -> Integers | None:
+    # (n_rows, n_features) -> a basis of all integer sums of rows, in echelon form, by
+    # Euclid's algorithm, column by column
+    left, top = rows.copy(), 0
+    for column in range(rows.shape[1]):
+        while (at := np.flatnonzero(left[top:, column]) + top).size:
+            if top == _DIMENSIONS or np.abs(left).max() > _MOST:
+                return None
+            least = at[np.argmin(np.abs(left[at, column]))]
+            left[[top, least]] = left[[least, top]]
+            if at.size == 1:
+                top += 1
+                break
+            times = left[top + 1 :, column] // left[top, column]
+            left[top + 1 :] -= times[:, None] * left[top]
+    return left[:top]
+
+
+def _coordinates(rows: Integers, basis: Integers) -> Integers:
+    # (n_rows, n_features) -> (n_rows, n_dimensions)
+    rest = rows.copy()
+    steps = np.zeros((len(rows), len(basis)), dtype=np.int64)
+    for of, direction in enumerate(basis):
+        first = np.flatnonzero(direction)[0]
+        steps[:, of] = rest[:, first] // direction[first]
+        rest -= steps[:, of, None] * direction
+    return steps
+
+
+def _shorten(steps: Integers, basis: Integers, shares: Floats) -> Integers:
+    # Lagrange's reduction, pair by pair: a coordinate less a multiple of another while
+    # that makes its variance smaller; the basis changes in place.
+    for _ in range(_TURNS):
+        centred = steps - shares @ steps
+        covariance = (centred * shares[:, None]).T @ centred
+        variance = np.diag(covariance)
+        times = np.rint(covariance / variance) - np.eye(len(variance))
+        gain = times * (2.0 * covariance - times * variance)
+        if not times.any():
+            break
+        of, by = np.unravel_index(np.argmax(gain), gain.shape)
+        turns = int(times[of, by])
+        steps[:, of] -= turns * steps[:, by]
+        basis[by] += turns * basis[of]
+    return steps

@@ -1,0 +1,266 @@
+"""Exact bootstrap intervals against all n^n resamples in fractions."""
+
+import itertools
+import math
+import subprocess
+import sys
+from collections import Counter
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from masrel.errors import ParameterError
+from masrel.intervals import bootstrap
+from tests.intervals import textbook
+from tests.intervals.data import TABLE_V, dirichlet_multinomial
+
+pytestmark = pytest.mark.filterwarnings("ignore::masrel.errors.SmallSampleWarning")
+
+FIVE = [[0, 0, 1], [1, 1, 1], [2, 1, 2], [0, 0, 0], [2, 2, 0]]
+SIX = [*FIVE, [0, 1, 0]]
+GAPS = [[0, 0, 1], [1, None, 1], [2, 1, 2], [0, 0, 0], [None, None, 2]]
+FORMULAS = {
+    "percent_agreement": textbook.percent,
+    "fleiss_kappa": textbook.fleiss,
+    "gwet_ac": textbook.gwet,
+    "krippendorff_alpha": textbook.krippendorff,
+    "cohen_kappa": textbook.cohen,
+}
+
+
+def exact(coefficient: str, table: object, **options: object) -> object:
+    options = {"target": "items", "categories": range(3), "exact": True, **options}
+    return bootstrap(coefficient, table, **options)  # type: ignore[arg-type]
+
+
+def columns(coefficient: str, table: textbook.Table) -> textbook.Table:
+    if coefficient != "cohen_kappa":
+        return table
+    # two raters; an item that neither rated is none
+    return [row[:2] for row in table if row[:2] != [None, None]]
+
+
+@pytest.mark.parametrize("coefficient", FORMULAS)
+@pytest.mark.parametrize("table", [FIVE, GAPS], ids=["complete", "gaps"])
+def test_the_law_is_that_of_all_resamples(
+    coefficient: str, table: textbook.Table
+) -> None:
+    ratings = columns(coefficient, table)
+    law = textbook.law_of_items(ratings, FORMULAS[coefficient])
+    found = exact(coefficient, ratings)
+    assert found.distribution is not None
+    assert found.distribution.values.size == len(law.values)
+    np.testing.assert_allclose(
+        found.distribution.values, [float(value) for value in law.values], atol=1e-13
+    )
+    np.testing.assert_allclose(
+        found.distribution.weights, [float(w) for w in law.weights], rtol=1e-12
+    )
+    assert found.low == pytest.approx(float(law.quantile(0.025)), abs=1e-13)
+    assert found.high == pytest.approx(float(law.quantile(0.975)), abs=1e-13)
+    assert (found.n_undefined > 0) == (law.undefined > 0)
+    if law.undefined:
+        (note,) = [note for note in found.notes if "undefined" in note]
+        assert f"probability {float(law.undefined):.2g}" in note
+
+
+def test_six_items_of_46_656_resamples() -> None:
+    law = textbook.law_of_items(SIX, textbook.fleiss)
+    for level in (0.5, 0.9, 0.95):
+        found = exact("fleiss_kappa", SIX, level=level)
+        tail = (1 - level) / 2
+        assert found.low == pytest.approx(float(law.quantile(tail)), abs=1e-13)
+        assert found.high == pytest.approx(float(law.quantile(1 - tail)), abs=1e-13)
+    mirror = exact("fleiss_kappa", SIX, kind="basic", level=0.9)
+    value = textbook.fleiss(SIX)
+    assert value is not None
+    for end, tail in ((mirror.low, 0.95), (mirror.high, 0.05)):
+        assert end == pytest.approx(float(2 * value - law.quantile(tail)), abs=1e-13)
+
+
+def test_a_position_that_is_met_exactly_gives_the_middle() -> None:
+    # Two items, agreeing and not: 0, 1/2, 1 with probability 1/4, 1/2, 1/4.
+    table = [[0, 0], [0, 1]]
+    found = exact("percent_agreement", table, level=0.5)
+    assert (found.low, found.high) == (0.25, 0.75)
+    just_inside = exact("percent_agreement", table, level=0.49)
+    assert (just_inside.low, just_inside.high) == (0.5, 0.5)
+    beyond = exact("percent_agreement", table, level=0.51)
+    assert (beyond.low, beyond.high) == (0.0, 1.0)
+
+
+@pytest.mark.parametrize("coefficient", ["fleiss_kappa", "gwet_ac"])
+def test_bca_counts_half_of_the_ties(coefficient: str) -> None:
+    formula = FORMULAS[coefficient]
+    law = textbook.law_of_items(FIVE, formula)
+    value = formula(FIVE)
+    left_out = [formula(FIVE[:i] + FIVE[i + 1 :]) for i in range(5)]
+    assert value is not None
+    assert law.below(value) != law.below(value - Fraction(1, 10**9))  # there are ties
+    for level in (0.8, 0.95):
+        found = exact(coefficient, FIVE, kind="bca", level=level)
+        low, high = textbook.bca_positions(level, law.below(value), left_out)  # type: ignore[arg-type]
+        assert found.low == pytest.approx(float(law.quantile(low)), abs=1e-13)
+        assert found.high == pytest.approx(float(law.quantile(high)), abs=1e-13)
+
+
+def test_studentized_has_the_error_of_every_resample() -> None:
+    table = [[0, 0, 1], [1, 1, 1], [2, 1, 2], [0, 1, 2], [2, 2, 0]]
+    value = textbook.fleiss(table)
+    assert value is not None
+    found: Counter[float] = Counter()
+    for drawn in itertools.product(range(5), repeat=5):
+        resample = [table[i] for i in drawn]
+        kappa = textbook.fleiss(resample)
+        if kappa is None:
+            continue
+        error = textbook.fleiss_error(resample)
+        off = float(kappa - value)
+        found[round(off / error if error else math.copysign(math.inf, off), 9)] += 1
+    values = sorted(found)
+    upto = np.cumsum([found[v] for v in values]) / sum(found.values())
+    own = textbook.fleiss_error(table)
+    for level in (0.6, 0.9):
+        tail = (1 - level) / 2
+        low, high = (
+            float(value) - own * values[int(np.searchsorted(upto, at))]
+            for at in (1 - tail, tail)
+        )
+        ours = exact("fleiss_kappa", table, kind="studentized", level=level)
+        assert ours.low == pytest.approx(max(low, -1.0), abs=1e-7)
+        assert ours.high == pytest.approx(min(high, 1.0), abs=1e-7)
+
+
+def test_raters_in_all_their_resamples() -> None:
+    table = [[0, 0, 1, 0], [1, 1, 2, 1], [2, 2, 2, 0], [0, 0, 0, 0]]
+    counted: Counter[Fraction | None] = Counter()
+    for taken in itertools.product(range(4), repeat=4):
+        pairs = [
+            (a, b)
+            for a, b in itertools.permutations(range(4), 2)
+            if taken[a] != taken[b]
+        ]
+        if not pairs:
+            counted[None] += 1
+            continue
+        observed = Fraction(
+            sum(row[taken[a]] == row[taken[b]] for row in table for a, b in pairs),
+            len(pairs) * len(table),
+        )
+        drawn = [[row[rater] for rater in taken] for row in table]
+        chance = sum(p * p for p in textbook.category_shares(drawn, 3))
+        counted[(observed - chance) / (1 - chance)] += 1
+    law = textbook.Law(counted)
+    found = exact("fleiss_kappa", table, target="raters")
+    assert found.unit == "raters"
+    assert found.distribution is not None
+    np.testing.assert_allclose(
+        found.distribution.values, [float(value) for value in law.values], atol=1e-13
+    )
+    np.testing.assert_allclose(
+        found.distribution.weights, [float(w) for w in law.weights], rtol=1e-12
+    )
+    assert found.n_undefined == 4  # one rater four times
+    assert found.low == pytest.approx(float(law.quantile(0.025)), abs=1e-13)
+
+
+def test_clusters_are_drawn_whole() -> None:
+    groups = [FIVE[:2], FIVE[2:3], [*FIVE[3:], [0, 1, 0]], [[2, 2, 1], [1, 1, 1]]]
+    law = textbook.law_of_clusters(groups, textbook.fleiss)
+    rows = [row for group in groups for row in group]
+    labels = [name for name, group in zip("abcd", groups, strict=True) for _ in group]
+    mixed = [5, 0, 7, 2, 4, 6, 1, 3]
+    found = exact(
+        "fleiss_kappa", [rows[i] for i in mixed], clusters=[labels[i] for i in mixed]
+    )
+    assert found.method == "percentile bootstrap of 4 clusters, exact"
+    assert found.low == pytest.approx(float(law.quantile(0.025)), abs=1e-13)
+    assert found.high == pytest.approx(float(law.quantile(0.975)), abs=1e-13)
+    each = exact("fleiss_kappa", SIX, clusters=range(6))
+    alone = exact("fleiss_kappa", SIX)
+    assert (each.low, each.high) == (alone.low, alone.high)
+
+
+def test_an_item_without_ratings_is_in_no_cluster() -> None:
+    rows = [[0, 0, 1], [None] * 3, [1, 1, 1], [2, 0, 2], [None] * 3]
+    found = exact("fleiss_kappa", rows, clusters=["a", "a", "a", "b", "c"])
+    assert found.method == "percentile bootstrap of 2 clusters, exact"
+
+
+@pytest.mark.parametrize(
+    ("clusters", "said"),
+    [
+        ("abc", "one label for each of 5 items, got 3"),
+        ([1, 2, 3, 4, None], "got a missing one"),
+        ([1, 2, 3, 4, math.nan], "got a missing one"),
+        ([[1], [2], [3], [4], [5]], "plain labels"),
+    ],
+)
+def test_wrong_clusters_are_named(clusters: object, said: str) -> None:
+    with pytest.raises(ParameterError, match=said):
+        exact("fleiss_kappa", FIVE, clusters=clusters)
+
+
+def test_clusters_are_of_items() -> None:
+    with pytest.raises(ParameterError, match='need target="items"'):
+        exact("fleiss_kappa", FIVE, target="raters", clusters=range(5))
+
+
+def test_an_exact_interval_draws_nothing_and_loads_neither_scipy_nor_matplotlib() -> (
+    None
+):
+    code = f"""
+import sys
+import numpy as np
+def forbidden(*_, **__):
+    raise AssertionError("a random number")
+np.random.default_rng = np.random.SeedSequence = forbidden
+from masrel.intervals import bootstrap
+import warnings
+warnings.simplefilter("ignore")
+for kind in ("percentile", "basic", "bca", "studentized"):
+    for target in ("items", "raters"):
+        found = bootstrap("fleiss_kappa", {TABLE_V!r}, target=target, kind=kind)
+        assert found.low < found.high and found.seed is None
+        assert found.n_resamples is None and found.monte_carlo_error is None
+print(sorted({{"scipy", "matplotlib", "pandas", "emcee"}} & set(sys.modules)))
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "[]"
+
+
+def test_the_generator_stays_where_it_was() -> None:
+    generator = np.random.default_rng(3)
+    before = generator.bit_generator.state
+    exact("fleiss_kappa", SIX, rng=generator)
+    assert generator.bit_generator.state == before
+    bootstrap("fleiss_kappa", SIX, target="items", exact=False, rng=generator)
+    assert generator.bit_generator.state != before
+
+
+def test_the_words_say_what_it_is() -> None:
+    found = bootstrap("fleiss_kappa", TABLE_V, target="items")
+    assert found.method == "percentile bootstrap, exact"
+    assert found.distribution is not None
+    assert found.distribution.words == "exact bootstrap distribution, 35 resamples"
+    assert not found.distribution.continuous
+    assert found.distribution.weights.sum() == pytest.approx(1.0, abs=1e-14)
+    assert found.n_undefined == 1
+    assert any("1 of 35 distinct resamples, of probability" in n for n in found.notes)
+    with pytest.raises(ValueError, match="read-only"):
+        found.distribution.values[0] = 0.0
+
+
+def test_too_many_resamples_are_drawn_or_refused_with_their_number() -> None:
+    table = dirichlet_multinomial(np.random.default_rng(1), 40, 6, 0.5)
+    drawn = bootstrap("fleiss_kappa", table, target="items", rng=1)
+    assert drawn.n_resamples == 10_000
+    with pytest.raises(ParameterError, match=r"exact: there are \S+ distinct resampl"):
+        exact("fleiss_kappa", table)
+    many = dirichlet_multinomial(np.random.default_rng(1), 5, 12, 0.5)
+    assert math.comb(23, 11) == 1_352_078
+    with pytest.raises(ParameterError, match="there are 1352078 distinct resamples"):
+        exact("fleiss_kappa", many, target="raters")
