@@ -9,6 +9,7 @@ from pathlib import Path
 import msgspec
 
 from masrel.analysis.results import Analysis
+from masrel.estimates import Interval, as_document
 
 __all__ = ["as_analysis_document", "write_analysis"]
 
@@ -79,6 +80,8 @@ def _fields(part: object) -> dict[str, object]:
 
 
 def _plain(value: object) -> object:
+    if isinstance(value, Interval):
+        return as_document(value)
     if dataclasses.is_dataclass(value) or isinstance(value, msgspec.Struct | Mapping):
         return _fields(value)
     if isinstance(value, float):
