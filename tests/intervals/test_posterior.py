@@ -1,19 +1,13 @@
-"""The sampled posterior against quadrature, and a sampler broken on purpose."""
-
-import math
+"""The sampled posterior against the exact one, and a sampler broken on purpose."""
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.special import betaln
 
-from masrel.errors import (
-    ConvergenceError,
-    ParameterError,
-    UndefinedStatisticWarning,
-)
+from masrel.errors import ConvergenceError
 from masrel.estimates import Interval
-from masrel.intervals import posterior
+from masrel.intervals import mcmc, posterior
 from masrel.intervals.dirichlet import DirichletMultinomial
 from tests.intervals.data import SCALE, TABLE_V
 
@@ -28,22 +22,6 @@ TWO = [
 ]
 
 
-def quadrature_ends() -> tuple[float, float]:
-    """Integrate the posterior of `TWO` on a grid: beta-binomial, ρ and π uniform."""
-    n_a = np.array([2, 0, 3, 2, 0])
-    x, w = np.polynomial.legendre.leggauss(400)
-    rho, share = 0.5 * (x + 1.0), 0.5 * (x + 1.0)
-    mass = (1.0 - rho) / rho
-    a, b = mass[:, None] * share, mass[:, None] * (1.0 - share)
-    log = sum(betaln(a + n, b + 3 - n) - betaln(a, b) for n in n_a)
-    density = np.exp(log - log.max()) @ w * w
-    cumulative = np.cumsum(density) / density.sum()
-    low, high = np.interp(
-        [0.025, 0.975], cumulative - 0.5 * density / density.sum(), rho
-    )
-    return float(low), float(high)
-
-
 def misses(found: Interval, ends: tuple[float, float]) -> list[float]:
     """How many Monte Carlo errors each endpoint is off."""
     assert found.monte_carlo_error is not None
@@ -51,44 +29,75 @@ def misses(found: Interval, ends: tuple[float, float]) -> list[float]:
     return [abs(end - exact) / error for end, exact, error in off]
 
 
-def test_two_categories_agree_with_quadrature() -> None:
-    found = posterior("fleiss_kappa", TWO, target="items", method="emcee", rng=1)
+def sampled(ratings: list[list[str]], **options: object) -> Interval:
+    return posterior(
+        "fleiss_kappa",
+        ratings,
+        target="items",
+        method="emcee",
+        rng=1,
+        **options,  # type: ignore[arg-type]
+    )
+
+
+def exact_ends(ratings: list[list[str]], **options: object) -> tuple[float, float]:
+    found = posterior("fleiss_kappa", ratings, target="items", **options)  # type: ignore[arg-type]
+    return found.low, found.high
+
+
+@pytest.fixture
+def brief(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let a tenth of a second of sampling pass as converged."""
+    monkeypatch.setattr(mcmc, "LEAST_ESS", 500.0)
+    monkeypatch.setattr(mcmc, "LARGEST_R_HAT", 1.5)
+
+
+def test_two_categories_agree_with_the_exact_posterior() -> None:
+    found = sampled(TWO)
     # 4.5 errors at either end: once in 70 000 runs of other seeds
-    assert max(misses(found, quadrature_ends())) < 4.5
+    assert max(misses(found, exact_ends(TWO))) < 4.5
     assert found.monte_carlo_error is not None
     assert max(found.monte_carlo_error) < 0.005
 
 
-def test_table_v_on_the_whole_scale_has_its_exact_ends() -> None:
-    # Ends of the exact posterior, by quadrature of its polynomial form.
-    found = posterior(
-        "fleiss_kappa",
-        TABLE_V,
-        target="items",
-        categories=SCALE,
-        method="emcee",
-        rng=1,
-    )
-    assert max(misses(found, (0.36964, 0.87373))) < 4.5
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "prior",
+    [{}, {"concentration": 1 / 6}, {"prior": "jeffreys"}],
+    ids=["uniform", "a = 1/6", "Jeffreys"],
+)
+def test_table_v_has_its_exact_ends(prior: dict[str, object]) -> None:
+    found = sampled(TABLE_V, categories=SCALE, **prior)
+    ends = exact_ends(TABLE_V, categories=SCALE, **prior)
+    assert (found.low, found.high) == pytest.approx(ends, abs=3e-3)
+    assert max(misses(found, ends)) < 4.5
+
+
+@pytest.mark.usefixtures("brief")
+def test_what_was_drawn_is_said() -> None:
+    found = sampled(TWO, n_steps=300)
     assert (found.kind, found.method) == (
         "credible",
         "Dirichlet-multinomial posterior, emcee",
     )
-    assert (found.seed, found.unit) == (1, None)
-    assert found.n_resamples is not None
+    assert (found.seed, found.unit, found.distribution) == (1, None, None)
+    assert found.n_resamples == 4 * 40 * 200  # a third of the steps is burn-in
 
 
+@pytest.mark.usefixtures("brief")
 def test_a_missing_part_of_the_jacobian_is_seen(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    whole = sampled(TWO, n_steps=600)
+    assert max(misses(whole, exact_ends(TWO))) < 4.5
+
     def without(self: DirichletMultinomial, position: Floats) -> Floats:
         rho, rest, pi = self.parts(position)
         density = self.log_likelihood(rho, rest, pi) + np.log(pi) @ self.prior
         return density + np.log(rho)  # and no log(1 - ρ)
 
     monkeypatch.setattr(DirichletMultinomial, "log_density", without)
-    found = posterior("fleiss_kappa", TWO, target="items", method="emcee", rng=1)
-    assert max(misses(found, quadrature_ends())) > 10
+    assert max(misses(sampled(TWO, n_steps=600), exact_ends(TWO))) > 10
 
 
 def test_likelihood_is_the_compound_multinomial() -> None:
@@ -125,52 +134,14 @@ def test_far_out_the_density_is_zero_and_not_nan() -> None:
     assert not np.isnan(model.log_density(far)).any()
 
 
+@pytest.mark.usefixtures("brief")
 def test_seeds_repeat() -> None:
-    one = posterior("fleiss_kappa", TWO, target="items", method="emcee", rng=3)
-    two = posterior("fleiss_kappa", TWO, target="items", method="emcee", rng=3)
-    assert two == one
+    one = sampled(TWO, n_steps=300)
+    assert sampled(TWO, n_steps=300) == one
 
 
 def test_no_interval_before_it_has_converged() -> None:
     with pytest.raises(
         ConvergenceError, match=r"after 30 steps.*more steps are needed"
     ):
-        posterior(
-            "fleiss_kappa",
-            TABLE_V,
-            target="items",
-            method="emcee",
-            n_steps=30,
-            most_steps=30,
-        )
-
-
-@pytest.mark.parametrize(
-    ("ratings", "reason"),
-    [
-        ([["a", None], [None, "b"]], "two raters"),
-        ([["a", "a"], ["a", "a"]], "one category is declared"),
-    ],
-)
-def test_where_the_prior_alone_would_speak_it_is_undefined(
-    ratings: list[list[str | None]], reason: str
-) -> None:
-    with pytest.warns(UndefinedStatisticWarning):
-        found = posterior("fleiss_kappa", ratings, target="items", rng=1)
-    assert math.isnan(found.low)
-    assert reason in (found.reason or "")
-
-
-@pytest.mark.parametrize(
-    ("coefficient", "target", "said"),
-    [
-        ("cohen_kappa", "items", "speaks of fleiss_kappa"),
-        ("fleiss_kappa", "raters", 'got "raters"'),
-        ("fleiss_kappa", "both", 'got "both"'),
-    ],
-)
-def test_what_the_model_does_not_answer_is_refused(
-    coefficient: str, target: str, said: str
-) -> None:
-    with pytest.raises(ParameterError, match=said):
-        posterior(coefficient, [["a", "b"], ["a", "a"]], target=target)  # type: ignore[arg-type]
+        sampled(TABLE_V, n_steps=30, most_steps=30)
