@@ -30,7 +30,7 @@ class LatentTrait:
     Severities are N(0, 1), noise N(0, scale²), biases N(0, (bias · scale)²). The scale
     is solved such that the population has `kappa`: that of all items and raters, or,
     with items fixed, of these items and all raters. Fixed items have evenly spaced
-    quantiles of severity, as models made to span a scale.
+    quantiles of severity, as models made to span a scale; none may lie on a threshold.
     """
 
     kappa: float

@@ -127,7 +127,7 @@ def _none(case: Case) -> Bounds:
     return Bounds(low=nowhere, high=nowhere)
 
 
-_PEERS: Mapping[str, Method] = {
+PEERS: Mapping[str, Method] = {
     "irrCAC": peers.irrcac,
     "null standard error": peers.null_error,
 }
@@ -144,7 +144,7 @@ METHODS: Mapping[Target, Mapping[str, Method]] = {
         "jackknife, t, intraclass, stopgap": partial(of_items, scale="intraclass"),
         "posterior": posterior,
         "posterior, holding κ̂": posterior_holding,
-        **_PEERS,
+        **PEERS,
     },
     "raters": {
         DEFAULT: default_of_raters,
@@ -155,7 +155,7 @@ METHODS: Mapping[Target, Mapping[str, Method]] = {
         "jackknife at least V_C, t, stopgap": at_least_cells,
         "V_C + E, Satterthwaite, stopgap": cells_and_excess,
         "posterior": posterior,
-        **_PEERS,
+        **PEERS,
     },
     "both": {
         DEFAULT: default_of_both,
@@ -170,6 +170,6 @@ METHODS: Mapping[Target, Mapping[str, Method]] = {
         "V_I and E, intraclass, stopgap": items_and_excess,
         "posterior and E": posterior_and_excess,
         "posterior": posterior,
-        **_PEERS,
+        **PEERS,
     },
 }

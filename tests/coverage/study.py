@@ -4,16 +4,19 @@
 """
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 
 from tqdm import tqdm
 
 from tests.coverage.figure import draw
 from tests.coverage.page import page
-from tests.coverage.simulate import Cell, all_cells, simulate
+from tests.coverage.simulate import DESIGNS, OTHERS, Cell, all_cells, simulate
+from tests.coverage.studies import Design
 
 DOCS = Path(__file__).parents[2] / "docs"
 SIZE, QUICK = 4_000, 200
+FEWER = 4  # by how much cells of other designs have fewer studies
 
 
 def main() -> None:
@@ -26,13 +29,18 @@ def main() -> None:
     parser.add_argument("--into", type=Path, default=DOCS, help="folder of the page")
     options = parser.parse_args()
     size = QUICK if options.quick else SIZE
-    questions = tqdm(list(all_cells()), disable=options.quiet, unit="cell")
-    cells: list[Cell] = [simulate(*question, size) for question in questions]
+    cells = _counted(DESIGNS, size, quiet=options.quiet)
+    others = _counted(OTHERS, size // FEWER, quiet=options.quiet)
     (options.into / "figures").mkdir(parents=True, exist_ok=True)
     draw(cells, options.into / "figures" / "coverage.png")
-    (options.into / "coverage.md").write_text(page(cells), encoding="utf-8")
+    (options.into / "coverage.md").write_text(page(cells, others), encoding="utf-8")
     if not options.quiet:
         print(f"wrote {options.into / 'coverage.md'}")
+
+
+def _counted(designs: Sequence[Design], size: int, *, quiet: bool) -> list[Cell]:
+    questions = tqdm(list(all_cells(designs)), disable=quiet, unit="cell")
+    return [simulate(*question, size) for question in questions]
 
 
 if __name__ == "__main__":
