@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from masrel.cli.agreement_figure import check_figure, write_figure
 from masrel.cli.agreement_rows import Row, Wanted, estimate_session, scale_notes
 from masrel.cli.agreement_table import agreement_table
 from masrel.errors import MasrelWarning, ParameterError, RatingsError
@@ -72,6 +73,11 @@ NO_INTERVAL = (
     type=click.Path(path_type=Path, allow_dash=True),
     help="Write the estimates here; - prints them, and nothing else, on stdout.",
 )
+@click.option(
+    "--figure",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Draw the intervals into this .png, .svg or .pdf; needs --target.",
+)
 @click.option("--csv", "csv", is_flag=True, help="Print every digit as CSV.")
 @click.option("--latex", "latex", is_flag=True, help="Print a LaTeX table.")
 def command(
@@ -90,6 +96,7 @@ def command(
     words: str | None,
     by: str | None,
     json_file: Path | None,
+    figure: Path | None,
     csv: bool,
     latex: bool,
 ) -> None:
@@ -104,6 +111,8 @@ def command(
     if len(printed) > 1:
         both = " and ".join(printed)
         raise ParameterError(f"{both} want the same stdout: choose one")
+    if figure is not None:
+        check_figure(figure, target)
     wanted = Wanted(
         coefficients=tuple(name.strip() for name in coefficients.split(",")),
         weights=weights,
@@ -140,6 +149,9 @@ def command(
         _print(agreement_table(rows, file, by, wanted, about), printed)
     if target is None:
         click.echo(NO_INTERVAL, err=True)
+    elif figure is not None:
+        write_figure(rows, ratings, by, target, figure)
+        click.echo(f"figure: {figure}", err=True)
 
 
 def _listed(text: str) -> list[str]:

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from masrel.cli.agreement_rows import Row, Wanted
+from masrel.estimates import Interval
 
 if TYPE_CHECKING:
     from masrel.report.tables import Table, Value
@@ -125,14 +126,22 @@ def _of_row(row: Row) -> list[str]:
     said = [] if estimate.reason is None else [f"undefined: {estimate.reason}"]
     said += row.notes
     if interval is not None:
-        said.append(
-            f"{100 * interval.level:g} % {interval.kind} interval, {interval.method}; "
-            f"it speaks of other {_OTHERS[interval.target]}"
-        )
+        said.append(_about(interval))
         said += interval.notes
         if interval.reason not in (None, estimate.reason):
             said.append(f"no interval: {interval.reason}")
     return said
+
+
+def _about(interval: Interval) -> str:
+    from masrel.report.meaning import origin, promise
+    from masrel.report.tables import percent
+
+    name = f"{percent(interval.level)} % {interval.kind} interval, {interval.method}"
+    speaks = f"it speaks of other {_OTHERS[interval.target]}"
+    if math.isnan(interval.low):
+        return f"{name}; {speaks}"
+    return f"{name}{origin(interval, 'item')}; {speaks}: {promise(interval, 'item')}"
 
 
 _OTHERS = {"items": "items", "raters": "raters", "both": "items and raters"}

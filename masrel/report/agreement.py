@@ -15,6 +15,12 @@ if TYPE_CHECKING:
 __all__ = ["agreement_section", "retest_section"]
 
 
+_MARKS = (
+    "confidence as lines with ends, credible as broad bars, with the posterior density "
+    "or the resamples above where there are any"
+)
+
+
 def agreement_section(material: Material) -> Section:
     """Show the inter-rater estimates of the plan.
 
@@ -85,9 +91,9 @@ def _forest(
                 label=f"{row.coefficient}, {row.name}",
                 detail=row.detail,
                 value=None if row.estimate is None else row.estimate.value,
-                low=None if row.interval is None else row.interval.low,
-                high=None if row.interval is None else row.interval.high,
+                interval=row.interval,
                 text=row.text,
+                has_zero=row.has_zero,
             )
             for row in rows
         ]
@@ -98,8 +104,8 @@ def _forest(
     return Drawing(
         name=name,
         caption=(
-            f"{caption}: estimates (diamonds) and their intervals (bars). Dashed: what "
-            "chance gives a κ."
+            f"{caption}: estimates (dots) and their intervals, {_MARKS}. Dashed: what "
+            "chance gives."
         ),
         alt=f"Forest plot. {told}.",
         draw=draw,

@@ -7,13 +7,16 @@ from dataclasses import dataclass
 from masrel.agreement import COEFFICIENTS
 from masrel.analysis import PlannedEstimate
 from masrel.estimates import Estimate, Interval
-from masrel.report.tables import counted, interval_words, number, percent
+from masrel.report.meaning import meaning
+from masrel.report.tables import UNDEFINED, counted, interval_words, number, percent
 
 __all__ = [
     "TARGETS",
     "EstimateRow",
+    "as_words",
     "coefficient_name",
     "estimate_rows",
+    "has_zero",
     "interval_name",
     "meanings",
 ]
@@ -24,12 +27,6 @@ TARGETS = {
     "both": "other raters and models",
 }
 """Target of an interval to what it speaks of."""
-
-_POPULATIONS = {
-    "raters": "the same models were put to other raters like these",
-    "items": "these raters graded other models like these",
-    "both": "other raters graded other models, both like these",
-}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,16 +70,15 @@ class EstimateRow:
         return None if self.estimate is None else self.estimate.interval
 
     @property
+    def has_zero(self) -> bool:
+        """Whether 0 is what chance gives."""
+        name = None if self.estimate is None else self.estimate.coefficient
+        return has_zero(name)
+
+    @property
     def text(self) -> str:
         """The value with its interval, or that there is none."""
-        if self.estimate is None:
-            return "not in these data"
-        if not math.isfinite(self.estimate.value):
-            return "undefined"
-        value = number(self.estimate.value, 3)
-        if self.interval is None:
-            return value
-        return f"{value} {interval_words(self.interval.low, self.interval.high)}"
+        return "not in these data" if self.estimate is None else as_words(self.estimate)
 
     @property
     def detail(self) -> str:
@@ -108,6 +104,46 @@ class EstimateRow:
             if self.interval.n_undefined:
                 said.append(f"undefined on {self.interval.n_undefined} resamples")
         return tuple(dict.fromkeys(text for text in said if text))
+
+
+def has_zero(coefficient: str | None) -> bool:
+    """Return whether 0 is what chance gives of a coefficient.
+
+    Parameters
+    ----------
+    coefficient : str or None
+        Its name in an estimate; of none there is no zero.
+
+    Returns
+    -------
+    bool
+        Not of a share, nor of a measure of order; of an ICC and a κ.
+    """
+    if coefficient is None:
+        return False
+    entry = COEFFICIENTS.get(coefficient)  # the forms of ICC have entries of their own
+    return entry is None or entry.chance_corrected
+
+
+def as_words(estimate: Estimate) -> str:
+    """Return a value with its interval, as shown.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        The estimate.
+
+    Returns
+    -------
+    str
+        Such as ``"0.626 [0.320, 0.933]"``, or that it is undefined.
+    """
+    if not math.isfinite(estimate.value):
+        return UNDEFINED
+    value, interval = number(estimate.value, 3), estimate.interval
+    if interval is None:
+        return value
+    return f"{value} {interval_words(interval.low, interval.high)}"
 
 
 def coefficient_name(coefficient: str, weights: str = "identity") -> str:
@@ -210,24 +246,7 @@ def meanings(rows: Sequence[EstimateRow]) -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        One sentence per kind of interval and target there is.
+        One sentence per kind of interval, target and origin there is.
     """
-    said = []
-    for row in rows:
-        if row.interval is None:
-            continue
-        level = percent(row.interval.level)
-        population = _POPULATIONS[row.interval.target]
-        if row.interval.kind == "confidence":
-            said.append(
-                f"Confidence interval: if {population}, again and again, about "
-                f"{level} % of the intervals made this way would hold the value that "
-                "all such studies together would give."
-            )
-        else:
-            said.append(
-                "Credible interval: given these ratings and the prior, the value that "
-                f"would be found if {population}, without end, lies inside with "
-                f"probability {level} %."
-            )
-    return tuple(dict.fromkeys(said))
+    intervals = (row.interval for row in rows if row.interval is not None)
+    return tuple(dict.fromkeys(meaning(interval, "model") for interval in intervals))

@@ -1,9 +1,12 @@
 """Figures: what they say, that they repeat, and that they stay inside their data."""
 
+from typing import Any
+
 import matplotlib as mpl
 import numpy as np
 import pytest
 
+from masrel.estimates import Distribution, Interval
 from masrel.report import figures
 from masrel.report.figures import ForestRow, GradeGrid, SpeedColumn, TracePanel
 from masrel.report.figures.style import STYLE
@@ -21,12 +24,46 @@ def grid(n_raters: int = 2) -> GradeGrid:
     )
 
 
+def interval(**changes: Any) -> Interval:
+    made: dict[str, Any] = {
+        "low": 0.3,
+        "high": 0.7,
+        "level": 0.95,
+        "kind": "confidence",
+        "method": "m",
+        "target": "items",
+    }
+    return Interval(**{**made, **changes})
+
+
+def posterior() -> Interval:
+    at = np.linspace(0.1, 0.9, 41)
+    density = Distribution(
+        values=at, weights=np.exp(-20.0 * (at - 0.5) ** 2), continuous=True, words="p"
+    )
+    return interval(kind="credible", distribution=density)
+
+
+def resampled(n_values: int = 100) -> Interval:
+    # one value has a fifth of the resamples, the others share the rest
+    weights = np.full(n_values, 0.8 / (n_values - 1))
+    weights[-1] = 0.2
+    values = np.linspace(-0.2, 1.0, n_values)
+    return interval(
+        distribution=Distribution(
+            values=values, weights=weights, continuous=False, words="b"
+        )
+    )
+
+
 def forest() -> list[ForestRow]:
-    shared = {"detail": "4 models", "low": None, "high": None}
+    shared = {"detail": "4 models", "interval": None}
     return [
         ForestRow(label="a", value=0.6, text="0.600", **shared),
         ForestRow(label="b", value=float("nan"), text="undefined", **shared),
         ForestRow(label="c", value=None, text="not in these data", **shared),
+        ForestRow(label="d", value=0.5, interval=posterior(), text="[0.3, 0.7]"),
+        ForestRow(label="e", value=0.5, interval=resampled(), text="[0.2, 0.8]"),
     ]
 
 

@@ -9,10 +9,11 @@ import textwrap
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import matplotlib as mpl
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_pdf import FigureCanvasPdf
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
@@ -27,9 +28,15 @@ __all__ = [
     "ORANGE",
     "VERMILLION",
     "Drawn",
+    "Form",
+    "as_bytes",
     "finish",
     "house_style",
+    "put_stamp",
 ]
+
+Form = Literal["png", "svg", "pdf"]
+"""What a figure's file can be."""
 
 BLACK = "#000000"
 GREY = "#6B6B6B"
@@ -54,6 +61,7 @@ STYLE: "dict[RcKeyType, object]" = {
     "legend.frameon": False,
     "svg.hashsalt": "masrel",  # ids of an SVG are otherwise random
     "svg.fonttype": "path",
+    "pdf.fonttype": 42,  # letters stay letters, as journals ask
     "figure.constrained_layout.use": True,
 }
 
@@ -95,29 +103,68 @@ def finish(figure: Figure, stamp: str) -> Drawn:
     figure : Figure
         The figure.
     stamp : str
-        The line that says where the data come from; one in capitals is a warning,
-        and set as one.
+        The line that says where the data come from.
 
     Returns
     -------
     Drawn
         Its files, without any time of day.
     """
-    if stamp:
-        loud = stamp.isupper()
-        # 7 pt letters are about 0.054 in wide; a long source goes on two lines
-        n_letters = int(figure.get_figwidth() / 0.054) - 2
-        figure.suptitle(
-            textwrap.fill(stamp, n_letters),
-            x=0.995,
-            ha="right",
-            fontsize=9.5 if loud else 7,
-            color=VERMILLION if loud else GREY,
-            weight="bold" if loud else "normal",
-        )
-    png, svg = io.BytesIO(), io.BytesIO()
-    FigureCanvasAgg(figure).print_figure(
-        png, format="png", dpi=200, metadata={"Software": None}
+    put_stamp(figure, stamp)
+    return Drawn(png=as_bytes(figure, "png"), svg=as_bytes(figure, "svg"))
+
+
+def put_stamp(figure: Figure, stamp: str) -> None:
+    """Say at the top of a figure where its data come from.
+
+    Parameters
+    ----------
+    figure : Figure
+        The figure.
+    stamp : str
+        The line; one in capitals is a warning, and set as one. None if empty.
+    """
+    if not stamp:
+        return
+    loud = stamp.isupper()
+    # 7 pt letters are about 0.054 in wide; a long source goes on two lines
+    n_letters = int(figure.get_figwidth() / 0.054) - 2
+    figure.suptitle(
+        textwrap.fill(stamp, n_letters),
+        x=0.995,
+        ha="right",
+        fontsize=9.5 if loud else 7,
+        color=VERMILLION if loud else GREY,
+        weight="bold" if loud else "normal",
     )
-    FigureCanvasSVG(figure).print_figure(svg, format="svg", metadata={"Date": None})
-    return Drawn(png=png.getvalue(), svg=svg.getvalue())
+
+
+def as_bytes(figure: Figure, form: Form) -> bytes:
+    """Make one file of a figure.
+
+    Parameters
+    ----------
+    figure : Figure
+        The figure.
+    form : {"png", "svg", "pdf"}
+        What file.
+
+    Returns
+    -------
+    bytes
+        The file, without any time of day.
+    """
+    file = io.BytesIO()
+    if form == "png":
+        metadata = {"Software": None}
+        canvas = FigureCanvasAgg(figure)
+        canvas.print_figure(file, format="png", dpi=200, metadata=metadata)
+    elif form == "svg":
+        FigureCanvasSVG(figure).print_figure(
+            file, format="svg", metadata={"Date": None}
+        )
+    else:
+        FigureCanvasPdf(figure).print_figure(
+            file, format="pdf", metadata={"CreationDate": None}
+        )
+    return file.getvalue()

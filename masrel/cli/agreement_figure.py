@@ -1,0 +1,99 @@
+"""The figure of a table of agreement: a file that a paper can take as it is."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from masrel.cli.agreement_rows import Row
+from masrel.errors import ParameterError
+from masrel.estimates import Target
+
+if TYPE_CHECKING:
+    from masrel.ratings import Ratings
+    from masrel.report.figures import ForestRow, Form
+
+__all__ = ["check_figure", "write_figure"]
+
+_FORMS: dict[str, "Form"] = {".png": "png", ".svg": "svg", ".pdf": "pdf"}
+_POPULATION = {
+    "items": "other items",
+    "raters": "other raters",
+    "both": "other items and raters",
+}
+
+
+def check_figure(file: Path, target: Target | None) -> None:
+    """Check that a figure can be made, before anything is computed for it.
+
+    Parameters
+    ----------
+    file : Path
+        Where it is wanted.
+    target : {"items", "raters", "both"} or None
+        Of whom its intervals speak.
+
+    Raises
+    ------
+    ParameterError
+        If its name does not end as that of a figure, or there are no intervals.
+    """
+    if file.suffix.lower() not in _FORMS:
+        raise ParameterError(
+            f"--figure: needs a name that ends in .png, .svg or .pdf, got {file}"
+        )
+    if target is None:
+        raise ParameterError(
+            "--figure: shows intervals, so it needs --target raters, items or both"
+        )
+
+
+def write_figure(
+    rows: list[Row], ratings: "Ratings", by: str | None, target: Target, file: Path
+) -> None:
+    """Draw the estimates with their intervals.
+
+    Parameters
+    ----------
+    rows : list of Row
+        The estimates.
+    ratings : Ratings
+        What they were made from.
+    by : str or None
+        The column that tells sessions apart, if there is more than one.
+    target : {"items", "raters", "both"}
+        Of whom intervals were asked to speak.
+    file : Path
+        Where to; its ending says in which form.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written.
+    """
+    # Imported here: a table loads nothing that draws.
+    from masrel.report.figures import forest_file
+
+    several = by is not None and len({row.session for row in rows}) > 1
+    drawn = forest_file(
+        [_line(row, several, target) for row in rows],
+        axis_label=f"agreement (1 is perfect); intervals for {_POPULATION[target]}",
+        stamp="SIMULATED DATA" if ratings.simulated else "",
+        form=_FORMS[file.suffix.lower()],
+    )
+    file.write_bytes(drawn)
+
+
+def _line(row: Row, several: bool, target: Target) -> "ForestRow":
+    from masrel.report.estimate_rows import as_words, has_zero
+    from masrel.report.figures import ForestRow
+
+    estimate, interval = row.estimate, row.estimate.interval
+    differs = interval is not None and interval.target != target
+    return ForestRow(
+        label=row.title,
+        detail=_POPULATION[interval.target] if interval is not None and differs else "",
+        value=estimate.value,
+        interval=interval,
+        text=as_words(estimate),
+        has_zero=has_zero(estimate.coefficient),
+        group=row.session if several else "",
+    )

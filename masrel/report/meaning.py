@@ -1,0 +1,106 @@
+"""What an interval means, in one plain sentence."""
+
+from typing import Literal
+
+from masrel.estimates import Interval
+from masrel.report.rounding import percent
+
+__all__ = ["Noun", "meaning", "origin", "promise"]
+
+Noun = Literal["model", "item"]
+"""What is rated: a haptic model in a study, any item elsewhere."""
+
+_POPULATIONS = {
+    "raters": "the same {}s were put to other raters like these",
+    "items": "these raters graded other {}s like these",
+    "both": "other raters graded other {}s, both like these",
+}
+
+
+def meaning(interval: Interval, noun: Noun) -> str:
+    """Say what an interval promises, of whom, and what it was made from.
+
+    Parameters
+    ----------
+    interval : Interval
+        The interval.
+    noun : {"model", "item"}
+        What was rated.
+
+    Returns
+    -------
+    str
+        One sentence.
+
+    Examples
+    --------
+    >>> print(meaning(Interval(
+    ...     low=0.4, high=1.0, level=0.95, kind="credible", target="items",
+    ...     method="Dirichlet-multinomial posterior, one-sided",
+    ... ), "item"))
+    Credible bound: given these ratings and the prior, the value that would be found \
+if these raters graded other items like these, without end, lies above the lower end \
+with probability 95 %.
+    """
+    bounded = interval.method.endswith("one-sided")
+    name = f"{interval.kind.capitalize()} {'bound' if bounded else 'interval'}"
+    return f"{name}{origin(interval, noun)}: {promise(interval, noun)}."
+
+
+def promise(interval: Interval, noun: Noun) -> str:
+    """Say what an interval promises, and of whom.
+
+    Parameters
+    ----------
+    interval : Interval
+        The interval.
+    noun : {"model", "item"}
+        What was rated.
+
+    Returns
+    -------
+    str
+        The sentence without its beginning and full stop.
+    """
+    level = f"{percent(interval.level)} %"
+    population = _POPULATIONS[interval.target].replace("{}", noun)
+    if interval.kind == "confidence":
+        return (
+            f"if {population}, again and again, about {level} of the intervals made "
+            "this way would hold the value that all such studies together would give"
+        )
+    bounded = interval.method.endswith("one-sided")
+    where = "above the lower end" if bounded else "inside"
+    return (
+        f"given these ratings and the prior, the value that would be found if "
+        f"{population}, without end, lies {where} with probability {level}"
+    )
+
+
+def origin(interval: Interval, noun: Noun) -> str:
+    """Say in brackets what the ends of an interval came from.
+
+    Parameters
+    ----------
+    interval : Interval
+        The interval.
+    noun : {"model", "item"}
+        What was rated.
+
+    Returns
+    -------
+    str
+        Such as ``" (from leaving out one item at a time)"``; nothing where nothing
+        was left out or drawn.
+    """
+    units = {"items": f"{noun}s", "raters": "raters", "both": f"{noun}s and raters"}
+    if interval.method.endswith("the spread of raters"):
+        return " (a posterior, made wider by what raters differ by)"
+    if interval.unit is None:
+        return ""
+    if "bootstrap" in interval.method:
+        return f" (from {units[interval.unit]} drawn with replacement)"
+    if interval.unit == "both":
+        return f" (from leaving out {noun}s and raters, one at a time)"
+    one = units[interval.unit].removesuffix("s")
+    return f" (from leaving out one {one} at a time)"

@@ -1,0 +1,133 @@
+"""masrel agree --figure: what is drawn, where to, and what is refused."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from masrel.report.figures.style import STYLE
+from tests.architecture.test_imports import loaded_after
+from tests.cli.process import Caller
+
+TABLE_V = Path(__file__).parents[2] / "studies/hess2012/ratings/published.csv"
+STARTS = {".png": b"\x89PNG\r\n\x1a\n", ".svg": b"<?xml", ".pdf": b"%PDF"}
+
+TWO_SESSIONS = "session,item,rater,grade,source\n" + "".join(
+    f"{session},{item},{rater},{(item * rater) % 3},simulated\n"
+    for session in ("first", "second")
+    for item in range(4)
+    for rater in range(3)
+)
+
+
+@pytest.fixture
+def masrel(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Caller:
+    return Caller(monkeypatch, capsys)
+
+
+@pytest.fixture
+def readable(monkeypatch: pytest.MonkeyPatch) -> None:
+    # With text kept as text the SVG says what can be read in the figure.
+    monkeypatch.setitem(STYLE, "svg.fonttype", "none")
+
+
+@pytest.mark.parametrize("suffix", [*STARTS, ".PDF"])
+def test_the_ending_says_what_is_written_and_one_line_says_where(
+    masrel: Caller, tmp_path: Path, suffix: str
+) -> None:
+    file = tmp_path / f"kappa{suffix}"
+    done = masrel("agree", TABLE_V, "--target", "items", "--figure", file)
+    assert done.code == 0
+    assert done.err == f"figure: {file}\n"
+    assert file.read_bytes().startswith(STARTS[suffix.lower()])
+
+
+@pytest.mark.parametrize("suffix", STARTS)
+def test_the_same_ratings_give_the_same_bytes(
+    masrel: Caller, tmp_path: Path, suffix: str
+) -> None:
+    files = [tmp_path / f"{name}{suffix}" for name in ("first", "second")]
+    for file in files:
+        masrel("agree", TABLE_V, "--target", "items", "--figure", file)
+    first, second = (file.read_bytes() for file in files)
+    assert first == second
+
+
+@pytest.mark.parametrize(
+    ("name", "target", "why"),
+    [
+        ("kappa.jpg", ("--target", "items"), ".png, .svg or .pdf"),
+        ("kappa", ("--target", "items"), ".png, .svg or .pdf"),
+        ("kappa.svg", (), "--target"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused_in_one_sentence(
+    masrel: Caller, tmp_path: Path, name: str, target: tuple[str, ...], why: str
+) -> None:
+    done = masrel("agree", TABLE_V, *target, "--figure", tmp_path / name)
+    assert (done.code, done.out) == (2, "")
+    assert done.err.startswith("masrel: --figure: ")
+    assert why in done.err
+    assert done.err.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_is_not_there_is_named(masrel: Caller, tmp_path: Path) -> None:
+    file = tmp_path / "none" / "kappa.svg"
+    done = masrel("agree", TABLE_V, "--target", "raters", "--figure", file)
+    assert done.code == 2
+    assert str(file) in done.err
+
+
+@pytest.mark.parametrize("draws", [False, True])
+def test_only_a_figure_loads_what_draws(tmp_path: Path, draws: bool) -> None:
+    figure = ["--figure", str(tmp_path / "kappa.svg")] if draws else []
+    call = ["agree", str(TABLE_V), "--target", "items", *figure]
+    loaded = loaded_after(f"from masrel.cli import cli\ncli({call!r})")
+    assert ("matplotlib" in loaded) == draws
+
+
+def test_json_alone_on_stdout_leaves_room_for_a_figure(tmp_path: Path) -> None:
+    call = [sys.executable, "-m", "masrel", "agree", str(TABLE_V), "--json", "-"]
+    figure = ["--target", "items", "--figure", str(tmp_path / "kappa.svg")]
+    plain, drawn = (
+        subprocess.run(
+            [*call, *more], capture_output=True, encoding="utf-8", check=True
+        )
+        for more in (figure[:2], figure)
+    )
+    assert plain.stdout == drawn.stdout
+    assert "figure: " in drawn.stderr
+
+
+@pytest.mark.usefixtures("readable")
+def test_the_figure_says_what_the_table_says(masrel: Caller, tmp_path: Path) -> None:
+    file = tmp_path / "all.svg"
+    wanted = ("--coefficients", "all", "--target", "both")
+    masrel("agree", TABLE_V, *wanted, "--figure", file)
+    svg = file.read_text("utf-8")
+    assert "0.626 [0.370, 0.874]" in svg
+    assert "intervals for other items and raters" in svg
+    assert svg.count(">other items<") == 2  # of ICC(C,1) and ICC(C,k) alone
+    assert "95 % credible interval" in svg
+    assert "95 % confidence interval" in svg
+    assert "posterior density" in svg
+    assert "resamples" not in svg
+    assert "SIMULATED" not in svg
+
+
+@pytest.mark.usefixtures("readable")
+def test_simulated_sessions_are_headed_and_labelled(
+    masrel: Caller, tmp_path: Path
+) -> None:
+    ratings, file = tmp_path / "ratings.csv", tmp_path / "drawn.svg"
+    ratings.write_text(TWO_SESSIONS, encoding="utf-8")
+    asked = ("--by", "session", "--target", "items", "--interval", "bootstrap")
+    done = masrel("agree", ratings, *asked, "--figure", file)
+    assert done.code == 0
+    svg = file.read_text("utf-8")
+    for words in ("SIMULATED DATA", ">first<", ">second<", "resamples"):
+        assert words in svg
