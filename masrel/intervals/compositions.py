@@ -52,7 +52,7 @@ def compositions(n: int, shares: Floats) -> tuple[NDArray[np.int32], Floats]:
     """
     # In logs, so that no n over- or underflows: Σ t log share - log t!.
     steps = np.log(np.maximum(np.arange(n + 1), 1))
-    factorials = np.cumsum(steps)
+    factorials = np.cumsum(steps, dtype=np.longdouble).astype(np.float64)
     left = np.array([n], dtype=np.int32)
     logs = np.array([factorials[n]])
     columns: list[NDArray[np.int32]] = []

@@ -6,12 +6,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from masrel.agreement.kernel import Floats
-from masrel.intervals.lattice import Integers, Lattice
-from masrel.intervals.states import transformed_states
+from masrel.intervals.lattice import Integers
+from masrel.intervals.states import line_of_sums
 
 __all__ = ["Control", "control_of", "whole_scores"]
 
-_SPAN = 1 << 18  # integers it spans at most
+_FINE = 60.0  # integers in a standard deviation of one draw
+_SPAN = 1 << 18  # integers that the sums span at most
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -20,22 +21,21 @@ class Control:
 
     Attributes
     ----------
-    sums : ndarray of int64, shape (n_sums,)
-        Sums of scores, ascending.
+    least : int
+        The least sum of the table.
     upto : ndarray, shape (n_sums,)
-        The probability of a sum at most as large.
+        The probability of a sum at most as large, for one after the other.
     """
 
-    sums: Integers = field(compare=False, repr=False)
+    least: int
     upto: Floats = field(compare=False, repr=False)
 
     def cut(self, position: float) -> tuple[int, float]:
         """Return the sum nearest to a position, and the probability up to it."""
-        at = int(np.searchsorted(self.upto, position))
-        at = min(max(at, 0), self.sums.size - 1)
+        at = min(int(np.searchsorted(self.upto, position)), self.upto.size - 1)
         if at and position - self.upto[at - 1] < self.upto[at] - position:
             at -= 1
-        return int(self.sums[at]), float(self.upto[at])
+        return self.least + at, float(self.upto[at])
 
 
 def control_of(scores: Integers, shares: Floats, n: int) -> Control:
@@ -55,16 +55,9 @@ def control_of(scores: Integers, shares: Floats, n: int) -> Control:
     Control
         Probabilities within 1e-12.
     """
-    least = int(scores.min())
-    line = Lattice(
-        steps=(scores - least)[:, None],
-        origin=np.zeros(1, dtype=np.int64),
-        basis=np.ones((1, 1), dtype=np.int64),
-        denominators=np.ones(1),
-    )
-    steps, found = transformed_states(line, shares, n)
-    order = np.argsort(steps[:, 0], kind="stable")  # two runs
-    return Control(sums=steps[order, 0] + n * least, upto=np.cumsum(found[order]))
+    lowest = int(scores.min())
+    least, found = line_of_sums(scores - lowest, shares, n)
+    return Control(least=least + n * lowest, upto=np.cumsum(found))
 
 
 def whole_scores(slopes: Floats, spread: float, n: int) -> Integers:
@@ -84,6 +77,6 @@ def whole_scores(slopes: Floats, spread: float, n: int) -> Integers:
     ndarray of int64, shape (n,)
         The slopes on a scale that fits a table of their sums.
     """
-    # Fine enough is a hundredth of the spread; the sums span 17 of their deviations.
-    scale = min(100.0, _SPAN / (17.0 * math.sqrt(n))) / spread
+    # Fine enough is a part of the spread; the sums span 17 of their deviations.
+    scale = min(_FINE, _SPAN / (17.0 * math.sqrt(n))) / spread
     return np.asarray(np.rint(slopes * scale), dtype=np.int64)

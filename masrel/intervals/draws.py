@@ -18,9 +18,9 @@ from masrel.intervals.slopes import influence
 
 __all__ = ["Sampler", "draw_resamples", "sampler_of"]
 
-_CHUNK = 500_000  # numbers held at once while resampling
+_CHUNK = 1 << 17  # numbers held at once while resampling
 _LEAST = 30  # draws from which on a control is worth its time
-_TABLE = 1 << 16  # sums of a few items that are looked up at once
+_TABLE = 1 << 14  # sums of a few items that are looked up at once
 _MOST_BITS = 62
 _BINOMIAL = 20  # lookups that take as long as one binomial number
 
@@ -214,12 +214,12 @@ def _packed(
     bits = _bits(lattice, n)
     places, masks = np.cumsum(bits) - bits, (1 << bits) - 1
     keys = np.repeat((lattice.steps << places).sum(axis=1), pool.times)
-    table, last = np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64)
-    rest = n % at_once or at_once
-    for digit in range(at_once):
-        table = (keys[:, None] + table).ravel()
-        last = np.repeat(last, n) if digit >= rest else (keys[:, None] + last).ravel()
+    table = surplus = np.zeros(1, dtype=np.int64)
     n_lookups = -(-n // at_once)
+    for digit in range(at_once):
+        table = np.add.outer(keys, table).ravel()
+        more = keys if digit >= at_once - (n_lookups * at_once - n) else 0 * keys
+        surplus = np.add.outer(more, surplus).ravel()
     scores = control = None
     if slopes is not None:
         slope, *_ = np.linalg.lstsq(
@@ -230,7 +230,8 @@ def _packed(
 
     def draw(size: int, generator: np.random.Generator) -> Batch:
         at = generator.integers(0, table.size, size=(size, n_lookups))
-        packed = table[at[:, :-1]].sum(axis=1) + last[at[:, -1]]
+        packed = table[at].sum(axis=1)
+        packed -= surplus[at[:, -1]]  # the last lookup may be of more than are left
         steps = packed[:, None] >> places & masks
         values = pool.values(lattice.sums(steps, n))
         return values, None if scores is None else steps @ scores

@@ -79,7 +79,7 @@ def _merged(pool: Pool, n_distinct: int, insist: bool) -> Resamples | None:
     lattice = pool.lattice
     if lattice is None:
         return None
-    size = math.prod(box(lattice, pool.shares, pool.n).tolist())
+    size = math.prod(box(lattice.steps, pool.shares, pool.n).tolist())
     if size <= min(_BOX, 10 * n_distinct):
         states = transformed_states(lattice, pool.shares, pool.n)
     elif insist and n_distinct > _MOST:

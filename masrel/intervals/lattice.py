@@ -1,7 +1,7 @@
 """Rows of features as points of a lattice, so that equal sums are equal integers."""
 
+import math
 from dataclasses import dataclass, field
-from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ Integers = NDArray[np.int64]
 
 _LARGEST = 10**5  # denominators above this are taken for irrational numbers
 _MOST = 2.0**52  # integers that a float still holds
+_WHOLE = 1e-13  # of a number: as near to an integer as that it is one, but for rounding
 _DIMENSIONS = 12  # a lattice of more helps nobody
 _TURNS = 50
 
@@ -54,8 +55,10 @@ class Lattice:
         ndarray, shape (..., n_features)
             The sums, each rounded once.
         """
-        whole = steps.astype(np.float64) @ self.basis.astype(np.float64)
-        return np.asarray((whole + n * self.origin) / self.denominators)
+        whole: Floats = steps.astype(np.float64) @ self.basis.astype(np.float64)
+        whole += n * self.origin
+        whole /= self.denominators
+        return whole
 
 
 def lattice_of(rows: Floats, shares: Floats, n: int) -> Lattice | None:
@@ -100,18 +103,34 @@ def lattice_of(rows: Floats, shares: Floats, n: int) -> Lattice | None:
 
 def _denominators(rows: Floats) -> Floats | None:
     # (n_features,): the least common denominator of each column
-    common = [1] * rows.shape[1]
+    common = np.ones(rows.shape[1])
+    scaled = rows
     while True:
+        off = np.abs(scaled - np.rint(scaled)) > _WHOLE * np.maximum(np.abs(scaled), 1)
+        at = np.argmax(off, axis=0)
+        columns = np.flatnonzero(off[at, np.arange(at.size)])
+        if columns.size == 0:
+            return common
+        for column in columns.tolist():
+            common[column] *= _denominator(float(scaled[at[column], column]))
+        if common.max() > _MOST:
+            return None
         scaled = rows * common
-        off = np.abs(scaled - np.rint(scaled)) > 1e-9 * np.maximum(1.0, np.abs(scaled))
-        if not off.any():
-            return np.array(common, dtype=np.float64)
-        for column in np.flatnonzero(off.any(axis=0)).tolist():
-            first = float(scaled[np.argmax(off[:, column]), column])
-            part = Fraction(first).limit_denominator(_LARGEST).denominator
-            common[column] *= part
-            if part == 1 or common[column] > _LARGEST**2:
-                return None
+
+
+def _denominator(number: float) -> float:
+    # of the first convergent of its continued fraction that is the number; infinity if
+    # that is none of the fractions known here
+    rest, before, found = number - math.floor(number), 0, 1
+    while found <= _LARGEST:
+        scaled = number * found
+        if abs(scaled - round(scaled)) <= _WHOLE * max(abs(scaled), 1.0):
+            return float(found)
+        rest = 1.0 / rest
+        whole = math.floor(rest)
+        rest -= whole
+        before, found = found, whole * found + before
+    return math.inf
 
 
 def _echelon(rows: Integers) -> Integers | None:

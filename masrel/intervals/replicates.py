@@ -51,7 +51,8 @@ class Enumerated:
         if values.size:
             with np.errstate(invalid="ignore"):  # two infinite values are the same
                 gaps = np.diff(values)
-            apart = gaps > _ROUNDING * np.maximum(1.0, np.abs(values[:-1]))
+            least = np.minimum(np.abs(values[1:]), np.abs(values[:-1]))
+            apart = gaps > _ROUNDING * np.clip(least, 1.0, 1e300)
             first = np.flatnonzero(np.concatenate([[True], apart]))
             if first.size < values.size:
                 values, weights = values[first], np.add.reduceat(weights, first)

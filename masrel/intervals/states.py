@@ -14,20 +14,20 @@ from numpy.typing import NDArray
 from masrel.agreement.kernel import Floats
 from masrel.intervals.lattice import Integers, Lattice
 
-__all__ = ["box", "merged_states", "transformed_states"]
+__all__ = ["box", "line_of_sums", "merged_states", "transformed_states"]
 
 Spectrum = NDArray[np.complex128]
 
 _LEFT_OUT = 1e-12  # probability that may be lost at the far ends, or in rounding
 
 
-def box(lattice: Lattice, shares: Floats, n: int) -> Integers:
+def box(steps: Integers, shares: Floats, n: int) -> Integers:
     """Return the sides of a box that holds the sums but for a probability of 1e-12.
 
     Parameters
     ----------
-    lattice : Lattice
-        The rows.
+    steps : ndarray of int64, shape (n_rows, n_dimensions)
+        The rows, of at least 0.
     shares : ndarray, shape (n_rows,)
         Probability of each row at a draw.
     n : int
@@ -44,7 +44,6 @@ def box(lattice: Lattice, shares: Floats, n: int) -> Integers:
     variance s², is t away from its own with probability at most
     2 exp(-t² / (2 (n s² + b t / 3))). Sums that far away are few where n is large.
     """
-    steps = lattice.steps
     apart = steps - shares @ steps
     variance = n * (shares @ apart**2)
     most = np.abs(apart).max(axis=0)
@@ -61,7 +60,9 @@ def transformed_states(
 
     Parameters
     ----------
-    lattice, shares, n
+    lattice : Lattice
+        The rows.
+    shares, n
         As of `box`.
 
     Returns
@@ -76,17 +77,50 @@ def transformed_states(
     Sums beyond the box come round to its other side; the box is so large that they do
     not matter, and a residue stands for the sum that is nearest to the mean.
     """
-    sides = [_smooth(int(side)) for side in box(lattice, shares, n)]
+    if not lattice.steps.shape[1]:  # all rows are alike
+        return np.zeros((1, 0), dtype=np.int64), np.ones(1)
+    sides = [_smooth(int(side)) for side in box(lattice.steps, shares, n)]
     one = np.zeros(lattice.steps.max(axis=0) + 1)
     np.add.at(one, tuple(lattice.steps.T), shares)
     axes = tuple(range(len(sides)))
     spectrum = _power(np.fft.rfftn(one, s=sides, axes=axes), n)
     found = np.fft.irfftn(spectrum, s=sides, axes=axes).ravel()
-    at = np.flatnonzero(found > _LEFT_OUT / found.size)
+    # What is below 0 is rounding, and so is what is above by as little.
+    at = np.flatnonzero(found > max(_LEFT_OUT / found.size, -4.0 * float(found.min())))
     residues = np.column_stack(np.unravel_index(at, sides))
-    centre = np.rint(n * (shares @ lattice.steps)).astype(np.int64)
-    least = np.maximum(centre - np.array(sides) // 2, 0)
+    least = _least(lattice.steps, shares, n, np.array(sides))
     return least + (residues - least) % sides, found[at]
+
+
+def line_of_sums(scores: Integers, shares: Floats, n: int) -> tuple[int, Floats]:
+    """Return the probabilities of sums of integers, one after the other.
+
+    Parameters
+    ----------
+    scores : ndarray of int64, shape (n_rows,)
+        One of each row, at least 0.
+    shares, n
+        As of `box`.
+
+    Returns
+    -------
+    least : int
+        The first sum.
+    probabilities : ndarray, shape (n_sums,)
+        Of it and those after it, within 1e-12 in all.
+    """
+    side = _smooth(int(box(scores[:, None], shares, n)[0]))
+    spectrum = _power(np.fft.rfft(np.bincount(scores, weights=shares), side), n)
+    found = np.fft.irfft(spectrum, side)
+    least = int(_least(scores[:, None], shares, n, np.array([side]))[0])
+    return least, np.roll(found, -(least % side))
+
+
+def _least(steps: Integers, shares: Floats, n: int, sides: Integers) -> Integers:
+    # (n_dimensions,): where a box around the mean begins, within what there is
+    centre = np.rint(n * (shares @ steps)).astype(np.int64)
+    last = np.maximum(n * steps.max(axis=0) + 1 - sides, 0)
+    return np.asarray(np.clip(centre - sides // 2, 0, last), dtype=np.int64)
 
 
 def merged_states(
@@ -97,7 +131,7 @@ def merged_states(
     Parameters
     ----------
     lattice, shares, n
-        As of `box`.
+        As of `transformed_states`.
     most : int
         How many sums are kept at most.
 
