@@ -13,7 +13,7 @@ from tests.coverage.simulate import DESIGNS, KAPPAS, MODELS, TARGETS, Cell
 # Okabe and Ito's colours; markers tell them apart without colour
 _COLOURS = {
     "default": ("#0072B2", "o"),
-    "jackknife": ("#E69F00", "v"),
+    "plain jackknife": ("#E69F00", "v"),
     "irrCAC": ("#CC79A7", "D"),
     "null standard error": ("#D55E00", "x"),
 }
@@ -40,7 +40,9 @@ def draw(cells: Sequence[Cell], path: Path) -> None:
                 axes.set_title(model[0].upper() + model[1:], fontsize=8)
         row[0].set_ylabel(f"{_TITLES[target]}\ncoverage (%)")
     handles, labels = panels[0][0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=5, frameon=False)
+    figure.legend(
+        handles[::-1], labels[::-1], loc="outside upper center", ncols=5, frameon=False
+    )
     figure.supxlabel(
         "κ 0.2, 0.6, 0.9 from left to right in each design, items × raters", fontsize=8
     )
@@ -48,7 +50,7 @@ def draw(cells: Sequence[Cell], path: Path) -> None:
 
 
 def _points(axes: Axes, cells: Sequence[Cell], plain: str) -> None:
-    names = {**{name: name for name in _COLOURS}, "jackknife": plain}
+    names = {**{name: name for name in _COLOURS}, "plain jackknife": plain}
     for label, (colour, marker) in reversed(_COLOURS.items()):
         shares = [100 * c.methods[names[label]].coverage for c in cells]
         size = 22 if names[label] == DEFAULT else 16

@@ -98,7 +98,12 @@ def _outside(cells: Cells) -> str:
     return _table(head, rows, n_text=3)
 
 
-_COMPARED = {
+_TITLES = {
+    "items": "Other items",
+    "raters": "Other raters",
+    "both": "Other items and raters",
+}
+_COMPARED: dict[str, tuple[str, ...]] = {
     "items": ("posterior, holding κ̂", "jackknife, t, intraclass, stopgap"),
     "raters": ("jackknife, t, intraclass, stopgap", "posterior"),
     "both": ("posterior and E", "V_I and E, intraclass, stopgap"),
@@ -106,34 +111,38 @@ _COMPARED = {
 
 
 def _of_others(cells: Cells) -> str:
-    places = dict.fromkeys((c.target, c.model, str(c.design)) for c in cells)
-    rows = []
-    for target, model, design in places:
-        found = [_cell(cells, target, model, design, kappa) for kappa in KAPPAS]
-        row = [target, model, design]
-        for name in (DEFAULT, *_COMPARED[target]):
-            shown = " / ".join(_marked(cell.methods[name]) for cell in found)
-            row.append(shown if name == DEFAULT else f"{name}: {shown}")
-        rows.append(row)
-    head = ["target", "model", "items × raters", "default", "beside it", "and"]
-    return _table(head, rows, n_text=3)
+    tables = []
+    for target, compared in _COMPARED.items():
+        here = [cell for cell in cells if cell.target == target]
+        rows = []
+        for model, design in dict.fromkeys((c.model, str(c.design)) for c in here):
+            found = [_cell(here, target, model, design, kappa) for kappa in KAPPAS]
+            shown = [_triple(found, name) for name in (DEFAULT, *compared)]
+            rows.append([model, design, *shown])
+        head = ["model", "items × raters", DEFAULT, *compared]
+        tables += [f"### {_TITLES[target]}", _table(head, rows, n_text=2)]
+    return "\n\n".join(tables)
+
+
+def _triple(cells: Cells, name: str) -> str:
+    return " / ".join(_marked(cell.methods[name]) for cell in cells)
 
 
 def _of_target(cells: Cells) -> Iterator[str]:
     for target in TARGETS:
-        yield f"### Other {'items and raters' if target == 'both' else target}"
+        yield f"### {_TITLES[target]}"
         for model in MODELS:
             rows = []
             for name in METHODS[target]:
                 found = [
-                    [
-                        _cell(cells, target, model, str(d), k).methods[name]
-                        for k in KAPPAS
-                    ]
+                    [_cell(cells, target, model, str(d), k) for k in KAPPAS]
                     for d in DESIGNS
                 ]
-                covers = [" / ".join(map(_marked, of)) for of in found]
-                widths = [" / ".join(f"{x.width:.2f}" for x in of) for of in found]
+                covers = [_triple(of_design, name) for of_design in found]
+                widths = [
+                    " / ".join(f"{cell.methods[name].width:.2f}" for cell in of_design)
+                    for of_design in found
+                ]
                 rows.append([name, *covers, *widths])
             designs = [str(design) for design in DESIGNS]
             head = ["method", *designs, *(f"width {d}" for d in designs)]
