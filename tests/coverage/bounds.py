@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 from scipy.special import stdtrit
 
-from tests.coverage.studies import Floats
+from tests.coverage.studies import Floats, Truths
 
 Scale = Literal["plain", "Fisher z", "intraclass"]
 PER_RATING = 0.003
@@ -31,7 +31,7 @@ class Bounds:
         """Whether there is an interval, as 0 or 1."""
         return np.isfinite(self.low + self.high).astype(np.float64)
 
-    def where(self, use: Floats, other: "Bounds") -> "Bounds":
+    def where(self, use: Truths, other: "Bounds") -> "Bounds":
         """Return these ends where `use` holds, else the other's."""
         return Bounds(
             low=np.where(use, self.low, other.low),
@@ -91,7 +91,7 @@ class Posterior:
         return wide.where(inside, self.one_sided)
 
 
-def has_spread(variance: Floats, value: Floats, n_ratings: int) -> Floats:
+def has_spread(variance: Floats, value: Floats, n_ratings: int) -> Truths:
     """Whether a variance is more than an accident of few disagreements."""
     return np.asarray(variance > PER_RATING * (1.0 - value) / n_ratings)
 

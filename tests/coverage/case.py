@@ -7,7 +7,7 @@ import numpy as np
 from tests.coverage.bounds import Posterior, has_spread, student
 from tests.coverage.exact import posterior_ends
 from tests.coverage.spread import Spread, spread_of
-from tests.coverage.studies import Floats, Studies
+from tests.coverage.studies import Floats, Studies, Truths
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,6 +70,6 @@ class Case:
         """Student's quantile with r - 1 degrees of freedom."""
         return float(student(self.r - 1))
 
-    def spreads(self, variance: Floats) -> Floats:
+    def spreads(self, variance: Floats) -> Truths:
         """Whether a variance is more than an accident."""
         return has_spread(variance, self.value, self.n * self.r)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Codes = NDArray[np.int8]
+Truths = NDArray[np.bool_]
 Target = Literal["items", "raters", "both"]
 
 
@@ -38,7 +39,7 @@ class Studies:
     def counts(self) -> NDArray[np.int64]:
         """Raters per category, shape (n_studies, n_items, n_categories)."""
         grades = np.arange(self.n_categories)
-        return (self.codes[..., None] == grades).sum(axis=2)
+        return np.asarray((self.codes[..., None] == grades).sum(axis=2))
 
 
 class Model(Protocol):

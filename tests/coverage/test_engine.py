@@ -7,13 +7,15 @@ import pytest
 
 from masrel.agreement import fleiss_kappa, fleiss_null
 from masrel.intervals import analytic, jackknife, posterior
+from masrel.intervals.analytic import Distribution
 from tests.coverage import peers
-from tests.coverage.bounds import around
+from tests.coverage.bounds import Bounds, around
 from tests.coverage.case import Case
 from tests.coverage.latent import LatentTrait
 from tests.coverage.methods import delta, of_items, of_raters, two_way
 from tests.coverage.multinomial import DirichletMultinomial
-from tests.coverage.studies import Design, Model
+from tests.coverage.simulate import TARGETS
+from tests.coverage.studies import Design, Model, Target
 
 pytestmark = pytest.mark.filterwarnings("ignore::masrel.errors.MasrelWarning")
 SIZE = 40
@@ -70,8 +72,8 @@ def test_kappa_without_an_item_and_a_rater(case: Case) -> None:
         )
 
 
-@pytest.mark.parametrize("target", ["items", "raters", "both"])
-def test_jackknives(case: Case, target: str) -> None:
+@pytest.mark.parametrize("target", TARGETS)
+def test_jackknives(case: Case, target: Target) -> None:
     ours = {
         "items": of_items(case, "plain", stopgap=False),
         "raters": of_raters(case, "plain", stopgap=False),
@@ -89,7 +91,11 @@ def test_jackknives(case: Case, target: str) -> None:
 
 def test_delta_method_on_two_scales(case: Case) -> None:
     scale = range(case.studies.n_categories)
-    for ours, distribution in ((delta(case), "t"), (delta(case, "Fisher z"), "logit")):
+    asked: dict[Distribution, Bounds] = {
+        "t": delta(case),
+        "fisher": delta(case, "Fisher z"),
+    }
+    for distribution, ours in asked.items():
         for table, low, high in zip(tables(case), ours.low, ours.high, strict=True):
             found = analytic(
                 "fleiss_kappa",
