@@ -16,12 +16,13 @@ from masrel import agreement
 
 DOCS = Path(__file__).parents[2] / "docs"
 INDEX = DOCS / "agreement.md"
+INTERVALS = DOCS / "intervals.md"
 PAGES = sorted((DOCS / "agreement").glob("*.md"))
 WITH_COMMANDS = [DOCS / "tutorial.md", DOCS / "agreement" / "command_line.md"]
 
 EXAMPLES = [
     pytest.param(code, id=f"{page.stem}-{number}")
-    for page in [INDEX, *PAGES]
+    for page in [INDEX, INTERVALS, *PAGES]
     for number, code in enumerate(
         re.findall(r"```python\n(.*?)```", page.read_text("utf-8"), flags=re.DOTALL)
     )
@@ -101,7 +102,7 @@ def test_every_page_of_commands_shows_some() -> None:
     assert {param.values[0] for param in COMMANDS} == set(WITH_COMMANDS)
 
 
-@pytest.mark.parametrize("page", [INDEX, *PAGES], ids=lambda page: page.stem)
+@pytest.mark.parametrize("page", [INDEX, INTERVALS, *PAGES], ids=lambda page: page.stem)
 def test_a_page_has_an_example_and_good_links(page: Path) -> None:
     text = page.read_text("utf-8")
     assert "```python\n" in text
