@@ -65,10 +65,14 @@ def draw_errors(points: Sequence[tuple[str, int, float, float]], path: Path) -> 
         if found:
             x, y, items = zip(*found, strict=True)
             axes.loglog(x, y, MARKERS[name], color=colour, label=name, alpha=0.9)
-            for at, off, n in zip(x, y, items, strict=True):
-                note = f"{n:.0e}".replace("e+0", "e")
+            for i, (at, off, n) in enumerate(zip(x, y, items, strict=True)):
                 axes.annotate(
-                    note, (at, off), xytext=(3, 4), textcoords="offset points", size=6
+                    f"{n:.0e}".replace("e+0", "e"),
+                    (at, off),
+                    xytext=(0, -11 if i % 2 else 5),  # so that neighbours keep apart
+                    textcoords="offset points",
+                    ha="center",
+                    size=6,
                 )
     axes.axhline(2**-54, color="0.6", lw=0.8, ls="--")
     axes.set_xlabel("time (s); beside each point the number of items")
