@@ -146,7 +146,8 @@ def command(
     if json_file == Path("-"):
         click.echo("".join(f"{note}\n" for note in about), err=True, nl=False)
     else:
-        _print(agreement_table(rows, file, by, wanted, about), printed)
+        data = "simulated" if ratings.simulated else "foreign"
+        _print(agreement_table(rows, file, by, wanted, about, data), printed)
     if target is None:
         click.echo(NO_INTERVAL, err=True)
     elif figure is not None:

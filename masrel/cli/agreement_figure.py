@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from masrel.cli.agreement_rows import Row
 from masrel.errors import ParameterError
-from masrel.estimates import Target
+from masrel.estimates import Interval, Target
 
 if TYPE_CHECKING:
     from masrel.ratings import Ratings
@@ -86,14 +86,23 @@ def _line(row: Row, several: bool, target: Target) -> "ForestRow":
     from masrel.report.estimate_rows import as_words, has_zero
     from masrel.report.figures import ForestRow
 
-    estimate, interval = row.estimate, row.estimate.interval
-    differs = interval is not None and interval.target != target
+    estimate = row.estimate
     return ForestRow(
         label=row.title,
-        detail=_POPULATION[interval.target] if interval is not None and differs else "",
+        detail=_detail(estimate.interval, target),
         value=estimate.value,
-        interval=interval,
+        interval=estimate.interval,
         text=as_words(estimate),
         has_zero=has_zero(estimate.coefficient),
         group=row.session if several else "",
     )
+
+
+def _detail(interval: Interval | None, target: Target) -> str:
+    # what the axis and the legend do not say of it
+    from masrel.report.meaning import aside
+
+    if interval is None:
+        return ""
+    whom = "" if interval.target == target else _POPULATION[interval.target]
+    return ", ".join(text for text in (aside(interval), whom) if text)

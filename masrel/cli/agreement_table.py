@@ -19,6 +19,7 @@ def agreement_table(
     by: str | None,
     wanted: Wanted,
     about: tuple[str, ...] = (),
+    data: str = "foreign",
 ) -> "Table":
     """Lay the estimates out as a table.
 
@@ -34,6 +35,8 @@ def agreement_table(
         What was asked for.
     about : tuple of str, optional
         What to say of the ratings.
+    data : str, optional
+        Where they come from, in one word.
 
     Returns
     -------
@@ -61,7 +64,7 @@ def agreement_table(
         columns=tuple(columns),
         rows=tuple(_cells(row, by, wanted) for row in rows),
         notes=(*about, *_notes(rows, by, wanted)),
-        data="foreign",
+        data=data,
     )
 
 

@@ -1,17 +1,14 @@
-"""Bayesian intervals of Fleiss' kappa from the Dirichlet-multinomial model."""
+"""Bayesian intervals: of Fleiss' kappa by any raters, of any coefficient by two."""
 
-import dataclasses
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from masrel.agreement.coding import Label
-from masrel.agreement.counting import item_counts
 from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target
-from masrel.intervals.bootstrap import recorded_generator
 from masrel.intervals.case import Case, Statistic, open_case
 from masrel.intervals.prior import Prior, PriorName
 
@@ -23,6 +20,7 @@ __all__ = ["SPOKEN_OF", "posterior"]
 SPOKEN_OF = ("fleiss_kappa", "scott_pi", "krippendorff_alpha")
 """Coefficients whose value in the population is the model's ρ."""
 
+Model = Literal["dirichlet-multinomial", "table"]
 Method = Literal["exact", "emcee"]
 
 
@@ -34,55 +32,63 @@ def posterior(
     categories: Sequence[Label] | None = None,
     weights: "WeightName | ArrayLike" = "identity",
     level: float = 0.95,
+    model: Model = "dirichlet-multinomial",
     prior: PriorName = "uniform",
-    concentration: float = 1.0,
+    concentration: float | None = None,
     method: Method = "exact",
+    n_draws: int = 10_000,
     n_steps: int = 3_000,
     most_steps: int = 48_000,
     rng: np.random.Generator | int | None = None,
 ) -> Interval:
-    """Compute the posterior of the population's Fleiss' kappa.
+    """Compute the posterior of a coefficient in the population of items.
 
     Parameters
     ----------
-    coefficient : {"fleiss_kappa", "scott_pi", "krippendorff_alpha"} or callable
-        The model has one parameter of agreement, ρ, whose value in the population
-        all three share.
+    coefficient : str or callable
+        "fleiss_kappa", "scott_pi" or "krippendorff_alpha", whose value in the
+        population is the one parameter of agreement ρ of the Dirichlet-multinomial
+        model; with `model` "table" any coefficient of two raters but stratified ones.
     ratings : nested sequence, array_like or DataFrame, shape (n_items, n_raters)
         Labels or numbers; None and ``nan`` are missing. An item of one rating
-        informs the shares of the categories only.
+        informs the shares of the categories only; it is left out of the table.
     target : {"items"}
-        Items are the sample; raters are exchangeable in the model.
+        Items are the sample.
     categories : sequence, optional
         The declared scale in order. Categories nobody used count: the prior spreads
         over all that are declared.
-    weights : {"identity"}, optional
-        The model is of agreement on one category.
+    weights : str or array_like, optional
+        How much two categories agree; identity but for "table".
     level : float, optional
         Level of the central credible interval.
+    model : {"dirichlet-multinomial", "table"}, optional
+        Any raters who are exchangeable; or exactly two, each with margins of their own.
     prior : {"uniform", "jeffreys"}, optional
         ρ ~ U(0, 1), or ρ ~ Beta(1/2, 1/2), the prior of Jeffreys for a probability.
     concentration : float, optional
-        The shares of the categories are Dirichlet(concentration, ...).
+        Every share of a category is Dirichlet(concentration, ...), 1 unless given;
+        with "table" every cell, one over the number of cells unless given, a prior
+        as strong as one item.
     method : {"exact", "emcee"}, optional
         Quadrature, which draws nothing; or a sampler, to check it.
+    n_draws : int, optional
+        Draws where the table of more than two categories needs them.
     n_steps, most_steps : int, optional
         Steps of every walker at first, and where the sampler gives up; for "emcee".
     rng : Generator or int, optional
-        Where randomness comes from; an integer is recorded as the seed. Without
-        it a fresh seed is drawn and recorded; for "emcee".
+        Where randomness comes from, if any is needed; an integer is recorded as the
+        seed. Without it a fresh seed is drawn and recorded.
 
     Returns
     -------
     Interval
-        A central credible interval. With "exact" its `distribution` is the density
-        of ρ; with "emcee" there is the Monte Carlo error of each endpoint, and
-        `n_resamples` counts the draws.
+        A central credible interval, its `distribution` the density. Where it was
+        drawn, with the Monte Carlo error of each endpoint.
 
     Raises
     ------
     ParameterError
-        If an option is none, or this model does not answer it.
+        If an option is none, or the model does not answer it.
     RatingsError
         If the ratings do not fit.
     ConvergenceError
@@ -95,10 +101,16 @@ def posterior(
 
     Notes
     -----
-    An item's category probabilities are Dirichlet(A π) and its ratings multinomial;
-    ρ = 1 / (1 + A). π is integrated out in closed form, and ρ by quadrature, to
-    about 1e-12 [1]_. Where the prior weighs, a note gives the interval under
-    another.
+    Dirichlet-multinomial: an item's category probabilities are Dirichlet(A π) and its
+    ratings multinomial; ρ = 1 / (1 + A). π is integrated out in closed form, and ρ by
+    quadrature, to about 1e-12 [1]_.
+
+    Table: the chances of the pairs of categories are Dirichlet. Percent agreement and
+    Brennan-Prediger's coefficient, unweighted, are then a Beta; with two categories all
+    are integrated by quadrature, to about 1e-10; with more, how often the raters agree
+    is integrated and the rest drawn.
+
+    Where the prior weighs, a note gives the interval under another.
 
     References
     ----------
@@ -120,108 +132,57 @@ def posterior(
         weights=weights,
         level=level,
     )
-    _check_model(case, weights)
-    believed = Prior.of(prior, concentration)
-    if method not in get_args(Method):
-        raise ParameterError(
-            f"method: needs one of {', '.join(get_args(Method))}, got {method!r}"
-        )
-    words = f"Dirichlet-multinomial posterior, {method}"
-    counts = item_counts(case.coded)
-    reason = _nothing_to_learn(counts)
-    if reason is not None:
-        undefined = case.undefined(reason, method=words, unit=None)
-        return dataclasses.replace(undefined, kind="credible")
+    believed = Prior.of(prior, 1.0 if concentration is None else concentration)
+    _check(case, weights, model, method, believed)
     # Imported here: the other intervals load neither scipy nor emcee.
-    from masrel.intervals.rho import prior_notes
+    if model == "table":
+        from masrel.intervals.table_interval import table_interval
 
-    if method == "exact":
-        found = _integrated(case, counts, believed, words)
-    else:
-        found = _sampled(case, counts, believed, words, n_steps, most_steps, rng)
-    notes = prior_notes(counts, believed, level, found.low, found.high)
-    return dataclasses.replace(found, notes=notes)
+        return table_interval(case, concentration, n_draws=n_draws, rng=rng)
+    from masrel.intervals.rho_interval import rho_interval
+
+    return rho_interval(
+        case,
+        believed,
+        sampled=method == "emcee",
+        n_steps=n_steps,
+        most_steps=most_steps,
+        rng=rng,
+    )
 
 
-def _check_model(case: Case, weights: "WeightName | ArrayLike") -> None:
+def _check(
+    case: Case,
+    weights: "WeightName | ArrayLike",
+    model: Model,
+    method: Method,
+    prior: Prior,
+) -> None:
+    for name, given, options in (("model", model, Model), ("method", method, Method)):
+        if given not in get_args(options):
+            known = ", ".join(get_args(options))
+            raise ParameterError(f"{name}: needs one of {known}, got {given!r}")
+    if case.target != "items":
+        raise ParameterError(
+            "target: a posterior speaks of other items, so "
+            f'"items"; for other raters use the jackknife; got "{case.target}"'
+        )
+    if model == "table":
+        if method != "exact" or prior.name != "uniform":
+            raise ParameterError(
+                'model: "table" has one prior, Dirichlet(concentration, ...), and no '
+                f'sampler; got prior="{prior.name}", method="{method}"'
+            )
+        return
     if case.entry.name not in SPOKEN_OF:
         raise ParameterError(
             "coefficient: the Dirichlet-multinomial model speaks of fleiss_kappa and "
             "of scott_pi and krippendorff_alpha, whose value in the population is the "
-            f"same; got {case.entry.name}"
+            'same; for two raters model="table" speaks of others; got '
+            f"{case.entry.name}"
         )
     if not (isinstance(weights, str) and weights == "identity"):
         raise ParameterError(
             "weights: the Dirichlet-multinomial model is of unweighted agreement, so "
-            f'"identity"; got {weights!r}'
+            f'"identity"; for two raters model="table" takes weights; got {weights!r}'
         )
-    if case.target != "items":
-        raise ParameterError(
-            "target: the Dirichlet-multinomial model speaks of other items, so "
-            f'"items"; for other raters use the jackknife; got "{case.target}"'
-        )
-
-
-def _nothing_to_learn(counts: NDArray[np.int64]) -> str | None:
-    # shape of counts: (n_items, n_categories)
-    if not (counts.sum(axis=1) >= 2).any():
-        return "no item has ratings of two raters"
-    if counts.shape[1] < 2:
-        return "one category is declared"
-    return None
-
-
-def _integrated(
-    case: Case, counts: NDArray[np.int64], prior: Prior, words: str
-) -> Interval:
-    from masrel.intervals.rho import ExactPosterior
-
-    found = ExactPosterior.of(counts, prior, case.level)
-    return Interval(
-        low=found.low,
-        high=found.high,
-        level=case.level,
-        kind="credible",
-        method=words,
-        target=case.target,
-        distribution=found.distribution(f"posterior of ρ, prior {prior.words}"),
-    )
-
-
-def _sampled(
-    case: Case,
-    counts: NDArray[np.int64],
-    prior: Prior,
-    words: str,
-    n_steps: int,
-    most_steps: int,
-    rng: np.random.Generator | int | None,
-) -> Interval:
-    from masrel.intervals.dirichlet import DirichletMultinomial
-    from masrel.intervals.mcmc import sample
-
-    generator, seed = recorded_generator(rng)
-    model = DirichletMultinomial.of_counts(
-        counts, concentration=prior.concentration, shape=prior.shape
-    )
-    draws = sample(
-        model.log_density,
-        model.n_dimensions,
-        lambda position: model.parts(position)[0],
-        generator=generator,
-        n_steps=n_steps,
-        most_steps=most_steps,
-    )
-    tail = 0.5 * (1.0 - case.level)
-    errors = (draws.quantile_error(tail), draws.quantile_error(1.0 - tail))
-    return Interval(
-        low=draws.quantile(tail),
-        high=draws.quantile(1.0 - tail),
-        level=case.level,
-        kind="credible",
-        method=words,
-        target=case.target,
-        n_resamples=int(draws.values.size),
-        monte_carlo_error=errors,
-        seed=seed,
-    )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from masrel.agreement import COEFFICIENTS
 from masrel.analysis import PlannedEstimate
 from masrel.estimates import Estimate, Interval
-from masrel.report.meaning import meaning
+from masrel.report.meaning import aside, meaning
 from masrel.report.tables import UNDEFINED, counted, interval_words, number, percent
 
 __all__ = [
@@ -91,7 +91,9 @@ class EstimateRow:
         )
         if self.interval is None:
             return size
-        return f"{size}; {self.interval.kind}, {TARGETS[self.interval.target]}"
+        said = (self.interval.kind, aside(self.interval))
+        how = ", ".join(text for text in said if text)
+        return f"{size}; {how}, {TARGETS[self.interval.target]}"
 
     @property
     def remarks(self) -> tuple[str, ...]:

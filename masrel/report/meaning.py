@@ -5,7 +5,7 @@ from typing import Literal
 from masrel.estimates import Interval
 from masrel.report.rounding import percent
 
-__all__ = ["Noun", "meaning", "origin", "promise"]
+__all__ = ["Noun", "aside", "meaning", "origin", "promise"]
 
 Noun = Literal["model", "item"]
 """What is rated: a haptic model in a study, any item elsewhere."""
@@ -15,6 +15,9 @@ _POPULATIONS = {
     "items": "these raters graded other {}s like these",
     "both": "other raters graded other {}s, both like these",
 }
+
+
+_WIDER = "and the spread of raters"
 
 
 def meaning(interval: Interval, noun: Noun) -> str:
@@ -70,11 +73,34 @@ def promise(interval: Interval, noun: Noun) -> str:
             "this way would hold the value that all such studies together would give"
         )
     bounded = interval.method.endswith("one-sided")
+    given = "these ratings and the prior"
+    if interval.target != "items":  # the model knows of no rater
+        given = "these ratings, the prior and raters who differ by chance alone"
     where = "above the lower end" if bounded else "inside"
     return (
-        f"given these ratings and the prior, the value that would be found if "
-        f"{population}, without end, lies {where} with probability {level}"
+        f"given {given}, the value that would be found if {population}, "
+        f"without end, lies {where} with probability {level}"
     )
+
+
+def aside(interval: Interval) -> str:
+    """Say in few words how the ends differ from quantiles of the distribution.
+
+    Parameters
+    ----------
+    interval : Interval
+        The interval.
+
+    Returns
+    -------
+    str
+        Nothing where they do not.
+    """
+    if interval.method.endswith("one-sided"):
+        return "one-sided"
+    if interval.method.endswith(_WIDER):
+        return "posterior, wider by the spread of raters"
+    return ""
 
 
 def origin(interval: Interval, noun: Noun) -> str:
@@ -94,7 +120,7 @@ def origin(interval: Interval, noun: Noun) -> str:
         was left out or drawn.
     """
     units = {"items": f"{noun}s", "raters": "raters", "both": f"{noun}s and raters"}
-    if interval.method.endswith("the spread of raters"):
+    if interval.method.endswith(_WIDER):
         return " (a posterior, made wider by what raters differ by)"
     if interval.unit is None:
         return ""

@@ -131,3 +131,22 @@ def test_simulated_sessions_are_headed_and_labelled(
     svg = file.read_text("utf-8")
     for words in ("SIMULATED DATA", ">first<", ">second<", "resamples"):
         assert words in svg
+
+
+def test_the_table_of_simulated_ratings_is_labelled(
+    masrel: Caller, tmp_path: Path
+) -> None:
+    ratings = tmp_path / "ratings.csv"
+    ratings.write_text(TWO_SESSIONS, encoding="utf-8")
+    table = masrel("agree", ratings, "--by", "session")
+    assert table.out.startswith("SIMULATED DATA. ")
+    rows = masrel("agree", ratings, "--by", "session", "--csv").out.splitlines()[1:]
+    assert all(row.endswith(",simulated") for row in rows)
+
+
+@pytest.mark.usefixtures("readable")
+def test_a_bound_is_said_to_be_one(masrel: Caller, tmp_path: Path) -> None:
+    ratings, file = tmp_path / "wide.csv", tmp_path / "drawn.svg"
+    ratings.write_text("item,A,B\n1,1,1\n2,2,2\n3,3,3\n4,1,1\n", encoding="utf-8")
+    masrel("agree", ratings, "--target", "items", "--figure", file)
+    assert "one-sided" in file.read_text("utf-8")

@@ -225,7 +225,7 @@ def test_where_the_prior_alone_would_speak_it_is_undefined(
         ({"method": "gibbs"}, "method: needs one of exact, emcee, got 'gibbs'"),
         ({"concentration": 0.0}, "concentration: needs a positive number, got 0.0"),
         ({"concentration": math.inf}, "concentration: needs a positive number"),
-        ({"weights": "linear"}, "so \"identity\"; got 'linear'"),
+        ({"weights": "linear"}, 'so "identity"; for two raters'),
         ({"target": "raters"}, 'so "items"; for other raters use the jackknife'),
         ({"target": "both"}, 'got "both"'),
         ({"coefficient": "cohen_kappa"}, "speaks of fleiss_kappa"),

@@ -5,11 +5,13 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
 
 from masrel.estimates import Distribution, Interval
 from masrel.report import figures
 from masrel.report.figures import ForestRow, GradeGrid, SpeedColumn, TracePanel
-from masrel.report.figures.style import STYLE
+from masrel.report.figures import forest as forest_module
+from masrel.report.figures.style import STYLE, house_style
 
 PNG = b"\x89PNG\r\n\x1a\n"
 
@@ -134,10 +136,85 @@ def test_a_grade_is_written_in_its_cell_and_a_missing_one_is_a_dash(
     assert svg.count(">–</text>") == 3  # two missing grades, no intended one
 
 
+def forest_text(rows: list[ForestRow], monkeypatch: pytest.MonkeyPatch) -> str:
+    monkeypatch.setitem(STYLE, "svg.fonttype", "none")
+    return figures.draw_forest(rows, axis_label="κ", stamp="").svg.decode()
+
+
+def row(shown: Interval | None = None, **changes: Any) -> ForestRow:
+    made = {"label": "a", "value": 0.5, "interval": shown, "text": "0.5"}
+    return ForestRow(**{**made, **changes})
+
+
 def test_an_estimate_that_is_not_there_is_said_in_the_figure(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setitem(STYLE, "svg.fonttype", "none")
-    svg = figures.draw_forest(forest(), axis_label="κ", stamp="").svg
-    assert b"undefined" in svg
-    assert b"not in these data" in svg
+    svg = forest_text(forest(), monkeypatch)
+    assert "undefined" in svg
+    assert "not in these data" in svg
+
+
+@pytest.mark.parametrize(
+    ("shown", "named"),
+    [
+        (None, set()),
+        (interval(low=float("nan"), high=float("nan")), set()),
+        (interval(), {"95 % confidence interval"}),
+        (interval(level=0.9), {"90 % confidence interval"}),
+        (posterior(), {"95 % credible interval", "posterior density"}),
+        (resampled(), {"95 % confidence interval", "in bars", "of one value"}),
+        (resampled(50), {"95 % confidence interval", "of one value"}),
+    ],
+)
+def test_the_legend_names_what_is_drawn_and_nothing_else(
+    monkeypatch: pytest.MonkeyPatch, shown: Interval | None, named: set[str]
+) -> None:
+    svg = forest_text([row(shown)], monkeypatch)
+    every = {
+        "90 % confidence interval",
+        "95 % confidence interval",
+        "95 % credible interval",
+        "posterior density",
+        "in bars",
+        "of one value",
+    }
+    assert {words for words in every if words in svg} == named
+
+
+def test_a_heading_stands_once_above_its_rows(monkeypatch: pytest.MonkeyPatch) -> None:
+    rows = [row(group=group) for group in ("test", "test", "retest")]
+    svg = forest_text(rows, monkeypatch)
+    assert (svg.count(">test<"), svg.count(">retest<")) == (1, 1)
+
+
+def drawn_axes(*rows: ForestRow) -> Axes:
+    with house_style():
+        (axes,) = forest_module._figure(rows, "κ").axes
+    return axes
+
+
+def lines_at_zero(axes: Axes) -> list[tuple[float, float]]:
+    found = (line.get_xydata() for line in axes.lines if line.get_zorder() == 1.0)
+    return [(ends[0][1], ends[1][1]) for ends in found]
+
+
+def test_zero_is_marked_where_chance_gives_it_alone() -> None:
+    axes = drawn_axes(row(has_zero=False), row(), row(), row(has_zero=False), row())
+    first, second = lines_at_zero(axes)
+    assert first == pytest.approx((0.25, 0.75))
+    assert second == pytest.approx((1.0, 1.25))
+    assert lines_at_zero(drawn_axes(row(has_zero=False))) == []
+
+
+@pytest.mark.parametrize(
+    ("value", "low", "markers"),
+    [(0.5, -0.9, {"|", "o"}), (0.5, -7.0, {"|", "o", "<"}), (-9.0, -20.0, {"|", "<"})],
+)
+def test_what_leaves_the_axis_is_an_arrow_at_its_end(
+    value: float, low: float, markers: set[str]
+) -> None:
+    axes = drawn_axes(row(interval(low=low), value=value))
+    assert axes.get_xlim()[0] >= -1.05
+    assert {line.get_marker() for line in axes.lines} - {"None"} == markers
+    inside = [x for line in axes.lines for x in line.get_xdata()]
+    assert min(inside) >= axes.get_xlim()[0]

@@ -16,6 +16,7 @@ from masrel.protocol import elbow_parameters
 from masrel.ratings import Ratings
 from masrel.report import ReportFiles, write_report
 from masrel.report.contents import SECTIONS, build_sections
+from masrel.report.figures.style import STYLE
 from masrel.report.material import Drawing, Material, Paragraph
 from masrel.report.tables import Table, as_text
 from tests.analysis.studies import (
@@ -196,3 +197,18 @@ def test_of_repeated_presentations_every_speed_counts() -> None:
     summary = speeds.blocks[1]
     assert isinstance(summary, Table)
     assert summary.rows[0][:4] == ("HM1", "test", 2, 100.0)
+
+
+def test_the_forest_shows_the_posterior_behind_an_interval(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(STYLE, "svg.fonttype", "none")
+    line = plan(id="kappa", interval="posterior", target="items")
+    protocol, rows = protocol_with(line, sections=("agreement",)), table_v()
+    analysis = analyze(protocol, rows)
+    made = Material(protocol=protocol, ratings=rows, analysis=analysis)
+    (section,) = build_sections(made)
+    (forest,) = [block for block in section.blocks if isinstance(block, Drawing)]
+    first, second = forest.draw().svg, forest.draw().svg
+    assert b"posterior density" in first
+    assert first == second

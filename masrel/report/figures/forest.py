@@ -14,7 +14,6 @@ from matplotlib.patches import Patch
 
 from masrel.estimates import Distribution, Interval
 from masrel.report.figures.ridge import (
-    BAR_WIDTH,
     RIDGE_ALPHA,
     RIDGE_COLOURS,
     Part,
@@ -35,13 +34,14 @@ from masrel.report.figures.style import (
     house_style,
     put_stamp,
 )
-from masrel.report.rounding import as_given, percent
+from masrel.report.rounding import percent
 
 __all__ = ["ForestRow", "draw_forest", "forest_file"]
 
 # Heights in inches: of a line of text, of a line below it, of a ridge and a heading.
 _LINE, _DETAIL, _RIDGE, _GROUP = 0.25, 0.14, 0.34, 0.28
-_LEAST = -1.0  # the axis goes no further: an interval that does ends in an arrow
+_LEAST = -1.0  # the axis goes no further: what does is an arrow at its end
+_RIGHT = 1.03
 
 _LOOKS: dict[str, dict[str, Any]] = {
     "confidence": {
@@ -59,7 +59,7 @@ _ZERO: dict[str, Any] = {"color": GREY, "linewidth": 0.8, "linestyle": DASHES}
 _PARTS: dict[Part, str] = {
     "density": "posterior density, each to its own height",
     "stems": "resamples of one value, each row to its own height",
-    "bars": f"resamples within {as_given(BAR_WIDTH)}, each row to its own height",
+    "bars": "resamples together in bars, each row to its own height",
 }
 
 
@@ -94,8 +94,10 @@ class ForestRow:
     @property
     def drawn(self) -> Interval | None:
         """The interval, if its ends are known."""
-        known = self.interval is not None and not math.isnan(self.interval.low)
-        return self.interval if known else None
+        if self.interval is None:
+            return None
+        known = map(math.isfinite, (self.interval.low, self.interval.high))
+        return self.interval if all(known) else None
 
     @property
     def distribution(self) -> Distribution | None:
@@ -169,7 +171,7 @@ def _figure(rows: Sequence[ForestRow], axis_label: str) -> Figure:
     figure = Figure(figsize=(7.2, bottom + 0.6 + 0.17 * len(handles)))
     axes = figure.add_subplot()
     left = max(_least(rows), _LEAST) - 0.05
-    axes.set_xlim(left, 1.03)
+    axes.set_xlim(left, _RIGHT)
     axes.set_ylim(bottom, 0.0)
     for above, below in _zeros(placed):
         axes.plot([0.0, 0.0], [above, below], **_ZERO, zorder=1.0)
@@ -251,8 +253,14 @@ def _row(axes: Axes, y: float, row: ForestRow, left: float) -> None:
     if row.drawn is not None:
         _interval(axes, y, row.drawn, left)
     if row.value is not None and row.is_known:
-        axes.plot([row.value], [y], **_DOT)
+        _dot(axes, y, row.value, left)
     _words(axes, y, row)
+
+
+def _dot(axes: Axes, y: float, value: float, left: float) -> None:
+    inside = min(max(value, left), _RIGHT)
+    marker = "o" if inside == value else "<" if value < left else ">"
+    axes.plot([inside], [y], clip_on=False, **{**_DOT, "marker": marker})
 
 
 def _interval(axes: Axes, y: float, interval: Interval, left: float) -> None:

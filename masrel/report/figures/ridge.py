@@ -1,8 +1,8 @@
 """The distribution of an estimate, as a small ridge above its interval.
 
 A density is a filled curve. Resamples are shares: a value that many of them have is a
-stem at its place, and all others are put together in bars of equal width, so that a
-point mass is never smeared and a stem and a bar of the same height are the same share.
+stem at its place, and all others are put together in bars, of one width in a row, so
+that a point mass is never smeared and a stem and a bar of one height are one share.
 """
 
 from typing import Any, Literal
@@ -15,7 +15,6 @@ from masrel.estimates import Distribution
 from masrel.report.figures.style import BLUE, ORANGE
 
 __all__ = [
-    "BAR_WIDTH",
     "RIDGE_ALPHA",
     "RIDGE_COLOURS",
     "Part",
@@ -27,15 +26,15 @@ __all__ = [
 Part = Literal["density", "stems", "bars"]
 """What a ridge is made of."""
 
-BAR_WIDTH = 0.02
-"""Width of the bars of resamples."""
-
 RIDGE_COLOURS: dict[Part, str] = {"density": ORANGE, "stems": BLUE, "bars": BLUE}
 """Colour of each part."""
 
 RIDGE_ALPHA = 0.35
 """How much of it a ridge's fill has."""
 
+_WIDTHS = (0.02, 0.01, 0.005, 0.002, 0.001)
+_FEWEST = 12  # bars that the middle of the resamples is to have
+_MIDDLE = (0.005, 0.995)
 _FEW = 60  # values that are all shown as stems
 _MANY = 0.05  # share of the resamples above which one value is a stem
 _FAINT = 0.01  # of the greatest height: what is below it needs no room
@@ -138,8 +137,17 @@ def _bars(
     # (n_bars + 1,), (n_bars,); a value on an edge belongs to the bar below, as 1 does
     if not values.size:
         return np.zeros(1), np.zeros(0)
-    at = np.ceil(values / BAR_WIDTH - _SAME).astype(np.int64)
+    width = _width(values, shares)
+    at = np.ceil(values / width - _SAME).astype(np.int64)
     first = at[0]
     heights = np.bincount(at - first, weights=shares).astype(np.float64)
-    edges = BAR_WIDTH * np.arange(first - 1, first + heights.size)
+    edges = width * np.arange(first - 1, first + heights.size)
     return edges, heights
+
+
+def _width(values: NDArray[np.float64], shares: NDArray[np.float64]) -> float:
+    # the widest that shows the shape of what is narrow, too
+    below = shares.cumsum() / shares.sum()
+    low, high = values[np.searchsorted(below, _MIDDLE).clip(0, values.size - 1)]
+    enough = (width for width in _WIDTHS if _FEWEST * width <= high - low)
+    return next(enough, _WIDTHS[-1])
