@@ -164,6 +164,8 @@ def _posterior(choice: Choice, excess: float) -> Interval:
     if excess:
         method += ", and the spread of raters"
     notes = prior_notes(choice.counts, _PRIOR, case.level, found.low, found.high)
+    if not low <= case.value <= high:
+        notes += ("widened to the estimate, which lies outside the posterior's",)
     interval = case.closed(
         min(low, case.value), max(high, case.value), method=method, unit=None
     )

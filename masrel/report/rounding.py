@@ -29,7 +29,7 @@ def number(value: float | None, digits: int) -> str:
     Parameters
     ----------
     value : float or None
-        The number; ``nan`` is shown as undefined, None as absent.
+        The number; ``nan`` is shown as undefined, None as absent, no bound as ∞.
     digits : int
         Decimals.
 
@@ -45,7 +45,9 @@ def number(value: float | None, digits: int) -> str:
     """
     if value is None:
         return ABSENT
-    if not math.isfinite(value):
+    if math.isinf(value):
+        return "∞" if value > 0.0 else "−∞"
+    if math.isnan(value):
         return UNDEFINED
     text = f"{value:.{digits}f}"
     if float(text) == 0.0:
@@ -170,6 +172,6 @@ def interval_words(low: float, high: float, digits: int = 3) -> str:
     str
         Such as ``"[0.320, 0.933]"``, or that it is undefined.
     """
-    if not (math.isfinite(low) and math.isfinite(high)):
+    if math.isnan(low) or math.isnan(high):
         return f"[{UNDEFINED}]"
     return f"[{number(low, digits)}, {number(high, digits)}]"

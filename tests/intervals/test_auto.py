@@ -144,6 +144,7 @@ def test_a_posterior_is_widened_to_an_estimate_that_it_leaves_out() -> None:
     found = chosen([["a", "b"], ["b", "a"], ["a", "b"]], "items")
     assert found.low == -1.0
     assert found.high > 0
+    assert any("widened to the estimate" in note for note in found.notes)
 
 
 def test_a_spread_that_is_an_accident_is_none() -> None:

@@ -55,6 +55,7 @@ def test_undefined_and_absent_are_told_apart() -> None:
     assert shown(math.nan, column) == "undefined"
     assert shown(None, column) == "–"
     assert interval_words(math.nan, 0.5) == "[undefined]"
+    assert interval_words(-math.inf, 0.5) == "[−∞, 0.500]"  # an end without a bound
 
 
 # Landis and Koch (1977), p. 165: .00-.20 slight, .21-.40 fair, .41-.60 moderate,
