@@ -187,13 +187,24 @@ def _counted(
         scores = whole_scores(*slopes, n)
         control = control_of(scores, shares, n)
 
+    member = np.repeat(np.arange(shares.size), pool.times)
+    by_lookup = n < _BINOMIAL // 2 * shares.size
+
     def draw(size: int, generator: np.random.Generator) -> Batch:
-        counts = generator.multinomial(n, shares, size=size)
+        if by_lookup:
+            drawn = member[generator.integers(0, n, size=(size, n))]
+            drawn += shares.size * np.arange(size)[:, None]
+            counts = np.bincount(drawn.ravel(), minlength=size * shares.size)
+            counts = counts.reshape(size, shares.size)
+        else:
+            counts = generator.multinomial(n, shares, size=size)
         values = statistic(counts.astype(np.float64))
         return values, None if scores is None else counts @ scores
 
-    features = 0 if pool.rows is None else pool.rows.shape[1]
-    return Sampler(draw=draw, control=control, width=3 * shares.size + 4 * features)
+    width = 3 * shares.size + (2 * n if by_lookup else 0)
+    if pool.rows is not None:
+        width += 4 * pool.rows.shape[1]
+    return Sampler(draw=draw, control=control, width=width)
 
 
 def _bits(lattice: Lattice, n: int) -> Integers:

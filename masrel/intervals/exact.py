@@ -18,9 +18,10 @@ from masrel.intervals.states import box, merged_states, transformed_states
 __all__ = ["enumerate_resamples"]
 
 _MOST = 300_000  # resamples, or sums of them, that are enumerated rather than drawn
+_MOST_COUNTED = 60_000  # the same where a statistic is none of sums alone
 _FEW = 5_000  # resamples that are enumerated before anything else is tried
 _BOX = 3_000_000  # places of a table whose transform is taken
-_BLOCK = 1 << 16  # numbers held at once while values are computed
+_BLOCK = 1 << 14  # numbers held at once while values are computed
 
 
 def enumerate_resamples(
@@ -53,7 +54,7 @@ def enumerate_resamples(
         found = _merged(pool, n_distinct, insist)
         if found is not None:
             return found
-    if n_distinct <= _MOST:
+    if n_distinct <= (_MOST if insist or statistic is None else _MOST_COUNTED):
         return _enumerated(pool, statistic)
     if insist:
         raise ParameterError(

@@ -15,7 +15,7 @@ Integers = NDArray[np.int64]
 _LARGEST = 10**5  # denominators above this are taken for irrational numbers
 _MOST = 2.0**52  # integers that a float still holds
 _WHOLE = 1e-13  # of a number: as near to an integer as that it is one, but for rounding
-_DIMENSIONS = 12  # a lattice of more helps nobody
+_DIMENSIONS, _ROWS = 12, 2_000  # a lattice of more helps nobody
 _TURNS = 50
 
 
@@ -77,8 +77,10 @@ def lattice_of(rows: Floats, shares: Floats, n: int) -> Lattice | None:
     -------
     Lattice or None
         None if some features are not rational, their numerators are too large, or
-        the rows span too many dimensions.
+        the rows are too many or span too many dimensions.
     """
+    if len(rows) > _ROWS:
+        return None
     denominators = _denominators(rows)
     if denominators is None:
         return None
@@ -165,16 +167,30 @@ def _coordinates(rows: Integers, basis: Integers) -> Integers:
 def _shorten(steps: Integers, basis: Integers, shares: Floats) -> Integers:
     # Lagrange's reduction, pair by pair: a coordinate less a multiple of another while
     # that makes its variance smaller; the basis changes in place.
+    centred = steps - shares @ steps
+    covariance = ((centred * shares[:, None]).T @ centred).tolist()
     for _ in range(_TURNS):
-        centred = steps - shares @ steps
-        covariance = (centred * shares[:, None]).T @ centred
-        variance = np.diag(covariance)
-        times = np.rint(covariance / variance) - np.eye(len(variance))
-        gain = times * (2.0 * covariance - times * variance)
-        if not times.any():
+        turn = _best_turn(covariance)
+        if turn is None:
             break
-        of, by = np.unravel_index(np.argmax(gain), gain.shape)
-        turns = int(times[of, by])
-        steps[:, of] -= turns * steps[:, by]
-        basis[by] += turns * basis[of]
+        of, by, times = turn
+        steps[:, of] -= times * steps[:, by]
+        basis[by] += times * basis[of]
+        for row in covariance:
+            row[of] -= times * row[by]
+        of_by = zip(covariance[of], covariance[by], strict=True)
+        covariance[of] = [x - times * y for x, y in of_by]
     return steps
+
+
+def _best_turn(covariance: list[list[float]]) -> tuple[int, int, int] | None:
+    # which coordinate loses most variance less how often which other
+    most, best = 0.0, None
+    for by, row in enumerate(covariance):
+        for of, shared in enumerate(row):
+            times = round(shared / row[by])
+            if times and of != by:
+                gain = times * (2.0 * shared - times * row[by])
+                if gain > most:
+                    most, best = gain, (of, by, times)
+    return best

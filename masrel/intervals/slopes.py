@@ -11,6 +11,7 @@ from masrel.intervals.pool import Pool
 __all__ = ["acceleration", "influence", "standard_errors", "studentized"]
 
 _STEP = 1e-30  # of the imaginary part: its square is nothing beside 1
+_NEAR = 1e-9  # so little that only what jumps moves
 _NO_SPREAD = 1e-9  # of the standard error of the estimate: rounding, not spread
 
 
@@ -33,7 +34,8 @@ def influence(pool: Pool, counts: Floats) -> Floats:
     -----
     The derivative of an analytic f at x is the imaginary part of f(x + ih) / h, to
     the last digits, because nothing is subtracted [1]_. Items are moved along an
-    orthogonal basis of their features, which has few directions; raters one by one.
+    orthogonal basis of their features, which has few directions; raters one by one. Of
+    a member that is not drawn it may be ``nan``, or no derivative at all.
 
     References
     ----------
@@ -44,10 +46,16 @@ def influence(pool: Pool, counts: Floats) -> Floats:
     if pool.rows is None:
         return _slopes(lambda at: pool.values(pool.sums(at)), counts, np.eye(pool.n))
     centred = pool.rows - pool.shares @ pool.rows
-    _, sizes, directions = np.linalg.svd(centred, full_matrices=False)
-    directions = directions[sizes > 1e-10 * max(float(sizes[0]), 1.0)]
-    slopes = _slopes(pool.values, pool.sums(counts), directions)
-    return np.asarray(slopes @ (directions @ centred.T))
+    sizes, vectors = np.linalg.eigh(centred.T @ centred)  # squares of their lengths
+    directions = vectors.T[sizes > 1e-14 * max(float(sizes[-1]), 1.0)]
+    sums = pool.sums(counts)
+    slopes = _slopes(pool.values, sums, directions) @ (directions @ centred.T)
+    # Where nobody has a feature, as a rater without a pair, a value may jump if the
+    # least part of one is added: there, only along the rows that are drawn.
+    bare = ((sums == 0.0) & pool.rows.any(axis=0)).any(axis=-1)
+    if bare.any():
+        slopes[bare] = _slopes(pool.values, sums[bare], pool.rows)
+    return slopes
 
 
 def _slopes(
@@ -60,8 +68,7 @@ def _slopes(
     with np.errstate(invalid="ignore", divide="ignore"):  # undefined ones
         for k, along in enumerate(directions):
             turned = values(cast("Floats", at + 1j * _STEP * along))
-            # A value that jumps, as where a rater has no pair, has no slope.
-            jumps = np.abs(turned.real - plain) > 1e-9
+            jumps = np.abs(turned.real - plain) > _NEAR
             slopes[..., k] = np.where(jumps, np.nan, turned.imag / _STEP)
     return slopes
 

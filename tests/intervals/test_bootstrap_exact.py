@@ -1,5 +1,6 @@
 """Exact bootstrap intervals against all n^n resamples in fractions."""
 
+import importlib
 import itertools
 import math
 import subprocess
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 
 from masrel.errors import ParameterError
+from masrel.estimates import Interval
 from masrel.intervals import bootstrap
 from tests.intervals import textbook
 from tests.intervals.data import TABLE_V, dirichlet_multinomial
@@ -29,7 +31,7 @@ FORMULAS = {
 }
 
 
-def exact(coefficient: str, table: object, **options: object) -> object:
+def exact(coefficient: str, table: object, **options: object) -> Interval:
     options = {"target": "items", "categories": range(3), "exact": True, **options}
     return bootstrap(coefficient, table, **options)  # type: ignore[arg-type]
 
@@ -132,26 +134,17 @@ def test_studentized_has_the_error_of_every_resample() -> None:
         assert ours.high == pytest.approx(min(high, 1.0), abs=1e-7)
 
 
-def test_raters_in_all_their_resamples() -> None:
-    table = [[0, 0, 1, 0], [1, 1, 2, 1], [2, 2, 2, 0], [0, 0, 0, 0]]
-    counted: Counter[Fraction | None] = Counter()
-    for taken in itertools.product(range(4), repeat=4):
-        pairs = [
-            (a, b)
-            for a, b in itertools.permutations(range(4), 2)
-            if taken[a] != taken[b]
-        ]
-        if not pairs:
-            counted[None] += 1
-            continue
-        observed = Fraction(
-            sum(row[taken[a]] == row[taken[b]] for row in table for a, b in pairs),
-            len(pairs) * len(table),
-        )
-        drawn = [[row[rater] for rater in taken] for row in table]
-        chance = sum(p * p for p in textbook.category_shares(drawn, 3))
-        counted[(observed - chance) / (1 - chance)] += 1
-    law = textbook.Law(counted)
+@pytest.mark.parametrize("whole", [True, False])
+def test_raters_in_all_their_resamples(whole: bool) -> None:
+    table: list[list[int | None]] = [
+        [0, 0, 1, 0],
+        [1, 1, 2, 1],
+        [2, 2, 2, 0],
+        [0, 0, 0, 0],
+    ]
+    if not whole:
+        table[1][2] = table[2][0] = table[2][1] = None
+    law = textbook.Law(rater_resamples(table))
     found = exact("fleiss_kappa", table, target="raters")
     assert found.unit == "raters"
     assert found.distribution is not None
@@ -163,6 +156,59 @@ def test_raters_in_all_their_resamples() -> None:
     )
     assert found.n_undefined == 4  # one rater four times
     assert found.low == pytest.approx(float(law.quantile(0.025)), abs=1e-13)
+
+
+def rater_resamples(table: textbook.Table) -> Counter[Fraction | None]:
+    """Fleiss' kappa of all 4^4 resamples, pairs of a rater with itself left out."""
+    counted: Counter[Fraction | None] = Counter()
+    for taken in itertools.product(range(4), repeat=4):
+        shares = []
+        for row in table:
+            pairs = [
+                (row[taken[a]], row[taken[b]])
+                for a, b in itertools.permutations(range(4), 2)
+                if taken[a] != taken[b]
+                and row[taken[a]] is not None
+                and row[taken[b]] is not None
+            ]
+            if pairs:
+                shares.append(Fraction(sum(a == b for a, b in pairs), len(pairs)))
+        drawn = [[row[rater] for rater in taken] for row in table]
+        chance = sum(p * p for p in textbook.category_shares(drawn, 3))
+        if not shares or chance == 1:
+            counted[None] += 1
+        else:
+            observed = sum(shares, Fraction(0)) / len(shares)
+            counted[(observed - chance) / (1 - chance)] += 1
+    return counted
+
+
+@pytest.mark.parametrize("kind", ["percentile", "bca"])
+def test_merging_changes_nothing(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    # 11 440 resamples, fewer sums: by the transform, merged, and each by itself
+    table = dirichlet_multinomial(np.random.default_rng(5), 9, 4, 0.3)
+    module = importlib.import_module("masrel.intervals.exact")
+    found = []
+    for few, places in ((0, 10**9), (0, 0), (10**9, 0)):
+        monkeypatch.setattr(module, "_FEW", few)
+        monkeypatch.setattr(module, "_BOX", places)
+        monkeypatch.setattr(module, "_MOST", 10**9 if few else 11_000)
+        found.append(exact("fleiss_kappa", table, kind=kind))
+    transformed, merged, alone = found
+    words = [f.distribution.words for f in found]
+    assert words[0] == words[1]
+    assert "sums of resamples" in words[0]
+    assert "sums" not in words[2]
+    for one in (transformed, merged):
+        assert one.low == pytest.approx(alone.low, abs=1e-13)
+        assert one.high == pytest.approx(alone.high, abs=1e-13)
+        assert one.n_undefined == alone.n_undefined
+        np.testing.assert_allclose(
+            one.distribution.values, alone.distribution.values, atol=1e-12
+        )
+        np.testing.assert_allclose(
+            one.distribution.weights, alone.distribution.weights, atol=1e-13
+        )
 
 
 def test_clusters_are_drawn_whole() -> None:

@@ -155,6 +155,58 @@ def test_a_resample_without_spread_is_infinitely_far_off() -> None:
     assert itself == 0.0
 
 
+def test_a_rater_without_a_pair_leaves_the_slopes_of_the_others_alone() -> None:
+    # One more item of the second rater would count in full; the items drawn have none.
+    first = [["a", "a"], ["b", "b"], ["a", "b"], ["b", "b"], ["b", "a"]]
+    second = [["a", "b"], ["b", "b"], [None, None], [None, None], [None, None]]
+    pool = item_pool(
+        open_case(
+            "stratified_kappa",
+            [first, second],
+            target="items",
+            categories=("a", "b"),
+            weights="identity",
+            level=0.95,
+        )
+    )
+    of_second = pool.rows[:, 7] > 0.0  # type: ignore[index]
+    assert of_second.sum() == 2
+    drawn = ~of_second
+    counts = np.zeros((1, 5))
+    counts[0, drawn] = 2.0, 2.0, 1.0
+    expected = by_differences(pool, counts[0], 1e-3)[drawn]
+    (slopes,) = influence(pool, counts)
+    np.testing.assert_allclose(slopes[drawn], expected, rtol=1e-8, atol=1e-10)
+    times = counts[0, drawn]
+    (error,) = standard_errors(pool, counts)
+    off = expected - times @ expected / pool.n
+    assert np.ptp(off) > 0.1
+    assert error == pytest.approx(np.sqrt(times @ off**2), rel=1e-7)
+
+
+def test_raters_who_are_not_drawn_are_not_asked_after() -> None:
+    # The last item is rated by the third rater alone: were he drawn, it would count.
+    table = [[0, 0, 0], [1, 1, 0], [2, 2, 2], [0, 1, 0], [None, None, 2]]
+    pool = rater_pool(
+        open_case(
+            "fleiss_kappa",
+            table,
+            target="raters",
+            categories=range(3),
+            weights="identity",
+            level=0.95,
+        )
+    )
+    counts = np.array([[1.0, 2.0, 0.0]])
+    (slopes,) = influence(pool, counts)
+    assert np.isnan(slopes[2])
+    (error,) = standard_errors(pool, counts)
+    mean = counts[0, :2] @ slopes[:2] / 3
+    assert error == pytest.approx(
+        np.sqrt(counts[0, :2] @ (slopes[:2] - mean) ** 2), rel=1e-12
+    )
+
+
 def test_acceleration_is_a_sixth_of_the_skewness_of_values_left_out() -> None:
     case = case_of("gwet_ac", n=14)
     features = case.features

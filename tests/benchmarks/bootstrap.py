@@ -1,0 +1,408 @@
+"""Bootstrap intervals beside other packages: time, error for the time, memory.
+
+``python -m tests.benchmarks.bootstrap [--quick] [--figure FILE]`` prints what its
+functions return. Peers that are not installed are left out.
+"""
+
+import argparse
+import importlib
+import math
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from masrel.intervals import bootstrap
+from tests.benchmarks.peers import present
+from tests.benchmarks.sidebyside import Timing, peak_megabytes, side_by_side
+
+Codes = NDArray[np.int64]
+Formula = Callable[[NDArray[np.int64]], float]
+Coefficient = Literal["fleiss_kappa", "gwet_ac"]
+
+N_RESAMPLES = 10_000
+OURS = "masrel"
+
+
+def made(n: int, r: int, q: int, seed: int = 1) -> Codes:
+    """Ratings of items that differ, codes 0 to q - 1."""
+    rng = np.random.default_rng(seed)
+    shares = rng.dirichlet(np.ones(q), n).cumsum(axis=1)
+    return (rng.random((n, r, 1)) > shares[:, None, :-1]).sum(axis=2)
+
+
+def counted(codes: Codes, q: int) -> NDArray[np.int64]:
+    """Raters per item and category."""
+    return np.stack([(codes == k).sum(axis=1) for k in range(q)], axis=1)
+
+
+def fleiss(counts: NDArray[np.int64]) -> float:
+    """Fleiss' kappa of (n_items, n_categories), in the fewest numpy calls."""
+    r = counts[0].sum()
+    observed = ((counts * counts).sum() / len(counts) - r) / (r * (r - 1))
+    shares = counts.sum(axis=0) / (r * len(counts))
+    chance = shares @ shares
+    return float((observed - chance) / (1.0 - chance))
+
+
+def gwet(counts: NDArray[np.int64]) -> float:
+    """Gwet's AC1 of (n_items, n_categories), in the fewest numpy calls."""
+    r, q = counts[0].sum(), counts.shape[1]
+    observed = ((counts * counts).sum() / len(counts) - r) / (r * (r - 1))
+    shares = counts.sum(axis=0) / (r * len(counts))
+    chance = (1.0 - shares @ shares) / (q - 1)
+    return float((observed - chance) / (1.0 - chance))
+
+
+FORMULAS: dict[Coefficient, Formula] = {"fleiss_kappa": fleiss, "gwet_ac": gwet}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Comparison:
+    """One study: seconds of 10 000 resamples, by package."""
+
+    name: str
+    times: dict[str, Timing]
+    scale: dict[str, float]
+
+    def seconds(self, name: str) -> float:
+        """The median of one package, for 10 000 resamples."""
+        return self.times[name].median * self.scale.get(name, 1.0)
+
+    def ratios(self) -> dict[str, tuple[float, float]]:
+        """Each peer's time over ours, with its relative spread."""
+        spread = self.times[OURS].spread
+        return {
+            name: (
+                self.seconds(name) / self.seconds(OURS),
+                float(np.hypot(spread, timing.spread)),
+            )
+            for name, timing in self.times.items()
+            if name != OURS
+        }
+
+
+def scipy_loop(counts: Codes, formula: Formula, n_resamples: int) -> tuple[float, ...]:
+    """scipy.stats.bootstrap with a Python statistic of the drawn items."""
+    from scipy.stats import bootstrap as theirs
+
+    found = theirs(
+        (np.arange(len(counts)),),
+        lambda items: formula(counts[items]),
+        n_resamples=n_resamples,
+        vectorized=False,
+        method="percentile",
+        rng=1,
+    )
+    return tuple(found.confidence_interval)
+
+
+def scipy_vectorized(
+    counts: Codes, name: Coefficient, n_resamples: int
+) -> tuple[float, ...]:
+    """scipy.stats.bootstrap with a statistic of many resamples at once."""
+    from scipy.stats import bootstrap as theirs
+
+    n, q = counts.shape
+    r = int(counts[0].sum())
+
+    def statistic(items: Codes, axis: int = -1) -> NDArray[np.float64]:
+        taken = np.moveaxis(counts[items], axis - 1, -2)
+        observed = ((taken * taken).sum(axis=(-1, -2)) / n - r) / (r * (r - 1))
+        squares = ((taken.sum(axis=-2) / (r * n)) ** 2).sum(axis=-1)
+        chance = squares if name == "fleiss_kappa" else (1.0 - squares) / (q - 1)
+        return np.asarray((observed - chance) / (1.0 - chance))
+
+    found = theirs(
+        (np.arange(n),),
+        statistic,
+        n_resamples=n_resamples,
+        vectorized=True,
+        batch=max(1, 2_000_000 // n),
+        method="percentile",
+        rng=1,
+    )
+    return tuple(found.confidence_interval)
+
+
+def arch_loop(counts: Codes, formula: Formula, n_resamples: int) -> tuple[float, ...]:
+    """arch.bootstrap.IIDBootstrap with a Python statistic."""
+    from arch.bootstrap import IIDBootstrap
+
+    found = IIDBootstrap(counts, seed=1).conf_int(
+        formula, reps=n_resamples, method="percentile"
+    )
+    return tuple(found.ravel())
+
+
+def resample_loop(
+    counts: Codes, formula: Formula, n_resamples: int
+) -> tuple[float, ...]:
+    """resample.bootstrap with a Python statistic."""
+    from resample.bootstrap import confidence_interval
+
+    return confidence_interval(  # type: ignore[no-any-return]
+        formula, counts, size=n_resamples, ci_method="percentile", random_state=1
+    )
+
+
+def by_items(quick: bool) -> list[Comparison]:
+    """10 000 percentile resamples of each coefficient and size, turn by turn."""
+    lines = []
+    for n, r, q in ((16, 8, 3), (100, 5, 4), (10_000, 5, 4))[: 2 if quick else None]:
+        codes = made(n, r, q)
+        for name, formula in FORMULAS.items():
+            lines.append(_compare(codes, q, name, formula, turns=3 if quick else 9))
+            print(lines[-1].name, lines[-1].ratios(), flush=True)
+    return lines
+
+
+def _compare(
+    codes: Codes, q: int, name: Coefficient, formula: Formula, turns: int
+) -> Comparison:
+    counts, n = counted(codes, q), len(codes)
+    size = N_RESAMPLES if n < 1000 else N_RESAMPLES // 20
+    ours = partial(bootstrap, name, codes, target="items", categories=range(q), rng=1)
+    works: dict[str, Callable[[], object]] = {
+        OURS: partial(ours, exact=False),
+        "scipy, a Python statistic": lambda: scipy_loop(counts, formula, size),
+        "scipy, vectorized": lambda: scipy_vectorized(counts, name, size),
+    }
+    if present(["arch"]):
+        works["arch"] = lambda: arch_loop(counts, formula, size)
+    if present(["resample"]):
+        works["resample"] = lambda: resample_loop(counts, formula, size)
+    return Comparison(
+        name=f"{name}, {n:,} × {codes.shape[1]}",
+        times=side_by_side(works, turns=turns),
+        scale={peer: N_RESAMPLES / size for peer in works if peer != OURS},
+    )
+
+
+def exact_cost(quick: bool) -> list[tuple[str, str, Timing]]:
+    """Study, what is enumerated, and the time of an exact interval."""
+    studies: dict[str, tuple[Codes, int, str]] = {
+        "4 × 8, 4 categories": (made(4, 8, 4, 2), 4, "items"),
+        "8 × 8, 4 categories": (made(8, 8, 4), 4, "items"),
+        "8 raters of 16 items": (made(16, 8, 3), 3, "raters"),
+        "10 raters of 16 items": (made(16, 10, 3), 3, "raters"),
+        "16 × 8, 2 categories": (made(16, 8, 2), 2, "items"),
+        "12 × 8, 3 categories": (made(12, 8, 3), 3, "items"),
+        "30 × 3, 3 categories": (made(30, 3, 3), 3, "items"),
+        "100 × 8, 2 categories": (made(100, 8, 2), 2, "items"),
+        "600 × 5, 2 categories": (made(600, 5, 2), 2, "items"),
+        "1000 × 3, 2 categories": (made(1000, 3, 2), 2, "items"),
+    }
+    found = []
+    for study, (codes, q, target) in studies.items():
+        work = partial(
+            bootstrap,
+            "fleiss_kappa",
+            codes,
+            target=target,  # type: ignore[arg-type]
+            categories=range(q),
+            exact=True,
+        )
+        words = work().distribution.words  # type: ignore[union-attr]
+        timing = side_by_side({study: work}, turns=3 if quick else 15)[study]
+        found.append((study, words, timing))
+        print(study, words, f"{1e3 * timing.median:.3g} ms", flush=True)
+    return found
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Point:
+    """How far the ends of one method are off after so many seconds."""
+
+    method: str
+    n_resamples: int
+    seconds: float
+    error: float
+
+
+def errors(quick: bool) -> list[Point]:
+    """Root mean square error of the ends over the half width, against seconds."""
+    codes, q = made(300, 3, 2), 2
+    counts = counted(codes, q)
+    ours = partial(
+        bootstrap, "fleiss_kappa", codes, target="items", categories=range(q)
+    )
+    start = time.perf_counter()
+    exact = ours(exact=True)
+    points = [
+        Point(
+            method="exact",
+            n_resamples=0,
+            seconds=time.perf_counter() - start,
+            error=1e-12,
+        )
+    ]
+    half = 0.5 * (exact.high - exact.low)
+
+    def point(
+        method: str, size: int, seeds: int, work: Callable[[int], tuple[float, ...]]
+    ) -> None:
+        start = time.perf_counter()
+        ends = [work(seed) for seed in range(seeds)]
+        seconds = (time.perf_counter() - start) / seeds
+        off = (np.array(ends) - [exact.low, exact.high]) / half
+        error = math.sqrt(float((off**2).mean()))
+        points.append(
+            Point(method=method, n_resamples=size, seconds=seconds, error=error)
+        )
+        print(points[-1], flush=True)
+
+    def drawn(size: int, seed: int) -> tuple[float, ...]:
+        found = ours(exact=False, n_resamples=size, rng=seed)
+        return found.low, found.high
+
+    sizes = (1000, 10_000) if quick else (1000, 10_000, 100_000, 1_000_000)
+    for size in sizes:
+        seeds = 40 if size < 10**6 else 10
+        point("drawn with a control", size, seeds, partial(drawn, size))
+        with _no_control():
+            point("drawn", size, seeds, partial(drawn, size))
+    for size in sizes[: 2 if quick else 3]:
+        from scipy.stats import bootstrap as theirs
+
+        def loop(seed: int, size: int = size) -> tuple[float, ...]:
+            found = theirs(
+                (np.arange(len(counts)),),
+                lambda items: fleiss(counts[items]),
+                n_resamples=size,
+                vectorized=False,
+                method="percentile",
+                rng=seed,
+            )
+            return tuple(found.confidence_interval)
+
+        point("scipy, a Python statistic", size, max(4, 20_000 // size), loop)
+    return points
+
+
+@contextmanager
+def _no_control() -> Iterator[None]:
+    module = importlib.import_module("masrel.intervals.draws")
+    least = module._LEAST
+    module._LEAST = 10**18
+    try:
+        yield
+    finally:
+        module._LEAST = least
+
+
+def gains(quick: bool) -> list[tuple[str, float, float]]:
+    """Study, and how much less error² × time the control takes for 10 000 resamples.
+
+    Errors are those between 60 seeds; the ratio of two variances of 60 is known to a
+    quarter, over two ends to a fifth.
+    """
+    found = []
+    for n, r, q in ((30, 5, 3), (100, 5, 4), (1000, 5, 4), (10_000, 5, 4)):
+        if quick and n > 100:
+            continue
+        codes = made(n, r, q)
+
+        def ends(seed: int, codes: Codes = codes, q: int = q) -> tuple[float, ...]:
+            drawn = bootstrap(
+                "fleiss_kappa",
+                codes,
+                target="items",
+                categories=range(q),
+                exact=False,
+                rng=seed,
+            )
+            return drawn.low, drawn.high
+
+        def plain(seed: int, ends: Callable[[int], tuple[float, ...]] = ends) -> object:
+            with _no_control():
+                return ends(seed)
+
+        times = side_by_side(
+            {"with": partial(ends, 1), "without": partial(plain, 1)},
+            turns=5,
+        )
+        spread = [
+            np.array([work(seed) for seed in range(60)]).var(axis=0).mean()
+            for work in (ends, plain)
+        ]
+        less = float(spread[1] / spread[0])
+        slower = times["with"].median / times["without"].median
+        found.append((f"{n:,} × {r}, {q} categories", less, less / slower))
+        print(found[-1], flush=True)
+    return found
+
+
+def memory(quick: bool) -> dict[str, float]:
+    """Most megabytes at once above the ratings themselves, by kind of interval."""
+    n = 100_000 if quick else 1_000_000
+    codes = made(n, 5, 5).astype(np.int8)
+    found = {}
+    for kind in ("percentile", "bca", "studentized"):
+        work = partial(
+            bootstrap,
+            "fleiss_kappa",
+            codes,
+            target="items",
+            categories=range(5),
+            kind=kind,  # type: ignore[arg-type]
+            rng=1,
+        )
+        found[kind] = peak_megabytes(work)
+    print(f"{n:,} × 5", found, flush=True)
+    return found
+
+
+def draw_errors(points: list[Point], path: Path) -> None:
+    """Draw error against seconds, both on logarithmic axes."""
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(figsize=(6.4, 4.2), layout="constrained")
+    for method in dict.fromkeys(point.method for point in points):
+        of = [point for point in points if point.method == method]
+        axes.plot(
+            [point.seconds for point in of],
+            [point.error for point in of],
+            "s" if method == "exact" else "o-",
+            label=method,
+        )
+    axes.set(
+        xscale="log",
+        yscale="log",
+        xlabel="seconds",
+        ylabel="error of an end / half width",
+        title="300 items, 3 raters, 2 categories: 95 % percentile interval of κ",
+    )
+    axes.grid(visible=True, which="major", alpha=0.3)
+    axes.legend(frameon=False)
+    figure.savefig(path, dpi=160)
+    plt.close(figure)
+
+
+def main() -> None:
+    """Run everything and print it."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="small sizes")
+    parser.add_argument("--figure", type=Path, help="where the figure is written")
+    asked = parser.parse_args()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        print(present(["numpy", "scipy", "arch", "resample"]))
+        by_items(asked.quick)
+        exact_cost(asked.quick)
+        gains(asked.quick)
+        memory(asked.quick)
+        points = errors(asked.quick)
+    if asked.figure is not None:
+        draw_errors(points, asked.figure)
+
+
+if __name__ == "__main__":
+    main()
