@@ -300,6 +300,18 @@ def test_the_words_say_what_it_is() -> None:
         found.distribution.values[0] = 0.0
 
 
+def test_too_many_sums_are_drawn_or_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    table = dirichlet_multinomial(np.random.default_rng(5), 9, 4, 0.3)
+    module = importlib.import_module("masrel.intervals.exact")
+    monkeypatch.setattr(module, "_MOST", 3000)
+    for places in (10**9, 0):  # by the transform, and merged
+        monkeypatch.setattr(module, "_BOX", places)
+        with pytest.raises(ParameterError, match="more than 3000 different sums"):
+            exact("fleiss_kappa", table)
+        drawn = bootstrap("fleiss_kappa", table, target="items", rng=1)
+        assert drawn.n_resamples == 10_000
+
+
 def test_too_many_resamples_are_drawn_or_refused_with_their_number() -> None:
     table = dirichlet_multinomial(np.random.default_rng(1), 40, 6, 0.5)
     drawn = bootstrap("fleiss_kappa", table, target="items", rng=1)
