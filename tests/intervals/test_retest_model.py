@@ -167,7 +167,7 @@ def test_on_many_pairs_of_alike_raters_it_is_stratified_kappa() -> None:
     assert found.kappa.value == pytest.approx(kappa.value, abs=0.01)
     # 3 standard errors of .021 around the truth: once in 370 runs of other seeds
     assert found.kappa.value == pytest.approx(0.7, abs=0.063)
-    assert found.spread.value < 0.07
+    assert found.spread.value < 0.1
 
 
 def test_raters_who_differ_are_told_apart_and_pulled_together() -> None:
