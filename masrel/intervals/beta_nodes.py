@@ -13,6 +13,7 @@ LEAST = 1e-18
 """Weight of a node that is kept, relative to the largest."""
 
 _FARTHEST = 9.0  # of w: sinh 9 = 4051 spreads
+_WIDEST = 2.0  # spread: one end can fall off within a few units of the logit
 
 
 def beta_nodes(
@@ -60,7 +61,8 @@ def beta_nodes(
         middle, spread = _mode(lambda logit: at(logit)[1])
         total = float(betainc(b, a, 1.0 - least) - betainc(b, a, least))
     else:
-        middle, spread, total = np.log(a / b), np.sqrt(1.0 / a + 1.0 / b), 1.0
+        middle, total = float(np.log(a / b)), 1.0
+        spread = min(float(np.sqrt(1.0 / a + 1.0 / b)), _WIDEST)
     w = np.arange(-_FARTHEST, _FARTHEST + 0.5 * step, step)
     x, log = at(middle + spread * np.sinh(w))
     weights = np.exp(log - log.max()) * np.cosh(w)

@@ -37,22 +37,26 @@ CHANCE: dict[str, Chance] = {
 class Nodes:
     """Values of x and y with what the coefficient needs of them.
 
-    The disagreement is t `apart`, and by chance
-    (1 - t)² `e_agreed` + t (1 - t) `e_mixed` + t² `e_apart`.
+    The disagreement is t d, and by chance (1 - t)² e_0 + t (1 - t) e_1 + t² e_2. What
+    is kept are differences from d, which for two categories lose no digits.
 
     Attributes
     ----------
     weights : ndarray, shape (n,)
         Probabilities of the values; they sum to 1.
-    apart, e_agreed, e_mixed, e_apart : ndarray, shape (n,)
-        As above.
+    apart : ndarray, shape (n,)
+        d, of pairs that are apart.
+    agreed : ndarray, shape (n,)
+        e_0, as if all pairs agreed.
+    less_mixed, less_apart : ndarray, shape (n,)
+        d - e_1, and d - e_2.
     """
 
     weights: Floats = field(compare=False, repr=False)
     apart: Floats = field(compare=False, repr=False)
-    e_agreed: Floats = field(compare=False, repr=False)
-    e_mixed: Floats = field(compare=False, repr=False)
-    e_apart: Floats = field(compare=False, repr=False)
+    agreed: Floats = field(compare=False, repr=False)
+    less_mixed: Floats = field(compare=False, repr=False)
+    less_apart: Floats = field(compare=False, repr=False)
 
     @classmethod
     def of(
@@ -98,12 +102,16 @@ class Nodes:
                 2.0 * rest + 2.0 * _products(u, x, both),
                 rest + _products(u, both, both),
             )
+        apart = y @ v[first, second]
+        less = apart - found[1], apart - found[2]
+        if q == 2 and chance == "margins":  # e_1 = d and e_2 = d (y² + (1 - y)²)
+            less = np.zeros(len(y)), apart * 2.0 * y[:, 0] * y[:, 1]
         return cls(
             weights=weights,
-            apart=y @ v[first, second],
-            e_agreed=found[0],
-            e_mixed=found[1],
-            e_apart=found[2],
+            apart=apart,
+            agreed=found[0],
+            less_mixed=less[0],
+            less_apart=less[1],
         )
 
     def first(self, n: int) -> "Nodes":
@@ -111,9 +119,9 @@ class Nodes:
         return Nodes(
             weights=np.full(n, 1.0 / n),
             apart=self.apart[:n],
-            e_agreed=self.e_agreed[:n],
-            e_mixed=self.e_mixed[:n],
-            e_apart=self.e_apart[:n],
+            agreed=self.agreed[:n],
+            less_mixed=self.less_mixed[:n],
+            less_apart=self.less_apart[:n],
         )
 
 
@@ -166,9 +174,9 @@ def grid(chance: Chance, v: Floats, prior: Floats, step: float, value: float) ->
 
     Notes
     -----
-    With margins and 1 - `value` = r, the quadratic in t is -2 r x (1 - x) at t = 0 and
-    1 - r + 2 r y (1 - y) at t = 1. Where both are negative it is negative between, and
-    where the second is 0 it has an end that a grid over all y would not see.
+    With margins and r = 1 - `value` the coefficient can be at most a negative value
+    only where r 2 y (1 - y) is at least -`value`; what is beyond is 0, and a grid over
+    all y would not see where it begins.
     """
     x, of_x = beta_nodes(float(prior[0, 0]), float(prior[1, 1]), step)
     y, of_y = np.full((1, 2), 0.5), np.ones(1)

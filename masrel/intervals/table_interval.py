@@ -18,6 +18,7 @@ from masrel.intervals.table_quantiles import table_quantiles
 __all__ = ["table_interval"]
 
 _FEW_ITEMS = 10
+_LEAST_DRAWS = 100
 _NOTED_DRAWS = 2_000  # for the interval under another prior: a note has three digits
 
 
@@ -50,13 +51,16 @@ def table_interval(
     Raises
     ------
     ParameterError
-        If there are not exactly two raters, or the coefficient is none of theirs.
+        If there are not exactly two raters, the coefficient is none of theirs, or
+        there are too few draws.
     """
     if case.entry.name not in CHANCE or case.coded.codes.shape[1] != 2:
         raise ParameterError(
             f'model: "table" speaks of {", ".join(CHANCE)} of exactly two raters; got '
             f"{case.entry.name} of {case.coded.codes.shape[1]}"
         )
+    if n_draws < _LEAST_DRAWS:
+        raise ParameterError(f"n_draws: needs at least {_LEAST_DRAWS}, got {n_draws}")
     table, n_single = _table(case.coded.codes, case.coded.n_categories)
     reason = _nothing_to_learn(case, table)
     if reason is not None:

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import betainc, betaln, xlog1py, xlogy
+from scipy.special import betainc, betaln, xlogy
 
 from masrel.agreement.kernel import Floats
 from masrel.estimates import Distribution
@@ -114,42 +114,54 @@ class TablePosterior:
         )
 
     def _given(self, nodes: Nodes, value: float) -> Floats:
-        # (n,): P(coefficient <= value) at each node
-        up, down, _ = _crossings(nodes, value)
-        below_down = betainc(self.apart, self.agreed, np.minimum(down, 1.0))
-        below_up = betainc(self.apart, self.agreed, np.minimum(up, 1.0))
-        return np.asarray(below_down - below_up)
-
-    def _densities(self, nodes: Nodes, value: float) -> Floats:
-        # (n,): the density of t at each crossing, times how fast that moves
-        up, down, slope = _crossings(nodes, value)
-        out = np.zeros(up.size)
-        for t in (up, down):
-            inside = (t < 1.0) & (t > 0.0) & (slope > 0.0)
-            at = t[inside]
-            log = xlogy(self.apart - 1.0, at) + xlog1py(self.agreed - 1.0, -at)
-            of_t = np.exp(log - betaln(self.apart, self.agreed))
-            chance = (
-                (1.0 - at) ** 2 * nodes.e_agreed[inside]
-                + at * (1.0 - at) * nodes.e_mixed[inside]
-                + at**2 * nodes.e_apart[inside]
-            )
-            out[inside] += of_t * chance / slope[inside]
+        # (n,): P(coefficient <= value) at each node; from the nearer end of t, so that
+        # a small parameter there keeps its digits
+        up, up_rest, down, _ = _crossings(nodes, value)
+        near = up < 0.5
+        a = np.where(near, self.apart, self.agreed)
+        b = np.where(near, self.agreed, self.apart)
+        part = betainc(a, b, np.where(near, up, up_rest))
+        out = np.where(near, 1.0 - part, part)
+        ends = down < 1.0
+        out[ends] -= betainc(self.agreed, self.apart, 1.0 - down[ends])
         return out
 
+    def _densities(self, nodes: Nodes, value: float) -> Floats:
+        # (n,): the density of t at each crossing, times how fast that moves in value,
+        # D_e / slope, where (1 - value) D_e = t apart
+        up, up_rest, down, slope = _crossings(nodes, value)
+        out = np.zeros(up.size)
+        for t, rest in ((up, up_rest), (down, 1.0 - down)):
+            inside = (t > 0.0) & (rest > 0.0) & (slope > 0.0)
+            log = xlogy(self.apart, t[inside]) + xlogy(self.agreed - 1.0, rest[inside])
+            of_t = np.exp(log - betaln(self.apart, self.agreed))  # density times t
+            out[inside] += of_t * nodes.apart[inside] / slope[inside]
+        return out / (1.0 - value)
 
-def _crossings(nodes: Nodes, value: float) -> tuple[Floats, Floats, Floats]:
-    # The coefficient is at most value where t apart - (1 - value) D_e(t) >= 0, a
-    # quadratic a2 t² + a1 t + a0 with a0 <= 0: from `up` to `down`, where its slope is
-    # ± `slope`. Both are 1 where that is nowhere, and `down` infinite where it stays.
+
+def _crossings(nodes: Nodes, value: float) -> tuple[Floats, Floats, Floats, Floats]:
+    # The coefficient is at most value where t apart - (1 - value) D_e(t) >= 0: a
+    # quadratic in t that is -`low` <= 0 at t = 0 and `high` at t = 1. It rises through
+    # 0 at t = `up`; with `high` < 0 it falls again at `down`, or is nowhere 0. Its
+    # roots are written so that nothing cancels at either end of t.
+    # Returned, each (n,): up, 1 - up, down (1 if none), and the slope at either.
     rest = 1.0 - value
-    a0 = -rest * nodes.e_agreed
-    a1 = nodes.apart - rest * (nodes.e_mixed - 2.0 * nodes.e_agreed)
-    a2 = -rest * (nodes.e_agreed - nodes.e_mixed + nodes.e_apart)
-    inside = a1 * a1 - 4.0 * a2 * a0
-    slope = np.sqrt(np.maximum(inside, 0.0))
+    low = rest * nodes.agreed
+    high = value * nodes.apart + rest * nodes.less_apart
+    h = value * nodes.apart + rest * nodes.less_mixed
+    falls = high < 0.0
+    cross = 2.0 * np.sqrt(low) * np.sqrt(np.abs(high))
+    inside = np.where(falls, (h - cross) * (h + cross), 0.0)
+    slope = np.where(falls, np.sqrt(np.maximum(inside, 0.0)), np.hypot(h, cross))
+    near = slope + np.abs(h)
     with np.errstate(divide="ignore", invalid="ignore"):
-        up = np.where(a1 > 0.0, -2.0 * a0 / (a1 + slope), (slope - a1) / (2.0 * a2))
-        down = np.where(a2 < 0.0, (a1 + slope) / (-2.0 * a2), np.inf)
-    nowhere = (inside < 0.0) | ((a1 <= 0.0) & (a2 <= 0.0))
-    return np.where(nowhere, 1.0, up), np.where(nowhere, 1.0, down), slope
+        of_low, of_high = near / (near + 2.0 * low), near / (near + 2.0 * high)
+        up = np.where(h >= 0.0, 2.0 * low / (near + 2.0 * low), of_high)
+        up_rest = np.where(h >= 0.0, of_low, 2.0 * high / (near + 2.0 * high))
+        down = near / (near - 2.0 * high)
+    twice = falls & (inside > 0.0) & (h > 0.0)
+    nowhere = falls & ~twice
+    up[nowhere], up_rest[nowhere] = 1.0, 0.0
+    lost = np.isnan(up)  # both ends are 0 in floating point
+    up[lost], up_rest[lost] = 0.0, 1.0
+    return up, up_rest, np.where(twice, down, 1.0), slope

