@@ -67,7 +67,7 @@ class ByPanels:
         start = self.edges[panel]
         points = self._points(np.array([start]), np.array([logit]))[0]
         density = np.exp(self.log_density(points) - self._top)
-        part = float(density @ self._w) * 0.5 * (logit - start)
+        part = float(density @ self._w) * 0.5 * (logit - float(start))
         return (float(self._cells[:panel].sum()) + part) / float(self._cells.sum())
 
     def quantile(self, share: float) -> float:
@@ -108,13 +108,13 @@ def _exact_terms(counts: Counts, a: Fraction) -> tuple[Floats, Floats]:
                 weighted.append(c * moment)
             moment *= a.numerator + t * a.denominator
         lowest, product = lowest + above[0], _times(product, weighted)
-    t = lowest + np.arange(len(product), dtype=np.float64)
-    logs = np.array([math.log(c) for c in product]) - t * math.log(a.denominator)
-    return logs - _log_moments(a * len(counts[0]), lowest, len(product)), t
+    powers = lowest + np.arange(len(product), dtype=np.float64)
+    logs = np.array([math.log(c) for c in product]) - powers * math.log(a.denominator)
+    return logs - _log_moments(a * len(counts[0]), lowest, len(product)), powers
 
 
 def _log_sum_terms(counts: Counts, a: Fraction) -> tuple[Floats, Floats]:
-    lowest, product = 0, np.zeros(1)
+    lowest, product = 0, np.zeros(1)  # of logarithms
     for above in _above(counts):
         category = np.zeros(1)
         for j, n in enumerate(above):

@@ -162,12 +162,12 @@ STUDIES: dict[str, Ratings] = {
     "nobody agrees": [["0", "1", "2"]] * 20,
     **{f"30 x 3, {kappa}": drawn(30, 3, kappa) for kappa in (0.05, 0.6, 0.95)},
     **{f"100 x 5, {kappa}": drawn(100, 5, kappa) for kappa in (0.01, 0.6, 0.99)},
-    "1000 x 4, 0.001": drawn(1000, 4, 0.001),
-    "1000 x 4, 0.6": drawn(1000, 4, 0.6),
-    "1000 x 4, 0.99": drawn(1000, 4, 0.99),
+    "1000 x 4": drawn(1000, 4, 0.6),
+    "1000 x 3, 0.001": drawn(1000, 3, 0.001),
+    "1000 x 3, 0.99": drawn(1000, 3, 0.99),
     "1000 x 2 perfect": [[str(i % 3)] * 2 for i in range(1000)],
-    "1000 x 4 in one category": [["0"] * 4] * 1000,
-    "one item of many ratings": labelled([[300, 250, 40, 10]]),
+    "1000 x 2 in one category": [["0"] * 2] * 1000,
+    "one item of many ratings": labelled([[120, 100, 16, 4]]),
     "few of many ratings": labelled([[40, 20, 0, 0], [0, 3, 55, 2]]),
 }
 

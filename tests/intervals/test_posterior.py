@@ -52,12 +52,13 @@ def brief(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mcmc, "LARGEST_R_HAT", 1.5)
 
 
+@pytest.mark.usefixtures("brief")
 def test_two_categories_agree_with_the_exact_posterior() -> None:
-    found = sampled(TWO)
+    found = sampled(TWO, n_steps=1000)
     # 4.5 errors at either end: once in 70 000 runs of other seeds
     assert max(misses(found, exact_ends(TWO))) < 4.5
     assert found.monte_carlo_error is not None
-    assert max(found.monte_carlo_error) < 0.005
+    assert max(found.monte_carlo_error) < 0.01
 
 
 @pytest.mark.slow
@@ -88,9 +89,6 @@ def test_what_was_drawn_is_said() -> None:
 def test_a_missing_part_of_the_jacobian_is_seen(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    whole = sampled(TWO, n_steps=600)
-    assert max(misses(whole, exact_ends(TWO))) < 4.5
-
     def without(self: DirichletMultinomial, position: Floats) -> Floats:
         rho, rest, pi = self.parts(position)
         density = self.log_likelihood(rho, rest, pi) + np.log(pi) @ self.prior

@@ -213,7 +213,7 @@ def test_whole_tables_drawn_give_the_same(
     coefficient: str, weights: str, table: list[list[int]]
 ) -> None:
     q = len(table)
-    away = np.abs(np.subtract.outer(range(q), range(q))) / (q - 1)
+    away: Floats = np.abs(np.subtract.outer(range(q), range(q))) / (q - 1.0)
     v = {"identity": (away > 0.0) * 1.0, "linear": away, "quadratic": away**2}[weights]
     values = drawn_values(coefficient, np.array(table) + 1.0 / q**2, v)
     found = asked(coefficient, table, weights=weights)
@@ -254,12 +254,12 @@ def test_draws_agree_with_the_quadrature_of_categories_that_count_as_one() -> No
 
 
 def test_the_monte_carlo_error_is_the_spread_over_seeds() -> None:
-    runs = [asked("cohen_kappa", TABLE, rng=seed, n_draws=500) for seed in range(40)]
+    runs = [asked("cohen_kappa", TABLE, rng=seed, n_draws=500) for seed in range(30)]
     for end in (0, 1):
         spread = float(np.std([ends(run)[end] for run in runs], ddof=1))
         said = [run.monte_carlo_error[end] for run in runs if run.monte_carlo_error]
-        # of 40 the standard deviation is within 0.65 and 1.4 but once in 1000
-        assert 0.65 < spread / float(np.mean(said)) < 1.4
+        # of 30 the standard deviation is within 0.6 and 1.45 but once in 1000
+        assert 0.6 < spread / float(np.mean(said)) < 1.45
 
 
 def test_seeds_repeat_and_are_recorded() -> None:
@@ -312,7 +312,7 @@ def test_levels_are_nested(cells: list[int], coefficient: str) -> None:
     assert -1.0 <= outer.low < inner.low < inner.high < outer.high <= 1.0
 
 
-@settings(max_examples=15)
+@settings(max_examples=8)
 @given(tables_of_two)
 def test_agreement_where_there_was_none_moves_it_up(cells: list[int]) -> None:
     a, b, c, d = cells
@@ -458,6 +458,6 @@ def test_what_the_table_does_not_answer_is_refused(
         "model": "table",
         **options,
     }
-    raters = wanted.pop("raters", 2)
+    row = ["a", "b", "a"] if wanted.pop("raters", 2) == 3 else ["a", "b"]
     with pytest.raises(ParameterError, match=said):
-        posterior(ratings=[["a", "b", "a"][:raters]] * 12, **wanted)  # type: ignore[arg-type,misc]
+        posterior(ratings=[row] * 12, **wanted)  # type: ignore[arg-type]
