@@ -119,7 +119,11 @@ def default_of_raters(case: Case) -> Bounds:
 
 def default_of_both(case: Case) -> Bounds:
     """What is recommended where both could have come."""
-    return posterior_and_excess(case) if is_small(case) else items_and_excess(case)
+    if not is_small(case):
+        return items_and_excess(case)
+    variance = case.spread.of_items + case.spread.of_raters
+    ends = posterior_and_excess(case)
+    return ends.where(case.spreads(variance), case.posterior.one_sided)
 
 
 def _none(case: Case) -> Bounds:

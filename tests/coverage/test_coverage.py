@@ -2,7 +2,7 @@
 
 Seeds are fixed, so a run that passes passes again. Were they not, defaults that cover
 what is claimed would fail one of the 123 comparisons in 1 of 16 000 runs, and one that
-fell to 89 % over the cells of a design would fail in most.
+fell to 88 % over the cells of a design would fail in most.
 """
 
 import numpy as np
@@ -28,7 +28,7 @@ from tests.coverage.studies import Design, Target
 pytestmark = pytest.mark.filterwarnings("ignore::masrel.errors.MasrelWarning")
 FALSE_ALARMS = 5e-7
 CLAIMED = 0.93
-SIZE = 300  # studies of a cell, all computed at once
+SIZE = 200  # studies of a cell, all computed at once
 PER_CELL = 15  # studies, of 4 designs × 3 kappas × 3 models
 
 
@@ -52,10 +52,7 @@ def test_the_default_is_what_the_study_judges(target: Target, design: Design) ->
     for kappa in (0.2, 0.9):
         case = draw_case(target, MODELS[1], design, kappa, 4)
         judged = METHODS[target][DEFAULT](case)
-        variance = case.spread.of_items + case.spread.of_raters
         for s, given in enumerate(by_default(case, target)):
-            if target == "both" and not case.spreads(variance)[s]:
-                continue  # nobody knows what raters add
             expected = judged.low[s], judged.high[s]
             assert (given.low, given.high) == pytest.approx(expected, abs=3e-5)
 
