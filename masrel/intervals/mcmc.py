@@ -10,7 +10,15 @@ from arviz_stats.base import array_stats
 from masrel.agreement.kernel import Floats
 from masrel.errors import ConvergenceError
 
-__all__ = ["Draws", "sample"]
+__all__ = [
+    "LARGEST_R_HAT",
+    "Draws",
+    "Walkers",
+    "diagnose",
+    "not_converged",
+    "quantile_error",
+    "sample",
+]
 
 N_ENSEMBLES = 4
 WALKERS_PER_DIMENSION = 20  # a step costs emcee more than its walkers do
@@ -42,10 +50,7 @@ class Draws:
 
     def quantile_error(self, share: float) -> float:
         """Return the Monte Carlo standard error of a quantile."""
-        error = array_stats.mcse(
-            self.values, chain_axis=0, draw_axis=1, method="quantile", prob=share
-        )
-        return float(error)
+        return quantile_error(self.values, share)
 
 
 def sample(
@@ -108,21 +113,130 @@ def sample(
             ensemble.run(more)
         total += more
         chains = np.concatenate([e.values(quantity, total // 3) for e in ensembles])
-        r_hat = float(array_stats.rhat(chains, chain_axis=0, draw_axis=1))
-        ess = float(
-            array_stats.ess(
-                chains, chain_axis=0, draw_axis=1, method="tail", prob=(0.025, 0.975)
-            )
-        )
+        r_hat, ess = diagnose(chains)
         if r_hat < LARGEST_R_HAT and ess >= LEAST_ESS:
             return Draws(values=chains, r_hat=r_hat, ess=ess)
-    # R-hat - 1 falls as one over the steps.
-    needed = max((r_hat - 1.0) / (LARGEST_R_HAT - 1.0), LEAST_ESS / max(ess, 1.0))
-    raise ConvergenceError(
-        f"the sampler has not converged after {total} steps: R-hat {r_hat:.4f} (needs "
-        f"below {LARGEST_R_HAT}), effective size {ess:.0f} (needs {LEAST_ESS:.0f}); "
-        f"about {int(total * needed) - total} more steps are needed"
+    raise not_converged(total, r_hat, ess, LEAST_ESS)
+
+
+def diagnose(chains: Floats) -> tuple[float, float]:
+    """Return rank-normalized split R-hat and the effective sample size of the tails.
+
+    Parameters
+    ----------
+    chains : ndarray, shape (n_chains, n_steps)
+        Draws of one quantity.
+
+    Returns
+    -------
+    tuple of float
+        Both as in [2] of `sample`; the tails are beyond 2.5 % on either side.
+    """
+    r_hat = array_stats.rhat(chains, chain_axis=0, draw_axis=1)
+    ess = array_stats.ess(
+        chains, chain_axis=0, draw_axis=1, method="tail", prob=(0.025, 0.975)
     )
+    return float(r_hat), float(ess)
+
+
+def quantile_error(chains: Floats, share: float) -> float:
+    """Return the Monte Carlo standard error of a quantile.
+
+    Parameters
+    ----------
+    chains : ndarray, shape (n_chains, n_steps)
+        Draws of one quantity.
+    share : float
+        Probability below the quantile.
+
+    Returns
+    -------
+    float
+        Its standard error.
+    """
+    error = array_stats.mcse(
+        chains, chain_axis=0, draw_axis=1, method="quantile", prob=share
+    )
+    return float(error)
+
+
+def not_converged(
+    total: int, r_hat: float, ess: float, least_ess: float
+) -> ConvergenceError:
+    """Say how many more steps a sampler needs.
+
+    Parameters
+    ----------
+    total : int
+        Steps made.
+    r_hat, ess : float
+        The largest and the smallest there are.
+    least_ess : float
+        What the effective size has to be.
+
+    Returns
+    -------
+    ConvergenceError
+        To be raised. R-hat - 1 falls as one over the steps.
+    """
+    needed = max((r_hat - 1.0) / (LARGEST_R_HAT - 1.0), least_ess / max(ess, 1.0))
+    more = int(total * needed) - total if np.isfinite(needed) else total
+    return ConvergenceError(
+        f"the sampler has not converged after {total} steps: R-hat {r_hat:.4f} (needs "
+        f"below {LARGEST_R_HAT}), effective size {ess:.0f} (needs {least_ess:.0f}); "
+        f"about {max(more, 1)} more steps are needed"
+    )
+
+
+class Walkers:
+    """Chains that do not see each other, moved by one proposal.
+
+    Parameters
+    ----------
+    log_density : callable
+        Positions of shape (n, n_dimensions) to log-densities of shape (n,).
+    proposal : callable
+        Positions and random state to new positions and the logarithms of what the
+        ratio of densities is multiplied by.
+    start : ndarray, shape (n_chains, n_dimensions)
+        Where the chains begin.
+    generator : Generator
+        Where randomness comes from.
+    """
+
+    def __init__(
+        self,
+        log_density: Callable[[Floats], Floats],
+        proposal: Callable[[Floats, np.random.RandomState], tuple[Floats, Floats]],
+        start: Floats,
+        generator: np.random.Generator,
+    ) -> None:
+        self._state = emcee.State(start, random_state=_legacy_state(generator))
+        self._sampler = emcee.EnsembleSampler(
+            *start.shape,
+            log_density,
+            moves=emcee.moves.MHMove(proposal),
+            vectorize=True,
+        )
+
+    def run(self, n_steps: int, *, thin: int = 1) -> Floats:
+        """Go on, and return every `thin`-th position, (n_chains, kept, dimensions)."""
+        self._sampler.reset()
+        self._state = self._sampler.run_mcmc(
+            self._state, n_steps // thin, thin_by=thin, skip_initial_state_check=True
+        )
+        return np.ascontiguousarray(self._sampler.get_chain().swapaxes(0, 1))
+
+    @property
+    def acceptance(self) -> float:
+        """Share of the proposals of the last run that were taken."""
+        return float(self._sampler.acceptance_fraction.mean())
+
+
+def _legacy_state(generator: np.random.Generator) -> tuple[object, ...]:
+    # emcee passes over a numpy Generator without a word: it wants legacy state.
+    legacy = np.random.RandomState(generator.integers(2**32, dtype=np.uint64))
+    return tuple(legacy.get_state(legacy=True))
 
 
 class _Ensemble:
@@ -136,9 +250,7 @@ class _Ensemble:
     ) -> None:
         n_walkers = max(16, WALKERS_PER_DIMENSION * n_dimensions)
         start = generator.normal(scale=1.5, size=(n_walkers, n_dimensions))
-        # emcee passes over a numpy Generator without a word: it wants legacy state.
-        legacy = np.random.RandomState(generator.integers(2**32, dtype=np.uint64))
-        self._state = emcee.State(start, random_state=legacy.get_state())
+        self._state = emcee.State(start, random_state=_legacy_state(generator))
         self._sampler = emcee.EnsembleSampler(
             n_walkers,
             n_dimensions,

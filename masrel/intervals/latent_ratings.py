@@ -1,0 +1,86 @@
+"""Ratings as the latent-trait model takes them."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from masrel.agreement.coding import Codes, Label, code_ratings
+from masrel.errors import ParameterError, RatingsError
+
+__all__ = ["Items", "LatentRatings"]
+
+Items = Literal["fixed", "random"]
+"""Whether kappa speaks of these items, or of new ones of their population."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LatentRatings:
+    """Checked ratings, without items or raters that have none.
+
+    Attributes
+    ----------
+    codes : ndarray of int, shape (n_items, n_raters)
+        Positions in the scale, -1 where missing.
+    categories : tuple of str, int or float
+        The declared scale.
+    items, raters : tuple of str
+        Names: of the index and the columns of a DataFrame, or numbers from 1.
+    """
+
+    codes: Codes = field(compare=False, repr=False)
+    categories: tuple[Label, ...]
+    items: tuple[str, ...]
+    raters: tuple[str, ...]
+
+    @classmethod
+    def of(cls, ratings: object, categories: Sequence[Label] | None) -> "LatentRatings":
+        """Check ratings.
+
+        Parameters
+        ----------
+        ratings : nested sequence, array_like or DataFrame, shape (n_items, n_raters)
+            Labels or numbers; None and ``nan`` are missing.
+        categories : sequence of str, int or float, or None
+            The declared scale in order.
+
+        Returns
+        -------
+        LatentRatings
+            The ratings.
+
+        Raises
+        ------
+        ParameterError
+            If the order of the labels is not known, or there is one category.
+        RatingsError
+            If the ratings do not fit, or no item has ratings of two raters.
+        """
+        coded = code_ratings(ratings, categories)
+        if not coded.declared and isinstance(coded.categories[0], str):
+            raise ParameterError(
+                "categories: the model needs the declared scale in order, the ratings "
+                "are text"
+            )
+        if coded.n_categories < 2:
+            raise ParameterError("categories: the model needs two, got one")
+        given = coded.codes >= 0
+        if not (given.sum(axis=1) >= 2).any():
+            raise RatingsError("ratings: the model needs an item rated by two raters")
+        rows = np.flatnonzero(given.any(axis=1))
+        columns = np.flatnonzero(given.any(axis=0))
+        return cls(
+            codes=coded.codes[rows][:, columns],
+            categories=coded.categories,
+            items=_names(getattr(ratings, "index", None), "item", rows.tolist()),
+            raters=_names(getattr(ratings, "columns", None), "rater", columns.tolist()),
+        )
+
+
+def _names(labels: object, what: str, kept: list[int]) -> tuple[str, ...]:
+    # of the rows or columns of a DataFrame; otherwise counted from 1
+    if isinstance(labels, Iterable):  # the index of a list is a method
+        every = list(labels)
+        return tuple(str(every[i]) for i in kept)
+    return tuple(f"{what} {i + 1}" for i in kept)
