@@ -16,7 +16,7 @@ from masrel.errors import ParameterError, UndefinedStatisticWarning
 from masrel.estimates import Interval
 from masrel.intervals import posterior
 from masrel.intervals.beta_nodes import beta_nodes
-from masrel.intervals.table_chances import CHANCE, grid
+from masrel.intervals.table_chances import CHANCE, Nodes, grid
 from masrel.intervals.table_posterior import TablePosterior
 from masrel.intervals.table_quantiles import table_quantiles
 
@@ -461,3 +461,55 @@ def test_what_the_table_does_not_answer_is_refused(
     row = ["a", "b", "a"] if wanted.pop("raters", 2) == 3 else ["a", "b"]
     with pytest.raises(ParameterError, match=said):
         posterior(ratings=[row] * 12, **wanted)  # type: ignore[arg-type]
+
+
+# Given what pairs agree on and how the others are apart, against every share t of pairs
+# apart on a fine grid, where the coefficient is computed from the table it makes.
+@pytest.mark.parametrize("value", [-0.6, -0.3, -0.05, 0.0, 0.4, 0.95])
+def test_given_the_rest_the_probability_is_that_of_a_grid_of_shares(
+    value: float,
+) -> None:
+    rng = np.random.default_rng(5)
+    n, q = 300, 3
+    x = rng.dirichlet(np.full(q, 0.3), size=n)
+    y = rng.dirichlet(np.full(q * (q - 1), 0.3), size=n)
+    v = np.array([[0.0, 0.25, 1.0], [0.25, 0.0, 0.25], [1.0, 0.25, 0.0]])
+    nodes = Nodes.of("margins", v, np.full(n, 1.0 / n), x, y)
+    found = TablePosterior(
+        nodes=lambda _: nodes, shown=lambda _: nodes, apart=2.5, agreed=1.5
+    )
+    edges = np.linspace(0.0, 1.0, 4001)
+    t = 0.5 * (edges[1:] + edges[:-1])
+    masses = np.diff(betainc(2.5, 1.5, edges))
+    below = twice = 0.0
+    for agreed, others in zip(x, y, strict=True):
+        cells = np.zeros((q, q))
+        cells[~np.eye(q, dtype=bool)] = others
+        theta = t[:, None, None] * cells + (1.0 - t)[:, None, None] * np.diag(agreed)
+        apart = (theta * v).sum(axis=(1, 2))
+        chance = np.einsum("tk,kl,tl->t", theta.sum(axis=2), v, theta.sum(axis=1))
+        inside = apart >= (1.0 - value) * chance
+        below += float(masses @ inside) / n
+        twice += bool(inside.any() and not inside[0] and not inside[-1])
+    assert found.probability(value) == pytest.approx(below, abs=2e-4)
+    assert twice > 0 or value >= 0.0  # of some tables shares in the middle alone
+
+
+@pytest.mark.parametrize(
+    "table", [[[0, 3], [3, 0]], [[1, 0], [0, 0]], [[2, 2], [2, 2]]]
+)
+@pytest.mark.parametrize("value", [-0.7, -0.1, -1e-6, 0.3])
+def test_halving_the_step_settles_on_both_sides_of_zero(
+    table: list[list[int]], value: float
+) -> None:
+    prior = np.array(table) + 0.25
+    one, two = (
+        TablePosterior(
+            nodes=partial(grid, "margins", IDENTITY, prior, step),
+            shown=partial(grid, "margins", IDENTITY, prior, step),
+            apart=prior[0, 1] + prior[1, 0],
+            agreed=prior.trace(),
+        ).probability(value)
+        for step in (0.125, 0.0625)
+    )
+    assert one == pytest.approx(two, abs=1e-6 if abs(value) < 1e-3 else 2e-8)
