@@ -1,6 +1,7 @@
 """Bootstrap intervals over items or raters: exact, or by Monte Carlo."""
 
 import dataclasses
+import math
 from collections.abc import Sequence
 from functools import partial
 from typing import Any, Literal, get_args
@@ -13,11 +14,13 @@ from masrel.agreement.weights import WeightName
 from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target
 from masrel.intervals.case import Case, Statistic, open_case, warn_small
-from masrel.intervals.draws import draw_resamples, sampler_of
+from masrel.intervals.draws import Effort, draw_resamples
 from masrel.intervals.endpoints import Kind, Rule
 from masrel.intervals.exact import enumerate_resamples
 from masrel.intervals.pool import Pool, cluster_pool, item_pool, rater_pool
 from masrel.intervals.resamples import Resamples
+from masrel.intervals.samplers import sampler_of
+from masrel.intervals.seeds import check_rng, recorded_generator
 from masrel.intervals.slopes import acceleration, standard_errors, studentized
 
 __all__ = ["Exact", "Kind", "bootstrap", "recorded_generator"]
@@ -145,7 +148,10 @@ def bootstrap(
     >>> found.seed, found.n_resamples, found.low < 0.5 < found.high
     (1, 10000, True)
     """
-    _check(kind, exact, n_resamples, tolerance, most_resamples, rng)
+    effort = Effort(
+        n_resamples=n_resamples, tolerance=tolerance, most_resamples=most_resamples
+    )
+    _check(kind, exact, effort, rng)
     case = open_case(
         coefficient,
         ratings,
@@ -155,49 +161,20 @@ def bootstrap(
         level=level,
     )
     pool, notes, what = _pool(case, clusters)
-    method = f"{kind} bootstrap{what}"
-    if np.isnan(case.value):
-        return case.undefined(
-            "the estimate itself is undefined", method=method, unit=target
-        )
     rule = _rule(case, pool, kind)
-    statistic = None
-    if kind == "studentized":
-        if not rule.error > 0.0:
-            reason = "the estimate has no standard error to studentize by"
-            return case.undefined(reason, method=method, unit=target)
-        statistic = partial(studentized, pool, value=rule.value, error=rule.error)
-    seed = None
-    found = None
-    if exact is not False:
-        found = enumerate_resamples(pool, statistic, insist=exact is True)
-    if found is None:
-        generator, seed = recorded_generator(rng)
-        found = draw_resamples(
-            sampler_of(pool, statistic),
-            rule,
-            generator,
-            n_resamples=n_resamples,
-            tolerance=tolerance,
-            most_resamples=most_resamples,
-        )
-    else:
+    method = f"{kind} bootstrap{what}"
+    reason = _no_ground(rule)
+    if reason is not None:
+        return case.undefined(reason, method=method, unit=target)
+    found, seed = _resamples(pool, rule, exact, effort, rng)
+    if found.n_resamples is None:
         method += ", exact"
-    if not found.has_spread:
-        reason = "every resample gives the same value or none, so there is no spread"
-        return case.undefined(reason, method=method, unit=target)
-    ends = rule.ends(found.source)
+    ends = rule.ends(found.source) if found.has_spread else None
     if ends is None:
-        reason = "all resamples lie on one side of the estimate, so BCa has no bias"
-        return case.undefined(reason, method=method, unit=target)
+        return case.undefined(_no_ends(found), method=method, unit=target)
+    said = (*notes, *found.notes, *_endless(found))
     return dataclasses.replace(
-        case.closed(
-            ends.low,
-            ends.high,
-            method=method,
-            unit=target,
-            notes=(*notes, *found.notes, *_endless(found)),
-        ),
+        case.closed(ends.low, ends.high, method=method, unit=target, notes=said),
         n_resamples=found.n_resamples,
         n_undefined=found.n_undefined,
         monte_carlo_error=ends.errors,
@@ -206,30 +183,34 @@ def bootstrap(
     )
 
 
-def _check(
-    kind: Kind,
-    exact: Exact,
-    n_resamples: int,
-    tolerance: float | None,
-    most_resamples: int,
-    rng: object,
-) -> None:
+def _check(kind: Kind, exact: Exact, effort: Effort, rng: object) -> None:
     if kind not in get_args(Kind):
         raise ParameterError(
             f"kind: needs one of {', '.join(get_args(Kind))}, got {kind!r}"
         )
     if not (exact is True or exact is False or exact == "auto"):
         raise ParameterError(f'exact: needs "auto", True or False, got {exact!r}')
-    if n_resamples < 100:
-        raise ParameterError(f"n_resamples: needs at least 100, got {n_resamples}")
-    if tolerance is not None and not tolerance > 0.0:
-        raise ParameterError(f"tolerance: needs a number above 0, got {tolerance}")
-    if most_resamples < n_resamples:
-        raise ParameterError(
-            f"most_resamples: needs at least the {n_resamples} of n_resamples, got "
-            f"{most_resamples}"
-        )
-    _check_rng(rng)
+    effort.check()
+    check_rng(rng)
+
+
+def _resamples(
+    pool: Pool,
+    rule: Rule,
+    exact: Exact,
+    effort: Effort,
+    rng: np.random.Generator | int | None,
+) -> tuple[Resamples, int | None]:
+    # all of them, or some with the seed that repeats them
+    statistic = None
+    if rule.kind == "studentized":
+        statistic = partial(studentized, pool, value=rule.value, error=rule.error)
+    if exact is not False:
+        every = enumerate_resamples(pool, statistic, insist=exact is True)
+        if every is not None:
+            return every, None
+    generator, seed = recorded_generator(rng)
+    return draw_resamples(sampler_of(pool, statistic), rule, effort, generator), seed
 
 
 def _pool(
@@ -253,18 +234,10 @@ def _pool(
     return pool, warn_small(pool.n, 16, "clusters"), f" of {pool.n} clusters"
 
 
-def _endless(found: Resamples) -> tuple[str, ...]:
-    share = float(found.source.weights[np.isinf(found.ascending)].sum())
-    if not share:
-        return ()
-    return (
-        f"resamples without any spread, of probability {share:.2g}, are infinitely "
-        "many of their standard errors off",
-    )
-
-
 def _rule(case: Case, pool: Pool, kind: Kind) -> Rule:
     rule = Rule(kind=kind, level=case.level, value=case.value)
+    if math.isnan(case.value):
+        return rule
     if kind == "bca":
         return dataclasses.replace(rule, skew=acceleration(pool))
     if kind == "studentized":
@@ -273,39 +246,25 @@ def _rule(case: Case, pool: Pool, kind: Kind) -> Rule:
     return rule
 
 
-def recorded_generator(
-    rng: np.random.Generator | int | None,
-) -> tuple[np.random.Generator, int | None]:
-    """Return a generator and the seed that repeats it.
-
-    Parameters
-    ----------
-    rng : Generator, int or None
-        A generator is taken as it is, and its seed is not known here; None draws a
-        fresh seed.
-
-    Returns
-    -------
-    tuple of Generator and int or None
-        The generator, and its seed where known.
-
-    Raises
-    ------
-    ParameterError
-        If it is neither.
-    """
-    _check_rng(rng)
-    if isinstance(rng, np.random.Generator):
-        return rng, None  # its owner knows where it began
-    if rng is None:
-        rng = int(np.random.SeedSequence().generate_state(1, np.uint64)[0] >> 1)
-    return np.random.default_rng(int(rng)), int(rng)
+def _no_ground(rule: Rule) -> str | None:
+    if math.isnan(rule.value):
+        return "the estimate itself is undefined"
+    if rule.kind == "studentized" and not rule.error > 0.0:
+        return "the estimate has no standard error to studentize by"
+    return None
 
 
-def _check_rng(rng: object) -> None:
-    if rng is None or isinstance(rng, np.random.Generator):
-        return
-    if isinstance(rng, bool) or not isinstance(rng, int | np.integer) or rng < 0:
-        raise ParameterError(
-            f"rng: needs a numpy Generator or an integer of at least 0, got {rng!r}"
-        )
+def _no_ends(found: Resamples) -> str:
+    if not found.has_spread:
+        return "every resample gives the same value or none, so there is no spread"
+    return "all resamples lie on one side of the estimate, so BCa has no bias"
+
+
+def _endless(found: Resamples) -> tuple[str, ...]:
+    share = float(found.source.weights[np.isinf(found.ascending)].sum())
+    if not share:
+        return ()
+    return (
+        f"resamples without any spread, of probability {share:.2g}, are infinitely "
+        "many of their standard errors off",
+    )

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from masrel.agreement.kernel import Floats
-from masrel.intervals.lattice import Integers
+from masrel.intervals.numerators import Integers
 from masrel.intervals.states import line_of_sums
 
 __all__ = ["Control", "control_of", "whole_scores"]

@@ -1,72 +1,75 @@
-"""Resamples that are drawn: in counts, or as packed sums of a few items at once."""
+"""Resamples that are drawn, as many as the ends of an interval need."""
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from masrel.agreement.kernel import Floats
-from masrel.errors import ConvergenceError
-from masrel.intervals.control import Control, control_of, whole_scores
+from masrel.errors import ConvergenceError, ParameterError
+from masrel.intervals.drawn import Drawn
 from masrel.intervals.endpoints import Rule
-from masrel.intervals.lattice import Integers, Lattice
-from masrel.intervals.pool import Pool
-from masrel.intervals.replicates import Drawn
+from masrel.intervals.numerators import Integers
 from masrel.intervals.resamples import Resamples
-from masrel.intervals.slopes import influence
+from masrel.intervals.samplers import Sampler
 
-__all__ = ["Sampler", "draw_resamples", "sampler_of"]
-
-_CHUNK = 1 << 17  # numbers held at once while resampling
-_LEAST = 30  # draws from which on a control is worth its time
-_TABLE = 1 << 14  # sums of a few items that are looked up at once
-_MOST_BITS = 62
-_BINOMIAL = 20  # lookups that take as long as one binomial number
-
-Batch = tuple[Floats, Integers | None]
-"""Values of resamples, ``nan`` where undefined, and their scores on the control."""
+__all__ = ["Effort", "draw_resamples"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Sampler:
-    """How resamples of one pool are drawn.
+class Effort:
+    """How many resamples are drawn.
 
     Attributes
     ----------
-    draw : callable
-        A number of resamples and a generator to a batch. What is drawn does not depend
-        on how it is cut into batches.
-    control : Control or None
-        The distribution of the scores; None where there are none.
-    width : int
-        Numbers a resample takes while it is drawn.
+    n_resamples : int
+        How many at least.
+    tolerance : float or None
+        The largest Monte Carlo error of an end; None for any.
+    most_resamples : int
+        How many at most.
     """
 
-    draw: Callable[[int, np.random.Generator], Batch]
-    control: Control | None = field(default=None, repr=False)
-    width: int
+    n_resamples: int
+    tolerance: float | None = None
+    most_resamples: int
 
-    def batches(self, n_resamples: int, generator: np.random.Generator) -> Batch:
-        """Draw resamples, a few at a time."""
-        step = max(1, _CHUNK // self.width)
-        parts = [
-            self.draw(min(step, n_resamples - start), generator)
-            for start in range(0, n_resamples, step)
-        ]
-        values = np.concatenate([values for values, _ in parts])
-        scores = [scores for _, scores in parts if scores is not None]
-        return values, np.concatenate(scores) if scores else None
+    def check(self) -> None:
+        """Raise ParameterError if a number is out of its range."""
+        if self.n_resamples < 100:
+            raise ParameterError(
+                f"n_resamples: needs at least 100, got {self.n_resamples}"
+            )
+        if self.tolerance is not None and not self.tolerance > 0.0:
+            raise ParameterError(
+                f"tolerance: needs a number above 0, got {self.tolerance}"
+            )
+        if self.most_resamples < self.n_resamples:
+            raise ParameterError(
+                f"most_resamples: needs at least the {self.n_resamples} of "
+                f"n_resamples, got {self.most_resamples}"
+            )
+
+    def more(self, drawn: int, error: float) -> int:
+        """Return how many more the tolerance takes, after `drawn` with an error."""
+        if self.tolerance is None or error <= self.tolerance:
+            return 0
+        wanted = drawn * (error / self.tolerance) ** 2
+        size = min(math.ceil(1.05 * wanted), self.most_resamples) - drawn
+        if wanted > self.most_resamples or size <= 0:
+            raise ConvergenceError(
+                f"tolerance: with {drawn} resamples an end has an error of "
+                f"{error:.2g}; {self.tolerance:g} takes about {wanted - drawn:.2g} "
+                f"more, and most_resamples is {self.most_resamples}"
+            )
+        return size
 
 
 def draw_resamples(
     sampler: Sampler,
     rule: Rule,
+    effort: Effort,
     generator: np.random.Generator,
-    *,
-    n_resamples: int,
-    tolerance: float | None,
-    most_resamples: int,
 ) -> Resamples:
     """Draw resamples, more of them while an end is less certain than asked for.
 
@@ -76,14 +79,10 @@ def draw_resamples(
         How they are drawn.
     rule : Rule
         What is asked of them.
+    effort : Effort
+        How many are drawn.
     generator : Generator
         Where randomness comes from.
-    n_resamples : int
-        How many at least.
-    tolerance : float or None
-        The largest Monte Carlo error of an end; None for any.
-    most_resamples : int
-        How many at most.
 
     Returns
     -------
@@ -95,38 +94,29 @@ def draw_resamples(
     ConvergenceError
         If the tolerance takes more; the message says how many.
     """
-    values, scores = sampler.batches(n_resamples, generator)
+    values, scores = sampler.batches(effort.n_resamples, generator)
     while True:
         found = _resamples(sampler, values, scores)
-        if tolerance is None or not found.has_spread:
+        size = effort.more(values.size, _error(found, rule))
+        if not size:
             return found
-        ends = rule.ends(found.source)
-        error = max(ends.errors) if ends is not None and ends.errors else 0.0
-        if error <= tolerance:
-            return found
-        wanted = values.size * (error / tolerance) ** 2
-        if wanted > most_resamples:
-            raise ConvergenceError(
-                f"tolerance: with {values.size} resamples an end has an error of "
-                f"{error:.2g}; {tolerance:g} takes about {wanted - values.size:.2g} "
-                f"more, and most_resamples is {most_resamples}"
-            )
-        size = min(math.ceil(1.05 * wanted), most_resamples) - values.size
-        if size <= 0:
-            raise ConvergenceError(
-                f"tolerance: with all {most_resamples} resamples an end has an error "
-                f"of {error:.2g}; {tolerance:g} takes a few more"
-            )
         more, more_scores = sampler.batches(size, generator)
         values = np.concatenate([values, more])
         if scores is not None and more_scores is not None:
             scores = np.concatenate([scores, more_scores])
 
 
+def _error(found: Resamples, rule: Rule) -> float:
+    # of the end that is less certain; 0 if there is no interval
+    ends = rule.ends(found.source) if found.has_spread else None
+    return 0.0 if ends is None or ends.errors is None else max(ends.errors)
+
+
 def _resamples(sampler: Sampler, drawn: Floats, scores: Integers | None) -> Resamples:
-    known = ~np.isnan(drawn)
-    values, control = drawn[known], sampler.control
-    if values.size < drawn.size:
+    values, control = drawn, sampler.control
+    lost = np.isnan(drawn)
+    if lost.any():
+        values = drawn[~lost]
         control = scores = None  # its distribution is that of all resamples
     return Resamples(
         source=Drawn(
@@ -136,116 +126,3 @@ def _resamples(sampler: Sampler, drawn: Floats, scores: Integers | None) -> Resa
         n_undefined=drawn.size - values.size,
         words=f"bootstrap distribution, {values.size} resamples",
     )
-
-
-def sampler_of(pool: Pool, statistic: Callable[[Floats], Floats] | None) -> Sampler:
-    """Choose how resamples of a pool are drawn.
-
-    Parameters
-    ----------
-    pool : Pool
-        What is resampled.
-    statistic : callable or None
-        As of `enumerate_resamples`.
-
-    Returns
-    -------
-    Sampler
-        The faster of two, which draw different resamples from the same distribution.
-    """
-    slopes = _slopes(pool)
-    n, n_members = pool.n, pool.times.size
-    at_once = max(1, int(math.log(_TABLE, max(n, 2)) + 1e-9))
-    if pool.rows is not None and statistic is None:
-        if n / at_once < _BINOMIAL * n_members:
-            lattice = pool.lattice
-            if lattice is not None and _bits(lattice, n).sum() <= _MOST_BITS:
-                return _packed(pool, lattice, slopes, at_once)
-    return _counted(pool, statistic or pool.of_counts, slopes)
-
-
-def _slopes(pool: Pool) -> tuple[Floats, float] | None:
-    # influence of each member on the estimate, and its standard deviation over a draw
-    if pool.n < _LEAST:
-        return None
-    (slopes,) = influence(pool, pool.times[None].astype(np.float64))
-    slopes = slopes - pool.shares @ slopes
-    spread = math.sqrt(float(pool.shares @ slopes**2))
-    if not math.isfinite(spread) or spread <= 1e-12 * float(np.abs(slopes).max()):
-        return None
-    return slopes, spread
-
-
-def _counted(
-    pool: Pool,
-    statistic: Callable[[Floats], Floats],
-    slopes: tuple[Floats, float] | None,
-) -> Sampler:
-    n, shares = pool.n, pool.shares
-    scores = control = None
-    if slopes is not None:
-        scores = whole_scores(*slopes, n)
-        control = control_of(scores, shares, n)
-
-    member = np.repeat(np.arange(shares.size), pool.times)
-    by_lookup = n < _BINOMIAL // 2 * shares.size
-
-    def draw(size: int, generator: np.random.Generator) -> Batch:
-        if by_lookup:
-            drawn = member[generator.integers(0, n, size=(size, n))]
-            drawn += shares.size * np.arange(size)[:, None]
-            counts = np.bincount(drawn.ravel(), minlength=size * shares.size)
-            counts = counts.reshape(size, shares.size)
-        else:
-            counts = generator.multinomial(n, shares, size=size)
-        values = statistic(counts.astype(np.float64))
-        return values, None if scores is None else counts @ scores
-
-    width = 3 * shares.size + (2 * n if by_lookup else 0)
-    if pool.rows is not None:
-        width += 4 * pool.rows.shape[1]
-    return Sampler(draw=draw, control=control, width=width)
-
-
-def _bits(lattice: Lattice, n: int) -> Integers:
-    # (n_dimensions,): bits that hold each coordinate of a sum
-    most = (n * lattice.steps.max(axis=0)).tolist()
-    return np.array([number.bit_length() for number in most], dtype=np.int64)
-
-
-def _packed(
-    pool: Pool,
-    lattice: Lattice,
-    slopes: tuple[Floats, float] | None,
-    at_once: int,
-) -> Sampler:
-    # The steps of an item are bit fields of one integer, and so are those of a sum.
-    # A table of the sums of any `at_once` items makes so many draws one lookup.
-    n = pool.n
-    bits = _bits(lattice, n)
-    places, masks = np.cumsum(bits) - bits, (1 << bits) - 1
-    keys = np.repeat((lattice.steps << places).sum(axis=1), pool.times)
-    table = surplus = np.zeros(1, dtype=np.int64)
-    n_lookups = -(-n // at_once)
-    for digit in range(at_once):
-        table = np.add.outer(keys, table).ravel()
-        more = keys if digit >= at_once - (n_lookups * at_once - n) else 0 * keys
-        surplus = np.add.outer(more, surplus).ravel()
-    scores = control = None
-    if slopes is not None:
-        slope, *_ = np.linalg.lstsq(
-            np.column_stack([lattice.steps, np.ones(len(lattice.steps))]), slopes[0]
-        )
-        scores = whole_scores(slope[:-1].astype(np.float64), slopes[1], n)
-        control = control_of(lattice.steps @ scores, pool.shares, n)
-
-    def draw(size: int, generator: np.random.Generator) -> Batch:
-        at = generator.integers(0, table.size, size=(size, n_lookups))
-        packed = table[at].sum(axis=1)
-        packed -= surplus[at[:, -1]]  # the last lookup may be of more than are left
-        steps = packed[:, None] >> places & masks
-        values = pool.values(lattice.sums(steps, n))
-        return values, None if scores is None else steps @ scores
-
-    width = 3 * n_lookups + 4 * lattice.origin.size
-    return Sampler(draw=draw, control=control, width=width)

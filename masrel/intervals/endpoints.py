@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from statistics import NormalDist
 from typing import Literal
 
-from masrel.intervals.replicates import Drawn, Enumerated
+from masrel.intervals.drawn import Drawn
+from masrel.intervals.enumerated import Enumerated
 
 __all__ = ["Ends", "Kind", "Rule", "bca_levels"]
 

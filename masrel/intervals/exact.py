@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from masrel.agreement.kernel import Floats
 from masrel.errors import ParameterError
 from masrel.intervals.compositions import compositions, n_compositions
+from masrel.intervals.enumerated import Enumerated
 from masrel.intervals.pool import Pool
-from masrel.intervals.replicates import Enumerated
 from masrel.intervals.resamples import Resamples
 from masrel.intervals.states import box, merged_states, transformed_states
 

@@ -1,20 +1,15 @@
 """Rows of features as points of a lattice, so that equal sums are equal integers."""
 
-import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from masrel.agreement.kernel import Floats
+from masrel.intervals.numerators import Integers, numerators_of
 
-__all__ = ["Integers", "Lattice", "lattice_of"]
+__all__ = ["Lattice", "grid_of", "lattice_of"]
 
-Integers = NDArray[np.int64]
-
-_LARGEST = 10**5  # denominators above this are taken for irrational numbers
 _MOST = 2.0**52  # integers that a float still holds
-_WHOLE = 1e-13  # of a number: as near to an integer as that it is one, but for rounding
 _DIMENSIONS, _ROWS = 12, 2_000  # a lattice of more helps nobody
 _TURNS = 50
 
@@ -61,6 +56,36 @@ class Lattice:
         return whole
 
 
+def grid_of(rows: Floats, n: int) -> Lattice | None:
+    """Take the numerators of the features themselves as steps.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (n_rows, n_features)
+        Rows of rational numbers.
+    n : int
+        How many rows are added at most.
+
+    Returns
+    -------
+    Lattice or None
+        One dimension for each feature that is not the same in all rows: more than
+        `lattice_of` finds, but found at once. None as there.
+    """
+    found = numerators_of(rows, n)
+    if found is None:
+        return None
+    whole, denominators = found
+    least = whole.min(axis=0)
+    moving = np.flatnonzero(whole.max(axis=0) - least)
+    return Lattice(
+        steps=whole[:, moving] - least[moving],
+        origin=least,
+        basis=np.eye(least.size, dtype=np.int64)[moving],
+        denominators=denominators,
+    )
+
+
 def lattice_of(rows: Floats, shares: Floats, n: int) -> Lattice | None:
     """Find the lattice of distinct rows, with short steps.
 
@@ -81,13 +106,10 @@ def lattice_of(rows: Floats, shares: Floats, n: int) -> Lattice | None:
     """
     if len(rows) > _ROWS:
         return None
-    denominators = _denominators(rows)
-    if denominators is None:
+    found = numerators_of(rows, n)
+    if found is None:
         return None
-    numerators = np.rint(rows * denominators)
-    if np.abs(numerators).max() * max(n, 1) > _MOST:
-        return None
-    whole = numerators.astype(np.int64)
+    whole, denominators = found
     basis = _echelon(whole - whole[0])
     if basis is None:
         return None
@@ -101,38 +123,6 @@ def lattice_of(rows: Floats, shares: Floats, n: int) -> Lattice | None:
         basis=basis,
         denominators=denominators,
     )
-
-
-def _denominators(rows: Floats) -> Floats | None:
-    # (n_features,): the least common denominator of each column
-    common = np.ones(rows.shape[1])
-    scaled = rows
-    while True:
-        off = np.abs(scaled - np.rint(scaled)) > _WHOLE * np.maximum(np.abs(scaled), 1)
-        at = np.argmax(off, axis=0)
-        columns = np.flatnonzero(off[at, np.arange(at.size)])
-        if columns.size == 0:
-            return common
-        for column in columns.tolist():
-            common[column] *= _denominator(float(scaled[at[column], column]))
-        if common.max() > _MOST:
-            return None
-        scaled = rows * common
-
-
-def _denominator(number: float) -> float:
-    # of the first convergent of its continued fraction that is the number; infinity if
-    # that is none of the fractions known here
-    rest, before, found = number - math.floor(number), 0, 1
-    while found <= _LARGEST:
-        scaled = number * found
-        if abs(scaled - round(scaled)) <= _WHOLE * max(abs(scaled), 1.0):
-            return float(found)
-        rest = 1.0 / rest
-        whole = math.floor(rest)
-        rest -= whole
-        before, found = found, whole * found + before
-    return math.inf
 
 
 def _echelon(rows: Integers) -> Integers | None:

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from masrel.agreement.kernel import Floats
 from masrel.errors import ParameterError
 from masrel.intervals.case import Case
-from masrel.intervals.lattice import Integers, Lattice, lattice_of
+from masrel.intervals.lattice import Lattice, lattice_of
+from masrel.intervals.numerators import Integers
 
 __all__ = ["Pool", "cluster_pool", "item_pool", "rater_pool"]
 

@@ -4,7 +4,8 @@ from dataclasses import dataclass, field
 
 from masrel.agreement.kernel import Floats
 from masrel.estimates import Distribution
-from masrel.intervals.replicates import Drawn, Enumerated
+from masrel.intervals.drawn import Drawn
+from masrel.intervals.enumerated import Enumerated
 
 __all__ = ["Resamples"]
 

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.agreement.kernel import Floats
-from masrel.intervals.lattice import Integers, Lattice
+from masrel.intervals.lattice import Lattice
+from masrel.intervals.numerators import Integers
 
 __all__ = ["box", "line_of_sums", "merged_states", "transformed_states"]
 

@@ -12,11 +12,13 @@ from masrel.errors import ConvergenceError, ParameterError
 from masrel.intervals import bootstrap
 from masrel.intervals.case import open_case
 from masrel.intervals.control import control_of, whole_scores
-from masrel.intervals.draws import Sampler, draw_resamples, sampler_of
+from masrel.intervals.drawn import Drawn
+from masrel.intervals.draws import Effort, draw_resamples
 from masrel.intervals.endpoints import Rule
+from masrel.intervals.enumerated import Enumerated, quantile_of
 from masrel.intervals.exact import enumerate_resamples
 from masrel.intervals.pool import Pool, item_pool, rater_pool
-from masrel.intervals.replicates import Drawn, Enumerated, quantile_of
+from masrel.intervals.samplers import Sampler, sampler_of
 from tests.intervals.data import dirichlet_multinomial
 
 few = pytest.mark.filterwarnings("ignore::masrel.errors.SmallSampleWarning")
@@ -62,7 +64,7 @@ FAR = math.sqrt(math.log(2e6) / (2 * 40_000))
 @pytest.mark.parametrize("n", [7, 16, 30, 49, 130])
 def test_looked_up_resamples_have_the_exact_distribution(n: int) -> None:
     pool = pool_of(made(n, 3, categories=3 if n < 10 else 2))
-    module = importlib.import_module("masrel.intervals.draws")
+    module = importlib.import_module("masrel.intervals.samplers")
     assert pool.lattice is not None
     slopes = module._slopes(pool)
     at_once = 3 if n <= 30 else 2  # the last lookup is of fewer, but for 30 and 130
@@ -158,10 +160,8 @@ def test_the_control_goes_where_resamples_are_undefined() -> None:
     found = draw_resamples(
         sampler_of(pool_of(table), None),
         Rule(kind="percentile", level=0.95, value=0.5),
+        Effort(n_resamples=5000, most_resamples=5000),
         np.random.default_rng(1),
-        n_resamples=5000,
-        tolerance=None,
-        most_resamples=5000,
     )
     assert found.n_undefined > 0
     assert isinstance(found.source, Drawn)
@@ -240,7 +240,7 @@ def test_scores_are_fine_and_few() -> None:
 def test_what_is_drawn_does_not_depend_on_batches(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    module = importlib.import_module("masrel.intervals.draws")
+    module = importlib.import_module("masrel.intervals.samplers")
     packed, counted = pool_of(made(37, 5)), pool_of(made(37, 5), weights="radical")
     for pool in (packed, counted):
         whole = sampler_of(pool, None).batches(1000, np.random.default_rng(2))
