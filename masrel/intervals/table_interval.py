@@ -54,13 +54,7 @@ def table_interval(
         If there are not exactly two raters, the coefficient is none of theirs, or
         there are too few draws.
     """
-    if case.entry.name not in CHANCE or case.coded.codes.shape[1] != 2:
-        raise ParameterError(
-            f'model: "table" speaks of {", ".join(CHANCE)} of exactly two raters; got '
-            f"{case.entry.name} of {case.coded.codes.shape[1]}"
-        )
-    if n_draws < _LEAST_DRAWS:
-        raise ParameterError(f"n_draws: needs at least {_LEAST_DRAWS}, got {n_draws}")
+    _check(case, n_draws)
     table, n_single = _table(case.coded.codes, case.coded.n_categories)
     reason = _nothing_to_learn(case, table)
     if reason is not None:
@@ -90,6 +84,16 @@ def table_interval(
             f"posterior of {case.entry.title}, prior {_words(a)}",
         ),
     )
+
+
+def _check(case: Case, n_draws: int) -> None:
+    if case.entry.name not in CHANCE or case.coded.codes.shape[1] != 2:
+        raise ParameterError(
+            f'model: "table" speaks of {", ".join(CHANCE)} of exactly two raters; got '
+            f"{case.entry.name} of {case.coded.codes.shape[1]}"
+        )
+    if n_draws < _LEAST_DRAWS:
+        raise ParameterError(f"n_draws: needs at least {_LEAST_DRAWS}, got {n_draws}")
 
 
 class _Asked:
@@ -136,7 +140,9 @@ def _nothing_to_learn(case: Case, table: Floats) -> str | None:
         return "no item has ratings of two raters"
     if len(table) < 2:
         return "one category is declared"
-    if not (case.v > 0.0).any():  # or nan: the scale has no such weights
+    if np.isnan(case.v).any():
+        return "the scale has no such weights"
+    if not case.v.any():
         return "the weights know no disagreement"
     return None
 

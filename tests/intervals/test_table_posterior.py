@@ -418,10 +418,15 @@ def test_items_of_a_single_rating_are_left_out_and_counted() -> None:
             {"categories": ["a", "b"], "weights": np.ones((2, 2))},
             "the weights know no disagreement",
         ),
+        (
+            [[-1, 1], [1, 1]],
+            {"categories": [-1, 1], "weights": "ratio"},
+            "the scale has no such weights",
+        ),
     ],
 )
 def test_where_nothing_can_be_said_it_is_undefined(
-    ratings: list[list[str | None]], options: dict[str, object], reason: str
+    ratings: object, options: dict[str, object], reason: str
 ) -> None:
     with pytest.warns(UndefinedStatisticWarning, match=reason):
         found = posterior(
