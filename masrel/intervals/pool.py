@@ -53,6 +53,21 @@ class Pool:
         return lattice_of(self.rows, self.shares, self.n)
 
     @cached_property
+    def directions(self) -> tuple[Floats, Floats]:
+        """An orthogonal basis of the rows less their mean, and the rows in it.
+
+        Shapes (n_directions, n_features) and (n_directions, n_members).
+        """
+        if self.rows is None:
+            raise TypeError("raters have no features")
+        centred = self.rows - self.shares @ self.rows
+        many = centred.shape[0] > centred.shape[1]
+        root = np.linalg.qr(centred, mode="r") if many else centred
+        _, sizes, basis = np.linalg.svd(root, full_matrices=False)
+        basis = basis[sizes > 1e-10 * max(float(sizes[0]), 1.0)]
+        return basis, np.asarray(basis @ centred.T)
+
+    @cached_property
     def shares(self) -> Floats:
         """Probability of each at a draw, (n_members,)."""
         return np.asarray(self.times / self.n)

@@ -45,11 +45,9 @@ def influence(pool: Pool, counts: Floats) -> Floats:
     """
     if pool.rows is None:
         return _slopes(lambda at: pool.values(pool.sums(at)), counts, np.eye(pool.n))
-    centred = pool.rows - pool.shares @ pool.rows
-    sizes, vectors = np.linalg.eigh(centred.T @ centred)  # squares of their lengths
-    directions = vectors.T[sizes > 1e-14 * max(float(sizes[-1]), 1.0)]
+    directions, along = pool.directions
     sums = pool.sums(counts)
-    slopes = _slopes(pool.values, sums, directions) @ (directions @ centred.T)
+    slopes = _slopes(pool.values, sums, directions) @ along
     # Where nobody has a feature, as a rater without a pair, a value may jump if the
     # least part of one is added: there, only along the rows that are drawn.
     bare = ((sums == 0.0) & pool.rows.any(axis=0)).any(axis=-1)
