@@ -8,12 +8,15 @@ from masrel.hess.hand import Hand, SimulatedHand
 from masrel.hess.limits import DeviceLimits
 from masrel.hess.loop import Presented, run_presentation
 from masrel.hess.registry import device_names, open_device
+from masrel.hess.setup import BackendOptions, DeviceSetup
 
 __all__ = [
+    "BackendOptions",
     "Clock",
     "Controller",
     "Device",
     "DeviceLimits",
+    "DeviceSetup",
     "Friction",
     "FrictionCompensation",
     "Hand",

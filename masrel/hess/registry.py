@@ -1,27 +1,27 @@
 """Devices by name."""
 
+import importlib
 import math
-from collections.abc import Callable
+from typing import Protocol, cast
 
 from masrel.errors import DeviceError
 from masrel.hess.clock import Clock
 from masrel.hess.device import Device
 from masrel.hess.hand import Hand
+from masrel.hess.setup import BackendOptions, DeviceSetup
 
 __all__ = ["device_names", "open_device"]
 
-
-def _simulated(clock: Clock, hand: Hand | None, range_end: float) -> Device:
-    from masrel.hess.simulated import SimulatedDevice  # only when chosen
-
-    if hand is None:
-        raise DeviceError("simulated: needs a hand, there is nobody to move the arm")
-    return SimulatedDevice(clock=clock, hand=hand, range_end=range_end)
-
-
-_BACKENDS: dict[str, Callable[[Clock, Hand | None, float], Device]] = {
-    "simulated": _simulated,
+_BACKENDS = {
+    "simulated": "masrel.hess.simulated",
 }
+"""Name to the module whose `build` makes the device; imported when it is chosen."""
+
+
+class _Backend(Protocol):
+    def build(self, setup: DeviceSetup) -> Device:
+        """Make a device, not yet open; `DeviceError` when the setup does not fit."""
+        ...
 
 
 def device_names() -> tuple[str, ...]:
@@ -34,8 +34,8 @@ def device_names() -> tuple[str, ...]:
 
     Examples
     --------
-    >>> device_names()
-    ('simulated',)
+    >>> "simulated" in device_names()
+    True
     """
     return tuple(sorted(_BACKENDS))
 
@@ -46,6 +46,7 @@ def open_device(
     clock: Clock,
     hand: Hand | None = None,
     range_end: float = math.radians(146.0),
+    options: BackendOptions | None = None,
 ) -> Device:
     """Open a device by name.
 
@@ -59,6 +60,8 @@ def open_device(
         The hand that moves a simulated arm; one stretch per device.
     range_end : float, optional
         Where a simulated arm meets its end stop, rad.
+    options : BackendOptions or None, optional
+        What this backend alone can be told; None for its defaults.
 
     Returns
     -------
@@ -68,8 +71,8 @@ def open_device(
     Raises
     ------
     DeviceError
-        If there is no device of that name, a simulated one has no hand, or it
-        cannot be opened.
+        If there is no device of that name, a simulated one has no hand, the
+        options are another backend's, or it cannot be opened.
     ParameterError
         If `range_end` does not fit the hand.
 
@@ -81,11 +84,14 @@ def open_device(
     ...     round(device.read().angle, 3)
     0.5
     """
-    backend = _BACKENDS.get(name)
-    if backend is None:
+    module = _BACKENDS.get(name)
+    if module is None:
         raise DeviceError(
             f"device: needs one of {', '.join(device_names())}, got {name!r}"
         )
-    device = backend(clock, hand, range_end)
+    backend = cast(_Backend, importlib.import_module(module))
+    device = backend.build(
+        DeviceSetup(clock=clock, hand=hand, range_end=range_end, options=options)
+    )
     device.open()
     return device

@@ -3,13 +3,14 @@
 import math
 from typing import ClassVar
 
-from masrel.errors import ParameterError
+from masrel.errors import DeviceError, ParameterError
 from masrel.hess.clock import Clock
 from masrel.hess.device import Device, Reading
 from masrel.hess.friction import Friction
 from masrel.hess.hand import Hand
+from masrel.hess.setup import DeviceSetup
 
-__all__ = ["SimulatedDevice"]
+__all__ = ["SimulatedDevice", "build"]
 
 _LONGEST_STEP_NS = 500_000
 _STOP_STIFFNESS = 20_000.0  # N·m/rad: 10 N·m move the end stop by 0.03 deg
@@ -163,3 +164,33 @@ class SimulatedDevice(Device):
             velocity = 0.0  # it sticks
         self._velocity = velocity
         self._angle = angle + step * velocity
+
+
+def build(setup: DeviceSetup) -> SimulatedDevice:
+    """Make a simulated device.
+
+    Parameters
+    ----------
+    setup : DeviceSetup
+        Clock, hand and end of range.
+
+    Returns
+    -------
+    SimulatedDevice
+        Not yet open.
+
+    Raises
+    ------
+    DeviceError
+        If there is no hand, or there are options: it has none.
+    ParameterError
+        If the end of range does not fit the hand.
+    """
+    if setup.hand is None:
+        raise DeviceError("simulated: needs a hand, there is nobody to move the arm")
+    if setup.options is not None:
+        got = type(setup.options).__name__
+        raise DeviceError(f"simulated: needs no options, got {got}")
+    return SimulatedDevice(
+        clock=setup.clock, hand=setup.hand, range_end=setup.range_end
+    )
