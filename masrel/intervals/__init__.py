@@ -9,10 +9,10 @@ from masrel.intervals.auto import estimate
 from masrel.intervals.bootstrap import bootstrap
 from masrel.intervals.difference import difference
 from masrel.intervals.jackknife import jackknife
-from masrel.intervals.latent_prior import LatentPrior
-from masrel.intervals.latent_trait import latent_trait
+from masrel.intervals.latent.prior import LatentPrior
+from masrel.intervals.latent.trait import latent_trait
 from masrel.intervals.posterior import posterior
-from masrel.intervals.retest_model import retest_model
+from masrel.intervals.retest.model import retest_model
 
 __all__ = [
     "LatentPrior",

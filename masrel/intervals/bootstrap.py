@@ -14,16 +14,20 @@ from masrel.agreement.weights import WeightName
 from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target
 from masrel.intervals.case import Case, Statistic, open_case, warn_small
-from masrel.intervals.draws import Effort, draw_resamples
-from masrel.intervals.endpoints import Kind, Rule
-from masrel.intervals.exact import enumerate_resamples
-from masrel.intervals.pool import Pool, cluster_pool, item_pool, rater_pool
-from masrel.intervals.resamples import Resamples
-from masrel.intervals.samplers import sampler_of
+from masrel.intervals.resampling.draws import Effort, draw_resamples
+from masrel.intervals.resampling.endpoints import Kind, Rule
+from masrel.intervals.resampling.exact import enumerate_resamples
+from masrel.intervals.resampling.pool import Pool, cluster_pool, item_pool, rater_pool
+from masrel.intervals.resampling.resamples import Resamples
+from masrel.intervals.resampling.samplers import sampler_of
+from masrel.intervals.resampling.slopes import (
+    acceleration,
+    standard_errors,
+    studentized,
+)
 from masrel.intervals.seeds import check_rng, recorded_generator
-from masrel.intervals.slopes import acceleration, standard_errors, studentized
 
-__all__ = ["Exact", "Kind", "bootstrap", "recorded_generator"]
+__all__ = ["Exact", "Kind", "bootstrap"]
 
 Exact = Literal["auto"] | bool
 """Whether all resamples are taken: always, never, or if there are few enough."""

@@ -14,9 +14,9 @@ from scipy.special import expit
 from masrel.agreement.counting import item_counts
 from masrel.estimates import Distribution, Interval
 from masrel.intervals.case import Case, student_t
+from masrel.intervals.dirichlet.prior import Prior
+from masrel.intervals.dirichlet.rho import ExactPosterior, prior_notes
 from masrel.intervals.jackknife import around_estimate
-from masrel.intervals.prior import Prior
-from masrel.intervals.rho import ExactPosterior, prior_notes
 from masrel.intervals.spread import Spread, excess_of_raters, spread
 from masrel.intervals.transforms import around
 

@@ -10,7 +10,7 @@ from masrel.agreement.coding import Label
 from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target
 from masrel.intervals.case import Case, Statistic, open_case
-from masrel.intervals.prior import Prior, PriorName
+from masrel.intervals.dirichlet.prior import Prior, PriorName
 
 if TYPE_CHECKING:
     from masrel.agreement.weights import WeightName
@@ -136,10 +136,10 @@ def posterior(
     _check(case, weights, model, method, believed)
     # Imported here: the other intervals load neither scipy nor emcee.
     if model == "table":
-        from masrel.intervals.table_interval import table_interval
+        from masrel.intervals.table.interval import table_interval
 
         return table_interval(case, concentration, n_draws=n_draws, rng=rng)
-    from masrel.intervals.rho_interval import rho_interval
+    from masrel.intervals.dirichlet.interval import rho_interval
 
     return rho_interval(
         case,

@@ -302,7 +302,7 @@ def errors(quick: bool) -> list[Point]:
 
 @contextmanager
 def _no_control() -> Iterator[None]:
-    module = importlib.import_module("masrel.intervals.samplers")
+    module = importlib.import_module("masrel.intervals.resampling.samplers")
     least = module._LEAST
     module._LEAST = 10**18
     try:

@@ -173,7 +173,7 @@ def test_chunks_do_not_change_what_is_drawn(monkeypatch: pytest.MonkeyPatch) -> 
         whole = bootstrap("fleiss_kappa", table, target=target, rng=5, exact=False)  # type: ignore[arg-type]
         with monkeypatch.context() as patch:
             # the function of the same name hides the module from a dotted path
-            module = importlib.import_module("masrel.intervals.samplers")
+            module = importlib.import_module("masrel.intervals.resampling.samplers")
             patch.setattr(module, "_CHUNK", 4000)
             cut = bootstrap("fleiss_kappa", table, target=target, rng=5, exact=False)  # type: ignore[arg-type]
         assert cut == whole

@@ -187,7 +187,7 @@ def rater_resamples(table: textbook.Table) -> Counter[Fraction | None]:
 def test_merging_changes_nothing(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     # 11 440 resamples, fewer sums: by the transform, merged, and each by itself
     table = dirichlet_multinomial(np.random.default_rng(5), 9, 4, 0.3)
-    module = importlib.import_module("masrel.intervals.exact")
+    module = importlib.import_module("masrel.intervals.resampling.exact")
     found = []
     for few, places in ((0, 10**9), (0, 0), (10**9, 0)):
         monkeypatch.setattr(module, "_FEW", few)
@@ -302,7 +302,7 @@ def test_the_words_say_what_it_is() -> None:
 
 def test_too_many_sums_are_drawn_or_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     table = dirichlet_multinomial(np.random.default_rng(5), 9, 4, 0.3)
-    module = importlib.import_module("masrel.intervals.exact")
+    module = importlib.import_module("masrel.intervals.resampling.exact")
     monkeypatch.setattr(module, "_MOST", 3000)
     for places in (10**9, 0):  # by the transform, and merged
         monkeypatch.setattr(module, "_BOX", places)

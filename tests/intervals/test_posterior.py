@@ -8,7 +8,7 @@ from scipy.special import betaln
 from masrel.errors import ConvergenceError
 from masrel.estimates import Interval
 from masrel.intervals import mcmc, posterior
-from masrel.intervals.dirichlet import DirichletMultinomial
+from masrel.intervals.dirichlet.model import DirichletMultinomial
 from tests.intervals.data import SCALE, TABLE_V
 
 Floats = NDArray[np.float64]

@@ -1,0 +1,1 @@
+"""The Dirichlet-multinomial posterior of agreement by any raters, exactly."""

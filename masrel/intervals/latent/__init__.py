@@ -1,0 +1,1 @@
+"""The ordinal latent-trait model: severities, biases, noises and thresholds."""

@@ -1,0 +1,125 @@
+"""Would the model have made such ratings? The posterior predictive check."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from masrel.agreement.coding import Codes
+from masrel.agreement.kernel import Floats
+from masrel.intervals.latent.density import Traits
+
+__all__ = ["PredictiveCheck", "predictive_checks", "replicate"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PredictiveCheck:
+    """One property of the ratings beside what the model would have made of it.
+
+    Attributes
+    ----------
+    name : str
+        What it is.
+    observed : float
+        In the ratings.
+    low, high : float
+        Central 95 % of ratings made anew by the same raters on the same items.
+    p_value : float
+        Share of those that are larger, with half of those that are equal. Near 0 or 1
+        the model does not make ratings such as these.
+    """
+
+    name: str
+    observed: float
+    low: float
+    high: float
+    p_value: float
+
+
+def predictive_checks(
+    codes: Codes,
+    traits: Traits,
+    categories: Sequence[object],
+    generator: np.random.Generator,
+) -> tuple[PredictiveCheck, ...]:
+    """Compare ratings with ratings made anew from the posterior.
+
+    Parameters
+    ----------
+    codes : ndarray of int, shape (n_items, n_raters)
+        The ratings, -1 where missing; they are missing in the new ones, too.
+    traits : Traits
+        Unknowns at n draws, each of which makes the ratings once.
+    categories : sequence
+        The scale.
+    generator : Generator
+        Where randomness comes from.
+
+    Returns
+    -------
+    tuple of PredictiveCheck
+        Share of agreeing pairs of raters on an item, ratings in each category, and
+        standard deviations of raters' and of items' mean grades.
+    """
+    made = np.where(codes >= 0, replicate(traits, generator), -1)
+    n = len(categories)
+    names = [
+        "agreeing pairs",
+        *(f"ratings of {category}" for category in categories),
+        "spread of raters' mean grades",
+        "spread of items' mean grades",
+    ]
+    observed, anew = _properties(codes[None], n)[0], _properties(made, n)
+    return tuple(
+        PredictiveCheck(
+            name=name,
+            observed=float(value),
+            low=float(np.quantile(drawn, 0.025)),
+            high=float(np.quantile(drawn, 0.975)),
+            p_value=float((drawn > value).mean() + 0.5 * (drawn == value).mean()),
+        )
+        for name, value, drawn in zip(names, observed, anew.T, strict=True)
+    )
+
+
+def replicate(traits: Traits, generator: np.random.Generator) -> NDArray[np.int64]:
+    """Let the same raters rate the same items anew.
+
+    Parameters
+    ----------
+    traits : Traits
+        Unknowns at n draws.
+    generator : Generator
+        Where randomness comes from.
+
+    Returns
+    -------
+    ndarray of int64, shape (n, n_items, n_raters)
+        Codes.
+    """
+    perceived = traits.severity[:, :, None] + traits.bias[:, None, :]
+    noise = generator.standard_normal(perceived.shape)
+    perceived = perceived + traits.noise[:, None, :] * noise
+    above = perceived[..., None] > traits.thresholds[:, None, None, :]
+    return np.asarray(above.sum(axis=-1))
+
+
+def _properties(codes: Codes, n_categories: int) -> Floats:
+    # (n, n_items, n_raters) -> (n, n_categories + 3)
+    given = codes >= 0
+    counts = (codes[..., None] == np.arange(n_categories)).sum(axis=2)  # (n, items, q)
+    rated = counts.sum(axis=2)
+    pairs = (rated * (rated - 1)).sum(axis=1)
+    grades = np.where(given, codes, 0)
+    with np.errstate(invalid="ignore"):  # an item or rater without ratings has no mean
+        by_rater = grades.sum(axis=1) / given.sum(axis=1)
+        by_item = grades.sum(axis=2) / given.sum(axis=2)
+    return np.column_stack(
+        [
+            (counts * (counts - 1)).sum(axis=(1, 2)) / pairs,
+            counts.sum(axis=1),
+            by_rater.std(axis=1),
+            by_item.std(axis=1),
+        ]
+    )

@@ -1,0 +1,1 @@
+"""The parts of a bootstrap: pools, every resample or draws of them, and their ends."""

@@ -1,0 +1,212 @@
+"""What resamples are drawn from: items, clusters of items, or raters."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from masrel.agreement.kernel import Floats
+from masrel.errors import ParameterError
+from masrel.intervals.case import Case
+from masrel.intervals.resampling.lattice import Lattice, lattice_of
+from masrel.intervals.resampling.numerators import Integers
+
+__all__ = ["Pool", "cluster_pool", "item_pool", "rater_pool"]
+
+_FEW = 2_000  # rows that are sorted column by column
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pool:
+    """Distinct members, of which as many are drawn as there are.
+
+    Attributes
+    ----------
+    times : ndarray of int64, shape (n_members,)
+        How often each is there.
+    rows : ndarray, shape (n_members, n_features), or None
+        Features of each, where a resample is a sum of them; None for raters.
+    sums : callable
+        How often each is drawn, (..., n_members), to sums (..., n_features).
+    values : callable
+        Sums (..., n_features) to the coefficient (...), ``nan`` where undefined.
+    """
+
+    times: Integers = field(compare=False, repr=False)
+    rows: Floats | None = field(compare=False, repr=False)
+    sums: Callable[[Floats], Floats]
+    values: Callable[[Floats], Floats]
+
+    @cached_property
+    def n(self) -> int:
+        """How many are drawn."""
+        return int(self.times.sum())
+
+    @cached_property
+    def lattice(self) -> Lattice | None:
+        """The rows as points of a lattice; None where they are none."""
+        if self.rows is None:
+            return None
+        return lattice_of(self.rows, self.shares, self.n)
+
+    @cached_property
+    def directions(self) -> tuple[Floats, Floats]:
+        """An orthogonal basis of the rows less their mean, and the rows in it.
+
+        Shapes (n_directions, n_features) and (n_directions, n_members).
+        """
+        if self.rows is None:
+            raise TypeError("raters have no features")
+        centred = self.rows - self.shares @ self.rows
+        many = centred.shape[0] > centred.shape[1]
+        root = np.linalg.qr(centred, mode="r") if many else centred
+        _, sizes, basis = np.linalg.svd(root, full_matrices=False)
+        basis = basis[sizes > 1e-10 * max(float(sizes[0]), 1.0)]
+        return basis, np.asarray(basis @ centred.T)
+
+    @cached_property
+    def shares(self) -> Floats:
+        """Probability of each at a draw, (n_members,)."""
+        return np.asarray(self.times / self.n)
+
+    def of_counts(self, counts: Floats) -> Floats:
+        """Return the coefficient of resamples.
+
+        Parameters
+        ----------
+        counts : ndarray, shape (n_resamples, n_members)
+            How often each member is drawn.
+
+        Returns
+        -------
+        ndarray, shape (n_resamples,)
+            Values, ``nan`` where undefined.
+        """
+        return self.values(self.sums(counts))
+
+    def without(self) -> Floats:
+        """Return the coefficient with one of each member left out, (n_members,)."""
+        if self.rows is not None:
+            return self.values(self.times @ self.rows - self.rows)
+        return self.of_counts(self.times - np.eye(self.times.size))
+
+
+def item_pool(case: Case) -> Pool:
+    """Return the items, those with equal features together.
+
+    Parameters
+    ----------
+    case : Case
+        A question.
+
+    Returns
+    -------
+    Pool
+        Distinct rows of features.
+    """
+    return _pool(case, case.rows, case.times)
+
+
+def cluster_pool(case: Case, clusters: Sequence[object] | NDArray[Any]) -> Pool:
+    """Return clusters of items, those with equal sums of features together.
+
+    Parameters
+    ----------
+    case : Case
+        A question.
+    clusters : sequence, shape (n_items,)
+        To which cluster each row of the ratings belongs.
+
+    Returns
+    -------
+    Pool
+        Distinct sums of the features of a cluster's items.
+
+    Raises
+    ------
+    ParameterError
+        If there is not one label for each row of the ratings.
+    """
+    labels = list(clusters)
+    n_items = case.coded.codes.shape[0]
+    if len(labels) != n_items:
+        raise ParameterError(
+            f"clusters: needs one label for each of {n_items} items, got {len(labels)}"
+        )
+    rated = np.any(case.coded.codes >= 0, axis=1).tolist()
+    try:
+        number: dict[object, int] = {}
+        of = [
+            number.setdefault(label, len(number))
+            for label, is_rated in zip(labels, rated, strict=True)
+            if is_rated
+        ]
+    except TypeError as error:
+        raise ParameterError(f"clusters: needs plain labels, {error}") from error
+    if any(label is None or label != label for label in number):
+        raise ParameterError("clusters: every item needs a label, got a missing one")
+    sums = np.zeros((len(number), case.rows.shape[1]))
+    np.add.at(sums, of, case.features)
+    return _pool(case, sums, np.ones(len(number), dtype=np.int64))
+
+
+def rater_pool(case: Case) -> Pool:
+    """Return the raters, of whom none is paired with a copy of itself.
+
+    Parameters
+    ----------
+    case : Case
+        A question about a coefficient whose raters can be resampled.
+
+    Returns
+    -------
+    Pool
+        Every rater once: two who always agree are still two.
+
+    Raises
+    ------
+    ParameterError
+        If raters of the coefficient cannot be resampled.
+    """
+    fewest, most = case.entry.n_raters
+    if case.kernel.rater_sums is None or most == fewest:
+        raise ParameterError(
+            f"target: raters of {case.entry.title} cannot be resampled without "
+            "pairing a rater with a copy of itself"
+        )
+    return Pool(
+        times=np.ones(case.patterns.codes.shape[1], dtype=np.int64),
+        rows=None,
+        sums=case.kernel.rater_sums(case.patterns, case.times, case.v),
+        values=case.values,
+    )
+
+
+def _pool(case: Case, rows: Floats, times: Integers) -> Pool:
+    rows, kind = _distinct(rows)
+    return Pool(
+        times=np.bincount(kind, weights=times).astype(np.int64),
+        rows=rows,
+        sums=lambda taken: taken @ rows,
+        values=case.values,
+    )
+
+
+def _distinct(rows: Floats) -> tuple[Floats, Integers]:
+    # distinct rows, and which of them each row is
+    if len(rows) <= _FEW:
+        found, kind = np.unique(rows, axis=0, return_inverse=True)
+        return found, kind.ravel()
+    # Equal rows have equal polynomials at any place; should different rows too, all
+    # are compared column by column.
+    key = np.zeros(len(rows))
+    for column in rows.T:
+        key = key * 0.7390851332151607 + column
+    _, first, kind = np.unique(key, return_index=True, return_inverse=True)
+    found = rows[first]
+    if not np.array_equal(found[kind.ravel()], rows):
+        found, kind = np.unique(rows, axis=0, return_inverse=True)
+    return found, kind.ravel()

@@ -1,0 +1,178 @@
+"""The interval of a coefficient of two raters from a Dirichlet on their table."""
+
+import dataclasses
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from masrel.agreement.kernel import Floats
+from masrel.errors import ParameterError
+from masrel.estimates import Interval
+from masrel.intervals.case import Case
+from masrel.intervals.seeds import recorded_generator
+from masrel.intervals.table.chances import CHANCE
+from masrel.intervals.table.posterior import TablePosterior
+from masrel.intervals.table.quantiles import table_quantiles
+
+__all__ = ["table_interval"]
+
+_FEW_ITEMS = 10
+_LEAST_DRAWS = 100
+_NOTED_DRAWS = 2_000  # for the interval under another prior: a note has three digits
+
+
+def table_interval(
+    case: Case,
+    concentration: float | None,
+    *,
+    n_draws: int,
+    rng: np.random.Generator | int | None,
+) -> Interval:
+    """Compute the central credible interval of a coefficient of two raters.
+
+    Parameters
+    ----------
+    case : Case
+        The question.
+    concentration : float or None
+        Parameter of every cell of the table in its Dirichlet prior; None for one over
+        the number of cells, a prior as strong as one item.
+    n_draws : int
+        How often to draw where there are more than two categories.
+    rng : Generator, int or None
+        Where randomness comes from, if any is needed.
+
+    Returns
+    -------
+    Interval
+        The interval; ``nan`` with a reason when the prior alone would speak.
+
+    Raises
+    ------
+    ParameterError
+        If there are not exactly two raters, the coefficient is none of theirs, or
+        there are too few draws.
+    """
+    _check(case, n_draws)
+    table, n_single = _table(case.coded.codes, case.coded.n_categories)
+    reason = _nothing_to_learn(case, table)
+    if reason is not None:
+        undefined = case.undefined(reason, method="table posterior", unit=None)
+        return dataclasses.replace(undefined, kind="credible")
+    a = 1.0 / table.size if concentration is None else concentration
+    asked = _Asked(case, rng)
+    found, (low, high) = asked.posterior(table + a, n_draws)
+    drawn = found.n_draws is not None
+    words = f"{n_draws} draws" if drawn else "exact"
+    notes = (f"left out, items of a single rating: {n_single}",) if n_single else ()
+    return Interval(
+        low=low,
+        high=high,
+        level=case.level,
+        kind="credible",
+        method=f"Dirichlet posterior of the table of two raters, {words}",
+        target=case.target,
+        n_resamples=found.n_draws,
+        monte_carlo_error=(
+            (found.quantile_error(low), found.quantile_error(high)) if drawn else None
+        ),
+        seed=asked.seed,
+        notes=(*notes, *_prior_notes(asked, table, a, (low, high))),
+        distribution=found.distribution(
+            *_reach(case, low, high),
+            f"posterior of {case.entry.title}, prior {_words(a)}",
+        ),
+    )
+
+
+def _check(case: Case, n_draws: int) -> None:
+    if case.entry.name not in CHANCE or case.coded.codes.shape[1] != 2:
+        raise ParameterError(
+            f'model: "table" speaks of {", ".join(CHANCE)} of exactly two raters; got '
+            f"{case.entry.name} of {case.coded.codes.shape[1]}"
+        )
+    if n_draws < _LEAST_DRAWS:
+        raise ParameterError(f"n_draws: needs at least {_LEAST_DRAWS}, got {n_draws}")
+
+
+class _Asked:
+    """One question for several priors; a generator is made when first needed."""
+
+    def __init__(self, case: Case, rng: np.random.Generator | int | None) -> None:
+        self.case = case
+        self.seed: int | None = None
+        self._rng = rng
+        self._generator: np.random.Generator | None = None
+
+    def posterior(
+        self, prior: Floats, n_draws: int
+    ) -> tuple[TablePosterior, tuple[float, float]]:
+        """Return the posterior of one Dirichlet and its ends."""
+        tail = 0.5 * (1.0 - self.case.level)
+        return table_quantiles(
+            CHANCE[self.case.entry.name],
+            self.case.v,
+            prior,
+            (tail, 1.0 - tail),
+            start=0.5 if math.isnan(self.case.value) else self.case.value,
+            generator=self._made,
+            n_draws=n_draws,
+        )
+
+    def _made(self) -> np.random.Generator:
+        if self._generator is None:
+            self._generator, self.seed = recorded_generator(self._rng)
+        return self._generator
+
+
+def _table(codes: NDArray[np.signedinteger], n_categories: int) -> tuple[Floats, int]:
+    # (n_items, 2) -> items per pair of categories, and items of one rating
+    given = (codes >= 0).sum(axis=1)
+    both = codes[given == 2].astype(np.int64)
+    cells = np.bincount(both @ (n_categories, 1), minlength=n_categories**2)
+    shape = (n_categories, n_categories)
+    return cells.reshape(shape).astype(np.float64), int((given == 1).sum())
+
+
+def _nothing_to_learn(case: Case, table: Floats) -> str | None:
+    if not table.any():
+        return "no item has ratings of two raters"
+    if len(table) < 2:
+        return "one category is declared"
+    if np.isnan(case.v).any():
+        return "the scale has no such weights"
+    if not case.v.any():
+        return "the weights know no disagreement"
+    return None
+
+
+def _words(a: float) -> str:
+    return f"Dirichlet({a:.3g}, ...) over the cells of the table"
+
+
+def _reach(case: Case, low: float, high: float) -> tuple[float, float]:
+    # beyond the ends as far as the interval is wide
+    wide = high - low
+    return max(low - wide, min(case.entry.lowest, low)), min(high + wide, 1.0)
+
+
+def _prior_notes(
+    asked: _Asked, table: Floats, a: float, ends: tuple[float, float]
+) -> tuple[str, ...]:
+    # the interval under another prior, where that matters
+    if (table > 0.0).sum() == 1 and table.trace():
+        what = "all ratings are in one category"
+    elif table.trace() == table.sum():
+        what = "agreement is perfect in these data"
+    elif table.sum() < _FEW_ITEMS:
+        what = f"{table.sum():.0f} items are few"
+    else:
+        return ()
+    as_one = 1.0 / table.size
+    other = as_one if not math.isclose(a, as_one) else 1.0 / len(table)
+    _, there = asked.posterior(table + other, _NOTED_DRAWS)
+    return (
+        f"{what}, so the prior weighs: {ends[0]:.3f} to {ends[1]:.3f} with {_words(a)},"
+        f" but {there[0]:.3f} to {there[1]:.3f} with Dirichlet({other:.3g}, ...)",
+    )

@@ -1,0 +1,257 @@
+"""The exact posterior of ρ against values by hand, panels, and a published table."""
+
+import csv
+import json
+import math
+import subprocess
+import sys
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from masrel.estimates import Interval
+from masrel.intervals import posterior
+from tests.intervals.data import SCALE, TABLE_V, dirichlet_multinomial
+from tests.intervals.dirichlet.gauss_legendre import ByPanels
+
+PUBLISHED = Path(__file__).parents[3] / "studies/hess2012/ratings/published.csv"
+
+Ratings = list[list[str | None]]
+
+
+def ends(found: Interval) -> tuple[float, float]:
+    return found.low, found.high
+
+
+def quadratic(constant: float, slope: float, share: float) -> float:
+    """The quantile of the density (constant + slope ρ) / (constant + slope / 2)."""
+    total = (constant + 0.5 * slope) * share
+    return 2.0 * total / (constant + math.sqrt(constant**2 + 2.0 * slope * total))
+
+
+# One item of two ratings, both in category 1 of K, prior Dirichlet(a, ...): its chance
+# is π_1 (A π_1 + 1) / (A + 1) = ρ π_1 + (1 - ρ) π_1², and E π_1 = 1 / K,
+# E π_1² = (a + 1) / (K (K a + 1)). So the density is linear in ρ.
+@pytest.mark.parametrize("n_categories", [2, 3, 6])
+@pytest.mark.parametrize("a", [1.0, 0.5, 1 / 6, 3.0])
+def test_one_agreeing_pair_by_hand(n_categories: int, a: float) -> None:
+    found = posterior(
+        "fleiss_kappa",
+        [["0", "0"]],
+        target="items",
+        categories=SCALE[:n_categories],
+        concentration=a,
+    )
+    square = (a + 1.0) / (n_categories * a + 1.0)
+    by_hand = [quadratic(square, 1.0 - square, share) for share in (0.025, 0.975)]
+    assert ends(found) == pytest.approx(by_hand, abs=1e-12)
+
+
+# Apart it is 2 π_1 π_2 A / (A + 1), and A / (A + 1) = 1 - ρ: the prior of π is lost.
+@pytest.mark.parametrize("a", [1.0, 1 / 6])
+def test_one_disagreeing_pair_by_hand(a: float) -> None:
+    found = posterior(
+        "fleiss_kappa",
+        [["0", "1"]],
+        target="items",
+        categories=SCALE,
+        concentration=a,
+        level=0.9,
+    )
+    by_hand = [1.0 - math.sqrt(1.0 - share) for share in (0.05, 0.95)]
+    assert ends(found) == pytest.approx(by_hand, abs=1e-12)
+
+
+# With Jeffreys' prior that is (1 - ρ) (ρ (1 - ρ))^(-1/2): a Beta(1/2, 3/2), whose
+# distribution function at sin² φ is (2 φ + sin 2φ) / π.
+def test_one_disagreeing_pair_with_jeffreys_prior_by_hand() -> None:
+    found = posterior("fleiss_kappa", [["0", "1"]], target="items", prior="jeffreys")
+    for end, share in zip(ends(found), (0.025, 0.975), strict=True):
+        angle = math.asin(math.sqrt(end))
+        below = (2.0 * angle + math.sin(2.0 * angle)) / math.pi
+        assert below == pytest.approx(share, abs=1e-12)
+
+
+# m items of one rating, all in category 1 of 2, multiply the chance of the agreeing
+# pair by π_1^m: ρ E π_1^(m+1) + (1 - ρ) E π_1^(m+2), with E π_1^t = 1 / (t + 1).
+@pytest.mark.parametrize("m", [0, 1, 7])
+def test_single_ratings_inform_the_shares_only(m: int) -> None:
+    ratings: Ratings = [["a", "a"], *[["a", None] for _ in range(m)]]
+    found = posterior("fleiss_kappa", ratings, target="items", categories=["a", "b"])
+    square = (m + 2.0) / (m + 3.0)
+    by_hand = [quadratic(square, 1.0 - square, share) for share in (0.025, 0.975)]
+    assert ends(found) == pytest.approx(by_hand, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("categories", "options", "expected"),
+    [
+        (SCALE, {}, (0.36964, 0.87373)),
+        (("1", "1+", "2", "3"), {}, (0.34777, 0.86627)),
+        (SCALE, {"concentration": 1 / 6}, (0.35421, 0.86818)),
+        (SCALE, {"prior": "jeffreys"}, (0.37107, 0.89087)),
+    ],
+)
+def test_table_v(
+    categories: tuple[str, ...], options: dict[str, object], expected: tuple[float, ...]
+) -> None:
+    with PUBLISHED.open(encoding="utf-8", newline="") as file:
+        grades = {
+            (row["model"], row["rater"]): row["grade"]
+            for row in csv.DictReader(file)
+            if row["session"] == "test"
+        }
+    models = ("HM1", "HM2", "HM3", "HM4")
+    ratings = [
+        [grades[model, f"R{rater + 1}"] for rater in range(8)] for model in models
+    ]
+    found = posterior(
+        "fleiss_kappa",
+        ratings,
+        target="items",
+        categories=categories,
+        **options,  # type: ignore[arg-type]
+    )
+    assert ends(found) == pytest.approx(expected, abs=6e-6)
+
+
+def test_the_bound_is_the_priors_where_one_category_was_used() -> None:
+    # lower 95 % bounds of four items by eight raters
+    bounds = [
+        posterior(
+            "fleiss_kappa",
+            [["1"] * 8] * 4,
+            target="items",
+            categories=SCALE,
+            concentration=a,
+            level=0.9,
+        ).low
+        for a in (1.0, 1 / 6)
+    ]
+    assert bounds == pytest.approx([0.554, 0.118], abs=5e-4)
+
+
+def labelled(counts: NDArray[np.int64] | list[list[int]]) -> Ratings:
+    """Ratings that have these counts, padded with missing ones."""
+    rows = [[str(k) for k, n in enumerate(row) for _ in range(n)] for row in counts]
+    most = max(map(len, rows))
+    return [[*row, *[None] * (most - len(row))] for row in rows]
+
+
+def drawn(n_items: int, n_raters: int, kappa: float) -> Ratings:
+    rng = np.random.default_rng([n_items, n_raters, int(1000 * kappa)])
+    codes = dirichlet_multinomial(rng, n_items, n_raters, kappa)
+    return [[str(code) for code in row] for row in codes]
+
+
+GAPS: Ratings = [
+    [grade if (i + j) % 3 else None for j, grade in enumerate(row)]
+    for i, row in enumerate(drawn(12, 6, 0.6))
+]
+
+STUDIES: dict[str, Ratings] = {
+    "one item": [["0", "0", "1", "2", "2"]],
+    "two items": [["0", "0", "1"], ["1", "1", "2"]],
+    "Table V": [[str(SCALE.index(grade)) for grade in row] for row in TABLE_V],
+    "gaps": GAPS,
+    "perfect": [[str(i % 3)] * 4 for i in range(9)],
+    "one category": [["0"] * 8] * 5,
+    "nobody agrees": [["0", "1", "2"]] * 20,
+    **{f"30 x 3, {kappa}": drawn(30, 3, kappa) for kappa in (0.05, 0.6, 0.95)},
+    **{f"100 x 5, {kappa}": drawn(100, 5, kappa) for kappa in (0.01, 0.6, 0.99)},
+    "1000 x 4": drawn(1000, 4, 0.6),
+    "1000 x 3, 0.001": drawn(1000, 3, 0.001),
+    "1000 x 3, 0.99": drawn(1000, 3, 0.99),
+    "1000 x 2 perfect": [[str(i % 3)] * 2 for i in range(1000)],
+    "1000 x 2 in one category": [["0"] * 2] * 1000,
+    "one item of many ratings": labelled([[120, 100, 16, 4]]),
+    "few of many ratings": labelled([[40, 20, 0, 0], [0, 3, 55, 2]]),
+}
+
+
+@pytest.mark.parametrize("name", STUDIES)
+@pytest.mark.parametrize(
+    ("a", "prior"), [(Fraction(1), "uniform"), (Fraction(1, 4), "jeffreys")]
+)
+def test_ends_are_those_of_panels(name: str, a: Fraction, prior: str) -> None:
+    ratings = STUDIES[name]
+    scale = ["0", "1", "2", "3"]
+    if name == "Table V":
+        scale += ["4", "5"]
+    counts = [[row.count(grade) for grade in scale] for row in ratings]
+    panels = ByPanels(counts, a, 1.0 if prior == "uniform" else 0.5)
+    found = posterior(
+        "fleiss_kappa",
+        ratings,
+        target="items",
+        categories=scale,
+        prior=prior,  # type: ignore[arg-type]
+        concentration=float(a),
+    )
+    expected = [panels.quantile(share) for share in (0.025, 0.975)]
+    assert ends(found) == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize("level", [0.01, 0.5, 0.9999, 1.0 - 1e-9])
+def test_ends_are_right_at_every_level(level: float) -> None:
+    counts = [[row.count(grade) for grade in SCALE] for row in TABLE_V]
+    panels = ByPanels(counts)
+    found = posterior(
+        "fleiss_kappa", TABLE_V, target="items", categories=SCALE, level=level
+    )
+    expected = [panels.quantile(0.5 - 0.5 * level), panels.quantile(0.5 + 0.5 * level)]
+    assert ends(found) == pytest.approx(expected, abs=1e-8)
+
+
+def test_two_categories_agree_with_an_integral_over_rho_and_the_share() -> None:
+    # No polynomial: the beta-binomial likelihood, integrated over both by panels.
+    n_first, n = np.array([2, 0, 3, 2, 0, 1, 3]), 3
+    x, w = np.polynomial.legendre.leggauss(60)
+    rho, share = 0.5 * (x + 1.0), 0.5 * (x + 1.0)
+
+    def inner(rho: NDArray[np.float64]) -> NDArray[np.float64]:
+        a = ((1.0 - rho) / rho)[:, None] * share
+        b = ((1.0 - rho) / rho)[:, None] * (1.0 - share)
+        value = np.ones_like(a)
+        for first in n_first:
+            for j in range(first):
+                value *= a + j
+            for j in range(n - first):
+                value *= b + j
+            for j in range(n):
+                value /= a + b + j
+        return np.asarray(value @ w)
+
+    total = inner(rho) @ w
+    ratings = [["a"] * k + ["b"] * (n - k) for k in n_first.tolist()]
+    found = posterior("fleiss_kappa", ratings, target="items")
+    for end, below in zip(ends(found), (0.025, 0.975), strict=True):
+        assert inner(rho * end) @ w * end / total == pytest.approx(below, abs=1e-10)
+
+
+_COUNTED = """
+import json, sys
+import numpy as np
+from masrel.intervals.posterior import posterior
+
+def no(*arguments, **options):
+    raise RuntimeError("drew a random number")
+
+np.random.default_rng = np.random.SeedSequence = np.random.RandomState = no
+np.random.random = np.random.normal = np.random.rand = no
+ratings = [["a", "a", "b"], ["b", "b", "b"], ["a", "a", "a"]]
+found = posterior("fleiss_kappa", ratings, target="items", rng=1)
+heavy = ("emcee", "arviz_stats", "scipy.stats", "pandas")
+loaded = [name for name in heavy if name in sys.modules]
+print(json.dumps([found.n_resamples, found.monte_carlo_error, found.seed, loaded]))
+"""
+
+
+def test_exact_draws_nothing_and_loads_no_sampler() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", _COUNTED], check=True, capture_output=True, text=True
+    )
+    assert json.loads(done.stdout) == [None, None, None, []]

@@ -1,0 +1,66 @@
+"""A category's polynomial, tilted, against Stirling numbers in integers."""
+
+import math
+
+import numpy as np
+import pytest
+
+from masrel.errors import ConvergenceError
+from masrel.intervals.dirichlet import powers as dirichlet_powers
+from masrel.intervals.dirichlet.model import DirichletMultinomial
+from masrel.intervals.dirichlet.powers import TRIMMED, Category
+from masrel.intervals.dirichlet.saddle import Factors
+
+
+def stirling(n: int) -> list[int]:
+    """Coefficients of x (x + 1) ... (x + n - 1), from power 0."""
+    row = [1]
+    for j in range(n):
+        row = [
+            j * same + below for same, below in zip([*row, 0], [0, *row], strict=True)
+        ]
+    return row
+
+
+def of_one_item(n: int) -> tuple[Category, Factors]:
+    """One item whose n ratings are all in one category: every N_j is 1."""
+    model = DirichletMultinomial.of_counts(np.array([[n, 0]]))
+    factors = Factors.of(model)
+    return Category(factors.powers[0], 1.0), factors
+
+
+@pytest.mark.parametrize("n", [5, 40, 700])
+@pytest.mark.parametrize("log_tilt", [-30.0, -2.0, 0.0, 5.0, 40.0])
+def test_every_coefficient_is_the_integer_times_its_moment(
+    n: int, log_tilt: float
+) -> None:
+    category, factors = of_one_item(n)
+    x, _ = factors.saddle(np.exp([log_tilt]))
+    found = category.tilted(float(x[0, 0]), log_tilt)
+    # Γ(1 + t) = t!
+    exact = np.array(
+        [
+            math.log(c) + math.lgamma(1.0 + t) + t * log_tilt
+            for t, c in enumerate(stirling(n))
+            if t
+        ]
+    )
+    kept = np.flatnonzero(exact > exact.max() + math.log(TRIMMED)) + 1
+    assert found.first == kept[0]
+    assert found.values.size == kept.size
+    logs = np.log(found.values) + found.scale
+    assert logs == pytest.approx(exact[kept - 1], rel=1e-12, abs=1e-10)
+
+
+def test_what_a_law_in_floats_drops_is_multiplied_out_in_logarithms(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # At this tilt the moments still need powers whose law is below 1e-230.
+    category, factors = of_one_item(700)
+    x, _ = factors.saddle(np.exp([-2.0]))
+    category.tilted(float(x[0, 0]), -2.0)
+    assert "_log_coefficients" in vars(category)
+    monkeypatch.setattr(dirichlet_powers, "_MOST_FACTORS", 500)
+    again, _ = of_one_item(700)
+    with pytest.raises(ConvergenceError, match='"emcee" samples it'):
+        again.tilted(float(x[0, 0]), -2.0)

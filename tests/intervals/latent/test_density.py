@@ -1,0 +1,185 @@
+"""The latent-trait density against a textbook in scalars."""
+
+import math
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy import stats
+
+from masrel.intervals.latent.density import LatentDensity, grade_shares
+from masrel.intervals.latent.prior import LatentPrior
+
+Floats = NDArray[np.float64]
+PRIORS = [LatentPrior(), LatentPrior.other()]
+
+RATINGS = np.array([[0, 1, 0], [2, 2, 3], [4, 3, -1], [2, -1, -1]])
+
+
+def natural(x: Floats, n_items: int, n_raters: int, middle: int) -> Floats:
+    """Turn coordinates into θ, b, log σ_r, ρ, f, η and grades' shares, one by one."""
+    z, b, w = np.split(x[: n_items + 2 * n_raters], [n_items, n_items + n_raters])
+    a, c, e, anchor, *gaps = x[n_items + 2 * n_raters :].tolist()
+    rho, f, eta = 1 / (1 + math.exp(-a)), 1 / (1 + math.exp(-c)), math.exp(e)
+    tau = [anchor]
+    for gap in gaps[:middle][::-1]:
+        tau.insert(0, tau[0] - math.exp(gap))
+    for gap in gaps[middle:]:
+        tau.append(tau[-1] + math.exp(gap))
+    below = stats.norm.cdf([-np.inf, *tau, np.inf])
+    log_noise = 0.5 * math.log((1 - rho) * f)
+    return np.array(
+        [
+            *(math.sqrt(rho) * z),
+            *(math.sqrt((1 - rho) * (1 - f)) * b),
+            *(log_noise + eta * w),
+            rho,
+            f,
+            eta,
+            *np.diff(below)[:-1],
+        ]
+    )
+
+
+def textbook(x: Floats, codes: NDArray[np.int64], n: int, prior: LatentPrior) -> float:
+    """Log-density in natural unknowns, and the Jacobian by differences."""
+    n_items, n_raters = codes.shape
+    middle = LatentDensity.of(codes, n, prior).middle
+    unknowns = natural(x, n_items, n_raters, middle)
+    theta, b, log_sigma = np.split(
+        unknowns[: n_items + 2 * n_raters], [n_items, n_items + n_raters]
+    )
+    rho, f, eta, *shares = unknowns[n_items + 2 * n_raters :].tolist()
+    tau = stats.norm.ppf(np.cumsum(shares))
+    tau = [-np.inf, *tau.tolist(), np.inf]
+    total = 0.0
+    for i in range(n_items):
+        for r in range(n_raters):
+            if codes[i, r] >= 0:
+                law = stats.norm(theta[i] + b[r], math.exp(log_sigma[r]))
+                low, high = tau[codes[i, r]], tau[codes[i, r] + 1]
+                if low > law.mean():  # from the other side, for its digits
+                    total += math.log(law.sf(low) - law.sf(high))
+                else:
+                    total += math.log(law.cdf(high) - law.cdf(low))
+    total += stats.norm(0, math.sqrt(rho)).logpdf(theta).sum()
+    total += stats.norm(0, math.sqrt((1 - rho) * (1 - f))).logpdf(b).sum()
+    total += stats.norm(0.5 * math.log((1 - rho) * f), eta).logpdf(log_sigma).sum()
+    total += stats.beta(*prior.item_share).logpdf(rho)
+    total += stats.beta(*prior.noise_fraction).logpdf(f)
+    total += stats.halfnorm(scale=prior.noise_spread).logpdf(eta)
+    grades = np.array([*shares, 1 - sum(shares)])
+    total += stats.dirichlet(np.full(n, prior.concentration)).logpdf(grades)
+    slopes = [
+        (
+            natural(x + h, n_items, n_raters, middle)
+            - natural(x - h, n_items, n_raters, middle)
+        )
+        / 2e-6
+        for h in 1e-6 * np.eye(x.size)
+    ]
+    return float(total + np.linalg.slogdet(np.array(slopes))[1])
+
+
+def positions(density: LatentDensity, n: int) -> Floats:
+    rng = np.random.default_rng(4)
+    scatter: Floats = 0.5 * rng.normal(size=(n, density.n_dimensions))
+    return density.middle_of_prior() + scatter
+
+
+@pytest.mark.parametrize("prior", PRIORS)
+@pytest.mark.parametrize("n_categories", [5, 6])
+def test_density_is_the_textbook_one(prior: LatentPrior, n_categories: int) -> None:
+    density = LatentDensity.of(RATINGS, n_categories, prior)
+    x = positions(density, 8)
+    theirs = [textbook(row, RATINGS, n_categories, prior) for row in x]
+    off = density.log_density(x) - theirs
+    assert np.ptp(off) < 1e-6  # one constant; the numerical Jacobian is that good
+
+
+@pytest.mark.parametrize("prior", PRIORS)
+def test_two_grades_have_one_threshold(prior: LatentPrior) -> None:
+    codes = np.array([[0, 1], [1, 1]])
+    density = LatentDensity.of(codes, 2, prior)
+    assert density.n_dimensions == 2 + 4 + 3 + 1
+    x = positions(density, 6)
+    off = density.log_density(x) - [textbook(row, codes, 2, prior) for row in x]
+    assert np.ptp(off) < 1e-6
+
+
+def test_a_missing_jacobian_is_seen_by_the_textbook() -> None:
+    density = LatentDensity.of(RATINGS, 5, LatentPrior())
+    x = positions(density, 8)
+    without = density.log_density(x) - x[:, -3:].sum(axis=1)  # of the log distances
+    off = without - [textbook(row, RATINGS, 5, LatentPrior()) for row in x]
+    assert np.ptp(off) > 1
+
+
+@pytest.mark.parametrize("prior", PRIORS)
+@pytest.mark.parametrize("n_categories", [2, 3, 6])
+def test_slopes_are_those_of_the_density(prior: LatentPrior, n_categories: int) -> None:
+    codes = np.minimum(RATINGS, n_categories - 1)
+    density = LatentDensity.of(codes, n_categories, prior)
+    x = positions(density, 10)
+    for k, h in enumerate(1e-5 * np.eye(density.n_dimensions)):
+        numerical = (density.log_density(x + h) - density.log_density(x - h)) / 2e-5
+        assert density.gradient(x)[:, k] == pytest.approx(numerical, rel=1e-6, abs=1e-6)
+
+
+def test_a_missing_rating_says_nothing() -> None:
+    prior = LatentPrior()
+    codes = np.array([[0, 1, -1], [2, 2, -1], [-1, -1, -1]])
+    density = LatentDensity.of(codes, 3, prior)
+    x = positions(density, 5)
+    nothing = LatentDensity.of(np.full((3, 3), -1), 3, prior)
+    part = LatentDensity.of(codes[:2, :2], 3, prior)
+    inner = np.delete(x, [2, 3 + 2, 6 + 2], axis=1)
+    assert part.middle == density.middle
+    prior_part = LatentDensity.of(np.full((2, 2), -1), 3, prior)
+    assert density.log_density(x) - nothing.log_density(x) == pytest.approx(
+        part.log_density(inner) - prior_part.log_density(inner)
+    )
+
+
+def test_thresholds_ascend_around_the_one_that_halves_the_ratings() -> None:
+    density = LatentDensity.of(np.array([[4, 4, 3], [4, 3, 3]]), 6, LatentPrior())
+    assert density.middle == 3  # three ratings below it, three above
+    x = positions(density, 5)
+    traits = density.traits(x)
+    assert (np.diff(traits.thresholds, axis=1) > 0).all()
+    assert traits.thresholds[:, 3] == pytest.approx(x[:, -5])
+
+
+def test_the_three_shares_are_the_variance() -> None:
+    density = LatentDensity.of(RATINGS, 5, LatentPrior())
+    traits = density.traits(positions(density, 20))
+    total = traits.item_share + traits.bias_variance + traits.noise_variance
+    assert total == pytest.approx(np.ones(20))
+
+
+def test_far_out_the_density_is_zero_and_not_nan() -> None:
+    density = LatentDensity.of(RATINGS, 5, LatentPrior())
+    far = np.vstack([s * 800.0 * np.eye(density.n_dimensions) for s in (1, -1)])
+    assert not np.isnan(density.log_density(far)).any()
+    assert np.isfinite(density.gradient(far)).all()
+
+
+def test_shares_of_far_grades_keep_their_digits() -> None:
+    found = grade_shares(np.array([[-9.0, 0.0, 9.0, 9.5]]))[0]
+    exact = [
+        stats.norm.cdf(-9),
+        0.5,
+        0.5,
+        stats.norm.sf(9) - stats.norm.sf(9.5),
+        stats.norm.sf(9.5),
+    ]
+    assert found == pytest.approx(exact, rel=1e-12)
+
+
+def test_many_walkers_are_one_call() -> None:
+    density = LatentDensity.of(RATINGS, 5, LatentPrior())
+    x = positions(density, 30)
+    one_by_one = np.concatenate([density.log_density(row[None]) for row in x])
+    assert density.log_density(x) == pytest.approx(one_by_one, rel=1e-13)
+    assert density.log_density(x).shape == (30,)
+    assert density.gradient(x).shape == x.shape

@@ -1,0 +1,150 @@
+"""Kappa implied by the latent-trait model against closed forms and brute force."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy import stats
+
+from masrel.intervals.latent.density import Traits
+from masrel.intervals.latent.kappa import (
+    Agreement,
+    agreement_on_items,
+    agreement_on_new_items,
+    grade_probabilities,
+)
+from masrel.intervals.latent.predictive import replicate
+
+Floats = NDArray[np.float64]
+
+
+def one(
+    rho: float,
+    f: float,
+    eta: float,
+    tau: list[float],
+    severity: tuple[float, ...] = (-1.0, 0.0, 0.3),
+) -> Traits:
+    """Make a single position."""
+    rest = 1.0 - rho
+    return Traits(
+        severity=np.array([severity]),
+        bias=np.zeros((1, 1)),
+        noise=np.ones((1, 1)),
+        thresholds=np.array([tau]),
+        item_share=np.array([rho]),
+        noise_fraction=np.array([f]),
+        noise_spread=np.array([eta]),
+        bias_variance=np.array([rest * (1 - f)]),
+        noise_variance=np.array([rest * f]),
+    )
+
+
+CASES = [
+    (0.5, 0.5, 0.3, [-1.0, 0.0, 1.0]),
+    (0.9, 0.3, 0.5, [-2.0, -0.5, 0.1, 1.5]),
+    (0.1, 0.9, 0.9, [-3.0, 2.0]),
+    (0.7, 0.5, 0.5, [-6.0, -0.1, 5.0, 7.0]),
+    (0.97, 0.9, 1.0, [0.1]),
+]
+
+
+@pytest.mark.parametrize("rho", [0.05, 0.5, 0.9, 0.98])
+def test_two_halves_have_the_arcsine_of_the_correlation(rho: float) -> None:
+    # Sheppard: both of two normals with correlation ρ below 0: 1/4 + asin(ρ) / (2 π).
+    found = agreement_on_new_items(one(rho, 0.4, 1e-9, [0.0]))
+    assert found.observed[0] == pytest.approx(0.5 + math.asin(rho) / math.pi, abs=1e-7)
+    assert found.chance[0] == pytest.approx(0.5)
+    assert found.kappa[0] == pytest.approx(2 * math.asin(rho) / math.pi, abs=2e-7)
+
+
+def test_alike_noises_have_the_rectangles_of_a_bivariate_normal() -> None:
+    rho, tau = 0.8, [-1.2, -0.1, 0.9]
+    law = stats.multivariate_normal([0, 0], [[1, rho], [rho, 1]])
+    ends = [-9.0, *tau, 9.0]
+    observed = sum(
+        law.cdf([b, b], lower_limit=[a, a]) for a, b in itertools.pairwise(ends)
+    )
+    found = agreement_on_new_items(one(rho, 0.5, 1e-9, tau))
+    assert found.observed[0] == pytest.approx(observed, abs=1e-6)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_new_items_agree_with_a_fine_grid(
+    case: tuple[float, float, float, list[float]],
+) -> None:
+    rho, f, eta, tau = case
+    w = np.linspace(-8, 8, 401)
+    weight = stats.norm.pdf(w) / stats.norm.pdf(w).sum()
+    s = np.sqrt((1 - rho) * (1 - f + f * np.exp(2 * eta * w)))
+    z = np.linspace(-8.5, 8.5, 1701)
+    mass = stats.norm.pdf(z) / stats.norm.pdf(z).sum()
+    away = (np.array(tau)[:, None] - math.sqrt(rho) * z)[..., None] / s
+    below = stats.norm.cdf(away) @ weight  # (thresholds, z)
+    p = np.diff(below, axis=0, prepend=0.0, append=1.0)
+    observed, chance = (p**2).sum(axis=0) @ mass, ((p @ mass) ** 2).sum()
+    found = agreement_on_new_items(one(*case))
+    assert found.observed[0] == pytest.approx(observed, abs=1e-6)
+    assert found.kappa[0] == pytest.approx((observed - chance) / (1 - chance), abs=2e-6)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_these_items_agree_with_simulated_raters(
+    case: tuple[float, float, float, list[float]],
+) -> None:
+    rho, f, eta, tau = case
+    rng = np.random.default_rng(6)
+    n, severity = 200_000, (-1.0, 0.0, 0.3)
+    rest = 1 - rho
+    drawn = Traits(
+        severity=np.tile(severity, (n, 1)),
+        bias=math.sqrt(rest * (1 - f)) * rng.normal(size=(n, 2)),
+        noise=math.sqrt(rest * f) * np.exp(eta * rng.normal(size=(n, 2))),
+        thresholds=np.tile(tau, (n, 1)),
+        item_share=np.full(n, rho),
+        noise_fraction=np.full(n, f),
+        noise_spread=np.full(n, eta),
+        bias_variance=np.full(n, rest * (1 - f)),
+        noise_variance=np.full(n, rest * f),
+    )
+    codes = replicate(drawn, rng)
+    found = agreement_on_items(one(*case))
+    # 4.5 standard errors: once in 150 000 runs of other seeds
+    error = 0.5 / math.sqrt(3 * n)
+    equal = float((codes[:, :, 0] == codes[:, :, 1]).mean())
+    assert found.observed[0] == pytest.approx(equal, abs=4.5 * error)
+    p = grade_probabilities(one(*case))[0]
+    for k in range(len(tau) + 1):
+        share = float((codes[:, 1] == k).mean())
+        assert p[1, k] == pytest.approx(share, abs=4.5 * 0.5 / math.sqrt(2 * n))
+
+
+def test_kappa_is_fleiss_own_formula() -> None:
+    traits = one(0.6, 0.5, 0.5, [-0.7, 0.2, 1.0])
+    p = grade_probabilities(traits)[0]
+    observed, chance = (p**2).sum(axis=1).mean(), (p.mean(axis=0) ** 2).sum()
+    found = agreement_on_items(traits)
+    assert found.observed[0] == pytest.approx(observed)
+    assert found.chance[0] == pytest.approx(chance)
+    assert found.kappa[0] == pytest.approx((observed - chance) / (1 - chance))
+
+
+def test_alike_items_have_kappa_0_and_sure_raters_kappa_1() -> None:
+    alike = agreement_on_items(one(0.5, 0.5, 0.3, [-1.0, 1.0], (0.2, 0.2)))
+    assert alike.kappa[0] == pytest.approx(0.0, abs=1e-15)
+    sure = one(1 - 1e-14, 0.5, 0.3, [-1.0, 1.0], (-2.0, 0.0, 2.0))
+    assert agreement_on_items(sure).kappa[0] == pytest.approx(1.0)
+    assert agreement_on_new_items(sure).kappa[0] == pytest.approx(1.0, abs=1e-4)
+
+
+def test_where_all_are_in_one_category_kappa_is_0_and_not_nan() -> None:
+    found = Agreement.of(np.array([[1.0, 0.0, 0.0]]), np.array([0.0]))
+    assert found.kappa.tolist() == [0.0]
+
+
+def test_probabilities_of_grades_sum_to_one() -> None:
+    p = grade_probabilities(one(0.5, 0.5, 0.5, [-1.0, 0.3]))
+    assert p.shape == (1, 3, 3)
+    assert p.sum(axis=2) == pytest.approx(np.ones((1, 3)))

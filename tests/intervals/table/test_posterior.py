@@ -1,0 +1,520 @@
+"""The posterior of two raters' table: by hand, by other integrals, by drawing it."""
+
+import math
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy.special import betainc, betaincinv, betaln, expit, roots_jacobi
+
+from masrel.agreement import COEFFICIENTS
+from masrel.errors import ParameterError, UndefinedStatisticWarning
+from masrel.estimates import Interval
+from masrel.intervals import posterior
+from masrel.intervals.table.beta_nodes import beta_nodes
+from masrel.intervals.table.chances import CHANCE, Nodes, grid
+from masrel.intervals.table.posterior import TablePosterior
+from masrel.intervals.table.quantiles import table_quantiles
+
+Floats = NDArray[np.float64]
+
+IDENTITY = 1.0 - np.eye(2)
+TAILS = (0.025, 0.975)
+
+
+def pairs(table: list[list[int]]) -> list[list[str]]:
+    """Ratings of two raters that have this table."""
+    names = "abcdef"
+    return [
+        [names[k], names[l]]
+        for k, row in enumerate(table)
+        for l, n in enumerate(row)  # noqa: E741 - as in a table
+        for _ in range(n)
+    ]
+
+
+def asked(
+    coefficient: str, table: list[list[int]], rng: int = 1, **options: object
+) -> Interval:
+    return posterior(
+        coefficient,
+        pairs(table),
+        target="items",
+        model="table",
+        rng=rng,
+        **{"categories": list("abcdef"[: len(table)]), **options},  # type: ignore[arg-type]
+    )
+
+
+def ends(found: Interval) -> tuple[float, float]:
+    return found.low, found.high
+
+
+# One pair in agreement, each of 2 × 2 cells of prior 1/2: the share of agreeing pairs
+# is Beta(1/2 + 1/2 + 1, 1/2 + 1/2), whose distribution function is x²; and
+# Brennan-Prediger's coefficient is 2 x - 1.
+def test_one_agreeing_pair_by_hand() -> None:
+    found = asked("brennan_prediger", [[1, 0], [0, 0]], concentration=0.5)
+    by_hand = [2.0 * math.sqrt(share) - 1.0 for share in TAILS]
+    assert ends(found) == pytest.approx(by_hand, abs=1e-11)
+
+
+TABLE = [[8, 2, 0], [1, 9, 3], [0, 2, 7]]
+
+
+def test_agreement_is_a_beta() -> None:
+    # 24 of 32 pairs agree; the prior, as strong as one item, is 1/9 a cell
+    agreed = betaincinv(24 + 3 / 9, 8 + 6 / 9, TAILS)
+    percent = asked("percent_agreement", TABLE)
+    assert ends(percent) == pytest.approx(tuple(agreed), abs=1e-11)
+    corrected = asked("brennan_prediger", TABLE)
+    assert ends(corrected) == pytest.approx(
+        tuple(1.0 - 1.5 * (1.0 - agreed)), abs=1e-11
+    )
+    for found in (percent, corrected):
+        assert (found.n_resamples, found.seed, found.monte_carlo_error) == (None,) * 3
+
+
+def jacobi(a: float, b: float) -> tuple[Floats, Floats]:
+    """Gauss-Jacobi nodes and weights of a Beta(a, b)."""
+    nodes, weights = roots_jacobi(80, b - 1.0, a - 1.0)
+    return 0.5 * (nodes + 1.0), weights / weights.sum()
+
+
+def cohen_probability(prior: Floats, value: float) -> float:
+    """By another way round: given the first rater's margin p and the second's share w
+    of category 1 on the first's category 2, κ <= value is linear in its share u on
+    the first's category 1: 2 p (1 - p) (u - w) <= value (p + q - 2 p q), with
+    q = p u + (1 - p) w.
+    """
+    p, of_p = jacobi(prior[0].sum(), prior[1].sum())
+    w, of_w = jacobi(prior[1, 0], prior[1, 1])
+    p, w = p[:, None], w[None, :]
+    slope = p * (2.0 * (1.0 - p) - value * (1.0 - 2.0 * p))
+    least = value * p + (1.0 - p) * w * (2.0 * p + value * (1.0 - 2.0 * p))
+    below = betainc(prior[0, 0], prior[0, 1], (least / slope).clip(0.0, 1.0))
+    given_both = np.where(slope > 0.0, below, 1.0 - below)
+    return float(of_p @ given_both @ of_w)
+
+
+def scott_probability(prior: Floats, value: float) -> float:
+    """By another way round: given the share t of pairs apart, with m = t/2 + (1 - t) x
+    of category 1, π <= value where m (1 - m) <= t / (2 (1 - value)): x beyond either
+    of two bounds, which meet at t = top.
+    """
+    apart, agreed = prior[0, 1] + prior[1, 0], prior.trace()
+    top = 0.5 * (1.0 - value)
+    x, weights = np.polynomial.legendre.leggauss(200)
+    root = 0.5 * (x + 1.0)  # t = top (1 - root²), so that the bounds are smooth in it
+    t = top * (1.0 - root**2)
+    log = (apart - 1.0) * np.log(t) + (agreed - 1.0) * np.log1p(-t)
+    of_t = np.exp(log - betaln(apart, agreed)) * top * root * weights
+    reach = np.sqrt(0.25 * root**2) / (1.0 - t)
+    a, b = prior[0, 0], prior[1, 1]
+    beyond = betainc(a, b, (0.5 - reach).clip(0.0, 1.0))
+    beyond += betainc(b, a, (0.5 - reach).clip(0.0, 1.0))
+    return float(of_t @ beyond + betainc(agreed, apart, 1.0 - top))
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        [[20, 5], [10, 15]],
+        [[200, 50], [100, 150]],
+        [[6, 5], [7, 9]],
+        [[4, 12], [13, 6]],
+        [[90, 4], [5, 12]],
+    ],
+)
+@pytest.mark.parametrize(
+    ("coefficient", "probability"),
+    [("cohen_kappa", cohen_probability), ("scott_pi", scott_probability)],
+)
+def test_two_categories_by_another_integral(
+    table: list[list[int]],
+    coefficient: str,
+    probability: Callable[[Floats, float], float],
+) -> None:
+    prior = np.array(table) + 2.0
+    found = asked(coefficient, table, concentration=2.0)
+    again = [probability(prior, end) for end in ends(found)]
+    # the other integrals have kinks where a share reaches 0 or 1
+    assert again == pytest.approx(TAILS, abs=1e-8)
+    assert found.n_resamples is None
+
+
+# κ <= 0 is an odds ratio of at most 1: the first rater's two rows have independent
+# Beta shares u <= w. Over the logit of w in panels, at priors far below 1, where the
+# densities have poles.
+@pytest.mark.parametrize(
+    "table",
+    [[[10, 0], [0, 0]], [[0, 3], [3, 0]], [[5, 1], [0, 4]], [[1, 1], [0, 0]]],
+)
+@pytest.mark.parametrize("a", [0.25, 0.05])
+def test_the_chance_of_no_agreement_beyond_chance(
+    table: list[list[int]], a: float
+) -> None:
+    prior = np.array(table) + a
+    x, weights = np.polynomial.legendre.leggauss(20)
+    edges = np.linspace(-40.0 / a, 40.0 / a, 801)
+    half = 0.5 * np.diff(edges)[:, None]
+    logit = edges[:-1, None] + half * (x + 1.0)
+    log = -prior[1, 0] * np.logaddexp(0.0, -logit)
+    log -= prior[1, 1] * np.logaddexp(0.0, logit) + betaln(prior[1, 0], prior[1, 1])
+    below = np.where(
+        logit < 0.0,
+        betainc(prior[0, 0], prior[0, 1], expit(logit)),
+        1.0 - betainc(prior[0, 1], prior[0, 0], expit(-logit)),
+    )
+    expected = float(((np.exp(log) * below) @ weights) @ half[:, 0])
+    found = TablePosterior(
+        nodes=partial(grid, "margins", IDENTITY, prior, 0.0625),
+        shown=partial(grid, "margins", IDENTITY, prior, 0.5),
+        apart=prior[0, 1] + prior[1, 0],
+        agreed=prior.trace(),
+    )
+    assert found.probability(0.0) == pytest.approx(
+        expected, abs=1e-7 if a < 0.1 else 1e-10
+    )
+
+
+def drawn_values(
+    coefficient: str, prior: Floats, v: Floats, n: int = 200_000
+) -> Floats:
+    """Draw whole tables of chances, and the coefficient of each by its definition."""
+    q = len(prior)
+    rng = np.random.default_rng(7)
+    theta = rng.dirichlet(prior.ravel(), size=n).reshape(n, q, q)
+    first, second = theta.sum(axis=2), theta.sum(axis=1)
+    apart = (theta * v).sum(axis=(1, 2))
+    both = 0.5 * (first + second)
+    by_chance = {
+        "percent_agreement": np.ones(n),
+        "brennan_prediger": np.full(n, v.sum() / q**2),
+        "scott_pi": np.einsum("nk,kl,nl->n", both, v, both),
+        "cohen_kappa": np.einsum("nk,kl,nl->n", first, v, second),
+        "gwet_ac": 1.0
+        - (1.0 - v).sum() / (q * (q - 1)) * (both * (1.0 - both)).sum(axis=1),
+    }
+    return np.asarray(1.0 - apart / by_chance[coefficient])
+
+
+@pytest.mark.parametrize("weights", ["identity", "linear", "quadratic"])
+@pytest.mark.parametrize(
+    "coefficient",
+    ["cohen_kappa", "scott_pi", "gwet_ac", "percent_agreement", "brennan_prediger"],
+)
+@pytest.mark.parametrize("table", [TABLE, [[20, 5], [10, 15]]])
+def test_whole_tables_drawn_give_the_same(
+    coefficient: str, weights: str, table: list[list[int]]
+) -> None:
+    q = len(table)
+    away: Floats = np.abs(np.subtract.outer(range(q), range(q))) / (q - 1.0)
+    v = {"identity": (away > 0.0) * 1.0, "linear": away, "quadratic": away**2}[weights]
+    values = drawn_values(coefficient, np.array(table) + 1.0 / q**2, v)
+    found = asked(coefficient, table, weights=weights)
+    errors = found.monte_carlo_error or (0.0, 0.0)
+    density = found.distribution
+    assert density is not None
+    for end, share, error in zip(ends(found), TAILS, errors, strict=True):
+        slope = float(np.interp(end, density.values, density.weights))
+        below = float((values <= end).mean())
+        noise = math.hypot(
+            math.sqrt(share * (1.0 - share) / values.size), error * slope
+        )
+        assert abs(below - share) < 4.5 * noise  # once in 150 000
+
+
+# Of three categories two count as one: κ is that of two categories, and the Dirichlet
+# of their table the sum over cells that fall together.
+def test_draws_agree_with_the_quadrature_of_categories_that_count_as_one() -> None:
+    weights = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 1.0], [0.0, 1.0, 1.0]])
+    found = asked("cohen_kappa", TABLE, weights=weights, concentration=0.5)
+    prior = np.array(TABLE) + 0.5
+    merged = np.add.reduceat(np.add.reduceat(prior, [0, 1], axis=0), [0, 1], axis=1)
+    _, exact = table_quantiles(
+        "margins",
+        IDENTITY,
+        merged,
+        TAILS,
+        start=0.5,
+        generator=np.random.default_rng,
+        n_draws=0,
+    )
+    assert found.monte_carlo_error is not None
+    for end, expected, error in zip(
+        ends(found), exact, found.monte_carlo_error, strict=True
+    ):
+        assert abs(end - expected) < 4.5 * error
+        assert error < 3e-3
+
+
+def test_the_monte_carlo_error_is_the_spread_over_seeds() -> None:
+    runs = [asked("cohen_kappa", TABLE, rng=seed, n_draws=500) for seed in range(30)]
+    for end in (0, 1):
+        spread = float(np.std([ends(run)[end] for run in runs], ddof=1))
+        said = [run.monte_carlo_error[end] for run in runs if run.monte_carlo_error]
+        # of 30 the standard deviation is within 0.6 and 1.45 but once in 1000
+        assert 0.6 < spread / float(np.mean(said)) < 1.45
+
+
+def test_seeds_repeat_and_are_recorded() -> None:
+    one, two = (asked("cohen_kappa", TABLE, rng=seed) for seed in (1, 2))
+    assert (one.seed, one.n_resamples) == (1, 10_000)
+    assert one == asked("cohen_kappa", TABLE)
+    assert one.low != two.low
+
+
+def test_coefficients_of_one_value_in_the_population_have_one_posterior() -> None:
+    for names in (
+        ("cohen_kappa", "conger_kappa", "light_kappa"),
+        ("scott_pi", "fleiss_kappa", "krippendorff_alpha"),
+    ):
+        first, *others = (ends(asked(name, TABLE)) for name in names)
+        for other in others:
+            assert other == pytest.approx(first, abs=1e-10)
+
+
+def test_every_coefficient_of_two_raters_is_spoken_of() -> None:
+    of_pairs = {
+        name
+        for name, entry in COEFFICIENTS.items()
+        if entry.kernel is not None and entry.shape == "ratings"
+    }
+    assert set(CHANCE) == of_pairs
+
+
+counts = st.integers(0, 12)
+tables_of_two = st.lists(counts, min_size=4, max_size=4).filter(any)
+
+
+@settings(max_examples=15)
+@given(tables_of_two, st.sampled_from(sorted(CHANCE)))
+def test_renaming_raters_or_categories_changes_nothing(
+    cells: list[int], coefficient: str
+) -> None:
+    a, b, c, d = cells
+    found = asked(coefficient, [[a, b], [c, d]])
+    for other in ([[a, c], [b, d]], [[d, c], [b, a]]):
+        assert ends(asked(coefficient, other)) == pytest.approx(ends(found), abs=1e-8)
+
+
+@settings(max_examples=15)
+@given(tables_of_two, st.sampled_from(sorted(CHANCE)))
+def test_levels_are_nested(cells: list[int], coefficient: str) -> None:
+    table = [cells[:2], cells[2:]]
+    inner = asked(coefficient, table, level=0.5)
+    outer = asked(coefficient, table, level=0.9)
+    assert -1.0 <= outer.low < inner.low < inner.high < outer.high <= 1.0
+
+
+@settings(max_examples=8)
+@given(tables_of_two)
+def test_agreement_where_there_was_none_moves_it_up(cells: list[int]) -> None:
+    a, b, c, d = cells
+    apart = asked("cohen_kappa", [[a, b + 1], [c + 1, d]])
+    agreed = asked("cohen_kappa", [[a + 1, b], [c, d + 1]])
+    assert agreed.low > apart.low
+    assert agreed.high > apart.high
+
+
+@pytest.mark.parametrize("coefficient", ["cohen_kappa", "scott_pi", "gwet_ac"])
+@pytest.mark.parametrize("table", [TABLE, [[20, 5], [10, 15]], [[4, 12], [13, 6]]])
+def test_the_density_holds_what_lies_between_the_ends(
+    coefficient: str, table: list[list[int]]
+) -> None:
+    found = asked(coefficient, table)
+    of = found.distribution
+    assert of is not None
+    assert of.continuous
+    steps = 0.5 * (of.weights[1:] + of.weights[:-1]) * np.diff(of.values)
+    below = np.append(0.0, steps.cumsum())
+    assert below[-1] == pytest.approx(1.0, abs=3e-3)
+    between = np.interp(ends(found), of.values, below)
+    assert between[1] - between[0] == pytest.approx(0.95, abs=4e-3)
+    assert of.words.endswith("over the cells of the table")
+
+
+def test_the_place_of_a_probability_is_its_quantile_at_every_level() -> None:
+    for level in (0.01, 0.9, 1.0 - 1e-9):
+        prior = np.array([[20, 5], [10, 15]]) + 2.0
+        found = asked(
+            "cohen_kappa", [[20, 5], [10, 15]], concentration=2.0, level=level
+        )
+        shares = [0.5 - 0.5 * level, 0.5 + 0.5 * level]
+        again = [cohen_probability(prior, end) for end in ends(found)]
+        assert again == pytest.approx(shares, abs=1e-10)
+
+
+@pytest.mark.parametrize("a", [0.01, 0.5, 3.0, 1e6])
+@pytest.mark.parametrize("b", [0.01, 1.0, 2e5])
+def test_nodes_of_a_beta_have_its_moments(a: float, b: float) -> None:
+    x, weights = beta_nodes(a, b, 0.0625)
+    total = a + b
+    assert weights.sum() == pytest.approx(1.0, abs=1e-14)
+    assert x.sum(axis=1) == pytest.approx(np.ones(len(x)))
+    mean = a / total
+    variance = a * b / (total**2 * (total + 1.0))
+    assert weights @ x[:, 0] == pytest.approx(mean, rel=1e-12)
+    assert weights @ (x[:, 0] - mean) ** 2 == pytest.approx(variance, rel=1e-10)
+
+
+@pytest.mark.parametrize(("a", "b"), [(0.25, 0.25), (5.0, 0.5), (400.0, 300.0)])
+@pytest.mark.parametrize("least", [1e-6, 0.2, 0.45])
+def test_nodes_of_a_part_of_a_beta_have_its_probability_and_mean(
+    a: float, b: float, least: float
+) -> None:
+    x, weights = beta_nodes(a, b, 0.125, least)
+    assert x.min() >= least
+    assert weights.sum() == pytest.approx(
+        betainc(a, b, 1.0 - least) - betainc(a, b, least), rel=1e-9
+    )
+    # x times its density is that of a Beta(a + 1, b), times a / (a + b)
+    upper = betainc(a + 1.0, b, 1.0 - least) - betainc(a + 1.0, b, least)
+    assert weights @ x[:, 0] == pytest.approx(a / (a + b) * upper, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("table", "what"),
+    [
+        ([[12, 0], [0, 0]], "all ratings are in one category"),
+        ([[6, 0], [0, 6]], "agreement is perfect in these data"),
+        ([[3, 1], [2, 3]], "9 items are few"),
+    ],
+)
+def test_where_the_prior_weighs_another_stands_beside(
+    table: list[list[int]], what: str
+) -> None:
+    found = asked("cohen_kappa", table)
+    other = asked("cohen_kappa", table, concentration=0.5)
+    assert found.notes == (
+        f"{what}, so the prior weighs: {found.low:.3f} to {found.high:.3f} with "
+        "Dirichlet(0.25, ...) over the cells of the table, but "
+        f"{other.low:.3f} to {other.high:.3f} with Dirichlet(0.5, ...)",
+    )
+    assert f"{found.low:.3f} to {found.high:.3f} with Dirichlet(0.25" in other.notes[0]
+
+
+def test_items_of_a_single_rating_are_left_out_and_counted() -> None:
+    ratings: list[list[str | None]] = [list(row) for row in pairs([[20, 5], [10, 15]])]
+    whole = posterior("cohen_kappa", ratings, target="items", model="table")
+    ratings += [["a", None], [None, "b"], [None, None]]
+    found = posterior("cohen_kappa", ratings, target="items", model="table")
+    assert ends(found) == ends(whole)
+    assert found.notes == ("left out, items of a single rating: 2",)
+
+
+@pytest.mark.parametrize(
+    ("ratings", "options", "reason"),
+    [
+        ([["a", None], [None, "b"]], {}, "no item has ratings of two raters"),
+        ([["a", "a"]], {"categories": ["a"]}, "one category is declared"),
+        (
+            [["a", "b"]],
+            {"categories": ["a", "b"], "weights": np.ones((2, 2))},
+            "the weights know no disagreement",
+        ),
+        (
+            [[-1, 1], [1, 1]],
+            {"categories": [-1, 1], "weights": "ratio"},
+            "the scale has no such weights",
+        ),
+    ],
+)
+def test_where_nothing_can_be_said_it_is_undefined(
+    ratings: object, options: dict[str, object], reason: str
+) -> None:
+    with pytest.warns(UndefinedStatisticWarning, match=reason):
+        found = posterior(
+            "cohen_kappa",
+            ratings,
+            target="items",
+            model="table",
+            **options,  # type: ignore[arg-type]
+        )
+    assert math.isnan(found.low)
+    assert (found.reason, found.kind) == (reason, "credible")
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"coefficient": "fleiss_kappa", "raters": 3}, "of exactly two raters; got"),
+        ({"coefficient": "kendall_w"}, "Kendall"),
+        ({"model": "tables"}, "model: needs one of dirichlet-multinomial, table, got"),
+        ({"method": "emcee"}, "and no sampler"),
+        ({"prior": "jeffreys"}, 'has one prior, .* got prior="jeffreys"'),
+        ({"target": "raters"}, "a posterior speaks of other items"),
+        ({"concentration": -1.0}, "concentration: needs a positive number, got -1.0"),
+        ({"n_draws": 50}, "n_draws: needs at least 100, got 50"),
+        ({"level": 2.0}, r"level: needs \(0, 1\), got 2"),
+    ],
+)
+def test_what_the_table_does_not_answer_is_refused(
+    options: dict[str, object], said: str
+) -> None:
+    wanted: dict[str, object] = {
+        "coefficient": "cohen_kappa",
+        "target": "items",
+        "model": "table",
+        **options,
+    }
+    row = ["a", "b", "a"] if wanted.pop("raters", 2) == 3 else ["a", "b"]
+    with pytest.raises(ParameterError, match=said):
+        posterior(ratings=[row] * 12, **wanted)  # type: ignore[arg-type]
+
+
+# Given what pairs agree on and how the others are apart, against every share t of pairs
+# apart on a fine grid, where the coefficient is computed from the table it makes.
+@pytest.mark.parametrize("value", [-0.6, -0.3, -0.05, 0.0, 0.4, 0.95])
+def test_given_the_rest_the_probability_is_that_of_a_grid_of_shares(
+    value: float,
+) -> None:
+    rng = np.random.default_rng(5)
+    n, q = 300, 3
+    x = rng.dirichlet(np.full(q, 0.3), size=n)
+    y = rng.dirichlet(np.full(q * (q - 1), 0.3), size=n)
+    v = np.array([[0.0, 0.25, 1.0], [0.25, 0.0, 0.25], [1.0, 0.25, 0.0]])
+    nodes = Nodes.of("margins", v, np.full(n, 1.0 / n), x, y)
+    found = TablePosterior(
+        nodes=lambda _: nodes, shown=lambda _: nodes, apart=2.5, agreed=1.5
+    )
+    edges = np.linspace(0.0, 1.0, 4001)
+    t = 0.5 * (edges[1:] + edges[:-1])
+    masses = np.diff(betainc(2.5, 1.5, edges))
+    below = twice = 0.0
+    for agreed, others in zip(x, y, strict=True):
+        cells = np.zeros((q, q))
+        cells[~np.eye(q, dtype=bool)] = others
+        theta = t[:, None, None] * cells + (1.0 - t)[:, None, None] * np.diag(agreed)
+        apart = (theta * v).sum(axis=(1, 2))
+        chance = np.einsum("tk,kl,tl->t", theta.sum(axis=2), v, theta.sum(axis=1))
+        inside = apart >= (1.0 - value) * chance
+        below += float(masses @ inside) / n
+        twice += bool(inside.any() and not inside[0] and not inside[-1])
+    assert found.probability(value) == pytest.approx(below, abs=2e-4)
+    assert twice > 0 or value >= 0.0  # of some tables shares in the middle alone
+
+
+@pytest.mark.parametrize(
+    "table", [[[0, 3], [3, 0]], [[1, 0], [0, 0]], [[2, 2], [2, 2]]]
+)
+@pytest.mark.parametrize("value", [-0.7, -0.1, -1e-6, 0.3])
+def test_halving_the_step_settles_on_both_sides_of_zero(
+    table: list[list[int]], value: float
+) -> None:
+    prior = np.array(table) + 0.25
+    one, two = (
+        TablePosterior(
+            nodes=partial(grid, "margins", IDENTITY, prior, step),
+            shown=partial(grid, "margins", IDENTITY, prior, step),
+            apart=prior[0, 1] + prior[1, 0],
+            agreed=prior.trace(),
+        ).probability(value)
+        for step in (0.125, 0.0625)
+    )
+    assert one == pytest.approx(two, abs=1e-6 if abs(value) < 1e-3 else 2e-8)
