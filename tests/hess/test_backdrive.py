@@ -6,6 +6,7 @@ from math import radians
 import pytest
 
 from masrel.hess import Friction, FrictionCompensation, SimulatedClock
+from masrel.hess.plant import PlantParameters
 from masrel.hess.simulated import SimulatedDevice
 from masrel.hess.velocity import VelocityEstimate
 
@@ -19,6 +20,7 @@ class BackAndForth:
     stiffness = 600.0
     damping = 40.0
     slip_time = math.inf
+    yields = False
     start = radians(35.0)
 
     def intended(self, time_s: float) -> tuple[float, float]:
@@ -35,7 +37,8 @@ def felt(share: float) -> list[float]:
     # The hand's torque at every tick of two trips, N·m. As in (7), the moving mass
     # is the motor's: the forearm hangs behind the sensor.
     clock = SimulatedClock()
-    device = SimulatedDevice(clock=clock, hand=BackAndForth(), arm_inertia=0.0)
+    bare = PlantParameters(arm_inertia=0.0)
+    device = SimulatedDevice(clock=clock, hand=BackAndForth(), parameters=bare)
     compensation = FrictionCompensation(Friction(), share=share)
     estimate = VelocityEstimate()
     torques = []

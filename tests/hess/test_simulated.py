@@ -5,22 +5,24 @@ import pytest
 
 from masrel.errors import DeviceError, ParameterError
 from masrel.hess import Friction, SimulatedClock, SimulatedHand
+from masrel.hess.plant import PlantParameters
 from masrel.hess.simulated import SimulatedDevice
 
+# An amplifier that gives any torque at once
+INSTANT = {"torque_step": 0.0, "lag_time": 0.0, "delay": 0.0}
 FRICTIONLESS = Friction(inertia=0.01, viscous=0.0, coulomb=0.0)
 
 
 def bench(
     *,
     slip_time: float | None = 0.0,
-    friction: Friction | None = None,
-    arm_inertia: float = 0.05,
+    **parameters: object,
 ) -> tuple[SimulatedClock, SimulatedDevice]:
     # Without a hand unless told otherwise: it slips at once.
     clock = SimulatedClock()
     hand = SimulatedHand(start=1.0, end=2.5, mean_speed=1.5, slip_time=slip_time)
     device = SimulatedDevice(
-        clock=clock, hand=hand, friction=friction, arm_inertia=arm_inertia
+        clock=clock, hand=hand, parameters=PlantParameters(**parameters)
     )
     device.open()
     device.read()
@@ -55,7 +57,7 @@ def test_above_it_the_arm_goes_against_the_sign_of_the_command(torque: float) ->
 
 def test_without_friction_a_constant_torque_gives_a_parabola() -> None:
     # θ = ½ (τ / I) t²: 0.06 N·m on 0.06 kg·m² give 1 rad/s², 0.5 rad after 1 s.
-    clock, device = bench(friction=FRICTIONLESS)
+    clock, device = bench(friction=FRICTIONLESS, **INSTANT)
     with device:
         device.command(-0.06)
         assert run(clock, device, 1.0)[-1] == pytest.approx(1.5, abs=5e-4)
@@ -64,7 +66,7 @@ def test_without_friction_a_constant_torque_gives_a_parabola() -> None:
 def test_with_viscous_friction_the_speed_settles_at_torque_over_damping() -> None:
     # θ(t) = v (t - T (1 - e^(-t/T))), v = τ/B = 1 rad/s, T = I/B = 0.1 s.
     friction = Friction(inertia=0.01, viscous=0.2, coulomb=0.0)
-    clock, device = bench(friction=friction, arm_inertia=0.01)
+    clock, device = bench(friction=friction, arm_inertia=0.01, **INSTANT)
     with device:
         device.command(-0.2)
         expected = 1.0 + (0.8 - 0.1 * (1.0 - math.exp(-8.0)))
@@ -144,26 +146,36 @@ def test_a_torque_that_is_not_finite_is_refused() -> None:
         ({"range_end": 0.9}, "range_end"),
         ({"range_end": 3.2}, "range_end"),
         ({"arm_inertia": -0.1}, "arm_inertia"),
-        ({"resolution": 0.0}, "resolution"),
+        ({"delay": math.nan}, "delay"),
+        ({"step_ns": 0}, "step_ns"),
     ],
 )
 def test_an_impossible_plant_is_refused(change: dict[str, float], words: str) -> None:
     hand = SimulatedHand(start=1.0, end=2.5, mean_speed=1.5)
     with pytest.raises(ParameterError, match=words):
-        SimulatedDevice(clock=SimulatedClock(), hand=hand, **change)
+        SimulatedDevice(
+            clock=SimulatedClock(), hand=hand, parameters=PlantParameters(**change)
+        )
+
+
+def test_an_encoder_without_steps_is_refused() -> None:
+    hand = SimulatedHand(start=1.0, end=2.5, mean_speed=1.5)
+    with pytest.raises(ParameterError, match="resolution"):
+        SimulatedDevice(clock=SimulatedClock(), hand=hand, resolution=0.0)
 
 
 def test_the_hand_presses_as_hard_as_the_arm_resists() -> None:
-    # Between the stops, at rest: 10 N·m, of which friction carries up to 0.189.
+    # Between the stops, at rest: 10 N·m, which is 1436 quanta, 9.9988 N·m;
+    # friction carries up to 0.189 of it.
     clock, device = bench(slip_time=None)
     with device:
         device.command(10.0)
         run(clock, device, 3.0)
-        assert device.hand_torque == pytest.approx(10.0, abs=0.1891)
+        assert device.hand_torque == pytest.approx(9.9988, abs=0.1891)
 
 
 def test_a_hand_that_has_let_go_or_not_begun_gives_no_torque() -> None:
-    clock, device = bench(slip_time=0.4)
+    clock, device = bench(slip_time=0.3997)
     with device:
         run(clock, device, 0.3)
         assert device.hand_torque != 0.0

@@ -1,0 +1,341 @@
+"""The arm that a simulated device moves: inertia, friction that sticks, end stops."""
+
+import math
+from collections import deque
+from dataclasses import dataclass, field
+
+from masrel.errors import ParameterError
+from masrel.hess.friction import Friction
+from masrel.hess.hand import Hand
+from masrel.hess.propagation import Propagator, propagator
+
+__all__ = ["Plant", "PlantParameters"]
+
+_LOWER, _FREE, _UPPER = -1, 0, 1  # which end stop the arm touches
+_FINEST = 10  # halvings of a step in which something changes: 0.5 ms / 1024
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlantParameters:
+    """What the simulated arm, motor and amplifier are like, in SI units.
+
+    Attributes
+    ----------
+    friction : Friction
+        Inertia of the motor and friction, (7).
+    arm_inertia : float
+        Inertia of the mannequin's forearm and hand, kg·m². Not printed in the
+        source: a rod of 0.8 kg and 0.25 m and a hand of 0.3 kg at 0.33 m give 0.05.
+    range_end : float
+        Where the arm meets its end stop, rad; the other one is at 0.
+    stop_stiffness, stop_damping : float
+        Of both end stops, N·m/rad and N·m·s/rad: 10 N·m move one by 0.03 deg, and
+        the arm does not bounce.
+    torque_step : float
+        Quantum of the commanded torque, N·m; 0 for none. One unit of an amplifier
+        with 2700 units to the N·m behind a gear of 18.8:1.
+    lag_time : float
+        Time constant of the current loop, s; 0 for none. Not printed; chosen.
+    delay : float
+        From the command until the current begins to follow, s. Not printed; chosen.
+    step_ns : int
+        Step of the integration, ns.
+
+    Raises
+    ------
+    ParameterError
+        If a value is outside its range.
+    """
+
+    friction: Friction = field(default_factory=Friction)
+    arm_inertia: float = 0.05
+    range_end: float = math.radians(146.0)
+    stop_stiffness: float = 20_000.0
+    stop_damping: float = 50.0
+    torque_step: float = 18.8 / 2700.0
+    lag_time: float = 0.0005
+    delay: float = 0.0005
+    step_ns: int = 500_000
+
+    def __post_init__(self) -> None:
+        zero_or_more = ("arm_inertia", "torque_step", "lag_time", "delay")
+        for name in (*zero_or_more, "stop_stiffness", "stop_damping"):
+            if not 0.0 <= getattr(self, name) < math.inf:
+                raise ParameterError(
+                    f"{name}: needs 0 or more, got {getattr(self, name)}"
+                )
+        if not 0.0 < self.range_end <= math.pi:
+            raise ParameterError(
+                "range_end: needs more than 0 and at most 180 degrees, "
+                f"got {self.range_end} rad"
+            )
+        if self.step_ns < 1:
+            raise ParameterError(f"step_ns: needs 1 or more, got {self.step_ns}")
+
+
+class Plant:
+    """The arm, integrated in fixed steps from the time of its first use.
+
+    The arm turns in a horizontal plane (no gravity)::
+
+        (I + I_arm) θ̈ = τ_hand - τ_motor - B θ̇ - β sgn(θ̇) - τ_stop
+
+    with I, B, β of (7). While the arm rests, Coulomb friction takes any value up to
+    β, so the arm truly sticks. The motor's torque follows the command, rounded to
+    its quantum, after a delay and through a first-order lag.
+
+    Between two changes (the arm sticks or breaks away, turns back, meets a stop, the
+    hand lets go) the equation is linear. A step solves it exactly for a torque of
+    the hand's intention that is linear within the step; a step in which something
+    changes is halved until the change lies within a 1024th of it.
+
+    Parameters
+    ----------
+    hand : Hand
+        What moves the arm; its time begins at `start_ns`.
+    parameters : PlantParameters
+        The arm.
+    start_ns : int
+        When it begins, ns.
+
+    Attributes
+    ----------
+    angle : float
+        rad, at `now_ns`.
+    velocity : float
+        rad/s.
+    now_ns : int
+        How far it has been integrated: `start_ns` and a whole number of steps.
+
+    Raises
+    ------
+    ParameterError
+        If the stretch does not start before the end of range.
+
+    References
+    ----------
+    .. [1] Park, H.-S., Kim, J., Damiano, D. L. (2012). IEEE TNSRE 20(3), 361-370,
+       Table II and equation (7). https://doi.org/10.1109/TNSRE.2012.2195330
+    """
+
+    __slots__ = (
+        "_commanded",
+        "_contact",
+        "_coulomb",
+        "_delay_ns",
+        "_force",
+        "_hand",
+        "_holds",
+        "_inertia",
+        "_lag",
+        "_lag_time",
+        "_pending",
+        "_propagators",
+        "_range_end",
+        "_slide",
+        "_start_ns",
+        "_step_ns",
+        "_stop_damping",
+        "_stop_stiffness",
+        "_time",
+        "_torque_step",
+        "_viscous",
+        "_yields",
+        "angle",
+        "now_ns",
+        "velocity",
+    )
+
+    def __init__(
+        self, hand: Hand, parameters: PlantParameters, *, start_ns: int
+    ) -> None:
+        if not 0.0 <= hand.start < parameters.range_end:
+            raise ParameterError(
+                "range_end: needs an angle beyond the start of the stretch, got "
+                f"{parameters.range_end} rad with a start at {hand.start} rad"
+            )
+        friction = parameters.friction
+        self._hand = hand
+        self._yields = hand.yields
+        self._inertia = friction.inertia + parameters.arm_inertia
+        self._viscous = friction.viscous
+        self._coulomb = friction.coulomb
+        self._range_end = parameters.range_end
+        self._stop_stiffness = parameters.stop_stiffness
+        self._stop_damping = parameters.stop_damping
+        self._torque_step = parameters.torque_step
+        self._lag_time = parameters.lag_time
+        self._delay_ns = round(parameters.delay * 1e9)
+        self._step_ns = parameters.step_ns
+        self._start_ns = self.now_ns = start_ns
+        self._time = 0.0  # of the hand, s
+        self.angle = hand.start
+        self.velocity = 0.0
+        self._commanded = 0.0  # what the motor is on its way to, N·m
+        self._lag = 0.0  # motor's torque less that
+        self._pending: deque[tuple[int, float]] = deque()  # (when, ns; N·m)
+        self._slide = 0  # direction of sliding, 0 while it sticks
+        self._contact = _FREE
+        self._holds = hand.slip_time > 0.0
+        self._propagators: dict[tuple[bool, int, int], Propagator] = {}
+        self._force = self._force_at(0.0)
+
+    @property
+    def motor_torque(self) -> float:
+        """Torque of the motor at the elbow now, N·m; positive resists extension."""
+        return self._commanded + self._lag
+
+    @property
+    def hand_torque(self) -> float:
+        """Torque of the hand on the arm now, as a sensor between them reads, N·m."""
+        hand = self._hand
+        if not self._holds:
+            return 0.0
+        angle, velocity = hand.intended(self._time)
+        spring = hand.stiffness * (angle - self.angle)
+        return spring + hand.damping * (velocity - self.velocity)
+
+    def angle_at(self, now_ns: int) -> float:
+        """Return the angle at a time less than a step ahead.
+
+        Parameters
+        ----------
+        now_ns : int
+            The time, ns, not before the plant's own.
+
+        Returns
+        -------
+        float
+            rad, at the speed of now: within half a step at 100 rad/s² that is right
+            to 0.0007 deg, less than an encoder sees.
+        """
+        return self.angle + self.velocity * (now_ns - self.now_ns) * 1e-9
+
+    def command(self, torque_nm: float, now_ns: int) -> None:
+        """Command a torque, which the motor begins to follow after its delay.
+
+        Parameters
+        ----------
+        torque_nm : float
+            Torque at the elbow, N·m; positive resists extension.
+        now_ns : int
+            When it is commanded, ns.
+        """
+        step = self._torque_step
+        if step > 0.0:
+            torque_nm = math.floor(torque_nm / step + 0.5) * step
+        self._pending.append((now_ns + self._delay_ns, torque_nm))
+
+    def advance(self, now_ns: int) -> None:
+        """Integrate up to the last whole step that ends at or before a time.
+
+        Parameters
+        ----------
+        now_ns : int
+            The time, ns; nothing happens when it lies less than a step ahead.
+        """
+        step_ns = self._step_ns
+        while self.now_ns + step_ns <= now_ns:
+            pending = self._pending
+            if pending and pending[0][0] <= self.now_ns:
+                self._take(pending.popleft()[1])
+                continue
+            if not self._stepped(0):
+                self._step_in_parts()
+            self.now_ns += step_ns
+            # From integers, so that rounding does not add up.
+            self._time = (self.now_ns - self._start_ns) * 1e-9
+            if self._yields and self._holds:
+                self._hand.feel(self._time, self.hand_torque)
+                self._force = self._force_at(self._time)
+
+    def _take(self, torque_nm: float) -> None:
+        # The motor's torque goes on from where it is.
+        self._lag = self._lag + self._commanded - torque_nm if self._lag_time else 0.0
+        self._commanded = torque_nm
+        self._force = self._force_at(self._time)
+
+    def _step_in_parts(self) -> None:
+        # Something changes within this step: parts of a half, a quarter, ... of it,
+        # each as long as the place reached allows.
+        done, whole = 0, 1 << _FINEST
+        while done < whole:
+            size = done & -done or whole >> 1
+            level = _FINEST + 1 - size.bit_length()
+            while not self._stepped(level):
+                level += 1
+            done += whole >> level
+
+    def _force_at(self, time_s: float) -> float:
+        # Torque on the arm that depends on neither its angle nor its speed, N·m
+        force = -self._commanded
+        if self._holds:
+            hand = self._hand
+            angle, speed = hand.intended(time_s)
+            force += hand.stiffness * angle + hand.damping * speed
+        if self._contact == _UPPER:
+            force += self._stop_stiffness * self._range_end
+        return force
+
+    def _stiffness(self) -> float:
+        stiffness = self._hand.stiffness if self._holds else 0.0
+        return stiffness + (self._stop_stiffness if self._contact else 0.0)
+
+    def _stepped(self, level: int) -> bool:
+        # One part of a step, half as long per level -> whether it was taken. It is
+        # not when something changes within it, unless the part is the shortest.
+        step = self._step_ns * 1e-9 / (1 << level)
+        end = self._time + step
+        force, new_force = self._force, self._force_at(end)
+        made = self._propagators.get((self._holds, self._contact, level))
+        if made is None:
+            made = self._propagator(step, level)
+        slide, angle, velocity = self._slide, self.angle, self.velocity
+        lag = made.lag * self._lag
+        if slide:
+            slope = (new_force - force) / step
+            (aa, as_, al, af, ag, sa, ss, sl, sf, sg, _) = made
+            driven = force - slide * self._coulomb
+            lagging = self._lag
+            angle, velocity = (
+                aa * angle + as_ * velocity + al * lagging + af * driven + ag * slope,
+                sa * angle + ss * velocity + sl * lagging + sf * driven + sg * slope,
+            )
+            turned = velocity * slide < 0.0
+        else:
+            net = new_force - lag - self._stiffness() * angle
+            turned = abs(net) > self._coulomb  # it breaks away
+        if angle > self._range_end:
+            contact = _UPPER
+        else:
+            contact = _LOWER if angle < 0.0 else _FREE
+        holds = self._holds and end < self._hand.slip_time
+        changes = turned or contact != self._contact or holds != self._holds
+        if changes and level < _FINEST:
+            return False
+        self._time, self.angle, self.velocity, self._lag = end, angle, velocity, lag
+        self._force = new_force
+        if changes:
+            self._change(contact, holds, turned)
+        return True
+
+    def _propagator(self, step: float, level: int) -> Propagator:
+        damping = self._viscous + (self._hand.damping if self._holds else 0.0)
+        damping += self._stop_damping if self._contact else 0.0
+        made = propagator(
+            self._inertia, damping, self._stiffness(), self._lag_time, step
+        )
+        self._propagators[self._holds, self._contact, level] = made
+        return made
+
+    def _change(self, contact: int, holds: bool, turned: bool) -> None:
+        self._contact, self._holds = contact, holds
+        self._force = self._force_at(self._time)
+        if not turned:
+            return
+        self.velocity = 0.0
+        net = self._force - self._lag - self._stiffness() * self.angle
+        if abs(net) <= self._coulomb:
+            self._slide = 0  # it sticks
+        else:
+            self._slide = 1 if net > 0.0 else -1
