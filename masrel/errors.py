@@ -14,6 +14,9 @@ The tree::
     ├── SessionStoppedError (RuntimeError)  a person stopped a session before its end
     └── DeviceError (RuntimeError)       the device cannot go on
         ├── DeviceTimeoutError (TimeoutError)
+        ├── FrameError (ValueError)       bytes on a bus mean nothing
+        ├── EmergencyStopError           somebody, or the device, stopped it at once
+        ├── ControllerError              the controller failed
         └── LimitExceededError
 
     MasrelWarning (UserWarning)
@@ -24,9 +27,12 @@ The tree::
 
 __all__ = [
     "ConvergenceError",
+    "ControllerError",
     "CountsError",
     "DeviceError",
     "DeviceTimeoutError",
+    "EmergencyStopError",
+    "FrameError",
     "LimitExceededError",
     "MasrelError",
     "MasrelWarning",
@@ -94,15 +100,53 @@ class SessionStoppedError(MasrelError, RuntimeError):
 
 
 class DeviceError(MasrelError, RuntimeError):
-    """The device cannot go on."""
+    """The device cannot go on.
+
+    Attributes
+    ----------
+    kind : str
+        What kind of fault it is, in one word, for logs and tables.
+    """
+
+    kind: str = "device"
 
 
 class DeviceTimeoutError(DeviceError, TimeoutError):
     """The device did not answer in time."""
 
+    kind = "no-answer"
+
+
+class EmergencyStopError(DeviceError):
+    """A person, a signal or the device itself asked for an emergency stop."""
+
+    kind = "emergency-stop"
+
+
+class ControllerError(DeviceError):
+    """The controller failed while it decided a torque."""
+
+    kind = "controller"
+
+
+class FrameError(DeviceError, ValueError):
+    """Bytes on a device's bus are no frame of it, or a value fits in none."""
+
 
 class LimitExceededError(DeviceError):
-    """A safety limit was exceeded and the presentation was stopped."""
+    """A safety limit was exceeded and the presentation was stopped.
+
+    Parameters
+    ----------
+    message : str
+        What was needed and what came.
+    kind : str, optional
+        Which limit.
+    """
+
+    def __init__(self, message: str, kind: str = "limit") -> None:
+        super().__init__(message)
+        self.kind = kind
 
 
 class MasrelWarning(UserWarning):
