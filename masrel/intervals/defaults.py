@@ -23,6 +23,7 @@ from masrel.intervals.transforms import around
 __all__ = ["Choice", "choose"]
 
 _FEW = 10  # items, and raters, below which the posterior covers best
+_SEVERAL = 30  # items, below which a jackknife alone ends too low
 _ACCIDENT = (
     0.003  # of (1 - κ) / ratings: a variance below it is chance, not information
 )
@@ -127,7 +128,10 @@ def choose(choice: Choice) -> Interval:
         half = student_t(case.level, case.n_items - 1) * math.sqrt(found.variance)
         words = f"item jackknife, t({case.n_items - 1}) on the logit"
         why = "items left out, on a scale without ends"
-        return _because(case, _on_logit(choice, found, half, words), why)
+        interval = _on_logit(choice, found, half, words)
+        if choice.modelled and case.n_items < _SEVERAL:
+            interval = _lifted(interval, choice.posterior.high)
+        return _because(case, interval, why)
     return _both(choice, found)
 
 
@@ -150,6 +154,20 @@ def _on_logit(choice: Choice, found: Spread, half: float, words: str) -> Interva
     if math.isnan(low):  # at the least value there is
         low, high = around(case.value, half, "none", choice.least)
     return case.closed(low, high, method=words, unit=case.target, notes=found.notes)
+
+
+def _lifted(interval: Interval, above: float) -> Interval:
+    # κ̂ of few items is skewed: low where its error is low, too. The posterior knows,
+    # but trusts many raters too much where κ is low: halfway to it covers with either.
+    if not above > interval.high:
+        return interval
+    note = (
+        f"the upper end, {interval.high:.3f}, is lifted halfway to that of the "
+        f"Dirichlet-multinomial posterior, {above:.3f}: with few items an estimate "
+        "that is low by chance has a low error, too"
+    )
+    high = 0.5 * (interval.high + above)
+    return dataclasses.replace(interval, high=high, notes=(*interval.notes, note))
 
 
 def _posterior(choice: Choice, excess: float) -> Interval:

@@ -14,6 +14,8 @@ Method = Callable[[Case], Bounds]
 DEFAULT = "default"
 FEW = 10
 """Items, and raters, below which the posterior is more than a stopgap."""
+SEVERAL = 30
+"""Items, below which a jackknife alone ends too low."""
 
 
 def is_small(case: Case) -> bool:
@@ -107,9 +109,19 @@ def posterior_and_excess(case: Case) -> Bounds:
     return case.posterior.holding(case.value, wide)
 
 
+def lifted(case: Case) -> Bounds:
+    """The jackknife on the intraclass scale, its upper end halfway to a higher one."""
+    ends, above = of_items(case, "intraclass"), case.posterior.central.high
+    high = np.maximum(ends.high, 0.5 * (ends.high + above))
+    higher = Bounds(low=ends.low, high=high)
+    return higher.where(case.spreads(case.spread.of_items), ends)
+
+
 def default_of_items(case: Case) -> Bounds:
     """What is recommended where other items could have come."""
-    return posterior_holding(case) if is_small(case) else of_items(case, "intraclass")
+    if is_small(case):
+        return posterior_holding(case)
+    return lifted(case) if case.n < SEVERAL else of_items(case, "intraclass")
 
 
 def default_of_raters(case: Case) -> Bounds:
@@ -146,6 +158,7 @@ METHODS: Mapping[Target, Mapping[str, Method]] = {
         "jackknife, t, stopgap": partial(of_items, scale="plain"),
         "jackknife, t, Fisher z, stopgap": partial(of_items, scale="Fisher z"),
         "jackknife, t, intraclass, stopgap": partial(of_items, scale="intraclass"),
+        "jackknife, t, intraclass, stopgap, lifted": lifted,
         "posterior": posterior,
         "posterior, holding κ̂": posterior_holding,
         **PEERS,

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from string import Template
 
-from tests.coverage.methods import DEFAULT, FEW, METHODS, PEERS
+from tests.coverage.methods import DEFAULT, FEW, METHODS, PEERS, SEVERAL
 from tests.coverage.simulate import DESIGNS, KAPPAS, MODELS, TARGETS, Cell, Counted
 
 LOWEST, HIGHEST = 93, 98  # %, of coverages rounded to whole numbers
@@ -18,6 +18,7 @@ def page(cells: Cells, others: Cells) -> str:
         n_studies=f"{cells[0].n_studies:,}".replace(",", " "),
         error=f"{100 * cells[0].error(0.95):.1f}",
         few=FEW,
+        several=SEVERAL,
         seen=_seen(cells),
         of_default=_of_default(cells),
         outside=_outside(cells),

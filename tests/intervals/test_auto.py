@@ -71,12 +71,37 @@ def on_logit(value: float, half: float, n_raters: int) -> tuple[float, float]:
 
 
 def test_other_items_leave_items_out_on_a_scale_without_ends() -> None:
+    rows = MEDIUM + MEDIUM[:5]
+    of_items, _, _ = variances(rows)
+    kappa = fleiss_kappa(rows).value
+    half = student.ppf(0.975, 29) * math.sqrt(of_items)
+    found = chosen(rows, "items", categories=LABELS)
+    assert (found.low, found.high) == pytest.approx(on_logit(kappa, half, 4), rel=1e-9)
+    assert found.method == "item jackknife, t(29) on the logit"
+
+
+def test_below_thirty_items_the_upper_end_goes_halfway_to_a_higher_posterior() -> None:
     of_items, _, _ = variances(MEDIUM)
     kappa = fleiss_kappa(MEDIUM).value
-    half = student.ppf(0.975, 24) * math.sqrt(of_items)
+    low, high = on_logit(kappa, student.ppf(0.975, 24) * math.sqrt(of_items), 4)
+    above = posterior("fleiss_kappa", MEDIUM, target="items", categories=LABELS).high
+    assert above > high
     found = chosen(MEDIUM, "items", categories=LABELS)
-    assert (found.low, found.high) == pytest.approx(on_logit(kappa, half, 4), rel=1e-9)
-    assert found.method == "item jackknife, t(24) on the logit"
+    assert (found.low, found.high) == pytest.approx((low, (high + above) / 2), rel=1e-9)
+    assert any("halfway" in note for note in found.notes)
+
+
+def test_a_lower_posterior_lowers_no_end() -> None:
+    # 29 items of which one is disputed: the jackknife reaches further up
+    rows = [[0] * 4, [1] * 4] * 14 + [[0, 0, 1, 1]]
+    of_items, _, _ = variances(rows)
+    kappa = fleiss_kappa(rows).value
+    ends = on_logit(kappa, student.ppf(0.975, 28) * math.sqrt(of_items), 4)
+    above = posterior("fleiss_kappa", rows, target="items", categories=LABELS).high
+    assert above < ends[1]
+    found = chosen(rows, "items", categories=LABELS)
+    assert (found.low, found.high) == pytest.approx(ends, rel=1e-9)
+    assert not any("halfway" in note for note in found.notes)
 
 
 def test_other_raters_leave_raters_out() -> None:
