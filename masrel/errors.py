@@ -22,6 +22,7 @@ The tree::
     MasrelWarning (UserWarning)
     ├── UndefinedStatisticWarning  a statistic is 0/0; its value is nan, with a reason
     ├── SmallSampleWarning         an interval rests on too little to hold what it says
+    ├── RecordingWarning           part of a recording is not used, or is suspect
     └── OverrunWarning             the control loop missed deadlines
 """
 
@@ -41,6 +42,7 @@ __all__ = [
     "ProtocolError",
     "RatingsError",
     "RecordingError",
+    "RecordingWarning",
     "ScheduleError",
     "SessionLogError",
     "SessionStoppedError",
@@ -159,6 +161,10 @@ class UndefinedStatisticWarning(MasrelWarning):
 
 class SmallSampleWarning(MasrelWarning):
     """An interval rests on too little data to hold what it says."""
+
+
+class RecordingWarning(MasrelWarning):
+    """Part of a recording is not used, or looks as if it were not what it says."""
 
 
 class OverrunWarning(MasrelWarning):
