@@ -158,7 +158,7 @@ def decode_request(data: bytes) -> Request:
 
     Examples
     --------
-    >>> decode_request(b"\\x30"), decode_request(bytes.fromhex("aa00feff"))
+    >>> decode_request(bytes.fromhex("30")), decode_request(bytes.fromhex("aa00feff"))
     (Request(property_id=48, value=None), Request(property_id=42, value=-2))
     """
     if len(data) == 1 and not data[0] & _SET_FLAG:
