@@ -14,7 +14,9 @@ The tree::
     ├── SessionStoppedError (RuntimeError)  a person stopped a session before its end
     └── DeviceError (RuntimeError)       the device cannot go on
         ├── DeviceTimeoutError (TimeoutError)
-        ├── FrameError (ValueError)       bytes on a bus mean nothing
+        ├── BusError                     the device's bus failed
+        ├── FrameError (ValueError)      bytes on a bus mean nothing
+        ├── IdledError                   somebody else switched the device to idle
         ├── EmergencyStopError           somebody, or the device, stopped it at once
         ├── ControllerError              the controller failed
         └── LimitExceededError
@@ -27,13 +29,15 @@ The tree::
 """
 
 __all__ = [
-    "ConvergenceError",
+    "BusError",
     "ControllerError",
+    "ConvergenceError",
     "CountsError",
     "DeviceError",
     "DeviceTimeoutError",
     "EmergencyStopError",
     "FrameError",
+    "IdledError",
     "LimitExceededError",
     "MasrelError",
     "MasrelWarning",
@@ -131,8 +135,32 @@ class ControllerError(DeviceError):
     kind = "controller"
 
 
+class BusError(DeviceError):
+    """The bus between host and device failed.
+
+    Parameters
+    ----------
+    message : str
+        What happened.
+    kind : str, optional
+        How it failed.
+    """
+
+    def __init__(self, message: str, kind: str = "bus") -> None:
+        super().__init__(message)
+        self.kind = kind
+
+
 class FrameError(DeviceError, ValueError):
     """Bytes on a device's bus are no frame of it, or a value fits in none."""
+
+    kind = "bad-frame"
+
+
+class IdledError(DeviceError):
+    """Somebody else switched the device to idle: it takes no more torques."""
+
+    kind = "idled"
 
 
 class LimitExceededError(DeviceError):

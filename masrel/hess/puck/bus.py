@@ -1,0 +1,229 @@
+"""The CAN bus, by python-can: the only module that imports it.
+
+A frame that a bus reports is a `Frame`, an error that python-can raises a
+`DeviceError`, a wait ends at a time on the loop's clock.
+"""
+
+from typing import NamedTuple, Protocol
+
+from masrel.errors import BusError, DeviceError
+from masrel.hess.clock import Clock
+
+try:
+    import can
+except ImportError as error:
+    raise DeviceError(
+        "puck: needs python-can; install it with: pip install 'masrel[can]'"
+    ) from error
+
+__all__ = [
+    "BUS_OFF",
+    "BUS_RESTARTED",
+    "CONTROLLER_ERROR",
+    "Frame",
+    "Link",
+    "Neighbour",
+    "open_link",
+]
+
+BITRATE = 1_000_000
+"""Bits a second on a Puck's bus."""
+
+# Classes of error in the identifier of SocketCAN's error frames (linux/can/error.h)
+CONTROLLER_ERROR, BUS_OFF, BUS_RESTARTED = 0x004, 0x040, 0x100
+
+_FILTERS_IN_KERNEL = frozenset({"socketcan"})
+
+
+class Frame(NamedTuple):
+    """One frame of the bus.
+
+    Attributes
+    ----------
+    identifier : int
+        Identifier of 11 bits; for an error frame the class of error.
+    data : bytes
+        Up to eight bytes.
+    is_error : bool
+        Whether the controller reports an error with it.
+    """
+
+    identifier: int
+    data: bytes
+    is_error: bool = False
+
+
+class Neighbour(Protocol):
+    """Somebody else on an in-process bus, who acts when the host sends or waits."""
+
+    def next_due_ns(self) -> int | None:
+        """Return when it will act next, ns; None when it waits for a frame."""
+        ...
+
+    def serve(self) -> None:
+        """Take in what was sent and do what is due by now."""
+        ...
+
+
+class Link:
+    """One end of a bus.
+
+    Parameters
+    ----------
+    bus : can.BusABC
+        An open bus.
+    clock : Clock
+        The clock of deadlines.
+    neighbour : Neighbour or None, optional
+        An emulator that lives in the same thread and is served whenever this end
+        sends or waits; so a bus works on a simulated clock, too.
+    """
+
+    __slots__ = ("_bus", "_clock", "_neighbour")
+
+    def __init__(
+        self, bus: can.BusABC, clock: Clock, *, neighbour: Neighbour | None = None
+    ) -> None:
+        self._bus = bus
+        self._clock = clock
+        self._neighbour = neighbour
+
+    def send(self, frame: Frame) -> int:
+        """Send a frame.
+
+        Parameters
+        ----------
+        frame : Frame
+            What to send.
+
+        Returns
+        -------
+        int
+            When it was handed to the bus, ns.
+
+        Raises
+        ------
+        BusError
+            If the bus does not take it.
+        """
+        message = can.Message(
+            arbitration_id=frame.identifier,
+            data=frame.data,
+            is_extended_id=False,
+            is_error_frame=frame.is_error,
+        )
+        now_ns = self._clock.now_ns()
+        try:
+            self._bus.send(message)
+        except (can.CanError, OSError) as error:
+            raise BusError(f"puck: the bus takes no frame ({error})") from error
+        if self._neighbour is not None:
+            self._neighbour.serve()
+        return now_ns
+
+    def receive(self, deadline_ns: int) -> Frame | None:
+        """Wait for a frame.
+
+        Parameters
+        ----------
+        deadline_ns : int
+            When to give up, ns; a time that has passed takes what is there already.
+
+        Returns
+        -------
+        Frame or None
+            The oldest that has not been received; None when none came.
+
+        Raises
+        ------
+        BusError
+            If the bus cannot be read.
+        """
+        if self._neighbour is None:
+            left_ns = deadline_ns - self._clock.now_ns()
+            return self._received(max(0.0, left_ns * 1e-9))
+        while True:
+            self._neighbour.serve()
+            frame = self._received(0.0)
+            if frame is not None:
+                return frame
+            due_ns = self._neighbour.next_due_ns()
+            if due_ns is None or due_ns > deadline_ns:
+                self._clock.sleep_until_ns(deadline_ns)
+                self._neighbour.serve()
+                return None
+            self._clock.sleep_until_ns(due_ns)
+
+    def close(self) -> None:
+        """Leave the bus; doing it twice does nothing more."""
+        self._bus.shutdown()
+
+    def _received(self, timeout_s: float) -> Frame | None:
+        # A timeout of 0 does not wait.
+        try:
+            message = self._bus.recv(timeout_s)
+        except (can.CanError, OSError) as error:
+            raise BusError(f"puck: the bus cannot be read ({error})") from error
+        if message is None:
+            return None
+        if message.is_error_frame:
+            return Frame(message.arbitration_id, bytes(message.data), is_error=True)
+        if message.is_extended_id or message.is_remote_frame:
+            return Frame(0, b"")  # not of a puck's bus; from the host to the host
+        return Frame(message.arbitration_id, bytes(message.data))
+
+
+def open_link(
+    interface: str,
+    channel: str,
+    *,
+    clock: Clock,
+    accepted: tuple[int, ...] | None = None,
+    neighbour: Neighbour | None = None,
+) -> Link:
+    """Open one end of a bus.
+
+    Parameters
+    ----------
+    interface : str
+        Name of a python-can interface, such as "socketcan" or "virtual".
+    channel : str
+        Its channel, such as "can0".
+    clock : Clock
+        The clock of deadlines.
+    accepted : tuple of int or None, optional
+        Identifiers to receive, None for all; a filter where the kernel has one.
+        Elsewhere whoever receives looks for himself, and error frames come through.
+    neighbour : Neighbour or None, optional
+        An emulator in the same thread.
+
+    Returns
+    -------
+    Link
+        Open; close it.
+
+    Raises
+    ------
+    BusError
+        If the bus cannot be opened.
+    """
+    filters: list[can.typechecking.CanFilter] | None = None
+    if accepted is not None and interface in _FILTERS_IN_KERNEL:
+        filters = [
+            {"can_id": identifier, "can_mask": 0x7FF, "extended": False}
+            for identifier in accepted
+        ]
+    try:
+        bus = can.Bus(
+            interface=interface,
+            channel=channel,
+            bitrate=BITRATE,
+            can_filters=filters,
+            ignore_config=True,  # what is opened is what was asked for
+        )
+    except (can.CanError, OSError, ValueError) as error:
+        raise BusError(
+            f"puck: cannot open channel {channel!r} of interface {interface!r} "
+            f"({error})"
+        ) from error
+    return Link(bus, clock, neighbour=neighbour)
