@@ -440,12 +440,28 @@ def test_where_nothing_can_be_said_it_is_undefined(
     assert (found.reason, found.kind) == (reason, "credible")
 
 
+def test_of_two_raters_others_than_fleiss_kappa_have_the_table_unasked() -> None:
+    rows = [[1, 1], [1, 2], [2, 2]] * 4
+    for coefficient, weights in (
+        ("cohen_kappa", "identity"),
+        ("scott_pi", "quadratic"),
+    ):
+        asked = posterior(
+            coefficient, rows, target="items", weights=weights, model="table"
+        )
+        unasked = posterior(coefficient, rows, target="items", weights=weights)
+        assert unasked == asked
+        assert "table of two raters" in unasked.method
+    assert "Dirichlet-multinomial" in posterior("scott_pi", rows, target="items").method
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [
         ({"coefficient": "fleiss_kappa", "raters": 3}, "of exactly two raters; got"),
         ({"coefficient": "kendall_w"}, "Kendall"),
-        ({"model": "tables"}, "model: needs one of dirichlet-multinomial, table, got"),
+        ({"model": "tables"}, "model: needs one of auto, .*table, got 'tables'"),
+        ({"model": "auto", "coefficient": "gwet_ac", "raters": 3}, "got gwet_ac by 3"),
         ({"method": "emcee"}, "and no sampler"),
         ({"prior": "jeffreys"}, 'has one prior, .* got prior="jeffreys"'),
         ({"target": "raters"}, "a posterior speaks of other items"),
