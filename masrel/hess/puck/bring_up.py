@@ -274,15 +274,15 @@ def activate(node: PuckNode, table: PropertyTable) -> None:
         )
 
 
-def release(node: PuckNode, table: PropertyTable) -> None:
+def release(node: PuckNode, *, torque_number: int, mode_number: int) -> None:
     """Zero the torque and idle a puck, again and again until it confirms.
 
     Parameters
     ----------
     node : PuckNode
         The puck.
-    table : PropertyTable
-        Numbers of its properties.
+    torque_number, mode_number : int
+        Numbers of T and MODE.
 
     Raises
     ------
@@ -293,9 +293,9 @@ def release(node: PuckNode, table: PropertyTable) -> None:
     reason = "it does not go to idle"
     while node.now_ns() - begun_ns < _RELEASE_S * 1e9:
         try:
-            node.tell(table.settable("T"), 0)
-            node.tell(table.settable("MODE"), IDLE)
-            if node.ask(table.number("MODE"), patience_s=0.005) == IDLE:
+            node.tell(torque_number, 0)
+            node.tell(mode_number, IDLE)
+            if node.ask(mode_number, patience_s=0.005) == IDLE:
                 return
         except (BusError, DeviceTimeoutError, FrameError) as error:
             reason = str(error)

@@ -4,7 +4,7 @@ A frame that a bus reports is a `Frame`, an error that python-can raises a
 `DeviceError`, a wait ends at a time on the loop's clock.
 """
 
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from masrel.errors import BusError, DeviceError
 from masrel.hess.clock import Clock
@@ -33,6 +33,9 @@ BITRATE = 1_000_000
 CONTROLLER_ERROR, BUS_OFF, BUS_RESTARTED = 0x004, 0x040, 0x100
 
 _FILTERS_IN_KERNEL = frozenset({"socketcan"})
+
+# A bus between the processes of one machine does not leave it.
+_SETTINGS: dict[str, dict[str, Any]] = {"udp_multicast": {"hop_limit": 0}}
 
 
 class Frame(NamedTuple):
@@ -220,6 +223,7 @@ def open_link(
             bitrate=BITRATE,
             can_filters=filters,
             ignore_config=True,  # what is opened is what was asked for
+            **_SETTINGS.get(interface, {}),
         )
     except (can.CanError, OSError, ValueError) as error:
         raise BusError(

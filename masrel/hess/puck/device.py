@@ -11,7 +11,7 @@ from masrel.errors import (
     LimitExceededError,
 )
 from masrel.hess.clock import Clock, SimulatedClock
-from masrel.hess.device import Device, Reading
+from masrel.hess.device import Device, IdleCommand, Reading
 from masrel.hess.hand import Hand
 from masrel.hess.puck import bring_up
 from masrel.hess.puck.bus import open_link
@@ -33,6 +33,9 @@ __all__ = [
 
 _LOWEST_ANGLE, _HIGHEST_ANGLE = math.radians(-5.0), math.radians(185.0)
 _UNANSWERED_POLLS = 2  # one may get lost
+
+_SHARED_INTERFACES = frozenset({"socketcan", "udp_multicast"})
+_IDLING_MODULE = "masrel.hess.puck.idling"
 
 _channels = itertools.count(1)
 
@@ -121,22 +124,42 @@ class PuckDevice(Device):
         try:
             bring_up.activate(node, table)
         except BaseException:
-            bring_up.release(node, table)
+            self._release()
             raise
 
     def _read(self) -> Reading:
         position, _, mode = self._numbers
         node = self._node
         time_ns, counts = node.position(position, patience_s=self._options.patience_s)
-        found = node.heard.pop(mode, None)
-        if found is not None:
-            self._n_unanswered = 0
-            if found != bring_up.TORQUE:
-                raise IdledError(
-                    f"puck {node.puck}: needs MODE {bring_up.TORQUE}, somebody else "
-                    f"has set it to {found}; an emergency stop, or a pendant?"
-                )
+        if mode in node.heard:
+            self._check_mode(node.heard.pop(mode))
         return Reading(time_ns, self.transmission.angle(counts))
+
+    def _check(self) -> None:
+        # In the loop the answers to polls come with readings; here it is waited for.
+        _, _, mode = self._numbers
+        try:
+            found = self._node.ask(mode, patience_s=self._options.patience_s)
+        except DeviceTimeoutError:
+            self._note_unanswered()
+        else:
+            self._check_mode(found)
+
+    def _check_mode(self, mode: int) -> None:
+        self._n_unanswered = 0
+        if mode != bring_up.TORQUE:
+            raise IdledError(
+                f"puck {self._node.puck}: needs MODE {bring_up.TORQUE}, somebody else "
+                f"has set it to {mode}; an emergency stop, or a pendant?"
+            )
+
+    def _note_unanswered(self) -> None:
+        self._n_unanswered += 1
+        if self._n_unanswered > _UNANSWERED_POLLS:
+            raise DeviceTimeoutError(
+                f"puck {self._node.puck}: has not said its mode "
+                f"{self._n_unanswered} times in a row"
+            )
 
     def _send(self, torque_nm: float) -> None:
         _, torque, mode = self._numbers
@@ -151,19 +174,34 @@ class PuckDevice(Device):
         self._until_poll -= 1
         if self._until_poll == 0:
             self._until_poll = self._options.mode_poll_ticks
-            self._n_unanswered += 1
-            if self._n_unanswered > _UNANSWERED_POLLS:
-                raise DeviceTimeoutError(
-                    f"puck {self._node.puck}: has not said its mode "
-                    f"{_UNANSWERED_POLLS} times in a row"
-                )
+            self._note_unanswered()  # until the answer comes
             self._node.inquire(mode)
 
     def _stop(self) -> None:
         try:
-            bring_up.release(self._node, self._table)
+            self._release()
         finally:
             self._disconnect()
+
+    def _release(self) -> None:
+        _, torque, mode = self._numbers
+        bring_up.release(self._node, torque_number=torque, mode_number=mode)
+
+    def idle_command(self) -> IdleCommand | None:
+        """Return how another process can idle the puck, once it is open.
+
+        Returns
+        -------
+        IdleCommand or None
+            None where two processes cannot share a bus: python-can's "virtual" is
+            inside this one, and most makers' adapters belong to whoever opened them.
+        """
+        options = self._options
+        if options.interface not in _SHARED_INTERFACES:
+            return None
+        where = (options.interface, options.channel, str(options.puck))
+        _, torque, mode = self._numbers
+        return IdleCommand(_IDLING_MODULE, (*where, str(torque), str(mode)))
 
 
 class UnwiredPuckDevice(PuckDevice):

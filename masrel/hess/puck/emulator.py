@@ -144,7 +144,8 @@ class PuckEmulator:
         return self._due[0][0] if self._due else None
 
     def serve(self) -> None:
-        """Take in the frames that wait, and do what is due by now."""
+        """Do what is due by now, and take in the frames that wait."""
+        self._act(self._clock.now_ns())  # before them: they come now
         while (frame := self._link.receive(0)) is not None:
             self._take(frame, self._clock.now_ns())
         self._act(self._clock.now_ns())
@@ -256,7 +257,8 @@ class PuckEmulator:
             return
         fits = -(2**15) <= value < 2**15
         size = self._options.reply_bytes if fits else 6
-        self._reply(PROPERTY_GROUP, encode_reply(number, value, size=size), now_ns)
+        data = encode_reply(number, value, size=size)
+        self._reply(Frame(from_puck(self._puck, PROPERTY_GROUP), data), now_ns)
 
     def _sample(self, now_ns: int) -> None:
         counts = self._counted(self.motor.counts(now_ns), now_ns)
@@ -265,11 +267,8 @@ class PuckEmulator:
             -counts if self._options.has_secondary else None,
             flagged=self._options.is_flagged,
         )
-        late = self._faults.amount("late-replies", now_ns)
-        due_ns = now_ns + _ANSWER_NS - _SAMPLING_NS + round(late * 1e9)
-        # A puck answers in the order in which it is asked.
-        self._last_answer_ns = due_ns = max(due_ns, self._last_answer_ns + 1)
-        self._at(due_ns, lambda due: self._reply(POSITION_GROUP, data, due))
+        frame = Frame(from_puck(self._puck, POSITION_GROUP), data)
+        self._reply(frame, now_ns + _ANSWER_NS - _SAMPLING_NS)
 
     def _counted(self, counts: int, now_ns: int) -> int:
         # What a faulty encoder makes of a count
@@ -283,15 +282,17 @@ class PuckEmulator:
             counts %= self._options.counts_per_turn
         return counts + round(self._faults.amount("jumping-encoder", now_ns))
 
-    def _reply(self, group: int, data: bytes, now_ns: int) -> None:
-        if self._faults.hit("dropped-replies", now_ns):
+    def _reply(self, frame: Frame, due_ns: int) -> None:
+        if self._faults.hit("dropped-replies", due_ns):
             return
-        if self._faults.hit("short-replies", now_ns):
-            data = data[:-1]
-        frame = Frame(from_puck(self._puck, group), data)
-        self._send(frame, now_ns)
-        if self._faults.hit("duplicated-replies", now_ns):
-            self._at(now_ns + _DUPLICATE_NS, lambda due: self._send(frame, due))
+        if self._faults.hit("short-replies", due_ns):
+            frame = frame._replace(data=frame.data[:-1])
+        due_ns += round(self._faults.amount("late-replies", due_ns) * 1e9)
+        # A puck answers in the order in which it is asked.
+        self._last_answer_ns = due_ns = max(due_ns, self._last_answer_ns + 1)
+        self._at(due_ns, lambda due: self._send(frame, due))
+        if self._faults.hit("duplicated-replies", due_ns):
+            self._at(due_ns + _DUPLICATE_NS, lambda due: self._send(frame, due))
 
     def _send(self, frame: Frame, now_ns: int) -> None:
         if self._faults.active("unplugged", now_ns) or self._faults.active(
@@ -347,3 +348,4 @@ class PuckEmulator:
         while self._due and self._due[0][0] <= now_ns:
             due_ns, _, act = heapq.heappop(self._due)
             act(due_ns)
+        self.motor.advance(now_ns)

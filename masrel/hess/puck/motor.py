@@ -73,7 +73,7 @@ class EmulatedMotor:
         """
         if self._plant is None:
             return self._hand.start
-        self._advance(self._plant, now_ns)
+        self.advance(now_ns)
         return self._plant.angle_at(now_ns)
 
     def counts(self, now_ns: int) -> int:
@@ -103,7 +103,7 @@ class EmulatedMotor:
         """
         if self._plant is None:
             self._plant = Plant(self._hand, self._parameters, start_ns=now_ns)
-        self._advance(self._plant, now_ns)
+        self.advance(now_ns)
         self._is_driven = True
         self._plant.command(self._turns.torque(units), now_ns)
 
@@ -115,11 +115,20 @@ class EmulatedMotor:
         now_ns : int
             The time, ns.
         """
-        if self._plant is not None:
-            self._advance(self._plant, now_ns)
+        self.advance(now_ns)
         self._is_driven = False
 
-    def _advance(self, plant: Plant, now_ns: int) -> None:
+    def advance(self, now_ns: int) -> None:
+        """Let the arm move up to a time; it does not before it is first driven.
+
+        Parameters
+        ----------
+        now_ns : int
+            The time, ns.
+        """
+        plant = self._plant
+        if plant is None:
+            return
         if self._is_driven:
             plant.advance(now_ns)
             return

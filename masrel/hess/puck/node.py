@@ -1,5 +1,7 @@
 """One puck at the other end of a bus: questions, settings and its position."""
 
+import itertools
+
 from masrel.errors import BusError, DeviceTimeoutError
 from masrel.hess.clock import Clock
 from masrel.hess.puck.bus import BUS_OFF, BUS_RESTARTED, Frame, Link
@@ -17,16 +19,16 @@ from masrel.hess.puck.identifiers import (
     from_puck,
     to_puck,
 )
+from masrel.hess.puck.properties import ID, ROLE, SERIAL_NUMBER, STATUS, VERSION
 
 __all__ = ["PuckNode", "accepted_identifiers"]
 
 _SAMPLING_NS = 75_000
 """A puck samples its encoder this long after it is asked; said by a public driver."""
 
-_SETTLING_NS = 500_000
-"""Long enough for a request (75 µs) and an answer (75 µs) behind a late one."""
+# What every puck answers, asked for its order among the answers, not for its value
+_MARKERS = (VERSION, ROLE, SERIAL_NUMBER, ID, STATUS)
 
-_DOUBTFUL_READINGS = 3  # an answer that was waited for in vain comes within as many
 _MOST_WAITING = 1000  # frames; more than fit on the bus in 50 ms
 _ERROR_FRAMES = 10  # on a bus of one joint there should be none
 
@@ -88,8 +90,9 @@ class PuckNode:
 
     __slots__ = (
         "_clock",
-        "_doubtful",
+        "_in_doubt",
         "_link",
+        "_markers",
         "_positions",
         "_properties",
         "_to",
@@ -105,7 +108,8 @@ class PuckNode:
         self._clock = clock
         self._to = to_puck(puck)
         self._positions, self._properties = accepted_identifiers(puck)
-        self._doubtful = 0
+        self._in_doubt = False
+        self._markers = itertools.cycle(_MARKERS)
         self.puck = puck
         self.heard: dict[int, int] = {}
         self.n_foreign = 0
@@ -190,9 +194,10 @@ class PuckNode:
         """Ask for the position and wait for it.
 
         An answer does not say which question it belongs to. So what waits is thrown
-        away first, and for three readings after one that stayed without an answer the
-        last of those that come within half a millisecond counts: a puck answers in
-        the order in which it is asked.
+        away first. After a question that stayed without an answer, which may only be
+        late, the next is followed by one for another property, each time another: a
+        puck answers in the order in which it is asked, so that the last position
+        before that answer is the one asked for.
 
         Parameters
         ----------
@@ -216,19 +221,32 @@ class PuckNode:
         """
         self.listen()
         asked_ns = self.inquire(property_id)
-        found = self._next_position(asked_ns + round(patience_s * 1e9))
+        marker = next(self._markers) if self._in_doubt else None
+        if marker is not None:
+            self.heard.pop(marker, None)
+            self.inquire(marker)
+        found = self._marked_position(asked_ns + round(patience_s * 1e9), marker)
         if found is None:
-            self._doubtful = _DOUBTFUL_READINGS
             raise DeviceTimeoutError(
                 f"puck {self.puck}: no position within {patience_s * 1e3:g} ms"
             )
-        sampled_ns = min(asked_ns + _SAMPLING_NS, self._clock.now_ns())
-        if self._doubtful:
-            self._doubtful -= 1
-            while later := self._next_position(asked_ns + _SETTLING_NS):
-                self.n_late += 1
-                found = later
-        return sampled_ns, found.counts
+        return min(asked_ns + _SAMPLING_NS, self._clock.now_ns()), found.counts
+
+    def _marked_position(self, deadline_ns: int, marker: int | None) -> Position | None:
+        # The first position that comes; with a marker, the last before its answer
+        found: Position | None = None
+        while found is None if marker is None else marker not in self.heard:
+            frame = self._link.receive(deadline_ns)
+            if frame is None:
+                self.n_late += found is not None  # that of an earlier question
+                self._in_doubt = True
+                return None
+            position = self._sort(frame)
+            if position is not None:
+                self.n_late += found is not None
+                found = position
+        self._in_doubt = False  # nothing earlier can come any more
+        return found
 
     def listen(self) -> None:
         """Take in what has come unasked: answers, errors, frames of others.
@@ -267,13 +285,6 @@ class PuckNode:
             How long, s.
         """
         self._clock.sleep_until_ns(self._clock.now_ns() + round(duration_s * 1e9))
-
-    def _next_position(self, deadline_ns: int) -> Position | None:
-        while (frame := self._link.receive(deadline_ns)) is not None:
-            position = self._sort(frame)
-            if position is not None:
-                return position
-        return None
 
     def _sort(self, frame: Frame) -> Position | None:
         # -> the position if it is one; everything else goes where it belongs

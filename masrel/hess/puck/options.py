@@ -14,6 +14,8 @@ __all__ = ["PuckOptions"]
 
 _MOTOR_PUCKS = 7  # 8 to 31 are hands, sensors and the safety module
 
+_WITHOUT_HARDWARE = frozenset({"virtual", "udp_multicast"})
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PuckOptions(BackendOptions):
@@ -91,5 +93,11 @@ class PuckOptions(BackendOptions):
 
     @property
     def moves_hardware(self) -> bool:
-        """Whether a motor may be on this bus; "virtual" and "vcan..." are none."""
-        return self.interface != "virtual" and not self.channel.startswith("vcan")
+        """Whether a motor may be on this bus.
+
+        There is none on python-can's "virtual" and "udp_multicast", nor on a network
+        device whose name begins with "vcan".
+        """
+        return self.interface not in _WITHOUT_HARDWARE and not self.channel.startswith(
+            "vcan"
+        )
