@@ -22,6 +22,7 @@ from masrel.hess.puck.transmission import Transmission
 __all__ = [
     "Identity",
     "activate",
+    "check_torque",
     "configure",
     "identify",
     "release",
@@ -274,6 +275,31 @@ def activate(node: PuckNode, table: PropertyTable) -> None:
         )
 
 
+def check_torque(node: PuckNode, table: PropertyTable) -> None:
+    """See whether a puck says what torque it was told, with one current unit.
+
+    Parameters
+    ----------
+    node : PuckNode
+        A puck in torque mode.
+    table : PropertyTable
+        Numbers of its properties.
+
+    Raises
+    ------
+    DeviceError
+        If it does not: then lost torques could not be noticed.
+    """
+    node.tell(table.settable("T"), 1)  # 0.007 N·m, less than friction holds
+    found = node.ask(table.number("T"))
+    _set(node, table, "T", 0)
+    if found != 1:
+        raise DeviceError(
+            f"puck {node.puck}: needs a T that reads back what it was set to, set to 1 "
+            f"it reads {found}; checks_torque = false goes without"
+        )
+
+
 def release(node: PuckNode, *, torque_number: int, mode_number: int) -> None:
     """Zero the torque and idle a puck, again and again until it confirms.
 
@@ -295,7 +321,8 @@ def release(node: PuckNode, *, torque_number: int, mode_number: int) -> None:
         try:
             node.tell(torque_number, 0)
             node.tell(mode_number, IDLE)
-            if node.ask(mode_number, patience_s=0.005) == IDLE:
+            node.tell(mode_number, IDLE)  # twice: a regular loss may not hit both
+            if _is_idle(node, mode_number):
                 return
         except (BusError, DeviceTimeoutError, FrameError) as error:
             reason = str(error)
@@ -304,6 +331,14 @@ def release(node: PuckNode, *, torque_number: int, mode_number: int) -> None:
         f"puck {node.puck}: not idle after {_RELEASE_S * 1e3:g} ms ({reason}); it may "
         "hold its last torque: SWITCH ITS SUPPLY OFF"
     )
+
+
+def _is_idle(node: PuckNode, mode_number: int) -> bool:
+    # One that has fallen asleep drives nothing, and does not say its mode.
+    try:
+        return node.ask(mode_number, patience_s=0.005) == IDLE
+    except DeviceTimeoutError:
+        return node.ask(STATUS, patience_s=0.005) == ASLEEP
 
 
 def _set(node: PuckNode, table: PropertyTable, name: str, value: int) -> None:

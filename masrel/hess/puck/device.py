@@ -5,6 +5,7 @@ import math
 from typing import ClassVar
 
 from masrel.errors import (
+    BusError,
     DeviceError,
     DeviceTimeoutError,
     IdledError,
@@ -33,6 +34,7 @@ __all__ = [
 
 _LOWEST_ANGLE, _HIGHEST_ANGLE = math.radians(-5.0), math.radians(185.0)
 _UNANSWERED_POLLS = 2  # one may get lost
+_LOST_TORQUES = 1  # the next comes after a tick
 
 _SHARED_INTERFACES = frozenset({"socketcan", "udp_multicast"})
 _IDLING_MODULE = "masrel.hess.puck.idling"
@@ -46,7 +48,8 @@ class PuckDevice(Device):
     The torque is set by a frame to this puck alone, not by the packed frame that sets
     four: that one would set the torques of its neighbours, and which of the four a
     puck obeys hangs on two more of its properties. No setting is acknowledged, so
-    that after every `mode_poll_ticks` torques the puck is asked for its mode.
+    that every `poll_ticks` torques the puck is asked for its mode and for the torque
+    it holds, in turn. Nobody waits for the answer: it comes before the next position.
 
     Parameters
     ----------
@@ -69,8 +72,11 @@ class PuckDevice(Device):
     def __init__(self, options: PuckOptions, *, clock: Clock) -> None:
         self._options = options
         self._clock = clock
-        self._until_poll = options.mode_poll_ticks
+        self._until_poll = options.poll_ticks
+        self._polls_mode = True  # the next time; its torque the time after
         self._n_unanswered = 0
+        self._told = 0  # current units, when its torque was asked for
+        self._n_lost = 0
         self._highest = 0
         self._node: PuckNode
         self._table: PropertyTable
@@ -123,17 +129,53 @@ class PuckDevice(Device):
         self._numbers = table.number("P"), table.number("T"), table.number("MODE")
         try:
             bring_up.activate(node, table)
+            if options.checks_torque:
+                bring_up.check_torque(node, table)
         except BaseException:
             self._release()
             raise
 
     def _read(self) -> Reading:
-        position, _, mode = self._numbers
+        position, torque, mode = self._numbers
         node = self._node
         time_ns, counts = node.position(position, patience_s=self._options.patience_s)
-        if mode in node.heard:
-            self._check_mode(node.heard.pop(mode))
+        heard = node.heard
+        if heard:
+            if mode in heard:
+                self._check_mode(heard[mode])
+            if torque in heard:
+                self._check_torque(heard[torque])
+            heard.clear()
+        if self._n_unanswered > _UNANSWERED_POLLS:
+            raise self._unanswered()
         return Reading(time_ns, self.transmission.angle(counts))
+
+    def _send(self, torque_nm: float) -> None:
+        _, torque, _ = self._numbers
+        units = self.transmission.units(torque_nm)
+        if abs(units) > self._highest:
+            raise LimitExceededError(
+                f"torque: needs at most {self._options.largest_torque:g} N·m on this "
+                f"puck, got {torque_nm:.3f} N·m",
+                "torque",
+            )
+        self._node.tell(torque, units)
+        self._until_poll -= 1
+        if self._until_poll == 0:
+            self._until_poll = self._options.poll_ticks
+            self._poll(units)
+
+    def _poll(self, units: int) -> None:
+        # An unanswered one is complained of when the next position is read: a torque
+        # that is being taken back must not be kept from it.
+        _, torque, mode = self._numbers
+        self._n_unanswered += 1  # until the answer comes
+        if self._polls_mode or not self._options.checks_torque:
+            self._node.inquire(mode)
+        else:
+            self._told = units
+            self._node.inquire(torque)
+        self._polls_mode = not self._polls_mode
 
     def _check(self) -> None:
         # In the loop the answers to polls come with readings; here it is waited for.
@@ -141,7 +183,9 @@ class PuckDevice(Device):
         try:
             found = self._node.ask(mode, patience_s=self._options.patience_s)
         except DeviceTimeoutError:
-            self._note_unanswered()
+            self._n_unanswered += 1
+            if self._n_unanswered > _UNANSWERED_POLLS:
+                raise self._unanswered() from None
         else:
             self._check_mode(found)
 
@@ -153,29 +197,25 @@ class PuckDevice(Device):
                 f"has set it to {mode}; an emergency stop, or a pendant?"
             )
 
-    def _note_unanswered(self) -> None:
-        self._n_unanswered += 1
-        if self._n_unanswered > _UNANSWERED_POLLS:
-            raise DeviceTimeoutError(
-                f"puck {self._node.puck}: has not said its mode "
-                f"{self._n_unanswered} times in a row"
+    def _check_torque(self, units: int) -> None:
+        self._n_unanswered = 0
+        if units == self._told:
+            self._n_lost = 0
+            return
+        self._n_lost += 1
+        if self._n_lost > _LOST_TORQUES:
+            raise BusError(
+                f"puck {self._node.puck}: needs the torque it was told, "
+                f"{self._told} current units, holds {units}, "
+                f"{self._n_lost} times in a row: torques get lost",
+                "lost-torques",
             )
 
-    def _send(self, torque_nm: float) -> None:
-        _, torque, mode = self._numbers
-        units = self.transmission.units(torque_nm)
-        if abs(units) > self._highest:
-            raise LimitExceededError(
-                f"torque: needs at most {self._options.largest_torque:g} N·m on this "
-                f"puck, got {torque_nm:.3f} N·m",
-                "torque",
-            )
-        self._node.tell(torque, units)
-        self._until_poll -= 1
-        if self._until_poll == 0:
-            self._until_poll = self._options.mode_poll_ticks
-            self._note_unanswered()  # until the answer comes
-            self._node.inquire(mode)
+    def _unanswered(self) -> DeviceTimeoutError:
+        return DeviceTimeoutError(
+            f"puck {self._node.puck}: has not said its mode or torque "
+            f"{self._n_unanswered} times in a row"
+        )
 
     def _stop(self) -> None:
         try:

@@ -90,6 +90,8 @@ class PuckEmulator:
         Its properties.
     motor : EmulatedMotor
         Arm and motor.
+    faults : ActiveFaults
+        What fails.
     settings : deque of Setting
         What it was told, the last 10 000.
     n_disturbances : int
@@ -117,7 +119,7 @@ class PuckEmulator:
         self._due: list[tuple[int, int, Callable[[int], None]]] = []
         self._n_scheduled = 0
         self._last_answer_ns = 0
-        self._faults = ActiveFaults(options.faults)
+        self.faults = ActiveFaults(options.faults)
         self._frozen: int | None = None
         self.registers = Registers(options, puck)
         self.motor = EmulatedMotor(
@@ -177,12 +179,12 @@ class PuckEmulator:
     def _take(self, frame: Frame, now_ns: int) -> None:
         if frame.is_error or not self._is_for_me(frame):
             return
-        if self._faults.hit("unplugged", now_ns) or self._faults.hit("bus-off", now_ns):
+        if self._is_cut_off(now_ns):
             return
         if self.registers.is_waking:
             self.n_disturbances += 1
             return
-        if self._faults.hit("dropped-requests", now_ns):
+        if self.faults.hit("dropped-requests", now_ns):
             return
         try:
             self._obey(frame, now_ns)
@@ -220,6 +222,8 @@ class PuckEmulator:
     def _set(self, number: int, value: int, now_ns: int) -> None:
         registers = self.registers
         name = registers.name(number)
+        if name == "T" and self.faults.hit("dropped-torques", now_ns):
+            return
         self.settings.append(Setting(now_ns, name, value))
         if name == "T":
             self._drive(value, now_ns)
@@ -232,8 +236,6 @@ class PuckEmulator:
             self._at(now_ns + wake_ns, lambda _due: registers.wake())
 
     def _drive(self, units: int, now_ns: int) -> None:
-        if self._faults.hit("dropped-torques", now_ns):
-            return
         registers = self.registers
         registers.torque = max(-registers.highest, min(registers.highest, units))
         if registers.mode == TORQUE:
@@ -245,7 +247,7 @@ class PuckEmulator:
             self.registers.torque = 0
             self.motor.brake(now_ns)
             return
-        if self._faults.start(now_ns):
+        if self.faults.start(now_ns):
             self._schedule_faults(now_ns)
         self.motor.drive(self.registers.torque, now_ns)
 
@@ -272,38 +274,39 @@ class PuckEmulator:
 
     def _counted(self, counts: int, now_ns: int) -> int:
         # What a faulty encoder makes of a count
-        if not self._faults.hit("frozen-encoder", now_ns):
+        if not self.faults.hit("frozen-encoder", now_ns):
             self._frozen = None
         elif self._frozen is None:
             self._frozen = counts
         if self._frozen is not None:
             counts = self._frozen
-        if self._faults.hit("wrapping-encoder", now_ns):
+        if self.faults.hit("wrapping-encoder", now_ns):
             counts %= self._options.counts_per_turn
-        return counts + round(self._faults.amount("jumping-encoder", now_ns))
+        return counts + round(self.faults.amount("jumping-encoder", now_ns))
 
     def _reply(self, frame: Frame, due_ns: int) -> None:
-        if self._faults.hit("dropped-replies", due_ns):
+        if self.faults.hit("dropped-replies", due_ns):
             return
-        if self._faults.hit("short-replies", due_ns):
+        if self.faults.hit("short-replies", due_ns):
             frame = frame._replace(data=frame.data[:-1])
-        due_ns += round(self._faults.amount("late-replies", due_ns) * 1e9)
+        due_ns += round(self.faults.amount("late-replies", due_ns) * 1e9)
         # A puck answers in the order in which it is asked.
         self._last_answer_ns = due_ns = max(due_ns, self._last_answer_ns + 1)
         self._at(due_ns, lambda due: self._send(frame, due))
-        if self._faults.hit("duplicated-replies", due_ns):
+        if self.faults.hit("duplicated-replies", due_ns):
             self._at(due_ns + _DUPLICATE_NS, lambda due: self._send(frame, due))
 
     def _send(self, frame: Frame, now_ns: int) -> None:
-        if self._faults.active("unplugged", now_ns) or self._faults.active(
-            "bus-off", now_ns
-        ):
-            return
-        self._link.send(frame)
+        if not self._is_cut_off(now_ns):
+            self._link.send(frame)
+
+    def _is_cut_off(self, now_ns: int) -> bool:
+        faults = self.faults
+        return any(faults.active(kind, now_ns) for kind in ("unplugged", "bus-off"))
 
     def _interfere(self, now_ns: int) -> None:
         # What else is on the bus when a position is asked for
-        if self._options.is_noisy or self._faults.hit("foreign-frames", now_ns):
+        if self._options.is_noisy or self.faults.hit("foreign-frames", now_ns):
             other = self._puck % 31 + 1
             for frame in (
                 Frame(from_puck(SAFETY_NODE, 0), bytes(8)),
@@ -312,7 +315,7 @@ class PuckEmulator:
                 Frame(to_puck(self._puck), b"\x30"),  # an echo of the host
             ):
                 self._link.send(frame)
-        if self._faults.hit("error-frames", now_ns):
+        if self.faults.hit("error-frames", now_ns):
             self._link.send(Frame(_PROTOCOL_ERROR, bytes(8), is_error=True))
 
     # Faults

@@ -146,13 +146,18 @@ class ActiveFaults:
     ----------
     faults : tuple of InjectedFault
         What fails, and when.
+
+    Attributes
+    ----------
+    started_ns : int or None
+        When their time began, ns; None while it has not.
     """
 
-    __slots__ = ("_faults", "_n_hit", "_started_ns")
+    __slots__ = ("_faults", "_n_hit", "started_ns")
 
     def __init__(self, faults: tuple[InjectedFault, ...]) -> None:
         self._faults = faults
-        self._started_ns: int | None = None
+        self.started_ns: int | None = None
         self._n_hit: dict[FaultKind, int] = {}
 
     def start(self, now_ns: int) -> bool:
@@ -168,9 +173,9 @@ class ActiveFaults:
         bool
             Whether it had not begun before.
         """
-        if self._started_ns is not None:
+        if self.started_ns is not None:
             return False
-        self._started_ns = now_ns
+        self.started_ns = now_ns
         return True
 
     def active(self, kind: FaultKind, now_ns: int) -> InjectedFault | None:
@@ -188,9 +193,9 @@ class ActiveFaults:
         InjectedFault or None
             The first that is on; None when none is.
         """
-        if self._started_ns is None:
+        if self.started_ns is None:
             return None
-        since_s = (now_ns - self._started_ns) * 1e-9
+        since_s = (now_ns - self.started_ns) * 1e-9
         for fault in self._faults:
             if fault.kind == kind and fault.start_s <= since_s < fault.end_s:
                 return fault

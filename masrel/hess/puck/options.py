@@ -37,8 +37,11 @@ class PuckOptions(BackendOptions):
         the motor has continuously; larger commands are refused before they are sent.
     patience_s : float
         How long to wait for a position, s: one period of the loop.
-    mode_poll_ticks : int
-        Commands after which it is asked once whether it is still in torque mode.
+    poll_ticks : int
+        Torques after which it is asked once for its mode, or for the torque it holds.
+    checks_torque : bool
+        Whether it is asked for its torque. A torque is not acknowledged: without,
+        nobody notices that torques get lost while positions come.
     angle_after_reset : float or None
         Where the arm is held while a puck that has lost its position is opened, rad;
         None refuses to open such a puck.
@@ -60,7 +63,8 @@ class PuckOptions(BackendOptions):
     direction: Literal[1, -1] = 1
     largest_torque: float = 28.0
     patience_s: float = 0.001
-    mode_poll_ticks: int = 10
+    poll_ticks: int = 5
+    checks_torque: bool = True
     angle_after_reset: float | None = None
     properties: PropertyTable | None = field(default=None, repr=False)
     emulator: EmulatorOptions | None = None
@@ -76,10 +80,8 @@ class PuckOptions(BackendOptions):
                 raise ParameterError(f"{name}: needs more than 0, got {value}")
         if self.direction not in (1, -1):
             raise ParameterError(f"direction: needs 1 or -1, got {self.direction}")
-        if self.mode_poll_ticks < 1:
-            raise ParameterError(
-                f"mode_poll_ticks: needs 1 or more, got {self.mode_poll_ticks}"
-            )
+        if self.poll_ticks < 1:
+            raise ParameterError(f"poll_ticks: needs 1 or more, got {self.poll_ticks}")
         angle = self.angle_after_reset
         if angle is not None and not 0.0 <= angle <= math.pi:
             raise ParameterError(
