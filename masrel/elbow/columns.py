@@ -66,7 +66,7 @@ def sampled_columns(
     threshold = parameters.speed_threshold
     speed = (velocity >= threshold).astype(np.int8) - (velocity <= -threshold)
     starts = np.flatnonzero(np.diff(speed, prepend=np.int8(2)))
-    ends = np.append(starts[1:], time.size).tolist()
+    ends = np.append(starts, time.size)[1:].tolist()
     for start, end in zip(starts.tolist(), ends, strict=True):
         columns.run(int(speed[start]), start, end)
     return columns.torque, columns.phase

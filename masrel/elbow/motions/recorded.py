@@ -2,13 +2,18 @@
 
 from collections.abc import Iterator
 from decimal import Decimal
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from masrel.elbow.motion import Floats
-from masrel.elbow.motions.slopes import chord_slopes, monotone_slopes
+from masrel.elbow.motions.slopes import (
+    chord_slopes,
+    exact_monotone_slopes,
+    monotone_slopes,
+)
 from masrel.elbow.piece import Piece
 from masrel.errors import ParameterError
 
@@ -77,11 +82,13 @@ class Recorded:
         self._knots, self._angles = times - times[0], angles
         width, rise = np.diff(self._knots), np.diff(angles)
         self._first, self._last = _SLOPES[interpolation](width, rise)
-        # θ_i + u (first + u (c₂ + u c₃)), u the time since sample i
+        # θ_i + u (first + u (c₂ + u c₃)), u the time since sample i; of a line, exactly
+        # 0 is left of the differences
         chord = rise / width
+        begin, finish = self._first - chord, self._last - chord
         self._cubic = (
-            (3.0 * chord - 2.0 * self._first - self._last) / width,
-            (self._first + self._last - 2.0 * chord) / width / width,
+            -(2.0 * begin + finish) / width,
+            (begin + finish) / width / width,
         )
 
     @property
@@ -126,21 +133,23 @@ class Recorded:
 
     def pieces(self) -> Iterator[Piece]:
         """Give the cubics, or lines, from sample to sample."""
-        columns = (self._knots, self._angles)
-        times, angles = (column.tolist() for column in columns)
-        slopes = zip(self._first.tolist(), self._last.tolist(), strict=True)
-        for i, (first, last) in enumerate(slopes):
-            length = Decimal(times[i + 1]) - Decimal(times[i])
-            low, rise = Decimal(angles[i]), Decimal(angles[i + 1]) - Decimal(angles[i])
-            if self.interpolation == "linear":
-                yield Piece(length=length, angle=(low, rise))
-                continue
-            begin, finish = length * Decimal(first), length * Decimal(last)
-            yield Piece(
-                length=length,
-                angle=(low, begin, 3 * rise - 2 * begin - finish,
-                       begin + finish - 2 * rise),
-            )  # fmt: skip
+        times, angles = (
+            [Decimal(x) for x in column.tolist()]
+            for column in (self._knots, self._angles)
+        )
+        widths = [high - low for low, high in pairwise(times)]
+        rises = [high - low for low, high in pairwise(angles)]
+        if self.interpolation == "linear":
+            for width, low, rise in zip(widths, angles, rises, strict=False):
+                yield Piece(length=width, angle=(low, rise))
+            return
+        slopes = pairwise(exact_monotone_slopes(widths, rises))
+        for width, low, rise, (first, last) in zip(
+            widths, angles, rises, slopes, strict=False
+        ):
+            begin, finish = width * first, width * last
+            square, cube = 3 * rise - 2 * begin - finish, begin + finish - 2 * rise
+            yield Piece(length=width, angle=(low, begin, square, cube))
 
 
 def _checked(time: ArrayLike, angle: ArrayLike) -> tuple[Floats, Floats]:

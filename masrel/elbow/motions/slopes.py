@@ -1,10 +1,18 @@
 """Slopes of the cubics between samples."""
 
+from collections.abc import Iterator, Sequence
+from decimal import Decimal
+from itertools import pairwise
+from typing import TypeVar
+
 import numpy as np
 
 from masrel.elbow.motion import Floats
+from masrel.elbow.polynomial import ZERO
 
-__all__ = ["chord_slopes", "monotone_slopes"]
+Number = TypeVar("Number", float, Decimal)
+
+__all__ = ["chord_slopes", "exact_monotone_slopes", "monotone_slopes"]
 
 
 def chord_slopes(width: Floats, rise: Floats) -> tuple[Floats, Floats]:
@@ -72,11 +80,44 @@ def monotone_slopes(width: Floats, rise: Floats) -> tuple[Floats, Floats]:
     return slopes[:-1], slopes[1:]
 
 
-def _end_slope(near: float, far: float, chord: float, next_chord: float) -> float:
+def exact_monotone_slopes(
+    width: Sequence[Decimal], rise: Sequence[Decimal]
+) -> Iterator[Decimal]:
+    """Give the slopes of `monotone_slopes` to 50 digits, sample by sample.
+
+    Parameters
+    ----------
+    width : sequence of Decimal, length n_samples - 1
+        Times between samples, s.
+    rise : sequence of Decimal, length n_samples - 1
+        Angles between samples, rad.
+
+    Yields
+    ------
+    Decimal
+        The slope at the next sample, rad/s.
+    """
+    chord = [up / time for up, time in zip(rise, width, strict=True)]
+    if len(chord) == 1:
+        yield from (chord[0], chord[0])
+        return
+    yield _end_slope(width[0], width[1], chord[0], chord[1])
+    for (one, other), (before, after) in zip(
+        pairwise(width), pairwise(chord), strict=True
+    ):
+        wide, narrow = 2 * other + one, other + 2 * one
+        if before * after > 0:
+            yield (wide + narrow) / (wide / before + narrow / after)
+        else:
+            yield ZERO
+    yield _end_slope(width[-1], width[-2], chord[-1], chord[-2])
+
+
+def _end_slope(near: Number, far: Number, chord: Number, next_chord: Number) -> Number:
     # of the parabola through three samples, kept from overshooting
-    slope = ((2.0 * near + far) * chord - near * next_chord) / (near + far)
-    if np.sign(slope) != np.sign(chord):
-        return 0.0
-    if np.sign(chord) != np.sign(next_chord) and abs(slope) > 3.0 * abs(chord):
-        return 3.0 * chord
-    return float(slope)
+    slope = ((2 * near + far) * chord - near * next_chord) / (near + far)
+    if slope * chord <= 0:
+        return slope - slope  # 0 of its kind
+    if chord * next_chord <= 0 and abs(slope) > 3 * abs(chord):
+        return 3 * chord
+    return slope
