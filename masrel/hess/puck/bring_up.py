@@ -320,9 +320,11 @@ def release(node: PuckNode, *, torque_number: int, mode_number: int) -> None:
     while node.now_ns() - begun_ns < _RELEASE_S * 1e9:
         try:
             node.tell(torque_number, 0)
+            if _is_asleep(node):
+                return
             node.tell(mode_number, IDLE)
             node.tell(mode_number, IDLE)  # twice: a regular loss may not hit both
-            if _is_idle(node, mode_number):
+            if node.ask(mode_number, patience_s=0.005) == IDLE:
                 return
         except (BusError, DeviceTimeoutError, FrameError) as error:
             reason = str(error)
@@ -333,12 +335,13 @@ def release(node: PuckNode, *, torque_number: int, mode_number: int) -> None:
     )
 
 
-def _is_idle(node: PuckNode, mode_number: int) -> bool:
-    # One that has fallen asleep drives nothing, and does not say its mode.
+def _is_asleep(node: PuckNode) -> bool:
+    # One that was reset drives nothing, and has another property where MODE was. One
+    # that says nothing is taken to be awake: idling it matters more.
     try:
-        return node.ask(mode_number, patience_s=0.005) == IDLE
-    except DeviceTimeoutError:
         return node.ask(STATUS, patience_s=0.005) == ASLEEP
+    except DeviceTimeoutError:
+        return False
 
 
 def _set(node: PuckNode, table: PropertyTable, name: str, value: int) -> None:

@@ -225,7 +225,7 @@ def open_link(
             ignore_config=True,  # what is opened is what was asked for
             **_SETTINGS.get(interface, {}),
         )
-    except (can.CanError, OSError, ValueError) as error:
+    except (can.CanError, NotImplementedError, OSError, ValueError) as error:
         raise BusError(
             f"puck: cannot open channel {channel!r} of interface {interface!r} "
             f"({error})"

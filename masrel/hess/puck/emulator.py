@@ -93,7 +93,7 @@ class PuckEmulator:
     faults : ActiveFaults
         What fails.
     settings : deque of Setting
-        What it was told, the last 10 000.
+        What it was told, by others too, the last 10 000.
     n_disturbances : int
         Frames that came while it was off the bus to wake: a real host may be thrown
         off the bus by one.
@@ -324,7 +324,7 @@ class PuckEmulator:
         for fault in self._options.faults:
             begin_ns = start_ns + round(fault.start_s * 1e9)
             if fault.kind == "idled":
-                self._at(begin_ns, lambda due: self._switch(IDLE, due))
+                self._at(begin_ns, self._idle)
             elif fault.kind == "reset":
                 self._at(begin_ns, self._reset)
             elif fault.kind == "bus-off":
@@ -336,8 +336,12 @@ class PuckEmulator:
     def _report(self, error_class: int) -> None:
         self._link.send(Frame(error_class, bytes(8), is_error=True))
 
-    def _reset(self, now_ns: int) -> None:
+    def _idle(self, now_ns: int) -> None:
+        self.settings.append(Setting(now_ns, "MODE", IDLE))
         self._switch(IDLE, now_ns)
+
+    def _reset(self, now_ns: int) -> None:
+        self._idle(now_ns)
         self.registers.fall_asleep()
         self.registers.offset = -self.motor.counts(now_ns)
 

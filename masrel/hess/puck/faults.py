@@ -193,7 +193,7 @@ class ActiveFaults:
         InjectedFault or None
             The first that is on; None when none is.
         """
-        if self.started_ns is None:
+        if self.started_ns is None or not self._faults:
             return None
         since_s = (now_ns - self.started_ns) * 1e-9
         for fault in self._faults:
