@@ -230,17 +230,18 @@ def open_case(
     kernel = kernel_of(entry)
     v = declared_weights(weights, coded.categories, declared=coded.declared).as_floats()
     codes, times = distinct_patterns(coded.codes, coded.n_categories)
-    rated = (codes >= 0).any(axis=1)
-    patterns = replace(coded, codes=codes[rated])
+    if (codes[0] < 0).all():  # the first of them, if any, has no rating
+        codes, times = codes[1:], times[1:]
+    patterns = replace(coded, codes=codes)
     rows = features_of(kernel, patterns, v)
     return Case(
         entry=entry,
         coded=coded,
         patterns=patterns,
-        times=times[rated],
+        times=times,
         rows=rows,
         v=v,
-        value=float(kernel.value(times[rated] @ rows, v)),
+        value=float(kernel.value(times @ rows, v)),
         target=target,
         level=level,
     )
