@@ -1,7 +1,8 @@
 """Which interval answers a question at its size, by the study of coverage in the docs.
 
-Fleiss' kappa, and what estimates the same, has the Dirichlet-multinomial posterior to
-fall back on where few items and raters, or no disagreement, leave nothing to resample.
+Where few items, or no disagreement, leave nothing to resample, Fleiss' kappa and what
+estimates the same fall back on the Dirichlet-multinomial posterior, and other
+coefficients of two raters on that of their table.
 """
 
 import dataclasses
@@ -18,12 +19,14 @@ from masrel.intervals.dirichlet.prior import Prior
 from masrel.intervals.dirichlet.rho import ExactPosterior, prior_notes
 from masrel.intervals.jackknife import around_estimate
 from masrel.intervals.spread import Spread, excess_of_raters, spread
+from masrel.intervals.table.interval import speaks_of, table_interval
 from masrel.intervals.transforms import around
 
 __all__ = ["Choice", "choose"]
 
 _FEW = 10  # items, and raters, below which the posterior covers best
 _SEVERAL = 30  # items, below which a jackknife alone ends too low
+_DRAWS, _SEED = 4_000, 1  # of a table; always the same ones, so that it repeats
 _ACCIDENT = (
     0.003  # of (1 - κ) / ratings: a variance below it is chance, not information
 )
@@ -48,6 +51,13 @@ class Choice:
     def small(self) -> bool:
         """Whether items and raters are both few."""
         return self.case.n_items < _FEW and self.n_raters < _FEW
+
+    @cached_property
+    def tabular(self) -> bool:
+        """Whether the table of two raters speaks of the coefficient instead."""
+        return (
+            not self.modelled and self.case.target == "items" and speaks_of(self.case)
+        )
 
     @property
     def n_raters(self) -> int:
@@ -114,8 +124,14 @@ def choose(choice: Choice) -> Interval:
     if choice.modelled and choice.small and case.target == "items":
         why = f"few items ({case.n_items}) and raters, where it covers best"
         return _because(case, _posterior(choice, 0.0), why)
+    if choice.tabular and case.n_items < _FEW:
+        why = f"few items ({case.n_items}), where it covers best"
+        return _because(case, _table(choice), why)
     found = spread(case)
     if not choice.has_spread(found.variance):
+        if choice.tabular:
+            why = "leaving items out says nothing, so that a model must"
+            return _because(case, _table(choice), why)
         if not choice.modelled:
             why = "the spread of the units left out"
             return _because(case, around_estimate(case, found), why)
@@ -217,6 +233,22 @@ def _one_sided(choice: Choice) -> Interval:
         target=case.target,
         notes=(note,),
         distribution=_distribution(choice.posterior),
+    )
+
+
+def _table(choice: Choice) -> Interval:
+    # one-sided where nothing disagrees, and holding the estimate elsewhere
+    case = choice.case
+    perfect = not case.value < 1.0
+    found = table_interval(case, None, n_draws=_DRAWS, rng=_SEED, one_sided=perfect)
+    if perfect or found.low <= case.value <= found.high:
+        return found
+    note = "widened to the estimate, which lies outside the posterior's"
+    return dataclasses.replace(
+        found,
+        low=min(found.low, case.value),
+        high=max(found.high, case.value),
+        notes=(*found.notes, note),
     )
 
 

@@ -68,8 +68,8 @@ def posterior(
         ρ ~ U(0, 1), or ρ ~ Beta(1/2, 1/2), the prior of Jeffreys for a probability.
     concentration : float, optional
         Every share of a category is Dirichlet(concentration, ...), 1 unless given;
-        with "table" every cell, one over the number of cells unless given, a prior
-        as strong as one item.
+        with "table" every cell. Unless given, the prior of the table is worth 1.5
+        items, half of it on pairs that agree.
     method : {"exact", "emcee"}, optional
         Quadrature, which draws nothing; or a sampler, to check it.
     n_draws : int, optional
