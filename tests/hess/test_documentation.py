@@ -37,7 +37,7 @@ def test_the_example_prints_what_the_page_says() -> None:
 
 def test_the_devices_are_those_that_the_page_names() -> None:
     # When a backend is added, the page's first statement has to change.
-    assert device_names() == ("puck", "simulated")
+    assert device_names() == ("puck", "replay", "simulated")
     assert "It has not been tested on physical hardware" in PAGE
 
 
