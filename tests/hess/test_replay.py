@@ -72,10 +72,9 @@ def test_it_does_so_for_what_a_puck_counted() -> None:
 def test_it_does_so_where_replies_were_missed() -> None:
     lost = fault("dropped-replies", 0.5, end_s=0.5015)
     first = on_a_puck(lost)[0].recording
-    assert first.facts["n_missed_replies"] == 2
+    assert np.diff(first.columns["time_s"]).max() > 0.0025  # two rows are missing
     again = played_back(first, "HM3")
     assert is_the_same(again, first)
-    assert again.facts["n_missed_ticks"] == 1  # of a gap of two ticks, all but one
 
 
 def test_it_does_so_after_the_recording_was_written_and_read(tmp_path: Path) -> None:
