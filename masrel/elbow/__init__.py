@@ -20,6 +20,7 @@ from masrel.elbow.motions import (
 )
 from masrel.elbow.parameters import STANDARD_MODELS, ElbowParameters
 from masrel.elbow.sampled import SampledJoint
+from masrel.elbow.scenes import SceneTable, evaluate
 from masrel.elbow.torque import times_at, torque, torque_at
 from masrel.elbow.trace import Trace, trace
 
@@ -37,9 +38,11 @@ __all__ = [
     "Recorded",
     "Reversed",
     "SampledJoint",
+    "SceneTable",
     "StretchEvents",
     "Trace",
     "Trapezoid",
+    "evaluate",
     "events",
     "impulse",
     "interrupted",

@@ -13,7 +13,7 @@ from masrel.elbow.parameters import ElbowParameters
 from masrel.elbow.polynomial import exactly
 from masrel.recording import Phase
 
-__all__ = ["Events", "PhaseSpan", "StretchEvents", "events"]
+__all__ = ["Events", "PhaseSpan", "StretchEvents", "events", "events_of"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -179,7 +179,24 @@ def events(parameters: ElbowParameters, motion: Motion) -> Events:
     >>> [span.name for span in found.phases]
     ['pre-catch', 'catch', 'post-catch']
     """
-    found = course(parameters, motion)
+    return events_of(parameters, course(parameters, motion))
+
+
+def events_of(parameters: ElbowParameters, found: Course) -> Events:
+    """Round a course to events.
+
+    Parameters
+    ----------
+    parameters : ElbowParameters
+        The joint.
+    found : Course
+        What happens in a motion.
+
+    Returns
+    -------
+    Events
+        The same, in floats.
+    """
     with exactly():
         stretches = tuple(
             _stretch(stretch, Decimal(parameters.peak_duration), found.end)
