@@ -34,9 +34,6 @@ CONTROLLER_ERROR, BUS_OFF, BUS_RESTARTED = 0x004, 0x040, 0x100
 
 _FILTERS_IN_KERNEL = frozenset({"socketcan"})
 
-# A bus between the processes of one machine does not leave it.
-_SETTINGS: dict[str, dict[str, Any]] = {"udp_multicast": {"hop_limit": 0}}
-
 
 class Frame(NamedTuple):
     """One frame of the bus.
@@ -191,7 +188,8 @@ def open_link(
     interface : str
         Name of a python-can interface, such as "socketcan" or "virtual".
     channel : str
-        Its channel, such as "can0".
+        Its channel, such as "can0"; for "udp_multicast" a group, or an IPv4 group, a
+        colon and a port.
     clock : Clock
         The clock of deadlines.
     accepted : tuple of int or None, optional
@@ -219,11 +217,9 @@ def open_link(
     try:
         bus = can.Bus(
             interface=interface,
-            channel=channel,
-            bitrate=BITRATE,
             can_filters=filters,
             ignore_config=True,  # what is opened is what was asked for
-            **_SETTINGS.get(interface, {}),
+            **_settings(interface, channel),
         )
     except (can.CanError, NotImplementedError, OSError, ValueError) as error:
         raise BusError(
@@ -231,3 +227,14 @@ def open_link(
             f"({error})"
         ) from error
     return Link(bus, clock, neighbour=neighbour)
+
+
+def _settings(interface: str, channel: str) -> dict[str, Any]:
+    if interface != "udp_multicast":
+        return {"channel": channel, "bitrate": BITRATE}
+    # A bus between the processes of one machine does not leave it.
+    settings: dict[str, Any] = {"channel": channel, "hop_limit": 0}
+    group, colon, port = channel.partition(":")
+    if colon and port.isdecimal():
+        settings.update(channel=group, port=int(port))
+    return settings
