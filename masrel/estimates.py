@@ -80,7 +80,8 @@ class Interval:
     reason : str or None
         Why it is undefined, or None.
     distribution : Distribution or None
-        What the ends are quantiles of, where the method has it.
+        How the coefficient is distributed over resamples, or in the posterior: what
+        the ends are read from. None where the method has no such thing.
     """
 
     low: float

@@ -204,8 +204,10 @@ def item_counts(coded: CodedRatings) -> Integers:
     """
     n_items, n_raters = coded.codes.shape
     if coded.codes.size * coded.n_categories <= _FEW_PLACES:
-        one_each = np.eye(coded.n_categories + 1, dtype=np.int64)[coded.codes]
-        return np.asarray(one_each.sum(axis=1)[:, :-1])  # code -1 is the last
+        width = coded.n_categories + 1  # code -1 is the first
+        places = coded.codes + (width * np.arange(n_items)[:, None] + 1)
+        found = np.bincount(places.ravel(), minlength=width * n_items)
+        return np.asarray(found.reshape(n_items, width)[:, 1:], dtype=np.int64)
     if coded.n_categories <= n_raters:
         parts = [(coded.codes == k).sum(axis=1) for k in range(coded.n_categories)]
         return np.column_stack(parts)

@@ -61,6 +61,8 @@ def divide(numerator: Floats, denominator: Floats) -> Floats:
     ndarray, shape (...)
         The ratios.
     """
+    if np.count_nonzero(denominator) == np.size(denominator):  # as a rule
+        return np.asarray(numerator / denominator)
     return np.asarray(numerator / np.where(denominator == 0.0, np.nan, denominator))
 
 

@@ -7,13 +7,14 @@ from masrel.agreement.coding import Codes
 
 __all__ = ["distinct_patterns"]
 
+Integers = NDArray[np.int64]
+
 _MOST_KEYS = 1 << 22  # patterns that are counted in a table rather than sorted
 _BLOCK = 1 << 16  # items counted at once, so that they stay in the cache
+_FEW = 1 << 10  # items for which one call costs less than a few for each rater
 
 
-def distinct_patterns(
-    codes: Codes, n_categories: int
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def distinct_patterns(codes: Codes, n_categories: int) -> tuple[Integers, Integers]:
     """Put equal rows of codes together.
 
     Parameters
@@ -34,6 +35,8 @@ def distinct_patterns(
     if n_keys > 2**62:
         rows, times = np.unique(codes, axis=0, return_counts=True)
         return rows.astype(np.int64), times.astype(np.int64)
+    if n_items <= _FEW:
+        return _sorted(codes, _keys(codes, base))
     if n_keys > min(_MOST_KEYS, 16 * n_items):
         met, times = np.unique(_keys(codes, base), return_counts=True)
     else:
@@ -47,8 +50,23 @@ def distinct_patterns(
     return met[:, None] // digits % base - 1, times.astype(np.int64)
 
 
-def _keys(codes: Codes, base: int) -> NDArray[np.int64]:
-    # Σ_r (code_r + 1) base^r, by Horner's rule
+def _sorted(codes: Codes, keys: Integers) -> tuple[Integers, Integers]:
+    # distinct rows in the order of their keys, by the last of those that are equal
+    order = keys.argsort()
+    ascending = keys[order]
+    is_last = np.ones(keys.size, dtype=bool)
+    np.not_equal(ascending[1:], ascending[:-1], out=is_last[:-1])
+    (last,) = is_last.nonzero()
+    times = last + 1
+    times[1:] -= times[:-1].copy()
+    return codes[order[last]].astype(np.int64), times
+
+
+def _keys(codes: Codes, base: int) -> Integers:
+    # Σ_r (code_r + 1) base^r, of many items by Horner's rule
+    if len(codes) <= _FEW:
+        digits = base ** np.arange(codes.shape[1], dtype=np.int64)
+        return np.asarray((codes.astype(np.int64) + 1) @ digits, dtype=np.int64)
     keys = codes[:, -1].astype(np.int64) + 1
     for column in codes.T[-2::-1]:
         keys *= base

@@ -93,15 +93,12 @@ def planned_interval(
             rng=seed,
         )
     if kind == "posterior":
-        if weights != "identity":
-            raise ParameterError(
-                f"weights: the posterior is of unweighted agreement, got {weights!r}"
-            )
         return intervals.posterior(
             coefficient,
             ratings,
             target=target,
             categories=categories,
+            weights=weights,
             level=level,
             rng=seed,
         )

@@ -1,23 +1,24 @@
-"""The events of a stretch, as roots of its motion: no time stepping.
+"""The events of a motion, as roots of it: no time stepping.
 
 Source: Park, Kim and Damiano (2012), IEEE TNSRE 20(3), 361-370,
 https://doi.org/10.1109/TNSRE.2012.2195330, equations (2), (4), (6) and Fig. 7.
 """
 
-import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from decimal import Decimal
 
-from masrel.elbow.motion import Motion, first_true
+from masrel.elbow.course import Course, Moment, Stretch, course
+from masrel.elbow.motion import Motion
 from masrel.elbow.parameters import ElbowParameters
-from masrel.errors import ParameterError
+from masrel.elbow.polynomial import exactly
 from masrel.recording import Phase
 
-__all__ = ["Events", "PhaseSpan", "events", "stretch_end"]
+__all__ = ["Events", "PhaseSpan", "StretchEvents", "events", "events_of"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PhaseSpan:
-    """One phase of a stretch.
+    """One phase of a motion.
 
     Attributes
     ----------
@@ -37,12 +38,12 @@ class PhaseSpan:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Events:
-    """When a stretch moves, catches, and goes on; None for what it does not reach.
+class StretchEvents:
+    """When one stretch catches and goes on; None for what it does not reach.
 
     Attributes
     ----------
-    onset : float or None
+    onset : float
         Speed first reaches ν_th, s.
     catch : float or None
         The catch begins, s.
@@ -55,16 +56,12 @@ class Events:
     peak_end : float or None
         The peak of (3) ends, s.
     catch_end : float or None
-        The catch ends, s; None when the stretch ends within it.
+        The catch ends, s; None when the motion ends within it.
     post_catch_end : float or None
         Speed falls below ν_th again after the catch, s; None when it does not.
-    end : float
-        The stretch ends, at its own end or at the end of range, s.
-    phases : tuple of PhaseSpan
-        The phases in order.
     """
 
-    onset: float | None
+    onset: float
     catch: float | None = None
     catch_angle: float | None = None
     catch_speed: float | None = None
@@ -72,29 +69,102 @@ class Events:
     peak_end: float | None = None
     catch_end: float | None = None
     post_catch_end: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Events:
+    """When a motion moves, catches, and goes on.
+
+    Attributes
+    ----------
+    stretches : tuple of StretchEvents
+        Every movement in extension that reaches ν_th, in order.
+    end : float
+        The motion ends, at its own end or at the end of range, s.
+    phases : tuple of PhaseSpan
+        The phases in order.
+
+    Notes
+    -----
+    `onset`, `catch` and the other attributes of `StretchEvents` are those of the first
+    stretch that catches, or of the first if none does; None if there is none.
+    """
+
+    stretches: tuple[StretchEvents, ...]
     end: float
     phases: tuple[PhaseSpan, ...]
+    course: Course = field(repr=False, compare=False)
+
+    @property
+    def _first(self) -> StretchEvents | None:
+        caught = [stretch for stretch in self.stretches if stretch.catch is not None]
+        return next(iter(caught or self.stretches), None)
+
+    @property
+    def onset(self) -> float | None:
+        """Speed first reaches ν_th, s."""
+        return None if self._first is None else self._first.onset
+
+    @property
+    def catch(self) -> float | None:
+        """The catch begins, s."""
+        return None if self._first is None else self._first.catch
+
+    @property
+    def catch_angle(self) -> float | None:
+        """Angle where the catch begins, rad."""
+        return None if self._first is None else self._first.catch_angle
+
+    @property
+    def catch_speed(self) -> float | None:
+        """v_c of (3), rad/s."""
+        return None if self._first is None else self._first.catch_speed
+
+    @property
+    def mean_speed(self) -> float | None:
+        """Mean speed from onset to catch, rad/s."""
+        return None if self._first is None else self._first.mean_speed
+
+    @property
+    def peak_end(self) -> float | None:
+        """The peak of (3) ends, s."""
+        return None if self._first is None else self._first.peak_end
+
+    @property
+    def catch_end(self) -> float | None:
+        """The catch ends, s."""
+        return None if self._first is None else self._first.catch_end
+
+    @property
+    def post_catch_end(self) -> float | None:
+        """Speed falls below ν_th again after the catch, s."""
+        return None if self._first is None else self._first.post_catch_end
 
 
 def events(parameters: ElbowParameters, motion: Motion) -> Events:
-    """Find the events of a stretch.
+    """Find the events of a motion.
 
     Parameters
     ----------
     parameters : ElbowParameters
         The joint.
     motion : Motion
-        The stretch, SI units.
+        The motion, SI units.
 
     Returns
     -------
     Events
-        Exact to rounding; what the stretch does not reach is None.
+        Each time and angle is the float nearest to the exact one; what the motion
+        does not reach is None.
 
     Raises
     ------
     ParameterError
-        If the stretch starts at or beyond the end of range.
+        If the motion starts at or beyond the end of range.
+
+    Notes
+    -----
+    Times that agree to 30 digits of the piece of motion they are in count as one.
 
     Examples
     --------
@@ -109,165 +179,69 @@ def events(parameters: ElbowParameters, motion: Motion) -> Events:
     >>> [span.name for span in found.phases]
     ['pre-catch', 'catch', 'post-catch']
     """
-    end = stretch_end(parameters, motion)
-    fast = motion.times_above(parameters.speed_threshold)
-    if fast is None or fast[0] >= end:
-        return Events(onset=None, end=end, phases=_phases(motion, [], end))
-    onset, slow = fast[0], min(fast[1], end)
-    catch = _catch(parameters, motion, onset, slow)
-    if catch is None:
-        return Events(onset=onset, end=end, phases=_phases(motion, [], end))
-    catch_angle = float(motion.angle(catch))
-    released = catch_angle + parameters.catch_travel  # (4): the angle travelled is D
-    catch_end = None
-    if released < float(motion.angle(end)):
-        catch_end = motion.time_at(released)
-    post_end = None
-    if catch_end is not None and slow < end:
-        post_end = max(catch_end, slow)
-    changes: list[tuple[Phase, float]] = [("catch", catch)]
-    if catch_end is not None:
-        changes.append(("post-catch", catch_end))
-    if post_end is not None:
-        changes.append(("pre-catch", post_end))
-    return Events(
-        onset=onset,
-        catch=catch,
-        catch_angle=catch_angle,
-        catch_speed=float(motion.velocity(catch)),
-        mean_speed=_mean_speed(motion, onset, catch),
-        peak_end=min(
-            catch + parameters.peak_duration, end if catch_end is None else catch_end
-        ),
-        catch_end=catch_end,
-        post_catch_end=post_end,
-        end=end,
-        phases=_phases(motion, changes, end),
-    )
+    return events_of(parameters, course(parameters, motion))
 
 
-def stretch_end(parameters: ElbowParameters, motion: Motion) -> float:
-    """Return when a stretch ends, at its own end or at the end of range.
+def events_of(parameters: ElbowParameters, found: Course) -> Events:
+    """Round a course to events.
 
     Parameters
     ----------
     parameters : ElbowParameters
-        The joint, of which the end of range is used.
-    motion : Motion
-        The stretch, SI units.
+        The joint.
+    found : Course
+        What happens in a motion.
 
     Returns
     -------
-    float
-        Time from the start, s.
-
-    Raises
-    ------
-    ParameterError
-        If the stretch starts at or beyond the end of range.
-
-    Examples
-    --------
-    >>> from masrel.elbow import STANDARD_MODELS, ConstantSpeed
-    >>> from math import radians
-    >>> stretch = ConstantSpeed(start=radians(46), end=radians(160), speed=radians(50))
-    >>> round(stretch_end(STANDARD_MODELS["HM1"], stretch), 12)
-    2.0
+    Events
+        The same, in floats.
     """
-    if motion.start >= parameters.range_end:
-        raise ParameterError(
-            "start: needs less than the end of range, "
-            f"{math.degrees(parameters.range_end):g} degrees, got "
-            f"{math.degrees(motion.start):g} degrees"
+    with exactly():
+        stretches = tuple(
+            _stretch(stretch, Decimal(parameters.peak_duration), found.end)
+            for stretch in found.stretches
         )
-    if motion.end > parameters.range_end:
-        return motion.time_at(parameters.range_end)  # the joint goes no further
-    return motion.duration
+    return Events(
+        stretches=stretches,
+        end=float(found.end.time),
+        phases=_phases(found),
+        course=found,
+    )
 
 
-def _mean_speed(motion: Motion, onset: float, time: float) -> float:
-    # v̄ of (2); at the onset itself its limit, the speed there
-    if time == onset:
-        return float(motion.velocity(onset))
-    return float(motion.angle(time) - motion.angle(onset)) / (time - onset)
+def _stretch(stretch: Stretch, peak: Decimal, end: Moment) -> StretchEvents:
+    catch, ended = stretch.catch, stretch.catch_end
+    if catch is None:
+        return StretchEvents(onset=float(stretch.onset.time))
+    last = end if ended is None else ended
+    return StretchEvents(
+        onset=float(stretch.onset.time),
+        catch=float(catch.time),
+        catch_angle=float(catch.angle),
+        catch_speed=float(catch.velocity),
+        mean_speed=None if stretch.mean_speed is None else float(stretch.mean_speed),
+        peak_end=float(min(catch.time + peak, last.time)),
+        catch_end=_time(ended),
+        post_catch_end=_time(stretch.post_catch_end),
+    )
 
 
-def _catch(
-    parameters: ElbowParameters, motion: Motion, onset: float, slow: float
-) -> float | None:
-    # first time in [onset, slow] at which θ > θ_catch(v̄)
-
-    def beyond(time: float) -> bool:
-        mean_speed = _mean_speed(motion, onset, time)
-        return bool(motion.angle(time) > parameters.catch_angle(mean_speed))
-
-    speed = float(motion.velocity(onset))
-    constant = speed == float(motion.velocity(slow))
-    if constant and not motion.turning_times(0.0, 1.0, 0.0):
-        # v̄ is the speed itself, so θ_catch is one angle, reached in closed form
-        if speed <= parameters.speed_threshold or not beyond(slow):
-            return None  # Fig. 7 asks for more than ν_th
-        angle = parameters.catch_angle(_mean_speed(motion, onset, slow))
-        return onset if beyond(onset) else motion.time_at(angle)
-    if beyond(onset):
-        return onset
-    # θ - θ_catch grows as long as v̄ grows, that is until the speed has fallen to v̄;
-    # it goes on growing until θ_catch rises faster than θ, and may grow once more
-    # when v̄ < ν_L keeps θ_catch in place. Each part has at most one change.
-    fastest = _fastest_mean(motion, onset, slow)
-    low = onset
-    for high in (fastest, _overtaken(parameters, motion, onset, fastest, slow), slow):
-        if high > low and beyond(high):
-            return first_true(beyond, low, high)
-        low = high
-    return None
+def _time(moment: Moment | None) -> float | None:
+    return None if moment is None else float(moment.time)
 
 
-def _fastest_mean(motion: Motion, onset: float, slow: float) -> float:
-    # where v̄ is largest: the speed, having peaked, has fallen to it
-    def slower(time: float) -> bool:
-        return bool(motion.velocity(time) <= _mean_speed(motion, onset, time))
-
-    peak = 0.5 * motion.duration
-    low = min(max(peak, onset), slow)
-    return first_true(slower, low, slow) if slower(slow) and not slower(low) else slow
-
-
-def _overtaken(
-    parameters: ElbowParameters,
-    motion: Motion,
-    onset: float,
-    fastest: float,
-    slow: float,
-) -> float:
-    # from where, after `fastest`, θ_catch of (2) rises faster than θ: dθ_catch/dt is
-    # -α dv̄/dt with dv̄/dt = (ω - v̄)/(t - t_onset), unless v̄ > ν_H keeps θ_catch
-    def rises_faster(time: float) -> bool:
-        mean_speed = _mean_speed(motion, onset, time)
-        speed = float(motion.velocity(time))
-        rise = parameters.catch_slope * (mean_speed - speed)
-        clamped = mean_speed > parameters.fastest_mean_speed
-        return not clamped and rise > speed * (time - onset)
-
-    if rises_faster(slow) and not rises_faster(fastest):
-        return first_true(rises_faster, fastest, slow)
-    return slow
-
-
-def _phases(
-    motion: Motion, changes: list[tuple[Phase, float]], end: float
-) -> tuple[PhaseSpan, ...]:
-    # phases begin at 0 and at every change; one of no length is left out
-    starts: list[tuple[Phase, float]] = [("pre-catch", 0.0), *changes]
-    ends = [time for _, time in changes] + [end]
+def _phases(found: Course) -> tuple[PhaseSpan, ...]:
+    # one of no length is left out
+    ends = [change.moment for change in found.changes[1:]] + [found.end]
     return tuple(
         PhaseSpan(
-            name=name,
-            start=start,
-            end=stop,
-            start_angle=float(motion.angle(start)),
-            end_angle=float(motion.angle(stop)),
+            name=change.phase,
+            start=float(change.moment.time),
+            end=float(end.time),
+            start_angle=float(change.moment.angle),
+            end_angle=float(end.angle),
         )
-        for (name, start), stop in zip(starts, ends, strict=True)
-        if stop > start
+        for change, end in zip(found.changes, ends, strict=True)
+        if end.time > change.moment.time
     )

@@ -10,10 +10,13 @@ from typing import Literal
 
 from masrel.errors import ParameterError
 
-__all__ = ["STANDARD_MODELS", "ElbowParameters", "PostCatch"]
+__all__ = ["STANDARD_MODELS", "ElbowParameters", "PostCatch", "ResidualReading"]
 
 PostCatch = Literal["continuous", "additive"]
 """Reading of equation (5): "continuous" starts from the residual torque."""
+
+ResidualReading = Literal["residual", "decrease"]
+"""What Q is a share of the rise for: the residual (section II), or the decrease."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,7 +32,8 @@ class ElbowParameters:
     catch_torque_constant : float
         H of (3), N·m·s/rad.
     residual_ratio : float
-        Q of (3): residual torque over peak torque, both above pre-catch.
+        Q of (3): residual torque over peak torque, both above pre-catch. In section
+        III.C's words, the decrease after the peak over the rise: `residual_reading`.
     catch_travel : float
         D of (4), rad: the angle travelled during the catch.
     inertia : float
@@ -56,6 +60,11 @@ class ElbowParameters:
         θ_rest of (1), rad; None means the angle where the stretch starts.
     post_catch : {"continuous", "additive"}
         Reading of (5).
+    residual_reading : {"residual", "decrease"}
+        Reading of Q: with "decrease" the residual is 1 - Q of the peak.
+    catch_rise : float
+        How long the torque takes to its peak, s; 0 is the step of (3). An amplifier
+        may be spared the step so: torque then rises along 3x² - 2x³.
 
     Raises
     ------
@@ -79,6 +88,8 @@ class ElbowParameters:
     range_end: float = math.radians(146.0)
     rest_angle: float | None = None
     post_catch: PostCatch = "continuous"
+    residual_reading: ResidualReading = "residual"
+    catch_rise: float = 0.0
 
     def __post_init__(self) -> None:
         for name in self.__slots__:
@@ -106,9 +117,22 @@ class ElbowParameters:
                 raise ParameterError(
                     f"{name}: needs 0 or more, got {getattr(self, name)}"
                 )
+        self._check_readings()
+
+    def _check_readings(self) -> None:
         if self.post_catch not in ("continuous", "additive"):
             raise ParameterError(
                 f'post_catch: needs "continuous" or "additive", got {self.post_catch!r}'
+            )
+        if self.residual_reading not in ("residual", "decrease"):
+            raise ParameterError(
+                'residual_reading: needs "residual" or "decrease", '
+                f"got {self.residual_reading!r}"
+            )
+        if not 0.0 <= self.catch_rise <= self.peak_duration:
+            raise ParameterError(
+                f"catch_rise: needs 0 to peak_duration, {self.peak_duration:g} s, "
+                f"got {self.catch_rise:g} s"
             )
 
     def _require(self, name: str, low: float, high: float, words: str) -> None:
@@ -121,6 +145,13 @@ class ElbowParameters:
         """Mean speed above which the catch angle is the smallest, ν_H of (6), rad/s."""
         span = self.catch_angle_constant - self.smallest_catch_angle
         return span / self.catch_slope
+
+    @property
+    def residual_share(self) -> float:
+        """Residual torque over peak torque, both above pre-catch."""
+        if self.residual_reading == "decrease":  # section III.C
+            return 1.0 - self.residual_ratio
+        return self.residual_ratio
 
     def catch_angle(self, mean_speed: float) -> float:
         """Return the catch angle for a mean pre-catch speed.

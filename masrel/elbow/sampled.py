@@ -154,10 +154,14 @@ class SampledJoint:
         parameters = self._parameters
         rise = parameters.catch_torque_constant * self._catch_speed  # H·v_c
         if self.phase == CATCH:
-            if time_s - self.catch_time < parameters.peak_duration:
+            since = time_s - self.catch_time
+            if since < parameters.catch_rise:  # a smoothed onset
+                share = since / parameters.catch_rise
+                return self._pre_end + rise * (share * share * (3.0 - 2.0 * share))
+            if since < parameters.peak_duration:
                 return self._pre_end + rise  # (3), first line
-            return self._pre_end + parameters.residual_ratio * rise  # (3), second line
-        residual = parameters.residual_ratio * rise
+            return self._pre_end + parameters.residual_share * rise  # (3), second line
+        residual = parameters.residual_share * rise
         climb = parameters.post_catch_stiffness * (angle - self._post_angle)
         if self._additive:  # (5) as Table III's footnote reads it
             return self._pre_catch_torque(angle, velocity) + residual + climb

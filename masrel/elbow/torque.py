@@ -1,20 +1,25 @@
-"""Torque of a stretch at any time, and its peak, from the exact events.
+"""Torque of a motion at given times or angles, from the exact events.
 
 Source: Park, Kim and Damiano (2012), IEEE TNSRE 20(3), 361-370,
 https://doi.org/10.1109/TNSRE.2012.2195330, equations (1), (3) and (5).
 """
 
+import math
+from decimal import Decimal
+from itertools import pairwise
+
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from masrel.elbow.events import Events, events
-from masrel.elbow.motion import Motion
+from masrel.elbow.legs import Leg, legs
+from masrel.elbow.motion import Floats, Motion
 from masrel.elbow.parameters import ElbowParameters
+from masrel.elbow.polynomial import ONE, ZERO, exactly, value
+from masrel.elbow.roots import cuts
 from masrel.errors import ParameterError
 
-__all__ = ["peak_torque", "torque"]
-
-Floats = NDArray[np.float64]
+__all__ = ["times_at", "torque", "torque_at"]
 
 
 def torque(
@@ -24,16 +29,16 @@ def torque(
     *,
     found: Events | None = None,
 ) -> Floats:
-    """Return the torque of a stretch at given times.
+    """Return the torque of a motion at given times.
 
     Parameters
     ----------
     parameters : ElbowParameters
         The joint.
     motion : Motion
-        The stretch, SI units.
+        The motion, SI units.
     times : array_like, shape (n_times,)
-        Times within the stretch, s.
+        Times within the motion, s.
     found : Events, optional
         Its events, when they are known already.
 
@@ -46,7 +51,7 @@ def torque(
     Raises
     ------
     ParameterError
-        If a time is outside the stretch, or the stretch starts at or beyond the end
+        If a time is outside the motion, or the motion starts at or beyond the end
         of range.
 
     Examples
@@ -66,103 +71,127 @@ def torque(
             f"times: need 0 to {found.end:g} s, the end of the stretch, "
             f"got {at.min():g} to {at.max():g} s"
         )
-    values = _pre_catch(parameters, motion, at)
-    if found.catch is None:
-        return values
-    pre_end, rise = _catch_levels(parameters, motion, found)
-    caught = at >= found.catch
-    values[caught] = np.where(
-        at[caught] < found.catch + parameters.peak_duration,
-        pre_end + rise,  # (3), first line
-        pre_end + parameters.residual_ratio * rise,  # (3), second line
-    )
-    if found.catch_end is not None:
-        after = at >= found.catch_end
-        values[after] = _post_catch(parameters, motion, found, at[after])
-        if found.post_catch_end is not None:
-            slow = at >= found.post_catch_end
-            values[slow] = _pre_catch(parameters, motion, at[slow])
+    values = np.empty(at.shape)
+    with exactly():
+        laid = legs(parameters, motion, found.course)
+        starts = np.array([float(leg.start) for leg in laid])
+        which = np.searchsorted(starts, at, side="right") - 1
+        for i, leg in enumerate(laid):
+            mine = which == i
+            if mine.any():
+                values[mine] = _of_leg(leg, motion, at[mine])
     return values
 
 
-def peak_torque(parameters: ElbowParameters, motion: Motion) -> float:
-    """Return the largest torque of a stretch, without a trace.
+def _of_leg(leg: Leg, motion: Motion, at: Floats) -> Floats:
+    # The origin is a root, known better than a float: what is left of it is taken off
+    # the difference of angles, which is small.
+    values = np.full(at.shape, float(leg.level))
+    if leg.stiffness:
+        origin = float(leg.origin)
+        left = float(leg.origin - Decimal(origin))
+        values += float(leg.stiffness) * (motion.angle(at, origin) - left)
+    if leg.damping:
+        values += float(leg.damping) * motion.velocity(at)
+    if leg.inertia:
+        values += float(leg.inertia) * motion.acceleration(at)
+    if leg.rise:
+        start = float(leg.start)
+        since = (at - start) - float(leg.start - Decimal(start))
+        share = np.clip(since / float(leg.rise_time), 0.0, 1.0)
+        values += float(leg.rise) * (share * share * (3.0 - 2.0 * share))
+    return values
+
+
+def torque_at(parameters: ElbowParameters, motion: Motion, angles: ArrayLike) -> Floats:
+    """Return the torque of a motion where it first reaches given angles.
 
     Parameters
     ----------
     parameters : ElbowParameters
         The joint.
     motion : Motion
-        The stretch, SI units.
+        The motion, SI units.
+    angles : array_like, shape (n_angles,)
+        Angles, rad.
 
     Returns
     -------
-    float
-        The largest torque of the whole stretch, N·m: at an event, at an end, or
-        where a phase's torque turns.
+    ndarray, shape (n_angles,)
+        Torque that resists extension, N·m.
 
     Raises
     ------
     ParameterError
-        If the stretch starts at or beyond the end of range.
+        If an angle is not reached, or the motion starts at or beyond the end of
+        range.
 
     Examples
     --------
     >>> from math import radians
     >>> from masrel.elbow import STANDARD_MODELS, ConstantSpeed
     >>> stretch = ConstantSpeed(start=radians(30), end=radians(146), speed=radians(92))
-    >>> round(peak_torque(STANDARD_MODELS["HM3"], stretch), 3)
-    10.984
+    >>> torque_at(STANDARD_MODELS["HM3"], stretch, [radians(146)]).round(3)
+    array([10.984])
     """
     found = events(parameters, motion)
-    marks = (found.catch, found.peak_end, found.catch_end, found.post_catch_end)
-    times = {0.0, found.end, *(time for time in marks if time is not None)}
-    k, b, m = parameters.stiffness, parameters.damping, parameters.inertia
-    times.update(motion.turning_times(k, b, m))
-    if found.catch_end is not None:
-        climb = parameters.post_catch_stiffness
-        additive = parameters.post_catch == "additive"
-        times.update(
-            motion.turning_times(
-                climb + (k if additive else 0), b if additive else 0, m
-            )
+    times = np.minimum(times_at(motion, angles), found.end)
+    beyond = np.asarray(angles, dtype=np.float64) > parameters.range_end
+    if beyond.any():
+        raise ParameterError(
+            f"angles: need {math.degrees(parameters.range_end):g} degrees, the end of "
+            "range, or less"
         )
-    inside = np.array(sorted(time for time in times if 0.0 <= time <= found.end))
-    # The largest torque of a phase may lie at its end, which belongs to the next.
-    before = np.nextafter(inside[1:], 0.0)
-    every = np.concatenate([inside, before])
-    return float(torque(parameters, motion, every, found=found).max())
+    return torque(parameters, motion, times, found=found)
 
 
-def _pre_catch(parameters: ElbowParameters, motion: Motion, at: Floats) -> Floats:
-    rest = motion.start if parameters.rest_angle is None else parameters.rest_angle
-    values = parameters.damping * motion.velocity(at)  # (1)
-    values = values + parameters.stiffness * (motion.angle(at) - rest)
-    if parameters.inertia:
-        values = values + parameters.inertia * motion.acceleration(at)
-    return np.asarray(values)
+def times_at(motion: Motion, angles: ArrayLike) -> Floats:
+    """Return when a motion first reaches given angles.
+
+    Parameters
+    ----------
+    motion : Motion
+        The motion, SI units.
+    angles : array_like, shape (n_angles,)
+        Angles, rad.
+
+    Returns
+    -------
+    ndarray, shape (n_angles,)
+        Times, s, each the float nearest to the exact one.
+
+    Raises
+    ------
+    ParameterError
+        If an angle is not reached.
+
+    Examples
+    --------
+    >>> from masrel.elbow import MinimumJerk
+    >>> times_at(MinimumJerk(start=0.5, end=2.5, mean_speed=1.0), [0.5, 1.5, 2.5])
+    array([0., 1., 2.])
+    """
+    goals = np.atleast_1d(np.asarray(angles, dtype=np.float64)).tolist()
+    with exactly():
+        return np.array([_first_time(motion, goal) for goal in goals])
 
 
-def _catch_levels(
-    parameters: ElbowParameters, motion: Motion, found: Events
-) -> tuple[float, float]:
-    # τ_pre_end and H·v_c of (3)
-    at = np.array([found.catch])
-    rise = parameters.catch_torque_constant * float(motion.velocity(at)[0])
-    return float(_pre_catch(parameters, motion, at)[0]), rise
+def _first_time(motion: Motion, goal: float) -> float:
+    time, angle = ZERO, Decimal(goal)
+    if goal == motion.start:
+        return 0.0
+    for piece in motion.pieces():
+        above = (piece.angle[0] - angle, *piece.angle[1:])
+        for low, high in pairwise(cuts((above,), ZERO, ONE)):
+            if high < 1 or (value(above, low) > 0) != (value(above, high) > 0):
+                return float(time + high * piece.length)
+        time += piece.length
+        if abs(value(above, ONE)) < _NEAR:
+            return float(time)
+    raise ParameterError(
+        f"angles: need ones that the motion reaches, got {math.degrees(goal):g} degrees"
+    )
 
 
-def _post_catch(
-    parameters: ElbowParameters, motion: Motion, found: Events, at: Floats
-) -> Floats:
-    # (5); found.catch_end is a time
-    pre_end, rise = _catch_levels(parameters, motion, found)
-    begin = motion.angle(np.array([found.catch_end]))[0]
-    climb = np.asarray(parameters.post_catch_stiffness * (motion.angle(at) - begin))
-    residual = parameters.residual_ratio * rise
-    if parameters.post_catch == "additive":
-        return np.asarray(_pre_catch(parameters, motion, at) + residual + climb)
-    values = pre_end + residual + climb
-    if parameters.inertia:
-        values = values + parameters.inertia * motion.acceleration(at)
-    return np.asarray(values)
+_NEAR = Decimal("1e-15")
+# rad: the end of a motion, of which `end` is the nearest float

@@ -1,4 +1,4 @@
-"""The trace of a stretch: what the controller would command, sample by sample."""
+"""The trace of a motion: what the controller would command, sample by sample."""
 
 import math
 from dataclasses import dataclass, field
@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.elbow.events import stretch_end
+from masrel.elbow.columns import sampled_columns
+from masrel.elbow.course import end_time
 from masrel.elbow.motion import Motion
 from masrel.elbow.parameters import ElbowParameters
-from masrel.elbow.sampled import SampledJoint
 from masrel.errors import ParameterError
 
 __all__ = ["Trace", "trace"]
@@ -17,7 +17,7 @@ __all__ = ["Trace", "trace"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trace:
-    """Columns of a stretch at a fixed rate; arrays are read-only.
+    """Columns of a motion at a fixed rate; arrays are read-only.
 
     Attributes
     ----------
@@ -46,14 +46,14 @@ class Trace:
 def trace(
     parameters: ElbowParameters, motion: Motion, *, rate_hz: float = 1000.0
 ) -> Trace:
-    """Step the sampled law over a stretch.
+    """Give the sampled law every sample of a motion.
 
     Parameters
     ----------
     parameters : ElbowParameters
         The joint.
     motion : Motion
-        The stretch, SI units; it is cut at the end of range.
+        The motion, SI units; it is cut at the end of range.
     rate_hz : float, optional
         Samples a second.
 
@@ -65,7 +65,7 @@ def trace(
     Raises
     ------
     ParameterError
-        If `rate_hz` is not more than 0, or the stretch starts at or beyond the end
+        If `rate_hz` is not more than 0, or the motion starts at or beyond the end
         of range.
 
     Examples
@@ -79,16 +79,9 @@ def trace(
     """
     if not 0.0 < rate_hz < math.inf:
         raise ParameterError(f"rate_hz: needs more than 0, got {rate_hz}")
-    end = stretch_end(parameters, motion)
-    time = np.arange(math.floor(end * rate_hz) + 1) / rate_hz
+    time = np.arange(math.floor(end_time(parameters, motion) * rate_hz) + 1) / rate_hz
     angle, velocity = motion.angle(time), motion.velocity(time)
-    joint = SampledJoint(parameters, start_angle=motion.start)
-    torque = np.empty(time.size)
-    phase = np.empty(time.size, dtype=np.int8)
-    samples = zip(time.tolist(), angle.tolist(), velocity.tolist(), strict=True)
-    for i, (t, theta, speed) in enumerate(samples):
-        torque[i] = joint.step(t, theta, speed)
-        phase[i] = joint.phase
+    torque, phase = sampled_columns(parameters, motion.start, time, angle, velocity)
     columns = (time, angle, velocity, torque, phase)
     for column in columns:
         column.setflags(write=False)

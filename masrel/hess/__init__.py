@@ -2,13 +2,15 @@
 
 from masrel.hess.clock import Clock, RealClock, SimulatedClock
 from masrel.hess.controller import Controller
-from masrel.hess.device import Device, Reading
+from masrel.hess.device import Device, IdleCommand, Reading
+from masrel.hess.fault import Fault
 from masrel.hess.friction import Friction, FrictionCompensation
-from masrel.hess.hand import Hand, SimulatedHand
+from masrel.hess.hand import Hand, SimulatedHand, YieldingHand
 from masrel.hess.limits import DeviceLimits
 from masrel.hess.loop import Presented, run_presentation
 from masrel.hess.registry import device_names, open_device
 from masrel.hess.setup import BackendOptions, DeviceSetup
+from masrel.hess.stop import EmergencyStop
 
 __all__ = [
     "BackendOptions",
@@ -17,14 +19,18 @@ __all__ = [
     "Device",
     "DeviceLimits",
     "DeviceSetup",
+    "EmergencyStop",
+    "Fault",
     "Friction",
     "FrictionCompensation",
     "Hand",
+    "IdleCommand",
     "Presented",
     "Reading",
     "RealClock",
     "SimulatedClock",
     "SimulatedHand",
+    "YieldingHand",
     "device_names",
     "open_device",
     "run_presentation",

@@ -40,6 +40,9 @@ class Controller:
         Share of the friction that is compensated, 0 to 1. The default leaves a
         tenth, so that B and β may be wrong by as much before friction is
         overcompensated.
+    dead_zone, full_speed : float, optional
+        Speeds below which Coulomb friction is not compensated, and above which it
+        is, rad/s; see `FrictionCompensation`.
     slip_speed_drop : float, optional
         Fall of speed that means a lost grip, rad/s. The default, 40 deg/s, lies
         between what a held arm does and a loose one: a minimum-jerk stretch at the
@@ -104,6 +107,8 @@ class Controller:
         start_angle: float,
         friction: Friction | None = None,
         compensation: float = 0.9,
+        dead_zone: float = math.radians(1.0),
+        full_speed: float = math.radians(5.0),
         slip_speed_drop: float = math.radians(40.0),
         rate_hz: int = 1000,
     ) -> None:
@@ -115,7 +120,10 @@ class Controller:
             raise ParameterError(f"rate_hz: needs 1 or more, got {rate_hz}")
         self._joint = SampledJoint(parameters, start_angle=start_angle)
         self._compensation = FrictionCompensation(
-            friction or Friction(), share=compensation
+            friction or Friction(),
+            share=compensation,
+            dead_zone=dead_zone,
+            full_speed=full_speed,
         )
         self._slip_speed_drop = slip_speed_drop
         self._free_end = parameters.range_end - _RANGE_END_MARGIN

@@ -8,7 +8,7 @@ from typing import ClassVar, Literal, NamedTuple, Self
 
 from masrel.errors import DeviceError
 
-__all__ = ["Device", "Reading"]
+__all__ = ["Device", "IdleCommand", "Reading"]
 
 State = Literal["new", "open", "closed"]
 
@@ -29,13 +29,30 @@ class Reading(NamedTuple):
     angle: float
 
 
+class IdleCommand(NamedTuple):
+    """How another process can idle the device when this one has died.
+
+    Attributes
+    ----------
+    module : str
+        A module with a function ``prepare(*arguments)``, which takes hold of the
+        device and returns a function without arguments that idles it.
+    arguments : tuple of str
+        What it is called with.
+    """
+
+    module: str
+    arguments: tuple[str, ...]
+
+
 class Device(ABC):
     """A one-joint device in torque mode.
 
     A device is opened once and closed once: what was closed, by a fault or on
     purpose, stays closed, and going on needs a new one. Opening an open device and
     closing a closed one do nothing. `close` sends zero torque first. A subclass
-    provides the four hooks `_start`, `_read`, `_send`, `_stop`.
+    provides the four hooks `_start`, `_read`, `_send`, `_stop`; hardware `_check` and
+    `idle_command` too.
 
     Attributes
     ----------
@@ -109,6 +126,31 @@ class Device(ABC):
             raise DeviceError(f"{self.name}: needs a finite torque, got {torque_nm}")
         self._send(torque_nm)
 
+    def check(self) -> None:
+        """Ask the device whether it still does what it is told.
+
+        Raises
+        ------
+        EmergencyStopError
+            If its emergency stop has been pressed.
+        DeviceError
+            If the device is not open, has been idled from outside, or says that
+            something is wrong with it.
+        """
+        if self._state != "open":
+            raise self._not_open("check")
+        self._check()
+
+    def idle_command(self) -> IdleCommand | None:
+        """Return how another process can idle the device, once it is open.
+
+        Returns
+        -------
+        IdleCommand or None
+            None when no other process can reach it; then no watchdog is started.
+        """
+        return None
+
     def close(self) -> None:
         """Send zero torque and let go; do nothing when there is nothing to close.
 
@@ -167,4 +209,7 @@ class Device(ABC):
 
     @abstractmethod
     def _stop(self) -> None:
-        """Let go of the hardware; the torque is zero already."""
+        """Idle the hardware and let go of it; the torque is zero already."""
+
+    def _check(self) -> None:  # noqa: B027 - a device without a state has nothing to say
+        """Ask an open device for its state; raise `DeviceError` when it is wrong."""

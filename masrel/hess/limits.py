@@ -3,124 +3,115 @@
 import math
 from dataclasses import dataclass
 
-from masrel.errors import LimitExceededError, ParameterError
+from masrel.errors import ParameterError
 
-__all__ = ["DeviceLimits"]
+__all__ = ["LONGEST_RAMP_S", "DeviceLimits"]
+
+LONGEST_RAMP_S = 0.1
+"""A fault's torque is zero after this at the latest, s."""
+
+_POSITIVE = (
+    "torque",
+    "torque_rate",
+    "speed",
+    "soft_stop_width",
+    "stale_time",
+    "frozen_time",
+    "jump_angle",
+    "standing_time",
+    "standing_torque",
+    "watchdog_time",
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DeviceLimits:
-    """What the loop lets pass, in SI units.
+    """What the loop lets pass, in SI units; ``docs/driver.md`` gives the reasons.
 
     Attributes
     ----------
-    torque : float
+    torque : float, optional
         Largest torque sent either way, N·m. A larger one is not sent, and the
         presentation is stopped: cut off there it would be another model that the
         rater feels and grades.
-    speed : float
+    torque_rate : float, optional
+        Fastest build-up of torque from one tick to the next, N·m/s. Torque may be
+        taken away as suddenly as it likes.
+    speed : float, optional
         Speed at which the presentation is stopped, either way, rad/s.
-    missed_ticks : int
-        Missed ticks that a presentation may have; one more stops it.
     lowest_angle, highest_angle : float, optional
-        Angles outside which the encoder cannot be right, rad: 5 deg beyond full
+        Angles outside which the presentation is stopped, rad: 5 deg beyond full
         flexion and a straight arm, because an end stop gives way a little.
+    soft_stop_width : float, optional
+        How far before these angles a spring begins to push back, rad.
+    soft_stop_torque : float, optional
+        What it reaches at them, N·m; 0 for no soft stop.
+    missed_ticks : int, optional
+        Missed ticks that a presentation may have; one more stops it.
+    missed_replies : int, optional
+        Ticks in a row without a new reading that are let pass, torque held.
+    stale_time : float, optional
+        Age of a reading at which it is too old, s.
+    frozen_time : float, optional
+        How long an arm that was moving may read one angle to the last step, s.
+    standing_time, standing_torque : float, optional
+        How long any arm may do so while more than this torque is sent, s and N·m.
+    jump_angle : float, optional
+        How far a reading may lie from where the speed before would have it, a tick
+        later, rad.
+    watchdog_time : float, optional
+        Longest time without a command, s; then the watchdog idles the device.
+    ramp_time : float, optional
+        How long a fault takes to bring the torque to zero, s; at most 0.1.
 
     Raises
     ------
     ParameterError
         If a limit is not finite or leaves nothing to pass.
+
+    Examples
+    --------
+    >>> DeviceLimits(torque=12.0).torque
+    12.0
     """
 
-    torque: float
-    speed: float
-    missed_ticks: int
+    torque: float = 20.0
+    torque_rate: float = 12_000.0
+    speed: float = math.radians(400.0)
     lowest_angle: float = math.radians(-5.0)
     highest_angle: float = math.radians(185.0)
+    soft_stop_width: float = math.radians(5.0)
+    soft_stop_torque: float = 10.0
+    missed_ticks: int = 20
+    missed_replies: int = 2
+    stale_time: float = 0.005
+    frozen_time: float = 0.010
+    standing_time: float = 0.5
+    standing_torque: float = 2.0
+    jump_angle: float = math.radians(0.3)
+    watchdog_time: float = 0.05
+    ramp_time: float = 0.05
 
     def __post_init__(self) -> None:
-        for name in ("torque", "speed"):
+        for name in _POSITIVE:
             value = getattr(self, name)
             if not 0.0 < value < math.inf:
                 raise ParameterError(f"{name}: needs a finite limit > 0, got {value}")
-        if self.missed_ticks < 0:
+        for name in ("missed_ticks", "missed_replies", "soft_stop_torque"):
+            value = getattr(self, name)
+            if not 0 <= value < math.inf:
+                raise ParameterError(f"{name}: needs 0 or more, got {value}")
+        if not 0.0 <= self.ramp_time <= LONGEST_RAMP_S:
             raise ParameterError(
-                f"missed_ticks: needs 0 or more, got {self.missed_ticks}"
+                f"ramp_time: needs 0 to {LONGEST_RAMP_S:g} s, got {self.ramp_time}"
             )
         if not -math.inf < self.lowest_angle < self.highest_angle < math.inf:
             raise ParameterError(
                 "lowest_angle, highest_angle: need finite angles in this order, "
                 f"got {self.lowest_angle} and {self.highest_angle}"
             )
-
-    def check_torque(self, torque: float) -> None:
-        """Check a torque before it is sent; ``nan`` never passes.
-
-        Parameters
-        ----------
-        torque : float
-            What the controller asks for, N·m.
-
-        Raises
-        ------
-        LimitExceededError
-            If it is above the limit, either way, or not a number.
-
-        Examples
-        --------
-        >>> limits = DeviceLimits(torque=20.0, speed=7.0, missed_ticks=20)
-        >>> limits.check_torque(-31.5)
-        Traceback (most recent call last):
-            ...
-        masrel.errors.LimitExceededError: torque: needs at most 20 N·m, got -31.500 N·m
-        """
-        if not -self.torque <= torque <= self.torque:
-            raise LimitExceededError(
-                f"torque: needs at most {self.torque:g} N·m, got {torque:.3f} N·m"
-            )
-
-    def check_motion(self, angle: float, velocity: float) -> None:
-        """Check one sample of the motion; ``nan`` never passes.
-
-        Parameters
-        ----------
-        angle : float
-            Elbow angle, rad.
-        velocity : float
-            Estimated speed, rad/s.
-
-        Raises
-        ------
-        LimitExceededError
-            If the angle is out of range or the arm too fast.
-        """
-        if not self.lowest_angle <= angle <= self.highest_angle:
-            raise LimitExceededError(
-                f"range: needs {math.degrees(self.lowest_angle):.1f} to "
-                f"{math.degrees(self.highest_angle):.1f} deg, the arm is at "
-                f"{math.degrees(angle):.1f} deg"
-            )
-        if not -self.speed <= velocity <= self.speed:
-            raise LimitExceededError(
-                f"speed: needs at most {math.degrees(self.speed):.0f} deg/s, the arm "
-                f"moves at {math.degrees(velocity):.0f} deg/s"
-            )
-
-    def check_missed(self, n_missed_ticks: int) -> None:
-        """Check how many ticks a presentation has missed so far.
-
-        Parameters
-        ----------
-        n_missed_ticks : int
-            Ticks missed since the presentation began.
-
-        Raises
-        ------
-        LimitExceededError
-            If there are more than the limit.
-        """
-        if n_missed_ticks > self.missed_ticks:
-            raise LimitExceededError(
-                f"missed ticks: needs at most {self.missed_ticks} in a presentation, "
-                f"the loop missed {n_missed_ticks}"
+        if 2.0 * self.soft_stop_width > self.highest_angle - self.lowest_angle:
+            raise ParameterError(
+                "soft_stop_width: needs at most half of the range, "
+                f"got {self.soft_stop_width} rad"
             )

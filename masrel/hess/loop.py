@@ -8,12 +8,16 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 from masrel.errors import DeviceError, OverrunWarning, ParameterError
-from masrel.hess.clock import Clock
+from masrel.hess.clock import Clock, RealClock
 from masrel.hess.controller import Controller
 from masrel.hess.device import Device
+from masrel.hess.fault import Fault
 from masrel.hess.limits import DeviceLimits
+from masrel.hess.realtime import real_time
 from masrel.hess.samples import movement_facts
+from masrel.hess.stop import EmergencyStop
 from masrel.hess.ticks import Ticks
+from masrel.hess.watchdog import NoWatchdog, Watching
 from masrel.recording import Recording
 
 __all__ = ["Presented", "run_presentation"]
@@ -28,15 +32,15 @@ class Presented:
     Attributes
     ----------
     recording : Recording
-        Every tick that was run; its facts repeat the two fields below.
-    fault : str or None
-        The limit or device error that stopped it, in words; None when none did.
+        Every tick that was run; its facts repeat the fields below.
+    fault : Fault or None
+        What stopped it; None when nothing did.
     n_missed_ticks : int
         Ticks skipped because the loop came too late for them.
     """
 
     recording: Recording
-    fault: str | None
+    fault: Fault | None
     n_missed_ticks: int
 
 
@@ -49,14 +53,17 @@ def run_presentation(
     rate_hz: int = 1000,
     max_duration_s: float = 10.0,
     end_angle: float = math.radians(146.0),
+    stop: EmergencyStop | None = None,
+    watchdog: Watching | None = None,
 ) -> Presented:
     """Present one model on an open device and record it.
 
     The presentation ends when the arm has been slower than 5 deg/s for 0.1 s within 3
-    deg of `end_angle` or beyond, or at `max_duration_s`, with zero torque. A limit or
-    an error of the device ends it with a fault: zero torque, device closed. Any
-    other exception does the same and goes on to the caller, with a note when the
-    device did not take the zero torque.
+    deg of `end_angle` or beyond, or at `max_duration_s`, with zero torque. A limit,
+    an error of the device or of the controller, or an emergency stop ends it with a
+    fault: the torque goes to zero within `DeviceLimits.ramp_time`, and the device is
+    closed. Any other exception closes it at once and goes on to the caller, with a
+    note when the device did not take the zero torque.
 
     Parameters
     ----------
@@ -74,6 +81,10 @@ def run_presentation(
         Longest duration, s.
     end_angle : float, optional
         Where the stretch is meant to end, rad.
+    stop : EmergencyStop or None, optional
+        A button that the loop looks at in every tick.
+    watchdog : Watching or None, optional
+        Told every 5 ms that the loop is alive.
 
     Returns
     -------
@@ -100,14 +111,58 @@ def run_presentation(
     >>> clock = SimulatedClock()
     >>> hand = SimulatedHand(start=0.5, end=2.5, mean_speed=1.5)
     >>> controller = Controller(STANDARD_MODELS["HM3"], start_angle=0.5)
-    >>> limits = DeviceLimits(torque=20.0, speed=7.0, missed_ticks=20)
     >>> with open_device("simulated", clock=clock, hand=hand) as device:
     ...     presented = run_presentation(
-    ...         device, controller, clock=clock, limits=limits, end_angle=2.5
+    ...         device, controller, clock=clock, limits=DeviceLimits(), end_angle=2.5
     ...     )
     >>> presented.recording.facts["phases"]
     'pre-catch, catch, post-catch, pre-catch'
     """
+    _check(device, controller, rate_hz, max_duration_s, end_angle)
+    n_ticks = math.ceil(max_duration_s * rate_hz)
+    ticks = Ticks(
+        device,
+        controller,
+        clock,
+        limits,
+        rate_hz,
+        n_ticks,
+        end_angle,
+        stop or EmergencyStop(),
+        watchdog or NoWatchdog(),
+    )
+    with _scheduled(clock) as scheduling, _collector_off():
+        ended, fault = _guarded(ticks, device)
+    if ticks.n_missed:
+        warnings.warn(
+            f"the control loop missed {ticks.n_missed} ticks; they were skipped",
+            OverrunWarning,
+            stacklevel=2,
+        )
+    columns = ticks.samples.columns()
+    facts: dict[str, Fact] = {
+        "simulated": device.simulated,
+        "device": device.name,
+        "rate_hz": rate_hz,
+        "scheduling": scheduling,
+        "n_missed_ticks": ticks.n_missed,
+        "n_missed_replies": ticks.guard.n_missed_replies,
+        **_fault_facts(fault),
+        "ended": ended,
+        "grip_lost": controller.grip_lost,
+        **movement_facts(columns, controller.speed_threshold, fault is not None),
+    }
+    recording = Recording(columns=columns, facts=facts)
+    return Presented(recording=recording, fault=fault, n_missed_ticks=ticks.n_missed)
+
+
+def _check(
+    device: Device,
+    controller: Controller,
+    rate_hz: int,
+    max_duration_s: float,
+    end_angle: float,
+) -> None:
     if rate_hz < 1 or not 0.0 < max_duration_s < math.inf:
         raise ParameterError(
             "rate_hz, max_duration_s: need more than 0, "
@@ -123,47 +178,66 @@ def run_presentation(
         raise ParameterError("controller: needs a new one for every presentation")
     if not device.is_open:
         raise DeviceError(f"{device.name}: needs an open device to present on")
-    n_ticks = math.ceil(max_duration_s * rate_hz)
-    ticks = Ticks(device, controller, clock, limits, rate_hz, n_ticks, end_angle)
-    ended, fault = _guarded(ticks, device)
-    if ticks.n_missed:
-        warnings.warn(
-            f"the control loop missed {ticks.n_missed} ticks; they were skipped",
-            OverrunWarning,
-            stacklevel=2,
-        )
-    columns = ticks.samples.columns()
-    facts: dict[str, Fact] = {
-        "simulated": device.simulated,
-        "device": device.name,
-        "rate_hz": rate_hz,
-        "n_missed_ticks": ticks.n_missed,
-        "fault": fault,
-        "ended": ended,
-        "grip_lost": controller.grip_lost,
-        **movement_facts(columns, controller.speed_threshold, fault),
-    }
-    recording = Recording(columns=columns, facts=facts)
-    return Presented(recording=recording, fault=fault, n_missed_ticks=ticks.n_missed)
 
 
-def _guarded(ticks: Ticks, device: Device) -> tuple[str, str | None]:
+def _guarded(ticks: Ticks, device: Device) -> tuple[str, Fault | None]:
     # -> how it ended, fault; whatever happens, the torque is zero afterwards
-    with _collector_off():
-        try:
-            ended = ticks.run()
-            device.command(0.0)
-        except BaseException as error:
-            unsafe = _close(device)  # before anything else, whatever came
-            if not isinstance(error, DeviceError):
-                if unsafe is not None:
-                    error.add_note(f"closing the device: {unsafe}")
-                raise
-            fault = str(error)
-        else:
-            return ended, None
-    ticks.mark_fault()
-    return "fault", fault if unsafe is None else f"{fault}; closing it: {unsafe}"
+    try:
+        ended = ticks.run()
+        ticks.finish()
+    except DeviceError as error:
+        time_s, torque = ticks.time_s(), ticks.sent
+        words = [str(error), *_ramped_and_closed(ticks, device)]
+        ticks.mark_end()
+        fault = Fault(
+            kind=error.kind, words="; ".join(words), time_s=time_s, torque_nm=torque
+        )
+        return "fault", fault
+    except BaseException as error:
+        unsafe = _close(device)  # before anything else, whatever came
+        if unsafe is not None:
+            error.add_note(f"closing the device: {unsafe}")
+        raise
+    return ended, None
+
+
+def _ramped_and_closed(ticks: Ticks, device: Device) -> list[str]:
+    # -> what went wrong with that, in words; it is closed in any case
+    wrong = []
+    try:
+        ticks.ramp_down()
+        ticks.finish()
+    except DeviceError as error:
+        wrong.append(f"ramping down: {error}")
+    finally:
+        unsafe = _close(device)
+    return wrong if unsafe is None else [*wrong, f"closing it: {unsafe}"]
+
+
+def _fault_facts(fault: Fault | None) -> dict[str, Fact]:
+    if fault is None:
+        return {
+            "fault": None,
+            "fault_kind": None,
+            "fault_time_s": None,
+            "fault_torque_nm": None,
+        }
+    return {
+        "fault": fault.words,
+        "fault_kind": fault.kind,
+        "fault_time_s": fault.time_s,
+        "fault_torque_nm": fault.torque_nm,
+    }
+
+
+@contextmanager
+def _scheduled(clock: Clock) -> Iterator[str | None]:
+    # Only where a tick comes at a time of the day does it matter how late it comes
+    if not isinstance(clock, RealClock):
+        yield None
+        return
+    with real_time() as granted:
+        yield granted
 
 
 @contextmanager

@@ -13,6 +13,8 @@ from masrel.hess.setup import BackendOptions, DeviceSetup
 __all__ = ["device_names", "open_device"]
 
 _BACKENDS = {
+    "puck": "masrel.hess.puck.device",
+    "replay": "masrel.hess.replay",
     "simulated": "masrel.hess.simulated",
 }
 """Name to the module whose `build` makes the device; imported when it is chosen."""

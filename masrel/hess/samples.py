@@ -77,6 +77,17 @@ class Samples:
         self._phase[n] = phase
         self.n = n + 1
 
+    def replace_command(self, command_torque: float) -> None:
+        """Write another torque into the last sample; nothing when there is none.
+
+        Parameters
+        ----------
+        command_torque : float
+            What was sent after all, N·m.
+        """
+        if self.n:
+            self._command[self.n - 1] = command_torque
+
     @property
     def last_time_s(self) -> float:
         """Time of the last sample, s; minus infinity when there is none."""
@@ -105,7 +116,7 @@ class Samples:
 
 
 def movement_facts(
-    columns: Columns, speed_threshold: float, fault: str | None
+    columns: Columns, speed_threshold: float, stopped: bool
 ) -> dict[str, str | float | None]:
     """Return what a recording's facts say of the movement.
 
@@ -115,8 +126,8 @@ def movement_facts(
         Columns of a recording.
     speed_threshold : float
         Speed threshold ν_th, rad/s.
-    fault : str or None
-        What stopped the presentation.
+    stopped : bool
+        Whether a fault stopped the presentation.
 
     Returns
     -------
@@ -125,7 +136,7 @@ def movement_facts(
         the catch there is no mean speed: the last reading may be what was wrong.
     """
     caught = catch_angle_deg(columns)
-    whole = fault is None or caught is not None
+    whole = not stopped or caught is not None
     return {
         "phases": ", ".join(phase_sequence(columns)),
         "catch_angle_deg": caught,

@@ -2,13 +2,16 @@
 
 import math
 
-from masrel.errors import DeviceError
+from masrel.errors import ControllerError, DeviceTimeoutError
 from masrel.hess.clock import Clock
 from masrel.hess.controller import Controller
 from masrel.hess.device import Device
+from masrel.hess.guard import Guard
 from masrel.hess.limits import DeviceLimits
 from masrel.hess.samples import Samples
+from masrel.hess.stop import EmergencyStop
 from masrel.hess.velocity import VelocityEstimate
+from masrel.hess.watchdog import Watching
 
 __all__ = ["Ticks"]
 
@@ -17,6 +20,9 @@ __all__ = ["Ticks"]
 _ARRIVAL_TOLERANCE = math.radians(3.0)
 _ARRIVAL_SPEED = math.radians(5.0)
 _ARRIVAL_TIME_S = 0.1
+
+_CHECK_EVERY_S = 0.05  # how often the device is asked for its state
+_BEAT_EVERY_S = 0.005  # how often the watchdog is told that the loop is alive
 
 
 class Ticks:
@@ -38,6 +44,10 @@ class Ticks:
         Ticks after which the presentation ends.
     end_angle : float
         Where the stretch is meant to end, rad.
+    stop : EmergencyStop
+        The button it looks at.
+    watchdog : Watching
+        Told every 5 ms that the loop is alive.
 
     Attributes
     ----------
@@ -45,6 +55,10 @@ class Ticks:
         One per tick that was run.
     n_missed : int
         Ticks that were skipped.
+    guard : Guard
+        What every reading and torque passed.
+    sent : float
+        The torque the device holds, N·m.
     """
 
     __slots__ = (
@@ -54,12 +68,18 @@ class Ticks:
         "_end_angle",
         "_estimate",
         "_latest",
-        "_limits",
         "_n_ticks",
         "_period_ns",
+        "_ramp_ns",
+        "_resting_since",
+        "_sent_ns",
         "_start_ns",
+        "_stop",
+        "_watchdog",
+        "guard",
         "n_missed",
         "samples",
+        "sent",
     )
 
     def __init__(
@@ -71,19 +91,28 @@ class Ticks:
         rate_hz: int,
         n_ticks: int,
         end_angle: float,
+        stop: EmergencyStop,
+        watchdog: Watching,
     ) -> None:
         self._device = device
         self._controller = controller
         self._clock = clock
-        self._limits = limits
         self._n_ticks = n_ticks
         self._period_ns = round(1e9 / rate_hz)
+        self._ramp_ns = round(limits.ramp_time * 1e9)
         self._end_angle = end_angle - _ARRIVAL_TOLERANCE
         self._estimate = VelocityEstimate()
-        self._start_ns = 0
+        self._start_ns = self._sent_ns = 0
         self._latest: tuple[float, float, float] | None = None
+        self._resting_since = math.inf
+        self._stop = stop
+        self._watchdog = watchdog
+        self.guard = Guard(limits, 1.0 / rate_hz)
         self.n_missed = 0
-        self.samples = Samples(n_ticks + 1)  # one more to mark a fault
+        self.sent = 0.0
+        # More than the ticks: the ramp of a fault, what it was, and zero at its end
+        n_ramp = math.ceil(limits.ramp_time * rate_hz)
+        self.samples = Samples(n_ticks + n_ramp + 3)
 
     def run(self) -> str:
         """Run ticks until the end, however it comes.
@@ -96,18 +125,25 @@ class Ticks:
         Raises
         ------
         DeviceError
-            If the device fails or a limit is exceeded.
+            If the device fails, a limit is exceeded, the controller fails, or the
+            emergency stop is pressed.
         """
-        self._start_ns = self._clock.now_ns()
-        resting_since = math.inf
+        self._start_ns = self._sent_ns = self._clock.now_ns()
+        stop, device, beat = self._stop, self._device, self._watchdog.beat
+        check_every = max(1, round(_CHECK_EVERY_S * 1e9 / self._period_ns))
+        beat_every = max(1, round(_BEAT_EVERY_S * 1e9 / self._period_ns))
+        next_check, next_beat = check_every, 0
         tick = 0
         while tick < self._n_ticks:
-            time_s, angle, velocity = self._tick()
-            if angle < self._end_angle or abs(velocity) > _ARRIVAL_SPEED:
-                resting_since = math.inf
-            elif resting_since == math.inf:
-                resting_since = time_s
-            elif time_s - resting_since >= _ARRIVAL_TIME_S:
+            if stop.reason is not None:
+                stop.check()
+            if tick >= next_beat:
+                beat()
+                next_beat = tick + beat_every
+            if tick >= next_check:
+                device.check()
+                next_check = tick + check_every
+            if self._tick():
                 return "arrived"
             tick = self._wait_for(tick + 1)
         return "max-duration"
@@ -117,40 +153,112 @@ class Ticks:
         # is over are skipped and counted: sent late, they would come in a burst.
         due_ns = self._start_ns + tick * self._period_ns  # absolute: no drift
         self._clock.sleep_until_ns(due_ns)
-        n_skipped = (self._clock.now_ns() - due_ns) // self._period_ns
+        now_ns = self._clock.now_ns()
+        n_skipped = (now_ns - due_ns) // self._period_ns
         if n_skipped <= 0:
             return tick
         self.n_missed += n_skipped
-        self._limits.check_missed(self.n_missed)
+        self.guard.missed_ticks(self.n_missed, (now_ns - self._sent_ns) * 1e-9)
         return tick + n_skipped
 
-    def _tick(self) -> tuple[float, float, float]:
-        # Read, estimate, check, decide, send, record -> time s, angle, speed
-        time_ns, angle = self._device.read()
+    def _tick(self) -> bool:
+        # Read, check, estimate, decide, check, send, record -> whether it is over
+        guard = self.guard
+        try:
+            time_ns, angle = self._device.read()
+        except DeviceTimeoutError as error:
+            guard.no_reading(str(error))
+            return False  # the device holds its torque
         time_s = (time_ns - self._start_ns) * 1e-9
-        if self._latest is not None and time_s <= self._latest[0]:
-            raise DeviceError(
-                f"reading: needs one newer than the last, of {self._latest[0]:.6f} s, "
-                f"got one of {time_s:.6f} s"
-            )
+        if not guard.is_new(time_s):
+            guard.no_reading(f"one of {time_s:.6f} s again")
+            return False
+        now_ns = self._clock.now_ns()
+        self._latest = (time_s, angle, 0.0)
+        guard.reading(time_s, angle, (now_ns - time_ns) * 1e-9)
         velocity = self._estimate.update(time_s, angle)
-        self._latest = latest = (time_s, angle, velocity)
-        self._limits.check_motion(angle, velocity)
+        self._latest = (time_s, angle, velocity)
+        guard.speed(velocity)
         controller = self._controller
-        torque = controller.step(time_s, angle, velocity)
-        self._limits.check_torque(torque)
+        torque = self._decide(time_s, angle, velocity) + guard.soft_stop(angle)
+        guard.torque(time_s, torque)
         self._device.command(torque)
+        self.sent = torque
+        self._sent_ns = now_ns
         self.samples.add(
             time_s, angle, velocity, controller.model_torque, torque, controller.phase
         )
-        return latest
+        if angle < self._end_angle or not -_ARRIVAL_SPEED <= velocity <= _ARRIVAL_SPEED:
+            self._resting_since = math.inf
+        elif self._resting_since == math.inf:
+            self._resting_since = time_s
+        return time_s - self._resting_since >= _ARRIVAL_TIME_S
 
-    def mark_fault(self) -> None:
-        """Add a last sample: where the arm was seen last, with zero torque."""
-        time_s = (self._clock.now_ns() - self._start_ns) * 1e-9
-        if self._latest is None or time_s <= self.samples.last_time_s:
+    def _decide(self, time_s: float, angle: float, velocity: float) -> float:
+        try:
+            return self._controller.step(time_s, angle, velocity)
+        except Exception as error:
+            # Whatever a model does wrong, the torque has to be taken back slowly
+            raise ControllerError(
+                f"controller: {type(error).__name__}: {error}"
+            ) from error
+
+    def time_s(self) -> float:
+        """Return the time since the presentation began, s."""
+        return (self._clock.now_ns() - self._start_ns) * 1e-9
+
+    def ramp_down(self) -> None:
+        """Bring the torque to zero in a straight line, and record that.
+
+        The rows hold the last reading: nothing is read any more, because reading may
+        be what failed.
+
+        Raises
+        ------
+        DeviceError
+            If the device does not take the torques.
+        """
+        begun_ns, torque = self._clock.now_ns(), self.sent
+        self._mark(begun_ns, torque)
+        due_ns = begun_ns
+        while torque != 0.0 and self._ramp_ns:
+            due_ns += self._period_ns
+            self._clock.sleep_until_ns(due_ns)
+            now_ns = self._clock.now_ns()
+            left = 1.0 - (now_ns - begun_ns) / self._ramp_ns
+            if left <= 0.0:
+                break
+            self._device.command(torque * left)
+            self.sent = torque * left
+            self._watchdog.beat()
+            self._mark(now_ns, self.sent)
+            due_ns = max(due_ns, now_ns - self._period_ns)  # late: no burst
+
+    def finish(self) -> None:
+        """Send zero torque, and let the watchdog rest.
+
+        Raises
+        ------
+        DeviceError
+            If the device does not take it, or the watchdog has ended.
+        """
+        self._device.command(0.0)
+        self.sent = 0.0
+        self._watchdog.rest()
+
+    def mark_end(self) -> None:
+        """Add a last sample with zero torque, now that it has been sent."""
+        self._mark(self._clock.now_ns(), 0.0)
+
+    def _mark(self, now_ns: int, torque: float) -> None:
+        # One row that holds what was read last; nothing when nothing was
+        if self._latest is None:
             return
         _, angle, velocity = self._latest
+        time_s = max((now_ns - self._start_ns) * 1e-9, self._latest[0])
         controller = self._controller
-        torque, phase = controller.model_torque, controller.phase
-        self.samples.add(time_s, angle, velocity, torque, 0.0, phase)
+        model, phase = controller.model_torque, controller.phase
+        if time_s <= self.samples.last_time_s:
+            self.samples.replace_command(torque)
+            return
+        self.samples.add(time_s, angle, velocity, model, torque, phase)

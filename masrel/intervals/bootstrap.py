@@ -87,9 +87,10 @@ def bootstrap(
     Returns
     -------
     Interval
-        A confidence interval with the distribution of the resamples, and the Monte
-        Carlo error of each endpoint if they were drawn; ``nan`` with a reason when
-        undefined.
+        A confidence interval with the distribution of the coefficient over resamples,
+        and the Monte Carlo error of each endpoint if they were drawn; ``nan`` with a
+        reason when undefined. "studentized" has no distribution: its ends come from
+        ratios, and what "percentile" has is the coefficient's.
 
     Raises
     ------
@@ -183,7 +184,8 @@ def bootstrap(
         n_undefined=found.n_undefined,
         monte_carlo_error=ends.errors,
         seed=seed,
-        distribution=found.distribution,
+        # ratios to standard errors are no values of the coefficient
+        distribution=None if kind == "studentized" else found.distribution,
     )
 
 

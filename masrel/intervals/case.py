@@ -2,7 +2,7 @@
 
 import math
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import get_args
 
@@ -20,6 +20,8 @@ from masrel.estimates import Estimate, Interval, Target, Unit
 __all__ = [
     "Case",
     "Statistic",
+    "blocks",
+    "features_of",
     "find_entry",
     "kernel_of",
     "normal",
@@ -29,6 +31,8 @@ __all__ = [
 ]
 
 Statistic = str | Callable[..., Estimate] | Coefficient
+
+_BLOCK = 1 << 14  # items at once: what is made of them takes more room than they do
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,7 +80,7 @@ class Case:
     def features(self) -> Floats:
         """Features of every item with a rating, in order, (n_items, n_features)."""
         rated = (self.coded.codes >= 0).any(axis=1)
-        return self.kernel.features(self.coded, self.v)[rated]
+        return features_of(self.kernel, self.coded, self.v)[rated]
 
     @property
     def sums(self) -> Floats:
@@ -226,17 +230,18 @@ def open_case(
     kernel = kernel_of(entry)
     v = declared_weights(weights, coded.categories, declared=coded.declared).as_floats()
     codes, times = distinct_patterns(coded.codes, coded.n_categories)
-    rated = (codes >= 0).any(axis=1)
-    patterns = replace(coded, codes=codes[rated])
-    rows = kernel.features(patterns, v)
+    if (codes[0] < 0).all():  # the first of them, if any, has no rating
+        codes, times = codes[1:], times[1:]
+    patterns = replace(coded, codes=codes)
+    rows = features_of(kernel, patterns, v)
     return Case(
         entry=entry,
         coded=coded,
         patterns=patterns,
-        times=times[rated],
+        times=times,
         rows=rows,
         v=v,
-        value=float(kernel.value(times[rated] @ rows, v)),
+        value=float(kernel.value(times @ rows, v)),
         target=target,
         level=level,
     )
@@ -266,6 +271,57 @@ def kernel_of(entry: Coefficient) -> Kernel:
             "no such interval of it"
         )
     return entry.kernel
+
+
+def blocks(n_items: int) -> Iterator[slice]:
+    """Cut items into blocks, so that what is made of them stays small.
+
+    Parameters
+    ----------
+    n_items : int
+        How many there are.
+
+    Yields
+    ------
+    slice
+        One block after the other.
+
+    Examples
+    --------
+    >>> list(blocks(20_000))
+    [slice(0, 16384, None), slice(16384, 20000, None)]
+    """
+    for start in range(0, n_items, _BLOCK):
+        yield slice(start, min(start + _BLOCK, n_items))
+
+
+def features_of(kernel: Kernel, coded: CodedRatings, v: Floats) -> Floats:
+    """Return the features of items, made a block at a time.
+
+    Parameters
+    ----------
+    kernel : Kernel
+        A coefficient.
+    coded : CodedRatings
+        The ratings.
+    v : ndarray, shape (n_categories, n_categories)
+        Disagreement of two categories.
+
+    Returns
+    -------
+    ndarray, shape (n_items, n_features)
+        The features.
+    """
+    n_items = len(coded.codes)
+    if n_items <= _BLOCK:
+        return kernel.features(coded, v)
+    found = None
+    for items in blocks(n_items):
+        rows = kernel.features(replace(coded, codes=coded.codes[items]), v)
+        if found is None:
+            found = np.empty((n_items, rows.shape[1]))
+        found[items] = rows
+    return np.asarray(found)
 
 
 def warn_small(count: int, least: int, what: str) -> tuple[str, ...]:

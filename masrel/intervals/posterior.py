@@ -20,7 +20,7 @@ __all__ = ["SPOKEN_OF", "posterior"]
 SPOKEN_OF = ("fleiss_kappa", "scott_pi", "krippendorff_alpha")
 """Coefficients whose value in the population is the model's ρ."""
 
-Model = Literal["dirichlet-multinomial", "table"]
+Model = Literal["auto", "dirichlet-multinomial", "table"]
 Method = Literal["exact", "emcee"]
 
 
@@ -32,7 +32,7 @@ def posterior(
     categories: Sequence[Label] | None = None,
     weights: "WeightName | ArrayLike" = "identity",
     level: float = 0.95,
-    model: Model = "dirichlet-multinomial",
+    model: Model = "auto",
     prior: PriorName = "uniform",
     concentration: float | None = None,
     method: Method = "exact",
@@ -48,7 +48,7 @@ def posterior(
     coefficient : str or callable
         "fleiss_kappa", "scott_pi" or "krippendorff_alpha", whose value in the
         population is the one parameter of agreement ρ of the Dirichlet-multinomial
-        model; with `model` "table" any coefficient of two raters but stratified ones.
+        model; of two raters any coefficient but stratified ones.
     ratings : nested sequence, array_like or DataFrame, shape (n_items, n_raters)
         Labels or numbers; None and ``nan`` are missing. An item of one rating
         informs the shares of the categories only; it is left out of the table.
@@ -58,17 +58,18 @@ def posterior(
         The declared scale in order. Categories nobody used count: the prior spreads
         over all that are declared.
     weights : str or array_like, optional
-        How much two categories agree; identity but for "table".
+        How much two categories agree; identity but for the table of two raters.
     level : float, optional
         Level of the central credible interval.
-    model : {"dirichlet-multinomial", "table"}, optional
-        Any raters who are exchangeable; or exactly two, each with margins of their own.
+    model : {"auto", "dirichlet-multinomial", "table"}, optional
+        Any raters who are exchangeable; or exactly two, each with margins of their
+        own. By default the first where it speaks of the coefficient.
     prior : {"uniform", "jeffreys"}, optional
         ρ ~ U(0, 1), or ρ ~ Beta(1/2, 1/2), the prior of Jeffreys for a probability.
     concentration : float, optional
         Every share of a category is Dirichlet(concentration, ...), 1 unless given;
-        with "table" every cell, one over the number of cells unless given, a prior
-        as strong as one item.
+        with "table" every cell. Unless given, the prior of the table is worth 1.5
+        items, half of it on pairs that agree.
     method : {"exact", "emcee"}, optional
         Quadrature, which draws nothing; or a sampler, to check it.
     n_draws : int, optional
@@ -133,12 +134,22 @@ def posterior(
         level=level,
     )
     believed = Prior.of(prior, 1.0 if concentration is None else concentration)
-    _check(case, weights, model, method, believed)
+    _check_options(case, model, method)
+    identity = isinstance(weights, str) and weights == "identity"
+    spoken_of = case.entry.name in SPOKEN_OF and identity
+    asked = case.entry.name if identity else f"weighted {case.entry.name}"
     # Imported here: the other intervals load neither scipy nor emcee.
-    if model == "table":
+    if model == "table" or (model == "auto" and not spoken_of):
+        _check_table(case, asked, model, method, believed)
         from masrel.intervals.table.interval import table_interval
 
         return table_interval(case, concentration, n_draws=n_draws, rng=rng)
+    if not spoken_of:
+        raise ParameterError(
+            "model: the Dirichlet-multinomial model speaks of unweighted fleiss_kappa, "
+            "and of scott_pi and krippendorff_alpha, whose value in the population is "
+            f'the same; for two raters "table" speaks of others; got {asked}'
+        )
     from masrel.intervals.dirichlet.interval import rho_interval
 
     return rho_interval(
@@ -151,13 +162,7 @@ def posterior(
     )
 
 
-def _check(
-    case: Case,
-    weights: "WeightName | ArrayLike",
-    model: Model,
-    method: Method,
-    prior: Prior,
-) -> None:
+def _check_options(case: Case, model: Model, method: Method) -> None:
     for name, given, options in (("model", model, Model), ("method", method, Method)):
         if given not in get_args(options):
             known = ", ".join(get_args(options))
@@ -167,22 +172,20 @@ def _check(
             "target: a posterior speaks of other items, so "
             f'"items"; for other raters use the jackknife; got "{case.target}"'
         )
-    if model == "table":
-        if method != "exact" or prior.name != "uniform":
-            raise ParameterError(
-                'model: "table" has one prior, Dirichlet(concentration, ...), and no '
-                f'sampler; got prior="{prior.name}", method="{method}"'
-            )
-        return
-    if case.entry.name not in SPOKEN_OF:
+
+
+def _check_table(
+    case: Case, asked: str, model: Model, method: Method, prior: Prior
+) -> None:
+    n_raters = case.coded.codes.shape[1]
+    if model == "auto" and n_raters != 2:
         raise ParameterError(
-            "coefficient: the Dirichlet-multinomial model speaks of fleiss_kappa and "
-            "of scott_pi and krippendorff_alpha, whose value in the population is the "
-            'same; for two raters model="table" speaks of others; got '
-            f"{case.entry.name}"
+            "coefficient: a posterior speaks of unweighted fleiss_kappa, scott_pi and "
+            "krippendorff_alpha, and of others by exactly two raters; got "
+            f"{asked} by {n_raters}"
         )
-    if not (isinstance(weights, str) and weights == "identity"):
+    if method != "exact" or prior.name != "uniform":
         raise ParameterError(
-            "weights: the Dirichlet-multinomial model is of unweighted agreement, so "
-            f'"identity"; for two raters model="table" takes weights; got {weights!r}'
+            'model: "table" has one prior, Dirichlet(concentration, ...), and no '
+            f'sampler; got prior="{prior.name}", method="{method}"'
         )

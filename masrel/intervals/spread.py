@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from masrel.agreement.kernel import Floats
 from masrel.errors import ParameterError
-from masrel.intervals.case import Case, warn_small
+from masrel.intervals.case import Case, blocks, features_of, warn_small
 
 __all__ = ["Spread", "excess_of_raters", "jackknife_variance", "spread", "without_item"]
 
@@ -120,8 +120,13 @@ def without_item(case: Case) -> tuple[Floats, Integers]:
     """
     if case.n_items < 2:
         return np.full(1, np.nan), np.ones(1, dtype=np.int64)
-    # sums without an item are the total less its features
-    return case.values(case.sums - case.rows), case.times
+    return _values_without(case, case.sums, case.rows), case.times
+
+
+def _values_without(case: Case, sums: Floats, rows: Floats) -> Floats:
+    # sums without an item are the total less its features; (n_patterns,)
+    parts = [case.values(sums - rows[items]) for items in blocks(len(rows))]
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
 def excess_of_raters(case: Case) -> float:
@@ -139,12 +144,12 @@ def excess_of_raters(case: Case) -> float:
         leaving out a rater on an item,
         (n - 1)(r - 1)/(n r) Σ_ij (κ_-i-j - κ_-i - κ_-j + κ)². 0 where undefined.
     """
-    without, n = case.values(case.sums - case.rows), case.n_items
+    without, n = _values_without(case, case.sums, case.rows), case.n_items
     raters, cells = [], 0.0
     for rows in _rows_without_each_rater(case):
         sums = case.times @ rows
         raters.append(float(case.values(sums)))
-        own = case.values(sums - rows) - without - raters[-1] + case.value
+        own = _values_without(case, sums, rows) - without - raters[-1] + case.value
         cells += float(case.times @ own**2)
     r = len(raters)
     of_raters = jackknife_variance(np.array(raters), np.ones(r, dtype=np.int64))
@@ -171,4 +176,4 @@ def _rows_without_each_rater(case: Case) -> Iterator[Floats]:
     for rater in range(n_raters):
         rest = np.delete(codes, np.s_[rater * width : (rater + 1) * width], axis=1)
         left = dataclasses.replace(case.patterns, codes=rest)
-        yield case.kernel.features(left, case.v)
+        yield features_of(case.kernel, left, case.v)

@@ -119,10 +119,31 @@ class DeviceSettings(Table, frozen=True, kw_only=True):
     backend: Identifier = "simulated"
     rate_hz: Annotated[int, Meta(ge=100, le=4000)] = 1000
     torque_limit_nm: Annotated[float, Meta(gt=0, le=28)] = 20.0
+    torque_rate_limit_nm_s: Positive = 12_000.0
     speed_limit_deg_s: Annotated[float, Meta(gt=0, le=600)] = 400.0
+    lowest_angle_deg: Annotated[float, Meta(ge=-30, lt=180)] = -5.0
+    highest_angle_deg: Annotated[float, Meta(gt=0, le=210)] = 185.0
+    soft_stop_deg: Annotated[float, Meta(gt=0, le=30)] = 5.0
+    soft_stop_torque_nm: Annotated[float, Meta(ge=0, le=28)] = 10.0
     missed_ticks_limit: Annotated[int, Meta(ge=0)] = 20
+    missed_replies_limit: Annotated[int, Meta(ge=0, le=20)] = 2
+    stale_limit_ms: Annotated[float, Meta(gt=0, le=50)] = 5.0
+    frozen_limit_ms: Annotated[float, Meta(gt=0, le=100)] = 10.0
+    standing_limit_ms: Annotated[float, Meta(gt=0, le=5000)] = 500.0
+    standing_torque_nm: Annotated[float, Meta(gt=0, le=28)] = 2.0
+    jump_limit_deg: Annotated[float, Meta(gt=0, le=5)] = 0.3
+    watchdog_ms: Annotated[float, Meta(gt=0, le=100)] = 50.0
+    ramp_ms: Annotated[float, Meta(ge=0, le=100)] = 50.0
     friction_compensation: Annotated[float, Meta(ge=0, le=1)] = 0.9
+    friction_viscous_nms_rad: NonNegative = 0.168
+    friction_coulomb_nm: NonNegative = 0.189
+    dead_zone_deg_s: NonNegative = 1.0
+    full_speed_deg_s: Positive = 5.0
     slip_speed_drop_deg_s: Positive = 40.0
+    puck_interface: Text = "socketcan"
+    puck_channel: Text = "can0"
+    puck_node: Annotated[int, Meta(ge=1, le=7)] = 1
+    puck_direction: Literal[1, -1] = 1
 
 
 class SimulatedRaters(Table, frozen=True, kw_only=True):

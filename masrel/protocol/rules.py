@@ -156,6 +156,34 @@ def _stretch(values: Values) -> Iterator[str]:
         )
 
 
+def _device(values: Values) -> Iterator[str]:
+    device, stretch = values.get("device") or {}, values.get("stretch") or {}
+    dead_zone, full_speed = (
+        device.get("dead_zone_deg_s"),
+        device.get("full_speed_deg_s"),
+    )
+    if dead_zone is not None and full_speed is not None and dead_zone >= full_speed:
+        yield (
+            f"device.dead_zone_deg_s: needed less than device.full_speed_deg_s "
+            f"({full_speed:g}), got {dead_zone:g}"
+        )
+    width = device.get("soft_stop_deg")
+    low, high = device.get("lowest_angle_deg"), device.get("highest_angle_deg")
+    start, end = stretch.get("start_deg"), stretch.get("end_deg")
+    if width is None:
+        return
+    if None not in (low, start) and start < low + width:
+        yield (
+            f"stretch.start_deg: needed at least device.lowest_angle_deg and the soft "
+            f"stop beside it ({low:g} + {width:g}), got {start:g}"
+        )
+    if None not in (high, end) and end > high - width:
+        yield (
+            f"stretch.end_deg: needed at most device.highest_angle_deg less the soft "
+            f"stop before it ({high:g} - {width:g}), got {end:g}"
+        )
+
+
 def _catch_angles(values: Values) -> Iterator[str]:
     elbow = values.get("elbow") or {}
     smallest = elbow.get("smallest_catch_angle_deg")  # θ_L of (6)
@@ -214,6 +242,7 @@ _RULES: tuple[Callable[[Values], Iterator[str]], ...] = (
     _file_names,
     _size,
     _stretch,
+    _device,
     _catch_angles,
     plan_rules,
     _sections,

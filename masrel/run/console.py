@@ -58,7 +58,8 @@ class ConsoleGrades:
         answer = self._ask(
             asked,
             f"Presentation {shown.position} of {asked.n_presentations}, code "
-            f"{shown.code}{again}. Enter to begin, stop to stop: ",
+            f"{shown.code}{again}. Enter to begin (then any key is an emergency "
+            "stop), stop to stop: ",
         )
         if answer == "stop":
             raise _stopped(asked, "on request")

@@ -1,23 +1,31 @@
 """One presentation of one model: the device, the loop, and the recording on disk."""
 
+import contextlib
 import dataclasses
 import math
 import os
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 from masrel.hess import (
     Clock,
-    Controller,
     DeviceLimits,
+    EmergencyStop,
+    Presented,
+    RealClock,
     SimulatedHand,
     open_device,
     run_presentation,
 )
+from masrel.hess.stop import stop_on_key, stop_on_signals
+from masrel.hess.watchdog import watched
 from masrel.protocol import Protocol, elbow_parameters
-from masrel.recording import Recording, write_recording
+from masrel.recording import write_recording
 from masrel.run.chain import Fact
+from masrel.run.fault import FaultRecord, fault_record
 from masrel.run.grades import Asked
+from masrel.run.settings import backend_options, device_limits, model_controller
 from masrel.run.simulated import intended_speed
 
 __all__ = ["SIMULATED_BACKEND", "Shown", "present"]
@@ -41,7 +49,7 @@ class Shown:
         Mean speed before the catch, deg/s; None when the arm never moved.
     n_missed_ticks : int
         Ticks the loop skipped.
-    fault : str or None
+    fault : FaultRecord or None
         What stopped it, or None.
     simulated : bool
         Whether no hardware moved.
@@ -50,12 +58,17 @@ class Shown:
     sha256: str
     mean_speed_deg_s: float | None
     n_missed_ticks: int
-    fault: str | None
+    fault: FaultRecord | None
     simulated: bool
 
 
-def present(protocol: Protocol, asked: Asked, *, clock: Clock, file: Path) -> Shown:
+def present(
+    protocol: Protocol, asked: Asked, *, clock: Clock, file: Path, stop: EmergencyStop
+) -> Shown:
     """Present a model once on the protocol's device and write the recording.
+
+    Signals that would end the process, and with a real clock any key of the terminal,
+    press the emergency stop while the device is open.
 
     Parameters
     ----------
@@ -67,6 +80,8 @@ def present(protocol: Protocol, asked: Asked, *, clock: Clock, file: Path) -> Sh
         The clock of the loop.
     file : Path
         The recording's ``.npz`` file.
+    stop : EmergencyStop
+        The button that stops the presentation.
 
     Returns
     -------
@@ -81,38 +96,53 @@ def present(protocol: Protocol, asked: Asked, *, clock: Clock, file: Path) -> Sh
     OSError
         If the recording cannot be written.
     """
+    limits = device_limits(protocol.device)
+    with contextlib.ExitStack() as held:
+        held.enter_context(stop_on_signals(stop))
+        if isinstance(clock, RealClock):
+            held.enter_context(stop_on_key(stop, sys.stdin))
+        presented = _on_device(protocol, asked, clock, limits, stop)
+    return _keep(presented, protocol, asked, file)
+
+
+def _on_device(
+    protocol: Protocol,
+    asked: Asked,
+    clock: Clock,
+    limits: DeviceLimits,
+    stop: EmergencyStop,
+) -> Presented:
     settings, stretch = protocol.device, protocol.stretch
-    parameters = elbow_parameters(protocol, asked.presentation.model)
     start, end = math.radians(stretch.start_deg), math.radians(stretch.end_deg)
     speed = _speed(protocol, asked)
     hand = (
         None if speed is None else SimulatedHand(start=start, end=end, mean_speed=speed)
     )
-    controller = Controller(
-        parameters,
-        start_angle=start,
-        compensation=settings.friction_compensation,
-        slip_speed_drop=math.radians(settings.slip_speed_drop_deg_s),
-        rate_hz=settings.rate_hz,
-    )
-    limits = DeviceLimits(
-        torque=settings.torque_limit_nm,
-        speed=math.radians(settings.speed_limit_deg_s),
-        missed_ticks=settings.missed_ticks_limit,
-    )
-    with open_device(
-        settings.backend, clock=clock, hand=hand, range_end=parameters.range_end
-    ) as device:
-        presented = run_presentation(
+    model = asked.presentation.model
+    with contextlib.ExitStack() as held:
+        device = held.enter_context(
+            open_device(
+                settings.backend,
+                clock=clock,
+                hand=hand,
+                range_end=elbow_parameters(protocol, model).range_end,
+                options=backend_options(settings),
+            )
+        )
+        watchdog = watched(device, limits.watchdog_time)
+        if watchdog is not None:
+            held.enter_context(watchdog)
+        return run_presentation(
             device,
-            controller,
+            model_controller(protocol, model),
             clock=clock,
             limits=limits,
             rate_hz=settings.rate_hz,
             max_duration_s=_longest(end - start, speed),
             end_angle=end,
+            stop=stop,
+            watchdog=watchdog,
         )
-    return _keep(presented.recording, protocol, asked, file)
 
 
 def _speed(protocol: Protocol, asked: Asked) -> float | None:
@@ -134,10 +164,10 @@ def _longest(travel: float, speed: float | None) -> float:
     )
 
 
-def _keep(recording: Recording, protocol: Protocol, asked: Asked, file: Path) -> Shown:
-    shown, found = asked.presentation, recording.facts
+def _keep(presented: Presented, protocol: Protocol, asked: Asked, file: Path) -> Shown:
+    shown, recording = asked.presentation, presented.recording
     facts: dict[str, Fact] = {
-        **found,
+        **recording.facts,
         "study": protocol.study.id,
         "rater": asked.rater,
         "session": asked.session,
@@ -150,13 +180,13 @@ def _keep(recording: Recording, protocol: Protocol, asked: Asked, file: Path) ->
     checksum = write_recording(dataclasses.replace(recording, facts=facts), file)
     for written in (file, file.with_suffix(".json")):
         _sync(written)  # before the log says that they are there
-    speed, fault = found["mean_speed_deg_s"], found["fault"]
+    speed = facts["mean_speed_deg_s"]
     return Shown(
         sha256=checksum,
         mean_speed_deg_s=None if speed is None else float(speed),
-        n_missed_ticks=int(found["n_missed_ticks"] or 0),
-        fault=None if fault is None else str(fault),
-        simulated=bool(found["simulated"]),
+        n_missed_ticks=presented.n_missed_ticks,
+        fault=fault_record(presented),
+        simulated=bool(facts["simulated"]),
     )
 
 

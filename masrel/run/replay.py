@@ -36,6 +36,16 @@ EVENTS: dict[str, tuple[str, ...]] = {
         "fault",
         "simulated",
     ),
+    "fault": (
+        "code",
+        "position",
+        "attempt",
+        "kind",
+        "words",
+        "time_s",
+        "torque_nm",
+        "last_200_ms",
+    ),
     "grade": ("code", "position", "grade"),
     "correction": ("code", "grade", "who", "why"),
     "stopped": ("code", "position", "why"),
@@ -121,6 +131,10 @@ def _misfit_of_code(state: SessionState, event: Event) -> str | None:
     code = event.fields.get("code")
     if event.kind == "presented" and code in state.given:
         return f"needed a code that is not graded yet, got {code}"
+    if event.kind == "fault":
+        before = state.presented.get(str(code), [])
+        if not before or before[-1].fields["fault"] is None:
+            return f"needed a presentation of {code} that a fault stopped before it"
     if event.kind == "grade":
         if code in state.given:
             return f"needed one grade of {code}, got another"

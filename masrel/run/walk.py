@@ -11,9 +11,10 @@ from masrel.errors import (
     SessionLogError,
     SessionStoppedError,
 )
-from masrel.hess import Clock, RealClock, SimulatedClock
+from masrel.hess import Clock, EmergencyStop, RealClock, SimulatedClock
 from masrel.protocol import Protocol, StudyPaths, presented_hash, protocol_hash
 from masrel.run.chain import Fact
+from masrel.run.fault import FaultRecord
 from masrel.run.grades import Asked, GradeSource
 from masrel.run.log import SessionLog
 from masrel.run.present import SIMULATED_BACKEND, Shown, present
@@ -31,6 +32,9 @@ CLOCKS: dict[str, Callable[[], Clock]] = {
 """The clocks a control loop can run on, by name."""
 
 _FORMAT = 1
+
+_ENDING = ("signal SIGTERM", "signal SIGHUP")
+"""Emergency stops by somebody who wants the process to end; Ctrl-C may be a rater's."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -223,11 +227,11 @@ class Walk:
             asked = self._asked(presentation, attempt, n_faults)
             if fault is None:
                 grade = self._checked(asked, self._grades.grade(asked))
-            elif not self._grades.present_again(asked, fault):
+            elif not self._grades.present_again(asked, fault.words):
                 raise DeviceError(
                     f"session {asked.session} of {asked.rater}: presentation "
                     f"{presentation.position}, code {presentation.code}, was stopped "
-                    f"by a fault: {fault}"
+                    f"by a fault: {fault.words}"
                 )
         return grade
 
@@ -247,8 +251,8 @@ class Walk:
         if asked.attempt > 1:
             file = file.with_name(f"{shown.code}-{asked.attempt}.npz")
         # A new one each time, so that the simulated clock starts at zero.
-        clock = CLOCKS[self._clock]()
-        left = present(self._protocol, asked, clock=clock, file=file)
+        clock, stop = CLOCKS[self._clock](), EmergencyStop()
+        left = present(self._protocol, asked, clock=clock, file=file, stop=stop)
         self._n_again += asked.attempt > 1
         self._n_faults += left.fault is not None
         self._log.append(
@@ -261,11 +265,35 @@ class Walk:
                 "sha256": left.sha256,
                 "mean_speed_deg_s": left.mean_speed_deg_s,
                 "n_missed_ticks": left.n_missed_ticks,
-                "fault": left.fault,
+                "fault": None if left.fault is None else left.fault.words,
                 "simulated": left.simulated,
             },
         )
+        if left.fault is not None:
+            self._log_fault(asked, left.fault)
+        if stop.reason in _ENDING:
+            raise SessionStoppedError(
+                f"session {asked.session} of {asked.rater} was stopped by "
+                f"{stop.reason} at presentation {shown.position}; the same command "
+                "goes on there"
+            )
         return left
+
+    def _log_fault(self, asked: Asked, fault: FaultRecord) -> None:
+        shown = asked.presentation
+        self._log.append(
+            "fault",
+            {
+                "code": shown.code,
+                "position": shown.position,
+                "attempt": asked.attempt,
+                "kind": fault.kind,
+                "words": fault.words,
+                "time_s": fault.time_s,
+                "torque_nm": fault.torque_nm,
+                "last_200_ms": fault.last_200_ms,
+            },
+        )
 
     def _checked(self, asked: Asked, grade: str | None) -> str | None:
         grades = self._protocol.scale.grades

@@ -1,24 +1,22 @@
 """Bootstrap intervals beside other packages: time, error for the time, memory.
 
-``python -m tests.benchmarks.bootstrap [--quick] [--figure FILE]`` prints what its
-functions return. Peers that are not installed are left out.
+Part of ``python -m tests.benchmarks.intervals``. Peers that are not installed are left
+out.
 """
 
-import argparse
 import importlib
 import math
 import time
-import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from masrel.estimates import Interval
 from masrel.intervals import bootstrap
 from tests.benchmarks.peers import present
 from tests.benchmarks.sidebyside import Timing, peak_megabytes, side_by_side
@@ -98,7 +96,9 @@ class Comparison:
         }
 
 
-def scipy_loop(counts: Codes, formula: Formula, n_resamples: int) -> tuple[float, ...]:
+def scipy_loop(
+    counts: Codes, formula: Formula, n_resamples: int, seed: int = 1
+) -> tuple[float, ...]:
     """scipy.stats.bootstrap with a Python statistic of the drawn items."""
     from scipy.stats import bootstrap as theirs
 
@@ -108,13 +108,13 @@ def scipy_loop(counts: Codes, formula: Formula, n_resamples: int) -> tuple[float
         n_resamples=n_resamples,
         vectorized=False,
         method="percentile",
-        rng=1,
+        rng=seed,
     )
     return tuple(found.confidence_interval)
 
 
 def scipy_vectorized(
-    counts: Codes, name: Coefficient, n_resamples: int
+    counts: Codes, name: Coefficient, n_resamples: int, seed: int = 1
 ) -> tuple[float, ...]:
     """scipy.stats.bootstrap with a statistic of many resamples at once."""
     from scipy.stats import bootstrap as theirs
@@ -136,29 +136,35 @@ def scipy_vectorized(
         vectorized=True,
         batch=max(1, 2_000_000 // n),
         method="percentile",
-        rng=1,
+        rng=seed,
     )
     return tuple(found.confidence_interval)
 
 
-def arch_loop(counts: Codes, formula: Formula, n_resamples: int) -> tuple[float, ...]:
+def arch_loop(
+    counts: Codes, formula: Formula, n_resamples: int, seed: int = 1
+) -> tuple[float, ...]:
     """arch.bootstrap.IIDBootstrap with a Python statistic."""
     from arch.bootstrap import IIDBootstrap
 
-    found = IIDBootstrap(counts, seed=1).conf_int(
+    found = IIDBootstrap(counts, seed=seed).conf_int(
         formula, reps=n_resamples, method="percentile"
     )
     return tuple(found.ravel())
 
 
 def resample_loop(
-    counts: Codes, formula: Formula, n_resamples: int
+    counts: Codes, formula: Formula, n_resamples: int, seed: int = 1
 ) -> tuple[float, ...]:
     """resample.bootstrap with a Python statistic."""
     from resample.bootstrap import confidence_interval
 
     return confidence_interval(  # type: ignore[no-any-return]
-        formula, counts, size=n_resamples, ci_method="percentile", random_state=1
+        formula,
+        counts,
+        size=n_resamples,
+        ci_method="percentile",
+        random_state=seed,
     )
 
 
@@ -194,7 +200,7 @@ def _compare(
         works["resample"] = lambda: resample_loop(counts, formula, size)
     return Comparison(
         name=f"{name}, {n:,} × {codes.shape[1]}",
-        times=side_by_side(works, turns=turns),
+        times=side_by_side(works, turns=turns, clock=time.process_time),
         scale={peer: N_RESAMPLES / size for peer in works if peer != OURS},
     )
 
@@ -208,10 +214,11 @@ def exact_cost(quick: bool) -> list[tuple[str, str, Timing]]:
         "10 raters of 16 items": (made(16, 10, 3), 3, "raters"),
         "16 × 8, 2 categories": (made(16, 8, 2), 2, "items"),
         "12 × 8, 3 categories": (made(12, 8, 3), 3, "items"),
+        "16 × 8, 3 categories": (made(16, 8, 3), 3, "items"),
         "30 × 3, 3 categories": (made(30, 3, 3), 3, "items"),
         "100 × 8, 2 categories": (made(100, 8, 2), 2, "items"),
-        "600 × 5, 2 categories": (made(600, 5, 2), 2, "items"),
         "1000 × 3, 2 categories": (made(1000, 3, 2), 2, "items"),
+        "300 × 7, 2 categories": (made(300, 7, 2), 2, "items"),
     }
     found = []
     for study, (codes, q, target) in studies.items():
@@ -224,7 +231,9 @@ def exact_cost(quick: bool) -> list[tuple[str, str, Timing]]:
             exact=True,
         )
         words = work().distribution.words  # type: ignore[union-attr]
-        timing = side_by_side({study: work}, turns=3 if quick else 15)[study]
+        timing = side_by_side(
+            {study: work}, turns=3 if quick else 15, clock=time.process_time
+        )[study]
         found.append((study, words, timing))
         print(study, words, f"{1e3 * timing.median:.3g} ms", flush=True)
     return found
@@ -235,68 +244,110 @@ class Point:
     """How far the ends of one method are off after so many seconds."""
 
     method: str
-    n_resamples: int
+    size: int
     seconds: float
     error: float
 
 
-def errors(quick: bool) -> list[Point]:
-    """Root mean square error of the ends over the half width, against seconds."""
-    codes, q = made(300, 3, 2), 2
-    counts = counted(codes, q)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Race:
+    """Points of all methods on one study, and how well the truth is known."""
+
+    name: str
+    points: list[Point]
+    floor: float | None
+
+
+def measured(
+    method: str,
+    size: int,
+    seeds: int,
+    work: Callable[[int], tuple[float, ...]],
+    truth: tuple[float, float],
+) -> Point:
+    """Root mean square error of the ends over the half width, against CPU seconds."""
+    start = time.process_time()
+    ends = [work(seed) for seed in range(1, seeds + 1)]
+    seconds = (time.process_time() - start) / seeds
+    off = (np.array(ends) - truth) / (0.5 * (truth[1] - truth[0]))
+    error = math.sqrt(float((off**2).mean()))
+    point = Point(method=method, size=size, seconds=seconds, error=error)
+    print(point, flush=True)
+    return point
+
+
+def races(quick: bool) -> list[Race]:
+    """Error against seconds for three sizes; in the first two the truth is exact."""
+    studies = [((16, 8, 3), True), ((1000, 3, 2), True), ((10_000, 5, 4), False)]
+    return [
+        _race(*shape, exact=exact, quick=quick) for shape, exact in studies[: 3 - quick]
+    ]
+
+
+def _race(n: int, r: int, q: int, *, exact: bool, quick: bool) -> Race:
+    codes = made(n, r, q)
     ours = partial(
         bootstrap, "fleiss_kappa", codes, target="items", categories=range(q)
     )
-    start = time.perf_counter()
-    exact = ours(exact=True)
-    points = [
-        Point(
-            method="exact",
-            n_resamples=0,
-            seconds=time.perf_counter() - start,
-            error=1e-12,
-        )
-    ]
-    half = 0.5 * (exact.high - exact.low)
+    points, floor = [], None
+    if exact:
+        known = ours(exact=True)
+        truth = (known.low, known.high)
+        # what is left is rounding; the test against fractions has 1e-13
+        points = [measured("exact", 0, 5, lambda _: _ends(ours(exact=True)), truth)]
+    else:
+        known = ours(exact=False, rng=99, n_resamples=100_000 if quick else 4_000_000)
+        truth = (known.low, known.high)
+        errors = known.monte_carlo_error or (math.nan, math.nan)
+        floor = max(errors) / (0.5 * (known.high - known.low))
+    for size in (1000, 10_000) if quick else (1000, 10_000, 100_000, 1_000_000):
+        if size * 4 > 10**6 and not exact:
+            continue
+        seeds = 40 if size <= 10_000 else 20 if size <= 100_000 else 6
 
-    def point(
-        method: str, size: int, seeds: int, work: Callable[[int], tuple[float, ...]]
-    ) -> None:
-        start = time.perf_counter()
-        ends = [work(seed) for seed in range(seeds)]
-        seconds = (time.perf_counter() - start) / seeds
-        off = (np.array(ends) - [exact.low, exact.high]) / half
-        error = math.sqrt(float((off**2).mean()))
-        points.append(
-            Point(method=method, n_resamples=size, seconds=seconds, error=error)
-        )
-        print(points[-1], flush=True)
+        def drawn(seed: int, size: int = size) -> tuple[float, ...]:
+            return _ends(ours(exact=False, n_resamples=size, rng=seed))
 
-    def drawn(size: int, seed: int) -> tuple[float, ...]:
-        found = ours(exact=False, n_resamples=size, rng=seed)
-        return found.low, found.high
-
-    sizes = (1000, 10_000) if quick else (1000, 10_000, 100_000, 1_000_000)
-    for size in sizes:
-        seeds = 40 if size < 10**6 else 10
-        point("drawn with a control", size, seeds, partial(drawn, size))
+        points.append(measured("with a control", size, seeds, drawn, truth))
         with _no_control():
-            point("drawn", size, seeds, partial(drawn, size))
-    for size in sizes[: 2 if quick else 3]:
-        from scipy.stats import bootstrap as theirs
+            points.append(measured("drawn", size, seeds, drawn, truth))
+    points += _peers(codes, q, truth, quick)
+    return Race(name=f"{n:,} × {r}, {q} categories", points=points, floor=floor)
 
-        def loop(seed: int, size: int = size) -> tuple[float, ...]:
-            found = theirs(
-                (np.arange(len(counts)),),
-                lambda items: fleiss(counts[items]),
-                n_resamples=size,
-                vectorized=False,
-                method="percentile",
-                rng=seed,
+
+def _ends(found: Interval) -> tuple[float, float]:
+    return found.low, found.high
+
+
+def _peers(
+    codes: Codes, q: int, truth: tuple[float, float], quick: bool
+) -> list[Point]:
+    counts = counted(codes, q)
+    loops: dict[str, Callable[[int, int], tuple[float, ...]]] = {
+        "scipy, loop": lambda size, seed: scipy_loop(counts, fleiss, size, seed),
+        "scipy, vectorized": lambda size, seed: scipy_vectorized(
+            counts, "fleiss_kappa", size, seed
+        ),
+        "arch": lambda size, seed: arch_loop(counts, fleiss, size, seed),
+        "resample": lambda size, seed: resample_loop(counts, fleiss, size, seed),
+    }
+    points = []
+    sizes = (300, 1000, 3000) if len(codes) > 5000 else (1000, 10_000, 100_000)
+    for name, loop in loops.items():
+        package = name.split(",")[0]
+        if not present([package]):
+            continue
+        for size in sizes[: 1 if quick else None]:
+            seeds = max(4, min(20, 6000 * sizes[0] // (300 * size)))
+            points.append(
+                measured(
+                    name,
+                    size,
+                    seeds,
+                    lambda seed, loop=loop, size=size: loop(size, seed),  # type: ignore[misc]
+                    truth,
+                )
             )
-            return tuple(found.confidence_interval)
-
-        point("scipy, a Python statistic", size, max(4, 20_000 // size), loop)
     return points
 
 
@@ -340,7 +391,8 @@ def gains(quick: bool) -> list[tuple[str, float, float]]:
 
         times = side_by_side(
             {"with": partial(ends, 1), "without": partial(plain, 1)},
-            turns=5,
+            turns=9,
+            clock=time.process_time,
         )
         spread = [
             np.array([work(seed) for seed in range(60)]).var(axis=0).mean()
@@ -371,51 +423,3 @@ def memory(quick: bool) -> dict[str, float]:
         found[kind] = peak_megabytes(work)
     print(f"{n:,} × 5", found, flush=True)
     return found
-
-
-def draw_errors(points: list[Point], path: Path) -> None:
-    """Draw error against seconds, both on logarithmic axes."""
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(figsize=(6.4, 4.2), layout="constrained")
-    for method in dict.fromkeys(point.method for point in points):
-        of = [point for point in points if point.method == method]
-        axes.plot(
-            [point.seconds for point in of],
-            [point.error for point in of],
-            "s" if method == "exact" else "o-",
-            label=method,
-        )
-    axes.set(
-        xscale="log",
-        yscale="log",
-        xlabel="seconds",
-        ylabel="error of an end / half width",
-        title="300 items, 3 raters, 2 categories: 95 % percentile interval of κ",
-    )
-    axes.grid(visible=True, which="major", alpha=0.3)
-    axes.legend(frameon=False)
-    figure.savefig(path, dpi=160)
-    plt.close(figure)
-
-
-def main() -> None:
-    """Run everything and print it."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="small sizes")
-    parser.add_argument("--figure", type=Path, help="where the figure is written")
-    asked = parser.parse_args()
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        print(present(["numpy", "scipy", "arch", "resample"]))
-        by_items(asked.quick)
-        exact_cost(asked.quick)
-        gains(asked.quick)
-        memory(asked.quick)
-        points = errors(asked.quick)
-    if asked.figure is not None:
-        draw_errors(points, asked.figure)
-
-
-if __name__ == "__main__":
-    main()

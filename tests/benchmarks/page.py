@@ -8,6 +8,8 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
+from tests.benchmarks.parts import write_part
+
 if TYPE_CHECKING:
     from tests.benchmarks.agreement import Line
 
@@ -101,11 +103,11 @@ def write_page(
     versions: Mapping[str, str],
     machine: str,
 ) -> None:
-    """Write the page in Markdown."""
+    """Write the part of the page in Markdown."""
     text = [
-        "# Benchmarks",
+        "## Estimates",
         "",
-        "`python -m tests.benchmarks.agreement` repeats this page: every function in "
+        "`python -m tests.benchmarks.agreement` repeats this part: every function in "
         "turn in one run, medians; ± is the",
         "relative half-distance of the quartiles. Times are of one machine with other "
         "load; ratios are what to look at. masrel",
@@ -115,7 +117,7 @@ def write_page(
         "",
         f"{machine}; " + ", ".join(f"{k} {v}" for k, v in versions.items()) + ".",
         "",
-        "## From a matrix of whole numbers",
+        "### From a matrix of whole numbers",
         "",
         "| items × raters | masrel, three | with errors | "
         + " | ".join(_peers(lines))
@@ -138,7 +140,7 @@ def write_page(
         + ", ".join(f"{name} {mb:,.0f} MB" for name, mb in megabytes.items())
         + f" (ratio {megabytes['masrel'] / megabytes['statsmodels']:.3f}).",
         "",
-        "## Other ways in",
+        "### Other ways in",
         "",
         "| what | masrel | beside | ratio |",
         "|---|---|---|---|",
@@ -153,7 +155,7 @@ def write_page(
         "A standard error is computed when it is read. In the smallest studies three "
         "of them cost as much as the estimates.",
         "",
-        "## Error against time",
+        "### Error against time",
         "",
         "Five raters, all items but five unanimous in one category, so that chance "
         "agreement is near 1; error against the value in",
@@ -161,9 +163,8 @@ def write_page(
         "rounds to five decimals.",
         "",
         "![Error against time](figures/benchmark_error.png)",
-        "",
     ]
-    path.write_text("\n".join(text), encoding="utf-8")
+    write_part(path, "estimates", text)
 
 
 def _peers(lines: "Sequence[Line]") -> list[str]:

@@ -31,24 +31,28 @@ class Timing:
 
 
 def side_by_side(
-    works: Mapping[str, Work], *, turns: int, least_s: float = 0.02
+    works: Mapping[str, Work],
+    *,
+    turns: int,
+    least_s: float = 0.02,
+    clock: Callable[[], float] = time.perf_counter,
 ) -> dict[str, Timing]:
     """Time every function in turn, each call repeated until it takes `least_s`."""
     repeats = {}
     for name, work in works.items():
-        start = time.perf_counter()
+        start = clock()
         work()
-        repeats[name] = max(1, int(least_s / max(time.perf_counter() - start, 1e-9)))
+        repeats[name] = max(1, int(least_s / max(clock() - start, 1e-9)))
     seconds: dict[str, list[float]] = {name: [] for name in works}
     gc.collect()
     gc.disable()
     try:
         for _ in range(turns):
             for name, work in works.items():
-                start = time.perf_counter()
+                start = clock()
                 for _ in range(repeats[name]):
                     work()
-                seconds[name].append((time.perf_counter() - start) / repeats[name])
+                seconds[name].append((clock() - start) / repeats[name])
     finally:
         gc.enable()
     return {name: Timing(seconds=tuple(found)) for name, found in seconds.items()}

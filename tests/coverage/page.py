@@ -58,7 +58,7 @@ def _seen(cells: Cells) -> str:
             ends = f"{100 * min(shares):.0f}", f"{100 * max(shares):.0f}"
             rows.append([target, name, *ends, f"{inside}", f"{width:.2f}"])
     head = ["target", "method", "least %", "most %", "cells within 93-98", "mean width"]
-    return _table(head, rows, n_text=2)
+    return markdown_table(head, rows, n_text=2)
 
 
 def _of_default(cells: Cells) -> str:
@@ -67,7 +67,7 @@ def _of_default(cells: Cells) -> str:
         row = [_cell(cells, target, model, design, kappa) for kappa in KAPPAS]
         found = [cell.methods[DEFAULT] for cell in row]
         covers = [
-            f"{_marked(of)} ± {100 * cell.error(of.coverage):.1f}"
+            f"{marked(of)} ± {100 * cell.error(of.coverage):.1f}"
             for of, cell in zip(found, row, strict=True)
         ]
         widths = [f"{of.width:.2f}" for of in found]
@@ -80,7 +80,7 @@ def _of_default(cells: Cells) -> str:
         *kappas,
         *(f"width {k}" for k in kappas),
     ]
-    return _table(head, rows, n_text=3)
+    return markdown_table(head, rows, n_text=3)
 
 
 def _outside(cells: Cells) -> str:
@@ -90,13 +90,13 @@ def _outside(cells: Cells) -> str:
         if is_within(default) and others:
             continue
         narrow = min(others, key=lambda name: cell.methods[name].width, default="")
-        other = f"{narrow}, {_marked(cell.methods[narrow])}" if narrow else "none"
+        other = f"{narrow}, {marked(cell.methods[narrow])}" if narrow else "none"
         place = [cell.target, cell.model, str(cell.design), f"{cell.kappa:g}"]
         shares = [f"{100 * x:.0f} %" for x in (cell.spreadless, cell.single)]
-        rows.append([*place, _marked(cell.methods[DEFAULT]), other, *shares])
+        rows.append([*place, marked(cell.methods[DEFAULT]), other, *shares])
     head = ["target", "model", "items × raters", "κ", "default", "narrowest within"]
     head += ["no spread", "one category"]
-    return _table(head, rows, n_text=3)
+    return markdown_table(head, rows, n_text=3)
 
 
 _TITLES = {
@@ -121,12 +121,12 @@ def _of_others(cells: Cells) -> str:
             shown = [_triple(found, name) for name in (DEFAULT, *compared)]
             rows.append([model, design, *shown])
         head = ["model", "items × raters", DEFAULT, *compared]
-        tables += [f"### {_TITLES[target]}", _table(head, rows, n_text=2)]
+        tables += [f"### {_TITLES[target]}", markdown_table(head, rows, n_text=2)]
     return "\n\n".join(tables)
 
 
 def _triple(cells: Cells, name: str) -> str:
-    return " / ".join(_marked(cell.methods[name]) for cell in cells)
+    return " / ".join(marked(cell.methods[name]) for cell in cells)
 
 
 def _of_target(cells: Cells) -> Iterator[str]:
@@ -148,7 +148,7 @@ def _of_target(cells: Cells) -> Iterator[str]:
             designs = [str(design) for design in DESIGNS]
             head = ["method", *designs, *(f"width {d}" for d in designs)]
             yield f"**{model[0].upper()}{model[1:]}**"
-            yield _table(head, rows, n_text=1)
+            yield markdown_table(head, rows, n_text=1)
 
 
 def _groups() -> Iterator[tuple[str, str, str]]:
@@ -165,14 +165,15 @@ def _cell(cells: Cells, target: str, model: str, design: str, kappa: float) -> C
     )
 
 
-def _marked(counted: Counted) -> str:
-    # bold: covers too little; italic: more than it need
+def marked(counted: Counted) -> str:
+    """Return a coverage; bold: it is too little; italic: more than need be."""
     shown = f"{100 * counted.coverage:.0f}"
     if is_within(counted.coverage):
         return shown
     return f"**{shown}**" if int(shown) < LOWEST else f"*{shown}*"
 
 
-def _table(head: list[str], rows: list[list[str]], *, n_text: int) -> str:
+def markdown_table(head: list[str], rows: list[list[str]], *, n_text: int) -> str:
+    """Return a table whose first columns are text, the others numbers."""
     rule = ["---"] * n_text + ["---:"] * (len(head) - n_text)
     return "\n".join(f"| {' | '.join(row)} |" for row in [head, rule, *rows])

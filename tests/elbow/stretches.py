@@ -1,14 +1,18 @@
 """Stretches, joints and counters that the tests of the elbow share."""
 
 import csv
+from collections.abc import Iterator
+from contextlib import contextmanager
 from math import radians
 from pathlib import Path
-from typing import ClassVar, NamedTuple
+from types import ModuleType
+from typing import NamedTuple
 
 import numpy as np
 from hypothesis import strategies as st
 
 from masrel.elbow import ConstantSpeed, ElbowParameters, MinimumJerk, Motion
+from masrel.elbow.piece import Piece
 
 PUBLISHED = Path(__file__).parents[2] / "studies/hess2012/ratings/published.csv"
 
@@ -80,14 +84,12 @@ class CountedMotion:
     def __init__(self, motion: Motion) -> None:
         self._motion = motion
         self.n_calls = 0
-        self.n_times = 0
+        self.n_pieces = 0
         self.largest = 0  # times in one call
 
     def _count(self, time: object) -> None:
-        size = int(np.size(time))
         self.n_calls += 1
-        self.n_times += size
-        self.largest = max(self.largest, size)
+        self.largest = max(self.largest, int(np.size(time)))
 
     @property
     def start(self) -> float:
@@ -101,9 +103,9 @@ class CountedMotion:
     def duration(self) -> float:
         return self._motion.duration
 
-    def angle(self, time):
+    def angle(self, time, origin=0.0):
         self._count(time)
-        return self._motion.angle(time)
+        return self._motion.angle(time, origin)
 
     def velocity(self, time):
         self._count(time)
@@ -113,24 +115,23 @@ class CountedMotion:
         self._count(time)
         return self._motion.acceleration(time)
 
-    def time_at(self, angle: float) -> float:
-        return self._motion.time_at(angle)
-
-    def times_above(self, speed: float) -> tuple[float, float] | None:
-        return self._motion.times_above(speed)
-
-    def turning_times(
-        self, stiffness: float, damping: float, inertia: float
-    ) -> tuple[float, ...]:
-        return self._motion.turning_times(stiffness, damping, inertia)
+    def pieces(self) -> Iterator[Piece]:
+        for piece in self._motion.pieces():
+            self.n_pieces += 1
+            yield piece
 
 
-class CountedJoint(ElbowParameters):
-    """A joint that counts how often its catch angle is evaluated."""
+@contextmanager
+def counted(module: ModuleType, name: str) -> Iterator[list[int]]:
+    """Count the calls that a module makes of one of its functions."""
+    whole, calls = getattr(module, name), [0]
 
-    __slots__ = ()
-    n_catch_angles: ClassVar[int] = 0
+    def count(*arguments, **options):
+        calls[0] += 1
+        return whole(*arguments, **options)
 
-    def catch_angle(self, mean_speed: float) -> float:
-        type(self).n_catch_angles += 1
-        return super().catch_angle(mean_speed)
+    setattr(module, name, count)
+    try:
+        yield calls
+    finally:
+        setattr(module, name, whole)

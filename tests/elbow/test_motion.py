@@ -8,8 +8,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from masrel.elbow import ConstantSpeed, MinimumJerk, Motion
-from masrel.elbow.motion import first_true
+from masrel.elbow import ConstantSpeed, MinimumJerk, Motion, times_at
 from masrel.errors import MasrelError, ParameterError
 from tests.elbow.stretches import constant, minimum_jerk, motions
 
@@ -54,7 +53,7 @@ def test_constant_speed_by_hand() -> None:
     assert stretch.angle(np.array([0.0, 0.25, 0.5])).tolist() == [0.5, 1.5, 2.5]
     assert stretch.velocity(np.array([0.0, 0.5])).tolist() == [4.0, 4.0]
     assert stretch.acceleration(np.array([0.0, 0.5])).tolist() == [0.0, 0.0]
-    assert stretch.time_at(1.5) == 0.25
+    assert times_at(stretch, [1.5]).tolist() == [0.25]
 
 
 @given(motion=motions())
@@ -101,76 +100,11 @@ def test_many_times_at_once_give_the_same_bits_as_one_by_one(
 
 
 @given(motion=motions(), share=st.floats(0.001, 0.999))
-def test_time_at_undoes_angle(motion: Motion, share: float) -> None:
+def test_times_at_undoes_angle(motion: Motion, share: float) -> None:
     angle = motion.start + share * (motion.end - motion.start)
-    found = motion.time_at(angle)
+    found = float(times_at(motion, [angle])[0])
     assert 0.0 <= found <= motion.duration
     assert float(motion.angle(found)) == pytest.approx(angle, abs=4e-15)
-
-
-@given(motion=motions(), threshold=st.floats(0.01, 4.0))
-def test_times_above_bound_the_fast_part(motion: Motion, threshold: float) -> None:
-    found = motion.times_above(threshold)
-    speed = motion.velocity(np.linspace(0.0, motion.duration, 501))
-    if found is None:
-        assert speed.max() < threshold * (1 + 1e-12)
-        return
-    first, last = found
-    fast = np.flatnonzero(speed > threshold * (1 + 1e-12))
-    grid = motion.duration / 500
-    assert first <= last
-    if fast.size:
-        # every fast sample is between them, and they are within a sample of the fast
-        assert first <= fast[0] * grid * (1 + 1e-12)
-        assert last >= fast[-1] * grid * (1 - 1e-12)
-        assert fast[0] * grid - first <= grid * (1 + 1e-9)
-        assert last - fast[-1] * grid <= grid * (1 + 1e-9)
-
-
-def test_times_above_of_minimum_jerk_by_hand() -> None:
-    # p' = 30 (s(1-s))² = 270/256 at s = 1/4 and 3/4, that is at 0.5 and 1.5 s
-    assert QUINTIC.times_above(270 / 256) == pytest.approx((0.5, 1.5), rel=1e-15)
-    assert QUINTIC.times_above(1.875) == (1.0, 1.0)
-    assert QUINTIC.times_above(1.8751) is None
-
-
-def test_constant_speed_is_fast_throughout_or_never() -> None:
-    stretch = ConstantSpeed(start=0.5, end=2.5, speed=4.0)
-    assert stretch.times_above(4.0) == (0.0, 0.5)
-    assert stretch.times_above(4.1) is None
-
-
-@given(
-    stiffness=st.floats(0.0, 10.0),
-    damping=st.floats(0.0, 3.0),
-    inertia=st.sampled_from([0.0, 0.05, 0.2]),
-    speed=st.floats(20.0, 200.0),
-)
-def test_turning_times_hold_the_largest_of_a_linear_law(
-    stiffness: float, damping: float, inertia: float, speed: float
-) -> None:
-    motion = minimum_jerk(speed)
-
-    def law(time: np.ndarray) -> np.ndarray:
-        return (
-            stiffness * motion.angle(time)
-            + damping * motion.velocity(time)
-            + inertia * motion.acceleration(time)
-        )
-
-    turning = motion.turning_times(stiffness, damping, inertia)
-    assert all(0.0 < time < motion.duration for time in turning)
-    at = np.array([0.0, *turning, motion.duration])
-    dense = float(law(np.linspace(0.0, motion.duration, 4001)).max())
-    assert float(law(at).max()) >= dense - 1e-12 * (1.0 + abs(dense))
-
-
-def test_first_true_is_the_smallest_float() -> None:
-    # sqrt(2) correctly rounded is 1.41421356237309514547..., and its square in floats
-    # is above 2; that of the float below is under 2.
-    found = first_true(lambda t: t * t >= 2.0, 1.0, 2.0)
-    assert found == math.sqrt(2.0)
-    assert np.nextafter(found, 0.0) ** 2 < 2.0
 
 
 @pytest.mark.parametrize("kind", [constant, minimum_jerk])

@@ -35,9 +35,9 @@ def test_the_example_prints_what_the_page_says() -> None:
     assert done.stdout.decode("utf-8") == printed
 
 
-def test_the_only_device_is_the_simulated_one() -> None:
+def test_the_devices_are_those_that_the_page_names() -> None:
     # When a backend is added, the page's first statement has to change.
-    assert device_names() == ("simulated",)
+    assert device_names() == ("puck", "replay", "simulated")
     assert "It has not been tested on physical hardware" in PAGE
 
 

@@ -10,7 +10,12 @@ import numpy as np
 import pytest
 
 from masrel.elbow import STANDARD_MODELS
-from masrel.errors import DeviceError, OverrunWarning, ParameterError
+from masrel.errors import (
+    DeviceError,
+    DeviceTimeoutError,
+    OverrunWarning,
+    ParameterError,
+)
 from masrel.hess import (
     Controller,
     DeviceLimits,
@@ -138,7 +143,9 @@ def test_too_fast_an_arm_is_a_fault_that_is_named_and_latched() -> None:
         device, controller, clock=clock, limits=limits_with(speed=radians(100.0))
     )
     assert presented.fault is not None
-    assert presented.fault.startswith("speed: needs at most 100 deg/s, the arm moves")
+    assert presented.fault.words.startswith(
+        "speed: needs at most 100 deg/s, the arm moves"
+    )
     assert not device.is_open
     for act in (device.open, device.read, lambda: device.command(0.0)):
         with pytest.raises(DeviceError):
@@ -150,18 +157,34 @@ def test_too_fast_an_arm_is_a_fault_that_is_named_and_latched() -> None:
 
 def test_a_fault_leaves_the_recording_up_to_its_moment() -> None:
     presented = present("HM3", 130.0, limits=limits_with(speed=radians(100.0)))
-    columns = presented.recording.columns
-    assert presented.recording.facts["fault"] == presented.fault
-    assert presented.recording.facts["ended"] == "fault"
-    assert np.all(np.abs(columns["velocity_deg_s"][:-1]) <= 100.0)
-    # The last sample is the one that was too much, and what was sent then is zero.
-    assert columns["velocity_deg_s"][-1] > 100.0
-    assert columns["command_torque_nm"][-1] == 0.0
-    assert columns["command_torque_nm"][-2] != 0.0
+    columns, facts = presented.recording.columns, presented.recording.facts
+    assert facts["fault"] == presented.fault.words
+    assert facts["fault_kind"] == "speed"
+    assert facts["ended"] == "fault"
+    before = columns["time_s"] < presented.fault.time_s
+    assert np.all(np.abs(columns["velocity_deg_s"][before]) <= 100.0)
+    # From then on what was too much is held, and the torque goes down to zero.
+    assert np.all(columns["velocity_deg_s"][~before] > 100.0)
+    assert np.unique(columns["angle_deg"][~before]).size == 1
     whole = present("HM3", 130.0).recording.columns
     for name in RECORDING_COLUMNS:
-        before = columns[name][:-1]
-        np.testing.assert_array_equal(before, whole[name][: before.size])
+        kept = columns[name][before]
+        np.testing.assert_array_equal(kept, whole[name][: kept.size])
+
+
+@pytest.mark.parametrize("ramp_time", [0.0, 0.02, 0.05, 0.1])
+def test_a_fault_brings_the_torque_to_zero_in_a_straight_line(ramp_time) -> None:
+    limits = limits_with(torque=9.0, ramp_time=ramp_time)
+    presented = present("HM4", 110.0, limits=limits)
+    columns, fault = presented.recording.columns, presented.fault
+    since = columns["time_s"] - fault.time_s
+    torque = columns["command_torque_nm"][since >= 0.0]
+    since = since[since >= 0.0]
+    assert fault.torque_nm > 4.0  # what was sent in the last tick before
+    line = fault.torque_nm * (1.0 - since / ramp_time) if ramp_time else [0.0]
+    np.testing.assert_allclose(torque, line, atol=1e-9)
+    assert torque[-1] == 0.0
+    assert since[-1] <= ramp_time + 1e-9
 
 
 def test_at_a_fault_zero_is_the_last_torque_and_the_device_is_let_go() -> None:
@@ -169,17 +192,19 @@ def test_at_a_fault_zero_is_the_last_torque_and_the_device_is_let_go() -> None:
     device, presented = rest(
         clock, angle=lambda t: START if t < 0.0095 else radians(-8.0)
     )
-    assert presented.fault == ("range: needs -5.0 to 185.0 deg, the arm is at -8.0 deg")
-    assert device.commands[-1] == (10 * PERIOD_NS, 0.0)
+    assert presented.fault.words == (
+        "range: needs -5.0 to 185.0 deg, the arm is at -8.0 deg"
+    )
+    assert device.commands[-1] == (10 * PERIOD_NS, 0.0)  # at rest: nothing to ramp
     assert device.stopped
-    assert len(device.commands) == 11  # ticks 0 to 9, and one zero
+    assert len(device.commands) == 12  # ticks 0 to 9, and zero twice
 
 
 def test_more_missed_ticks_than_allowed_are_a_fault() -> None:
     clock = LateClock({5 * PERIOD_NS: 3_400_000})
     with pytest.warns(OverrunWarning, match="missed 3 ticks"):
         device, presented = rest(clock, limits=limits_with(missed_ticks=2))
-    assert presented.fault == (
+    assert presented.fault.words == (
         "missed ticks: needs at most 2 in a presentation, the loop missed 3"
     )
     assert device.commands[-1] == (8_400_000, 0.0)
@@ -191,13 +216,15 @@ def test_a_torque_above_the_limit_is_never_sent_and_stops_the_presentation() -> 
     presented = present("HM4", 110.0, limits=limits_with(torque=5.0))
     columns = presented.recording.columns
     assert presented.fault is not None
-    assert presented.fault.startswith("torque: needs at most 5 N·m, got 1")
+    assert presented.fault.words.startswith("torque: needs at most 5 N·m, got 1")
     assert presented.recording.facts["ended"] == "fault"
     assert np.max(np.abs(columns["command_torque_nm"])) <= 5.0
-    # The last sample keeps what the model asked for, in the first tick of the catch.
-    assert columns["model_torque_nm"][-1] > 5.0
+    # The last samples keep what the model asked for, in the first tick of the catch.
+    since = columns["time_s"] >= presented.fault.time_s
+    assert np.all(columns["model_torque_nm"][since] > 5.0)
     assert columns["command_torque_nm"][-1] == 0.0
-    assert columns["phase"][-2:].tolist() == [0, 1]
+    assert set(columns["phase"][since]) == {1}
+    assert columns["phase"][~since][-1] == 0
 
 
 def test_a_torque_that_is_no_number_is_a_fault() -> None:
@@ -206,8 +233,8 @@ def test_a_torque_that_is_no_number_is_a_fault() -> None:
     controller = Controller(STANDARD_MODELS["HM3"], start_angle=math.nan)
     with device:
         presented = run_presentation(device, controller, clock=clock, limits=LIMITS)
-    assert presented.fault == "torque: needs at most 20 N·m, got nan N·m"
-    assert [torque for _, torque in device.commands] == [0.0]
+    assert presented.fault.words == "torque: needs at most 20 N·m, got nan N·m"
+    assert [torque for _, torque in device.commands] == [0.0, 0.0]  # end, closing
 
 
 @pytest.mark.parametrize("attribute", ["silent_after", "deaf_after"])
@@ -219,10 +246,14 @@ def test_a_device_that_fails_is_a_fault_with_its_own_words(attribute: str) -> No
     controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
     presented = run_presentation(device, controller, clock=clock, limits=LIMITS)
     assert presented.fault is not None
-    assert presented.fault.startswith("scripted: ")
+    assert "scripted: " in presented.fault.words
     assert not device.is_open
     assert device.stopped  # also when it does not take the zero
-    assert presented.recording.columns["time_s"][-1] == pytest.approx(6e-3)
+    # Two ticks without a reading are let pass, a command that is not taken is not.
+    late = {"silent_after": 8e-3, "deaf_after": 6e-3}[attribute]
+    assert presented.recording.columns["time_s"][-1] == pytest.approx(late)
+    kind = {"silent_after": "missed-replies", "deaf_after": "no-answer"}[attribute]
+    assert presented.fault.kind == kind
 
 
 def test_what_goes_wrong_while_closing_is_added_to_the_fault() -> None:
@@ -232,12 +263,33 @@ def test_what_goes_wrong_while_closing_is_added_to_the_fault() -> None:
     device.open()
     controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
     presented = run_presentation(device, controller, clock=clock, limits=LIMITS)
-    assert presented.fault == (
-        "scripted: no answer; closing it: scripted: does not listen"
+    assert presented.fault.words == (
+        "missed replies: needs a new reading after at most 2 ticks without, got 3 in a "
+        "row (scripted: no answer); ramping down: scripted: does not listen; "
+        "closing it: scripted: does not listen"
     )
 
 
-def test_a_reading_that_is_not_newer_than_the_last_one_is_a_fault() -> None:
+def test_replies_that_come_again_after_two_ticks_are_no_fault() -> None:
+    class Patchy(ScriptedDevice):
+        def _read(self):
+            reading = super()._read()
+            if 4 <= self.n_reads % 10 <= 5:
+                raise DeviceTimeoutError("scripted: no answer")
+            return reading
+
+    clock = SimulatedClock()
+    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
+    with Patchy(clock) as device:
+        presented = run_presentation(
+            device, controller, clock=clock, limits=LIMITS, max_duration_s=0.03
+        )
+    assert presented.fault is None
+    assert presented.recording.facts["n_missed_replies"] == 6
+    assert presented.recording.n_samples == 24  # nothing is recorded without a reading
+
+
+def test_readings_that_are_not_newer_than_the_last_one_are_a_fault() -> None:
     class StuckDevice(ScriptedDevice):
         def _read(self):
             reading = super()._read()
@@ -249,7 +301,8 @@ def test_a_reading_that_is_not_newer_than_the_last_one_is_a_fault() -> None:
     controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
     presented = run_presentation(device, controller, clock=clock, limits=LIMITS)
     assert presented.fault is not None
-    assert presented.fault.startswith("reading: needs one newer than the last")
+    assert presented.fault.kind == "missed-replies"
+    assert presented.fault.words.endswith("(one of 0.005000 s again)")
     assert not device.is_open
 
 
@@ -260,7 +313,7 @@ def test_a_device_that_never_answers_leaves_an_empty_recording(tmp_path) -> None
     device.open()
     controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
     presented = run_presentation(device, controller, clock=clock, limits=LIMITS)
-    assert presented.fault == "scripted: no answer"
+    assert presented.fault.words.endswith("(scripted: no answer)")
     assert presented.recording.n_samples == 0
     assert presented.recording.facts["phases"] == ""
     write_recording(presented.recording, tmp_path / "empty.npz")
@@ -275,10 +328,10 @@ def test_a_fault_of_the_encoder_leaves_a_recording_that_can_be_written(
         SimulatedClock(), angle=lambda t: START + t if t < 0.0175 else angle
     )
     assert presented.fault is not None
-    assert presented.fault.startswith("range: ")
+    assert presented.fault.words.startswith("range: ")
     write_recording(presented.recording, tmp_path / "fault.npz")
     facts = json.loads((tmp_path / "fault.json").read_text())
-    assert facts["fault"] == presented.fault
+    assert facts["fault"] == presented.fault.words
     assert facts["mean_speed_deg_s"] is None  # no catch, and the last angle is wrong
 
 
@@ -379,11 +432,13 @@ def test_a_rest_that_is_broken_off_begins_anew() -> None:
     def angle(time_s: float) -> float:
         return radians(120.0 if 0.0495 < time_s < 0.0605 else 145.0)
 
+    lenient = {"speed": 1e5, "torque": 1e5, "torque_rate": 1e9, "jump_angle": 10.0}
+
     _, presented = rest(
         SimulatedClock(),
         angle=angle,
         max_duration_s=1.0,
-        limits=limits_with(speed=1e5, torque=1e5),
+        limits=limits_with(**lenient, frozen_time=1.0),
     )
     # There again at 61 ms, at rest when the low-pass has forgotten the jump.
     assert presented.recording.facts["ended"] == "arrived"
@@ -459,7 +514,7 @@ def test_with_a_real_clock_it_goes_the_same_way() -> None:
                     device,
                     controller,
                     clock=clock,
-                    limits=limits_with(missed_ticks=2_000),
+                    limits=limits_with(missed_ticks=2_000, watchdog_time=1.0),
                     max_duration_s=1.4,
                 )
         found.append(presented)

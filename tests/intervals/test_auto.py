@@ -9,7 +9,7 @@ import warnings
 
 import numpy as np
 import pytest
-from scipy.special import expit, logit
+from scipy.special import betaincinv, expit, logit
 from scipy.stats import t as student
 
 from masrel.agreement import COEFFICIENTS, fleiss_kappa, stratified_kappa
@@ -278,3 +278,48 @@ def test_nothing_is_drawn_and_no_sampler_is_loaded() -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     )
     assert done.stdout.strip() == "None []"
+
+
+FEW_PAIRS = [["a", "a"], ["a", "b"], ["b", "b"], ["c", "c"], ["c", "c"], ["b", "c"]]
+
+
+def test_two_raters_of_few_items_have_the_posterior_of_their_table() -> None:
+    asked = {"target": "items", "categories": list("abc")}
+    found = estimate("cohen_kappa", FEW_PAIRS, **asked).interval  # type: ignore[arg-type]
+    again = estimate("cohen_kappa", FEW_PAIRS, **asked).interval  # type: ignore[arg-type]
+    plain = posterior("cohen_kappa", FEW_PAIRS, model="table", rng=3, **asked)  # type: ignore[arg-type]
+    assert found is not None
+    assert plain.monte_carlo_error is not None
+    assert found == again  # it is drawn, always the same
+    assert found.method.startswith("Dirichlet posterior of the table of two raters")
+    assert found.notes[0].startswith("chosen for other items: few items (6)")
+    # two sets of draws: 5 errors of the one with fewer, once in a million runs
+    slack = 5.0 * 2.0 * max(plain.monte_carlo_error)
+    assert (found.low, found.high) == pytest.approx((plain.low, plain.high), abs=slack)
+
+
+def test_two_raters_of_more_items_have_the_jackknife_while_something_moves() -> None:
+    found = estimate("cohen_kappa", FEW_PAIRS * 2, target="items").interval
+    assert found is not None
+    assert found.method == "item jackknife, t(11) on the logit"
+
+
+def test_two_raters_who_always_agree_have_a_lower_bound() -> None:
+    rows = [["a", "a"], ["b", "b"]] * 8
+    found = estimate("cohen_kappa", rows, target="items").interval
+    assert found is not None
+    # The two agreeing cells are Beta(8.375), the others hold 0.75: kappa is nearly
+    # one less the share of these over chance, Beta(0.75, 16.75) / 0.5.
+    rough = 1.0 - 2.0 * betaincinv(0.75, 16.75, 0.95)
+    assert found.low == pytest.approx(rough, abs=0.02)
+    assert (found.high, found.method[-9:]) == (1.0, "one-sided")
+    assert any("the prior weighs" in note for note in found.notes)
+
+
+def test_the_interval_of_two_raters_holds_the_estimate() -> None:
+    # never agreeing: kappa is -1, where no posterior reaches
+    rows = [["a", "b"], ["b", "a"]] * 2
+    found = estimate("cohen_kappa", rows, target="items")
+    assert found.interval is not None
+    assert (found.value, found.interval.low) == (-1.0, -1.0)
+    assert any("widened to the estimate" in note for note in found.interval.notes)

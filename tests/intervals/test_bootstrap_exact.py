@@ -300,6 +300,28 @@ def test_the_words_say_what_it_is() -> None:
         found.distribution.values[0] = 0.0
 
 
+@pytest.mark.parametrize("options", [{"exact": True}, {"exact": False, "rng": 1}])
+@pytest.mark.parametrize("target", ["items", "raters"])
+def test_the_distribution_is_of_the_coefficient_or_not_there(
+    target: str, options: dict[str, object]
+) -> None:
+    found = {
+        kind: bootstrap("fleiss_kappa", TABLE_V, target=target, kind=kind, **options)  # type: ignore[arg-type]
+        for kind in ("percentile", "basic", "bca", "studentized")
+    }
+    # ratios to standard errors, infinite ones among them, are no values of kappa
+    assert found["studentized"].distribution is None
+    plain = found["percentile"].distribution
+    assert plain is not None
+    assert plain.values.min() > -1.0
+    assert plain.values.max() <= 1.0
+    for kind in ("basic", "bca"):
+        other = found[kind].distribution
+        assert other is not None
+        np.testing.assert_array_equal(other.values, plain.values)
+        np.testing.assert_array_equal(other.weights, plain.weights)
+
+
 def test_too_many_sums_are_drawn_or_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     table = dirichlet_multinomial(np.random.default_rng(5), 9, 4, 0.3)
     module = importlib.import_module("masrel.intervals.resampling.exact")

@@ -1,13 +1,16 @@
 """A session presents, asks and logs; stopped anywhere, it goes on there."""
 
+import csv
 import hashlib
 import io
 import os
+import signal
 import time
 from collections.abc import Callable
 from pathlib import Path
 
 import msgspec
+import numpy as np
 import pytest
 
 from masrel.errors import (
@@ -17,9 +20,10 @@ from masrel.errors import (
     SessionLogError,
     SessionStoppedError,
 )
+from masrel.hess import SimulatedClock
 from masrel.protocol import DeviceSettings, Protocol, StudyPaths
 from masrel.ratings import ratings_from_logs
-from masrel.recording import read_recording
+from masrel.recording import RECORDING_COLUMNS, read_recording
 from masrel.run import (
     Asked,
     ConsoleGrades,
@@ -31,6 +35,7 @@ from masrel.run import (
     record_correction,
     run_session,
 )
+from masrel.run.walk import CLOCKS
 from masrel.scales import MODIFIED_ASHWORTH
 from masrel.schedule import Presentation, read_schedule
 
@@ -186,20 +191,71 @@ def faulty(new_study: Callable[..., Small]) -> Small:
 def test_faults_are_logged_and_stop_the_session_after_three(faulty: Small) -> None:
     with pytest.raises(DeviceError, match=r"presentation 1, code .*speed"):
         run(faulty, SimulatedGrades(faulty[1]))
-    assert events(faulty) == ["session", "presented", "presented", "presented"]
+    assert events(faulty) == ["session", *["presented", "fault"] * 3]
     log = read_log(faulty[0].log_file("R1", "test"))
-    assert [event.fields["attempt"] for event in log[1:]] == [1, 2, 3]
-    for event in log[1:]:
+    assert [event.fields["attempt"] for event in log[1:]] == [1, 1, 2, 2, 3, 3]
+    for event in log[1::2]:
         assert "speed" in str(event.fields["fault"])
         path = faulty[0].sessions / str(event.fields["recording"])
         assert read_recording(path).facts["fault"] == event.fields["fault"]
+
+
+def test_the_log_names_a_fault_with_the_data_before_it(faulty: Small) -> None:
+    with pytest.raises(DeviceError):
+        run(faulty, SimulatedGrades(faulty[1]))
+    log = read_log(faulty[0].log_file("R1", "test"))
+    shown, fault = log[1], log[2]
+    assert fault.fields["kind"] == "speed"
+    assert fault.fields["words"] == shown.fields["fault"]
+    recording = read_recording(faulty[0].sessions / str(shown.fields["recording"]))
+    rows = list(csv.DictReader(io.StringIO(str(fault.fields["last_200_ms"]))))
+    time_s = recording.columns["time_s"]
+    assert rows[0].keys() == set(RECORDING_COLUMNS)
+    assert len(rows) == np.sum(time_s >= float(fault.fields["time_s"]) - 0.2)
+    for name in RECORDING_COLUMNS:
+        logged = [float(row[name]) for row in rows]
+        kept = recording.columns[name][-len(rows) :]
+        np.testing.assert_allclose(logged, kept, atol=0.0051)
+    assert float(rows[-1]["command_torque_nm"]) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("number", "left"),
+    [
+        (signal.SIGINT, ["presented", "fault", "presented", "grade"]),
+        (signal.SIGTERM, ["presented", "fault", "stopped"]),
+    ],
+)
+def test_a_signal_is_an_emergency_stop(small: Small, number, left) -> None:
+    # The signal comes while the first presentation runs, from its own clock.
+    handlers = [signal.getsignal(number)]
+
+    class Signalling(SimulatedClock):
+        def sleep_until_ns(self, deadline_ns: int) -> None:
+            if deadline_ns == 300_000_000 and len(handlers) == 1:
+                handlers.append(signal.getsignal(number))
+                signal.raise_signal(number)
+            super().sleep_until_ns(deadline_ns)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(CLOCKS, "simulated", Signalling)
+        if number == signal.SIGTERM:
+            with pytest.raises(SessionStoppedError, match="stopped by signal SIGTERM"):
+                run(small, SimulatedGrades(small[1]))
+        else:
+            run(small, SimulatedGrades(small[1]))
+    assert events(small)[1 : 1 + len(left)] == left
+    fault = read_log(small[0].log_file("R1", "test"))[2]
+    assert fault.fields["kind"] == "emergency-stop"
+    assert fault.fields["words"] == f"emergency stop: signal {number.name}"
+    assert signal.getsignal(number) is handlers[0]  # as it was before
 
 
 def test_a_person_decides_whether_to_try_again_after_a_fault(faulty: Small) -> None:
     source, said = console("\nyes\n\nperhaps\nno\n")
     with pytest.raises(DeviceError, match="stopped by a fault"):
         run(faulty, source)
-    assert events(faulty) == ["session", "presented", "presented"]
+    assert events(faulty) == ["session", *["presented", "fault"] * 2]
     assert said.getvalue().count("Present it again? (yes, no): ") == 3
 
 

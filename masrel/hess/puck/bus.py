@@ -4,7 +4,7 @@ A frame that a bus reports is a `Frame`, an error that python-can raises a
 `DeviceError`, a wait ends at a time on the loop's clock.
 """
 
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from masrel.errors import BusError, DeviceError
 from masrel.hess.clock import Clock
@@ -188,7 +188,8 @@ def open_link(
     interface : str
         Name of a python-can interface, such as "socketcan" or "virtual".
     channel : str
-        Its channel, such as "can0".
+        Its channel, such as "can0"; for "udp_multicast" a group, or an IPv4 group, a
+        colon and a port.
     clock : Clock
         The clock of deadlines.
     accepted : tuple of int or None, optional
@@ -216,14 +217,24 @@ def open_link(
     try:
         bus = can.Bus(
             interface=interface,
-            channel=channel,
-            bitrate=BITRATE,
             can_filters=filters,
             ignore_config=True,  # what is opened is what was asked for
+            **_settings(interface, channel),
         )
-    except (can.CanError, OSError, ValueError) as error:
+    except (can.CanError, NotImplementedError, OSError, ValueError) as error:
         raise BusError(
             f"puck: cannot open channel {channel!r} of interface {interface!r} "
             f"({error})"
         ) from error
     return Link(bus, clock, neighbour=neighbour)
+
+
+def _settings(interface: str, channel: str) -> dict[str, Any]:
+    if interface != "udp_multicast":
+        return {"channel": channel, "bitrate": BITRATE}
+    # A bus between the processes of one machine does not leave it.
+    settings: dict[str, Any] = {"channel": channel, "hop_limit": 0}
+    group, colon, port = channel.partition(":")
+    if colon and port.isdecimal():
+        settings.update(channel=group, port=int(port))
+    return settings

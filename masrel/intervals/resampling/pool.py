@@ -1,7 +1,7 @@
 """What resamples are drawn from: items, clusters of items, or raters."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from masrel.agreement.kernel import Floats
 from masrel.errors import ParameterError
-from masrel.intervals.case import Case
+from masrel.intervals.case import Case, blocks
 from masrel.intervals.resampling.lattice import Lattice, lattice_of
 from masrel.intervals.resampling.numerators import Integers
 
@@ -130,6 +130,20 @@ def cluster_pool(case: Case, clusters: Sequence[object] | NDArray[Any]) -> Pool:
     ParameterError
         If there is not one label for each row of the ratings.
     """
+    of, n_clusters = _numbered(case, clusters)
+    codes = case.coded.codes
+    sums = np.zeros((n_clusters, case.rows.shape[1]))
+    for items in blocks(len(codes)):
+        rated = np.any(codes[items] >= 0, axis=1)
+        block = replace(case.coded, codes=codes[items][rated])
+        np.add.at(sums, of[items][rated], case.kernel.features(block, case.v))
+    return _pool(case, sums, np.ones(n_clusters, dtype=np.int64))
+
+
+def _numbered(
+    case: Case, clusters: Sequence[object] | NDArray[Any]
+) -> tuple[Integers, int]:
+    # number of each item's cluster, -1 without ratings, (n_items,); how many there are
     labels = list(clusters)
     n_items = case.coded.codes.shape[0]
     if len(labels) != n_items:
@@ -137,20 +151,21 @@ def cluster_pool(case: Case, clusters: Sequence[object] | NDArray[Any]) -> Pool:
             f"clusters: needs one label for each of {n_items} items, got {len(labels)}"
         )
     rated = np.any(case.coded.codes >= 0, axis=1).tolist()
+    number: dict[object, int] = {}
     try:
-        number: dict[object, int] = {}
-        of = [
-            number.setdefault(label, len(number))
-            for label, is_rated in zip(labels, rated, strict=True)
-            if is_rated
-        ]
+        of = np.fromiter(
+            (
+                number.setdefault(label, len(number)) if is_rated else -1
+                for label, is_rated in zip(labels, rated, strict=True)
+            ),
+            dtype=np.int64,
+            count=n_items,
+        )
     except TypeError as error:
         raise ParameterError(f"clusters: needs plain labels, {error}") from error
     if any(label is None or label != label for label in number):
         raise ParameterError("clusters: every item needs a label, got a missing one")
-    sums = np.zeros((len(number), case.rows.shape[1]))
-    np.add.at(sums, of, case.features)
-    return _pool(case, sums, np.ones(len(number), dtype=np.int64))
+    return of, len(number)
 
 
 def rater_pool(case: Case) -> Pool:
@@ -207,6 +222,8 @@ def _distinct(rows: Floats) -> tuple[Floats, Integers]:
         key = key * 0.7390851332151607 + column
     _, first, kind = np.unique(key, return_index=True, return_inverse=True)
     found = rows[first]
-    if not np.array_equal(found[kind.ravel()], rows):
+    if not all(
+        np.array_equal(found[kind[some]], rows[some]) for some in blocks(len(rows))
+    ):
         found, kind = np.unique(rows, axis=0, return_inverse=True)
     return found, kind.ravel()

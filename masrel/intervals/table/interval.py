@@ -13,13 +13,34 @@ from masrel.intervals.case import Case
 from masrel.intervals.seeds import recorded_generator
 from masrel.intervals.table.chances import CHANCE
 from masrel.intervals.table.posterior import TablePosterior
+from masrel.intervals.table.prior import TablePrior
 from masrel.intervals.table.quantiles import table_quantiles
 
-__all__ = ["table_interval"]
+__all__ = ["speaks_of", "table_interval"]
 
 _FEW_ITEMS = 10
 _LEAST_DRAWS = 100
 _NOTED_DRAWS = 2_000  # for the interval under another prior: a note has three digits
+
+
+def speaks_of(case: Case) -> bool:
+    """Return whether a table of two raters has something to say.
+
+    Parameters
+    ----------
+    case : Case
+        The question.
+
+    Returns
+    -------
+    bool
+        False for a coefficient or a number of raters it does not know, or where the
+        prior alone would speak.
+    """
+    if case.entry.name not in CHANCE or case.coded.codes.shape[1] != 2:
+        return False
+    table, _ = _table(case.coded.codes, case.coded.n_categories)
+    return _nothing_to_learn(case, table) is None
 
 
 def table_interval(
@@ -28,20 +49,23 @@ def table_interval(
     *,
     n_draws: int,
     rng: np.random.Generator | int | None,
+    one_sided: bool = False,
 ) -> Interval:
-    """Compute the central credible interval of a coefficient of two raters.
+    """Compute the credible interval of a coefficient of two raters.
 
     Parameters
     ----------
     case : Case
         The question.
     concentration : float or None
-        Parameter of every cell of the table in its Dirichlet prior; None for one over
-        the number of cells, a prior as strong as one item.
+        Parameter of every cell of the table in its Dirichlet prior; None for the
+        default, see `TablePrior`.
     n_draws : int
         How often to draw where there are more than two categories.
     rng : Generator, int or None
         Where randomness comes from, if any is needed.
+    one_sided : bool, optional
+        All above a lower end, instead of the central interval.
 
     Returns
     -------
@@ -60,9 +84,14 @@ def table_interval(
     if reason is not None:
         undefined = case.undefined(reason, method="table posterior", unit=None)
         return dataclasses.replace(undefined, kind="credible")
-    a = 1.0 / table.size if concentration is None else concentration
-    asked = _Asked(case, rng)
-    found, (low, high) = asked.posterior(table + a, n_draws)
+    q = len(table)
+    prior = (
+        TablePrior.by_default(q)
+        if concentration is None
+        else TablePrior.of(concentration, q)
+    )
+    asked = _Asked(case, rng, one_sided)
+    found, (low, high) = asked.posterior(table + prior.cells, n_draws)
     drawn = found.n_draws is not None
     words = f"{n_draws} draws" if drawn else "exact"
     notes = (f"left out, items of a single rating: {n_single}",) if n_single else ()
@@ -71,17 +100,23 @@ def table_interval(
         high=high,
         level=case.level,
         kind="credible",
-        method=f"Dirichlet posterior of the table of two raters, {words}",
+        method=f"Dirichlet posterior of the table of two raters, {words}"
+        + (", one-sided" if one_sided else ""),
         target=case.target,
         n_resamples=found.n_draws,
         monte_carlo_error=(
-            (found.quantile_error(low), found.quantile_error(high)) if drawn else None
+            (
+                found.quantile_error(low),
+                0.0 if one_sided else found.quantile_error(high),
+            )
+            if drawn
+            else None
         ),
         seed=asked.seed,
-        notes=(*notes, *_prior_notes(asked, table, a, (low, high))),
+        notes=(*notes, *_prior_notes(asked, table, prior, (low, high))),
         distribution=found.distribution(
             *_reach(case, low, high),
-            f"posterior of {case.entry.title}, prior {_words(a)}",
+            f"posterior of {case.entry.title}, prior {prior.words}",
         ),
     )
 
@@ -99,8 +134,11 @@ def _check(case: Case, n_draws: int) -> None:
 class _Asked:
     """One question for several priors; a generator is made when first needed."""
 
-    def __init__(self, case: Case, rng: np.random.Generator | int | None) -> None:
+    def __init__(
+        self, case: Case, rng: np.random.Generator | int | None, one_sided: bool
+    ) -> None:
         self.case = case
+        self.one_sided = one_sided
         self.seed: int | None = None
         self._rng = rng
         self._generator: np.random.Generator | None = None
@@ -109,8 +147,9 @@ class _Asked:
         self, prior: Floats, n_draws: int
     ) -> tuple[TablePosterior, tuple[float, float]]:
         """Return the posterior of one Dirichlet and its ends."""
-        tail = 0.5 * (1.0 - self.case.level)
-        return table_quantiles(
+        tail = 1.0 - self.case.level
+        tail = tail if self.one_sided else 0.5 * tail
+        found, (low, high) = table_quantiles(
             CHANCE[self.case.entry.name],
             self.case.v,
             prior,
@@ -119,6 +158,7 @@ class _Asked:
             generator=self._made,
             n_draws=n_draws,
         )
+        return found, (low, 1.0 if self.one_sided else high)
 
     def _made(self) -> np.random.Generator:
         if self._generator is None:
@@ -147,10 +187,6 @@ def _nothing_to_learn(case: Case, table: Floats) -> str | None:
     return None
 
 
-def _words(a: float) -> str:
-    return f"Dirichlet({a:.3g}, ...) over the cells of the table"
-
-
 def _reach(case: Case, low: float, high: float) -> tuple[float, float]:
     # beyond the ends as far as the interval is wide
     wide = high - low
@@ -158,7 +194,7 @@ def _reach(case: Case, low: float, high: float) -> tuple[float, float]:
 
 
 def _prior_notes(
-    asked: _Asked, table: Floats, a: float, ends: tuple[float, float]
+    asked: _Asked, table: Floats, prior: TablePrior, ends: tuple[float, float]
 ) -> tuple[str, ...]:
     # the interval under another prior, where that matters
     if (table > 0.0).sum() == 1 and table.trace():
@@ -169,10 +205,9 @@ def _prior_notes(
         what = f"{table.sum():.0f} items are few"
     else:
         return ()
-    as_one = 1.0 / table.size
-    other = as_one if not math.isclose(a, as_one) else 1.0 / len(table)
-    _, there = asked.posterior(table + other, _NOTED_DRAWS)
+    other = prior.other()
+    _, there = asked.posterior(table + other.cells, _NOTED_DRAWS)
     return (
-        f"{what}, so the prior weighs: {ends[0]:.3f} to {ends[1]:.3f} with {_words(a)},"
-        f" but {there[0]:.3f} to {there[1]:.3f} with Dirichlet({other:.3g}, ...)",
+        f"{what}, so the prior weighs: {ends[0]:.3f} to {ends[1]:.3f} with "
+        f"{prior.words}, but {there[0]:.3f} to {there[1]:.3f} with {other.words}",
     )

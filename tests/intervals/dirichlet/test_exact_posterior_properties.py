@@ -230,10 +230,15 @@ def test_where_the_prior_alone_would_speak_it_is_undefined(
         ({"method": "gibbs"}, "method: needs one of exact, emcee, got 'gibbs'"),
         ({"concentration": 0.0}, "concentration: needs a positive number, got 0.0"),
         ({"concentration": math.inf}, "concentration: needs a positive number"),
-        ({"weights": "linear"}, 'so "identity"; for two raters'),
+        ({"weights": "linear", "model": "dirichlet-multinomial"}, "of unweighted"),
+        ({"weights": "linear", "method": "emcee"}, "and no sampler"),
         ({"target": "raters"}, 'so "items"; for other raters use the jackknife'),
         ({"target": "both"}, 'got "both"'),
-        ({"coefficient": "cohen_kappa"}, "speaks of fleiss_kappa"),
+        (
+            {"coefficient": "cohen_kappa", "model": "dirichlet-multinomial"},
+            "two raters .* got cohen_kappa",
+        ),
+        ({"coefficient": "gwet_ac", "method": "emcee"}, "and no sampler"),
         ({"coefficient": "kendall_w"}, "coefficient"),
     ],
 )

@@ -18,6 +18,7 @@ from masrel.intervals import posterior
 from masrel.intervals.table.beta_nodes import beta_nodes
 from masrel.intervals.table.chances import CHANCE, Nodes, grid
 from masrel.intervals.table.posterior import TablePosterior
+from masrel.intervals.table.prior import TablePrior
 from masrel.intervals.table.quantiles import table_quantiles
 
 Floats = NDArray[np.float64]
@@ -67,8 +68,8 @@ TABLE = [[8, 2, 0], [1, 9, 3], [0, 2, 7]]
 
 
 def test_agreement_is_a_beta() -> None:
-    # 24 of 32 pairs agree; the prior, as strong as one item, is 1/9 a cell
-    agreed = betaincinv(24 + 3 / 9, 8 + 6 / 9, TAILS)
+    # 24 of 32 pairs agree; of the prior, 1.5 items, half is on pairs that do
+    agreed = betaincinv(24 + 0.75, 8 + 0.75, TAILS)
     percent = asked("percent_agreement", TABLE)
     assert ends(percent) == pytest.approx(tuple(agreed), abs=1e-11)
     corrected = asked("brennan_prediger", TABLE)
@@ -203,6 +204,21 @@ def drawn_values(
     return np.asarray(1.0 - apart / by_chance[coefficient])
 
 
+def by_default(q: int) -> Floats:
+    """1.5 items, half on the diagonal: 3/8 a cell of 2 × 2."""
+    return np.where(np.eye(q) > 0.0, 0.75 / q, 0.75 / (q * q - q))
+
+
+@pytest.mark.parametrize("q", [2, 3, 6])
+def test_the_default_prior_is_worth_one_item_and_a_half(q: int) -> None:
+    prior = TablePrior.by_default(q)
+    assert prior.cells == pytest.approx(by_default(q), rel=1e-15)
+    assert prior.cells.sum() == pytest.approx(1.5, rel=1e-15)
+    assert prior.cells.trace() == pytest.approx(0.75, rel=1e-15)
+    assert np.array_equal(TablePrior.of(1.0 / q, q).other().cells, prior.cells)
+    assert np.array_equal(prior.other().cells, np.full((q, q), 1.0 / q))
+
+
 @pytest.mark.parametrize("weights", ["identity", "linear", "quadratic"])
 @pytest.mark.parametrize(
     "coefficient",
@@ -215,7 +231,7 @@ def test_whole_tables_drawn_give_the_same(
     q = len(table)
     away: Floats = np.abs(np.subtract.outer(range(q), range(q))) / (q - 1.0)
     v = {"identity": (away > 0.0) * 1.0, "linear": away, "quadratic": away**2}[weights]
-    values = drawn_values(coefficient, np.array(table) + 1.0 / q**2, v)
+    values = drawn_values(coefficient, np.array(table) + by_default(q), v)
     found = asked(coefficient, table, weights=weights)
     errors = found.monte_carlo_error or (0.0, 0.0)
     density = found.distribution
@@ -336,7 +352,7 @@ def test_the_density_holds_what_lies_between_the_ends(
     assert below[-1] == pytest.approx(1.0, abs=3e-3)
     between = np.interp(ends(found), of.values, below)
     assert between[1] - between[0] == pytest.approx(0.95, abs=4e-3)
-    assert of.words.endswith("over the cells of the table")
+    assert of.words.endswith("half of it on pairs that agree")
 
 
 def test_the_place_of_a_probability_is_its_quantile_at_every_level() -> None:
@@ -393,10 +409,11 @@ def test_where_the_prior_weighs_another_stands_beside(
     other = asked("cohen_kappa", table, concentration=0.5)
     assert found.notes == (
         f"{what}, so the prior weighs: {found.low:.3f} to {found.high:.3f} with "
-        "Dirichlet(0.25, ...) over the cells of the table, but "
-        f"{other.low:.3f} to {other.high:.3f} with Dirichlet(0.5, ...)",
+        "a Dirichlet worth 1.5 items, half of it on pairs that agree, but "
+        f"{other.low:.3f} to {other.high:.3f} with Dirichlet(0.5, ...) over the cells "
+        "of the table",
     )
-    assert f"{found.low:.3f} to {found.high:.3f} with Dirichlet(0.25" in other.notes[0]
+    assert f"{found.low:.3f} to {found.high:.3f} with a Dirichlet" in other.notes[0]
 
 
 def test_items_of_a_single_rating_are_left_out_and_counted() -> None:
@@ -440,12 +457,28 @@ def test_where_nothing_can_be_said_it_is_undefined(
     assert (found.reason, found.kind) == (reason, "credible")
 
 
+def test_of_two_raters_others_than_fleiss_kappa_have_the_table_unasked() -> None:
+    rows = [[1, 1], [1, 2], [2, 2]] * 4
+    for coefficient, weights in (
+        ("cohen_kappa", "identity"),
+        ("scott_pi", "quadratic"),
+    ):
+        asked = posterior(
+            coefficient, rows, target="items", weights=weights, model="table"
+        )
+        unasked = posterior(coefficient, rows, target="items", weights=weights)
+        assert unasked == asked
+        assert "table of two raters" in unasked.method
+    assert "Dirichlet-multinomial" in posterior("scott_pi", rows, target="items").method
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [
         ({"coefficient": "fleiss_kappa", "raters": 3}, "of exactly two raters; got"),
         ({"coefficient": "kendall_w"}, "Kendall"),
-        ({"model": "tables"}, "model: needs one of dirichlet-multinomial, table, got"),
+        ({"model": "tables"}, "model: needs one of auto, .*table, got 'tables'"),
+        ({"model": "auto", "coefficient": "gwet_ac", "raters": 3}, "got gwet_ac by 3"),
         ({"method": "emcee"}, "and no sampler"),
         ({"prior": "jeffreys"}, 'has one prior, .* got prior="jeffreys"'),
         ({"target": "raters"}, "a posterior speaks of other items"),

@@ -1,0 +1,67 @@
+"""Many stretches at constant speed: every event in closed form.
+
+Source: Park, Kim and Damiano (2012), IEEE TNSRE 20(3), 361-370,
+https://doi.org/10.1109/TNSRE.2012.2195330, equations (2), (4) and (6).
+"""
+
+import numpy as np
+
+from masrel.elbow.scenes.course import Courses, Motions
+from masrel.elbow.scenes.table import Joints
+from masrel.elbow.scenes.twofold import Twofold, difference, product
+
+__all__ = ["constant_courses"]
+
+_NEAR = 1e-24
+# rad: two angles as near as that are left to 50 digits
+
+
+def constant_courses(joints: Joints, motions: Motions) -> Courses:
+    """Find the events of stretches at constant speed.
+
+    Parameters
+    ----------
+    joints : Joints
+        The joints.
+    motions : Motions
+        The stretches.
+
+    Returns
+    -------
+    Courses
+        Their events.
+    """
+    speed, start = motions.speed, motions.start
+    way = difference(np.minimum(motions.end, joints.range_end), start)
+    lowest = difference(joints.smallest_catch_angle, start)
+    # (2) with the first line of (6), as a way from the start
+    held = np.maximum(speed, joints.slowest_mean_speed)
+    line = difference(joints.catch_angle_constant, start) - product(
+        joints.catch_slope, held
+    )
+    travel = lowest.where(lowest.high > line.high, line)  # (6), third line
+    none = Twofold(np.zeros_like(speed))
+    travel = none.where(travel.high < 0.0, travel)  # it starts beyond the catch angle
+    released = travel + joints.catch_travel  # (4)
+    moves = speed >= joints.speed_threshold
+    catches = (speed > joints.speed_threshold) & ((way - travel).high > 0.0)
+    leaves = catches & ((way - released).high > 0.0)
+    doubtful = joints.has_jump
+    for one, other in ((way, travel), (way, released), (lowest, line)):
+        doubtful |= np.abs((one - other).high) < _NEAR
+    constant = Twofold(speed)
+    return Courses(
+        is_doubtful=doubtful,
+        moves=moves,
+        catches=catches,
+        leaves=leaves,
+        slows=np.zeros_like(moves),
+        onset=none,
+        catch=travel / speed,
+        catch_end=released / speed,
+        post_end=none,
+        end=way / speed,
+        catch_angle=travel + start,
+        catch_speed=constant,
+        mean_speed=constant,
+    )

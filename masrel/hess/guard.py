@@ -1,0 +1,279 @@
+"""The guard of one presentation: every reading and every torque passes it."""
+
+import math
+
+from masrel.errors import LimitExceededError
+from masrel.hess.limits import DeviceLimits
+
+__all__ = ["Guard"]
+
+# An arm that was faster than this cannot stop within a tick without 20 N·m on its
+# 0.06 kg·m²; slower ones may come to rest between two steps of the encoder.
+_MOVING_SPEED = math.radians(20.0)
+
+
+class Guard:
+    """Check readings and torques against limits that look at more than one tick.
+
+    Parameters
+    ----------
+    limits : DeviceLimits
+        What may pass.
+    period_s : float
+        Time from tick to tick, s.
+
+    Attributes
+    ----------
+    n_missed_replies : int
+        Ticks without a new reading so far.
+
+    Examples
+    --------
+    >>> guard = Guard(DeviceLimits(), 0.001)
+    >>> guard.torque(0.0, 31.5)
+    Traceback (most recent call last):
+        ...
+    masrel.errors.LimitExceededError: torque: needs at most 20 N·m, got 31.500 N·m
+    """
+
+    __slots__ = (
+        "_angle",
+        "_in_a_row",
+        "_limits",
+        "_moved_at",
+        "_period",
+        "_raw_speed",
+        "_sent",
+        "_sent_at",
+        "_stop_slope",
+        "_stopped_dead",
+        "_time",
+        "n_missed_replies",
+    )
+
+    def __init__(self, limits: DeviceLimits, period_s: float) -> None:
+        self._limits = limits
+        self._period = period_s
+        self._stop_slope = limits.soft_stop_torque / limits.soft_stop_width
+        self._time = -math.inf  # of the last reading, s
+        self._angle = 0.0
+        self._raw_speed = 0.0  # between the last two readings, rad/s
+        self._moved_at = 0.0  # when the angle changed last, s
+        self._stopped_dead = False  # whether it moved fast one tick before that
+        self._in_a_row = 0
+        self._sent = 0.0  # the last torque, N·m
+        self._sent_at = math.inf  # nothing yet: the device holds zero
+        self.n_missed_replies = 0
+
+    def is_new(self, time_s: float) -> bool:
+        """Return whether a reading is newer than the last one."""
+        return time_s > self._time
+
+    def no_reading(self, words: str) -> None:
+        """Count a tick without a new reading.
+
+        Parameters
+        ----------
+        words : str
+            What came instead.
+
+        Raises
+        ------
+        LimitExceededError
+            If there are more in a row than may pass.
+        """
+        self.n_missed_replies += 1
+        self._in_a_row += 1
+        if self._in_a_row > self._limits.missed_replies:
+            raise LimitExceededError(
+                f"missed replies: needs a new reading after at most "
+                f"{self._limits.missed_replies} ticks without, got {self._in_a_row} "
+                f"in a row ({words})",
+                "missed-replies",
+            )
+
+    def reading(self, time_s: float, angle: float, age_s: float) -> None:
+        """Check a new reading alone and against the one before.
+
+        Parameters
+        ----------
+        time_s : float
+            When it was read, s since the presentation began.
+        angle : float
+            Elbow angle, rad; ``nan`` never passes.
+        age_s : float
+            How long ago that is, s.
+
+        Raises
+        ------
+        LimitExceededError
+            If it is stale, out of range, or cannot follow the one before.
+        """
+        limits = self._limits
+        if not -self._period <= age_s <= limits.stale_time:
+            raise LimitExceededError(
+                f"stale: needs a reading at most {limits.stale_time * 1e3:g} ms old, "
+                f"got one of {age_s * 1e3:.1f} ms",
+                "stale",
+            )
+        if not limits.lowest_angle <= angle <= limits.highest_angle:
+            raise LimitExceededError(
+                f"range: needs {math.degrees(limits.lowest_angle):.1f} to "
+                f"{math.degrees(limits.highest_angle):.1f} deg, the arm is at "
+                f"{math.degrees(angle):.1f} deg",
+                "range",
+            )
+        self._in_a_row = 0
+        if self._time == -math.inf:
+            self._moved_at = time_s
+        else:
+            self._follows(time_s, angle)
+        self._time = time_s
+        self._angle = angle
+
+    def _follows(self, time_s: float, angle: float) -> None:
+        # The same encoder cannot read just any angle one tick later.
+        limits = self._limits
+        interval = time_s - self._time
+        change = angle - self._angle
+        if change == 0.0:
+            self._raw_speed = 0.0
+            self._still_for(time_s - self._moved_at)
+            return
+        off = change - self._raw_speed * interval
+        ticks = interval / self._period if interval > self._period else 1.0
+        if not -limits.jump_angle <= off / ticks <= limits.jump_angle:
+            raise LimitExceededError(
+                f"jump: needs an angle within {math.degrees(limits.jump_angle):g} deg "
+                f"of where the speed would have it, got one "
+                f"{math.degrees(off / ticks):.2f} deg a tick from there",
+                "jump",
+            )
+        self._raw_speed = speed = change / interval
+        self._moved_at = time_s
+        self._stopped_dead = abs(speed) > _MOVING_SPEED
+
+    def _still_for(self, duration_s: float) -> None:
+        limits = self._limits
+        if self._stopped_dead and duration_s > limits.frozen_time:
+            raise LimitExceededError(
+                f"frozen: needs an angle that changes within "
+                f"{limits.frozen_time * 1e3:g} ms of an arm that was moving, "
+                f"got one that does not for {duration_s * 1e3:.1f} ms",
+                "frozen",
+            )
+        if duration_s > limits.standing_time and not (
+            -limits.standing_torque <= self._sent <= limits.standing_torque
+        ):
+            raise LimitExceededError(
+                f"standing torque: needs at most {limits.standing_torque:g} N·m on an "
+                f"arm that has not moved for {limits.standing_time * 1e3:g} ms, "
+                f"got {self._sent:.3f} N·m",
+                "standing-torque",
+            )
+
+    def speed(self, velocity: float) -> None:
+        """Check the estimated speed.
+
+        Parameters
+        ----------
+        velocity : float
+            rad/s; ``nan`` never passes.
+
+        Raises
+        ------
+        LimitExceededError
+            If the arm is too fast.
+        """
+        limit = self._limits.speed
+        if not -limit <= velocity <= limit:
+            raise LimitExceededError(
+                f"speed: needs at most {math.degrees(limit):.0f} deg/s, the arm "
+                f"moves at {math.degrees(velocity):.0f} deg/s",
+                "speed",
+            )
+
+    def soft_stop(self, angle: float) -> float:
+        """Return what the soft stops push back with.
+
+        Parameters
+        ----------
+        angle : float
+            Elbow angle within the range, rad.
+
+        Returns
+        -------
+        float
+            Torque to add to the command, N·m: positive near the highest angle,
+            negative near the lowest, 0 between.
+        """
+        limits = self._limits
+        beyond = angle - (limits.highest_angle - limits.soft_stop_width)
+        if beyond > 0.0:
+            return self._stop_slope * beyond
+        beyond = angle - (limits.lowest_angle + limits.soft_stop_width)
+        return self._stop_slope * beyond if beyond < 0.0 else 0.0
+
+    def torque(self, time_s: float, torque: float) -> None:
+        """Check a torque before it is sent.
+
+        Parameters
+        ----------
+        time_s : float
+            When, s.
+        torque : float
+            What is to be sent, N·m; ``nan`` never passes.
+
+        Raises
+        ------
+        LimitExceededError
+            If it is too large or builds up too fast.
+        """
+        limits = self._limits
+        if not -limits.torque <= torque <= limits.torque:
+            raise LimitExceededError(
+                f"torque: needs at most {limits.torque:g} N·m, got {torque:.3f} N·m",
+                "torque",
+            )
+        before = self._sent
+        if not (0.0 <= torque <= before or before <= torque <= 0.0):  # it builds up
+            interval = time_s - self._sent_at
+            if interval < self._period:
+                interval = self._period
+            if abs(torque - before) > limits.torque_rate * interval:
+                raise LimitExceededError(
+                    f"torque rate: needs at most {limits.torque_rate:g} N·m/s, "
+                    f"got {before:.3f} and then {torque:.3f} N·m",
+                    "torque-rate",
+                )
+        self._sent = torque
+        self._sent_at = time_s
+
+    def missed_ticks(self, n_missed: int, gap_s: float) -> None:
+        """Check how many ticks have been missed so far, and how many at once.
+
+        Parameters
+        ----------
+        n_missed : int
+            Ticks missed since the presentation began.
+        gap_s : float
+            How long nothing has been sent, s.
+
+        Raises
+        ------
+        LimitExceededError
+            If there are too many, or the gap is as long as the watchdog waits.
+        """
+        limits = self._limits
+        if gap_s >= limits.watchdog_time:
+            raise LimitExceededError(
+                f"silence: needs a command every {limits.watchdog_time * 1e3:g} ms, "
+                f"the loop sent none for {gap_s * 1e3:.1f} ms",
+                "overrun",
+            )
+        if n_missed > limits.missed_ticks:
+            raise LimitExceededError(
+                f"missed ticks: needs at most {limits.missed_ticks} in a presentation, "
+                f"the loop missed {n_missed}",
+                "overrun",
+            )

@@ -1,0 +1,48 @@
+"""Idle a puck from another process: what the watchdog does when the loop has died."""
+
+from collections.abc import Callable
+
+from masrel.hess.clock import RealClock
+from masrel.hess.puck.bring_up import release
+from masrel.hess.puck.bus import open_link
+from masrel.hess.puck.node import PuckNode, accepted_identifiers
+
+__all__ = ["prepare"]
+
+
+def prepare(
+    interface: str, channel: str, puck: str, torque_number: str, mode_number: str
+) -> Callable[[], None]:
+    """Join the bus and be ready to idle the puck.
+
+    Parameters
+    ----------
+    interface, channel : str
+        Of python-can.
+    puck : str
+        Node of the puck.
+    torque_number, mode_number : str
+        Numbers of T and MODE.
+
+    Returns
+    -------
+    callable
+        Zeroes the torque and idles the puck; raises `DeviceError` if it does not
+        confirm within 0.1 s.
+
+    Raises
+    ------
+    DeviceError
+        If the bus cannot be opened.
+    """
+    clock = RealClock()
+    node_number = int(puck)
+    link = open_link(
+        interface, channel, clock=clock, accepted=accepted_identifiers(node_number)
+    )
+    node = PuckNode(link, clock, node_number)
+
+    def idle() -> None:
+        release(node, torque_number=int(torque_number), mode_number=int(mode_number))
+
+    return idle

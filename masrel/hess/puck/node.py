@@ -1,0 +1,317 @@
+"""One puck at the other end of a bus: questions, settings and its position."""
+
+import itertools
+
+from masrel.errors import BusError, DeviceTimeoutError
+from masrel.hess.clock import Clock
+from masrel.hess.puck.bus import BUS_OFF, BUS_RESTARTED, Frame, Link
+from masrel.hess.puck.frames import (
+    Position,
+    PropertyValue,
+    decode_position,
+    decode_reply,
+    encode_get,
+    encode_set,
+)
+from masrel.hess.puck.identifiers import (
+    POSITION_GROUP,
+    PROPERTY_GROUP,
+    from_puck,
+    to_puck,
+)
+from masrel.hess.puck.properties import ID, ROLE, SERIAL_NUMBER, STATUS, VERSION
+
+__all__ = ["PuckNode", "accepted_identifiers"]
+
+_SAMPLING_NS = 75_000
+"""A puck samples its encoder this long after it is asked; said by a public driver."""
+
+# What every puck answers, asked for its order among the answers, not for its value
+_MARKERS = (VERSION, ROLE, SERIAL_NUMBER, ID, STATUS)
+
+_MOST_WAITING = 1000  # frames; more than fit on the bus in 50 ms
+_ERROR_FRAMES = 10  # on a bus of one joint there should be none
+
+
+def accepted_identifiers(puck: int) -> tuple[int, int]:
+    """Return the only identifiers that a driver of one puck listens to.
+
+    Parameters
+    ----------
+    puck : int
+        Node of the puck.
+
+    Returns
+    -------
+    tuple of int
+        Its positions and its other answers. The safety module's broadcasts, other
+        pucks and what other hosts ask are not among them.
+
+    Raises
+    ------
+    FrameError
+        If there is no such node.
+
+    Examples
+    --------
+    >>> [hex(identifier) for identifier in accepted_identifiers(1)]
+    ['0x423', '0x426']
+    """
+    return from_puck(puck, POSITION_GROUP), from_puck(puck, PROPERTY_GROUP)
+
+
+class PuckNode:
+    """A puck, spoken to frame by frame.
+
+    Parameters
+    ----------
+    link : Link
+        The bus.
+    clock : Clock
+        The clock of the link.
+    puck : int
+        Node of the puck, 1 to 31.
+
+    Attributes
+    ----------
+    puck : int
+        Node of the puck.
+    heard : dict of int to int
+        Answers nobody was waiting for, the last by property number.
+    n_foreign, n_late, n_errors : int
+        Frames that were not for this driver, positions that came when nobody
+        waited for one any more, and error frames.
+
+    Raises
+    ------
+    FrameError
+        If there is no such node.
+    """
+
+    __slots__ = (
+        "_clock",
+        "_in_doubt",
+        "_link",
+        "_markers",
+        "_positions",
+        "_properties",
+        "_to",
+        "heard",
+        "n_errors",
+        "n_foreign",
+        "n_late",
+        "puck",
+    )
+
+    def __init__(self, link: Link, clock: Clock, puck: int) -> None:
+        self._link = link
+        self._clock = clock
+        self._to = to_puck(puck)
+        self._positions, self._properties = accepted_identifiers(puck)
+        self._in_doubt = False
+        self._markers = itertools.cycle(_MARKERS)
+        self.puck = puck
+        self.heard: dict[int, int] = {}
+        self.n_foreign = 0
+        self.n_late = 0
+        self.n_errors = 0
+
+    def tell(self, property_id: int, value: int) -> None:
+        """Set a property; a puck does not acknowledge it.
+
+        Parameters
+        ----------
+        property_id : int
+            Number of the property.
+        value : int
+            Its new value.
+
+        Raises
+        ------
+        BusError
+            If the bus does not take the frame.
+        FrameError
+            If the value does not fit.
+        """
+        self._link.send(Frame(self._to, encode_set(property_id, value)))
+
+    def inquire(self, property_id: int) -> int:
+        """Ask for a property and do not wait; the answer comes into `heard`.
+
+        Parameters
+        ----------
+        property_id : int
+            Number of the property.
+
+        Returns
+        -------
+        int
+            When it was asked for, ns.
+
+        Raises
+        ------
+        BusError
+            If the bus does not take the frame.
+        """
+        return self._link.send(Frame(self._to, encode_get(property_id)))
+
+    def ask(self, property_id: int, *, patience_s: float = 0.05) -> int:
+        """Ask for a property and wait for the answer.
+
+        Parameters
+        ----------
+        property_id : int
+            Number of the property.
+        patience_s : float, optional
+            How long to wait, s.
+
+        Returns
+        -------
+        int
+            Its value.
+
+        Raises
+        ------
+        DeviceTimeoutError
+            If no answer comes.
+        BusError, FrameError
+            If the bus fails or the answer is none.
+        """
+        self.listen()
+        self.heard.pop(property_id, None)
+        deadline_ns = self.inquire(property_id) + round(patience_s * 1e9)
+        while property_id not in self.heard:
+            frame = self._link.receive(deadline_ns)
+            if frame is None:
+                raise DeviceTimeoutError(
+                    f"puck {self.puck}: no answer for property {property_id} within "
+                    f"{patience_s * 1e3:g} ms"
+                )
+            self._sort(frame)
+        return self.heard.pop(property_id)
+
+    def position(self, property_id: int, *, patience_s: float) -> tuple[int, int]:
+        """Ask for the position and wait for it.
+
+        An answer does not say which question it belongs to. So what waits is thrown
+        away first. After a question that stayed without an answer, which may only be
+        late, the next is followed by one for another property, each time another: a
+        puck answers in the order in which it is asked, so that the last position
+        before that answer is the one asked for.
+
+        Parameters
+        ----------
+        property_id : int
+            Number of P.
+        patience_s : float
+            How long to wait, s.
+
+        Returns
+        -------
+        tuple of int
+            When the encoder was sampled, ns: 75 µs after it was asked for, or when
+            the answer came if that was sooner; and its count, of 22 bits.
+
+        Raises
+        ------
+        DeviceTimeoutError
+            If no answer comes.
+        BusError, FrameError
+            If the bus fails or the answer is none.
+        """
+        self.listen()
+        asked_ns = self.inquire(property_id)
+        marker = next(self._markers) if self._in_doubt else None
+        if marker is not None:
+            self.heard.pop(marker, None)
+            self.inquire(marker)
+        found = self._marked_position(asked_ns + round(patience_s * 1e9), marker)
+        if found is None:
+            raise DeviceTimeoutError(
+                f"puck {self.puck}: no position within {patience_s * 1e3:g} ms"
+            )
+        return min(asked_ns + _SAMPLING_NS, self._clock.now_ns()), found.counts
+
+    def _marked_position(self, deadline_ns: int, marker: int | None) -> Position | None:
+        # The first position that comes; with a marker, the last before its answer
+        found: Position | None = None
+        while found is None if marker is None else marker not in self.heard:
+            frame = self._link.receive(deadline_ns)
+            if frame is None:
+                self.n_late += found is not None  # that of an earlier question
+                self._in_doubt = True
+                return None
+            position = self._sort(frame)
+            if position is not None:
+                self.n_late += found is not None
+                found = position
+        self._in_doubt = False  # nothing earlier can come any more
+        return found
+
+    def listen(self) -> None:
+        """Take in what has come unasked: answers, errors, frames of others.
+
+        Raises
+        ------
+        BusError
+            If the bus is off, floods this end, or reports one error after another.
+        FrameError
+            If an answer of this puck is none.
+        """
+        for _ in range(_MOST_WAITING):
+            frame = self._link.receive(0)
+            if frame is None:
+                return
+            if self._sort(frame) is not None:
+                self.n_late += 1
+        raise BusError(f"puck {self.puck}: the bus is flooded with frames", "flooded")
+
+    def now_ns(self) -> int:
+        """Return the time.
+
+        Returns
+        -------
+        int
+            Time on the clock of the link, ns.
+        """
+        return self._clock.now_ns()
+
+    def wait(self, duration_s: float) -> None:
+        """Let time pass without a frame being sent.
+
+        Parameters
+        ----------
+        duration_s : float
+            How long, s.
+        """
+        self._clock.sleep_until_ns(self._clock.now_ns() + round(duration_s * 1e9))
+
+    def _sort(self, frame: Frame) -> Position | None:
+        # -> the position if it is one; everything else goes where it belongs
+        if frame.is_error:
+            self._note_error(frame.identifier)
+        elif frame.identifier == self._positions:
+            return decode_position(frame.data)
+        elif frame.identifier == self._properties:
+            answer: PropertyValue = decode_reply(frame.data)
+            self.heard[answer.property_id] = answer.value
+        else:
+            self.n_foreign += 1
+        return None
+
+    def _note_error(self, error_class: int) -> None:
+        if error_class & BUS_RESTARTED:
+            return
+        if error_class & BUS_OFF:
+            raise BusError(
+                f"puck {self.puck}: bus off, the host's controller has given up",
+                "bus-off",
+            )
+        self.n_errors += 1
+        if self.n_errors > _ERROR_FRAMES:
+            raise BusError(
+                f"puck {self.puck}: needs at most {_ERROR_FRAMES} error frames, the "
+                f"bus has reported {self.n_errors}, the last of class "
+                f"{error_class:#05x}",
+                "error-frames",
+            )

@@ -1,0 +1,182 @@
+"""The properties of an emulated puck, asleep and awake."""
+
+from masrel.hess.puck.faults import EmulatorOptions
+from masrel.hess.puck.properties import (
+    ERROR,
+    ID,
+    MONITOR_ANSWERS,
+    ROLE,
+    SERIAL_NUMBER,
+    STATUS,
+    VERSION,
+    property_table,
+)
+
+__all__ = ["ASLEEP", "IDLE", "READY", "TORQUE", "Registers"]
+
+ASLEEP, READY = 0, 2  # STAT; 1 is an error
+IDLE, TORQUE = 0, 2  # MODE; a puck has others, which this driver does not use
+
+_WAKE = READY  # setting STAT to this wakes
+_UNIVERSAL = {
+    "VERS": VERSION,
+    "ROLE": ROLE,
+    "SN": SERIAL_NUMBER,
+    "ID": ID,
+    "ERROR": ERROR,
+    "STAT": STATUS,
+}
+_FACTORY = {"MT": 4860, "PIDX": 1, "GRPA": 0, "GRPB": 2, "GRPC": 5, "POLES": 12}
+_MEASURED = {"TEMP": 31, "PTEMP": 33, "THERM": 30, "VBUS": 48}
+
+
+class Registers:
+    """What an emulated puck answers and remembers.
+
+    Parameters
+    ----------
+    options : EmulatorOptions
+        What it is like.
+    puck : int
+        Its node.
+
+    Attributes
+    ----------
+    table : PropertyTable
+        Numbers of its properties.
+    mode, torque : int
+        MODE, and T in current units.
+    offset : int
+        What P is more than the encoder's own count.
+    is_waking : bool
+        Whether it is off the bus.
+    n_memory_writes : int
+        How often it was told to write its permanent memory.
+
+    Raises
+    ------
+    DeviceError
+        If the firmware's numbers are not known and so cannot be emulated.
+    """
+
+    def __init__(self, options: EmulatorOptions, puck: int) -> None:
+        self.table = options.properties or property_table(options.firmware)
+        self._names = {number: name for name, number in self.table.numbers.items()}
+        self._values: dict[str, int] = {
+            **_FACTORY,
+            **_MEASURED,
+            "CTS": options.counts_per_turn,
+            "IPNM": options.units_per_nm,
+            "VERS": options.firmware,
+            "ROLE": options.role,
+            "SN": 4711,
+            "ID": puck,
+            "ERROR": 0,
+        }
+        self._universal = {number: name for name, number in _UNIVERSAL.items()}
+        self.is_waking = False
+        self.n_memory_writes = 0
+        self.offset = 0
+        self.mode = IDLE
+        self.torque = 0
+        self._is_awake = options.awake
+        if not options.awake:
+            self.fall_asleep()
+
+    @property
+    def position_number(self) -> int:
+        """Number of P; -1 while it is asleep and has none."""
+        return self.table.number("P") if self._is_awake else -1
+
+    @property
+    def groups(self) -> tuple[int, ...]:
+        """Groups it listens to."""
+        return tuple(self._values[name] for name in ("GRPA", "GRPB", "GRPC"))
+
+    @property
+    def slot(self) -> int:
+        """Its place in a frame of packed torques, from 0."""
+        return (self._values["PIDX"] - 1) % 4
+
+    @property
+    def highest(self) -> int:
+        """Largest torque, current units."""
+        return self._values["MT"]
+
+    def name(self, number: int) -> str:
+        """Return what a number means now.
+
+        Parameters
+        ----------
+        number : int
+            Number of a property.
+
+        Returns
+        -------
+        str
+            Its name; the number itself where it has none.
+        """
+        if number in self._universal:
+            return self._universal[number]
+        if not self._is_awake:
+            return {8: "LOCK", 9: "SAVE", 10: "LOAD"}.get(number, str(number))
+        return self._names.get(number, str(number))
+
+    def value(self, number: int) -> int | None:
+        """Return what it answers.
+
+        Parameters
+        ----------
+        number : int
+            Number of a property.
+
+        Returns
+        -------
+        int or None
+            Its value; None where it does not answer.
+        """
+        if number == STATUS:
+            return READY if self._is_awake else ASLEEP
+        if not self._is_awake and number not in MONITOR_ANSWERS:
+            return None
+        name = self.name(number)
+        if name == "MODE":
+            return self.mode
+        return self.torque if name == "T" else self._values.get(name)
+
+    def set(self, number: int, value: int) -> bool:
+        """Set a property that neither moves nor brakes the motor.
+
+        Parameters
+        ----------
+        number : int
+            Number of the property.
+        value : int
+            Its new value.
+
+        Returns
+        -------
+        bool
+            Whether it now wakes.
+        """
+        name = self.name(number)
+        if name in ("SAVE", "LOAD", "DEF", "LOCK"):
+            self.n_memory_writes += 1
+        elif name == "STAT" and not self._is_awake and value == _WAKE:
+            self.is_waking = True
+            return True
+        elif self._is_awake and name in _FACTORY:
+            self._values[name] = value
+        return False
+
+    def wake(self) -> None:
+        """Come back onto the bus."""
+        self.is_waking = False
+        self._is_awake = True
+
+    def fall_asleep(self) -> None:
+        """Lose everything that is not in permanent memory, the position first."""
+        self._is_awake = False
+        self.mode = IDLE
+        self.torque = 0
+        self._values.update(_FACTORY)

@@ -1,0 +1,146 @@
+"""The emergency stop: a key, a signal, or anything else that can press a button."""
+
+import os
+import select
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import TextIO
+
+from masrel.errors import EmergencyStopError
+
+if sys.platform != "win32":
+    import termios
+    import tty
+
+__all__ = ["EmergencyStop", "stop_on_key", "stop_on_signals"]
+
+_SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
+
+
+class EmergencyStop:
+    """A button that stays pressed; the loop looks at it in every tick.
+
+    Pressing it brings the torque to zero in the way of every fault. It is software,
+    and no substitute for a switch in the supply of the motor.
+
+    Attributes
+    ----------
+    reason : str or None
+        Who pressed it first; None while it is not pressed.
+
+    Examples
+    --------
+    >>> stop = EmergencyStop()
+    >>> stop.press("key")
+    >>> stop.check()
+    Traceback (most recent call last):
+        ...
+    masrel.errors.EmergencyStopError: emergency stop: key
+    """
+
+    __slots__ = ("reason",)
+
+    def __init__(self) -> None:
+        self.reason: str | None = None
+
+    def press(self, reason: str) -> None:
+        """Press it; once it is pressed, again changes nothing.
+
+        Parameters
+        ----------
+        reason : str
+            Who presses it.
+        """
+        if self.reason is None:
+            self.reason = reason
+
+    def check(self) -> None:
+        """Do nothing unless it is pressed.
+
+        Raises
+        ------
+        EmergencyStopError
+            If it is pressed.
+        """
+        if self.reason is not None:
+            raise EmergencyStopError(f"emergency stop: {self.reason}")
+
+
+@contextmanager
+def stop_on_signals(stop: EmergencyStop) -> Iterator[None]:
+    """Let signals that would end the process press the button instead.
+
+    Outside the main thread, where Python lets nobody handle signals, it does nothing.
+
+    Parameters
+    ----------
+    stop : EmergencyStop
+        The button.
+
+    Yields
+    ------
+    None
+        While the signals are caught: SIGINT (Ctrl-C), SIGTERM and SIGHUP.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def press(number: int, _frame: FrameType | None) -> None:
+        stop.press(f"signal {signal.Signals(number).name}")
+
+    numbers = [getattr(signal, name) for name in _SIGNALS if hasattr(signal, name)]
+    before = {number: signal.signal(number, press) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
+def stop_on_key(stop: EmergencyStop, keys: TextIO) -> Iterator[None]:
+    """Let any key of a terminal press the button.
+
+    Parameters
+    ----------
+    stop : EmergencyStop
+        The button.
+    keys : TextIO
+        Where the keys come from. Anything but a terminal is left alone, and so is
+        every terminal on Windows.
+
+    Yields
+    ------
+    None
+        While keys are waited for, in a thread that sleeps until one comes.
+    """
+    if sys.platform == "win32" or not keys.isatty():
+        yield
+        return
+    terminal = keys.fileno()
+    ended, end = os.pipe()
+    settings = termios.tcgetattr(terminal)
+    waiting = threading.Thread(
+        target=_wait_for_key, args=(stop, terminal, ended), daemon=True
+    )
+    try:
+        tty.setcbreak(terminal)  # a key counts at once, without Enter
+        waiting.start()
+        yield
+    finally:
+        os.close(end)
+        waiting.join()
+        os.close(ended)
+        termios.tcsetattr(terminal, termios.TCSAFLUSH, settings)
+
+
+def _wait_for_key(stop: EmergencyStop, terminal: int, ended: int) -> None:
+    ready, _, _ = select.select([terminal, ended], [], [])
+    if terminal in ready:
+        os.read(terminal, 1)
+        stop.press("key")

@@ -1,0 +1,150 @@
+"""What a model says where few items, or no disagreement, leave nothing to resample."""
+
+import dataclasses
+import math
+
+from scipy.special import expit
+
+from masrel.estimates import Distribution, Interval
+from masrel.intervals.choice import PRIOR, Choice
+from masrel.intervals.dirichlet.rho import ExactPosterior, prior_notes
+from masrel.intervals.table.interval import table_interval
+
+__all__ = ["lifted", "of_any_raters", "of_two_raters", "one_sided"]
+
+_DRAWS, _SEED = 4_000, 1  # of a table; always the same ones, so that it repeats
+
+
+def lifted(interval: Interval, above: float) -> Interval:
+    """Move an upper end halfway to a higher one of the posterior.
+
+    An estimate of few items is skewed: low where its error is low, too. The posterior
+    knows, but trusts many raters too much where κ is low; halfway covers with either.
+
+    Parameters
+    ----------
+    interval : Interval
+        A jackknife's.
+    above : float
+        The posterior's upper end.
+
+    Returns
+    -------
+    Interval
+        The interval, with a note if its end was moved.
+    """
+    if not above > interval.high:
+        return interval
+    note = (
+        f"the upper end, {interval.high:.3f}, is lifted halfway to that of the "
+        f"Dirichlet-multinomial posterior, {above:.3f}: with few items an estimate "
+        "that is low by chance has a low error, too"
+    )
+    high = 0.5 * (interval.high + above)
+    return dataclasses.replace(interval, high=high, notes=(*interval.notes, note))
+
+
+def of_any_raters(choice: Choice, excess: float) -> Interval:
+    """Compute the Dirichlet-multinomial posterior's interval, holding the estimate.
+
+    Parameters
+    ----------
+    choice : Choice
+        The question.
+    excess : float
+        Square of what raters add to a half width.
+
+    Returns
+    -------
+    Interval
+        The central interval; one-sided where the estimate is 1 or undefined.
+    """
+    case, found = choice.case, choice.posterior
+    if not case.value < 1.0:  # perfect, or undefined: one category
+        return one_sided(choice)
+    middle = float(expit(found.logit.quantile(0.5)))
+    low = middle - math.hypot(middle - found.low, math.sqrt(excess))
+    high = middle + math.hypot(found.high - middle, math.sqrt(excess))
+    method = "Dirichlet-multinomial posterior, exact"
+    if excess:
+        method += ", and the spread of raters"
+    notes = prior_notes(choice.counts, PRIOR, case.level, found.low, found.high)
+    if not low <= case.value <= high:
+        notes += ("widened to the estimate, which lies outside the posterior's",)
+    interval = case.closed(
+        min(low, case.value), max(high, case.value), method=method, unit=None
+    )
+    return dataclasses.replace(
+        interval,
+        kind="confidence" if excess else "credible",
+        notes=(*interval.notes, *notes),
+        distribution=_distribution(found),
+    )
+
+
+def one_sided(choice: Choice) -> Interval:
+    """Compute all that is above a lower end of the Dirichlet-multinomial posterior.
+
+    Parameters
+    ----------
+    choice : Choice
+        The question.
+
+    Returns
+    -------
+    Interval
+        Up to 1; a note gives the end under another prior.
+    """
+    case, share = choice.case, 1.0 - choice.case.level
+    low = float(expit(choice.posterior.logit.quantile(share)))
+    others = [
+        (float(expit(other.logit.quantile(share))), prior.words)
+        for prior in PRIOR.others(choice.counts.shape[1])
+        for other in [ExactPosterior.of(choice.counts, prior, case.level)]
+    ]
+    there, words = max(others, key=lambda found: abs(found[0] - low))
+    note = (
+        f"the bound rests on the prior, too: {low:.3f} with {PRIOR.words}, but "
+        f"{there:.3f} with {words}"
+    )
+    return Interval(
+        low=low,
+        high=1.0,
+        level=case.level,
+        kind="credible",
+        method="Dirichlet-multinomial posterior, one-sided",
+        target=case.target,
+        notes=(note,),
+        distribution=_distribution(choice.posterior),
+    )
+
+
+def of_two_raters(choice: Choice) -> Interval:
+    """Compute the interval of the posterior of two raters' table.
+
+    Parameters
+    ----------
+    choice : Choice
+        The question.
+
+    Returns
+    -------
+    Interval
+        One-sided where nothing disagrees, elsewhere holding the estimate.
+    """
+    case = choice.case
+    perfect = not case.value < 1.0
+    found = table_interval(case, None, n_draws=_DRAWS, rng=_SEED, one_sided=perfect)
+    if perfect or found.low <= case.value <= found.high:
+        return found
+    note = "widened to the estimate, which lies outside the posterior's"
+    return dataclasses.replace(
+        found,
+        low=min(found.low, case.value),
+        high=max(found.high, case.value),
+        notes=(*found.notes, note),
+    )
+
+
+def _distribution(found: ExactPosterior) -> Distribution:
+    return found.distribution(f"posterior of ρ, prior {PRIOR.words}")

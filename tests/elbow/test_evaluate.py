@@ -1,0 +1,240 @@
+"""Many scenes at once: the bits of one scene, only what is asked, bounded memory."""
+
+import tracemalloc
+from dataclasses import replace
+from fractions import Fraction
+from math import isnan, radians
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from masrel.elbow import (
+    STANDARD_MODELS,
+    ConstantSpeed,
+    ElbowParameters,
+    MinimumJerk,
+    Motion,
+    evaluate,
+    events,
+    impulse,
+    peak_torque,
+    residual_torque,
+    scenes,
+    work,
+)
+from masrel.elbow.scenes import EFFORTS, EVENTS, batch
+from masrel.elbow.scenes.twofold import Twofold
+from masrel.errors import ParameterError
+from tests.elbow.scenes import KINDS, corner_cases, random_scene
+from tests.elbow.stretches import constant, counted, minimum_jerk, table_v
+
+HM3 = STANDARD_MODELS["HM3"]
+FUNCTIONS = {
+    "peak_torque": peak_torque,
+    "residual_torque": residual_torque,
+    "work": work,
+    "impulse": impulse,
+}
+
+
+def drawn(
+    kind: str, n: int, *, wide: bool, plain: bool = False
+) -> tuple[list[ElbowParameters], list[Motion]]:
+    """Random scenes; `plain` ones without inertia or a smoothed onset."""
+    found = []
+    for seed in range(3 * n):
+        rng = np.random.default_rng([seed, KINDS.index(kind), 11])
+        joint, motion = random_scene(rng, kind, wide=wide)
+        if plain:
+            joint = replace(joint, inertia=0.0, catch_rise=0.0)
+        if motion.start < joint.range_end:
+            found.append((joint, motion))
+    joints, motions = zip(*found[:n], strict=True)
+    return list(joints), list(motions)
+
+
+def same(one: float, other: float | None) -> bool:
+    return isnan(one) if other is None else one == other
+
+
+@pytest.mark.parametrize("wide", [False, True])
+@pytest.mark.parametrize("kind", ["constant", "minimum jerk", "interrupted"])
+def test_events_are_those_of_one_scene_to_the_last_bit(kind: str, wide: bool) -> None:
+    joints, motions = drawn(kind, 150, wide=wide)
+    table = evaluate(joints, motions, EVENTS)
+    for i, (joint, motion) in enumerate(zip(joints, motions, strict=True)):
+        found = events(joint, motion)
+        for name in EVENTS:
+            assert same(table.column(name)[i], getattr(found, name)), (i, name)
+
+
+@pytest.mark.parametrize("kind", ["constant", "minimum jerk"])
+def test_torques_and_integrals_are_those_of_one_scene(kind: str) -> None:
+    joints, motions = drawn(kind, 120, wide=False)
+    table = evaluate(joints, motions, EFFORTS)
+    for name, function in FUNCTIONS.items():
+        expected = [
+            function(joint, motion)
+            for joint, motion in zip(joints, motions, strict=True)
+        ]
+        # sums of up to seven terms that may cancel: 1e-12 of the largest in a study
+        assert table.column(name) == pytest.approx(
+            expected, rel=1e-12, abs=1e-12, nan_ok=True
+        )
+
+
+@pytest.mark.parametrize("kind", ["constant", "minimum jerk"])
+def test_few_scenes_need_to_go_alone(kind: str) -> None:
+    # Nothing but near ties: of 150 scenes over ten orders of magnitude in speed and
+    # nine in D and the peak, at most a few.
+    joints, motions = drawn(kind, 150, wide=True, plain=True)
+    table = evaluate(joints, motions, (*EVENTS, *EFFORTS))
+    assert table.n_alone <= 30
+    assert np.isfinite(table.column("catch")).sum() > 40
+
+
+def test_corner_cases_are_those_of_one_scene() -> None:
+    cases = corner_cases()
+    joints, motions = (list(column) for column in zip(*cases.values(), strict=True))
+    table = evaluate(joints, motions, (*EVENTS, "peak_torque"))
+    for i, name in enumerate(cases):
+        found = events(joints[i], motions[i])
+        for event in EVENTS:
+            assert same(table.column(event)[i], getattr(found, event)), (name, event)
+        peak = peak_torque(joints[i], motions[i])
+        assert table.column("peak_torque")[i] == pytest.approx(peak, rel=1e-13)
+
+
+def test_table_v_in_one_call() -> None:
+    rows = table_v()
+    joints = [STANDARD_MODELS[row.model] for row in rows]
+    motions = [constant(row.speed_deg_s) for row in rows]
+    table = evaluate(joints, motions, ("catch_end", "end"))
+    reaches = np.isfinite(table.column("catch_end"))
+    assert reaches.tolist() == [row.model != "HM1" for row in rows]
+    assert table.n_alone == 0
+
+
+def test_one_joint_for_many_motions_and_one_motion_for_many_joints() -> None:
+    speeds = [constant(speed) for speed in (70.0, 92.0)]
+    table = evaluate(HM3, speeds, ["catch_angle"])
+    assert np.degrees(table.column("catch_angle")) == pytest.approx([90.5, 82.8])
+    models = list(STANDARD_MODELS.values())
+    table = evaluate(models, constant(92.0), ["catch_angle"])
+    expected = [97.8, 87.8, 82.8, 77.8]  # L - 0.35 · 92
+    assert np.degrees(table.column("catch_angle")) == pytest.approx(expected)
+    assert evaluate(HM3, constant(92.0)).values.shape == (1, 2)
+
+
+@pytest.mark.parametrize("chunk", [1, 7, 1000])
+def test_chunks_change_nothing(chunk: int) -> None:
+    joints, motions = drawn("minimum jerk", 40, wide=False)
+    whole = evaluate(joints, motions, (*EVENTS, *EFFORTS))
+    cut = evaluate(joints, motions, (*EVENTS, *EFFORTS), chunk=chunk)
+    assert np.array_equal(whole.values, cut.values, equal_nan=True)
+    assert whole.n_alone == cut.n_alone
+
+
+def test_memory_is_that_of_a_chunk() -> None:
+    # 60 000 scenes in chunks of 500: beside the result, 0.5 MB, and the list of rows
+    # there is no more than for 500, some 200 columns of 4 kB.
+    n = 60_000
+    motions = [constant(92.0)] * n
+    evaluate(HM3, motions[:500], chunk=500)
+    tracemalloc.start()
+    try:
+        evaluate(HM3, motions, chunk=500)
+        most = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert most < 6e6  # at once 200 columns would take 96 MB
+
+
+# Counted
+
+
+def test_only_what_is_asked_is_computed() -> None:
+    motions = [minimum_jerk(80.0), minimum_jerk(90.0)]
+    with counted(batch, "Efforts") as n_efforts:
+        evaluate(HM3, motions, EVENTS)
+        assert n_efforts == [0]
+        evaluate(HM3, motions, ["peak_torque", "work"])
+        assert n_efforts == [1]
+    with counted(batch, "course") as n_courses:
+        evaluate(HM3, motions, EVENTS)
+        assert n_courses == [0]  # nobody goes alone
+
+
+# Refused
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: evaluate(HM3, constant(92.0), ["peak"]), "outputs: .* got 'peak'"),
+        (lambda: evaluate(HM3, constant(92.0), []), "outputs: .* got none"),
+        (
+            lambda: evaluate([HM3] * 3, [constant(92.0)] * 2),
+            "one of either, got 3 and 2",
+        ),
+        (lambda: evaluate([], []), "got 0 and 0"),
+        (lambda: evaluate(HM3, constant(92.0), chunk=0), "chunk: needs 1 or more"),
+        (
+            lambda: evaluate(
+                HM3, [constant(92.0), constant(92.0, start_deg=150.0, end_deg=160.0)]
+            ),
+            r"motions\[1\]\.start: needs less than the end of range, 146 degrees",
+        ),
+        (
+            lambda: evaluate(HM3, constant(92.0)).column("work"),
+            "output: needs one of catch_angle, peak_torque, got 'work'",
+        ),
+    ],
+)
+def test_wrong_calls_are_refused(call, said: str) -> None:
+    with pytest.raises(ParameterError, match=said):
+        call()
+
+
+def test_the_names_are_those_of_the_functions() -> None:
+    found = events(HM3, minimum_jerk(92.0))
+    assert all(hasattr(found, name) for name in scenes.EVENTS)
+    assert set(scenes.EFFORTS) == set(FUNCTIONS)
+    assert isinstance(constant(1.0), ConstantSpeed)
+    assert isinstance(minimum_jerk(1.0), MinimumJerk)
+
+
+# Arithmetic in 32 digits
+
+numbers = st.floats(1e-6, 1e6) | st.floats(-1e6, -1e-6)
+
+
+def exact(number: Twofold) -> Fraction:
+    return Fraction(float(number.high)) + Fraction(float(number.low))
+
+
+@given(a=numbers, b=numbers, c=numbers)
+def test_twofold_numbers_have_32_digits(a: float, b: float, c: float) -> None:
+    x, y, z = Twofold(a) / 3.0, Twofold(b), Twofold(c)
+    least = Fraction(1, 10**30)
+    third = exact(x)
+    assert abs(third * 3 - Fraction(a)) <= least * abs(Fraction(a))
+    total = third + Fraction(b)
+    assert abs(exact(x + y) - total) <= least * (abs(third) + abs(Fraction(b)))
+    assert abs(exact(y - x) + third - Fraction(b)) <= least * (
+        abs(third) + abs(Fraction(b))
+    )
+    assert abs(exact(x * z) - third * Fraction(c)) <= least * abs(third * Fraction(c))
+    ratio = third / Fraction(c)
+    assert abs(exact(x / z) - ratio) <= least * abs(ratio)
+    root = exact((x * x).sqrt())
+    assert abs(root - abs(third)) <= least * abs(third)
+
+
+def test_a_twofold_number_rounds_to_the_nearest_float() -> None:
+    third = Twofold(1.0) / 3.0
+    assert float(third.high) == 1 / 3
+    assert abs(float(third.low)) <= 2.0**-54
+    assert radians(180.0) == float((Twofold(radians(180.0)) * 1.0).high)

@@ -1,0 +1,222 @@
+"""A device that fails on purpose: faults of readings and commands, at a chosen time.
+
+It stands around any other device, whichever backend: what is wrong on a bus itself is
+the matter of that bus' own emulator.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from math import radians
+from typing import ClassVar
+
+from masrel.errors import DeviceError, DeviceTimeoutError, EmergencyStopError
+from masrel.hess import Device, Reading
+
+# Since the first reading: time s, the true reading -> what the loop gets
+ReadFault = Callable[[float, Reading], Reading]
+# Since the first reading: time s, torque -> what the device gets, or None for nothing
+SendFault = Callable[[float, float], float | None]
+
+
+@dataclass
+class FaultyDevice(Device):
+    """Reads and commands another device through faults."""
+
+    inner: Device
+    read_fault: ReadFault | None = None
+    send_fault: SendFault | None = None
+    check_fault: Callable[[float], None] | None = None
+    cut_s: float = math.inf  # from then on it cannot even be let go
+    commands: list[tuple[float, float]] = field(default_factory=list)  # s, N·m
+    let_go_s: float = math.nan
+
+    name: ClassVar[str] = "simulated"  # what the log and the loop shall see
+    simulated: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        self.start_ns: int | None = None
+        self.time_s = 0.0
+
+    def _start(self) -> None:
+        self.inner.open()
+
+    def _read(self) -> Reading:
+        reading = self.inner.read()
+        if self.start_ns is None:
+            self.start_ns = reading.time_ns
+        self.time_s = (reading.time_ns - self.start_ns) * 1e-9
+        if self.read_fault is not None:
+            reading = self.read_fault(self.time_s, reading)
+        return reading
+
+    def _send(self, torque_nm: float) -> None:
+        if self.start_ns is not None:  # commands come between readings, too
+            now_ns = self.inner.read().time_ns
+            self.time_s = (now_ns - self.start_ns) * 1e-9
+        torque: float | None = torque_nm
+        if self.send_fault is not None:
+            torque = self.send_fault(self.time_s, torque_nm)
+        if torque is not None:
+            self.commands.append((self.time_s, torque))
+            self.inner.command(torque)
+
+    def _check(self) -> None:
+        if self.check_fault is not None:
+            self.check_fault(self.time_s)
+
+    def _stop(self) -> None:
+        if self.time_s >= self.cut_s - 1e-9:
+            raise DeviceTimeoutError("nobody is there to be idled")
+        self.let_go_s = self.time_s
+        self.inner.close()
+
+    def held_nm(self) -> float:
+        """The torque that is left when all is over."""
+        return 0.0 if math.isfinite(self.let_go_s) else self.commands[-1][1]
+
+
+def dropped(start_s: float, n: float = math.inf) -> ReadFault:
+    """No answer to n readings from a time on."""
+    count = 0
+
+    def fault(time_s: float, reading: Reading) -> Reading:
+        nonlocal count
+        if time_s >= start_s - 1e-9 and count < n:
+            count += 1
+            raise DeviceTimeoutError("no answer within a period")
+        return reading
+
+    return fault
+
+
+def late(start_s: float, by_s: float, n: float = math.inf) -> ReadFault:
+    """Readings that are older by some time; the newest that can be there."""
+    seen: list[Reading] = []
+    count = 0
+
+    def fault(time_s: float, reading: Reading) -> Reading:
+        nonlocal count
+        seen.append(reading)
+        if time_s < start_s - 1e-9 or count >= n:
+            return reading
+        count += 1
+        old = [r for r in seen if r.time_ns <= reading.time_ns - round(by_s * 1e9)]
+        return old[-1] if old else seen[0]
+
+    return fault
+
+
+def repeated(start_s: float, n: float = math.inf) -> ReadFault:
+    """The last reading once more, time and all."""
+    before: list[Reading] = []
+    count = 0
+
+    def fault(time_s: float, reading: Reading) -> Reading:
+        nonlocal count
+        if time_s >= start_s - 1e-9 and before and count < n:
+            count += 1
+            return before[0]
+        before[:] = [reading]
+        return reading
+
+    return fault
+
+
+def frozen(start_s: float) -> ReadFault:
+    """One angle for ever, with the right times."""
+    held: list[float] = []
+
+    def fault(time_s: float, reading: Reading) -> Reading:
+        if time_s < start_s - 1e-9:
+            held[:] = [reading.angle]
+            return reading
+        return reading._replace(angle=held[0])
+
+    return fault
+
+
+def shifted(start_s: float, by: float, n: float = math.inf) -> ReadFault:
+    """Angles that are off by some rad, n times or from then on."""
+    count = 0
+
+    def fault(time_s: float, reading: Reading) -> Reading:
+        nonlocal count
+        if time_s >= start_s - 1e-9 and count < n:
+            count += 1
+            return reading._replace(angle=reading.angle + by)
+        return reading
+
+    return fault
+
+
+def early(start_s: float, by_s: float) -> ReadFault:
+    """Readings from the future: a clock of its own that has run away."""
+
+    def fault(time_s: float, reading: Reading) -> Reading:
+        if time_s < start_s - 1e-9:
+            return reading
+        return reading._replace(time_ns=reading.time_ns + round(by_s * 1e9))
+
+    return fault
+
+
+def drifting(start_s: float, rate: float) -> ReadFault:
+    """An encoder that gains some rad/s on the arm."""
+
+    def fault(time_s: float, reading: Reading) -> Reading:
+        gained = rate * max(0.0, time_s - start_s)
+        return reading._replace(angle=reading.angle + gained)
+
+    return fault
+
+
+def broken(start_s: float, error: Exception) -> ReadFault:
+    """A reading that raises an error of the device, from a time on."""
+
+    def fault(time_s: float, reading: Reading) -> Reading:
+        if time_s >= start_s - 1e-9:
+            raise error
+        return reading
+
+    return fault
+
+
+def not_taken(start_s: float, n: float = math.inf) -> SendFault:
+    """The device refuses n torques from a time on."""
+    count = 0
+
+    def fault(time_s: float, torque: float) -> float | None:
+        nonlocal count
+        if time_s >= start_s - 1e-9 and count < n:
+            count += 1
+            raise DeviceTimeoutError("the torque was not taken within a period")
+        return torque
+
+    return fault
+
+
+def ignored(start_s: float) -> SendFault:
+    """The device was idled from outside: it follows no torque and holds none."""
+
+    def fault(time_s: float, torque: float) -> float | None:
+        return torque if time_s < start_s - 1e-9 else 0.0
+
+    return fault
+
+
+def says(start_s: float, error: DeviceError) -> Callable[[float], None]:
+    """What the device answers when it is asked for its state, from a time on."""
+
+    def fault(time_s: float) -> None:
+        if time_s >= start_s - 1e-9:
+            raise error
+
+    return fault
+
+
+IDLED = DeviceError("the device is not in torque mode any more")
+BUS_OFF = DeviceError("the bus is off")
+STOPPED = EmergencyStopError("emergency stop: the pendant of the device")
+WRAP = -2.0 * math.pi * 2**22 / (4096 * 18.8)  # 22 bits of counts at the elbow, rad
+JUMP = radians(1.0)

@@ -1,0 +1,454 @@
+"""At least 25 faults, each put into a session, and what came of it.
+
+``python -m tests.hess.injected`` prints the table of docs/driver.md.
+"""
+
+import contextlib
+import errno
+import math
+import os
+import pathlib
+import signal
+import tempfile
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from math import radians
+from unittest import mock
+
+import numpy as np
+
+from masrel.errors import OverrunWarning
+from masrel.hess import Controller, Device, SimulatedClock, SimulatedHand, open_device
+from masrel.protocol import Protocol, StudyPaths, read_protocol
+from masrel.recording import read_recording
+from masrel.run import SimulatedGrades, read_log, run_session
+from masrel.run import present as presenting
+from masrel.run.settings import model_controller
+from masrel.run.walk import CLOCKS
+from masrel.schedule import write_schedules
+
+from . import faults as f
+
+PROTOCOL = """
+[study]
+id = "one"
+title = "One model"
+[scale]
+name = "MAS"
+grades = ["0", "1", "1+", "2", "3", "4"]
+[[models]]
+id = "HM3"
+intended_grade = "2"
+catch_angle_constant_deg = 115.0
+catch_torque_nms_rad = 2.8
+residual_ratio = 0.60
+catch_travel_deg = 30.0
+[[raters]]
+id = "R1"
+[[sessions]]
+id = "test"
+raters = ["R1"]
+[schedule]
+seed = 11
+[simulated_raters]
+mean_speed_deg_s = {speed}
+speed_sd_deg_s = 0.0
+"""
+
+# HM3 at 92 deg/s: pre-catch until 0.63 s, catch until 0.96 s, then post-catch
+PRE, CATCH, POST = 0.4, 0.68, 1.1
+
+Wrap = Callable[[Device], Device]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Injection:
+    """One fault: where it is put, and what is expected of it."""
+
+    name: str
+    at_s: float
+    expected: str | None  # kind of fault; None where it is let pass
+    wrap: Wrap | None = None
+    clock: Callable[[], SimulatedClock] | None = None
+    controller: Callable[[Protocol, str], Controller] | None = None
+    slip: bool = False
+    full_disk: bool = False
+    speed: float = 92.0
+
+
+@dataclass(kw_only=True)
+class Outcome:
+    """What came of one injection."""
+
+    name: str
+    kind: str | None = None
+    detected_ms: float = math.nan
+    held_nm: float = math.nan  # when it was noticed
+    peak_nm: float = math.nan  # after that
+    zero_ms: float = math.nan  # from notice to zero torque
+    intact: bool = False
+    resumes: bool = False
+    events: list[str] = field(default_factory=list)
+
+
+def reading(fault: f.ReadFault) -> Wrap:
+    return lambda inner: f.FaultyDevice(inner, read_fault=fault)
+
+
+def sending(fault: f.SendFault) -> Wrap:
+    return lambda inner: f.FaultyDevice(inner, send_fault=fault)
+
+
+class Late(SimulatedClock):
+    """A machine that is away for some ms at chosen times."""
+
+    def __init__(self, gaps: dict[float, float]) -> None:
+        super().__init__()
+        self.gaps = gaps  # at s -> how long, s
+
+    def sleep_until_ns(self, deadline_ns: int) -> None:
+        super().sleep_until_ns(deadline_ns)
+        for at_s in [at for at in self.gaps if deadline_ns >= round(at * 1e9)]:
+            gap_ns = round(self.gaps.pop(at_s) * 1e9)
+            super().sleep_until_ns(deadline_ns + gap_ns)
+
+
+class Signalling(SimulatedClock):
+    """Somebody presses Ctrl-C at a time."""
+
+    def __init__(self, at_s: float) -> None:
+        super().__init__()
+        self.at_ns: int | None = round(at_s * 1e9)
+
+    def sleep_until_ns(self, deadline_ns: int) -> None:
+        super().sleep_until_ns(deadline_ns)
+        if self.at_ns is not None and deadline_ns >= self.at_ns:
+            self.at_ns = None
+            signal.raise_signal(signal.SIGINT)
+
+
+class Wrong:
+    """A joint model that goes wrong at a time; else like the one it stands for."""
+
+    def __init__(self, joint, at_s: float, act: Callable[[float], float]) -> None:
+        self.joint, self.at_s, self.act = joint, at_s, act
+
+    def __getattr__(self, name: str):
+        return getattr(self.joint, name)
+
+    def step(self, time_s: float, angle: float, velocity: float) -> float:
+        torque = self.joint.step(time_s, angle, velocity)
+        return torque if time_s < self.at_s - 1e-9 else self.act(torque)
+
+
+def model(at_s: float, act: Callable[[float], float]):
+    def made(protocol: Protocol, name: str) -> Controller:
+        controller = model_controller(protocol, name)
+        controller._joint = Wrong(controller._joint, at_s, act)
+        return controller
+
+    return made
+
+
+def _fail(_torque: float) -> float:
+    raise ZeroDivisionError("float division by zero")
+
+
+def injections() -> list[Injection]:
+    def device(name: str, at_s: float, expected: str | None, wrap: Wrap, **options):
+        return Injection(name=name, at_s=at_s, expected=expected, wrap=wrap, **options)
+
+    def check(error) -> Wrap:
+        return lambda inner: f.FaultyDevice(
+            inner, send_fault=f.ignored(CATCH), check_fault=f.says(CATCH, error)
+        )
+
+    lost = "missed-replies"
+    return [
+        device("one reply dropped", CATCH, None, reading(f.dropped(CATCH, 1))),
+        device("two replies dropped", CATCH, None, reading(f.dropped(CATCH, 2))),
+        device("three replies dropped", CATCH, lost, reading(f.dropped(CATCH, 3))),
+        device("replies cease in pre-catch", PRE, lost, reading(f.dropped(PRE))),
+        device("replies cease in the catch", CATCH, lost, reading(f.dropped(CATCH))),
+        device("replies cease in post-catch", POST, lost, reading(f.dropped(POST))),
+        device("one reply late by 2 ms", CATCH, None, reading(f.late(CATCH, 2e-3, 1))),
+        device("replies late by 3 ms", CATCH, lost, reading(f.late(CATCH, 3e-3))),
+        device("replies late by 8 ms", CATCH, lost, reading(f.late(CATCH, 8e-3))),
+        device("a reply twice", CATCH, None, reading(f.repeated(CATCH, 1))),
+        device("the same reply for ever", CATCH, lost, reading(f.repeated(CATCH))),
+        device("replies from the future", CATCH, "stale", reading(f.early(CATCH, 1.0))),
+        device("encoder frozen in pre-catch", PRE, "frozen", reading(f.frozen(PRE))),
+        device(
+            "encoder frozen in the catch", CATCH, "frozen", reading(f.frozen(CATCH))
+        ),
+        device("encoder frozen in post-catch", POST, "frozen", reading(f.frozen(POST))),
+        device(
+            "encoder frozen at 15 deg/s",
+            4.0,
+            "standing-torque",
+            reading(f.frozen(4.0)),
+            speed=15.0,
+        ),
+        device(
+            "encoder jumps by 1 deg", CATCH, "jump", reading(f.shifted(CATCH, f.JUMP))
+        ),
+        device(
+            "encoder off by -1 deg once",
+            CATCH,
+            "jump",
+            reading(f.shifted(CATCH, -f.JUMP, 1)),
+        ),
+        device(
+            "encoder wraps at 22 bits", PRE, "range", reading(f.shifted(PRE, f.WRAP))
+        ),
+        device(
+            "encoder drifts by 400 deg/s",
+            PRE,
+            "jump",
+            reading(f.drifting(PRE, radians(400.0))),
+        ),
+        device("no number", CATCH, "range", reading(f.shifted(CATCH, math.nan))),
+        device(
+            "bus off while reading",
+            CATCH,
+            "device",
+            reading(f.broken(CATCH, f.BUS_OFF)),
+        ),
+        device(
+            "one torque not taken", CATCH, "no-answer", sending(f.not_taken(CATCH, 1))
+        ),
+        device(
+            "no torque taken any more", CATCH, "no-answer", sending(f.not_taken(CATCH))
+        ),
+        device(
+            "bus cut for good",
+            CATCH,
+            "no-answer",
+            lambda inner: f.FaultyDevice(
+                inner, send_fault=f.not_taken(CATCH), cut_s=CATCH
+            ),
+        ),
+        device("idled from outside", CATCH, "device", check(f.IDLED)),
+        device(
+            "emergency stop of the device", CATCH, "emergency-stop", check(f.STOPPED)
+        ),
+        Injection(
+            name="emergency stop by Ctrl-C",
+            at_s=CATCH,
+            expected="emergency-stop",
+            clock=lambda: Signalling(CATCH),
+        ),
+        Injection(
+            name="loop away for 10 ms",
+            at_s=CATCH,
+            expected=None,
+            clock=lambda: Late({CATCH: 0.010}),
+        ),
+        Injection(
+            name="loop away for 25 ms",
+            at_s=CATCH,
+            expected="overrun",
+            clock=lambda: Late({CATCH: 0.025}),
+        ),
+        Injection(
+            name="five times 5 ms in 50 ms",
+            at_s=CATCH,
+            expected="overrun",
+            clock=lambda: Late({CATCH + 0.01 * n: 0.005 for n in range(5)}),
+        ),
+        Injection(
+            name="loop away for 60 ms",
+            at_s=CATCH,
+            expected="overrun",
+            clock=lambda: Late({CATCH: 0.060}),
+        ),
+        Injection(
+            name="exception in the model",
+            at_s=CATCH,
+            expected="controller",
+            controller=model(CATCH, _fail),
+        ),
+        Injection(
+            name="model gives no number",
+            at_s=CATCH,
+            expected="torque",
+            controller=model(CATCH, lambda _: math.nan),
+        ),
+        Injection(
+            name="model gives 35 N·m",
+            at_s=CATCH,
+            expected="torque",
+            controller=model(CATCH, lambda _: 35.0),
+        ),
+        Injection(
+            name="model jumps to 17 N·m",
+            at_s=PRE,
+            expected="torque-rate",
+            controller=model(PRE, lambda _: 17.0),
+        ),
+        Injection(name="grip lost in pre-catch", at_s=PRE, expected=None, slip=True),
+        Injection(name="grip lost in the catch", at_s=CATCH, expected=None, slip=True),
+        Injection(name="grip lost in post-catch", at_s=POST, expected=None, slip=True),
+        Injection(name="full disk", at_s=CATCH, expected="disk", full_disk=True),
+    ]
+
+
+def outcome(
+    injection: Injection,
+    folder: pathlib.Path,
+    opener: Callable[..., Device] = open_device,
+) -> Outcome:
+    """Run a session whose first presentation has the fault, to its end."""
+    study, protocol = _study(injection, folder)
+    made = Outcome(name=injection.name)
+    devices: list[f.FaultyDevice] = []
+    with warnings.catch_warnings(), _injected(injection, opener, devices):
+        warnings.simplefilter("ignore", OverrunWarning)
+        grades = SimulatedGrades(protocol)
+        try:
+            run_session(study, protocol, "R1", "test", grades=grades, clock="simulated")
+        except OSError as error:
+            if error.errno != errno.ENOSPC:
+                raise
+            made.kind = "disk"
+            run_session(study, protocol, "R1", "test", grades=grades, clock="simulated")
+    for device in devices:
+        device.inner.close()  # what even the bus that was cut leaves open
+    log = read_log(study.log_file("R1", "test"))
+    made.events = [event.kind for event in log]
+    made.resumes = made.events[-2:] == ["grade", "complete"]
+    shown = next(event for event in log if event.kind == "presented")
+    path = study.sessions / str(shown.fields["recording"])
+    columns = read_recording(path).columns  # checks its checksum
+    # Whole: a row for every tick before the fault
+    n_before = int(np.sum(columns["time_s"] < injection.at_s - 1e-9))
+    made.intact = n_before == round(injection.at_s * 1000) and not injection.full_disk
+    noticed = next((event for event in log if event.kind == "fault"), None)
+    if noticed is not None:
+        made.kind = str(noticed.fields["kind"])
+        made.held_nm = float(noticed.fields["torque_nm"] or 0.0)
+        _take_back(made, injection, devices[0], float(noticed.fields["time_s"] or 0.0))
+    elif injection.slip:
+        _let_go(made, injection, columns)
+    return made
+
+
+def _take_back(
+    made: Outcome, injection: Injection, device: f.FaultyDevice, at_s: float
+) -> None:
+    made.detected_ms = 1e3 * (at_s - injection.at_s)
+    after = [(t, abs(torque)) for t, torque in device.commands if t >= at_s]
+    made.peak_nm = max((torque for _, torque in after), default=0.0)
+    zeros = [t for t, torque in after if torque == 0.0]
+    if math.isfinite(device.let_go_s):
+        zeros.append(device.let_go_s)
+    else:
+        made.peak_nm = made.held_nm  # nobody can take it back
+    made.zero_ms = 1e3 * (min(zeros) - at_s) if zeros else math.nan
+
+
+def _let_go(
+    made: Outcome, injection: Injection, columns: dict[str, np.ndarray]
+) -> None:
+    # The model is back in pre-catch, the torque that of (1): no fault of the device
+    made.kind = "released"
+    phase, torque = columns["phase"], np.abs(columns["command_torque_nm"])
+    slipped = round(injection.at_s * 1000)
+    released = slipped + int(np.argmax(phase[slipped:] == 0))
+    made.detected_ms = float(released - slipped)
+    made.held_nm = float(torque[released - 1])
+    made.peak_nm = float(torque[released:].max())
+
+
+@contextlib.contextmanager
+def _injected(
+    injection: Injection,
+    opener: Callable[..., Device],
+    devices: list[f.FaultyDevice],
+) -> Iterator[None]:
+    # The first presentation alone gets the fault
+    first = {"device": True, "clock": True, "controller": True, "hand": True}
+
+    def is_first(what: str) -> bool:
+        was, first[what] = first[what], False
+        return was
+
+    def open_faulty(name: str, **options) -> Device:
+        inner = opener(name, **options)
+        wrap = injection.wrap if is_first("device") else None
+        device = (wrap or f.FaultyDevice)(inner)
+        device.open()
+        devices.append(device)
+        return device
+
+    def clock() -> SimulatedClock:
+        use = is_first("clock") and injection.clock is not None
+        return injection.clock() if use else SimulatedClock()
+
+    def controller(protocol: Protocol, name: str) -> Controller:
+        use = is_first("controller") and injection.controller is not None
+        return (injection.controller if use else model_controller)(protocol, name)
+
+    def hand(**options) -> SimulatedHand:
+        slips = is_first("hand") and injection.slip
+        return SimulatedHand(**options, slip_time=injection.at_s if slips else None)
+
+    written = presenting.write_recording
+    disk_is_full = [injection.full_disk]
+
+    def write(recording, path):
+        if disk_is_full.pop() if disk_is_full else False:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+        return written(recording, path)
+
+    with (
+        mock.patch.object(presenting, "open_device", open_faulty),
+        mock.patch.object(presenting, "model_controller", controller),
+        mock.patch.object(presenting, "SimulatedHand", hand),
+        mock.patch.object(presenting, "write_recording", write),
+        mock.patch.dict(CLOCKS, {"simulated": clock}),
+    ):
+        yield
+
+
+def _study(injection: Injection, folder: pathlib.Path) -> tuple[StudyPaths, Protocol]:
+    study = StudyPaths(folder)
+    study.root.mkdir(exist_ok=True)
+    text = PROTOCOL.format(speed=injection.speed)
+    study.protocol.write_text(text, encoding="utf-8")
+    protocol = read_protocol(study.protocol)
+    write_schedules(protocol, study)
+    return study, protocol
+
+
+def row(made: Outcome) -> str:
+    """One row of the table in docs/driver.md."""
+
+    def cell(value: float, digits: int) -> str:
+        return "" if math.isnan(value) else f"{value:.{digits}f}"
+
+    zero = cell(made.zero_ms, 0)
+    if math.isnan(made.zero_ms) and made.kind not in (None, "released", "disk"):
+        zero = "never"
+    cells = [
+        made.name,
+        made.kind or "let pass",
+        cell(made.detected_ms, 0),
+        cell(made.held_nm, 1),
+        cell(made.peak_nm, 1),
+        zero,
+        "yes" if made.intact else "no",
+        "yes" if made.resumes else "no",
+    ]
+    return "| " + " | ".join(cells) + " |"
+
+
+def main() -> None:
+    for injection in injections():
+        with tempfile.TemporaryDirectory() as folder:
+            print(row(outcome(injection, pathlib.Path(folder) / "study")))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,101 @@
+"""A bench for the tests: an emulated puck on a bus inside the process."""
+
+from dataclasses import dataclass, replace
+from itertools import count
+from math import radians
+
+from masrel.elbow import STANDARD_MODELS
+from masrel.hess import (
+    Controller,
+    DeviceLimits,
+    Hand,
+    Presented,
+    SimulatedClock,
+    SimulatedHand,
+    open_device,
+    run_presentation,
+)
+from masrel.hess.puck.bus import Link, open_link
+from masrel.hess.puck.device import EmulatedPuckDevice, emulated_options
+from masrel.hess.puck.emulator import PuckEmulator
+from masrel.hess.puck.faults import EmulatorOptions, FaultKind, InjectedFault
+from masrel.hess.puck.node import PuckNode
+from masrel.hess.puck.options import PuckOptions
+
+START, END = radians(30.0), radians(146.0)
+LIMITS = DeviceLimits(torque=20.0, speed=radians(400.0), missed_ticks=20)
+
+_channels = count()
+
+
+def stretching(speed_deg_s: float = 92.0) -> SimulatedHand:
+    return SimulatedHand(start=START, end=END, mean_speed=radians(speed_deg_s))
+
+
+def loose(start_deg: float = 90.0) -> SimulatedHand:
+    """A hand that has let go: the arm is free."""
+    return SimulatedHand(
+        start=radians(start_deg), end=END, mean_speed=radians(90.0), slip_time=0.0
+    )
+
+
+@dataclass
+class Bench:
+    """The two ends of a bus."""
+
+    clock: SimulatedClock
+    link: Link
+    emulator: PuckEmulator
+    node: PuckNode
+
+    def close(self) -> None:
+        self.link.close()
+        self.emulator.close()
+
+
+def bench(*, hand: Hand | None = None, puck: int = 1, **options) -> Bench:
+    clock = SimulatedClock()
+    channel = f"bench-{next(_channels)}"
+    emulator = PuckEmulator(
+        link=open_link("virtual", channel, clock=clock),
+        clock=clock,
+        hand=hand or loose(),
+        range_end=END,
+        options=EmulatorOptions(**options),
+        puck=puck,
+    )
+    link = open_link("virtual", channel, clock=clock, neighbour=emulator)
+    return Bench(clock, link, emulator, PuckNode(link, clock, puck))
+
+
+def puck_options(hand: Hand, *, emulator: dict | None = None, **changes) -> PuckOptions:
+    options = replace(
+        emulated_options(hand), emulator=EmulatorOptions(**(emulator or {}))
+    )
+    return replace(options, **changes)
+
+
+def opened(
+    clock: SimulatedClock, hand: Hand, *, emulator: dict | None = None, **changes
+) -> EmulatedPuckDevice:
+    options = puck_options(hand, emulator=emulator, **changes)
+    device = open_device("puck", clock=clock, hand=hand, options=options)
+    assert isinstance(device, EmulatedPuckDevice)
+    return device
+
+
+def presented(
+    *faults: InjectedFault, model: str = "HM3", speed_deg_s: float = 92.0, **changes
+) -> tuple[Presented, EmulatedPuckDevice, SimulatedClock]:
+    """One presentation on an emulated puck; the device is closed afterwards."""
+    clock, hand = SimulatedClock(), stretching(speed_deg_s)
+    controller = Controller(STANDARD_MODELS[model], start_angle=START)
+    with opened(clock, hand, emulator={"faults": faults, **changes}) as device:
+        done = run_presentation(
+            device, controller, clock=clock, limits=LIMITS, end_angle=END
+        )
+    return done, device, clock
+
+
+def fault(kind: FaultKind, start_s: float = 0.4, **more) -> InjectedFault:
+    return InjectedFault(kind=kind, start_s=start_s, **more)

@@ -1,0 +1,237 @@
+"""Each limit passes what lies on it, and names what lies beyond."""
+
+import math
+from math import degrees, radians
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from masrel.elbow import STANDARD_MODELS, MinimumJerk, trace
+from masrel.errors import LimitExceededError
+from masrel.hess import DeviceLimits
+from masrel.hess.guard import Guard
+
+PERIOD = 0.001
+STEP = radians(0.005)  # of the encoder
+END = radians(146.0)
+
+
+def guard(**limits: float) -> Guard:
+    return Guard(DeviceLimits(**limits), PERIOD)
+
+
+def fed(made: Guard, angles: list[float], start: int = 0) -> Guard:
+    for tick, angle in enumerate(angles, start):
+        made.reading(tick * PERIOD, angle, 0.0)
+    return made
+
+
+def refusal(kind: str, words: str):
+    class Expected:
+        def __enter__(self) -> None:
+            self.caught = pytest.raises(LimitExceededError, match=words)
+            self.info = self.caught.__enter__()
+
+        def __exit__(self, *error: object) -> bool:
+            passed = self.caught.__exit__(*error)
+            assert self.info.value.kind == kind
+            return bool(passed)
+
+    return Expected()
+
+
+# Torque
+
+
+@given(st.floats(-20.0, 20.0), st.floats(-20.0, 20.0))
+def test_a_torque_within_the_limit_passes_slowly(first: float, second: float) -> None:
+    made = guard(torque=20.0)
+    made.torque(0.0, 0.6 * first)
+    made.torque(1.0, second)  # a second later
+
+
+@pytest.mark.parametrize("torque", [20.001, -20.001, math.inf, -math.inf, math.nan])
+def test_a_torque_beyond_it_either_way_is_named(torque: float) -> None:
+    with refusal("torque", "torque: needs at most 20 N·m"):
+        guard(torque=20.0).torque(0.0, torque)
+
+
+@pytest.mark.parametrize(
+    ("before", "after"), [(0.0, 12.1), (3.0, 15.2), (-3.0, 9.2), (-1.0, -13.2)]
+)
+def test_a_torque_that_builds_up_too_fast_is_named(before, after) -> None:
+    made = guard(torque_rate=12_000.0)
+    made.torque(0.0, before)
+    with refusal("torque-rate", r"torque rate: needs at most 12000 N·m/s, got"):
+        made.torque(PERIOD, after)
+
+
+@pytest.mark.parametrize(
+    ("before", "after"), [(0.0, 11.9), (11.0, 0.0), (-11.0, 0.0), (11.0, 0.5)]
+)
+def test_torque_is_taken_away_as_fast_as_it_likes(before, after) -> None:
+    made = guard(torque_rate=12_000.0)
+    made.torque(0.0, before)
+    made.torque(PERIOD, after)
+    made = guard(torque_rate=1.0)
+    with refusal("torque-rate", "torque rate"):
+        made.torque(0.0, 0.002)  # the very first counts from zero
+    made = guard(torque_rate=1.0)
+    made.torque(0.0, 0.001)
+    made.torque(PERIOD, 0.0)
+
+
+# HM4 needs more than 20 N·m from 85 deg/s on.
+WITHIN = [
+    (model, speed)
+    for model in sorted(STANDARD_MODELS)
+    for speed in (60.0, 72.0, 80.0, 93.0, 131.0)
+    if model != "HM4" or speed <= 80.0
+]
+
+
+@pytest.mark.parametrize(("model", "speed"), WITHIN)
+def test_the_law_itself_passes_the_defaults(model: str, speed: float) -> None:
+    motion = MinimumJerk(start=radians(30.0), end=END, mean_speed=radians(speed))
+    made = trace(STANDARD_MODELS[model], motion)
+    watching = guard()
+    for time_s, angle, velocity, torque in zip(
+        made.time, made.angle, made.velocity, made.torque, strict=True
+    ):
+        watching.reading(time_s, round(angle / STEP) * STEP, 0.0)
+        watching.speed(velocity)
+        watching.torque(time_s, torque)
+    assert watching.n_missed_replies == 0
+
+
+# Angle and speed
+
+
+@pytest.mark.parametrize("angle", [-0.001, 2.701, math.nan, math.inf])
+def test_an_angle_out_of_range_is_named(angle: float) -> None:
+    made = guard(lowest_angle=0.0, highest_angle=2.7)
+    with refusal("range", r"range: needs 0\.0 to 154\.7 deg"):
+        made.reading(0.0, angle, 0.0)
+
+
+@pytest.mark.parametrize("velocity", [7.001, -7.001, math.nan])
+def test_a_speed_either_way_is_named(velocity: float) -> None:
+    with refusal("speed", "speed: needs at most 401 deg/s"):
+        guard(speed=7.0).speed(velocity)
+
+
+def test_what_lies_on_the_limits_passes() -> None:
+    made = guard(torque=20.0, speed=7.0, missed_ticks=3, torque_rate=1e6)
+    made.speed(-7.0)
+    made.speed(7.0)
+    made.torque(0.0, 20.0)
+    made.torque(PERIOD, -20.0)
+    made.missed_ticks(3, 0.049)
+    made.reading(0.0, radians(-5.0), 0.005)
+    guard().reading(0.0, radians(185.0), -0.001)
+    assert made.soft_stop(radians(-5.0)) == pytest.approx(-10.0)
+
+
+def test_the_soft_stops_push_back_from_five_degrees_before_the_ends() -> None:
+    made = guard()
+    assert made.soft_stop(radians(182.5)) == pytest.approx(5.0)  # resists extension
+    assert made.soft_stop(radians(-1.0)) == pytest.approx(-2.0)
+    for angle in (0.0, 90.0, 180.0):
+        assert made.soft_stop(radians(angle)) == 0.0
+    assert guard(soft_stop_torque=0.0).soft_stop(radians(184.0)) == 0.0
+
+
+# The encoder
+
+
+def test_a_reading_that_is_too_old_or_from_the_future_is_named() -> None:
+    for age in (0.00501, -0.00101, math.nan):
+        with refusal("stale", "stale: needs a reading at most 5 ms old, got one of"):
+            guard().reading(0.0, 1.0, age)
+
+
+def test_a_jump_is_named_where_it_happens() -> None:
+    # 100 deg/s, then 0.35 deg beyond where that leads
+    angles = [1.0 + radians(0.1) * tick for tick in range(20)]
+    made = fed(guard(), angles)
+    with refusal("jump", r"jump: needs an angle within 0\.3 deg .* 0\.35 deg"):
+        made.reading(0.020, angles[-1] + radians(0.45), 0.0)
+    made = fed(guard(), angles)
+    made.reading(0.020, angles[-1] + radians(0.39), 0.0)
+
+
+@pytest.mark.parametrize("jump_deg", [0.35, -0.35, 54.0, -60.0])
+def test_a_jump_at_rest_is_named_at_once(jump_deg: float) -> None:
+    made = fed(guard(), [1.5] * 5)
+    with refusal("jump", "jump: needs"):
+        made.reading(0.005, 1.5 + radians(jump_deg), 0.0)
+
+
+def test_a_gap_widens_what_may_follow() -> None:
+    # 20 ticks without a reading: an arm can have gained 300 deg/s in each of them
+    made = fed(guard(), [1.5] * 3)
+    made.reading(0.022, 1.5 + radians(0.3 * 19.9), 0.0)
+
+
+def test_an_arm_that_stops_dead_is_named_after_ten_milliseconds() -> None:
+    angles = [1.0 + radians(0.03) * tick for tick in range(20)]  # 30 deg/s
+    made = fed(guard(), angles + [angles[-1]] * 9)
+    with refusal("frozen", r"frozen: needs .* within 10 ms .* not for 11\.5 ms"):
+        made.reading(0.0305, angles[-1], 0.0)
+
+
+def test_a_slow_arm_may_come_to_rest() -> None:
+    angles = [1.0 + radians(0.015) * tick for tick in range(20)]  # 15 deg/s
+    made = fed(guard(), angles + [angles[-1]] * 1000)
+    assert made.is_new(1.020)
+
+
+def test_a_standing_torque_on_an_arm_at_rest_is_named_after_half_a_second() -> None:
+    made = guard()
+    made.torque(0.0, 2.1)
+    fed(made, [1.5] * 501)
+    with refusal("standing-torque", r"standing torque: needs at most 2 N·m .* 2\.100"):
+        made.reading(0.5015, 1.5, 0.0)
+    made = guard()
+    made.torque(0.0, -2.0)
+    fed(made, [1.5] * 2000)
+    assert made.is_new(2.0)
+
+
+def test_an_arm_that_trembles_by_one_step_may_be_held_for_long() -> None:
+    made = guard()
+    made.torque(0.0, 10.0)
+    fed(made, [1.5 + STEP * (tick // 300 % 2) for tick in range(3000)])
+    assert made.is_new(3.0)
+
+
+# Replies and ticks
+
+
+def test_replies_may_be_missed_twice_in_a_row() -> None:
+    made = guard()
+    for _ in range(3):
+        made.no_reading("no answer")
+        made.no_reading("no answer")
+        made.reading(made.n_missed_replies * PERIOD, 1.0, 0.0)
+    assert made.n_missed_replies == 6
+    made.no_reading("no answer")
+    made.no_reading("no answer")
+    with refusal("missed-replies", r"at most 2 ticks .* 3 in a row \(no answer\)"):
+        made.no_reading("no answer")
+
+
+def test_one_missed_tick_too_many_is_named() -> None:
+    with refusal("overrun", r"at most 3 .* missed 4"):
+        guard(missed_ticks=3).missed_ticks(4, 0.005)
+
+
+def test_a_gap_as_long_as_the_watchdog_waits_is_named() -> None:
+    with refusal("overrun", r"silence: needs a command every 50 ms.* for 50\.0 ms"):
+        guard(missed_ticks=100).missed_ticks(49, 0.05)
+
+
+def test_every_refusal_says_degrees_where_it_speaks_of_angles() -> None:
+    with pytest.raises(LimitExceededError, match=f"at {degrees(3.5):.1f} deg"):
+        guard().reading(0.0, 3.5, 0.0)
