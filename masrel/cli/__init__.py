@@ -29,6 +29,7 @@ VERBS = {
     "report": "Write the report of a study.",
     "agree": "Agreement of any CSV file of ratings, no study needed.",
     "trace": "Torque trace of one stretch of one model.",
+    "fit": "Identify a joint, or a device's friction, from recordings.",
     "demo": "The whole flow on the simulated device.",
 }
 """Verb to summary. The verb ``x`` is the command ``command`` of ``masrel.cli.x``."""
