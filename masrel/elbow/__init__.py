@@ -20,7 +20,7 @@ from masrel.elbow.motions import (
 )
 from masrel.elbow.parameters import STANDARD_MODELS, ElbowParameters
 from masrel.elbow.sampled import SampledJoint
-from masrel.elbow.scenes import SceneTable, evaluate
+from masrel.elbow.scenes import SceneTable, evaluate, torque_traces
 from masrel.elbow.torque import times_at, torque, torque_at
 from masrel.elbow.trace import Trace, trace
 
@@ -51,6 +51,7 @@ __all__ = [
     "times_at",
     "torque",
     "torque_at",
+    "torque_traces",
     "trace",
     "work",
 ]
