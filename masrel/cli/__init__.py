@@ -29,6 +29,7 @@ VERBS = {
     "report": "Write the report of a study.",
     "agree": "Agreement of any CSV file of ratings, no study needed.",
     "trace": "Torque trace of one stretch of one model.",
+    "device": "Bring a Puck up on its CAN bus: probe, check, zero, friction.",
     "demo": "The whole flow on the simulated device.",
 }
 """Verb to summary. The verb ``x`` is the command ``command`` of ``masrel.cli.x``."""
