@@ -36,12 +36,15 @@ class Kinematics:
         When each stretch is fastest, s.
     top_speed : ndarray
         rad/s.
+    is_rising : bool
+        Whether no sampled angle is less than the one before, rounding and all.
     """
 
     angle: Callable[[Floats], Floats]
     velocity: Callable[[Floats], Floats]
     fastest: Floats
     top_speed: Floats
+    is_rising: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -176,7 +179,7 @@ class _Search:
             return (self.angle(i) - angle) - self.joints.catch_travel
 
         found = _first(lambda i: over(i) > 0.0, at, self.n)
-        for neighbour in (found, found - 1):
+        for neighbour in () if self.motion.is_rising else (found, found - 1):
             inside = np.clip(neighbour, 0, self.n - 1)
             self.doubtful |= caught & (np.abs(over(inside)) < 1e-14)
         return np.where(caught, found, self.n)
