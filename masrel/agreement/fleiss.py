@@ -188,7 +188,7 @@ _COEFFICIENT = PooledCoefficient(
 
 def _in_floats(shares: Floats, v: Floats) -> Floats:
     # shares (..., n_categories) -> (...)
-    return np.asarray(((shares @ v) * shares).sum(axis=-1))
+    return np.asarray(np.einsum("...k,...k->...", shares @ v, shares))
 
 
 FLEISS_KERNEL = pooled_kernel(_in_floats)

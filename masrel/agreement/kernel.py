@@ -81,7 +81,7 @@ def weighted_disagreement(counts: Floats, v: Floats) -> Floats:
     ndarray, shape (...)
         Disagreeing ordered pairs of raters, weighted.
     """
-    return np.asarray(((counts @ v) * counts).sum(axis=-1))
+    return np.asarray(np.einsum("...k,...k->...", counts @ v, counts))
 
 
 def pooled_kernel(expected: Callable[[Floats, Floats], Floats | float]) -> Kernel:

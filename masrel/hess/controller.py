@@ -107,8 +107,8 @@ class Controller:
         start_angle: float,
         friction: Friction | None = None,
         compensation: float = 0.9,
-        dead_zone: float = math.radians(1.0),
-        full_speed: float = math.radians(5.0),
+        dead_zone: float = math.radians(0.1),
+        full_speed: float = math.radians(2.0),
         slip_speed_drop: float = math.radians(40.0),
         rate_hz: int = 1000,
     ) -> None:

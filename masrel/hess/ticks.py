@@ -220,10 +220,10 @@ class Ticks:
         """
         begun_ns, torque = self._clock.now_ns(), self.sent
         self._mark(begun_ns, torque)
-        due_ns = begun_ns
+        now_ns = begun_ns
         while torque != 0.0 and self._ramp_ns:
-            due_ns += self._period_ns
-            self._clock.sleep_until_ns(due_ns)
+            n_over = (now_ns - begun_ns) // self._period_ns  # late ones are skipped
+            self._clock.sleep_until_ns(begun_ns + (n_over + 1) * self._period_ns)
             now_ns = self._clock.now_ns()
             left = 1.0 - (now_ns - begun_ns) / self._ramp_ns
             if left <= 0.0:
@@ -232,7 +232,6 @@ class Ticks:
             self.sent = torque * left
             self._watchdog.beat()
             self._mark(now_ns, self.sent)
-            due_ns = max(due_ns, now_ns - self._period_ns)  # late: no burst
 
     def finish(self) -> None:
         """Send zero torque, and let the watchdog rest.

@@ -150,8 +150,8 @@ class DeviceSettings(Table, frozen=True, kw_only=True):
     friction_compensation: Annotated[float, Meta(ge=0, le=1)] = 0.9
     friction_viscous_nms_rad: NonNegative = 0.168
     friction_coulomb_nm: NonNegative = 0.189
-    dead_zone_deg_s: NonNegative = 1.0
-    full_speed_deg_s: Positive = 5.0
+    dead_zone_deg_s: NonNegative = 0.1
+    full_speed_deg_s: Positive = 2.0
     slip_speed_drop_deg_s: Positive = 40.0
     puck_interface: Text = "socketcan"
     puck_channel: Text = "can0"

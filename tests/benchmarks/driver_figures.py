@@ -69,10 +69,10 @@ def draw_integrators(
             axes.annotate(
                 "as shipped: 0.5 ms",
                 (seconds, error),
-                (-4, -16),
+                (-7, -3),
                 textcoords="offset points",
                 color=BLUE,
-                ha="center",
+                ha="right",
             )
     axes.axhline(18.8 / 2700.0, color=GREY, linewidth=0.8)
     axes.text(2.4, 18.8 / 2700.0 * 1.2, "torque quantum", color=GREY, ha="right")

@@ -131,7 +131,7 @@ def frozen(start_s: float) -> ReadFault:
         if time_s < start_s - 1e-9:
             held[:] = [reading.angle]
             return reading
-        return reading._replace(angle=held[0])
+        return reading._replace(angle=held[0] if held else reading.angle)
 
     return fault
 

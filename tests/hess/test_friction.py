@@ -35,7 +35,7 @@ def test_the_whole_friction_is_scaled_by_the_share() -> None:
 def test_inside_the_dead_zone_only_the_viscous_part_is_left() -> None:
     compensation = FrictionCompensation(Friction(), share=0.5)
     assert compensation.torque(0.0) == 0.0
-    speed = radians(0.9)
+    speed = radians(0.09)
     assert compensation.torque(speed) == pytest.approx(0.5 * 0.168 * speed)
 
 

@@ -74,9 +74,9 @@ def test_a_hash_is_that_of_canonical_json(tmp_path: Path) -> None:
         '"speed_threshold_deg_s":20.0,"stiffness_nm_rad":3.15}'
     )
     device = (
-        '{"backend":"simulated","dead_zone_deg_s":1.0,"friction_compensation":0.9,'
+        '{"backend":"simulated","dead_zone_deg_s":0.1,"friction_compensation":0.9,'
         '"friction_coulomb_nm":0.189,"friction_viscous_nms_rad":0.168,'
-        '"frozen_limit_ms":10.0,"full_speed_deg_s":5.0,"highest_angle_deg":185.0,'
+        '"frozen_limit_ms":10.0,"full_speed_deg_s":2.0,"highest_angle_deg":185.0,'
         '"jump_limit_deg":0.3,"lowest_angle_deg":-5.0,"missed_replies_limit":2,'
         '"missed_ticks_limit":20,"puck_channel":"can0","puck_direction":1,'
         '"puck_interface":"socketcan","puck_node":1,"ramp_ms":50.0,"rate_hz":1000,'

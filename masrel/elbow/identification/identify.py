@@ -181,7 +181,7 @@ def _law(step: Step) -> PreCatchLaw:
         if names[name] < 0.0:
             _warn(
                 f"{name} is negative ({names[name]:.4g}): torque must resist "
-                "extension, and the angle grow with it; are the signs of both columns right?"
+                "extension, and the angle grow with it; are both signs right?"
             )
     return PreCatchLaw(
         damping=names["damping"],

@@ -5,6 +5,7 @@ In: joints and motions. Out: the outputs asked for, of every scene.
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from operator import attrgetter
 
 import numpy as np
 
@@ -21,7 +22,15 @@ from masrel.elbow.scenes.quintic import quintic_courses
 from masrel.elbow.scenes.table import Joints, joints_of
 from masrel.errors import ParameterError
 
-__all__ = ["EFFORTS", "EVENTS", "SceneTable", "evaluate"]
+__all__ = [
+    "EFFORTS",
+    "EVENTS",
+    "SceneTable",
+    "check_starts",
+    "evaluate",
+    "motions_of",
+    "paired",
+]
 
 EVENTS = (
     "onset",
@@ -139,8 +148,8 @@ def evaluate(
         )
     if chunk < 1:
         raise ParameterError(f"chunk: needs 1 or more, got {chunk}")
-    joints, moves = _paired(parameters, motions)
-    _check_starts(joints, moves)
+    joints, moves = paired(parameters, motions)
+    check_starts(joints, moves, np.arange(len(moves)))
     asked = tuple(outputs)
     values = np.empty((len(moves), len(asked)))
     n_alone = 0
@@ -157,10 +166,29 @@ def evaluate(
     return SceneTable(outputs=asked, values=values, n_alone=n_alone)
 
 
-def _paired(
+def paired(
     parameters: ElbowParameters | Sequence[ElbowParameters],
     motions: Motion | Sequence[Motion],
 ) -> tuple[Sequence[ElbowParameters], Sequence[Motion]]:
+    """Give every scene its joint and its motion.
+
+    Parameters
+    ----------
+    parameters : ElbowParameters or sequence of ElbowParameters
+        The joints, one a scene; or one for all.
+    motions : Motion or sequence of Motion
+        The motions, one a scene; or one for all.
+
+    Returns
+    -------
+    tuple of two sequences, each of length n_scenes
+        Joints and motions.
+
+    Raises
+    ------
+    ParameterError
+        If their numbers do not fit.
+    """
     joints = [parameters] if isinstance(parameters, ElbowParameters) else parameters
     moves = motions if isinstance(motions, Sequence) else [motions]
     n = max(len(joints), len(moves)) if joints and moves else 0
@@ -175,8 +203,26 @@ def _paired(
     )
 
 
-def _check_starts(joints: Sequence[ElbowParameters], moves: Sequence[Motion]) -> None:
-    for i, (joint, motion) in enumerate(zip(joints, moves, strict=True)):
+def check_starts(
+    joints: Sequence[ElbowParameters], moves: Sequence[Motion], rows: np.ndarray
+) -> None:
+    """Check that no motion starts at or beyond the end of range.
+
+    Parameters
+    ----------
+    joints : sequence of ElbowParameters
+        The joints.
+    moves : sequence of Motion
+        The motions.
+    rows : ndarray of int
+        What number each has among those asked for.
+
+    Raises
+    ------
+    ParameterError
+        If one does; the message says which.
+    """
+    for i, joint, motion in zip(rows.tolist(), joints, moves, strict=True):
         if motion.start >= joint.range_end:
             raise ParameterError(
                 f"motions[{i}].start: needs less than the end of range, "
@@ -211,6 +257,26 @@ _KINDS: Mapping[type[Motion], _Kind] = {
 }
 
 
+def motions_of(kind: type[Motion], stretches: Sequence[Motion]) -> Motions:
+    """Put motions of one kind into columns.
+
+    Parameters
+    ----------
+    kind : type
+        `ConstantSpeed` or `MinimumJerk`.
+    stretches : sequence of Motion
+        The motions.
+
+    Returns
+    -------
+    Motions
+        Their columns.
+    """
+    read = attrgetter("start", "end", _KINDS[kind].speed)
+    start, end, speed = np.array([read(one) for one in stretches], dtype=np.float64).T
+    return Motions(start=start, end=end, speed=speed)
+
+
 def _together(
     kind: type[Motion],
     own: Sequence[ElbowParameters],
@@ -220,11 +286,7 @@ def _together(
     # the outputs, and in which scenes they are not to be had so
     of = _KINDS[kind]
     joints = joints_of(own)
-    columns = (
-        np.array([getattr(motion, name) for motion in stretches], dtype=np.float64)
-        for name in ("start", "end", of.speed)
-    )
-    motions = Motions(**dict(zip(("start", "end", "speed"), columns, strict=True)))
+    motions = motions_of(kind, stretches)
     courses = of.courses(joints, motions)
     alone = courses.is_doubtful.copy()
     values = np.empty((len(own), len(outputs)))

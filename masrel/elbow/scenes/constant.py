@@ -6,11 +6,12 @@ https://doi.org/10.1109/TNSRE.2012.2195330, equations (2), (4) and (6).
 
 import numpy as np
 
-from masrel.elbow.scenes.course import Courses, Motions
+from masrel.elbow.motion import Floats
+from masrel.elbow.scenes.course import Courses, Flags, Motions
 from masrel.elbow.scenes.table import Joints
 from masrel.elbow.scenes.twofold import Twofold, difference, product
 
-__all__ = ["constant_courses"]
+__all__ = ["constant_courses", "constant_ends"]
 
 _NEAR = 1e-24
 # rad: two angles as near as that are left to 50 digits
@@ -65,3 +66,24 @@ def constant_courses(joints: Joints, motions: Motions) -> Courses:
         catch_speed=constant,
         mean_speed=constant,
     )
+
+
+def constant_ends(joints: Joints, motions: Motions) -> tuple[Floats, Flags]:
+    """Find when stretches at constant speed end, and nothing else.
+
+    Parameters
+    ----------
+    joints : Joints
+        The joints, of which the end of range is used.
+    motions : Motions
+        The stretches.
+
+    Returns
+    -------
+    end : ndarray, shape (n_scenes,)
+        s.
+    is_doubtful : ndarray of bool, shape (n_scenes,)
+        None of them is.
+    """
+    way = difference(np.minimum(motions.end, joints.range_end), motions.start)
+    return (way / motions.speed).high, np.zeros(motions.speed.shape, dtype=np.bool_)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from masrel.elbow.motion import Floats
 from masrel.elbow.scenes.twofold import Twofold
 
-__all__ = ["Courses", "Motions", "nearest"]
+__all__ = ["Courses", "Flags", "Motions", "nearest"]
 
 Flags = NDArray[np.bool_]
 

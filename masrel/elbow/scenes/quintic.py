@@ -15,7 +15,7 @@ from masrel.elbow.scenes.course import Courses, Flags, Motions
 from masrel.elbow.scenes.table import Joints
 from masrel.elbow.scenes.twofold import Twofold, difference, product
 
-__all__ = ["quintic_courses", "shares_of_way"]
+__all__ = ["quintic_courses", "quintic_ends", "shares_of_way"]
 
 _NEAR = 1e-12
 # rad, or shares: what is as near as that is left to 50 digits
@@ -41,6 +41,35 @@ def quintic_courses(joints: Joints, motions: Motions) -> Courses:
     """
     with np.errstate(all="ignore"):  # what is not reached may be anything
         return _Quintics(joints, motions).courses()
+
+
+def quintic_ends(joints: Joints, motions: Motions) -> tuple[Floats, Flags]:
+    """Find when minimum-jerk stretches end, and nothing else.
+
+    Parameters
+    ----------
+    joints : Joints
+        The joints, of which the end of range is used.
+    motions : Motions
+        The stretches.
+
+    Returns
+    -------
+    end : ndarray, shape (n_scenes,)
+        s.
+    is_doubtful : ndarray of bool, shape (n_scenes,)
+        Ask `masrel.elbow.course` instead.
+    """
+    duration = difference(motions.end, motions.start) / motions.speed
+    cut = joints.range_end < motions.end
+    if not cut.any():
+        return duration.high, cut
+    with np.errstate(all="ignore"):
+        share = difference(joints.range_end, motions.start)
+        share = share / difference(motions.end, motions.start)
+        place, settled = shares_of_way(share)
+    end = (place * duration).where(cut, duration)
+    return end.high, cut & ~settled
 
 
 class _Quintics:

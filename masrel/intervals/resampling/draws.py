@@ -50,16 +50,16 @@ class Effort:
                 f"n_resamples, got {self.most_resamples}"
             )
 
-    def more(self, drawn: int, error: float) -> int:
-        """Return how many more the tolerance takes, after `drawn` with an error."""
-        if self.tolerance is None or error <= self.tolerance:
+    def more(self, drawn: int, error: float, tolerance: float) -> int:
+        """Return how many more a tolerance takes, after `drawn` with an error."""
+        if error <= tolerance:
             return 0
-        wanted = drawn * (error / self.tolerance) ** 2
+        wanted = drawn * (error / tolerance) ** 2
         size = min(math.ceil(1.05 * wanted), self.most_resamples) - drawn
         if wanted > self.most_resamples or size <= 0:
             raise ConvergenceError(
                 f"tolerance: with {drawn} resamples an end has an error of "
-                f"{error:.2g}; {self.tolerance:g} takes about {wanted - drawn:.2g} "
+                f"{error:.2g}; {tolerance:g} takes about {wanted - drawn:.2g} "
                 f"more, and most_resamples is {self.most_resamples}"
             )
         return size
@@ -97,7 +97,9 @@ def draw_resamples(
     values, scores = sampler.batches(effort.n_resamples, generator)
     while True:
         found = _resamples(sampler, values, scores)
-        size = effort.more(values.size, _error(found, rule))
+        if effort.tolerance is None:
+            return found
+        size = effort.more(values.size, _error(found, rule), effort.tolerance)
         if not size:
             return found
         more, more_scores = sampler.batches(size, generator)

@@ -15,7 +15,7 @@ from masrel.intervals.resampling.slopes import influence
 
 __all__ = ["Sampler", "sampler_of"]
 
-_CHUNK = 1 << 16  # numbers held at once while resampling
+_CHUNK = 1 << 17  # numbers held at once while resampling
 _LEAST = 30  # draws from which on a control is worth its time
 _TABLE = 1 << 14  # sums of a few items that are looked up at once
 _MOST_BITS = 62
@@ -155,7 +155,8 @@ def _packed(
     # A table of the sums of any `at_once` items makes so many draws one lookup.
     n = pool.n
     bits = _bits(lattice, n)
-    places, masks = np.cumsum(bits) - bits, (1 << bits) - 1
+    places = np.cumsum(bits) - bits
+    fields = list(zip(places.tolist(), ((1 << bits) - 1).tolist(), strict=True))
     keys = np.repeat((lattice.steps << places).sum(axis=1), pool.times)
     table = surplus = np.zeros(1, dtype=np.int64)
     n_lookups = -(-n // at_once)
@@ -173,9 +174,11 @@ def _packed(
 
     def draw(size: int, generator: np.random.Generator) -> Batch:
         at = generator.integers(0, table.size, size=(size, n_lookups))
-        packed = table[at].sum(axis=1)
+        packed = np.einsum("ij->i", table[at])  # sums short rows faster than sum
         packed -= surplus[at[:, -1]]  # the last lookup may be of more than are left
-        steps = packed[:, None] >> places & masks
+        steps = np.empty((size, bits.size), dtype=np.int64)
+        for column, (place, mask) in enumerate(fields):
+            np.bitwise_and(packed >> place, mask, out=steps[:, column])
         values = pool.values(lattice.sums(steps, n))
         return values, None if scores is None else steps @ scores
 
