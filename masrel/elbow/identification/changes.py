@@ -17,6 +17,10 @@ COARSE = 150
 LEAST_SIGNAL = 3.0
 """A rise or climb of less than so many standard deviations of the residuals is none."""
 
+LEAST_GAIN = 50.0
+"""An end that takes less than so many residual variances off the sum of squares is
+none: of the ends of white noise the best takes 2 ln n, about 15."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Changes:
@@ -43,8 +47,9 @@ class _Sums:
     rest2: Floats
     angle: Floats
     angle2: Floats
-    torque_angle: Floats
-    rest_angle: Floats
+    later: Floats  # torque - inertial torque, after the catch
+    later2: Floats
+    later_angle: Floats
 
 
 def find_changes(
@@ -55,6 +60,7 @@ def find_changes(
     first: int,
     peak: int,
     additive: bool,
+    pushed: Floats | None = None,
 ) -> Changes:
     """Find the catch of a stretch by least squares.
 
@@ -73,6 +79,9 @@ def find_changes(
     additive : bool
         Whether post-catch adds to the pre-catch law, instead of going on from the
         residual torque.
+    pushed : ndarray, shape (n_samples,), optional
+        The inertial torque m·θ̈ of (5), which post-catch has and the catch has not,
+        N·m; 0 unless given.
 
     Returns
     -------
@@ -89,7 +98,13 @@ def find_changes(
     """
     angle = angle - angle.mean()
     torque, pre_catch = torque - torque.mean(), pre_catch - pre_catch.mean()
-    sums = _sums(torque, torque - pre_catch, angle)
+    # After the catch the level goes on, and with it, of what the law adds there:
+    # m·θ̈ of (5), or the pre-catch law less what it was at the catch.
+    offset = pre_catch if additive else np.zeros_like(torque)
+    later = torque - pre_catch if additive else torque
+    if pushed is not None and not additive:
+        later = torque - pushed
+    sums = _sums(torque, torque - pre_catch, later, angle)
     n = torque.size
     step = max(1, n // COARSE)
     starts = np.arange(first + 1, n - 2, step)
@@ -99,7 +114,7 @@ def find_changes(
     # First both coarsely, then the catch to the sample, then the end to the sample.
     gap = step
     for finer in (False, True, True):
-        squares = _squares(sums, angle, starts, ends, (peak, gap), additive=additive)
+        squares = _squares(sums, angle, starts, ends, (peak, gap), offset)
         place = np.unravel_index(int(np.argmin(squares)), squares.shape)
         catch, end = int(starts[place[0]]), int(ends[place[1]])
         reach = 2 if finer else 3 * step
@@ -111,14 +126,18 @@ def find_changes(
     sd = math.sqrt(max(least, 0.0) / max(n - 6, 1))
     if _rise(torque, pre_catch, catch, min(catch + peak, end)) < LEAST_SIGNAL * sd:
         return Changes(catch=None, end=None)
-    if end < n and _climb(sums, angle, catch, end, peak, additive) < LEAST_SIGNAL * sd:
-        lone = np.array([n])
-        squares = _squares(sums, angle, starts, lone, (peak, 0), additive=additive)
-        catch, end = int(starts[int(np.argmin(squares[:, 0]))]), n
-    return Changes(catch=catch, end=None if end == n else end)
+    if end == n:
+        return Changes(catch=catch, end=None)
+    endless = _squares(sums, angle, starts, np.array([n]), (peak, 0), offset)[:, 0]
+    climbs = additive or (
+        _climb(sums, angle, min(catch + peak, end), end) >= LEAST_SIGNAL * sd
+    )
+    if climbs and float(endless.min()) - least >= LEAST_GAIN * sd**2:
+        return Changes(catch=catch, end=end)
+    return Changes(catch=int(starts[int(np.argmin(endless))]), end=None)
 
 
-def _sums(torque: Floats, rest: Floats, angle: Floats) -> _Sums:
+def _sums(torque: Floats, rest: Floats, later: Floats, angle: Floats) -> _Sums:
     def before(values: Floats) -> Floats:
         return np.concatenate([[0.0], np.cumsum(values)])
 
@@ -129,8 +148,9 @@ def _sums(torque: Floats, rest: Floats, angle: Floats) -> _Sums:
         rest2=before(rest**2),
         angle=before(angle),
         angle2=before(angle**2),
-        torque_angle=before(torque * angle),
-        rest_angle=before(rest * angle),
+        later=before(later),
+        later2=before(later**2),
+        later_angle=before(later * angle),
     )
 
 
@@ -146,8 +166,7 @@ def _squares(
     starts: Ints,
     ends: Ints,
     lengths: tuple[int, int],
-    *,
-    additive: bool,
+    offset: Floats,
 ) -> Floats:
     # residual sum of squares of every pair, shape (n_starts, n_ends); without `gap`
     # samples after a step, which then may be anywhere between two candidates, and
@@ -162,41 +181,32 @@ def _squares(
         sums.torque, sums.torque2, low, np.maximum(step - 1, low)
     )
     after = np.minimum(step + max(gap, 1), n)
-    if additive:
-        later = np.maximum(e, after)
-        total = total + _about_mean(sums.torque, sums.torque2, after, later)
-        total = total + _line(sums.rest, sums.rest2, sums.rest_angle, sums, later, n)
-    else:
-        total = total + _hinge(sums, angle, after, np.maximum(e, after), n)
+    end = np.maximum(e, after)
+    total = total + _hinge(sums, angle, (after, end), offset[i])
     # an end just before that of the peak is the same as one just after it
     apart = (e > i + gap) & ((e < i + peak - 3) | (e > i + peak + 1))
     return np.where(apart, total, np.inf)
 
 
-def _line(
-    one: Floats, two: Floats, cross: Floats, sums: _Sums, low: Ints, n: int
+def _hinge(
+    sums: _Sums, angle: Floats, ends: tuple[Ints, Ints], offset: Floats | float
 ) -> Floats:
-    # residuals of a straight line in the angle over [low, n), its slope not negative
-    count = np.maximum(n - low, 1)
-    mean = (sums.angle[n] - sums.angle[low]) / count
-    spread = sums.angle2[n] - sums.angle2[low] - count * mean**2
-    along = cross[n] - cross[low] - mean * (one[n] - one[low])
-    return _left(_about_mean(one, two, low, np.full_like(low, n)), along, spread)
-
-
-def _hinge(sums: _Sums, angle: Floats, low: Ints, end: Ints, n: int) -> Floats:
-    # residuals of a level over [low, end) that climbs with the angle over [end, n)
-    count = np.maximum(n - low, 1)
-    m = n - end
+    # residuals of a level from `low` on that climbs with the angle from `end` on
+    low, end = ends
+    n = angle.size
+    count, m = np.maximum(n - low, 1), n - end
     at = angle[np.minimum(end, n - 1)]
-    torque = sums.torque[n] - sums.torque[low]
-    h = sums.angle[n] - sums.angle[end] - m * at  # Σ max(θ - θ_e, 0)
-    h2 = sums.angle2[n] - sums.angle2[end]
-    h2 = h2 - 2.0 * at * (sums.angle[n] - sums.angle[end]) + m * at**2
-    cross = sums.torque_angle[n] - sums.torque_angle[end]
-    cross = cross - at * (sums.torque[n] - sums.torque[end])
-    whole = _about_mean(sums.torque, sums.torque2, low, np.full_like(low, n))
-    return _left(whole, cross - torque * h / count, h2 - h**2 / count)
+    later = sums.later[n] - sums.later[end]
+    squares = sums.later2[n] - sums.later2[end] + offset * (2.0 * later + offset * m)
+    later = later + offset * m
+    total = sums.torque[end] - sums.torque[low] + later
+    squares = squares + sums.torque2[end] - sums.torque2[low]
+    moved = sums.angle[n] - sums.angle[end]
+    h = moved - m * at  # Σ max(θ - θ_e, 0)
+    h2 = sums.angle2[n] - sums.angle2[end] - 2.0 * at * moved + m * at**2
+    cross = sums.later_angle[n] - sums.later_angle[end] + offset * moved - at * later
+    whole = squares - total**2 / count
+    return _left(whole, cross - total * h / count, h2 - h**2 / count)
 
 
 def _left(whole: Floats, along: Floats, spread: Floats) -> Floats:
@@ -209,16 +219,10 @@ def _rise(torque: Floats, pre_catch: Floats, catch: int, end: int) -> float:
     return float(torque[catch:end].mean()) - before
 
 
-def _climb(
-    sums: _Sums, angle: Floats, catch: int, end: int, peak: int, additive: bool
-) -> float:
-    # what the fitted climb adds up to by the last sample
-    n = angle.size
-    if additive:
-        return math.inf  # the step back to the pre-catch law is seen by itself
-    low = min(catch + peak, end)
+def _climb(sums: _Sums, angle: Floats, low: int, end: int) -> float:
+    # what the climb of a level from `low` on adds up to by the last sample
     h = np.maximum(angle[low:] - angle[end], 0.0)
-    torque = np.diff(sums.torque[low:])
+    torque = np.append(np.diff(sums.torque[low : end + 1]), np.diff(sums.later[end:]))
     centred = h - h.mean()
     spread = float(centred @ centred)
-    return float(h[n - low - 1]) * float(centred @ torque) / spread if spread else 0.0
+    return float(h[-1]) * float(centred @ torque) / spread if spread else 0.0

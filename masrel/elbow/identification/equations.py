@@ -111,6 +111,9 @@ class Equations:
         motion = np.repeat(held, part.time.size, axis=0)  # τ_pre_end of (3)
         if additive:
             motion = np.where(over[:, None], _motion(part), motion)
+        elif catch.end is not None:
+            later = part.time >= catch.end
+            motion[later, 2] += part.acceleration[later]  # m·θ̈ of (5)
         own = ["peak"] if in_peak.any() else []
         own += ["residual"] if not in_peak.all() else []
         moves = catch.end is not None and not fixed_end and "catch_travel" in names

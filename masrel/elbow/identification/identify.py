@@ -34,7 +34,11 @@ from masrel.elbow.identification.steps import (
     fit_post_catch,
     fit_slow,
 )
-from masrel.elbow.identification.stretches import Stretch, find_stretches
+from masrel.elbow.identification.stretches import (
+    Stretch,
+    check_velocity,
+    find_stretches,
+)
 from masrel.elbow.identification.together import Together, refine
 from masrel.elbow.identification.trials import Catch, Trial, fast_trial, slow_trial
 from masrel.elbow.parameters import STANDARD_MODELS, ElbowParameters
@@ -120,6 +124,12 @@ def fit(
         raise ParameterError(f"slow_below: needs more than 0, got {slow_below}")
     if inertia not in ("zero", "fitted"):
         raise ParameterError(f'inertia: needs "zero" or "fitted", got {inertia!r}')
+    if inertia == "fitted" and held.post_catch == "additive":
+        raise ParameterError(
+            'inertia: with post_catch "additive", m is in every phase but the catch, '
+            "and where one ends cannot be told from the jump of m·θ̈; needs "
+            '"zero", got "fitted"'
+        )
     movements = [
         entry if isinstance(entry, Movement) else read_movement(Path(entry))
         for entry in recordings
@@ -148,7 +158,9 @@ def _stretches(
 ) -> dict[str, Stretch]:
     found: dict[str, Stretch] = {}
     for movement in movements:
-        here = find_stretches(even_samples(movement), window=window, slow_below=limit)
+        samples = even_samples(movement)
+        check_velocity(movement, samples, window)
+        here = find_stretches(samples, window=window, slow_below=limit)
         if not here:
             _warn(f"{movement.name}: no extension of 15 degrees or more; not used")
         for number, stretch in enumerate(here, start=1):

@@ -144,7 +144,7 @@ def _saturated(name: str, torque: Floats) -> NDArray[np.bool_]:
     lengths = np.diff(starts, append=torque.size)
     long = lengths >= SATURATED_RUN
     extreme = np.isin(torque[starts], (torque.min(), torque.max()))
-    extreme &= np.abs(torque[starts]) >= 0.5 * np.abs(torque).max()
+    extreme &= np.abs(torque[starts]) >= 0.9 * np.abs(torque).max()
     if not (long & extreme).any() or (long & ~extreme).any():
         return np.zeros(torque.size, dtype=np.bool_)
     marked = np.repeat(extreme, lengths)

@@ -256,8 +256,8 @@ def fitted(
         reason = None
         if math.isnan(value):
             reason = (reasons or {}).get(name, "these trials do not determine it")
-        elif not half > 0.0:
-            error = half = math.nan
+        elif fit.n_trials[place] < 2 or not half > 0.0:
+            error = half = freedom = math.nan
             reason = "an interval by trial needs two trials that differ"
         made.append(
             FittedParameter(

@@ -170,7 +170,7 @@ def catch_levels(
     in_peak = after.time < min(catch.time + constants.peak_duration, end)
     later = after.time >= end
     past = np.where(later, after.angle - (catch.angle + catch.travel), 0.0)
-    torque = above
+    torque = above - np.where(later, law.inertia * after.acceleration, 0.0)
     if constants.post_catch == "additive":
         torque = np.where(later, after.torque - law.torque(after) - own, above)
     climb, residual = _climb(past[~in_peak], torque[~in_peak])

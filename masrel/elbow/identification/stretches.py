@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.elbow.identification.kinematics import differentiate
-from masrel.elbow.identification.movement import LEAST_TRAVEL
+from masrel.elbow.identification.movement import LEAST_TRAVEL, Movement
 from masrel.elbow.identification.samples import Samples
+from masrel.errors import RecordingError
 
-__all__ = ["Pace", "Stretch", "find_stretches"]
+__all__ = ["Pace", "Stretch", "check_velocity", "find_stretches"]
 
 Floats = NDArray[np.float64]
 
@@ -117,6 +118,36 @@ def find_stretches(
             )
         )
     return found
+
+
+def check_velocity(movement: Movement, samples: Samples, window: float) -> None:
+    """Hold a recorded velocity to the derivative of the angle.
+
+    Parameters
+    ----------
+    movement : Movement
+        The recording; without a velocity there is nothing to check.
+    samples : Samples
+        The same at even times.
+    window : float
+        Length of the window of the filter, s.
+
+    Raises
+    ------
+    RecordingError
+        If it is not 0.8 to 1.25 times the derivative, by least squares: its unit or
+        sign is another, or its column is.
+    """
+    if movement.velocity is None:
+        return
+    _, velocity, _ = differentiate(samples.angle, samples.period, window)
+    recorded = np.interp(samples.time, movement.time, movement.velocity)
+    ratio = float(recorded @ velocity) / float(velocity @ velocity)
+    if not 0.8 <= ratio <= 1.25:
+        raise RecordingError(
+            f"{movement.name}: the velocity is {ratio:.3g} times the derivative of the "
+            "angle; is its unit right?"
+        )
 
 
 def _runs(samples: Samples, angle: Floats, velocity: Floats) -> list[tuple[int, int]]:

@@ -70,6 +70,28 @@ class Part:
             measured=self.measured[which],
         )
 
+    def then(self, later: "Part") -> "Part":
+        """Join two parts.
+
+        Parameters
+        ----------
+        later : Part
+            What follows.
+
+        Returns
+        -------
+        Part
+            Both.
+        """
+        return Part(
+            time=np.concatenate([self.time, later.time]),
+            angle=np.concatenate([self.angle, later.angle]),
+            velocity=np.concatenate([self.velocity, later.velocity]),
+            acceleration=np.concatenate([self.acceleration, later.acceleration]),
+            torque=np.concatenate([self.torque, later.torque]),
+            measured=np.concatenate([self.measured, later.measured]),
+        )
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Catch:
@@ -165,24 +187,28 @@ def slow_trial(stretch: Stretch, name: str) -> Trial:
         start=float(stretch.time[0]),
         duration=float(stretch.time[-1] - stretch.time[0]),
         peak_speed=stretch.peak_speed,
-        pre_catch=_filtered(stretch, unusable, stretch.time.size, SLOW_WINDOW),
+        pre_catch=_filtered(stretch, unusable, (0, stretch.time.size), SLOW_WINDOW),
         remark=f"{lost} samples missing or saturated" if lost else "",
     )
 
 
 def _filtered(
-    stretch: Stretch, unusable: NDArray[np.bool_], stop: int, window: float
+    stretch: Stretch,
+    unusable: NDArray[np.bool_],
+    ends: tuple[int, int],
+    window: float,
 ) -> Part:
-    # samples before `stop`; one is used if its window holds nothing unusable
+    # samples between the ends; one is used if its window holds nothing unusable
     period = stretch.samples.period
     margin = window_length(window, period) // 2 + 1
-    if stop <= 2 * margin:
+    start, stop = ends
+    if stop - start <= 2 * margin:
         return _part(stretch, slice(0, 0))
-    angle, torque = stretch.raw_angle[:stop], stretch.torque[:stop]
+    angle, torque = stretch.raw_angle[start:stop], stretch.torque[start:stop]
     made = filter_alike(angle, torque, period, window)
-    inner = slice(margin, stop - margin)
+    inner = slice(start + margin, stop - margin)
     reach = np.ones(2 * margin + 1)
-    touched = np.convolve(unusable[:stop], reach, mode="valid") > 0.5
+    touched = np.convolve(unusable[start:stop], reach, mode="valid") > 0.5
     whole = Part(
         time=stretch.time[inner],
         angle=made[0],
@@ -241,12 +267,13 @@ def fast_trial(
         first=onset,
         peak=round(constants.peak_duration / period),
         additive=constants.post_catch == "additive",
+        pushed=law[2] * stretch.acceleration[:stop] if law[2] else None,
     )
     if changes.catch is None:
         return _unused(stretch, name, "no catch that stands out of the noise")
-    return _caught(
-        stretch, name, constants, window, (onset, changes.catch, stop), changes.end
-    )
+    places = (onset, changes.catch, stop)
+    has_inertia = law[2] != 0.0
+    return _caught(stretch, name, constants, window, places, changes.end, has_inertia)
 
 
 def _caught(
@@ -256,6 +283,7 @@ def _caught(
     window: float,
     places: tuple[int, int, int],
     end: int | None,
+    has_inertia: bool,
 ) -> Trial:
     onset, begin, stop = places
     time, period = stretch.time, stretch.samples.period
@@ -284,12 +312,18 @@ def _caught(
         within_peak=catch_end is not None and catch_end < peak_end - 2.0 * period,
     )
     after = _part(stretch, slice(begin, stop), window=window)
+    if end is not None and (constants.post_catch == "additive" or has_inertia):
+        # speed and acceleration are regressors here: as before the catch
+        held = after.keep(after.time < last)
+        after = held.then(
+            _filtered(stretch, stretch.saturated, (end, stop), FAST_WINDOW)
+        )
     steps = [instant, peak_end if not catch.within_peak else last]
     if constants.post_catch == "additive" and catch_end is not None:
         steps.append(catch_end)
     near = np.min([np.abs(after.time - step) for step in steps], axis=0) < GUARD
     cut = bool(stretch.saturated[:stop].any())
-    pre = _filtered(stretch, stretch.saturated, begin, FAST_WINDOW)
+    pre = _filtered(stretch, stretch.saturated, (0, begin), FAST_WINDOW)
     return Trial(
         name=name,
         pace="fast",

@@ -214,7 +214,8 @@ def _torque(
     catch_angle = float(np.interp(catch, time, angle))
     catch_speed = float(np.interp(catch, time, speed))
     before = time < catch
-    pre_end = float(np.interp(catch, time[before], law[before]))
+    # the last difference before the catch already reaches over it
+    pre_end = float(np.interp(catch, time[before][:-1], law[before][:-1]))
     released = catch_angle + joint.catch_travel
     catch_end = (
         float(np.interp(released, angle, time)) if released < angle[-1] else math.inf
@@ -224,7 +225,9 @@ def _torque(
     level = np.where(in_peak, rise, joint.residual_ratio * rise)
     climb = np.maximum(np.interp(at, time, angle) - released, 0.0)
     added = level + joint.post_catch_stiffness * climb
-    torque = np.where(at < catch, pre, pre_end + added)
+    pushed = joint.inertia * np.interp(at, time, np.gradient(speed, STEP))
+    after = pre_end + added + np.where(at >= catch_end, pushed, 0.0)
+    torque = np.where(at < catch, pre, after)
     if joint.post_catch == "additive":
         torque = np.where(at >= catch_end, pre + added, torque)
     slow = time[np.flatnonzero(speed >= joint.speed_threshold)[-1]]

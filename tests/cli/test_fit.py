@@ -1,0 +1,126 @@
+"""masrel fit: from files to a table, figures, and a model file for a protocol."""
+
+import csv
+import json
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from masrel.elbow import STANDARD_MODELS
+from masrel.elbow.identification import Movement
+from masrel.protocol import elbow_parameters, read_protocol
+from tests.elbow.identification.synthesis import study
+from tests.elbow.identification.test_friction import backdriven
+from tests.protocol.documents import VALID, write
+
+
+def masrel(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "masrel", "fit", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=False,
+        encoding="utf-8",
+    )
+
+
+def put(movement: Movement, folder: Path) -> Path:
+    path = folder / f"{movement.name.replace(' ', '_')}.csv"
+    with path.open("w", encoding="utf-8", newline="") as file:
+        file.write("# simulated: true\n")
+        writer = csv.writer(file)
+        writer.writerow(["time_s", "angle_deg", "torque_nm"])
+        columns = movement.time, np.degrees(movement.angle), movement.torque
+        writer.writerows(zip(*(c.tolist() for c in columns), strict=True))
+    return path
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    folder = tmp_path_factory.mktemp("recordings")
+    made = study(STANDARD_MODELS["HM3"], seed=21, n_slow=3, n_fast=6)
+    return [put(movement, folder) for movement in made]
+
+
+def test_a_fit_goes_into_a_protocol(files: list[Path], tmp_path: Path) -> None:
+    done = masrel(*files, "-o", tmp_path / "s3.toml", "--json", tmp_path / "fit.json")
+    assert done.returncode == 0, done.stderr
+    assert "SIMULATED DATA" in done.stdout
+    assert "3 slow and 6 fast trials" in done.stdout
+    model = tomllib.loads((tmp_path / "s3.toml").read_text(encoding="utf-8"))
+    assert model["simulated"] is True
+    assert len(model["recordings"]) == 9
+    document = json.loads((tmp_path / "fit.json").read_text(encoding="utf-8"))
+    fitted = {e["key"]: e["value"] for e in document["estimates"]}
+    protocol = dict(VALID)
+    entry = {"id": "S3", "file": "s3.toml"}
+    protocol["models"] = [entry, *VALID["models"][1:]]
+    joint = elbow_parameters(read_protocol(write(protocol, tmp_path)), "S3")
+    assert joint.damping == fitted["damping_nms_rad"]
+    assert joint.residual_ratio == fitted["residual_ratio"]
+    assert joint.catch_slope == pytest.approx(0.35, rel=0.1)
+
+
+def test_json_on_stdout_is_one_document_and_nothing_else(files: list[Path]) -> None:
+    done = masrel(*files[:3], "--json", "-")
+    document = json.loads(done.stdout)
+    missing = {e["key"]: e for e in document["estimates"]}["catch_slope_s"]
+    assert missing["value"] is None
+    assert "only slow stretches" in missing["reason"]
+    assert [trial["pace"] for trial in document["trials"]] == ["slow"] * 3
+    assert document["simulated"] is True
+
+
+def test_only_slow_trials_make_no_model_file(files: list[Path], tmp_path: Path) -> None:
+    done = masrel(*files[:3], "-o", tmp_path / "s3.toml")
+    assert done.returncode == 2
+    assert "catch_angle_constant: there are only slow stretches" in done.stderr
+    assert not (tmp_path / "s3.toml").exists()
+
+
+def test_figures_are_drawn(files: list[Path], tmp_path: Path) -> None:
+    done = masrel(*files, "--figures", tmp_path, "--quiet")
+    assert done.returncode == 0, done.stderr
+    names = ("fit_catches", "fit_residuals", "fit_slow", "fit_trials")
+    expected = [f"{name}.{form}" for name in names for form in ("png", "svg")]
+    assert sorted(path.name for path in tmp_path.iterdir()) == expected
+
+
+def test_friction_is_fitted_and_drawn(tmp_path: Path) -> None:
+    path = put(backdriven(1), tmp_path)
+    done = masrel(path, "--friction", "--figures", tmp_path / "out", "--json", "-")
+    assert done.returncode == 0, done.stderr
+    document = json.loads(done.stdout)
+    values = {e["key"]: e["value"] for e in document["estimates"]}
+    assert values["viscous_nms_rad"] == pytest.approx(0.168, rel=0.02)
+    assert (tmp_path / "out" / "fit_friction.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--unit", "torque"], "--unit: needs QUANTITY=TEXT, got 'torque'"),
+        (["--unit", "torque=lb"], "torque needs one of nm, mnm, ncm, got 'lb'"),
+        (["--unit", "angle=rad"], "column angle_deg says deg, units says rad"),
+        (["--column", "torque=Moment"], "needs the column 'Moment'"),
+        (["--friction", "-o", "x.toml"], "a model file is of a joint"),
+        (["--level", "2"], "level: needs more than 0.5"),
+    ],
+)
+def test_a_wrong_call_is_one_sentence(
+    files: list[Path], arguments: list[str], said: str
+) -> None:
+    done = masrel(*files[:2], *arguments)
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_file_that_is_not_there_is_named() -> None:
+    done = masrel("absent.csv")
+    assert done.returncode == 2
+    assert "absent.csv: no such file" in done.stderr

@@ -1,0 +1,150 @@
+"""Clustered least squares against closed forms, a dense form, and statsmodels."""
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import statsmodels.api as sm
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from masrel.elbow.identification.clusters import Rows, solve, without_own
+
+
+def trials(seed: int, sizes: Sequence[int], n_parameters: int = 2) -> list[Rows]:
+    rng = np.random.default_rng(seed)
+    made = []
+    for size in sizes:
+        design = rng.standard_normal((size, n_parameters)) + 1.0
+        target = design.sum(axis=1) + rng.standard_normal() + rng.standard_normal(size)
+        made.append(Rows(design=design, target=target))
+    return made
+
+
+def dense(rows: Sequence[Rows]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Values, CR2 covariance and degrees of freedom with whole n by n matrices."""
+    x = np.concatenate([r.design for r in rows])
+    y = np.concatenate([r.target for r in rows])
+    inverse = np.linalg.inv(x.T @ x)
+    values = inverse @ x.T @ y
+    residual_maker = np.eye(len(y)) - x @ inverse @ x.T
+    ends = np.cumsum([0, *(len(r.target) for r in rows)])
+    pieces = [slice(a, b) for a, b in pairwise(ends)]
+    meat, columns = np.zeros_like(inverse), []
+    for piece in pieces:
+        sizes, directions = np.linalg.eigh(residual_maker[piece, piece])
+        root = directions @ np.diag(sizes**-0.5) @ directions.T
+        score = x[piece].T @ root @ (residual_maker @ y)[piece]
+        meat += np.outer(score, score)
+        column = np.zeros((len(y), x.shape[1]))
+        column[piece] = root @ x[piece] @ inverse
+        columns.append(column)
+    freedom = []
+    for j in range(x.shape[1]):
+        u = np.stack([column[:, j] for column in columns], axis=1)
+        g = u.T @ residual_maker @ u
+        freedom.append(np.trace(g) ** 2 / np.trace(g @ g))
+    return values, inverse @ meat @ inverse, np.array(freedom)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    st.integers(0, 2**32),
+    st.lists(st.integers(3, 9), min_size=3, max_size=6),
+)
+def test_reduced_and_whole_matrices_agree(seed: int, sizes: list[int]) -> None:
+    rows = trials(seed, sizes)
+    fit, (values, covariance, freedom) = solve(rows), dense(rows)
+    np.testing.assert_allclose(fit.values, values, rtol=1e-9)
+    np.testing.assert_allclose(fit.covariance, covariance, rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(fit.freedom, freedom, rtol=1e-6)
+
+
+def test_with_one_row_a_trial_it_is_hc2_of_statsmodels() -> None:
+    rows = trials(3, [1] * 12)
+    x = np.concatenate([r.design for r in rows])
+    y = np.concatenate([r.target for r in rows])
+    peer = sm.OLS(y, x).fit(cov_type="HC2")
+    fit = solve(rows)
+    np.testing.assert_allclose(fit.values, peer.params, rtol=1e-12)
+    np.testing.assert_allclose(fit.covariance, peer.cov_params(), rtol=1e-9)
+
+
+def test_values_and_residuals_are_those_of_statsmodels_with_a_dummy_a_trial() -> None:
+    rows = trials(5, [7, 9, 6, 8])
+    x = np.concatenate([r.design for r in rows])
+    y = np.concatenate([r.target for r in rows])
+    which = np.repeat(np.arange(4), [7, 9, 6, 8])
+    dummies = (which[:, None] == np.arange(4)).astype(float)
+    peer = sm.OLS(y, np.hstack([x, dummies])).fit()
+    own = [without_own(np.ones((r.target.size, 1)), r.design, r.target) for r in rows]
+    fit = solve(own, n_own=4)
+    np.testing.assert_allclose(fit.values, peer.params[:2], rtol=1e-10)
+    assert fit.residual_sd == pytest.approx(math.sqrt(peer.mse_resid), rel=1e-10)
+
+
+def test_a_mean_of_trials_of_unlike_size_by_hand() -> None:
+    # Trials of 1, 1 and 2 equal rows, values 0, 3 and 3: mean 9/4. With h_g = n_g/4,
+    # CR2 gives Σ n_g² e_g²/(1 - n_g/4)/16: 1·(81/16)/(3/4) + 1·(9/16)/(3/4) +
+    # 4·(9/16)/(1/2), all over 16.
+    rows = [
+        Rows(design=np.ones((n, 1)), target=np.full(n, y))
+        for n, y in ((1, 0.0), (1, 3.0), (2, 3.0))
+    ]
+    fit = solve(rows)
+    by_hand = (81 / 16 / 0.75 + 9 / 16 / 0.75 + 4 * 9 / 16 / 0.5) / 16
+    assert fit.values[0] == pytest.approx(2.25, rel=1e-15)
+    assert fit.covariance[0, 0] == pytest.approx(by_hand, rel=1e-12)
+
+
+def test_what_no_row_tells_is_undefined_and_the_rest_is_not() -> None:
+    rng = np.random.default_rng(1)
+    rows = []
+    for _ in range(4):
+        column = rng.standard_normal(6)
+        design = np.stack([column, np.zeros(6), rng.standard_normal(6)], axis=1)
+        rows.append(Rows(design=design, target=2.0 * column))
+    fit = solve(rows)
+    assert math.isnan(fit.values[1])
+    assert fit.values[0] == pytest.approx(2.0, rel=1e-12)
+    assert fit.n_trials.tolist() == [4, 0, 4]
+
+
+def test_columns_that_say_the_same_are_both_undefined() -> None:
+    rng = np.random.default_rng(2)
+    rows = []
+    for _ in range(3):
+        one = rng.standard_normal(5)
+        design = np.stack([one, 2.0 * one, rng.standard_normal(5)], axis=1)
+        rows.append(Rows(design=design, target=design[:, 2]))
+    fit = solve(rows)
+    assert np.isnan(fit.values).tolist() == [True, True, False]
+    assert fit.values[2] == pytest.approx(1.0, rel=1e-12)
+
+
+def test_one_trial_has_values_and_no_covariance() -> None:
+    fit = solve(trials(4, [8]))
+    assert np.isfinite(fit.values).all()
+    assert np.isnan(fit.covariance).all()
+    assert np.isnan(fit.freedom).all()
+
+
+def test_intervals_of_few_unlike_trials_hold_what_they_say() -> None:
+    # 8 trials whose errors belong together: 400 intervals at 95 % cover 380 of 400 on
+    # average; under that, fewer than 361 or more than 396 has probability < 3e-5.
+    from scipy.special import stdtrit
+
+    covered = 0
+    for seed in range(400):
+        rng = np.random.default_rng(seed)
+        rows = []
+        for size in (4, 5, 6, 7, 8, 9, 10, 30):
+            design = np.stack([np.ones(size), rng.standard_normal(size)], axis=1)
+            error = rng.standard_normal() + 0.3 * rng.standard_normal(size)
+            rows.append(Rows(design=design, target=design @ [1.0, 2.0] + error))
+        fit = solve(rows)
+        half = stdtrit(fit.freedom[1], 0.975) * math.sqrt(fit.covariance[1, 1])
+        covered += abs(fit.values[1] - 2.0) <= half
+    assert 361 <= covered <= 396

@@ -1,0 +1,48 @@
+"""Intervals hold what they say: recordings are made anew and the truth is looked for.
+
+Everything here is simulated: an encoder in steps of 0.09 degrees, torque noise of
+0.1 N·m a sample, hands that are never twice the same, with and without joints that
+vary from trial to trial.
+"""
+
+import math
+
+import pytest
+
+from masrel.elbow import STANDARD_MODELS, fit
+from masrel.elbow.identification.results import QUANTITIES
+from tests.elbow.identification.synthesis import Scatter, study
+
+HM3 = STANDARD_MODELS["HM3"]
+SCATTERED = Scatter(
+    catch_angle=math.radians(2.0), catch_torque=0.1, catch_travel=math.radians(2.0)
+)
+NAMES = [name for name in QUANTITIES if name != "inertia"]
+
+
+def covered(scatter: Scatter | None, seeds: range) -> dict[str, int]:
+    """How often each parameter's 95 % interval holds the truth."""
+    counts = dict.fromkeys(NAMES, 0)
+    for seed in seeds:
+        made = fit(study(HM3, seed=seed, scatter=scatter))
+        for name in NAMES:
+            counts[name] += made[name].covers(getattr(HM3, name))
+    return counts
+
+
+def test_few_intervals_miss() -> None:
+    # 8 studies of 8 parameters: at 95 % coverage 3.2 of 64 miss on average. Were they
+    # independent, 11 or more would miss once in 2500 times; the seeds are fixed.
+    counts = covered(SCATTERED, range(8))
+    assert 64 - sum(counts.values()) <= 10
+    assert min(counts.values()) >= 5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scatter", [None, SCATTERED], ids=["exact", "scattered"])
+def test_every_interval_covers_as_often_as_it_says(scatter: Scatter | None) -> None:
+    # 200 studies: an interval of true coverage 95 % is within 180 to 196 but once in
+    # 200 times; the seeds are fixed, so that this is a statement about the method.
+    counts = covered(scatter, range(1000, 1200))
+    shares = {name: count / 200 for name, count in counts.items()}
+    assert all(0.90 <= share <= 0.98 for share in shares.values()), shares

@@ -1,0 +1,76 @@
+"""The filters: what they keep, what they pass, and where a hand's speed breaks."""
+
+import math
+
+import numpy as np
+import pytest
+
+from masrel.elbow.identification.kinematics import (
+    bandwidth,
+    differentiate,
+    filter_alike,
+    state_at_break,
+    window_length,
+)
+from masrel.errors import ParameterError
+
+PERIOD = 1e-3
+TIME = np.arange(600) * PERIOD
+
+
+def test_a_cubic_is_kept_with_its_derivatives_up_to_the_ends() -> None:
+    cubic = np.polynomial.Polynomial([0.3, 1.0, -2.0, 4.0])
+    angle, velocity, acceleration = differentiate(cubic(TIME), PERIOD, 0.06)
+    np.testing.assert_allclose(angle, cubic(TIME), atol=1e-12)
+    np.testing.assert_allclose(velocity, cubic.deriv()(TIME), atol=1e-9)
+    np.testing.assert_allclose(acceleration, cubic.deriv(2)(TIME), atol=1e-6)
+
+
+def test_a_sine_at_the_stated_bandwidth_comes_out_at_half_its_power() -> None:
+    frequency = bandwidth(0.06, PERIOD)
+    turn = 2.0 * math.pi * frequency
+    _, velocity, _ = differentiate(np.sin(turn * TIME), PERIOD, 0.06)
+    inner = slice(100, 500)
+    ratio = velocity[inner] @ np.cos(turn * TIME[inner])
+    ratio /= turn * (np.cos(turn * TIME[inner]) @ np.cos(turn * TIME[inner]))
+    assert ratio == pytest.approx(math.sqrt(0.5), rel=2e-3)
+
+
+def test_neither_filter_delays() -> None:
+    # An even function of time about the middle stays even, its derivative odd.
+    about = TIME - TIME[300]
+    bump = np.exp(-((about / 0.08) ** 2))[1:]
+    _, velocity, acceleration = differentiate(bump, PERIOD, 0.06)
+    np.testing.assert_allclose(velocity, -velocity[::-1], atol=1e-9)
+    means, rate, _, torque = filter_alike(bump, bump, PERIOD, 0.1)
+    np.testing.assert_allclose(means, torque, atol=1e-15)
+    np.testing.assert_allclose(rate, -rate[::-1], atol=1e-12)
+    assert acceleration.size == bump.size
+
+
+def test_a_linear_law_survives_filtering_angle_and_torque_alike() -> None:
+    # whatever the motion: here one far beyond the filter's bandwidth
+    rng = np.random.default_rng(3)
+    angle = np.cumsum(np.cumsum(rng.standard_normal(900))) * 1e-5
+    law = np.zeros_like(angle)
+    law[1:-1] = 1.3 * (angle[2:] - angle[:-2]) / (2 * PERIOD) + 3.0 * angle[1:-1]
+    x, v, a, torque = filter_alike(angle[1:-1], law[1:-1], PERIOD, 0.1)
+    np.testing.assert_allclose(torque, 1.3 * v + 3.0 * x, atol=1e-10)
+    assert a.shape == x.shape
+
+
+def test_a_break_in_acceleration_does_not_reach_the_speed_before_it() -> None:
+    # speed 2 rad/s that falls by 40 rad/s² from 0.3 s on
+    late = np.maximum(TIME - 0.3, 0.0)
+    angle = 2.0 * TIME - 20.0 * late**2
+    _, speed, acceleration = state_at_break(TIME, angle, 0.3)
+    assert speed == pytest.approx(2.0, abs=1e-9)
+    assert acceleration == pytest.approx(0.0, abs=1e-6)
+    smooth = differentiate(angle, PERIOD, 0.06)[1][300]
+    assert smooth < 1.95  # what a filter that knows nothing of the break would say
+
+
+@pytest.mark.parametrize("window", [0.0, 0.004])
+def test_a_window_without_samples_is_refused(window: float) -> None:
+    with pytest.raises(ParameterError, match=r"window: needs 7 samples, 0\.007 s"):
+        window_length(window, PERIOD)

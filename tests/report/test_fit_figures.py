@@ -1,0 +1,54 @@
+"""Figures of a fit: every trial and law is in them, and the same data give one file."""
+
+import numpy as np
+import pytest
+
+from masrel.elbow import STANDARD_MODELS, fit, fit_friction
+from masrel.elbow.identification import ElbowFit
+from masrel.report.figures.fit_catch import draw_catches
+from masrel.report.figures.fit_friction import draw_friction
+from masrel.report.figures.fit_residuals import draw_residuals
+from masrel.report.figures.fit_slow import draw_slow_trials
+from masrel.report.figures.fit_trial import draw_fast_trials
+from masrel.report.fit_table import fit_table, friction_table
+from masrel.report.tables import as_text
+from tests.elbow.identification.synthesis import study
+from tests.elbow.identification.test_friction import backdriven
+
+DRAWN = [draw_catches, draw_residuals, draw_slow_trials, draw_fast_trials]
+
+
+@pytest.fixture(scope="module")
+def found() -> ElbowFit:
+    return fit(study(STANDARD_MODELS["HM3"], seed=31, n_slow=3, n_fast=6))
+
+
+@pytest.mark.parametrize("draw", DRAWN)
+def test_a_figure_repeats_byte_for_byte(draw, found: ElbowFit) -> None:  # type: ignore[no-untyped-def]
+    one, two = draw(found, stamp="SIMULATED DATA"), draw(found, stamp="SIMULATED DATA")
+    assert one.png == two.png
+    assert one.svg == two.svg
+    assert one.png.startswith(b"\x89PNG")
+
+
+def test_only_slow_trials_have_figures_too() -> None:
+    found = fit(study(STANDARD_MODELS["HM3"], seed=31, n_slow=3, n_fast=0))
+    assert draw_slow_trials(found, stamp="").png
+    assert draw_residuals(found, stamp="").png
+
+
+def test_the_table_has_a_row_a_parameter_and_its_interval(found: ElbowFit) -> None:
+    table = fit_table(found)
+    assert [row[0] for row in table.rows] == "b k L α H Q D k_post".split()
+    assert table.simulated
+    by_symbol = {row[0]: row for row in table.rows}
+    value = float(str(by_symbol["L"][2]))
+    degrees = np.degrees(found["catch_angle_constant"].value)
+    assert value == pytest.approx(degrees, abs=0.05)
+    assert "clustered by trial" in as_text(table)
+
+
+def test_friction_has_its_figure_and_table() -> None:
+    found = fit_friction([backdriven(1)])
+    assert draw_friction(found, stamp="SIMULATED DATA").svg.startswith(b"<?xml")
+    assert [row[0] for row in friction_table(found).rows] == ["I", "B", "β"]
