@@ -4,6 +4,8 @@ In: the parameters of a joint and a motion. Out: exact events, torque at any tim
 what moving the arm takes, or the trace a controller would command.
 """
 
+from typing import TYPE_CHECKING
+
 from masrel.elbow.effort import impulse, peak_torque, residual_torque, work
 from masrel.elbow.events import Events, PhaseSpan, StretchEvents, events
 from masrel.elbow.motion import Motion
@@ -23,6 +25,14 @@ from masrel.elbow.sampled import SampledJoint
 from masrel.elbow.scenes import SceneTable, evaluate, torque_traces
 from masrel.elbow.torque import times_at, torque, torque_at
 from masrel.elbow.trace import Trace, trace
+
+if TYPE_CHECKING:
+    from masrel.elbow.identification import (
+        fit,
+        fit_friction,
+        intermediate_models,
+        read_movement,
+    )
 
 __all__ = [
     "STANDARD_MODELS",
@@ -44,9 +54,13 @@ __all__ = [
     "Trapezoid",
     "evaluate",
     "events",
+    "fit",
+    "fit_friction",
     "impulse",
+    "intermediate_models",
     "interrupted",
     "peak_torque",
+    "read_movement",
     "residual_torque",
     "times_at",
     "torque",
@@ -55,3 +69,14 @@ __all__ = [
     "trace",
     "work",
 ]
+
+_IDENTIFIED = ("fit", "fit_friction", "intermediate_models", "read_movement")
+
+
+def __getattr__(name: str) -> object:
+    # identification needs scipy, which nothing else here does
+    if name not in _IDENTIFIED:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    import importlib
+
+    return getattr(importlib.import_module("masrel.elbow.identification"), name)

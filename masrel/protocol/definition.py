@@ -17,6 +17,7 @@ __all__ = [
     "ElbowConstants",
     "EstimatePlan",
     "Model",
+    "ModelConstants",
     "Protocol",
     "Rater",
     "Report",
@@ -71,6 +72,16 @@ class ElbowConstants(Table, frozen=True, kw_only=True):
     post_catch: Literal["continuous", "additive"] = "continuous"
 
 
+class ModelConstants(Table, frozen=True, kw_only=True):
+    """``[models.constants]``: what a model does not share with the others."""
+
+    inertia_kg_m2: NonNegative | None = None
+    damping_nms_rad: NonNegative | None = None
+    stiffness_nm_rad: NonNegative | None = None
+    catch_slope_s: Positive | None = None
+    post_catch_stiffness_nm_rad: NonNegative | None = None
+
+
 class Model(Table, frozen=True, kw_only=True):
     """``[[models]]``: one haptic model."""
 
@@ -81,6 +92,8 @@ class Model(Table, frozen=True, kw_only=True):
     catch_torque_nms_rad: NonNegative  # H
     residual_ratio: Annotated[float, Meta(ge=0, lt=1)]  # Q
     catch_travel_deg: Angle  # D
+    file: Text | None = None
+    constants: ModelConstants = ModelConstants()
 
 
 class Rater(Table, frozen=True, kw_only=True):

@@ -1,6 +1,7 @@
 """Hashes of a protocol's content, whatever its comments and layout."""
 
 import hashlib
+from typing import Any
 
 import msgspec
 
@@ -24,9 +25,9 @@ def protocol_hash(protocol: Protocol) -> str:
     -------
     str
         SHA-256, 64 hexadecimal digits. Comments, order of keys and layout of the
-        file do not enter.
+        file do not enter. Of a model file its numbers enter, and its name.
     """
-    return _digest(msgspec.to_builtins(protocol))
+    return _digest(_plain(protocol))
 
 
 def presented_hash(protocol: Protocol) -> str:
@@ -49,7 +50,22 @@ def presented_hash(protocol: Protocol) -> str:
     a rater or wording a title better makes nobody's drawn schedule stale.
     """
     tables = {name: getattr(protocol, name) for name in PRESENTED}
-    return _digest(msgspec.to_builtins({"study": protocol.study.id, **tables}))
+    content = _plain({"study": protocol.study.id, **tables})
+    for model in content["models"]:
+        model.pop("file", None)  # the numbers are what is felt, wherever they stood
+    return _digest(content)
+
+
+def _plain(content: object) -> dict[str, Any]:
+    # What a model shares with the others is not its own, and does not enter twice.
+    plain: dict[str, Any] = msgspec.to_builtins(content)
+    for model in plain["models"]:
+        own = {k: v for k, v in model.pop("constants").items() if v is not None}
+        if own:
+            model["constants"] = own
+        if model["file"] is None:
+            del model["file"]
+    return plain
 
 
 def _digest(content: object) -> str:

@@ -39,7 +39,8 @@ def elbow_parameters(protocol: Protocol, model_id: str) -> ElbowParameters:
     Returns
     -------
     ElbowParameters
-        The model's L, H, Q and D with the constants of ``[elbow]``; rad, rad/s, s.
+        The model's L, H, Q and D and its own constants, with those of ``[elbow]``
+        for the rest; rad, rad/s, s.
 
     Raises
     ------
@@ -50,21 +51,27 @@ def elbow_parameters(protocol: Protocol, model_id: str) -> ElbowParameters:
     if not found:
         known = ", ".join(model.id for model in protocol.models)
         raise ParameterError(f"model: needed one of {known}, got {model_id!r}")
-    (model,), shared = found, protocol.elbow
+    (model,), shared, own = found, protocol.elbow, found[0].constants
     return ElbowParameters(
         catch_angle_constant=math.radians(model.catch_angle_constant_deg),
         catch_torque_constant=model.catch_torque_nms_rad,
         residual_ratio=model.residual_ratio,
         catch_travel=math.radians(model.catch_travel_deg),
-        inertia=shared.inertia_kg_m2,
-        damping=shared.damping_nms_rad,
-        stiffness=shared.stiffness_nm_rad,
-        catch_slope=shared.catch_slope_s,
+        inertia=_either(own.inertia_kg_m2, shared.inertia_kg_m2),
+        damping=_either(own.damping_nms_rad, shared.damping_nms_rad),
+        stiffness=_either(own.stiffness_nm_rad, shared.stiffness_nm_rad),
+        catch_slope=_either(own.catch_slope_s, shared.catch_slope_s),
         peak_duration=shared.peak_duration_s,
-        post_catch_stiffness=shared.post_catch_stiffness_nm_rad,
+        post_catch_stiffness=_either(
+            own.post_catch_stiffness_nm_rad, shared.post_catch_stiffness_nm_rad
+        ),
         speed_threshold=math.radians(shared.speed_threshold_deg_s),
         slowest_mean_speed=math.radians(shared.slowest_mean_speed_deg_s),
         smallest_catch_angle=math.radians(shared.smallest_catch_angle_deg),
         range_end=math.radians(shared.range_end_deg),
         post_catch=shared.post_catch,
     )
+
+
+def _either(own: float | None, shared: float) -> float:
+    return shared if own is None else own

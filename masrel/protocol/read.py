@@ -8,6 +8,7 @@ import msgspec
 from masrel.errors import ProtocolError
 from masrel.protocol.decode import decode_table
 from masrel.protocol.definition import Protocol
+from masrel.protocol.model_files import Resolved, resolve_model_files
 from masrel.protocol.rules import broken_rules
 
 __all__ = ["read_protocol"]
@@ -35,15 +36,30 @@ def read_protocol(path: Path) -> Protocol:
 
     Notes
     -----
+    A model that names a model file gets its numbers from there, and the protocol has
+    them as if they stood in it: hashes follow the numbers, not the file.
+
     Rules across keys are applied to what could be decoded, so that one wrong key
     hides no other problem.
     """
-    raw = _read_toml(path)
+    resolved = resolve_model_files(_read_toml(path), path.parent)
+    raw = resolved.raw
     decoded = decode_table(raw, Protocol)
-    problems = [*decoded.problems, *broken_rules(decoded.values)]
+    problems = [*resolved.problems, *_told(decoded.problems, resolved)]
+    problems += broken_rules(decoded.values)
     if problems:
         raise ProtocolError(*(f"{path}: {problem}" for problem in problems))
     return msgspec.convert(raw, Protocol)
+
+
+def _told(problems: list[str], resolved: Resolved) -> list[str]:
+    # A model whose file could not be used lacks its keys for that reason alone.
+    unread = tuple(f"models[{index}]." for index in resolved.unread)
+    return [
+        problem
+        for problem in problems
+        if not (problem.startswith(unread) and ", got none" in problem)
+    ]
 
 
 def _read_toml(path: Path) -> dict[str, object]:

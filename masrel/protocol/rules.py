@@ -198,7 +198,9 @@ def _catch_angles(values: Values) -> Iterator[str]:
     for index, model in _entries(values, "models"):
         constant = model.get("catch_angle_constant_deg")  # L of (2)
         if constant is not None:
-            for problem in _catch_angle(constant, smallest, elbow):
+            own = (model.get("constants") or {}).get("catch_slope_s")
+            shared = elbow if own is None else {**elbow, "catch_slope_s": own}
+            for problem in _catch_angle(constant, smallest, shared):
                 where = f"models[{index}].catch_angle_constant_deg"
                 yield f"{where}: {problem}{_named(model)}"
 

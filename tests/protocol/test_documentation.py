@@ -16,6 +16,7 @@ TABLES = {
     "[scale]": definition.ScaleDefinition,
     "[elbow]": definition.ElbowConstants,
     "[[models]]": definition.Model,
+    "[models.constants]": definition.ModelConstants,
     "[[raters]]": definition.Rater,
     "[[sessions]]": definition.Session,
     "[schedule]": definition.ScheduleScheme,
@@ -47,6 +48,8 @@ def said(field: msgspec.structs.FieldInfo) -> str:
         return "none"
     if field.name == "sections":
         return 'all but `"in-person"`'
+    if isinstance(field.default, msgspec.Struct):
+        return "`{}`"
     return f"`{json.dumps(field.default)}`"
 
 
@@ -59,7 +62,7 @@ def test_every_key_is_there_with_its_default(heading: str) -> None:
 def test_every_table_of_a_protocol_is_there() -> None:
     names = {heading.strip("[]") for heading in TABLES}
     fields = {field.name for field in msgspec.structs.fields(Protocol)}
-    assert names == fields | {"analysis.estimates"}
+    assert names == fields | {"analysis.estimates", "models.constants"}
 
 
 def test_the_default_sections_are_all_but_in_person() -> None:

@@ -58,3 +58,15 @@ def test_the_bundled_studies_have_the_standard_models(study: str, model: str) ->
     path = Path(__file__).parents[2] / "studies" / study / "protocol.toml"
     found = elbow_parameters(read_protocol(path), model)
     assert found == STANDARD_MODELS[model]
+
+
+def test_a_models_own_constants_take_the_place_of_the_shared_ones(
+    tmp_path: Path,
+) -> None:
+    own = {"damping_nms_rad": 0.9, "catch_slope_s": 0.3}
+    protocol = read_protocol(write(changed("models", 0, "constants", to=own), tmp_path))
+    first = elbow_parameters(protocol, "HM1")
+    second = elbow_parameters(protocol, "D1")
+    assert (first.damping, first.catch_slope) == (0.9, 0.3)
+    assert first.stiffness == second.stiffness
+    assert second.damping == protocol.elbow.damping_nms_rad

@@ -1,0 +1,254 @@
+"""``masrel fit``: identify a joint, or a device's friction, from recordings."""
+
+import json
+import math
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from masrel.cli.notes import notes
+from masrel.errors import ParameterError
+
+if TYPE_CHECKING:
+    from masrel.elbow.identification import ElbowFit, FrictionFit, Movement
+
+__all__ = ["command"]
+
+
+@click.command("fit")
+@click.argument("recordings", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option(
+    "-o",
+    "--output",
+    "model_file",
+    type=click.Path(path_type=Path),
+    help="Write the model file here, for a protocol to name.",
+)
+@click.option(
+    "--friction",
+    "of_device",
+    is_flag=True,
+    help="Fit (7) to recordings of backdriving.",
+)
+@click.option(
+    "--unit",
+    "units",
+    help="Unit of a column whose name has none: time=ms, angle=deg, torque=nm.",
+    metavar="QUANTITY=TEXT",
+    multiple=True,
+)
+@click.option(
+    "--column",
+    "columns",
+    help="Name of a column that is called otherwise: torque='Moment'.",
+    metavar="QUANTITY=TEXT",
+    multiple=True,
+)
+@click.option(
+    "--slow-below",
+    "slow_below",
+    type=float,
+    help="Stretches below this speed are slow, deg/s; default: 20, the threshold.",
+)
+@click.option(
+    "--inertia",
+    type=click.Choice(["zero", "fitted"]),
+    default="zero",
+    show_default=True,
+    help="Whether m of (1) is fitted.",
+)
+@click.option(
+    "--post-catch",
+    type=click.Choice(["continuous", "additive"]),
+    default="continuous",
+    show_default=True,
+    help="How (5) is read.",
+)
+@click.option("--level", type=float, default=0.95, show_default=True)
+@click.option(
+    "--figures",
+    "folder",
+    type=click.Path(path_type=Path, file_okay=False),
+    help="Draw the fit as PNG and SVG files in this folder.",
+)
+@click.option(
+    "--json",
+    "json_file",
+    type=click.Path(path_type=Path, allow_dash=True),
+    help="Write everything as JSON here; - prints it, and nothing else, on stdout.",
+)
+@click.option("--quiet", is_flag=True, help="Show no progress.")
+def command(
+    recordings: tuple[Path, ...],
+    model_file: Path | None,
+    of_device: bool,
+    units: tuple[str, ...],
+    columns: tuple[str, ...],
+    slow_below: float | None,
+    inertia: str,
+    post_catch: str,
+    level: float,
+    folder: Path | None,
+    json_file: Path | None,
+    quiet: bool,
+) -> None:
+    """Identify the joint behind RECORDINGS of slow and fast stretches.
+
+    A recording is a CSV file or an npz archive with time, angle and torque, the unit
+    in each column's name (time_s, angle_deg, torque_nm). Prints every parameter with
+    its confidence interval, clustered by trial, and what these trials do not
+    determine.
+    """
+    if of_device and model_file is not None:
+        raise ParameterError("--output: a model file is of a joint, not of a device")
+    named = _pairs("--column", columns), _pairs("--unit", units)
+    with notes():
+        movements = [_read(path, *named) for path in _shown(recordings, quiet=quiet)]
+        if of_device:
+            _friction(movements, level, folder, json_file)
+            return
+        found = _joint(movements, slow_below, inertia, post_catch, level)
+    if model_file is not None:
+        _write_model(found, model_file)
+    if folder is not None:
+        _draw_joint(found, folder)
+    _say(found, json_file)
+
+
+def _pairs(option: str, given: tuple[str, ...]) -> dict[str, str]:
+    made = {}
+    for entry in given:
+        key, sign, value = entry.partition("=")
+        if not sign or not value:
+            raise ParameterError(f"{option}: needs QUANTITY=TEXT, got {entry!r}")
+        made[key] = value
+    return made
+
+
+def _shown(paths: tuple[Path, ...], *, quiet: bool) -> "Iterator[Path]":
+    from tqdm import tqdm
+
+    is_hidden = quiet or not sys.stderr.isatty()
+    yield from tqdm(paths, desc="reading", unit="file", disable=is_hidden, delay=1.0)
+
+
+def _read(path: Path, columns: dict[str, str], units: dict[str, str]) -> "Movement":
+    from masrel.elbow.identification import read_movement
+
+    return read_movement(path, columns=columns, units=units)
+
+
+def _joint(
+    movements: "list[Movement]",
+    slow_below: float | None,
+    inertia: str,
+    post_catch: str,
+    level: float,
+) -> "ElbowFit":
+    from dataclasses import replace
+
+    from masrel.elbow import STANDARD_MODELS
+    from masrel.elbow.identification import fit
+
+    constants = STANDARD_MODELS["HM1"]
+    if post_catch == "additive":
+        constants = replace(constants, post_catch="additive")
+    return fit(
+        movements,
+        constants=constants,
+        inertia="fitted" if inertia == "fitted" else "zero",
+        slow_below=None if slow_below is None else math.radians(slow_below),
+        level=level,
+    )
+
+
+def _friction(
+    movements: "list[Movement]",
+    level: float,
+    folder: Path | None,
+    json_file: Path | None,
+) -> None:
+    from masrel.elbow.identification import fit_friction
+
+    found = fit_friction(movements, level=level)
+    if folder is not None:
+        from masrel.report.figures.fit_friction import draw_friction
+
+        with _files(folder) as write:
+            write("fit_friction", draw_friction(found, stamp=_stamp(found)))
+    _say(found, json_file)
+
+
+def _write_model(found: "ElbowFit", path: Path) -> None:
+    import masrel
+    from masrel.elbow.identification import as_toml, model_document
+
+    document = model_document(
+        found.joint(),
+        simulated=found.simulated,
+        made_from=f"masrel fit {masrel.__version__}, {len(found.trials)} trials",
+        fit=found,
+    )
+    path.write_text(as_toml(document), encoding="utf-8")
+    click.echo(f"model: {path}", err=True)
+
+
+def _stamp(found: "ElbowFit | FrictionFit") -> str:
+    return "SIMULATED DATA" if found.simulated else ""
+
+
+def _draw_joint(found: "ElbowFit", folder: Path) -> None:
+    from masrel.report.figures.fit_catch import draw_catches
+    from masrel.report.figures.fit_residuals import draw_residuals
+    from masrel.report.figures.fit_slow import draw_slow_trials
+    from masrel.report.figures.fit_trial import draw_fast_trials
+
+    stamp = _stamp(found)
+    with _files(folder) as write:
+        write("fit_slow", draw_slow_trials(found, stamp=stamp))
+        write("fit_residuals", draw_residuals(found, stamp=stamp))
+        if any(trial.after is not None for trial in found.trials):
+            write("fit_trials", draw_fast_trials(found, stamp=stamp))
+            write("fit_catches", draw_catches(found, stamp=stamp))
+
+
+@contextmanager
+def _files(folder: Path) -> "Iterator[_Write]":
+    folder.mkdir(parents=True, exist_ok=True)
+    yield _Write(folder)
+    click.echo(f"figures: {folder}", err=True)
+
+
+class _Write:
+    # writes the two files of a figure into a folder
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def __call__(self, name: str, drawn: object) -> None:
+        from masrel.report.figures.style import Drawn
+
+        if isinstance(drawn, Drawn):
+            (self._folder / f"{name}.png").write_bytes(drawn.png)
+            (self._folder / f"{name}.svg").write_bytes(drawn.svg)
+
+
+def _say(found: "ElbowFit | FrictionFit", json_file: Path | None) -> None:
+    from masrel.cli.fit_document import fit_document
+
+    document = json.dumps(fit_document(found), indent=1, ensure_ascii=False)
+    if json_file == Path("-"):
+        click.echo(document)
+        return
+    if json_file is not None:
+        json_file.write_text(document + "\n", encoding="utf-8")
+    from masrel.elbow.identification import ElbowFit
+    from masrel.report.fit_table import fit_table, friction_table
+    from masrel.report.tables import as_text
+
+    table = fit_table(found) if isinstance(found, ElbowFit) else friction_table(found)
+    click.echo(as_text(table))

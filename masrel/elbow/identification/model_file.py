@@ -1,0 +1,188 @@
+"""The model file: a joint with what is known of it, for a protocol to name."""
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from masrel.elbow.parameters import ElbowParameters
+from masrel.errors import ParameterError
+
+if TYPE_CHECKING:
+    from masrel.elbow.identification.results import ElbowFit
+
+__all__ = ["FORMAT", "as_toml", "model_document"]
+
+FORMAT = "masrel joint model 1"
+"""What the key ``format`` of a model file says."""
+
+_DEGREES = 180.0 / math.pi
+
+MODEL_KEYS = {
+    "catch_angle_constant_deg": ("catch_angle_constant", _DEGREES),  # L
+    "catch_torque_nms_rad": ("catch_torque_constant", 1.0),  # H
+    "residual_ratio": ("residual_ratio", 1.0),  # Q
+    "catch_travel_deg": ("catch_travel", _DEGREES),  # D
+}
+"""Key of a protocol's model to the parameter and its unit in SI units."""
+
+CONSTANT_KEYS = {
+    "inertia_kg_m2": ("inertia", 1.0),
+    "damping_nms_rad": ("damping", 1.0),
+    "stiffness_nm_rad": ("stiffness", 1.0),
+    "catch_slope_s": ("catch_slope", 1.0),
+    "post_catch_stiffness_nm_rad": ("post_catch_stiffness", 1.0),
+}
+"""Likewise the constants that a model may have of its own."""
+
+Document = dict[str, object]
+
+
+def model_document(
+    joint: ElbowParameters,
+    *,
+    simulated: bool,
+    made_from: str,
+    fit: "ElbowFit | None" = None,
+) -> Document:
+    """Make the content of a model file.
+
+    Parameters
+    ----------
+    joint : ElbowParameters
+        The joint.
+    simulated : bool
+        Whether it comes from simulated recordings.
+    made_from : str
+        Where it comes from, for people.
+    fit : ElbowFit, optional
+        The fit it comes from: its intervals, remarks and recordings are written
+        beside the numbers.
+
+    Returns
+    -------
+    dict
+        Tables ``model``, ``constants`` and, of a fit, ``estimates`` and
+        ``recordings``; degrees where the key says so.
+
+    Examples
+    --------
+    >>> from masrel.elbow import STANDARD_MODELS
+    >>> hm1 = STANDARD_MODELS["HM1"]
+    >>> made = model_document(hm1, simulated=False, made_from="Table III")
+    >>> made["model"]["catch_torque_nms_rad"]
+    1.4
+    """
+    document: Document = {
+        "format": FORMAT,
+        "made_from": made_from,
+        "simulated": simulated,
+        "model": {
+            key: getattr(joint, name) * factor
+            for key, (name, factor) in MODEL_KEYS.items()
+        },
+        "constants": {
+            key: getattr(joint, name) * factor
+            for key, (name, factor) in CONSTANT_KEYS.items()
+        },
+    }
+    if fit is not None:
+        document["remarks"] = list(fit.remarks)
+        document["estimates"] = _estimates(fit)
+        document["recordings"] = [
+            {"name": name, **({} if sha256 is None else {"sha256": sha256})}
+            for name, sha256 in fit.sources.items()
+        ]
+    return document
+
+
+def _estimates(fit: "ElbowFit") -> list[Document]:
+    names = {name: key for key, (name, _) in {**MODEL_KEYS, **CONSTANT_KEYS}.items()}
+    factors = dict({**MODEL_KEYS, **CONSTANT_KEYS}.values())
+    made = []
+    for estimate in fit.estimates:
+        factor = factors[estimate.name]
+        numbers = {
+            "value": estimate.value * factor,
+            "standard_error": estimate.standard_error * factor,
+            "low": estimate.low * factor,
+            "high": estimate.high * factor,
+            "degrees_of_freedom": estimate.freedom,
+        }
+        entry: Document = {"key": names[estimate.name], "level": estimate.level}
+        entry.update({k: v for k, v in numbers.items() if math.isfinite(v)})
+        entry["n_trials"] = estimate.n_trials
+        if estimate.reason is not None:
+            entry["reason"] = estimate.reason
+        made.append(entry)
+    return made
+
+
+def as_toml(document: Mapping[str, object]) -> str:
+    """Write a document of plain values, tables and arrays of tables as TOML.
+
+    Parameters
+    ----------
+    document : mapping
+        What `model_document` makes.
+
+    Returns
+    -------
+    str
+        TOML; numbers in full precision.
+
+    Raises
+    ------
+    ParameterError
+        If a value is none that TOML has here.
+
+    Examples
+    --------
+    >>> print(as_toml({"format": "x", "model": {"residual_ratio": 0.3}}), end="")
+    format = "x"
+    <BLANKLINE>
+    [model]
+    residual_ratio = 0.3
+    """
+    lines = [
+        f"{key} = {_value(value)}"
+        for key, value in document.items()
+        if not _is_table(value)
+    ]
+    for key, value in document.items():
+        if isinstance(value, Mapping):
+            lines += ["", f"[{key}]", *_pairs(value)]
+        elif _is_table(value) and isinstance(value, list):
+            for entry in value:
+                lines += ["", f"[[{key}]]", *_pairs(entry)]
+    return "\n".join(lines) + "\n"
+
+
+def _is_table(value: object) -> bool:
+    entries = value if isinstance(value, list) else [value]
+    return bool(entries) and all(isinstance(entry, Mapping) for entry in entries)
+
+
+def _pairs(table: Mapping[str, object]) -> list[str]:
+    return [f"{key} = {_value(value)}" for key, value in table.items()]
+
+
+def _value(value: object) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int | float) and math.isfinite(value):
+        return repr(float(value)) if isinstance(value, float) else str(value)
+    if isinstance(value, str):
+        return _text(value)
+    if isinstance(value, list):
+        return f"[{', '.join(_value(entry) for entry in value)}]"
+    raise ParameterError(f"value: needs text, a finite number or a list, got {value!r}")
+
+
+def _text(value: str) -> str:
+    # a basic string: quotes, backslashes and control characters are escaped
+    escaped = value.replace("\\", "\\\\").replace('"', '\\"')
+    plain = "".join(
+        letter if letter.isprintable() else f"\\U{ord(letter):08X}"
+        for letter in escaped
+    )
+    return f'"{plain}"'

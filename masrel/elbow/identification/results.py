@@ -1,0 +1,275 @@
+"""What a fit says: parameters with their uncertainty, step by step and together."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import stdtrit
+
+from masrel.elbow.identification.clusters import ClusteredFit
+from masrel.elbow.identification.trials import Trial
+from masrel.elbow.parameters import ElbowParameters
+from masrel.errors import ParameterError
+
+__all__ = ["QUANTITIES", "ElbowFit", "FittedParameter", "Quantity", "Step", "fitted"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Quantity:
+    """How a parameter is written in files and tables.
+
+    Attributes
+    ----------
+    symbol : str
+        Its symbol in the paper.
+    key : str
+        Its key in a model or protocol file, with the unit.
+    unit : str
+        That unit, in words for tables.
+    factor : float
+        What a value in SI units is multiplied by to be in it.
+    """
+
+    symbol: str
+    key: str
+    unit: str
+    factor: float = 1.0
+
+
+_DEGREES = 180.0 / math.pi
+
+QUANTITIES: dict[str, Quantity] = {
+    "damping": Quantity(symbol="b", key="damping_nms_rad", unit="N·m·s/rad"),
+    "stiffness": Quantity(symbol="k", key="stiffness_nm_rad", unit="N·m/rad"),
+    "inertia": Quantity(symbol="m", key="inertia_kg_m2", unit="kg·m²"),
+    "catch_angle_constant": Quantity(
+        symbol="L", key="catch_angle_constant_deg", unit="deg", factor=_DEGREES
+    ),
+    "catch_slope": Quantity(symbol="α", key="catch_slope_s", unit="s"),
+    "catch_torque_constant": Quantity(
+        symbol="H", key="catch_torque_nms_rad", unit="N·m·s/rad"
+    ),
+    "residual_ratio": Quantity(symbol="Q", key="residual_ratio", unit="1"),
+    "catch_travel": Quantity(
+        symbol="D", key="catch_travel_deg", unit="deg", factor=_DEGREES
+    ),
+    "post_catch_stiffness": Quantity(
+        symbol="k_post", key="post_catch_stiffness_nm_rad", unit="N·m/rad"
+    ),
+}
+"""What can be fitted, by the name it has in `ElbowParameters`."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FittedParameter:
+    """One parameter with its confidence interval.
+
+    Attributes
+    ----------
+    name : str
+        Its name in `ElbowParameters` or in the friction law.
+    value : float
+        SI units; ``nan`` when these trials do not determine it.
+    standard_error : float
+        Clustered by trial; ``nan`` when undefined.
+    freedom : float
+        Degrees of freedom of its t.
+    low, high : float
+        Confidence interval; ``nan`` when undefined.
+    level : float
+        Its level.
+    n_trials : int
+        Trials that say something of it.
+    reason : str or None
+        Why the value or its interval is undefined, or None.
+    """
+
+    name: str
+    value: float
+    standard_error: float
+    freedom: float
+    low: float
+    high: float
+    level: float
+    n_trials: int
+    reason: str | None = None
+
+    def covers(self, truth: float) -> bool:
+        """Say whether the interval holds a value.
+
+        Parameters
+        ----------
+        truth : float
+            A value, SI units.
+
+        Returns
+        -------
+        bool
+            False when the interval is undefined.
+        """
+        return self.low <= truth <= self.high
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Step:
+    """One of the fits that the source made, on its own.
+
+    Attributes
+    ----------
+    name : str
+        What was fitted.
+    estimates : tuple of FittedParameter
+        Its parameters.
+    residual_sd : float
+        Standard deviation of its residuals, in the unit of what was fitted.
+    """
+
+    name: str
+    estimates: tuple[FittedParameter, ...]
+    residual_sd: float
+
+    def __getitem__(self, name: str) -> FittedParameter:
+        return next(e for e in self.estimates if e.name == name)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ElbowFit:
+    """A joint identified from recordings.
+
+    Attributes
+    ----------
+    estimates : tuple of FittedParameter
+        Every parameter, from all trials together; in the order of `QUANTITIES`.
+    correlation : ndarray, shape (n_estimates, n_estimates)
+        Of the estimates' errors; ``nan`` where one is undefined.
+    steps : tuple of Step
+        The fits before the last, in their order.
+    relative_error : float
+        Of slow trials: mean distance of torque from the law of step 1 over mean
+        torque, both absolute.
+    torque_sd : float
+        Standard deviation of torque about the law in all trials, N·m.
+    trials : tuple of Trial
+        What was used.
+    fitted_torque : tuple of ndarray
+        Per trial the law's torque at the samples of `pre_catch` and then `after`.
+    constants : ElbowParameters
+        What was held: ν_th, ν_L, θ_L, ΔT_peak, end of range, reading of (5).
+    n_evaluations : int
+        How often the last fit evaluated the law.
+    level : float
+        Level of the intervals.
+    simulated : bool
+        Whether any recording is.
+    sources : mapping of str to str or None
+        Recording to its checksum.
+    remarks : tuple of str
+        What a reader must know before relying on it.
+    """
+
+    estimates: tuple[FittedParameter, ...]
+    correlation: Floats = field(compare=False, repr=False)
+    steps: tuple[Step, ...]
+    relative_error: float
+    torque_sd: float
+    trials: tuple[Trial, ...] = field(repr=False)
+    fitted_torque: tuple[Floats, ...] = field(compare=False, repr=False)
+    constants: ElbowParameters
+    n_evaluations: int
+    level: float
+    simulated: bool
+    sources: Mapping[str, str | None]
+    remarks: tuple[str, ...] = ()
+
+    def __getitem__(self, name: str) -> FittedParameter:
+        found = [e for e in self.estimates if e.name == name]
+        if not found:
+            known = ", ".join(e.name for e in self.estimates)
+            raise ParameterError(f"name: needs one of {known}, got {name!r}")
+        return found[0]
+
+    def joint(self, *, missing: ElbowParameters | None = None) -> ElbowParameters:
+        """Make the joint of the fitted values.
+
+        Parameters
+        ----------
+        missing : ElbowParameters, optional
+            Where to take what these trials do not determine.
+
+        Returns
+        -------
+        ElbowParameters
+            The fitted values, with `constants` for all that was held.
+
+        Raises
+        ------
+        ParameterError
+            If a parameter is undetermined and `missing` is not given, or a value is
+            none that a joint can have.
+        """
+        values: dict[str, Any] = {}
+        for estimate in self.estimates:
+            if not math.isnan(estimate.value):
+                values[estimate.name] = estimate.value
+            elif missing is not None:
+                values[estimate.name] = getattr(missing, estimate.name)
+            elif estimate.name != "inertia":
+                raise ParameterError(f"{estimate.name}: {estimate.reason}")
+        return replace(self.constants, **values)
+
+
+def fitted(
+    names: Sequence[str],
+    fit: ClusteredFit,
+    level: float,
+    reasons: Mapping[str, str] | None = None,
+) -> tuple[FittedParameter, ...]:
+    """Give values of a clustered fit their intervals.
+
+    Parameters
+    ----------
+    names : sequence of str, length n_parameters
+        What the values are.
+    fit : ClusteredFit
+        The fit.
+    level : float
+        Level of the intervals.
+    reasons : mapping of str to str, optional
+        Why a parameter cannot be determined, where it is not.
+
+    Returns
+    -------
+    tuple of FittedParameter
+        With intervals from t.
+    """
+    made = []
+    for place, name in enumerate(names):
+        value = float(fit.values[place])
+        error = math.sqrt(fit.covariance[place, place])
+        freedom = float(fit.freedom[place])
+        half = float(stdtrit(freedom, 0.5 + 0.5 * level)) * error
+        reason = None
+        if math.isnan(value):
+            reason = (reasons or {}).get(name, "these trials do not determine it")
+        elif not half > 0.0:
+            error = half = math.nan
+            reason = "an interval by trial needs two trials that differ"
+        made.append(
+            FittedParameter(
+                name=name,
+                value=value,
+                standard_error=error,
+                freedom=freedom,
+                low=value - half,
+                high=value + half,
+                level=level,
+                n_trials=int(fit.n_trials[place]),
+                reason=reason,
+            )
+        )
+    return tuple(made)

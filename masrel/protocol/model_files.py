@@ -1,0 +1,116 @@
+"""Model files that a protocol names: their numbers take the place of its own."""
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from masrel.elbow.identification.model_file import (
+    CONSTANT_KEYS,
+    FORMAT,
+    MODEL_KEYS,
+)
+from masrel.protocol.wording import got
+
+__all__ = ["Resolved", "resolve_model_files"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Resolved:
+    """A protocol's content with the numbers of its model files in it.
+
+    Attributes
+    ----------
+    raw : dict
+        The content.
+    problems : list of str
+        What is wrong with the files, each with the key that names one.
+    unread : list of int
+        Places of the models whose file could not be used: their keys are missing
+        for that reason alone.
+    """
+
+    raw: dict[str, object]
+    problems: list[str] = field(default_factory=list)
+    unread: list[int] = field(default_factory=list)
+
+
+def resolve_model_files(raw: Mapping[str, object], folder: Path) -> Resolved:
+    """Read the model files that a protocol names.
+
+    Parameters
+    ----------
+    raw : mapping
+        The protocol as ``tomllib`` gives it.
+    folder : Path
+        Its folder: where a relative name of a file starts.
+
+    Returns
+    -------
+    Resolved
+        The content, in which every model has its numbers, as if they stood there.
+    """
+    resolved = Resolved(raw=dict(raw))
+    models = raw.get("models")
+    if not isinstance(models, list):
+        return resolved
+    made = list(models)
+    for index, entry in enumerate(models):
+        if isinstance(entry, Mapping) and isinstance(entry.get("file"), str):
+            where = f"models[{index}]"
+            read = _read(folder / entry["file"])
+            if isinstance(read, str):
+                resolved.problems.append(f"{where}.file: {read}")
+                resolved.unread.append(index)
+                continue
+            made[index] = _merged(entry, read, where, resolved.problems)
+    resolved.raw["models"] = made
+    return resolved
+
+
+def _read(path: Path) -> dict[str, Any] | str:
+    # the tables of a model file, or what is wrong with it
+    try:
+        content = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+    except OSError as error:
+        return f"needed a model file, got {path}: {error.strerror or error}"
+    except ValueError as error:  # not UTF-8, or not TOML
+        return f"needed a model file, got {path}: {error}"
+    if content.get("format") != FORMAT:
+        return (
+            f'needed a model file, whose format is "{FORMAT}", got {path} with '
+            f"{got(content.get('format', 'none'))}"
+        )
+    for table, known in (("model", MODEL_KEYS), ("constants", CONSTANT_KEYS)):
+        keys = content.get(table, {})
+        foreign = [key for key in keys if key not in known]
+        if not isinstance(keys, dict) or foreign:
+            came = got(keys) if not foreign else ", ".join(foreign)
+            return (
+                f"needed keys of [{table}] among {', '.join(known)}, got {came} in "
+                f"{path}"
+            )
+    return content
+
+
+def _merged(
+    entry: Mapping[str, Any], read: Mapping[str, Any], where: str, problems: list[str]
+) -> dict[str, object]:
+    model, constants = read.get("model", {}), read.get("constants", {})
+    own = entry.get("constants", {})
+    for key in model:
+        if key in entry:
+            problems.append(
+                f"{where}.{key}: needed in {entry['file']} or here, got it in both"
+            )
+    if isinstance(own, Mapping):
+        for key in own:
+            if key in constants:
+                problems.append(
+                    f"{where}.constants.{key}: needed in {entry['file']} or here, got "
+                    "it in both"
+                )
+        own = {**constants, **own}
+
+    return {**model, **entry, "constants": own}

@@ -1,0 +1,116 @@
+"""Fast trials with their phases and the law, in the manner of Figs. 2 and 4."""
+
+import math
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from masrel.elbow.identification.results import ElbowFit
+from masrel.elbow.identification.trials import Catch, Trial
+from masrel.report.figures.style import (
+    BLACK,
+    BLUE,
+    GREY,
+    ORANGE,
+    Drawn,
+    finish,
+    house_style,
+)
+
+__all__ = ["draw_fast_trials"]
+
+MOST_COLUMNS = 3
+
+
+def draw_fast_trials(fit: ElbowFit, *, stamp: str) -> Drawn:
+    """Draw torque, angle and speed of fast trials: slowest, middle and fastest.
+
+    Parameters
+    ----------
+    fit : ElbowFit
+        A fit with at least one catch whose torque is used.
+    stamp : str
+        The line that says where the data come from.
+
+    Returns
+    -------
+    Drawn
+        The figure's files.
+    """
+    fast = [
+        (trial.catch.mean_speed, i)
+        for i, trial in enumerate(fit.trials)
+        if trial.catch is not None and trial.after is not None
+    ]
+    ordered = [place for _, place in sorted(fast)]
+    picked = sorted({0, len(ordered) // 2, len(ordered) - 1})
+    with house_style():
+        figure = Figure(figsize=(0.8 + 2.15 * max(2, len(picked)), 4.9))
+        grid = figure.subplots(
+            3,
+            len(picked),
+            sharex=True,
+            sharey="row",
+            squeeze=False,
+            height_ratios=(1.8, 1.0, 1.0),
+        )
+        for column, pick in enumerate(picked):
+            _trial(grid[:, column].tolist(), fit, ordered[pick])
+        for axes, label in zip(
+            grid[:, 0], ("torque (N·m)", "angle (deg)", "speed (deg/s)"), strict=True
+        ):
+            axes.set_ylabel(label)
+        for axes in grid[2]:
+            axes.set_xlabel("time in the stretch (s)")
+            axes.set_ylim(bottom=0.0)
+        handles, labels = grid[0, 0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=4)
+        return finish(figure, stamp)
+
+
+def _trial(column: list[Axes], fit: ElbowFit, place: int) -> None:
+    trial = fit.trials[place]
+    catch, after, pre = trial.catch, trial.after, trial.pre_catch
+    if catch is None or after is None:
+        return
+    top, middle, bottom = column
+    time = np.concatenate([pre.time, after.time]) - trial.start
+    measured = np.concatenate([pre.measured, after.measured])
+    law = fit.fitted_torque[place]
+    n = pre.time.size
+    for part in (slice(0, n), slice(n, None)):
+        top.plot(
+            time[part],
+            measured[part],
+            color=GREY,
+            linewidth=0.6,
+            label="measured" if part.start == 0 else None,
+        )
+        top.plot(
+            time[part],
+            law[part],
+            color=BLACK,
+            linewidth=1.3,
+            linestyle=(0, (5, 1.5)),
+            label="law, fitted" if part.start == 0 else None,
+        )
+    angle = np.concatenate([pre.angle, after.angle])
+    speed = np.concatenate([pre.velocity, after.velocity])
+    middle.plot(time, np.degrees(angle), color=BLACK, linewidth=1.0)
+    bottom.plot(time, np.degrees(speed), color=BLACK, linewidth=1.0)
+    for axes in column:
+        _shade(axes, trial, catch, float(time[-1]))
+    top.set_title(f"mean speed {math.degrees(catch.mean_speed):.0f} deg/s")
+
+
+def _shade(axes: Axes, trial: Trial, catch: Catch, last: float) -> None:
+    begin = catch.time - trial.start
+    end = last if catch.end is None else catch.end - trial.start
+    axes.axvspan(begin, end, color=ORANGE, alpha=0.35, linewidth=0.0, label="catch")
+    if catch.end is not None:
+        axes.axvspan(
+            end, last, color=BLUE, alpha=0.15, linewidth=0.0, label="post-catch"
+        )
+        axes.axvline(end, color=GREY, linewidth=0.7)
+    axes.axvline(begin, color=GREY, linewidth=0.7)

@@ -1,0 +1,252 @@
+"""Recordings of an evaluator that never were: the law, a varying hand, its sensors.
+
+Everything made here is simulated. The motion is integrated in steps of 0.25 ms and
+events are interpolated between them, apart from `masrel.elbow`, whose code this
+does not use but for the parameters.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from masrel.elbow.identification import Movement
+from masrel.elbow.parameters import ElbowParameters
+
+Floats = NDArray[np.float64]
+
+STEP = 2.5e-4  # s
+ENCODER = math.radians(0.09)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Hand:
+    """How a hand moves a joint: a bell-shaped speed that is never twice the same.
+
+    `wobble` is the size of slow irregularities relative to the speed; `yielding` how
+    much of the speed is lost after a catch, with a time constant of 0.12 s.
+    """
+
+    wobble: float = 0.08
+    yielding: float = 0.3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scatter:
+    """Trial-to-trial standard deviations of the joint itself; the paper has none."""
+
+    catch_angle: float = 0.0  # rad
+    catch_torque: float = 0.0  # relative
+    catch_travel: float = 0.0  # rad
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Truth:
+    """What really happened in one stretch."""
+
+    catch: float | None
+    catch_angle: float | None
+    catch_speed: float | None
+    catch_end: float | None
+    mean_speed: float | None
+
+
+NEVER = Truth(
+    catch=None, catch_angle=None, catch_speed=None, catch_end=None, mean_speed=None
+)
+
+
+def recording(
+    joint: ElbowParameters,
+    *,
+    start: float,
+    end: float,
+    mean_speed: float,
+    rng: np.random.Generator,
+    hand: Hand | None = None,
+    scatter: Scatter | None = None,
+    noise: float = 0.1,
+    encoder: float = ENCODER,
+    rate: float = 1000.0,
+    rest: float = 0.2,
+    duration: float | None = None,
+    offset: float = 0.0,
+    name: str = "simulated",
+) -> tuple[Movement, Truth]:
+    """One stretch with `rest` seconds of rest before and after it."""
+    hand, scatter = hand or Hand(), scatter or Scatter()
+    speed = _speed(end - start, mean_speed, hand, rng)
+    joint = replace(
+        joint,
+        catch_torque_constant=joint.catch_torque_constant
+        * (1.0 + scatter.catch_torque * rng.standard_normal()),
+        catch_travel=joint.catch_travel + scatter.catch_travel * rng.standard_normal(),
+    )
+    shift = scatter.catch_angle * rng.standard_normal()
+    time = np.arange(speed.size) * STEP
+    angle = start + _integral(speed)
+    catch = _catch(joint, time, angle, speed, shift)
+    if catch is not None:
+        speed = _yield(speed, time, catch, hand)
+        angle = start + _integral(speed)
+    length = time[-1] + 2 * rest if duration is None else duration
+    at = np.arange(round(length * rate)) / rate
+    inside = np.clip(at - rest, 0.0, time[-1])
+    sampled = np.interp(inside, time, angle)
+    torque, truth = _torque(joint, time, angle, speed, catch, inside)
+    felt = torque + offset + noise * rng.standard_normal(at.size)
+    if encoder:
+        sampled = np.round(sampled / encoder) * encoder
+    made = Movement(name=name, time=at, angle=sampled, torque=felt, simulated=True)
+    return made, _shifted(truth, rest)
+
+
+def study(
+    joint: ElbowParameters,
+    *,
+    seed: int,
+    n_slow: int = 8,
+    n_fast: int = 16,
+    scatter: Scatter | None = None,
+    noise: float = 0.1,
+    fast: tuple[float, float] = (60.0, 120.0),
+) -> list[Movement]:
+    """Slow stretches of part of the range and fast ones of all of it."""
+    rng = np.random.default_rng(seed)
+    made = []
+    for i in range(n_slow):
+        start = math.radians(rng.uniform(25.0, 105.0))
+        mean = math.radians(rng.uniform(5.0, 8.5))
+        made.append(
+            recording(
+                joint,
+                start=start,
+                end=start + math.radians(18.0),
+                mean_speed=mean,
+                rng=rng,
+                noise=noise,
+                name=f"slow {i}",
+            )[0]
+        )
+    for i in range(n_fast):
+        made.append(
+            recording(
+                joint,
+                start=math.radians(rng.uniform(27.0, 33.0)),
+                end=joint.range_end,
+                mean_speed=math.radians(rng.uniform(*fast)),
+                rng=rng,
+                scatter=scatter,
+                noise=noise,
+                name=f"fast {i}",
+            )[0]
+        )
+    return made
+
+
+def _speed(travel: float, mean: float, hand: Hand, rng: np.random.Generator) -> Floats:
+    duration = travel / mean
+    s = np.arange(0.0, duration + STEP, STEP) / duration
+    s = s[s <= 1.0]
+    bell = 30.0 * mean * (s * (1.0 - s)) ** 2
+    ripple = np.ones_like(s)
+    for cycles in (1.0, 2.0, 3.0):
+        phase = rng.uniform(0.0, 2.0 * math.pi)
+        ripple += (
+            hand.wobble
+            * rng.standard_normal()
+            * np.sin(2.0 * math.pi * cycles * s + phase)
+        )
+    shaped = bell * np.maximum(ripple, 0.2)
+    return np.asarray(shaped * (travel / _integral(shaped)[-1]))
+
+
+def _integral(speed: Floats) -> Floats:
+    return np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1])) * STEP])
+
+
+def _catch(
+    joint: ElbowParameters, time: Floats, angle: Floats, speed: Floats, shift: float
+) -> float | None:
+    fast = np.flatnonzero(speed >= joint.speed_threshold)
+    if fast.size == 0:
+        return None
+    onset = fast[0]
+    later = slice(onset + 1, fast[-1])
+    mean = (angle[later] - angle[onset]) / (time[later] - time[onset])
+    at = joint.catch_angle_constant - joint.catch_slope * np.maximum(
+        mean, joint.slowest_mean_speed
+    )
+    at = np.where(mean > joint.fastest_mean_speed, joint.smallest_catch_angle, at)
+    beyond = angle[later] - at - shift
+    if not (beyond > 0.0).any():
+        return None
+    first = int(np.argmax(beyond > 0.0))
+    if first == 0:
+        return float(time[later][0])
+    part = beyond[first - 1] / (beyond[first - 1] - beyond[first])
+    return float(time[later][first - 1] + part * STEP)
+
+
+def _yield(speed: Floats, time: Floats, catch: float, hand: Hand) -> Floats:
+    since = np.maximum(time - catch, 0.0)
+    return speed * (1.0 - hand.yielding * (1.0 - np.exp(-since / 0.12)))
+
+
+def _torque(
+    joint: ElbowParameters,
+    time: Floats,
+    angle: Floats,
+    speed: Floats,
+    catch: float | None,
+    at: Floats,
+) -> tuple[Floats, Truth]:
+    # torque at the times `at`; a step is before or after a sample, never smeared
+    rest = angle[0] if joint.rest_angle is None else joint.rest_angle
+    law = joint.damping * speed + joint.stiffness * (angle - rest)
+    law = law + joint.inertia * np.gradient(speed, STEP)
+    pre = np.interp(at, time, law)
+    if catch is None:
+        return pre, NEVER
+    onset = int(np.argmax(speed >= joint.speed_threshold))
+    catch_angle = float(np.interp(catch, time, angle))
+    catch_speed = float(np.interp(catch, time, speed))
+    before = time < catch
+    pre_end = float(np.interp(catch, time[before], law[before]))
+    released = catch_angle + joint.catch_travel
+    catch_end = (
+        float(np.interp(released, angle, time)) if released < angle[-1] else math.inf
+    )
+    rise = joint.catch_torque_constant * catch_speed
+    in_peak = at < min(catch + joint.peak_duration, catch_end)
+    level = np.where(in_peak, rise, joint.residual_ratio * rise)
+    climb = np.maximum(np.interp(at, time, angle) - released, 0.0)
+    added = level + joint.post_catch_stiffness * climb
+    torque = np.where(at < catch, pre, pre_end + added)
+    if joint.post_catch == "additive":
+        torque = np.where(at >= catch_end, pre + added, torque)
+    slow = time[np.flatnonzero(speed >= joint.speed_threshold)[-1]]
+    torque = np.where((at > slow) & (at > catch_end), pre, torque)
+    truth = Truth(
+        catch=catch,
+        catch_angle=catch_angle,
+        catch_speed=catch_speed,
+        catch_end=None if math.isinf(catch_end) else catch_end,
+        mean_speed=(catch_angle - float(angle[onset])) / (catch - time[onset]),
+    )
+    return torque, truth
+
+
+def _shifted(truth: Truth, by: float) -> Truth:
+    return replace(
+        truth,
+        catch=None if truth.catch is None else truth.catch + by,
+        catch_end=None if truth.catch_end is None else truth.catch_end + by,
+    )
+
+
+def durations(movements: Sequence[Movement]) -> list[float]:
+    """How long each lasts, s."""
+    return [float(m.time[-1] - m.time[0]) for m in movements]

@@ -1,0 +1,153 @@
+"""A model file's numbers are in the protocol as if they stood there."""
+
+import copy
+import hashlib
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+
+from masrel.elbow.identification import as_toml, model_document
+from masrel.elbow.parameters import STANDARD_MODELS
+from masrel.errors import ProtocolError
+from masrel.protocol import (
+    elbow_parameters,
+    presented_hash,
+    protocol_hash,
+    read_protocol,
+)
+from tests.protocol.documents import VALID, write
+
+KEYS = (
+    "catch_angle_constant_deg",
+    "catch_torque_nms_rad",
+    "residual_ratio",
+    "catch_travel_deg",
+)
+
+
+def named(file: str = "s3.toml", **more: object) -> dict[str, Any]:
+    """The valid protocol, its first model in a file."""
+    document = copy.deepcopy(VALID)
+    for key in KEYS:
+        document["models"][0].pop(key, None)
+    document["models"][0] |= {"file": file, **more}
+    return document
+
+
+def put(folder: Path, name: str = "s3.toml", **changes: dict[str, object]) -> Path:
+    """A model file of HM3, with changes of its tables."""
+    made = model_document(STANDARD_MODELS["HM3"], simulated=True, made_from="a test")
+    for table, values in changes.items():
+        made[table] = {**made[table], **values}  # type: ignore[dict-item]
+    path = folder / name
+    path.write_text(as_toml(made), encoding="utf-8")
+    return path
+
+
+def test_a_named_model_is_the_one_in_the_file(tmp_path: Path) -> None:
+    put(tmp_path, constants={"damping_nms_rad": 0.77})
+    protocol = read_protocol(write(named(), tmp_path))
+    found = elbow_parameters(protocol, protocol.models[0].id)
+    expected = STANDARD_MODELS["HM3"]
+    assert found.damping == 0.77
+    assert found.catch_torque_constant == expected.catch_torque_constant
+    assert found.catch_angle_constant == pytest.approx(
+        expected.catch_angle_constant, rel=1e-15
+    )
+
+
+def test_both_hashes_follow_the_numbers_in_the_file(tmp_path: Path) -> None:
+    path = write(named(), tmp_path)
+    put(tmp_path)
+    before = read_protocol(path)
+    put(tmp_path, model={"residual_ratio": 0.61})
+    after = read_protocol(path)
+    assert protocol_hash(before) != protocol_hash(after)
+    assert presented_hash(before) != presented_hash(after)
+
+
+def test_what_is_presented_does_not_depend_on_the_files_name(tmp_path: Path) -> None:
+    put(tmp_path)
+    put(tmp_path, "other.toml")
+    one = read_protocol(write(named(), tmp_path))
+    two = read_protocol(write(named("other.toml"), tmp_path))
+    assert presented_hash(one) == presented_hash(two)
+    assert protocol_hash(one) != protocol_hash(two)
+
+
+def test_numbers_in_a_file_and_in_the_protocol_are_presented_alike(
+    tmp_path: Path,
+) -> None:
+    put(tmp_path)
+    filed = read_protocol(write(named(), tmp_path))
+    model = filed.models[0]
+    inline = named()
+    entry = inline["models"][0]
+    del entry["file"]
+    entry |= {key: getattr(model, key) for key in KEYS}
+    own = model.constants
+    entry["constants"] = {name: getattr(own, name) for name in own.__struct_fields__}
+    written = read_protocol(write(inline, tmp_path))
+    assert presented_hash(written) == presented_hash(filed)
+
+
+def test_a_protocol_without_files_has_the_hash_it_had_before_there_were_any() -> None:
+    # Schedules drawn then must not turn stale: what is not used does not enter.
+    folder = Path(__file__).parents[2] / "studies"
+    protocol = read_protocol(folder / "hess2012" / "protocol.toml")
+    content = msgspec.to_builtins(protocol)
+    for model in content["models"]:
+        assert model.pop("file") is None
+        assert set(model.pop("constants").values()) == {None}
+    canonical = msgspec.json.encode(content, order="sorted")
+    assert protocol_hash(protocol) == hashlib.sha256(canonical).hexdigest()
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (None, r"models\[0\].file: needed a model file, got .*s3.toml: No such file"),
+        ("x = [", r"models\[0\].file: needed a model file, got .*s3.toml"),
+        ("x = 1\n", r'models\[0\].file: needed .* format is "masrel joint model 1"'),
+        (
+            'format = "masrel joint model 1"\n[model]\nid = "X"\n',
+            r"models\[0\].file: needed keys of \[model\] among .*, got id in",
+        ),
+    ],
+)
+def test_a_file_that_is_no_model_file_is_one_problem(
+    tmp_path: Path, content: str | None, said: str
+) -> None:
+    if content is not None:
+        (tmp_path / "s3.toml").write_text(content, encoding="utf-8")
+    with pytest.raises(ProtocolError, match=said) as raised:
+        read_protocol(write(named(), tmp_path))
+    assert len(raised.value.problems) == 1
+
+
+def test_a_number_in_both_places_is_refused(tmp_path: Path) -> None:
+    put(tmp_path)
+    document = named(residual_ratio=0.2, constants={"damping_nms_rad": 1.0})
+    with pytest.raises(ProtocolError) as raised:
+        read_protocol(write(document, tmp_path))
+    said = "\n".join(raised.value.problems)
+    assert "models[0].residual_ratio: needed in s3.toml or here" in said
+    assert "models[0].constants.damping_nms_rad: needed in s3.toml or here" in said
+
+
+def test_a_number_out_of_range_is_named_by_its_key(tmp_path: Path) -> None:
+    put(tmp_path, model={"residual_ratio": 1.5}, constants={"catch_slope_s": -1.0})
+    with pytest.raises(ProtocolError) as raised:
+        read_protocol(write(named(), tmp_path))
+    said = "\n".join(raised.value.problems)
+    assert "models[0].residual_ratio: needed a number at least 0" in said
+    assert "models[0].constants.catch_slope_s: needed a number above 0" in said
+
+
+def test_the_rule_of_catch_angles_uses_the_models_own_slope(tmp_path: Path) -> None:
+    # L 115 deg - 1.0 s · 60 deg/s = 55 deg, below the smallest catch angle
+    put(tmp_path, constants={"catch_slope_s": 1.0})
+    with pytest.raises(ProtocolError, match=r"115 - 1 \* 60 = 55"):
+        read_protocol(write(named(), tmp_path))
