@@ -1,5 +1,6 @@
 """Idle a puck from another process: what the watchdog does when the loop has died."""
 
+import atexit
 from collections.abc import Callable
 
 from masrel.hess.clock import RealClock
@@ -40,6 +41,7 @@ def prepare(
     link = open_link(
         interface, channel, clock=clock, accepted=accepted_identifiers(node_number)
     )
+    atexit.register(link.close)
     node = PuckNode(link, clock, node_number)
 
     def idle() -> None:
