@@ -216,7 +216,7 @@ def the_invariants_hold(faults: tuple[InjectedFault, ...]) -> None:
 
 few = settings(deadline=None, max_examples=8)
 many = settings(
-    deadline=None, max_examples=400, suppress_health_check=[HealthCheck.too_slow]
+    deadline=None, max_examples=1000, suppress_health_check=[HealthCheck.too_slow]
 )
 
 
@@ -231,7 +231,7 @@ def test_some_sequences_of_faults_leave_no_torque(
 @pytest.mark.slow
 @many
 @given(fault_sequences())
-def test_hundreds_of_sequences_of_faults_leave_no_torque(
+def test_a_thousand_sequences_of_faults_leave_no_torque(
     faults: tuple[InjectedFault, ...],
 ) -> None:
     the_invariants_hold(faults)
