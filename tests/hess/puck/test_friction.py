@@ -71,7 +71,7 @@ def test_runs_that_cannot_tell_are_refused(runs: list[SteadyRun]) -> None:
         fit_friction(runs)
 
 
-@pytest.mark.parametrize("start_deg", [35.0, 60.0, 120.0])
+@pytest.mark.parametrize("start_deg", [35.0, 120.0])
 def test_a_free_arm_says_its_friction_from_wherever_it_starts(start_deg: float) -> None:
     clock = SimulatedClock()
     two = (radians(40.0), radians(80.0))
