@@ -8,6 +8,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from masrel.errors import DeviceError, OverrunWarning, ParameterError
 from masrel.hess.clock import Clock, RealClock
 from masrel.hess.controller import Controller
@@ -203,10 +205,13 @@ def cut_off(spool: Path) -> Presented | None:
         time_s=float(columns["time_s"][-1]),
         torque_nm=float(columns["command_torque_nm"][-1]),
     )
+    # What is missing between the first and the last tick; nobody counted why
+    n_due = round(float(np.ptp(columns["time_s"])) * float(left.facts["rate_hz"] or 0))
+    n_missed = n_due + 1 - columns["time_s"].size
     facts: dict[str, Fact] = {
         **left.facts,
         "scheduling": None,
-        "n_missed_ticks": None,
+        "n_missed_ticks": n_missed,
         "n_missed_replies": None,
         **_fault_facts(fault),
         "ended": "fault",
@@ -214,7 +219,7 @@ def cut_off(spool: Path) -> Presented | None:
         **movement_facts(columns, threshold, True),
     }
     recording = Recording(columns=columns, facts=facts)
-    return Presented(recording=recording, fault=fault, n_missed_ticks=0)
+    return Presented(recording=recording, fault=fault, n_missed_ticks=n_missed)
 
 
 def _check(

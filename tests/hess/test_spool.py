@@ -24,9 +24,11 @@ from masrel.recording import RECORDING_COLUMNS
 
 from .rig import END, START
 
+FACTS = {"device": "none", "rate_hz": 2000, "speed_threshold": 0.3}
+
 
 def written(path: Path, n: int, capacity: int = 10) -> None:
-    spool = Spool(path, capacity, {"device": "none", "speed_threshold": 0.3})
+    spool = Spool(path, capacity, FACTS)
     samples = Samples(capacity, spool)
     for tick in range(n):
         samples.add(tick * 1e-3, 0.5 + tick, 1.0, 2.0, 3.0 + tick, 1)
@@ -49,7 +51,7 @@ def test_what_was_added_is_in_the_file(tmp_path: Path) -> None:
     written(path, 3)
     left = read_spool(path)
     assert left is not None
-    assert left.facts == {"device": "none", "speed_threshold": 0.3}
+    assert left.facts == FACTS
     assert left.columns.shape == (6, 3)
     assert left.columns[0].tolist() == [0.0, 1e-3, 2e-3]
     assert left.columns[1].tolist() == [0.5, 1.5, 2.5]
@@ -101,6 +103,7 @@ def test_what_was_cut_off_says_where(tmp_path: Path) -> None:
     )
     assert left.recording.columns["angle_deg"][-1] == degrees(2.5)
     assert left.recording.facts["ended"] == "fault"
+    assert left.n_missed_ticks == 2  # 2 ms at 2 kHz are five ticks, three are there
 
 
 @pytest.mark.parametrize("n_bytes", [0, 100, 4096, 4100])
