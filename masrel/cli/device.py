@@ -57,7 +57,7 @@ def check_command(bench: Bench) -> None:
     milliseconds with no more than 0.007 N·m, and is idle afterwards.
     """
     from masrel.hess.puck.checks import check
-    from masrel.hess.puck.survey import awake
+    from masrel.hess.puck.connection import awake
 
     with bench.link() as link:
         checks = check(awake(link, bench.clock, bench.options), bench.options)
@@ -84,7 +84,7 @@ def check_command(bench: Bench) -> None:
 def zero_command(bench: Bench, angle_deg: float) -> None:
     """Tell a puck where the arm is; it forgets when its supply is switched off."""
     from masrel.hess.puck.bring_up import set_position
-    from masrel.hess.puck.survey import awake
+    from masrel.hess.puck.connection import awake
 
     with bench.link() as link:
         puck = awake(link, bench.clock, bench.options)
