@@ -154,7 +154,7 @@ class Point:
 
 
 def work_against_error(turns: int) -> list[Point]:
-    """Largest error of catch and catch end over a few speeds, and the time they take."""
+    """Largest error of catch and catch end over a few speeds, and the time it takes."""
     joint = STANDARD_MODELS["HM3"]
     motions = [reach(speed) for speed in (73.0, 81.0, 92.0, 104.0, 117.0)]
     ways: dict[tuple[str, str], tuple[Way, Way | None]] = {
