@@ -3,6 +3,7 @@
 import dataclasses
 import math
 import sys
+from contextlib import nullcontext
 from typing import TYPE_CHECKING
 
 import click
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 __all__ = ["command"]
 
 _N_NODES = 31
+_WATCHDOG_S = 0.05  # as in a protocol
 
 
 @click.group("device")
@@ -55,7 +57,7 @@ def check_command(bench: Bench) -> None:
     milliseconds with no more than 0.007 N·m, and is idle afterwards.
     """
     from masrel.hess.puck.checks import check
-    from masrel.hess.puck.survey import awake
+    from masrel.hess.puck.connection import awake
 
     with bench.link() as link:
         checks = check(awake(link, bench.clock, bench.options), bench.options)
@@ -82,7 +84,7 @@ def check_command(bench: Bench) -> None:
 def zero_command(bench: Bench, angle_deg: float) -> None:
     """Tell a puck where the arm is; it forgets when its supply is switched off."""
     from masrel.hess.puck.bring_up import set_position
-    from masrel.hess.puck.survey import awake
+    from masrel.hess.puck.connection import awake
 
     with bench.link() as link:
         puck = awake(link, bench.clock, bench.options)
@@ -109,13 +111,19 @@ def friction_command(bench: Bench, arm_is_free: bool) -> None:
     2 N·m, for about 20 s.
     """
     from masrel.hess.puck.friction import SPEEDS, fit_friction, steady_runs
+    from masrel.hess.watchdog import watched
 
     if not arm_is_free:
         raise click.UsageError(
             "the arm will move by itself; when it is free, say --arm-is-free"
         )
-    with bench.device() as device, bench.progress(2 * len(SPEEDS)) as progress:
-        estimate = fit_friction(steady_runs(device, bench.clock, progress=progress))
+    with (
+        bench.device() as device,
+        watched(device, _WATCHDOG_S) or nullcontext() as watchdog,
+        bench.progress(2 * len(SPEEDS)) as progress,
+    ):
+        runs = steady_runs(device, bench.clock, watchdog=watchdog, progress=progress)
+        estimate = fit_friction(runs)
     bench.say(_friction_lines(estimate), dataclasses.asdict(estimate))
 
 

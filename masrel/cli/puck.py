@@ -13,7 +13,7 @@ import click
 from tqdm import tqdm
 
 from masrel.hess import Clock, RealClock, SimulatedClock, SimulatedHand
-from masrel.hess.puck.faults import EmulatorOptions
+from masrel.hess.puck.emulator_options import EmulatorOptions
 from masrel.hess.puck.options import PuckOptions
 from masrel.hess.puck.properties import PropertyTable, read_property_table
 
@@ -54,7 +54,7 @@ class Bench:
     @contextmanager
     def link(self, *, hears_all: bool = False) -> "Iterator[Link]":
         """Join the bus for a while."""
-        from masrel.hess.puck.survey import connected
+        from masrel.hess.puck.connection import connected
 
         with connected(
             self.options,

@@ -20,6 +20,7 @@ from masrel.elbow.motions import (
     Trapezoid,
     interrupted,
 )
+from masrel.elbow.outline import Outline, outline
 from masrel.elbow.parameters import STANDARD_MODELS, ElbowParameters
 from masrel.elbow.sampled import SampledJoint
 from masrel.elbow.scenes import SceneTable, evaluate, torque_traces
@@ -43,6 +44,7 @@ __all__ = [
     "Joined",
     "MinimumJerk",
     "Motion",
+    "Outline",
     "Part",
     "PhaseSpan",
     "Recorded",
@@ -59,6 +61,7 @@ __all__ = [
     "impulse",
     "intermediate_models",
     "interrupted",
+    "outline",
     "peak_torque",
     "read_movement",
     "residual_torque",

@@ -19,7 +19,7 @@ from masrel.elbow.polynomial import ONE, ZERO, exactly, value
 from masrel.elbow.roots import cuts
 from masrel.errors import ParameterError
 
-__all__ = ["times_at", "torque", "torque_at"]
+__all__ = ["leg_torque", "times_at", "torque", "torque_at"]
 
 
 def torque(
@@ -79,11 +79,27 @@ def torque(
         for i, leg in enumerate(laid):
             mine = which == i
             if mine.any():
-                values[mine] = _of_leg(leg, motion, at[mine])
+                values[mine] = leg_torque(leg, motion, at[mine])
     return values
 
 
-def _of_leg(leg: Leg, motion: Motion, at: Floats) -> Floats:
+def leg_torque(leg: Leg, motion: Motion, at: Floats) -> Floats:
+    """Return the torque of one law, also at the instant at which the next begins.
+
+    Parameters
+    ----------
+    leg : Leg
+        The law; read within `masrel.elbow.polynomial.exactly`.
+    motion : Motion
+        The motion.
+    at : ndarray, shape (n_times,)
+        Times of the leg, s.
+
+    Returns
+    -------
+    ndarray, shape (n_times,)
+        Torque that resists extension, N·m.
+    """
     # The origin is a root, known better than a float: what is left of it is taken off
     # the difference of angles, which is small.
     values = np.full(at.shape, float(leg.level))

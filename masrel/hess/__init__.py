@@ -7,7 +7,7 @@ from masrel.hess.fault import Fault
 from masrel.hess.friction import Friction, FrictionCompensation
 from masrel.hess.hand import Hand, SimulatedHand, YieldingHand
 from masrel.hess.limits import DeviceLimits
-from masrel.hess.loop import Presented, run_presentation
+from masrel.hess.loop import Presented, cut_off, run_presentation
 from masrel.hess.registry import device_names, open_device
 from masrel.hess.setup import BackendOptions, DeviceSetup
 from masrel.hess.stop import EmergencyStop
@@ -31,6 +31,7 @@ __all__ = [
     "SimulatedClock",
     "SimulatedHand",
     "YieldingHand",
+    "cut_off",
     "device_names",
     "open_device",
     "run_presentation",

@@ -6,6 +6,9 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
 
 from masrel.errors import DeviceError, OverrunWarning, ParameterError
 from masrel.hess.clock import Clock, RealClock
@@ -14,13 +17,14 @@ from masrel.hess.device import Device
 from masrel.hess.fault import Fault
 from masrel.hess.limits import DeviceLimits
 from masrel.hess.realtime import real_time
-from masrel.hess.samples import movement_facts
+from masrel.hess.samples import Samples, movement_facts, recorded_columns
+from masrel.hess.spool import Spool, read_spool
 from masrel.hess.stop import EmergencyStop
-from masrel.hess.ticks import Ticks
+from masrel.hess.ticks import Ticks, n_samples
 from masrel.hess.watchdog import NoWatchdog, Watching
 from masrel.recording import Recording
 
-__all__ = ["Presented", "run_presentation"]
+__all__ = ["Presented", "cut_off", "run_presentation"]
 
 Fact = str | int | float | bool | None
 
@@ -55,6 +59,7 @@ def run_presentation(
     end_angle: float = math.radians(146.0),
     stop: EmergencyStop | None = None,
     watchdog: Watching | None = None,
+    spool: Path | None = None,
 ) -> Presented:
     """Present one model on an open device and record it.
 
@@ -86,6 +91,10 @@ def run_presentation(
     watchdog : Watching or None, optional
         Told every 5 ms that the loop is alive.
 
+    spool : Path or None, optional
+        A file that keeps every sample from the moment it is taken, for a process that
+        is killed; `cut_off` reads it. Remove it when the recording is on disk.
+
     Returns
     -------
     Presented
@@ -98,6 +107,8 @@ def run_presentation(
         the controller has been used, or `end_angle` is not finite.
     DeviceError
         If the device is not open to begin with.
+    OSError
+        If the spool cannot be written.
 
     Warns
     -----
@@ -120,26 +131,35 @@ def run_presentation(
     """
     _check(device, controller, rate_hz, max_duration_s, end_angle)
     n_ticks = math.ceil(max_duration_s * rate_hz)
-    ticks = Ticks(
-        device,
-        controller,
-        clock,
-        limits,
-        rate_hz,
-        n_ticks,
-        end_angle,
-        stop or EmergencyStop(),
-        watchdog or NoWatchdog(),
-    )
-    with _scheduled(clock) as scheduling, _collector_off():
-        ended, fault = _guarded(ticks, device)
+    capacity = n_samples(n_ticks, rate_hz, limits)
+    known: dict[str, Fact] = {
+        "simulated": device.simulated,
+        "device": device.name,
+        "rate_hz": rate_hz,
+        "speed_threshold": controller.speed_threshold,
+    }
+    with _samples(spool, capacity, known) as samples:
+        ticks = Ticks(
+            device,
+            controller,
+            clock,
+            limits,
+            rate_hz,
+            n_ticks,
+            end_angle,
+            samples,
+            stop or EmergencyStop(),
+            watchdog or NoWatchdog(),
+        )
+        with _scheduled(clock) as scheduling, _collector_off():
+            ended, fault = _guarded(ticks, device)
+        columns = samples.columns()
     if ticks.n_missed:
         warnings.warn(
             f"the control loop missed {ticks.n_missed} ticks; they were skipped",
             OverrunWarning,
             stacklevel=2,
         )
-    columns = ticks.samples.columns()
     facts: dict[str, Fact] = {
         "simulated": device.simulated,
         "device": device.name,
@@ -154,6 +174,52 @@ def run_presentation(
     }
     recording = Recording(columns=columns, facts=facts)
     return Presented(recording=recording, fault=fault, n_missed_ticks=ticks.n_missed)
+
+
+def cut_off(spool: Path) -> Presented | None:
+    """Read what a presentation left whose process died.
+
+    Parameters
+    ----------
+    spool : Path
+        What `run_presentation` was given.
+
+    Returns
+    -------
+    Presented or None
+        Its recording, with a fault that says so; None when it had not begun.
+
+    Raises
+    ------
+    RecordingError
+        If it is no such file.
+    """
+    left = read_spool(spool)
+    if left is None:
+        return None
+    threshold = float(left.facts.pop("speed_threshold") or 0.0)
+    columns = recorded_columns(left.columns)
+    fault = Fault(
+        kind="process",
+        words="process: needs one that keeps its recording, this one ended before",
+        time_s=float(columns["time_s"][-1]),
+        torque_nm=float(columns["command_torque_nm"][-1]),
+    )
+    # What is missing between the first and the last tick; nobody counted why
+    n_due = round(float(np.ptp(columns["time_s"])) * float(left.facts["rate_hz"] or 0))
+    n_missed = n_due + 1 - columns["time_s"].size
+    facts: dict[str, Fact] = {
+        **left.facts,
+        "scheduling": None,
+        "n_missed_ticks": n_missed,
+        "n_missed_replies": None,
+        **_fault_facts(fault),
+        "ended": "fault",
+        "grip_lost": None,
+        **movement_facts(columns, threshold, True),
+    }
+    recording = Recording(columns=columns, facts=facts)
+    return Presented(recording=recording, fault=fault, n_missed_ticks=n_missed)
 
 
 def _check(
@@ -228,6 +294,21 @@ def _fault_facts(fault: Fault | None) -> dict[str, Fact]:
         "fault_time_s": fault.time_s,
         "fault_torque_nm": fault.torque_nm,
     }
+
+
+@contextmanager
+def _samples(
+    spool: Path | None, capacity: int, known: dict[str, Fact]
+) -> Iterator[Samples]:
+    # In memory, or in a file that outlives this process
+    file = None if spool is None else Spool(spool, capacity, known)
+    samples = Samples(capacity, file)
+    try:
+        yield samples
+    finally:
+        samples.close()
+        if file is not None:
+            file.close()
 
 
 @contextmanager

@@ -13,7 +13,7 @@ from masrel.hess.setup import BackendOptions, DeviceSetup
 __all__ = ["device_names", "open_device"]
 
 _BACKENDS = {
-    "puck": "masrel.hess.puck.device",
+    "puck": "masrel.hess.puck.backend",
     "replay": "masrel.hess.replay",
     "simulated": "masrel.hess.simulated",
 }

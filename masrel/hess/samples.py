@@ -6,6 +6,7 @@ from array import array
 import numpy as np
 from numpy.typing import NDArray
 
+from masrel.hess.spool import N_COLUMNS, Spool
 from masrel.recording import PHASES
 
 __all__ = [
@@ -14,6 +15,7 @@ __all__ = [
     "mean_speed_deg_s",
     "movement_facts",
     "phase_sequence",
+    "recorded_columns",
 ]
 
 Columns = dict[str, NDArray[np.float64]]
@@ -28,18 +30,32 @@ class Samples:
     ----------
     capacity : int
         Samples that fit in.
+    spool : Spool or None, optional
+        A file that the samples go to; None keeps them in memory.
     """
 
-    __slots__ = ("_angle", "_command", "_model", "_phase", "_time", "_velocity", "n")
+    __slots__ = (
+        "_angle",
+        "_command",
+        "_model",
+        "_phase",
+        "_time",
+        "_velocity",
+        "_words",
+        "n",
+    )
 
-    def __init__(self, capacity: int) -> None:
-        zeros = bytes(8 * capacity)
-        self._time = array("d", zeros)
-        self._angle = array("d", zeros)
-        self._velocity = array("d", zeros)
-        self._model = array("d", zeros)
-        self._command = array("d", zeros)
-        self._phase = array("d", zeros)
+    def __init__(self, capacity: int, spool: Spool | None = None) -> None:
+        n_words = 1 + N_COLUMNS * capacity
+        if spool is None:
+            words: memoryview[float] = memoryview(array("d", bytes(8 * n_words)))
+        else:
+            words = spool.words
+        self._words = words
+        starts = range(1, n_words, max(capacity, 1))
+        parts = [words[start : start + capacity] for start in starts]
+        self._time, self._angle, self._velocity = parts[:3]
+        self._model, self._command, self._phase = parts[3:]
         self.n = 0
 
     def add(
@@ -75,7 +91,7 @@ class Samples:
         self._model[n] = model_torque
         self._command[n] = command_torque
         self._phase[n] = phase
-        self.n = n + 1
+        self.n = self._words[0] = n + 1  # last, so that what is counted is whole
 
     def replace_command(self, command_torque: float) -> None:
         """Write another torque into the last sample; nothing when there is none.
@@ -101,18 +117,54 @@ class Samples:
         dict of str to ndarray, shape (n,)
             One array per name of `masrel.recording.RECORDING_COLUMNS`.
         """
-        return {
-            "time_s": self._written(self._time),
-            "angle_deg": np.degrees(self._written(self._angle)),
-            "velocity_deg_s": np.degrees(self._written(self._velocity)),
-            "model_torque_nm": self._written(self._model),
-            "command_torque_nm": self._written(self._command),
-            "phase": self._written(self._phase),
-        }
+        parts = (
+            self._time,
+            self._angle,
+            self._velocity,
+            self._model,
+            self._command,
+            self._phase,
+        )
+        written = np.empty((N_COLUMNS, self.n))
+        for row, part in zip(written, parts, strict=True):
+            row[:] = part[: self.n]
+        return recorded_columns(written)
 
-    def _written(self, column: "array[float]") -> NDArray[np.float64]:
-        # -> (n,), a copy: the buffer is not kept alive
-        return np.frombuffer(column, dtype=np.float64, count=self.n).copy()
+    def close(self) -> None:
+        """Let go of a spool's memory, so that it can be closed; nothing is left."""
+        for part in (
+            self._time,
+            self._angle,
+            self._velocity,
+            self._model,
+            self._command,
+            self._phase,
+        ):
+            part.release()
+
+
+def recorded_columns(written: NDArray[np.float64]) -> Columns:
+    """Name what the loop wrote, in the units of a recording.
+
+    Parameters
+    ----------
+    written : ndarray, shape (6, n)
+        Time, angle, speed, model torque, command and phase, in SI units.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (n,)
+        One array per name of `masrel.recording.RECORDING_COLUMNS`.
+    """
+    time_s, angle, velocity, model, command, phase = written
+    return {
+        "time_s": time_s.copy(),
+        "angle_deg": np.degrees(angle),
+        "velocity_deg_s": np.degrees(velocity),
+        "model_torque_nm": model.copy(),
+        "command_torque_nm": command.copy(),
+        "phase": phase.copy(),
+    }
 
 
 def movement_facts(

@@ -103,23 +103,23 @@ def stop_on_signals(stop: EmergencyStop) -> Iterator[None]:
 
 
 @contextmanager
-def stop_on_key(stop: EmergencyStop, keys: TextIO) -> Iterator[None]:
+def stop_on_key(stop: EmergencyStop, keys: TextIO | None) -> Iterator[None]:
     """Let any key of a terminal press the button.
 
     Parameters
     ----------
     stop : EmergencyStop
         The button.
-    keys : TextIO
-        Where the keys come from. Anything but a terminal is left alone, and so is
-        every terminal on Windows.
+    keys : TextIO or None
+        Where the keys come from; None for nowhere. Anything but a terminal is left
+        alone, and so is every terminal on Windows.
 
     Yields
     ------
     None
         While keys are waited for, in a thread that sleeps until one comes.
     """
-    if sys.platform == "win32" or not keys.isatty():
+    if sys.platform == "win32" or keys is None or not keys.isatty():
         yield
         return
     terminal = keys.fileno()

@@ -13,7 +13,7 @@ from masrel.hess.stop import EmergencyStop
 from masrel.hess.velocity import VelocityEstimate
 from masrel.hess.watchdog import Watching
 
-__all__ = ["Ticks"]
+__all__ = ["Ticks", "n_samples"]
 
 # A hand that presses against the end stop rests within a few tenths of a degree of
 # it; one encoder step makes 0.8 deg/s; 0.1 s is shorter than a person's reaction.
@@ -23,6 +23,26 @@ _ARRIVAL_TIME_S = 0.1
 
 _CHECK_EVERY_S = 0.05  # how often the device is asked for its state
 _BEAT_EVERY_S = 0.005  # how often the watchdog is told that the loop is alive
+
+
+def n_samples(n_ticks: int, rate_hz: int, limits: DeviceLimits) -> int:
+    """Return how many samples so many ticks can leave.
+
+    Parameters
+    ----------
+    n_ticks : int
+        Ticks after which the presentation ends.
+    rate_hz : int
+        Ticks a second.
+    limits : DeviceLimits
+        What the loop lets pass.
+
+    Returns
+    -------
+    int
+        One a tick, and the ramp of a fault, what it was, and zero at its end.
+    """
+    return n_ticks + math.ceil(limits.ramp_time * rate_hz) + 3
 
 
 class Ticks:
@@ -44,6 +64,8 @@ class Ticks:
         Ticks after which the presentation ends.
     end_angle : float
         Where the stretch is meant to end, rad.
+    samples : Samples
+        Where it writes to; `n_samples` fit in.
     stop : EmergencyStop
         The button it looks at.
     watchdog : Watching
@@ -91,6 +113,7 @@ class Ticks:
         rate_hz: int,
         n_ticks: int,
         end_angle: float,
+        samples: Samples,
         stop: EmergencyStop,
         watchdog: Watching,
     ) -> None:
@@ -110,9 +133,7 @@ class Ticks:
         self.guard = Guard(limits, 1.0 / rate_hz)
         self.n_missed = 0
         self.sent = 0.0
-        # More than the ticks: the ramp of a fault, what it was, and zero at its end
-        n_ramp = math.ceil(limits.ramp_time * rate_hz)
-        self.samples = Samples(n_ticks + n_ramp + 3)
+        self.samples = samples
 
     def run(self) -> str:
         """Run ticks until the end, however it comes.

@@ -99,10 +99,10 @@ class SincDistribution:
             low, high = (low, at) if missing > 0.0 else (at, high)
             slope = self.density(at)
             ahead = at - missing / slope if slope > 0.0 else low
+            if slope > 0.0 and abs(ahead - at) < 1e-12 * max(1.0, abs(at)):
+                return ahead  # also where rounding puts it beyond what is known
             if not low < ahead < high:
                 ahead = 0.5 * (low + high)
-            if abs(ahead - at) < 1e-12 * max(1.0, abs(at)):
-                return ahead
             at = ahead
         return at
 

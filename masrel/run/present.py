@@ -15,6 +15,7 @@ from masrel.hess import (
     Presented,
     RealClock,
     SimulatedHand,
+    cut_off,
     open_device,
     run_presentation,
 )
@@ -28,7 +29,7 @@ from masrel.run.grades import Asked
 from masrel.run.settings import backend_options, device_limits, model_controller
 from masrel.run.simulated import intended_speed
 
-__all__ = ["SIMULATED_BACKEND", "Shown", "present"]
+__all__ = ["SIMULATED_BACKEND", "Shown", "present", "recover", "spool_of"]
 
 SIMULATED_BACKEND = "simulated"
 """The device that needs a simulated hand."""
@@ -101,7 +102,58 @@ def present(
         held.enter_context(stop_on_signals(stop))
         if isinstance(clock, RealClock):
             held.enter_context(stop_on_key(stop, sys.stdin))
-        presented = _on_device(protocol, asked, clock, limits, stop)
+        spool = spool_of(file)
+        presented = _on_device(protocol, asked, clock, limits, stop, spool)
+    return _keep(presented, protocol, asked, file)
+
+
+def spool_of(file: Path) -> Path:
+    """Return where samples are kept while the recording is made.
+
+    Parameters
+    ----------
+    file : Path
+        The recording's ``.npz`` file.
+
+    Returns
+    -------
+    Path
+        A file beside it.
+    """
+    return file.with_suffix(".partial")
+
+
+def recover(protocol: Protocol, asked: Asked, *, file: Path) -> Shown | None:
+    """Make a recording of what a process left that died while presenting.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        As for `present`.
+    asked : Asked
+        What was being presented.
+    file : Path
+        The recording's ``.npz`` file.
+
+    Returns
+    -------
+    Shown or None
+        What is to be logged; None when no process died here, or before it began.
+
+    Raises
+    ------
+    RecordingError
+        If what lies there is something else.
+    OSError
+        If the recording cannot be written.
+    """
+    spool = spool_of(file)
+    if not spool.exists():
+        return None
+    presented = cut_off(spool)
+    if presented is None:
+        spool.unlink()
+        return None
     return _keep(presented, protocol, asked, file)
 
 
@@ -111,6 +163,7 @@ def _on_device(
     clock: Clock,
     limits: DeviceLimits,
     stop: EmergencyStop,
+    spool: Path,
 ) -> Presented:
     settings, stretch = protocol.device, protocol.stretch
     start, end = math.radians(stretch.start_deg), math.radians(stretch.end_deg)
@@ -142,6 +195,7 @@ def _on_device(
             end_angle=end,
             stop=stop,
             watchdog=watchdog,
+            spool=spool,
         )
 
 
@@ -180,6 +234,7 @@ def _keep(presented: Presented, protocol: Protocol, asked: Asked, file: Path) ->
     checksum = write_recording(dataclasses.replace(recording, facts=facts), file)
     for written in (file, file.with_suffix(".json")):
         _sync(written)  # before the log says that they are there
+    spool_of(file).unlink(missing_ok=True)  # only now is it of no use
     speed = facts["mean_speed_deg_s"]
     return Shown(
         sha256=checksum,

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 import masrel
@@ -17,7 +18,7 @@ from masrel.run.chain import Fact
 from masrel.run.fault import FaultRecord
 from masrel.run.grades import Asked, GradeSource
 from masrel.run.log import SessionLog
-from masrel.run.present import SIMULATED_BACKEND, Shown, present
+from masrel.run.present import SIMULATED_BACKEND, Shown, present, recover
 from masrel.run.replay import SessionState, replay
 from masrel.schedule import Presentation, Schedule
 
@@ -218,6 +219,7 @@ class Walk:
     def _until_graded(self, presentation: Presentation) -> str:
         attempt = len(self._state.presented.get(presentation.code, []))
         n_faults, grade = 0, None
+        attempt += self._recovered(self._asked(presentation, attempt + 1, 0))
         while grade is None:
             attempt += 1
             asked = self._asked(presentation, attempt, n_faults)
@@ -245,15 +247,38 @@ class Walk:
             n_faults=n_faults,
         )
 
+    def _file(self, asked: Asked) -> Path:
+        code = asked.presentation.code
+        file = self._study.recording_file(asked.rater, asked.session, code)
+        return (
+            file.with_name(f"{code}-{asked.attempt}.npz") if asked.attempt > 1 else file
+        )
+
+    def _recovered(self, asked: Asked) -> bool:
+        # Whether a process died while it presented this, and its data are now logged
+        file = self._file(asked)
+        left = recover(self._protocol, asked, file=file)
+        if left is not None:
+            self._log_shown(asked, left, file)
+        return left is not None
+
     def _present(self, asked: Asked) -> Shown:
-        shown = asked.presentation
-        file = self._study.recording_file(asked.rater, asked.session, shown.code)
-        if asked.attempt > 1:
-            file = file.with_name(f"{shown.code}-{asked.attempt}.npz")
+        shown, file = asked.presentation, self._file(asked)
         # A new one each time, so that the simulated clock starts at zero.
         clock, stop = CLOCKS[self._clock](), EmergencyStop()
         left = present(self._protocol, asked, clock=clock, file=file, stop=stop)
         self._n_again += asked.attempt > 1
+        self._log_shown(asked, left, file)
+        if stop.reason in _ENDING:
+            raise SessionStoppedError(
+                f"session {asked.session} of {asked.rater} was stopped by "
+                f"{stop.reason} at presentation {shown.position}; the same command "
+                "goes on there"
+            )
+        return left
+
+    def _log_shown(self, asked: Asked, left: Shown, file: Path) -> None:
+        shown = asked.presentation
         self._n_faults += left.fault is not None
         self._log.append(
             "presented",
@@ -271,13 +296,6 @@ class Walk:
         )
         if left.fault is not None:
             self._log_fault(asked, left.fault)
-        if stop.reason in _ENDING:
-            raise SessionStoppedError(
-                f"session {asked.session} of {asked.rater} was stopped by "
-                f"{stop.reason} at presentation {shown.position}; the same command "
-                "goes on there"
-            )
-        return left
 
     def _log_fault(self, asked: Asked, fault: FaultRecord) -> None:
         shown = asked.presentation

@@ -50,7 +50,7 @@ def _figure(width: float = 5.6, height: float = 3.6) -> Figure:
 def draw_integrators(
     found: Mapping[str, list[tuple[float, float, float]]], path: Path
 ) -> None:
-    """Draw the time of a simulated second against the largest error."""
+    """Draw the processor time of a simulated second against the largest error."""
     figure = _figure()
     axes = figure.add_subplot()
     for name, points in found.items():
@@ -69,14 +69,14 @@ def draw_integrators(
             axes.annotate(
                 "as shipped: 0.5 ms",
                 (seconds, error),
-                (-7, -3),
+                (7, 1),
                 textcoords="offset points",
                 color=BLUE,
-                ha="right",
+                ha="left",
             )
     axes.axhline(18.8 / 2700.0, color=GREY, linewidth=0.8)
-    axes.text(2.4, 18.8 / 2700.0 * 1.2, "torque quantum", color=GREY, ha="right")
-    axes.set_xlabel("run time of a simulated second (s)")
+    axes.text(0.3, 18.8 / 2700.0 * 1.2, "torque quantum", color=GREY, ha="center")
+    axes.set_xlabel("processor time of a simulated second (s)")
     axes.set_ylabel("largest error of the hand's torque (N·m)")
     axes.grid(color="#DDDDDD", linewidth=0.6)
     axes.legend(frameon=False, loc="lower left", fontsize=8)

@@ -66,6 +66,7 @@ def test_zero_says_the_count(masrel: Caller, tmp_path: Path) -> None:
     assert document == {"angle_deg": 90.0, "counts": 19251, "simulated": True}
 
 
+@pytest.mark.slow  # tests/hess/puck/test_documentation.py reads its lines by default
 def test_friction_finds_that_of_the_emulated_arm(masrel: Caller) -> None:
     done = masrel("device", "friction", "--arm-is-free", *EMULATED, "--json", "-")
     assert done.code == 0

@@ -164,6 +164,7 @@ HM3 = "--model HM3 --speed-deg-s"
         (f"{HM3} 0 --motion minimum-jerk", "mean_speed: needs more than 0"),
         (f"{HM3} 92 --from-deg 50 --to-deg 40", "got 50 and 40 degrees"),
         (f"{HM3} 92 --from-deg 150 --to-deg 160", "end of range, 146 degrees, got 150"),
+        ("--model HM3", "--speed-deg-s: needs a speed for --motion constant"),
         (f"{HM3} 92 --study no/such", "no/such/protocol.toml"),
         ("--model HM9 --speed-deg-s 92 --study small", "got 'HM9'"),
         (f"{HM3} 92 --json no/such/file.json", "no/such/file.json"),
@@ -182,7 +183,6 @@ def test_a_wrong_call_is_one_sentence_and_code_2(arguments: str, said: str) -> N
 @pytest.mark.parametrize(
     "arguments",
     [
-        "--model HM3",
         "--speed-deg-s 92",
         f"{HM3} fast",
         f"{HM3} 92 --motion sudden",

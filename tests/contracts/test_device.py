@@ -1,6 +1,7 @@
 """What every device does, whichever backend it is: one suite for all names."""
 
 import gc
+import importlib
 import math
 import warnings
 from collections.abc import Callable
@@ -259,6 +260,32 @@ def test_a_later_reading_has_a_later_time(
         tick(clock)
         times.append(opened.read().time_ns)
     assert times == sorted(set(times))
+
+
+# Its state, and who else can idle it
+
+
+def test_an_open_device_that_is_well_has_nothing_to_say(
+    opened: Device, clock: SimulatedClock
+) -> None:
+    tick(clock)
+    opened.read()
+    opened.check()
+    assert opened.is_open
+
+
+def test_a_closed_device_has_no_state(opened: Device, backend: str) -> None:
+    opened.close()
+    words = f"{backend}: needs an open device to check, this one is closed"
+    with pytest.raises(DeviceError, match=words):
+        opened.check()
+
+
+def test_who_else_can_idle_it_is_a_module_that_can(opened: Device) -> None:
+    idle = opened.idle_command()
+    if idle is not None:
+        assert callable(importlib.import_module(idle.module).prepare)
+        assert all(isinstance(argument, str) for argument in idle.arguments)
 
 
 # Commanding

@@ -19,9 +19,15 @@ class Ode:
     """A stretch integrated from event to event."""
 
     def __init__(
-        self, joint: ElbowParameters, motion: Motion, *, rtol: float, max_step: float
+        self,
+        joint: ElbowParameters,
+        motion: Motion,
+        *,
+        rtol: float,
+        max_step: float,
+        method: str = "DOP853",
     ) -> None:
-        self.joint, self.motion = joint, motion
+        self.joint, self.motion, self.method = joint, motion, method
         self.rtol, self.max_step = rtol, max_step
         self.found: dict[str, float] = {}
         self.time, self.state = 0.0, np.array([motion.start, 0.0, 0.0])
@@ -49,7 +55,7 @@ class Ode:
 
         event.terminal, event.direction = True, 1.0  # type: ignore[attr-defined]
         done = solve_ivp(
-            slope, (self.time, self.motion.duration), self.state, method="DOP853",
+            slope, (self.time, self.motion.duration), self.state, method=self.method,
             rtol=self.rtol, atol=0.1 * self.rtol, events=event, max_step=self.max_step,
         )  # fmt: skip
         self.time, self.state = float(done.t[-1]), done.y[:, -1]

@@ -290,7 +290,7 @@ def injections() -> list[Injection]:
         Injection(name="grip lost in pre-catch", at_s=PRE, expected=None, slip=True),
         Injection(name="grip lost in the catch", at_s=CATCH, expected=None, slip=True),
         Injection(name="grip lost in post-catch", at_s=POST, expected=None, slip=True),
-        Injection(name="full disk", at_s=CATCH, expected="disk", full_disk=True),
+        Injection(name="full disk", at_s=CATCH, expected="process", full_disk=True),
     ]
 
 
@@ -311,7 +311,6 @@ def outcome(
         except OSError as error:
             if error.errno != errno.ENOSPC:
                 raise
-            made.kind = "disk"
             run_session(study, protocol, "R1", "test", grades=grades, clock="simulated")
     for device in devices:
         device.inner.close()  # what even the bus that was cut leaves open
@@ -323,10 +322,12 @@ def outcome(
     columns = read_recording(path).columns  # checks its checksum
     # Whole: a row for every tick before the fault
     n_before = int(np.sum(columns["time_s"] < injection.at_s - 1e-9))
-    made.intact = n_before == round(injection.at_s * 1000) and not injection.full_disk
+    made.intact = n_before == round(injection.at_s * 1000)
     noticed = next((event for event in log if event.kind == "fault"), None)
     if noticed is not None:
         made.kind = str(noticed.fields["kind"])
+        if injection.full_disk:
+            return made  # all went well, until the recording was to be written
         made.held_nm = float(noticed.fields["torque_nm"] or 0.0)
         _take_back(made, injection, devices[0], float(noticed.fields["time_s"] or 0.0))
     elif injection.slip:
@@ -429,7 +430,7 @@ def row(made: Outcome) -> str:
         return "" if math.isnan(value) else f"{value:.{digits}f}"
 
     zero = cell(made.zero_ms, 0)
-    if math.isnan(made.zero_ms) and made.kind not in (None, "released", "disk"):
+    if math.isnan(made.zero_ms) and made.kind not in (None, "released", "process"):
         zero = "never"
     cells = [
         made.name,

@@ -51,6 +51,13 @@ def test_the_limits_are_the_defaults_of_a_protocol() -> None:
     assert row("range")[3] == f"{low:.0f} and {high:.0f} deg".replace("-", "−")
 
 
+def test_every_key_of_a_limit_is_on_the_page() -> None:
+    no_limits = ("backend", "rate_hz", "friction", "dead_zone", "full_speed", "slip")
+    for key in DeviceSettings.__struct_fields__:
+        if not key.startswith((*no_limits, "puck")):
+            assert f"`{key}`" in PAGE
+
+
 def test_the_friction_is_the_default_one() -> None:
     friction = Friction()
     assert row("I, B, β")[1] == (

@@ -24,14 +24,18 @@ def test_an_injected_fault(name: str, tmp_path: Path) -> None:
     # The page has what came of it, to the digits it prints
     assert row(made) in PAGE.read_text(encoding="utf-8")
     assert made.resumes
-    assert made.intact is not injection.full_disk
+    assert made.intact
     if injection.slip:
         assert made.kind == "released"
         assert made.detected_ms <= 20.0
         return
     assert made.kind == injection.expected
-    if injection.expected in (None, "disk"):
+    if injection.expected is None:
         assert "fault" not in made.events
+        return
+    if injection.full_disk:
+        assert made.events[:2] == ["session", "resumed"]
+        assert made.events[2:4] == ["presented", "fault"]  # from what was kept
         return
     assert made.events[1:5] == ["presented", "fault", "presented", "grade"]
     assert made.peak_nm <= made.held_nm  # never more than was there

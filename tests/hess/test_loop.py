@@ -335,6 +335,63 @@ def test_a_fault_of_the_encoder_leaves_a_recording_that_can_be_written(
     assert facts["mean_speed_deg_s"] is None  # no catch, and the last angle is wrong
 
 
+@pytest.mark.parametrize(("angle_deg", "pushed_nm"), [(183.0, 6.0), (-2.0, -4.0)])
+def test_a_soft_stop_pushes_back_and_the_model_does_not_know(
+    angle_deg: float, pushed_nm: float
+) -> None:
+    # 10 N·m over 5 deg: 3 deg into the upper one 6 N·m, 2 deg into the lower one -4.
+    clock = SimulatedClock()
+    start = radians(angle_deg)
+    controller = Controller(STANDARD_MODELS["HM3"], start_angle=start)
+    with ScriptedDevice(clock, lambda _: start) as device:
+        presented = run_presentation(
+            device, controller, clock=clock, limits=LIMITS, max_duration_s=0.05
+        )
+    columns = presented.recording.columns
+    np.testing.assert_allclose(columns["command_torque_nm"], pushed_nm, rtol=1e-12)
+    np.testing.assert_array_equal(columns["model_torque_nm"], 0.0)
+
+
+def test_the_device_is_asked_for_its_state_every_50_ms() -> None:
+    asked = []
+
+    class Asked(ScriptedDevice):
+        def _check(self) -> None:
+            asked.append(self.clock.now_ns() / PERIOD_NS)
+
+    clock = SimulatedClock()
+    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
+    with Asked(clock) as device:
+        run_presentation(
+            device, controller, clock=clock, limits=LIMITS, max_duration_s=0.21
+        )
+    assert asked == [50.0, 100.0, 150.0, 200.0]
+
+
+def test_the_watchdog_hears_every_5_ms_and_is_let_rest_at_the_end() -> None:
+    heard = []
+
+    class Watching:
+        def beat(self) -> None:
+            heard.append(clock.now_ns() / PERIOD_NS)
+
+        def rest(self) -> None:
+            heard.append("rest")
+
+    clock = SimulatedClock()
+    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
+    with ScriptedDevice(clock) as device:
+        run_presentation(
+            device,
+            controller,
+            clock=clock,
+            limits=LIMITS,
+            max_duration_s=0.021,
+            watchdog=Watching(),
+        )
+    assert heard == [0.0, 5.0, 10.0, 15.0, 20.0, "rest"]
+
+
 # Exceptions that are no fault of the device
 
 

@@ -104,6 +104,7 @@ def test_the_other_exact_ones_draw_nothing(call: str) -> None:
     assert loaded <= SPECIAL
 
 
+@pytest.mark.slow
 def test_the_sampler_alone_loads_emcee() -> None:
     call = 'posterior("fleiss_kappa", rows, target="items", method="emcee", rng=1)'
     drew, loaded = watched(call, 5)

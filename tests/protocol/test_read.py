@@ -178,6 +178,24 @@ NUMBER = "a number above 0 and at most 180"
             "stretch.start_deg: needed less than stretch.end_deg (146), got 146",
         ),
         (
+            ("device", "full_speed_deg_s"),
+            0.1,
+            "device.dead_zone_deg_s: needed less than device.full_speed_deg_s (0.1), "
+            "got 0.1",
+        ),
+        (
+            ("device", "lowest_angle_deg"),
+            26.0,
+            "stretch.start_deg: needed at least device.lowest_angle_deg and the soft "
+            "stop beside it (26 + 5), got 30",
+        ),
+        (
+            ("device", "highest_angle_deg"),
+            150.0,
+            "stretch.end_deg: needed at most device.highest_angle_deg less the soft "
+            "stop before it (150 - 5), got 146",
+        ),
+        (
             ("elbow",),
             {"smallest_catch_angle_deg": 126, "slowest_mean_speed_deg_s": 0},
             "models[1].catch_angle_constant_deg: needed more than "

@@ -6,12 +6,15 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from masrel.protocol import Protocol, StudyPaths
 from masrel.ratings import ratings_from_logs
+from masrel.recording import read_recording
 from masrel.run import SimulatedGrades, read_log, run_session
 
 Small = tuple[StudyPaths, Protocol]
@@ -91,4 +94,42 @@ def test_the_command_killed_from_outside_goes_on(small: Small) -> None:
     assert done.returncode == 0, done.stderr
     grades = [e.fields["grade"] for e in read_log(log) if e.kind == "grade"]
     assert grades == ["1+", "2", "3"]
+    assert ratings_from_logs(study, protocol).table["grade"].notna().all()
+
+
+def n_sampled(study: StudyPaths) -> int:
+    # How many samples the presentation that is going on has left so far
+    for partial in study.sessions.glob("*/*.partial"):
+        words = partial.read_bytes()[4096:4104]
+        return int(np.frombuffer(words)[0]) if len(words) == 8 else 0
+    return 0
+
+
+def test_killed_in_the_middle_of_a_presentation_its_recording_is_kept(
+    new_study: Callable[..., Small],
+) -> None:
+    # However late a busy machine is, that shall not end the presentation.
+    lenient = "[device]\nmissed_ticks_limit = 100000\nwatchdog_ms = 100.0\n\n[schedule]"
+    small = new_study(("[schedule]", lenient))
+    study, protocol = small
+    command = [sys.executable, "-c", "from masrel.cli import main; main()"]
+    command += ["run", str(study.root), "--rater", "R1", "--session", "test"]
+    command += ["--grades", "simulated", "--clock", "real", "--quiet"]
+    log = study.log_file("R1", "test")
+    with subprocess.Popen(command, stderr=subprocess.DEVNULL) as process:
+        deadline = time.monotonic() + 60
+        while n_sampled(study) < 50 and time.monotonic() < deadline:
+            time.sleep(0.01)
+        process.kill()
+    n_before = len(whole_lines(log))
+    go_on(small)
+    events = read_log(log)
+    kinds = [event.kind for event in events[n_before:]]
+    assert kinds[:5] == ["resumed", "presented", "fault", "presented", "grade"]
+    shown, fault = events[n_before + 1], events[n_before + 2]
+    assert fault.fields["kind"] == "process"
+    recording = read_recording(study.sessions / str(shown.fields["recording"]))
+    assert recording.n_samples >= 50
+    assert np.all(np.diff(recording.columns["time_s"]) > 0.0)
+    assert not list(study.sessions.glob("*/*.partial"))
     assert ratings_from_logs(study, protocol).table["grade"].notna().all()

@@ -17,6 +17,7 @@ import mpmath
 from tqdm import tqdm
 
 import masrel
+from tests.stability import elbow
 from tests.stability.cases import CASES, METRICS, Case
 from tests.stability.exactness import relative
 from tests.stability.peers import PACKAGES, Answer, ask, installed, offers_errors
@@ -156,7 +157,8 @@ def main() -> None:
     versions |= installed(["numpy", "scipy", "pandas", "mpmath"])
     versions["Python"] = platform.python_version()
     draw(lines, DOCS / "figures" / "accuracy.png")
-    (DOCS / "accuracy.md").write_text(page(lines, versions), encoding="utf-8")
+    path = DOCS / "accuracy.md"  # its last section is written by tests.stability.elbow
+    path.write_text(page(lines, versions) + elbow.kept(path), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,134 +1,33 @@
-"""From a puck that has just been switched on to one in torque mode, and back.
+"""From a puck that has just been switched on to one in torque mode.
 
 Source of the order: Barrett WAM Arm User's Manual D1001 AH.00, pp. 46-48, and what
 the two public drivers of the arm do. The permanent memory is never written.
 """
 
 import math
-from dataclasses import dataclass
 
-from masrel.errors import BusError, DeviceError, DeviceTimeoutError, FrameError
+from masrel.errors import DeviceError
 from masrel.hess.puck.node import PuckNode
 from masrel.hess.puck.options import PuckOptions
 from masrel.hess.puck.properties import (
-    ROLE,
     STATUS,
-    VERSION,
     PropertyTable,
-    property_table,
 )
+from masrel.hess.puck.states import IDLE, READY, TORQUE
 from masrel.hess.puck.transmission import Transmission
 
 __all__ = [
-    "Identity",
     "activate",
     "check_torque",
     "configure",
-    "identify",
-    "release",
     "set_position",
-    "table_of",
     "wake",
 ]
 
-ASLEEP, READY = 0, 2  # STAT
-IDLE, TORQUE = 0, 2  # MODE
-
-_MOTOR_ROLE = 0  # of the lowest five bits of ROLE
-_ROLE_MASK = 0x1F
 _OFF_BUS_S = 1.2  # a waking puck leaves the bus; public drivers wait 1.0 and 1.2 s
-_RELEASE_S = 0.1
 _HIGHEST_UNITS = 8191  # what 14 bits of current units can say
 _COUNT_TOLERANCE = 2  # an arm that is held moves the encoder by no more
 _SETTING_TIME_S = 0.001  # a setting takes 0.11 ms on the bus
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Identity:
-    """What a puck says of itself before anything is set.
-
-    Attributes
-    ----------
-    puck : int
-        Its node.
-    is_awake : bool
-        Whether it has left its monitor.
-    firmware : int
-        VERS.
-    role : int
-        ROLE.
-    """
-
-    puck: int
-    is_awake: bool
-    firmware: int
-    role: int
-
-    @property
-    def is_motor(self) -> bool:
-        """Whether it drives a motor: on others the same numbers mean other things."""
-        return self.role & _ROLE_MASK == _MOTOR_ROLE
-
-
-def identify(node: PuckNode, *, patience_s: float = 0.05) -> Identity:
-    """Ask a puck who it is; nothing is set.
-
-    Parameters
-    ----------
-    node : PuckNode
-        The puck.
-    patience_s : float, optional
-        How long to wait for each answer, s.
-
-    Returns
-    -------
-    Identity
-        What it answers, asleep or awake.
-
-    Raises
-    ------
-    DeviceTimeoutError
-        If nobody answers at this node.
-    DeviceError
-        If it reports an error, or the bus fails.
-    """
-    status = node.ask(STATUS, patience_s=patience_s)
-    if status not in (ASLEEP, READY):
-        raise DeviceError(f"puck {node.puck}: needs STAT 0 or 2, it reports {status}")
-    return Identity(
-        puck=node.puck,
-        is_awake=status == READY,
-        firmware=node.ask(VERSION, patience_s=patience_s),
-        role=node.ask(ROLE, patience_s=patience_s),
-    )
-
-
-def table_of(identity: Identity, given: PropertyTable | None) -> PropertyTable:
-    """Return the numbers of a motor puck's properties.
-
-    Parameters
-    ----------
-    identity : Identity
-        What it says of itself.
-    given : PropertyTable or None
-        A table of the user's own, which goes before.
-
-    Returns
-    -------
-    PropertyTable
-        Names and numbers.
-
-    Raises
-    ------
-    DeviceError
-        If it is no motor's, or its firmware is not known and no table was given.
-    """
-    if not identity.is_motor:
-        raise DeviceError(
-            f"puck {identity.puck}: needs a motor's puck, its ROLE is "
-            f"{identity.role & _ROLE_MASK}"
-        )
-    return given or property_table(identity.firmware)
 
 
 def wake(node: PuckNode) -> None:
@@ -298,50 +197,6 @@ def check_torque(node: PuckNode, table: PropertyTable) -> None:
             f"puck {node.puck}: needs a T that reads back what it was set to, set to 1 "
             f"it reads {found}; checks_torque = false goes without"
         )
-
-
-def release(node: PuckNode, *, torque_number: int, mode_number: int) -> None:
-    """Zero the torque and idle a puck, again and again until it confirms.
-
-    Parameters
-    ----------
-    node : PuckNode
-        The puck.
-    torque_number, mode_number : int
-        Numbers of T and MODE.
-
-    Raises
-    ------
-    DeviceError
-        If it has not confirmed within 0.1 s.
-    """
-    begun_ns = node.now_ns()
-    reason = "it does not go to idle"
-    while node.now_ns() - begun_ns < _RELEASE_S * 1e9:
-        try:
-            node.tell(torque_number, 0)
-            if _is_asleep(node):
-                return
-            node.tell(mode_number, IDLE)
-            node.tell(mode_number, IDLE)  # twice: a regular loss may not hit both
-            if node.ask(mode_number, patience_s=0.005) == IDLE:
-                return
-        except (BusError, DeviceTimeoutError, FrameError) as error:
-            reason = str(error)
-        node.wait(_SETTING_TIME_S)
-    raise DeviceError(
-        f"puck {node.puck}: not idle after {_RELEASE_S * 1e3:g} ms ({reason}); it may "
-        "hold its last torque: SWITCH ITS SUPPLY OFF"
-    )
-
-
-def _is_asleep(node: PuckNode) -> bool:
-    # One that was reset drives nothing, and has another property where MODE was. One
-    # that says nothing is taken to be awake: idling it matters more.
-    try:
-        return node.ask(STATUS, patience_s=0.005) == ASLEEP
-    except DeviceTimeoutError:
-        return False
 
 
 def _set(node: PuckNode, table: PropertyTable, name: str, value: int) -> None:

@@ -5,11 +5,12 @@ import statistics
 from dataclasses import dataclass
 
 from masrel.errors import DeviceError, DeviceTimeoutError
-from masrel.hess.puck import bring_up
+from masrel.hess.puck.bring_up import activate, check_torque
+from masrel.hess.puck.connection import Awake
 from masrel.hess.puck.node import PuckNode
 from masrel.hess.puck.options import PuckOptions
 from masrel.hess.puck.properties import PropertyTable
-from masrel.hess.puck.survey import Awake
+from masrel.hess.puck.release import release
 
 __all__ = ["Check", "check"]
 
@@ -138,15 +139,13 @@ def _position(counts: list[int], puck: Awake) -> list[Check]:
 
 def _torque_mode(node: PuckNode, table: PropertyTable, options: PuckOptions) -> Check:
     try:
-        bring_up.activate(node, table)
+        activate(node, table)
         if options.checks_torque:
-            bring_up.check_torque(node, table)
+            check_torque(node, table)
     except DeviceError as error:
         return Check(name="torque mode", holds=False, found=str(error))
     finally:
-        bring_up.release(
-            node, torque_number=table.number("T"), mode_number=table.number("MODE")
-        )
+        release(node, torque_number=table.number("T"), mode_number=table.number("MODE"))
     said = "T reads back" if options.checks_torque else "T not asked for"
     return Check(
         name="torque mode", holds=True, found=f"in and out of it; {said}; idle now"

@@ -1,6 +1,5 @@
 """The puck as a device: read and commanded once a tick, idled when it is closed."""
 
-import itertools
 import math
 from typing import ClassVar
 
@@ -11,26 +10,19 @@ from masrel.errors import (
     IdledError,
     LimitExceededError,
 )
-from masrel.hess.clock import Clock, SimulatedClock
+from masrel.hess.clock import Clock
 from masrel.hess.device import Device, IdleCommand, Reading
-from masrel.hess.hand import Hand
 from masrel.hess.puck import bring_up
 from masrel.hess.puck.bus import open_link
-from masrel.hess.puck.emulator import PuckEmulator
-from masrel.hess.puck.faults import EmulatorOptions
+from masrel.hess.puck.identity import Identity, identify, table_of
 from masrel.hess.puck.node import PuckNode, accepted_identifiers
 from masrel.hess.puck.options import PuckOptions
 from masrel.hess.puck.properties import PropertyTable
+from masrel.hess.puck.release import release
+from masrel.hess.puck.states import TORQUE
 from masrel.hess.puck.transmission import Transmission
-from masrel.hess.setup import DeviceSetup
 
-__all__ = [
-    "EmulatedPuckDevice",
-    "PuckDevice",
-    "UnwiredPuckDevice",
-    "build",
-    "emulated_options",
-]
+__all__ = ["PuckDevice"]
 
 _LOWEST_ANGLE, _HIGHEST_ANGLE = math.radians(-5.0), math.radians(185.0)
 _UNANSWERED_POLLS = 2  # one may get lost
@@ -38,8 +30,6 @@ _LOST_TORQUES = 1  # the next comes after a tick
 
 _SHARED_INTERFACES = frozenset({"socketcan", "udp_multicast"})
 _IDLING_MODULE = "masrel.hess.puck.idling"
-
-_channels = itertools.count(1)
 
 
 class PuckDevice(Device):
@@ -81,7 +71,7 @@ class PuckDevice(Device):
         self._node: PuckNode
         self._table: PropertyTable
         self.transmission: Transmission
-        self.identity: bring_up.Identity
+        self.identity: Identity
 
     def _start(self) -> None:
         self._connect()
@@ -106,8 +96,8 @@ class PuckDevice(Device):
     def _bring_up(self) -> None:
         options = self._options
         self._node = node = PuckNode(self._link, self._clock, options.puck)
-        self.identity = identity = bring_up.identify(node)
-        self._table = table = bring_up.table_of(identity, options.properties)
+        self.identity = identity = identify(node)
+        self._table = table = table_of(identity, options.properties)
         if not identity.is_awake:
             if options.angle_after_reset is None:
                 raise DeviceError(
@@ -191,9 +181,9 @@ class PuckDevice(Device):
 
     def _check_mode(self, mode: int) -> None:
         self._n_unanswered = 0
-        if mode != bring_up.TORQUE:
+        if mode != TORQUE:
             raise IdledError(
-                f"puck {self._node.puck}: needs MODE {bring_up.TORQUE}, somebody else "
+                f"puck {self._node.puck}: needs MODE {TORQUE}, somebody else "
                 f"has set it to {mode}; an emergency stop, or a pendant?"
             )
 
@@ -225,7 +215,7 @@ class PuckDevice(Device):
 
     def _release(self) -> None:
         _, torque, mode = self._numbers
-        bring_up.release(self._node, torque_number=torque, mode_number=mode)
+        release(self._node, torque_number=torque, mode_number=mode)
 
     def idle_command(self) -> IdleCommand | None:
         """Return how another process can idle the puck, once it is open.
@@ -242,126 +232,3 @@ class PuckDevice(Device):
         where = (options.interface, options.channel, str(options.puck))
         _, torque, mode = self._numbers
         return IdleCommand(_IDLING_MODULE, (*where, str(torque), str(mode)))
-
-
-class UnwiredPuckDevice(PuckDevice):
-    """A puck on a bus without hardware, emulated by another thread or process."""
-
-    simulated: ClassVar[bool] = True
-
-
-class EmulatedPuckDevice(PuckDevice):
-    """A puck that is emulated, on a bus inside this process.
-
-    Parameters
-    ----------
-    options : PuckOptions
-        With those of its emulator.
-    clock : Clock
-        The clock of the loop; it may be simulated.
-    hand : Hand
-        What moves the simulated arm.
-    range_end : float
-        Where the arm meets its end stop, rad.
-
-    Attributes
-    ----------
-    emulator : PuckEmulator
-        The other end of the bus, once it is open.
-    """
-
-    simulated: ClassVar[bool] = True
-
-    def __init__(
-        self, options: PuckOptions, *, clock: Clock, hand: Hand, range_end: float
-    ) -> None:
-        super().__init__(options, clock=clock)
-        self._hand = hand
-        self._range_end = range_end
-        self.emulator: PuckEmulator
-
-    def _connect(self) -> None:
-        options, clock = self._options, self._clock
-        self.emulator = PuckEmulator(
-            link=open_link(options.interface, options.channel, clock=clock),
-            clock=clock,
-            hand=self._hand,
-            range_end=self._range_end,
-            options=options.emulator or EmulatorOptions(),
-            puck=options.puck,
-        )
-        self._link = open_link(
-            options.interface, options.channel, clock=clock, neighbour=self.emulator
-        )
-
-    def _disconnect(self) -> None:
-        super()._disconnect()
-        self.emulator.close()
-
-
-def emulated_options(hand: Hand) -> PuckOptions:
-    """Return options for an emulated puck on a bus of its own.
-
-    Parameters
-    ----------
-    hand : Hand
-        What moves the simulated arm; it says where the arm is when the puck wakes.
-
-    Returns
-    -------
-    PuckOptions
-        For `open_device`.
-    """
-    return PuckOptions(
-        interface="virtual",
-        channel=f"masrel-{next(_channels)}",
-        angle_after_reset=hand.start,
-        emulator=EmulatorOptions(),
-    )
-
-
-def build(setup: DeviceSetup) -> PuckDevice:
-    """Make the device of a puck: emulated when there is a hand, else on a real bus.
-
-    Parameters
-    ----------
-    setup : DeviceSetup
-        With a hand the puck is emulated, and there may be no options; without one
-        the options say where it is.
-
-    Returns
-    -------
-    PuckDevice
-        Not yet open.
-
-    Raises
-    ------
-    DeviceError
-        If options are missing, another backend's, or contradict the hand, or the
-        clock is simulated and the bus is not.
-    ParameterError
-        If the end of range does not fit the hand.
-    BusError
-        If the bus of an emulated puck cannot be opened.
-    """
-    options, hand = setup.options, setup.hand
-    if options is None:
-        if hand is None:
-            raise DeviceError("puck: needs options that say on which bus it is")
-        options = emulated_options(hand)
-    if not isinstance(options, PuckOptions):
-        got = type(options).__name__
-        raise DeviceError(f"puck: needs options of type PuckOptions, got {got}")
-    if (hand is None) != (options.emulator is None):
-        raise DeviceError(
-            "puck: needs a simulated hand with an emulated puck and none without, got "
-            + ("an emulator alone" if hand is None else "a hand alone")
-        )
-    if hand is not None:
-        return EmulatedPuckDevice(
-            options, clock=setup.clock, hand=hand, range_end=setup.range_end
-        )
-    if isinstance(setup.clock, SimulatedClock):
-        raise DeviceError("puck: needs a real clock, its bus is outside this process")
-    kind = PuckDevice if options.moves_hardware else UnwiredPuckDevice
-    return kind(options, clock=setup.clock)

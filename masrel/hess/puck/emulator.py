@@ -15,13 +15,9 @@ from masrel.errors import FrameError
 from masrel.hess.clock import Clock
 from masrel.hess.hand import Hand
 from masrel.hess.puck.bus import BUS_OFF, BUS_RESTARTED, Frame, Link
-from masrel.hess.puck.faults import ActiveFaults, EmulatorOptions
-from masrel.hess.puck.frames import (
-    decode_request,
-    decode_torques,
-    encode_position,
-    encode_reply,
-)
+from masrel.hess.puck.emulator_options import EmulatorOptions
+from masrel.hess.puck.faults import ActiveFaults
+from masrel.hess.puck.frames import decode_request, encode_reply
 from masrel.hess.puck.identifiers import (
     HOST,
     POSITION_GROUP,
@@ -33,7 +29,10 @@ from masrel.hess.puck.identifiers import (
     to_puck,
 )
 from masrel.hess.puck.motor import EmulatedMotor
-from masrel.hess.puck.registers import IDLE, TORQUE, Registers
+from masrel.hess.puck.positions import encode_position
+from masrel.hess.puck.registers import Registers
+from masrel.hess.puck.states import IDLE, TORQUE
+from masrel.hess.puck.torques import decode_torques
 from masrel.hess.puck.transmission import Transmission
 
 __all__ = ["PuckEmulator", "Setting"]

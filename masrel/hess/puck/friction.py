@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from masrel.errors import DeviceError, ParameterError
+from masrel.errors import DeviceError, DeviceTimeoutError, ParameterError
 from masrel.hess.clock import Clock
 from masrel.hess.device import Device
 from masrel.hess.velocity import VelocityEstimate
+from masrel.hess.watchdog import NoWatchdog, Watching
 
 __all__ = ["SPEEDS", "FrictionEstimate", "SteadyRun", "fit_friction", "steady_runs"]
 
@@ -26,6 +27,7 @@ _INTEGRAL_GAIN = 20.0  # N·m/rad: 18 rad/s with that inertia, damped by a half
 _PROBE_TORQUE, _PROBE_S = 0.5, 0.3
 _PROBE_TRAVEL = math.radians(1.0)
 _PERIOD_NS = 1_000_000
+_MOST_MISSED = 2  # readings in a row, as in a presentation
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -132,6 +134,7 @@ def steady_runs(
     clock: Clock,
     *,
     speeds: Sequence[float] = SPEEDS,
+    watchdog: Watching | None = None,
     progress: Callable[[], None] = lambda: None,
 ) -> tuple[SteadyRun, ...]:
     """Turn a free arm to and fro at steady speeds.
@@ -147,6 +150,8 @@ def steady_runs(
         The clock of the device.
     speeds : sequence of float, optional
         Speeds above 0, rad/s.
+    watchdog : Watching or None, optional
+        Told at every tick that all is well.
     progress : callable, optional
         Called after each run; there are two to a speed.
 
@@ -161,7 +166,8 @@ def steady_runs(
         If the device fails, or the arm goes the wrong way, is held or blocked, is too
         fast, or is not between 30 and 125 deg to begin with.
     """
-    turning = _Turning(device, clock)
+    watching = watchdog or NoWatchdog()
+    turning = _Turning(device, clock, watching)
     turning.check_direction()
     away = 1.0 if turning.is_low else -1.0
     turning.turn(-away * speeds[0])  # to the nearer end
@@ -171,19 +177,22 @@ def steady_runs(
             runs.append(_mean(turning.turn(direction * speed), direction * speed))
             progress()
     device.command(0.0)
+    watching.rest()
     return tuple(runs)
 
 
 class _Turning:
     """A free arm under speed control, tick by tick."""
 
-    def __init__(self, device: Device, clock: Clock) -> None:
+    def __init__(self, device: Device, clock: Clock, watchdog: Watching) -> None:
         self._device = device
         self._clock = clock
+        self._watchdog = watchdog
         self._estimate = VelocityEstimate()
         self._due_ns = clock.now_ns()
         self.angle = 0.0
         self._velocity = 0.0
+        self._n_missed = 0  # readings in a row
 
     @property
     def is_low(self) -> bool:
@@ -232,7 +241,14 @@ class _Turning:
         # torque: of the motor, positive in extension
         self._clock.sleep_until_ns(self._due_ns)
         self._due_ns = max(self._due_ns, self._clock.now_ns() - _PERIOD_NS) + _PERIOD_NS
-        time_ns, self.angle = self._device.read()
+        try:
+            time_ns, self.angle = self._device.read()
+        except DeviceTimeoutError:
+            self._n_missed += 1
+            if self._n_missed > _MOST_MISSED:
+                raise
+            return  # the device holds its torque
+        self._n_missed = 0
         self._velocity = self._estimate.update(time_ns * 1e-9, self.angle)
         if abs(self._velocity) > _LARGEST_SPEED:
             raise DeviceError(
@@ -240,6 +256,7 @@ class _Turning:
                 f"the arm turns at {math.degrees(self._velocity):.0f}"
             )
         self._device.command(-torque_nm)
+        self._watchdog.beat()
 
 
 def _mean(steady: list[tuple[float, float]], speed: float) -> SteadyRun:

@@ -1,11 +1,12 @@
 """Idle a puck from another process: what the watchdog does when the loop has died."""
 
+import atexit
 from collections.abc import Callable
 
 from masrel.hess.clock import RealClock
-from masrel.hess.puck.bring_up import release
 from masrel.hess.puck.bus import open_link
 from masrel.hess.puck.node import PuckNode, accepted_identifiers
+from masrel.hess.puck.release import release
 
 __all__ = ["prepare"]
 
@@ -40,6 +41,7 @@ def prepare(
     link = open_link(
         interface, channel, clock=clock, accepted=accepted_identifiers(node_number)
     )
+    atexit.register(link.close)
     node = PuckNode(link, clock, node_number)
 
     def idle() -> None:

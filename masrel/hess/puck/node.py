@@ -5,20 +5,14 @@ import itertools
 from masrel.errors import BusError, DeviceTimeoutError
 from masrel.hess.clock import Clock
 from masrel.hess.puck.bus import BUS_OFF, BUS_RESTARTED, Frame, Link
-from masrel.hess.puck.frames import (
-    Position,
-    PropertyValue,
-    decode_position,
-    decode_reply,
-    encode_get,
-    encode_set,
-)
+from masrel.hess.puck.frames import decode_reply, encode_get, encode_set
 from masrel.hess.puck.identifiers import (
     POSITION_GROUP,
     PROPERTY_GROUP,
     from_puck,
     to_puck,
 )
+from masrel.hess.puck.positions import Position, decode_position
 from masrel.hess.puck.properties import ID, ROLE, SERIAL_NUMBER, STATUS, VERSION
 
 __all__ = ["PuckNode", "accepted_identifiers"]
@@ -293,7 +287,7 @@ class PuckNode:
         elif frame.identifier == self._positions:
             return decode_position(frame.data)
         elif frame.identifier == self._properties:
-            answer: PropertyValue = decode_reply(frame.data)
+            answer = decode_reply(frame.data)
             self.heard[answer.property_id] = answer.value
         else:
             self.n_foreign += 1

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from masrel.errors import ParameterError
-from masrel.hess.puck.faults import EmulatorOptions
+from masrel.hess.puck.emulator_options import EmulatorOptions
 from masrel.hess.puck.properties import PropertyTable
 from masrel.hess.puck.transmission import GEAR_RATIO
 from masrel.hess.setup import BackendOptions

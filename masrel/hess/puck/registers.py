@@ -1,6 +1,6 @@
 """The properties of an emulated puck, asleep and awake."""
 
-from masrel.hess.puck.faults import EmulatorOptions
+from masrel.hess.puck.emulator_options import EmulatorOptions
 from masrel.hess.puck.properties import (
     ERROR,
     ID,
@@ -11,11 +11,9 @@ from masrel.hess.puck.properties import (
     VERSION,
     property_table,
 )
+from masrel.hess.puck.states import ASLEEP, IDLE, READY
 
-__all__ = ["ASLEEP", "IDLE", "READY", "TORQUE", "Registers"]
-
-ASLEEP, READY = 0, 2  # STAT; 1 is an error
-IDLE, TORQUE = 0, 2  # MODE; a puck has others, which this driver does not use
+__all__ = ["Registers"]
 
 _WAKE = READY  # setting STAT to this wakes
 _UNIVERSAL = {

@@ -18,7 +18,8 @@ __all__ = ["Factors", "Region"]
 
 _WIDEST = 160.0  # of log λ either way: beyond any posterior that floats can hold
 _NATS = 45.0  # what is left out is below exp(-40) of the density's largest value
-_STEPS = 12  # of Newton's method; it is quadratic
+_STEPS = 12  # of Newton's method at most; it is quadratic,
+_CLOSE = 1e-9  # so that after a step as small as that, of x, the next changes nothing
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,7 +104,10 @@ class Factors:
             share = 1.0 / (x[..., None] + depth)
             t = x * (self.powers * share).sum(axis=-1)
             slope = (self.powers * depth * share * share).sum(axis=-1)
-            x = x - (x - tilt * (self.a + t)) / (1.0 - tilt * slope)
+            step = (x - tilt * (self.a + t)) / (1.0 - tilt * slope)
+            x = x - step
+            if (np.abs(step) <= _CLOSE * x).all():
+                break
         share = 1.0 / (x[..., None] + depth)
         return x, x * (self.powers * share).sum(axis=-1)
 

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from masrel.agreement.kernel import Floats
-from masrel.intervals.latent.density import LatentDensity, Traits
+from masrel.intervals.latent.density import LatentDensity
 from masrel.intervals.latent.kappa import (
     Agreement,
     agreement_on_items,
@@ -16,12 +16,13 @@ from masrel.intervals.latent.kappa import (
 )
 from masrel.intervals.latent.ratings import Items
 from masrel.intervals.latent.sampler import Chains, sample_smooth
+from masrel.intervals.latent.traits import Traits
 
 __all__ = ["LatentFit", "fit_latent"]
 
 _N_CHAINS = 64
 _FLATTEST = 0.2  # least curvature at the mode that is believed
-_FURTHEST = 1.5  # how far below the mode chains may begin, per dimension
+_FURTHEST = 0.75  # how far below the mode chains may begin, per dimension
 _MOST_KAPPAS = 8_192  # positions where an integral over new items is computed
 
 
@@ -86,9 +87,11 @@ def fit_latent(
     ConvergenceError
         If it has not converged after `most_steps`.
     """
+    agreement: list[Agreement] = []
 
     def quantities(positions: Floats) -> list[Floats]:
-        kappa = _agreement(density, positions, items).kappa
+        agreement[:] = [_agreement(density, positions, items)]
+        kappa = agreement[0].kappa
         traits = density.traits(positions.reshape(-1, density.n_dimensions))
         columns = np.column_stack([part for _, part in _reported(traits)]).T
         rest = columns.reshape(len(columns), *positions.shape[:2])
@@ -109,7 +112,7 @@ def fit_latent(
         density=density,
         chains=chains,
         parts=_parts(density.traits(start)),
-        agreement=_agreement(density, chains.positions, items),
+        agreement=agreement[0],
     )
 
 
@@ -155,9 +158,14 @@ def _begin(
     density: LatentDensity, generator: np.random.Generator
 ) -> tuple[Floats, Floats]:
     # -> starts (n_chains, d) spread as a normal around the mode, and its covariance
+    tilt = density.counterweight
+
+    def height(x: Floats) -> Floats:
+        return np.asarray(density.log_density(x) + x @ tilt)
+
     def downhill(x: Floats) -> tuple[float, Floats]:
         row = x[None]
-        return -float(density.log_density(row)[0]), -density.gradient(row)[0]
+        return -float(height(row)[0]), -density.gradient(row)[0] - tilt
 
     found = minimize(downhill, density.middle_of_prior(), jac=True, method="BFGS")
     mode = found.x
@@ -169,6 +177,6 @@ def _begin(
     away = generator.standard_normal((_N_CHAINS, mode.size))
     away = away @ np.linalg.cholesky(covariance).T
     lowest = -found.fun - _FURTHEST * mode.size
-    while (low := ~(density.log_density(mode + away) > lowest)).any():
+    while (low := ~(height(mode + away) > lowest)).any():
         away[low] *= 0.8  # walls of the likelihood are nearer than a normal's
     return mode + away, covariance

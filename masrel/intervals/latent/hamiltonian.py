@@ -52,11 +52,12 @@ def hamiltonian_proposal(
         momentum = random.standard_normal(position.shape)
         length = 1.4 * step * 0.1 ** random.uniform(size=(len(position), 1))
         before = 0.5 * (momentum**2).sum(axis=1)
-        momentum = momentum + 0.5 * length * (gradient(position) @ root)
-        for leap in range(leaps):
-            position = position + length * (momentum @ root.T)
-            share = 1.0 if leap < leaps - 1 else 0.5
-            momentum = momentum + share * length * (gradient(position) @ root)
-        return position, before - 0.5 * (momentum**2).sum(axis=1)
+        with np.errstate(over="ignore", invalid="ignore"):  # a wall; not taken then
+            momentum = momentum + 0.5 * length * (gradient(position) @ root)
+            for leap in range(leaps):
+                position = position + length * (momentum @ root.T)
+                share = 1.0 if leap < leaps - 1 else 0.5
+                momentum = momentum + share * length * (gradient(position) @ root)
+            return position, before - 0.5 * (momentum**2).sum(axis=1)
 
     return propose

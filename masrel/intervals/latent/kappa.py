@@ -14,7 +14,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from masrel.agreement.kernel import Floats
-from masrel.intervals.latent.density import Traits
+from masrel.intervals.latent.traits import Traits
 
 __all__ = [
     "Agreement",

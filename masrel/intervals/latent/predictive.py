@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from masrel.agreement.coding import Codes
 from masrel.agreement.kernel import Floats
-from masrel.intervals.latent.density import Traits
+from masrel.intervals.latent.traits import Traits
 
 __all__ = ["PredictiveCheck", "predictive_checks", "replicate"]
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from masrel.agreement.coding import Codes, Label, code_ratings
 from masrel.errors import ParameterError, RatingsError
@@ -55,7 +56,8 @@ class LatentRatings:
         ParameterError
             If the order of the labels is not known, or there is one category.
         RatingsError
-            If the ratings do not fit, or no item has ratings of two raters.
+            If the ratings do not fit, have fewer than two items, no item rated by two
+            raters, or no disagreement.
         """
         coded = code_ratings(ratings, categories)
         if not coded.declared and isinstance(coded.categories[0], str):
@@ -69,12 +71,29 @@ class LatentRatings:
         if not (given.sum(axis=1) >= 2).any():
             raise RatingsError("ratings: the model needs an item rated by two raters")
         rows = np.flatnonzero(given.any(axis=1))
+        _check_spread(coded.codes, given)
         columns = np.flatnonzero(given.any(axis=0))
         return cls(
             codes=coded.codes[rows][:, columns],
             categories=coded.categories,
             items=_names(getattr(ratings, "index", None), "item", rows.tolist()),
             raters=_names(getattr(ratings, "columns", None), "rater", columns.tolist()),
+        )
+
+
+def _check_spread(codes: Codes, given: NDArray[np.bool_]) -> None:
+    n_items = int(given.any(axis=1).sum())
+    if n_items < 2:
+        raise RatingsError(
+            "ratings: the model needs two items to say how far apart they are, got "
+            f"{n_items}"
+        )
+    highest = np.where(given, codes, -1).max(axis=1)
+    lowest = np.where(given, codes, codes.max()).min(axis=1)
+    if (highest <= lowest).all():
+        raise RatingsError(
+            "ratings: no two raters disagree on any item, so that nothing tells how "
+            "small biases and noises are; masrel.intervals.posterior bounds kappa here"
         )
 
 

@@ -147,7 +147,7 @@ def _warm_up(
         positions = walkers.run(n_steps)
         tell(n_steps)
         start = positions[:, -1]
-        covariance = _covariance(positions[:, n_steps // 2 :])
+        covariance = _covariance(positions[:, n_steps // 2 :], covariance)
         if walkers.acceptance < _BEST_ACCEPTANCE[0]:
             step *= 0.6
         elif walkers.acceptance > _BEST_ACCEPTANCE[1]:
@@ -155,12 +155,13 @@ def _warm_up(
     return walkers
 
 
-def _covariance(positions: Floats) -> Floats:
-    # (n_chains, n_steps, d) -> (d, d), with a little of I so that it has a root
-    flat = positions.reshape(-1, positions.shape[-1])
-    mix = 5.0 / (len(flat) + 5.0)  # as Stan does
-    found = np.asarray(np.cov(flat.T), dtype=np.float64)
-    return (1.0 - mix) * found + 1e-3 * mix * np.eye(flat.shape[1])
+def _covariance(positions: Floats, before: Floats) -> Floats:
+    # (n_chains, n_steps, d) -> (d, d), with as much of the one before as it takes for
+    # the draws, of which one in ten counts, to know every direction
+    n_chains, n_steps, d = positions.shape
+    found = np.asarray(np.cov(positions.reshape(-1, d).T), dtype=np.float64)
+    mix = d / (d + n_chains * n_steps / 10)
+    return np.asarray((1.0 - mix) * found.reshape(d, d) + mix * before)
 
 
 def _go_on(

@@ -76,7 +76,8 @@ def latent_trait(
     ParameterError
         If an option is none, or the order of the scale is not known.
     RatingsError
-        If the ratings do not fit, or no item has ratings of two raters.
+        If the ratings do not fit, have fewer than two items, no item rated by two
+        raters, or no disagreement.
     ConvergenceError
         If the sampler has not converged after `most_steps`; says how many it needs.
 

@@ -15,10 +15,12 @@ from masrel.hess import (
     open_device,
     run_presentation,
 )
+from masrel.hess.puck.backend import emulated_options
 from masrel.hess.puck.bus import Link, open_link
-from masrel.hess.puck.device import EmulatedPuckDevice, emulated_options
+from masrel.hess.puck.emulated import EmulatedPuckDevice
 from masrel.hess.puck.emulator import PuckEmulator
-from masrel.hess.puck.faults import EmulatorOptions, FaultKind, InjectedFault
+from masrel.hess.puck.emulator_options import EmulatorOptions
+from masrel.hess.puck.faults import FaultKind, InjectedFault
 from masrel.hess.puck.node import PuckNode
 from masrel.hess.puck.options import PuckOptions
 

@@ -6,9 +6,11 @@ import pytest
 
 from masrel.errors import BusError, DeviceTimeoutError, FrameError, ParameterError
 from masrel.hess.puck.bus import Frame
-from masrel.hess.puck.faults import EmulatorOptions, InjectedFault
-from masrel.hess.puck.frames import encode_get, encode_torques
+from masrel.hess.puck.emulator_options import EmulatorOptions
+from masrel.hess.puck.faults import InjectedFault
+from masrel.hess.puck.frames import encode_get
 from masrel.hess.puck.identifiers import to_group, to_puck
+from masrel.hess.puck.torques import encode_torques
 from tests.hess.puck.rig import Bench, bench, fault, loose
 
 VERS, ROLE, STAT = 0, 1, 5

@@ -14,7 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from masrel.errors import OverrunWarning
-from masrel.hess.puck.device import EmulatedPuckDevice
+from masrel.hess.puck.emulated import EmulatedPuckDevice
 from masrel.hess.puck.faults import FaultKind, InjectedFault
 from masrel.hess.puck.transmission import Transmission
 from tests.hess.puck.rig import fault, presented

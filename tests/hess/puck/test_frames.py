@@ -6,25 +6,19 @@ from hypothesis import strategies as st
 
 from masrel.errors import FrameError
 from masrel.hess.puck.frames import (
-    HIGHEST_TORQUE,
-    LOWEST_TORQUE,
-    Position,
     PropertyValue,
     Request,
-    decode_position,
     decode_reply,
     decode_request,
-    decode_torques,
     encode_get,
-    encode_position,
     encode_reply,
     encode_set,
-    encode_torques,
 )
+from masrel.hess.puck.positions import decode_position
+from masrel.hess.puck.torques import decode_torques
 
 int32 = st.integers(-(2**31), 2**31 - 1)
 numbers = st.integers(0, 127)
-torques = st.integers(LOWEST_TORQUE, HIGHEST_TORQUE)
 
 
 # Bytes by hand
@@ -49,29 +43,6 @@ def test_a_reply_of_four_bytes_has_its_sign_in_the_last() -> None:
     assert decode_reply(bytes.fromhex("c400 00a0 0000")) == PropertyValue(68, 40960)
 
 
-def test_positions_come_highest_byte_first_in_22_bits() -> None:
-    assert decode_position(bytes.fromhex("000102")) == Position(258, None)
-    assert decode_position(bytes.fromhex("1fffff")) == Position(2**21 - 1, None)
-    assert decode_position(bytes.fromhex("200000")) == Position(-(2**21), None)
-    assert decode_position(bytes.fromhex("3fffff")) == Position(-1, None)
-    # with a second encoder
-    assert decode_position(bytes.fromhex("000001 3ffffe")) == Position(1, -2)
-
-
-@pytest.mark.parametrize("top_bits", [0x00, 0x40, 0x80, 0xC0])
-def test_the_two_bits_above_a_position_change_nothing(top_bits: int) -> None:
-    data = bytes([top_bits | 0x12, 0x34, 0x56])
-    assert decode_position(data).counts == 0x123456
-
-
-def test_packed_torques_are_four_times_14_bits() -> None:
-    # 5 = 00000000000101, -5 = 11111111111011, 8191 = 01..1, -8192 = 10..0
-    bits = "00000000000101" + "11111111111011" + "0" + "1" * 13 + "1" + "0" * 13
-    data = b"\xaa" + int(bits, 2).to_bytes(7, "big")
-    assert encode_torques(5, -5, 8191, -8192) == data
-    assert decode_torques(data) == (5, -5, 8191, -8192)
-
-
 # Both ways
 
 
@@ -93,47 +64,6 @@ def test_a_reply_of_six_bytes_comes_back(number: int, value: int) -> None:
 def test_every_reply_of_four_bytes_comes_back() -> None:
     for value in range(-(2**15), 2**15):
         assert decode_reply(encode_reply(48, value, size=4)).value == value
-
-
-def test_every_packed_torque_comes_back_from_every_place() -> None:
-    for torque in range(LOWEST_TORQUE, HIGHEST_TORQUE + 1):
-        sent = (torque, -1 - torque, torque ^ 1, 0)
-        assert decode_torques(encode_torques(*sent)) == sent
-
-
-@given(torques, torques, torques, torques)
-def test_packed_torques_come_back(a: int, b: int, c: int, d: int) -> None:
-    assert decode_torques(encode_torques(a, b, c, d)) == (a, b, c, d)
-
-
-def positions_come_back(counts: range) -> bool:
-    return all(
-        decode_position(encode_position(count)).counts == count for count in counts
-    )
-
-
-def test_positions_come_back() -> None:
-    assert positions_come_back(range(-(2**21), 2**21, 61))
-    assert positions_come_back(range(-(2**21), -(2**21) + 300))
-    assert positions_come_back(range(2**21 - 300, 2**21))
-    assert positions_come_back(range(-300, 300))
-
-
-@pytest.mark.slow
-def test_every_position_comes_back() -> None:
-    assert positions_come_back(range(-(2**21), 2**21))
-
-
-@given(int32, st.none() | int32, st.booleans())
-def test_a_position_is_the_count_up_to_whole_wraps(
-    counts: int, secondary: int | None, flagged: bool
-) -> None:
-    got = decode_position(encode_position(counts, secondary, flagged=flagged))
-    assert -(2**21) <= got.counts < 2**21
-    assert (got.counts - counts) % 2**22 == 0
-    assert (got.secondary is None) == (secondary is None)
-    if secondary is not None and got.secondary is not None:
-        assert (got.secondary - secondary) % 2**22 == 0
 
 
 # What is no frame
@@ -178,16 +108,11 @@ def test_what_is_decoded_is_what_those_bytes_are_the_frame_of(data: bytes) -> No
         (lambda: encode_set(42, 2**31), "value: needs 32 bits with sign"),
         (lambda: encode_reply(42, 2**15, size=4), "value: needs 16 bits with sign"),
         (lambda: encode_reply(42, 1, size=5), "reply: needs 4 or 6 bytes, got 5"),
-        (lambda: encode_torques(0, 8192, 0, 0), "torque: needs -8192 to 8191"),
-        (lambda: encode_torques(0, 0, 0, -8193), "torque: needs -8192 to 8191"),
         (lambda: decode_request(b"\xaa"), "request: needs 1 byte below 80"),
         (lambda: decode_request(b"\x2a\x00\x01\x00"), "got 2a 00 01 00"),
         (lambda: decode_request(b""), "got none"),
         (lambda: decode_reply(b"\x85\x00\x02"), "reply: needs 4 or 6 bytes"),
         (lambda: decode_reply(b"\x05\x00\x02\x00"), "the first from 80 up"),
-        (lambda: decode_position(b"\x00\x01"), "position: needs 3 or 6 bytes"),
-        (lambda: decode_torques(b"\xaa" + bytes(6)), "torques: need 8 bytes"),
-        (lambda: decode_torques(b"\x2a" + bytes(7)), "torques: need 8 bytes"),
     ],
 )
 def test_what_is_no_frame_or_fits_in_none_is_refused(call, words: str) -> None:

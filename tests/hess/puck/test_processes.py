@@ -19,7 +19,7 @@ from masrel.errors import BusError
 from masrel.hess import RealClock, SimulatedClock, open_device
 from masrel.hess.puck.bus import open_link
 from masrel.hess.puck.emulator import PuckEmulator
-from masrel.hess.puck.faults import EmulatorOptions
+from masrel.hess.puck.emulator_options import EmulatorOptions
 from masrel.hess.puck.options import PuckOptions
 from masrel.hess.watchdog import watched
 from tests.hess.puck.rig import END, loose, opened

@@ -7,8 +7,10 @@ import pytest
 from numpy.typing import NDArray
 from scipy import stats
 
-from masrel.intervals.latent.density import LatentDensity, grade_shares
+from masrel.intervals.latent.coordinates import Coordinates
+from masrel.intervals.latent.density import LatentDensity
 from masrel.intervals.latent.prior import LatentPrior
+from masrel.intervals.latent.traits import grade_shares
 
 Floats = NDArray[np.float64]
 PRIORS = [LatentPrior(), LatentPrior.other()]
@@ -16,21 +18,31 @@ PRIORS = [LatentPrior(), LatentPrior.other()]
 RATINGS = np.array([[0, 1, 0], [2, 2, 3], [4, 3, -1], [2, -1, -1]])
 
 
-def natural(x: Floats, n_items: int, n_raters: int, middle: int) -> Floats:
+def natural(x: Floats, like: Coordinates) -> Floats:
     """Turn coordinates into θ, b, log σ_r, ρ, f, η and grades' shares, one by one."""
-    z, b, w = np.split(x[: n_items + 2 * n_raters], [n_items, n_items + n_raters])
+    n_items, n_raters = like.n_items, like.n_raters
+    own, b, w = np.split(x[: n_items + 2 * n_raters], [n_items, n_items + n_raters])
     a, c, e, anchor, *gaps = x[n_items + 2 * n_raters :].tolist()
     rho, f, eta = 1 / (1 + math.exp(-a)), 1 / (1 + math.exp(-c)), math.exp(e)
+    unit = math.sqrt(1 - rho)
     tau = [anchor]
-    for gap in gaps[:middle][::-1]:
-        tau.insert(0, tau[0] - math.exp(gap))
-    for gap in gaps[middle:]:
-        tau.append(tau[-1] + math.exp(gap))
+    for gap in gaps[: like.middle][::-1]:
+        tau.insert(0, tau[0] - unit * math.exp(gap))
+    for gap in gaps[like.middle :]:
+        tau.append(tau[-1] + unit * math.exp(gap))
+    theta = [
+        sum(share * t for share, t in zip(weights, tau, strict=True)) + unit * value
+        if is_placed
+        else math.sqrt(rho) * value
+        for value, is_placed, weights in zip(
+            own, like.placed, like.between, strict=True
+        )
+    ]
     below = stats.norm.cdf([-np.inf, *tau, np.inf])
     log_noise = 0.5 * math.log((1 - rho) * f)
     return np.array(
         [
-            *(math.sqrt(rho) * z),
+            *theta,
             *(math.sqrt((1 - rho) * (1 - f)) * b),
             *(log_noise + eta * w),
             rho,
@@ -44,8 +56,8 @@ def natural(x: Floats, n_items: int, n_raters: int, middle: int) -> Floats:
 def textbook(x: Floats, codes: NDArray[np.int64], n: int, prior: LatentPrior) -> float:
     """Log-density in natural unknowns, and the Jacobian by differences."""
     n_items, n_raters = codes.shape
-    middle = LatentDensity.of(codes, n, prior).middle
-    unknowns = natural(x, n_items, n_raters, middle)
+    like = LatentDensity.of(codes, n, prior).coordinates
+    unknowns = natural(x, like)
     theta, b, log_sigma = np.split(
         unknowns[: n_items + 2 * n_raters], [n_items, n_items + n_raters]
     )
@@ -71,11 +83,7 @@ def textbook(x: Floats, codes: NDArray[np.int64], n: int, prior: LatentPrior) ->
     grades = np.array([*shares, 1 - sum(shares)])
     total += stats.dirichlet(np.full(n, prior.concentration)).logpdf(grades)
     slopes = [
-        (
-            natural(x + h, n_items, n_raters, middle)
-            - natural(x - h, n_items, n_raters, middle)
-        )
-        / 2e-6
+        (natural(x + h, like) - natural(x - h, like)) / 2e-6
         for h in 1e-6 * np.eye(x.size)
     ]
     return float(total + np.linalg.slogdet(np.array(slopes))[1])
@@ -85,6 +93,20 @@ def positions(density: LatentDensity, n: int) -> Floats:
     rng = np.random.default_rng(4)
     scatter: Floats = 0.5 * rng.normal(size=(n, density.n_dimensions))
     return density.middle_of_prior() + scatter
+
+
+def test_items_that_ratings_tell_apart_are_placed_by_them() -> None:
+    like = Coordinates.of(RATINGS, 5)
+    # the grades of the first lie around 0 | 1, of the second around 2 | 3, of the third
+    # around 3 | 4; the last has one grade
+    assert like.placed.tolist() == [True, True, True, False]
+    assert like.between.tolist() == [
+        [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1], [0, 0, 0, 0],
+    ]  # fmt: skip
+    wide = Coordinates.of(np.array([[0, 2, 2, 2], [4, 4, 4, 4], [4, 4, 4, 3]]), 5)
+    assert wide.between[0].tolist() == [0.5, 0.5, 0, 0]
+    alike = Coordinates.of(np.array([[0, 1, 3], [2, 0, 1], [1, 3, 0]]), 4)
+    assert not alike.placed.any()
 
 
 @pytest.mark.parametrize("prior", PRIORS)
@@ -134,7 +156,7 @@ def test_a_missing_rating_says_nothing() -> None:
     nothing = LatentDensity.of(np.full((3, 3), -1), 3, prior)
     part = LatentDensity.of(codes[:2, :2], 3, prior)
     inner = np.delete(x, [2, 3 + 2, 6 + 2], axis=1)
-    assert part.middle == density.middle
+    assert part.coordinates.middle == density.coordinates.middle
     prior_part = LatentDensity.of(np.full((2, 2), -1), 3, prior)
     assert density.log_density(x) - nothing.log_density(x) == pytest.approx(
         part.log_density(inner) - prior_part.log_density(inner)
@@ -143,7 +165,7 @@ def test_a_missing_rating_says_nothing() -> None:
 
 def test_thresholds_ascend_around_the_one_that_halves_the_ratings() -> None:
     density = LatentDensity.of(np.array([[4, 4, 3], [4, 3, 3]]), 6, LatentPrior())
-    assert density.middle == 3  # three ratings below it, three above
+    assert density.coordinates.middle == 3  # three ratings below it, three above
     x = positions(density, 5)
     traits = density.traits(x)
     assert (np.diff(traits.thresholds, axis=1) > 0).all()

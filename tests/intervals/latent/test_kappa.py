@@ -8,7 +8,6 @@ import pytest
 from numpy.typing import NDArray
 from scipy import stats
 
-from masrel.intervals.latent.density import Traits
 from masrel.intervals.latent.kappa import (
     Agreement,
     agreement_on_items,
@@ -16,6 +15,7 @@ from masrel.intervals.latent.kappa import (
     grade_probabilities,
 )
 from masrel.intervals.latent.predictive import replicate
+from masrel.intervals.latent.traits import Traits
 
 Floats = NDArray[np.float64]
 

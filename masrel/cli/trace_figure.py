@@ -1,0 +1,142 @@
+"""The figures of ``masrel trace``."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from masrel.cli.trace_scene import Scene
+from masrel.errors import ParameterError
+
+if TYPE_CHECKING:
+    from masrel.report.figures import CatchCurve, Form, StretchPanel
+
+__all__ = ["VIEWS", "check_figure", "write_figure"]
+
+VIEWS = ("angle", "time", "catch")
+
+N_PIXELS = 800
+"""Points a line has: a panel is less wide than that."""
+
+_FORMS: dict[str, "Form"] = {".png": "png", ".svg": "svg", ".pdf": "pdf"}
+
+
+def check_figure(file: Path, view: str, scenes: Sequence[Scene]) -> None:
+    """Check that a figure can be made, before anything is computed for it.
+
+    Parameters
+    ----------
+    file : Path
+        Where it is wanted.
+    view : {"angle", "time", "catch"}
+        What it shows.
+    scenes : sequence of Scene
+        The scenes.
+
+    Raises
+    ------
+    ParameterError
+        If its name does not end as that of a figure, there are more models than fit
+        beside each other or more lines than can be told apart, or too few speeds.
+    """
+    if file.suffix.lower() not in _FORMS:
+        raise ParameterError(
+            f"--figure: needs a name that ends in .png, .svg or .pdf, got {file}"
+        )
+    models = _by_model(scenes)
+    most = max(len(own) for own in models.values())
+    if len(models) > 5 or (view != "catch" and (len(models) > 4 or most > 5)):
+        raise ParameterError(
+            "--figure: shows 4 models at 5 speeds at most, or with --view catch 5 "
+            f"models, got {len(models)} and {most}"
+        )
+    if view == "catch" and most < 2:
+        raise ParameterError("--view catch: needs two or more speeds, got 1")
+
+
+def write_figure(scenes: Sequence[Scene], view: str, file: Path) -> None:
+    """Draw scenes.
+
+    Parameters
+    ----------
+    scenes : sequence of Scene
+        The scenes.
+    view : {"angle", "time", "catch"}
+        Torque against angle, torque and angle against time, or what catches depend on.
+    file : Path
+        Where the figure goes.
+    """
+    from masrel.report import figures
+
+    form = _FORMS[file.suffix.lower()]
+    stamp = "computed from the joint model, not measured"
+    if view == "catch":
+        curves = [_curve(name, own) for name, own in _by_model(scenes).items()]
+        drawn = figures.draw_catches(curves, form=form, stamp=stamp)
+    else:
+        against: Literal["angle", "time"] = "angle" if view == "angle" else "time"
+        panels = [_panel(name, own) for name, own in _by_model(scenes).items()]
+        drawn = figures.draw_stretches(panels, against=against, form=form, stamp=stamp)
+    file.write_bytes(drawn)
+
+
+def _by_model(scenes: Sequence[Scene]) -> dict[str, list[Scene]]:
+    models: dict[str, list[Scene]] = {}
+    for scene in scenes:
+        models.setdefault(scene.model, []).append(scene)
+    return models
+
+
+def _panel(name: str, own: Sequence[Scene]) -> "StretchPanel":
+    import numpy as np
+
+    from masrel.elbow import outline
+    from masrel.report.figures import StretchLine, StretchPanel
+
+    lines = []
+    for scene in own:
+        made = outline(scene.parameters, scene.motion, n_points=N_PIXELS)
+        speed = scene.speed_deg_s
+        lines.append(
+            StretchLine(
+                label=scene.kind if speed is None else f"{speed:g} deg/s",
+                time=made.time,
+                angle=np.degrees(made.angle),
+                torque=made.torque,
+                phases=tuple((s.name, s.start, s.end) for s in made.events.phases),
+            )
+        )
+    return StretchPanel(title=name, lines=tuple(lines))
+
+
+def _curve(name: str, own: Sequence[Scene]) -> "CatchCurve":
+    import numpy as np
+
+    from masrel.elbow import evaluate
+    from masrel.report.figures import CatchCurve
+
+    joints = [scene.parameters for scene in own]
+    motions = [scene.motion for scene in own]
+    outputs = ("mean_speed", "catch_angle", "catch", "catch_end")
+    found = evaluate(joints, motions, outputs)
+    caught = found.values[np.isfinite(found.column("catch"))]
+    mean, angle, catch, end = caught[np.argsort(caught[:, 0])].T
+    joint = joints[0]
+    duration = end - catch
+    which = np.flatnonzero(np.isfinite(found.column("catch")))
+    ordered = which[np.argsort(caught[:, 0])].tolist()
+    gone = [
+        float(motions[i].angle(until, origin)) if np.isfinite(until) else np.nan
+        for i, until, origin in zip(ordered, end.tolist(), angle.tolist(), strict=True)
+    ]
+    return CatchCurve(
+        label=name,
+        mean_speed=np.degrees(mean),
+        catch_angle=np.degrees(angle),
+        catch_speed=np.degrees(np.array(gone) / duration),
+        duration=duration,
+        clamps=(
+            math.degrees(joint.slowest_mean_speed),
+            math.degrees(joint.fastest_mean_speed),
+        ),
+    )

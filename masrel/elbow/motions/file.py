@@ -1,0 +1,89 @@
+"""Motions from files: a table of times and angles, or a recording of the loop."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+
+from masrel.elbow.motions.recorded import Interpolation, Recorded
+from masrel.errors import ParameterError, RecordingError
+from masrel.recording import read_recording
+
+__all__ = ["read_motion"]
+
+_COLUMNS = ("time_s", "angle_deg")
+
+
+def read_motion(path: Path, *, interpolation: Interpolation = "pchip") -> Recorded:
+    r"""Read a motion from a file.
+
+    Parameters
+    ----------
+    path : Path
+        CSV with a row of names, of which ``time_s`` and ``angle_deg`` are read; or one
+        of the two files of a `masrel.recording.Recording`.
+    interpolation : {"pchip", "linear"}, optional
+        What happens between samples.
+
+    Returns
+    -------
+    Recorded
+        The motion.
+
+    Raises
+    ------
+    RecordingError
+        If there is no such file, a column is missing, or a value is not a number; the
+        message names file, row and column. A row is counted with the names as row 1.
+    ParameterError
+        If the samples are no motion; as of `Recorded`.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "motion.csv"
+    ...     _ = path.write_text("time_s,angle_deg\n0,30\n1,90\n")
+    ...     read_motion(path).duration
+    1.0
+    """
+    if path.suffix in (".npz", ".json"):
+        columns = read_recording(path.with_suffix(".npz")).columns
+        samples = [list(columns[name]) for name in _COLUMNS]
+    else:
+        samples = _read_table(path)
+    try:
+        return Recorded(
+            time=samples[0],
+            angle=np.radians(np.array(samples[1])),
+            interpolation=interpolation,
+        )
+    except ParameterError as error:
+        raise ParameterError(f"{path}: {error}") from error
+
+
+def _read_table(path: Path) -> list[list[float]]:
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            rows = list(csv.reader(file))
+    except (OSError, UnicodeDecodeError) as error:
+        raise RecordingError(f"{path}: cannot be read: {error}") from error
+    names = [name.strip() for name in rows[0]] if rows else []
+    missing = [name for name in _COLUMNS if name not in names]
+    if missing:
+        raise RecordingError(
+            f"{path}: needs the columns {', '.join(_COLUMNS)} in row 1, "
+            f"got {', '.join(names) or 'nothing'}"
+        )
+    places = [names.index(name) for name in _COLUMNS]
+    samples: list[list[float]] = [[], []]
+    for number, row in enumerate(rows[1:], start=2):
+        for name, place, column in zip(_COLUMNS, places, samples, strict=True):
+            cell = row[place] if place < len(row) else ""
+            try:
+                column.append(float(cell))
+            except ValueError as error:
+                raise RecordingError(
+                    f"{path}, row {number}, {name}: needs a number, got {cell!r}"
+                ) from error
+    return samples

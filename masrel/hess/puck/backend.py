@@ -1,0 +1,84 @@
+"""Make the device of a puck, on a real bus or emulated."""
+
+import itertools
+
+from masrel.errors import DeviceError
+from masrel.hess.clock import SimulatedClock
+from masrel.hess.hand import Hand
+from masrel.hess.puck.device import PuckDevice
+from masrel.hess.puck.emulated import EmulatedPuckDevice, UnwiredPuckDevice
+from masrel.hess.puck.emulator_options import EmulatorOptions
+from masrel.hess.puck.options import PuckOptions
+from masrel.hess.setup import DeviceSetup
+
+__all__ = ["build", "emulated_options"]
+
+_channels = itertools.count(1)
+
+
+def emulated_options(hand: Hand) -> PuckOptions:
+    """Return options for an emulated puck on a bus of its own.
+
+    Parameters
+    ----------
+    hand : Hand
+        What moves the simulated arm; it says where the arm is when the puck wakes.
+
+    Returns
+    -------
+    PuckOptions
+        For `open_device`.
+    """
+    return PuckOptions(
+        interface="virtual",
+        channel=f"masrel-{next(_channels)}",
+        angle_after_reset=hand.start,
+        emulator=EmulatorOptions(),
+    )
+
+
+def build(setup: DeviceSetup) -> PuckDevice:
+    """Make the device of a puck: emulated when there is a hand, else on a real bus.
+
+    Parameters
+    ----------
+    setup : DeviceSetup
+        With a hand the puck is emulated, and there may be no options; without one
+        the options say where it is.
+
+    Returns
+    -------
+    PuckDevice
+        Not yet open.
+
+    Raises
+    ------
+    DeviceError
+        If options are missing, another backend's, or contradict the hand, or the
+        clock is simulated and the bus is not.
+    ParameterError
+        If the end of range does not fit the hand.
+    BusError
+        If the bus of an emulated puck cannot be opened.
+    """
+    options, hand = setup.options, setup.hand
+    if options is None:
+        if hand is None:
+            raise DeviceError("puck: needs options that say on which bus it is")
+        options = emulated_options(hand)
+    if not isinstance(options, PuckOptions):
+        got = type(options).__name__
+        raise DeviceError(f"puck: needs options of type PuckOptions, got {got}")
+    if (hand is None) != (options.emulator is None):
+        raise DeviceError(
+            "puck: needs a simulated hand with an emulated puck and none without, got "
+            + ("an emulator alone" if hand is None else "a hand alone")
+        )
+    if hand is not None:
+        return EmulatedPuckDevice(
+            options, clock=setup.clock, hand=hand, range_end=setup.range_end
+        )
+    if isinstance(setup.clock, SimulatedClock):
+        raise DeviceError("puck: needs a real clock, its bus is outside this process")
+    kind = PuckDevice if options.moves_hardware else UnwiredPuckDevice
+    return kind(options, clock=setup.clock)

@@ -1,0 +1,117 @@
+"""A recording that outlives its process: samples in a file that is mapped to memory.
+
+What the loop writes is in the system's hands at once, so that a process that is killed
+in the middle of a presentation leaves every sample up to that moment. The file is laid
+down whole before the first tick: a full disk is noticed before anything moves.
+"""
+
+import json
+import mmap
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from masrel.errors import RecordingError
+
+__all__ = ["N_COLUMNS", "Spool", "Spooled", "read_spool"]
+
+N_COLUMNS = 6
+_HEADER = 4096  # bytes for the facts, a page
+_WORD = 8  # bytes of a float64
+
+Fact = str | int | float | bool | None
+
+
+class Spool:
+    """The file, open for the samples of one presentation.
+
+    Parameters
+    ----------
+    path : Path
+        The file; one that is there is replaced.
+    capacity : int
+        Samples that fit in.
+    facts : dict
+        What is known before the first sample.
+
+    Attributes
+    ----------
+    words : memoryview of float64, shape (1 + 6 * capacity,)
+        How many samples there are, then the columns one after another.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+
+    __slots__ = ("_map", "words")
+
+    def __init__(self, path: Path, capacity: int, facts: dict[str, Fact]) -> None:
+        header = json.dumps({**facts, "capacity": capacity}).encode()
+        n_bytes = _HEADER + _WORD * (1 + N_COLUMNS * capacity)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with path.open("w+b") as file:
+            file.write(header.ljust(_HEADER))
+            file.write(bytes(n_bytes - _HEADER))  # not sparse: the space is taken
+            file.flush()
+            self._map = mmap.mmap(file.fileno(), n_bytes)
+        self.words = memoryview(self._map)[_HEADER:].cast("d")
+
+    def close(self) -> None:
+        """Let go of the file; it stays where it is."""
+        self.words.release()
+        self._map.close()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Spooled:
+    """What a presentation that never ended left.
+
+    Attributes
+    ----------
+    columns : ndarray, shape (6, n)
+        Its samples, as the loop wrote them.
+    facts : dict
+        What was known before the first.
+    """
+
+    columns: NDArray[np.float64]
+    facts: dict[str, Fact]
+
+
+def read_spool(path: Path) -> Spooled | None:
+    """Read what a process that died left.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    Spooled or None
+        None when it died before the first sample.
+
+    Raises
+    ------
+    RecordingError
+        If it is no such file.
+    """
+    data = path.read_bytes()
+    if len(data) < _HEADER + _WORD or not data[:_HEADER].strip():
+        return None  # it died while it laid the file down
+    try:
+        facts = json.loads(data[:_HEADER])
+        capacity = int(facts.pop("capacity"))
+        words = np.frombuffer(data, dtype=np.float64, offset=_HEADER)
+        n = int(words[0])
+        columns = words[1 : 1 + N_COLUMNS * capacity].reshape(N_COLUMNS, capacity)
+    except (ValueError, KeyError, TypeError) as error:
+        raise RecordingError(
+            f"{path}: needs the samples of a presentation that was cut off, got "
+            f"something else ({error}); move it away to go on"
+        ) from error
+    return Spooled(columns=columns[:, :n].copy(), facts=facts) if n else None

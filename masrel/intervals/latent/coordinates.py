@@ -1,0 +1,263 @@
+"""Coordinates in which the posterior of the latent-trait model is nearly normal.
+
+Ratings tell how items and thresholds lie to each other in units of c = √(1 - ρ), by
+which a rating differs from its item; of ρ they tell nothing more. So thresholds are
+T_k = (τ_k - α) / c from the one of them that halves the ratings, α, and an item whose
+ratings place it is told by how far (θ_i - α) / c is from the thresholds between its
+grades. An item that its ratings hardly place is told by θ_i / √ρ, as its prior is.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import expit, ndtri
+
+from masrel.agreement.coding import Codes
+from masrel.agreement.kernel import Floats
+from masrel.intervals.latent.traits import Traits
+
+__all__ = ["Coordinates", "Place"]
+
+_PLAIN = 5.0  # variance of items' means over its error, where ratings place items
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """Positions taken apart, in units of c.
+
+    Attributes
+    ----------
+    item : ndarray, shape (n, n_items)
+        u_i = (θ_i - α) / c.
+    bias, noise : ndarray, shape (n, n_raters)
+        b_r / c and σ_r / c.
+    threshold : ndarray, shape (n, n_categories - 1)
+        T_k = (τ_k - α) / c.
+    own : ndarray, shape (n, n_items)
+        The items' coordinates.
+    b, w : ndarray, shape (n, n_raters)
+        b_r / ω and w_r.
+    logit_share, logit_fraction, log_spread : ndarray, shape (n, 1)
+        logit ρ, logit f, log η.
+    share, root, fraction, spread : ndarray, shape (n, 1)
+        ρ, c, f and η.
+    anchor : ndarray, shape (n, 1)
+        α.
+    gap : ndarray, shape (n, n_categories - 2)
+        Distances of neighbouring T_k.
+    """
+
+    item: Floats = field(compare=False, repr=False)
+    bias: Floats = field(compare=False, repr=False)
+    noise: Floats = field(compare=False, repr=False)
+    threshold: Floats = field(compare=False, repr=False)
+    own: Floats = field(compare=False, repr=False)
+    b: Floats = field(compare=False, repr=False)
+    w: Floats = field(compare=False, repr=False)
+    logit_share: Floats = field(compare=False, repr=False)
+    logit_fraction: Floats = field(compare=False, repr=False)
+    log_spread: Floats = field(compare=False, repr=False)
+    share: Floats = field(compare=False, repr=False)
+    root: Floats = field(compare=False, repr=False)
+    fraction: Floats = field(compare=False, repr=False)
+    spread: Floats = field(compare=False, repr=False)
+    anchor: Floats = field(compare=False, repr=False)
+    gap: Floats = field(compare=False, repr=False)
+
+    @property
+    def severity(self) -> Floats:
+        """θ_i, (n, n_items)."""
+        return self.anchor + self.root * self.item
+
+    @property
+    def tau(self) -> Floats:
+        """τ_k, (n, n_categories - 1)."""
+        return self.anchor + self.root * self.threshold
+
+    @property
+    def traits(self) -> Traits:
+        """All on the scale where a rating has variance 1."""
+        rest = (self.root**2)[:, 0]
+        fraction = self.fraction[:, 0]
+        return Traits(
+            severity=self.severity,
+            bias=self.root * self.bias,
+            noise=self.root * self.noise,
+            thresholds=self.tau,
+            item_share=self.share[:, 0],
+            noise_fraction=fraction,
+            noise_spread=self.spread[:, 0],
+            bias_variance=rest * expit(-self.logit_fraction[:, 0]),
+            noise_variance=rest * fraction,
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Coordinates:
+    """What a position holds.
+
+    In this order: one coordinate an item; b_r / ω and w_r (n_raters each); logit ρ,
+    logit f, log η; α; and the logarithms of the distances between neighbouring T_k,
+    from the lowest pair up.
+
+    Attributes
+    ----------
+    n_items, n_raters, n_categories : int
+        Sizes.
+    middle : int
+        The threshold that is α: the one that halves the ratings best.
+    placed : ndarray of bool, shape (n_items,)
+        Items whose coordinate is v_i = u_i - Σ_k W_ik T_k; of the others it is
+        z_i = θ_i / √ρ.
+    between : ndarray, shape (n_items, n_categories - 1)
+        W: weights of the thresholds between an item's grades.
+    """
+
+    n_items: int
+    n_raters: int
+    n_categories: int
+    middle: int
+    placed: NDArray[np.bool_] = field(compare=False, repr=False)
+    between: Floats = field(compare=False, repr=False)
+
+    @classmethod
+    def of(cls, codes: Codes, n_categories: int) -> "Coordinates":
+        """Fit coordinates to codes of shape (n_items, n_raters), -1 where missing."""
+        given = codes >= 0
+        grades = np.arange(n_categories - 1)
+        at_most = (given[:, :, None] & (codes[:, :, None] <= grades)).sum(axis=1)
+        n_each = given.sum(axis=1)
+        share = at_most / n_each.clip(1)[:, None]
+        weight = share * (1.0 - share)  # 0 where all are on one side
+        total = weight.sum(axis=1)
+        placed = (total > 0.0) & _tell_items_apart(codes)
+        return cls(
+            n_items=codes.shape[0],
+            n_raters=codes.shape[1],
+            n_categories=n_categories,
+            middle=int(np.abs(2 * at_most.sum(axis=0) - given.sum()).argmin()),
+            placed=placed,
+            between=np.where(placed, 1.0 / np.where(placed, total, 1.0), 0.0)[:, None]
+            * weight,
+        )
+
+    @property
+    def n_dimensions(self) -> int:
+        """Length of a position."""
+        return self.shares + 3 + self.n_categories - 1
+
+    @property
+    def shares(self) -> int:
+        """Where logit ρ, logit f and log η begin."""
+        return self.n_items + 2 * self.n_raters
+
+    def middle_of_prior(self, noise_spread: float) -> Floats:
+        """Return a position, (n_dimensions,), where the density is not far from high.
+
+        Parameters
+        ----------
+        noise_spread : float
+            η there. Biases and noises are in the middle, the grades equally frequent,
+            and items where their ratings place them.
+
+        Returns
+        -------
+        ndarray, shape (n_dimensions,)
+            The position.
+        """
+        position = np.zeros(self.n_dimensions)
+        at = self.shares
+        position[at] = 1.0
+        position[at + 2] = np.log(noise_spread)
+        tau = ndtri(np.arange(1, self.n_categories) / self.n_categories)
+        position[at + 3] = tau[self.middle]
+        position[at + 4 :] = np.log(np.diff(tau) / np.sqrt(expit(-1.0)))
+        return position
+
+    def place(self, position: Floats) -> Place:
+        """Take positions (n, n_dimensions) apart."""
+        at, n = self.shares, self.n_items
+        own, b, w = np.split(position[:, :at], [n, n + self.n_raters], axis=1)
+        rho, f, eta, anchor = np.split(position[:, at : at + 4], 4, axis=1)
+        share, fraction, spread = expit(rho), expit(f), np.exp(eta)
+        root = np.sqrt(expit(-rho))
+        gap = np.exp(position[:, at + 4 :])
+        threshold = np.hstack(
+            [
+                -_from_right(gap[:, : self.middle]),
+                np.zeros_like(anchor),
+                gap[:, self.middle :].cumsum(axis=1),
+            ]
+        )
+        return Place(
+            item=np.where(
+                self.placed,
+                own + threshold @ self.between.T,
+                (np.sqrt(share) * own - anchor) / root,
+            ),
+            bias=np.sqrt(expit(-f)) * b,
+            noise=np.sqrt(fraction) * np.exp(spread * w),
+            threshold=threshold,
+            own=own,
+            b=b,
+            w=w,
+            logit_share=rho,
+            logit_fraction=f,
+            log_spread=eta,
+            share=share,
+            root=root,
+            fraction=fraction,
+            spread=spread,
+            anchor=anchor,
+            gap=gap,
+        )
+
+    def log_jacobian(self, place: Place) -> Floats:
+        """Return log |∂(θ, τ) / ∂(their coordinates)|, (n,), without items' √ρ.
+
+        z_i is a unit normal by its prior, whose density needs no Jacobian.
+        """
+        n_scaled = int(self.placed.sum()) + self.n_categories - 2
+        return np.asarray(
+            n_scaled * np.log(place.root[:, 0]) + np.log(place.gap).sum(axis=1)
+        )
+
+    def by_threshold(self, slope: Floats, place: Place) -> Floats:
+        """Turn slopes by T_k into slopes by the logarithms of their distances.
+
+        Parameters
+        ----------
+        slope : ndarray, shape (n, n_categories - 1)
+            Slopes by T_k.
+        place : Place
+            Where.
+
+        Returns
+        -------
+        ndarray, shape (n, n_categories - 2)
+            Slopes.
+        """
+        # a distance below the middle moves all thresholds below it down
+        down = -slope.cumsum(axis=1)[:, : self.middle]
+        up = _from_right(slope)[:, self.middle + 1 :]
+        return np.asarray(place.gap * np.hstack([down, up]))
+
+
+def _tell_items_apart(codes: Codes) -> bool:
+    # whether the variance of items' mean codes is plainly more than its error
+    given = codes >= 0
+    n_each = given.sum(axis=1)
+    rated = n_each > 0
+    spare = int((n_each[rated] - 1).sum())
+    if rated.sum() < 2 or spare < 1:
+        return False
+    mean = np.where(given, codes, 0).sum(axis=1) / n_each.clip(1)
+    within = (np.where(given, codes - mean[:, None], 0.0) ** 2).sum() / spare
+    error = within * (1.0 / n_each[rated]).mean()
+    return bool(mean[rated].var(ddof=1) > _PLAIN * error)
+
+
+def _from_right(values: Floats) -> Floats:
+    # (n, m) -> (n, m): sums of each entry and all to its right
+    return values[:, ::-1].cumsum(axis=1)[:, ::-1]

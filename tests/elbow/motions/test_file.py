@@ -1,0 +1,75 @@
+"""Motions from files: what is read, and what is said of a wrong file."""
+
+from math import radians
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from masrel.elbow.motions.file import read_motion
+from masrel.errors import ParameterError, RecordingError
+from masrel.recording import RECORDING_COLUMNS, Recording, write_recording
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "motion.csv"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_a_table_is_read_by_its_names(tmp_path: Path) -> None:
+    path = written(
+        tmp_path, "torque_nm, angle_deg ,time_s\n1,30,0.5\n2,60,1.0\n3,90,2.5\n"
+    )
+    motion = read_motion(path)
+    assert motion.duration == 2.0
+    assert (motion.start, motion.end) == (radians(30.0), radians(90.0))
+    assert read_motion(path, interpolation="linear").interpolation == "linear"
+
+
+def test_a_recording_of_the_loop_is_a_motion(tmp_path: Path) -> None:
+    n = 5
+    columns = {name: np.zeros(n) for name in RECORDING_COLUMNS}
+    columns["time_s"] = np.arange(n) / 10.0
+    columns["angle_deg"] = np.linspace(30.0, 70.0, n)
+    write_recording(Recording(columns=columns, facts={}), tmp_path / "one.npz")
+    for name in ("one.npz", "one.json"):
+        motion = read_motion(tmp_path / name, interpolation="linear")
+        assert motion.duration == 0.4
+        assert np.degrees(motion.velocity(0.1)) == pytest.approx(100.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", r"motion\.csv: needs the columns time_s, angle_deg in row 1, got nothing"),
+        ("t,angle_deg\n", "in row 1, got t, angle_deg"),
+        ("time_s,angle_deg\n0,30\n1,x\n", r"row 3, angle_deg: needs a number, got 'x'"),
+        ("time_s,angle_deg\n0,30\n1\n", r"row 3, angle_deg: needs a number, got ''"),
+    ],
+)
+def test_a_wrong_table_is_refused_with_its_place(
+    tmp_path: Path, text: str, said: str
+) -> None:
+    with pytest.raises(RecordingError, match=said):
+        read_motion(written(tmp_path, text))
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("time_s,angle_deg\n0,30\n", r"motion\.csv: time, angle: need two or more"),
+        ("time_s,angle_deg\n0,30\n0,31\n", r"motion\.csv: time: needs to grow"),
+        ("time_s,angle_deg\n0,30\n1,nan\n", r"motion\.csv: angle: needs finite"),
+    ],
+)
+def test_samples_that_are_no_motion_are_refused_with_the_file(
+    tmp_path: Path, text: str, said: str
+) -> None:
+    with pytest.raises(ParameterError, match=said):
+        read_motion(written(tmp_path, text))
+
+
+def test_no_file_is_said_to_be_none(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r"no\.csv: cannot be read"):
+        read_motion(tmp_path / "no.csv")

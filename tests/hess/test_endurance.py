@@ -1,0 +1,57 @@
+"""An hour of presentations, simulated: memory flat, recordings complete."""
+
+import gc
+import resource
+from math import radians
+
+import numpy as np
+import pytest
+
+from masrel.elbow import STANDARD_MODELS
+from masrel.hess import (
+    Controller,
+    DeviceLimits,
+    SimulatedClock,
+    SimulatedHand,
+    open_device,
+    run_presentation,
+)
+
+from .rig import END, START
+
+HOUR_S = 3600.0
+WARM_UP = 50  # presentations in which caches and pools fill
+MOST_GROWTH_KB = 4096  # a leak of one recording in ten would be 17 MB
+
+
+def resident_kb() -> int:
+    """The largest this process has ever been."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+
+@pytest.mark.slow
+def test_in_an_hour_of_presentations_memory_is_flat_and_every_tick_is_there() -> None:
+    models = sorted(STANDARD_MODELS)
+    simulated_s, n_presentations, before_kb = 0.0, 0, 0
+    sizes: dict[str, set[int]] = {model: set() for model in models}
+    while simulated_s < HOUR_S:
+        model = models[n_presentations % len(models)]
+        clock = SimulatedClock()
+        hand = SimulatedHand(start=START, end=END, mean_speed=radians(80.0))
+        controller = Controller(STANDARD_MODELS[model], start_angle=START)
+        with open_device("simulated", clock=clock, hand=hand) as device:
+            presented = run_presentation(
+                device, controller, clock=clock, limits=DeviceLimits(), end_angle=END
+            )
+        assert presented.fault is None
+        time_s = presented.recording.columns["time_s"]
+        np.testing.assert_allclose(time_s, np.arange(time_s.size) * 1e-3, atol=1e-9)
+        sizes[model].add(time_s.size)
+        simulated_s += float(time_s[-1])
+        n_presentations += 1
+        if n_presentations == WARM_UP:
+            gc.collect()
+            before_kb = resident_kb()
+    assert n_presentations > 2000
+    assert all(len(found) == 1 for found in sizes.values())  # the same each time
+    assert resident_kb() - before_kb < MOST_GROWTH_KB

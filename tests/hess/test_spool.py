@@ -1,0 +1,130 @@
+"""Samples in a file are there for whoever comes after the process that took them."""
+
+import json
+from math import degrees, radians
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from masrel.elbow import STANDARD_MODELS
+from masrel.errors import RecordingError
+from masrel.hess import (
+    Controller,
+    DeviceLimits,
+    SimulatedClock,
+    SimulatedHand,
+    cut_off,
+    open_device,
+    run_presentation,
+)
+from masrel.hess.samples import Samples
+from masrel.hess.spool import Spool, read_spool
+from masrel.recording import RECORDING_COLUMNS
+
+from .rig import END, START
+
+FACTS = {"device": "none", "rate_hz": 2000, "speed_threshold": 0.3}
+
+
+def written(path: Path, n: int, capacity: int = 10) -> None:
+    spool = Spool(path, capacity, FACTS)
+    samples = Samples(capacity, spool)
+    for tick in range(n):
+        samples.add(tick * 1e-3, 0.5 + tick, 1.0, 2.0, 3.0 + tick, 1)
+    samples.close()
+    spool.close()
+
+
+def presented(spool: Path | None):
+    clock = SimulatedClock()
+    hand = SimulatedHand(start=START, end=END, mean_speed=radians(92.0))
+    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
+    with open_device("simulated", clock=clock, hand=hand) as device:
+        return run_presentation(
+            device, controller, clock=clock, limits=DeviceLimits(), spool=spool
+        )
+
+
+def test_what_was_added_is_in_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "sub" / "a.partial"
+    written(path, 3)
+    left = read_spool(path)
+    assert left is not None
+    assert left.facts == FACTS
+    assert left.columns.shape == (6, 3)
+    assert left.columns[0].tolist() == [0.0, 1e-3, 2e-3]
+    assert left.columns[1].tolist() == [0.5, 1.5, 2.5]
+    assert left.columns[4].tolist() == [3.0, 4.0, 5.0]
+
+
+def test_the_whole_file_is_there_before_the_first_sample(tmp_path: Path) -> None:
+    path = tmp_path / "a.partial"
+    spool = Spool(path, 1000, {})
+    size = path.stat().st_size
+    assert size == 4096 + 8 * (1 + 6 * 1000)
+    assert path.stat().st_blocks * 512 >= size  # not sparse: the disk has given it
+    spool.close()
+    assert read_spool(path) is None  # and nothing was sampled
+
+
+def test_a_spooled_presentation_is_the_same_to_the_last_bit(tmp_path: Path) -> None:
+    path = tmp_path / "a.partial"
+    spooled, kept = presented(path), presented(None)
+    for name in RECORDING_COLUMNS:
+        column = spooled.recording.columns[name]
+        assert column.tobytes() == kept.recording.columns[name].tobytes()
+    left = cut_off(path)  # whoever did not remove it can read it all again
+    assert left is not None
+    assert left.recording.facts["fault_kind"] == "process"
+    for name in RECORDING_COLUMNS:
+        column = left.recording.columns[name]
+        assert column.tobytes() == kept.recording.columns[name].tobytes()
+    for name in (
+        "phases",
+        "catch_angle_deg",
+        "mean_speed_deg_s",
+        "device",
+        "simulated",
+    ):
+        assert left.recording.facts[name] == kept.recording.facts[name]
+
+
+def test_what_was_cut_off_says_where(tmp_path: Path) -> None:
+    path = tmp_path / "a.partial"
+    written(path, 3)
+    left = cut_off(path)
+    assert left is not None
+    assert left.fault is not None
+    assert (left.fault.kind, left.fault.time_s, left.fault.torque_nm) == (
+        "process",
+        2e-3,
+        5.0,
+    )
+    assert left.recording.columns["angle_deg"][-1] == degrees(2.5)
+    assert left.recording.facts["ended"] == "fault"
+    assert left.n_missed_ticks == 2  # 2 ms at 2 kHz are five ticks, three are there
+
+
+@pytest.mark.parametrize("n_bytes", [0, 100, 4096, 4100])
+def test_a_file_that_was_never_laid_down_is_nothing(tmp_path, n_bytes: int) -> None:
+    path = tmp_path / "a.partial"
+    written(path, 3)
+    path.write_bytes(path.read_bytes()[:n_bytes])
+    assert cut_off(path) is None
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"x" * 5000,
+        json.dumps({"device": "none"}).encode().ljust(5000),
+        json.dumps({"capacity": 7}).encode().ljust(4096) + np.ones(9).tobytes(),
+        json.dumps({"capacity": None}).encode().ljust(4096) + np.ones(9).tobytes(),
+    ],
+)
+def test_anything_else_is_refused_with_a_way_out(tmp_path, content: bytes) -> None:
+    path = tmp_path / "a.partial"
+    path.write_bytes(content)
+    with pytest.raises(RecordingError, match=r"a\.partial: needs .* move it away"):
+        cut_off(path)
