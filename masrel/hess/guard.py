@@ -10,6 +10,7 @@ __all__ = ["Guard"]
 # An arm that was faster than this cannot stop within a tick without 20 N·m on its
 # 0.06 kg·m²; slower ones may come to rest between two steps of the encoder.
 _MOVING_SPEED = math.radians(20.0)
+_LONGEST_STOP_TICKS = 1.5
 
 
 class Guard:
@@ -151,7 +152,8 @@ class Guard:
             )
         self._raw_speed = speed = change / interval
         self._moved_at = time_s
-        self._stopped_dead = abs(speed) > _MOVING_SPEED
+        # Over a longer gap it may well have come to rest, against an end stop say.
+        self._stopped_dead = abs(speed) > _MOVING_SPEED and ticks < _LONGEST_STOP_TICKS
 
     def _still_for(self, duration_s: float) -> None:
         limits = self._limits

@@ -181,6 +181,14 @@ def test_an_arm_that_stops_dead_is_named_after_ten_milliseconds() -> None:
         made.reading(0.0305, angles[-1], 0.0)
 
 
+def test_an_arm_may_come_to_rest_while_nobody_looks() -> None:
+    # At 30 deg/s, then a gap of 15 ms in which it met its end stop
+    angles = [1.0 + radians(0.03) * tick for tick in range(20)]
+    made = fed(guard(), angles)
+    fed(made, [angles[-1] + radians(0.4)] * 400, start=35)
+    assert made.is_new(0.435)
+
+
 def test_a_slow_arm_may_come_to_rest() -> None:
     angles = [1.0 + radians(0.015) * tick for tick in range(20)]  # 15 deg/s
     made = fed(guard(), angles + [angles[-1]] * 1000)
