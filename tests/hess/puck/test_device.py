@@ -406,3 +406,14 @@ def test_a_torque_that_does_not_read_back_can_be_gone_without() -> None:
     with opened(SimulatedClock(), loose(), **options) as device:
         device.command(1.0)
         assert device.is_open
+
+
+def test_a_bus_that_comes_back_while_closing_is_used() -> None:
+    # Off for 30 ms, which nobody has noticed yet
+    clock = SimulatedClock()
+    faults = (fault("bus-off", 0.01, end_s=0.04),)
+    device = opened(clock, loose(), emulator={"faults": faults})
+    device.command(2.0)
+    clock.sleep_until_ns(clock.now_ns() + 15_000_000)
+    device.close()
+    assert device.emulator.registers.mode == 0

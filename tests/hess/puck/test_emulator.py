@@ -413,3 +413,17 @@ def test_the_babbling_of_others_is_bounded(on) -> None:
 def test_options_out_of_range_are_refused(make, words: str) -> None:
     with pytest.raises(ParameterError, match=words):
         make()
+
+
+def test_answers_come_in_the_order_of_their_questions(on) -> None:
+    # Late until 2 ms after the beginning, and then not: nobody is overtaken.
+    one = driving(on(awake=True, faults=(fault("late-replies", 0.001, end_s=0.002),)))
+    late = one.clock.now_ns()
+    numbers = [CTS, IPNM, STAT, VERS]
+    for number in numbers:
+        one.node.inquire(number)
+        one.node.wait(0.0006)
+    end_ns, answered = late + 10_000_000, []
+    while (frame := one.link.receive(end_ns)) is not None:
+        answered.append(frame.data[0] & 0x7F)
+    assert answered == numbers
