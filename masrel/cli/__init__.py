@@ -28,6 +28,7 @@ VERBS = {
     "analyze": "Compute the agreement tables a study asks for.",
     "report": "Write the report of a study.",
     "agree": "Agreement of any CSV file of ratings, no study needed.",
+    "latent": "Biases and noises of raters of any CSV file, items on one scale.",
     "trace": "Torque trace of one stretch of one model.",
     "fit": "Identify a joint, or a device's friction, from recordings.",
     "device": "Bring a Puck up on its CAN bus: probe, check, zero, friction.",

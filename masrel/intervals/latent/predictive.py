@@ -59,8 +59,10 @@ def predictive_checks(
     Returns
     -------
     tuple of PredictiveCheck
-        Share of agreeing pairs of raters on an item, ratings in each category, and
-        standard deviations of raters' and of items' mean grades.
+        Share of agreeing pairs of raters on an item, ratings in each category,
+        standard deviations of raters' and of items' mean grades, the item on whose
+        grade raters differ most, and the rater who differs most from the items' means
+        (both as standard deviations of places in the scale).
     """
     made = np.where(codes >= 0, replicate(traits, generator), -1)
     n = len(categories)
@@ -69,6 +71,8 @@ def predictive_checks(
         *(f"ratings of {category}" for category in categories),
         "spread of raters' mean grades",
         "spread of items' mean grades",
+        "widest spread of the grades of an item",
+        "widest distance of a rater from items' means",
     ]
     observed, anew = _properties(codes[None], n)[0], _properties(made, n)
     return tuple(
@@ -106,20 +110,22 @@ def replicate(traits: Traits, generator: np.random.Generator) -> NDArray[np.int6
 
 
 def _properties(codes: Codes, n_categories: int) -> Floats:
-    # (n, n_items, n_raters) -> (n, n_categories + 3)
+    # (n, n_items, n_raters) -> (n, n_categories + 5)
     given = codes >= 0
     counts = (codes[..., None] == np.arange(n_categories)).sum(axis=2)  # (n, items, q)
     rated = counts.sum(axis=2)
     pairs = (rated * (rated - 1)).sum(axis=1)
     grades = np.where(given, codes, 0)
-    with np.errstate(invalid="ignore"):  # an item or rater without ratings has no mean
-        by_rater = grades.sum(axis=1) / given.sum(axis=1)
-        by_item = grades.sum(axis=2) / given.sum(axis=2)
+    by_rater = grades.sum(axis=1) / given.sum(axis=1)  # each has a rating
+    by_item = grades.sum(axis=2) / given.sum(axis=2)
+    away = np.where(given, codes - by_item[:, :, None], 0.0) ** 2
     return np.column_stack(
         [
             (counts * (counts - 1)).sum(axis=(1, 2)) / pairs,
             counts.sum(axis=1),
             by_rater.std(axis=1),
             by_item.std(axis=1),
+            np.sqrt(away.sum(axis=2) / given.sum(axis=2)).max(axis=1),
+            np.sqrt(away.sum(axis=1) / given.sum(axis=1)).max(axis=1),
         ]
     )

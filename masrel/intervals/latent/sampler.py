@@ -16,7 +16,7 @@ LEAST_ESS = 4_000.0  # an end of a 95 % interval within .04 posterior deviations
 _WARM_UP = (100, 100, 100)
 _FIRST_STEP = 0.1
 _BEST_ACCEPTANCE = (0.8, 0.97)
-_MOST_KEPT = 2_000  # positions of a chain; beyond, every other one is dropped
+_MOST_KEPT = 500  # positions of a chain; beyond, every other one is dropped
 
 
 class SmoothDensity(Protocol):

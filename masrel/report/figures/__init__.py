@@ -10,7 +10,6 @@ from masrel.report.figures.grades import GradeGrid, draw_grades
 from masrel.report.figures.latent import (
     LatentScale,
     ScaleRow,
-    draw_latent,
     latent_file,
 )
 from masrel.report.figures.schematic import CatchSchematic, draw_schematic
@@ -39,7 +38,6 @@ __all__ = [
     "draw_catches",
     "draw_forest",
     "draw_grades",
-    "draw_latent",
     "draw_schematic",
     "draw_speeds",
     "draw_stretches",

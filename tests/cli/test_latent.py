@@ -1,0 +1,167 @@
+"""masrel latent: tables, JSON and figure of the latent-trait model."""
+
+import csv
+import io
+import json
+from pathlib import Path
+
+import pytest
+
+from masrel.report.figures.style import STYLE
+from tests.architecture.test_imports import loaded_after
+from tests.cli.process import Caller
+
+SAMPLER = "masrel.intervals.latent.sampler"
+
+WIDE = "patient,Kim,Lee,Ann\nA,1,1+,1\nB,2,NA,2\nC,1,1,2\nD,3,3,3\n"
+NUMBERS = "patient,Kim,Lee,Ann\nA,1,2,1\nB,2,NA,2\nC,1,1,2\nD,3,3,3\n"
+SESSIONS = "session,item,rater,grade,source\n" + "".join(
+    f"{session},{item},{rater},{(item + (item * rater) % 2) % 4},simulated\n"
+    for session in ("first", "second")
+    for item in range(4)
+    for rater in range(3)
+)
+
+
+@pytest.fixture(autouse=True)
+def brief(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let a second of sampling pass as converged."""
+    monkeypatch.setattr(f"{SAMPLER}.LEAST_ESS", 50.0)
+    monkeypatch.setattr(f"{SAMPLER}.LARGEST_R_HAT", 1.3)
+    monkeypatch.setattr(f"{SAMPLER}._WARM_UP", (20, 20, 20))
+    monkeypatch.setattr("masrel.intervals.latent.fit._N_CHAINS", 16)
+    monkeypatch.setattr(
+        "masrel.intervals.latent.trait.latent_trait.__kwdefaults__",
+        {**_defaults(), "n_steps": 50},
+    )
+
+
+def _defaults() -> dict[str, object]:
+    from masrel.intervals import latent_trait
+
+    return dict(latent_trait.__kwdefaults__ or {})
+
+
+@pytest.fixture
+def masrel(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Caller:
+    return Caller(monkeypatch, capsys)
+
+
+@pytest.fixture
+def wide(tmp_path: Path) -> Path:
+    file = tmp_path / "wide.csv"
+    file.write_text(WIDE, encoding="utf-8")
+    return file
+
+
+def test_the_table_says_all_there_is_with_the_other_prior_beside(
+    masrel: Caller, wide: Path
+) -> None:
+    done = masrel("latent", wide, "--items", "fixed", "--quiet")
+    assert (done.code, done.err) == (0, "")
+    lines = done.out.splitlines()
+    assert lines[0] == f"Latent-trait model of the ratings in {wide}"
+    for start in (
+        "kappa ", "severity           A", "threshold          1+ | 2",
+        "bias               Lee", "noise              Ann",
+        "share of variance  items", "Kappa: agreement of two new raters on these",
+        "Other prior: share of the items ~ Beta(1, 1)", "The model makes ratings",
+    ):  # fmt: skip
+        assert any(line.startswith(start) for line in lines), start
+    assert "told by its grade 1+" in done.out
+    assert "seed 0." in lines[-1]
+
+
+def test_json_and_csv_keep_every_digit_and_repeat(masrel: Caller, wide: Path) -> None:
+    one, two = (
+        masrel("latent", wide, "--items", "fixed", "--json", "-", "--seed", 3)
+        for _ in range(2)
+    )
+    assert one.out == two.out
+    found = json.loads(one.out)
+    assert [of["name"] for of in found["raters"]] == ["Kim", "Lee", "Ann"]
+    assert found["kappa"]["interval"]["target"] == "raters"
+    assert found["seed"] == found["other"]["seed"] == 3
+    assert len(found["grades"]) == 4
+    assert found["other"]["other"] is None
+    printed = masrel("latent", wide, "--items", "fixed", "--csv", "--seed", 3)
+    rows = list(csv.DictReader(io.StringIO(printed.out)))
+    assert rows[0]["what"] == "kappa"
+    assert "Neighbouring thresholds" in printed.err
+    assert float(rows[0]["median"]) == found["kappa"]["value"]
+    assert float(rows[0]["other_low"]) == found["other"]["kappa"]["interval"]["low"]
+
+
+def test_one_prior_has_no_other_and_random_items_speak_of_new_ones(
+    masrel: Caller, wide: Path
+) -> None:
+    done = masrel("latent", wide, "--items", "random", "--one-prior", "--quiet")
+    assert "Other prior" not in done.out
+    assert "two new raters on new items like these" in done.out
+
+
+def test_the_figure_shows_items_thresholds_and_raters(
+    masrel: Caller, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(STYLE, "svg.fonttype", "none")  # text stays text
+    file, figure = tmp_path / "study.csv", tmp_path / "scale.svg"
+    file.write_text(SESSIONS, encoding="utf-8")
+    asked = ("latent", file, "--items", "fixed", "--session", "second", "--one-prior")
+    done = masrel(*asked, "--categories", "0,1,2,3", "--quiet", "--figure", figure)
+    assert done.code == 0
+    assert done.err == f"figure: {figure}\n"
+    assert done.out.startswith("SIMULATED DATA. ")
+    drawn = figure.read_text("utf-8")
+    for words in ("SIMULATED DATA", "severity", "2 | 3", "bias of raters"):
+        assert words in drawn
+
+
+def test_progress_is_shown_unless_quiet(masrel: Caller, wide: Path) -> None:
+    assert "sampling" in masrel("latent", wide, "--items", "fixed", "--one-prior").err
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "said"),
+    [
+        (WIDE.replace("1+", "x"), (), "--categories: the model needs every grade"),
+        (SESSIONS, (), "holds 2 sessions (first, second); --session chooses one"),
+        (SESSIONS, ("--session", "third"), "holds no session third"),
+        (NUMBERS, ("--level", "95"), "level: needs (0, 1), got 95"),
+        (NUMBERS, ("--seed", "-1"), "--seed: needs at least 0"),
+        (NUMBERS, ("--figure", "scale.jpg"), "--figure: needs a name that ends in"),
+        (NUMBERS, ("--json", "-", "--csv"), "want the same stdout"),
+        ("patient,Kim,Lee\nA,1,1\nB,2,2\n", (), "no two raters disagree"),
+        ("patient,Kim,Lee\nA,1,2\n", (), "needs two items"),
+    ],
+)
+def test_what_cannot_be_done_is_one_sentence(
+    masrel: Caller, tmp_path: Path, text: str, options: tuple[str, ...], said: str
+) -> None:
+    file = tmp_path / "ratings.csv"
+    file.write_text(text, encoding="utf-8")
+    done = masrel("latent", file, "--items", "fixed", "--quiet", *options)
+    assert done.code == 2
+    assert done.out == ""
+    assert said in done.err
+    assert done.err.count("\n") == 1
+
+
+def test_too_few_steps_are_a_failed_run(
+    masrel: Caller, wide: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(f"{SAMPLER}.LEAST_ESS", 1e9)
+    monkeypatch.setattr(
+        "masrel.intervals.latent.trait.latent_trait.__kwdefaults__",
+        {**_defaults(), "most_steps": 50},
+    )
+    done = masrel("latent", wide, "--items", "fixed", "--quiet")
+    assert done.code == 1
+    assert "more steps are needed" in done.err
+
+
+def test_help_and_a_table_load_nothing_that_draws() -> None:
+    code = "from masrel.cli import cli\ncli(['latent', '--help'])"
+    heavy = {"matplotlib", "emcee", "scipy", "pandas", "arviz_stats"}
+    assert loaded_after(code) & heavy == set()

@@ -1,0 +1,318 @@
+"""The latent-trait model as its users meet it."""
+
+import re
+from collections.abc import Iterator
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from masrel.errors import ConvergenceError, MasrelError, ParameterError, RatingsError
+from masrel.intervals import LatentPrior, latent_trait
+from masrel.intervals.latent.result import LatentTrait
+from tests.intervals.data import SCALE, TABLE_V
+from tests.intervals.latent.studies import drawn
+
+SMALL = [[1, 1, 2], [2, 2, 2], [3, 4, 3], [4, 4, 3]]
+
+SAMPLER = "masrel.intervals.latent.sampler"
+
+
+@pytest.fixture(scope="module", autouse=True)
+def brief() -> Iterator[None]:
+    """Let a second of sampling pass as converged."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(f"{SAMPLER}.LEAST_ESS", 100.0)
+        patch.setattr(f"{SAMPLER}.LARGEST_R_HAT", 1.2)
+        patch.setattr(f"{SAMPLER}._WARM_UP", (25, 25, 25))
+        patch.setattr("masrel.intervals.latent.fit._N_CHAINS", 24)
+        yield
+
+
+def asked(ratings: object = SMALL, **options: object) -> LatentTrait:
+    given: dict[str, object] = {
+        "items": "fixed",
+        "n_steps": 60,
+        "rng": 1,
+        "compare": False,
+        **({} if "categories" in options else {"categories": [1, 2, 3, 4, 5]}),
+        **options,
+    }
+    return latent_trait(ratings, **given)  # type: ignore[arg-type]
+
+
+@pytest.fixture(scope="module")
+def found(brief: None) -> LatentTrait:  # noqa: ARG001 - it has to come first
+    return asked(keep_chains=True, compare=True)
+
+
+def test_everything_has_a_name_and_an_interval(found: LatentTrait) -> None:
+    assert [one.name for one in found.items] == [f"item {i}" for i in (1, 2, 3, 4)]
+    raters = ["rater 1", "rater 2", "rater 3"]
+    assert [one.name for one in found.raters] == raters
+    assert [one.name for one in found.noises] == raters
+    assert [one.name for one in found.thresholds] == [
+        "1 | 2",
+        "2 | 3",
+        "3 | 4",
+        "4 | 5",
+    ]
+    for one in (*found.items, *found.raters, *found.noises, *found.shares):
+        assert one.interval.low < one.value < one.interval.high
+        assert (one.interval.kind, one.interval.level) == ("credible", 0.95)
+    assert np.array(found.grades).sum(axis=1) == pytest.approx(np.ones(4))
+
+
+def test_numbers_are_those_of_the_chains(found: LatentTrait) -> None:
+    chains, kappa = found.chains, found.kappa
+    assert chains is not None
+    assert kappa.interval is not None
+    assert kappa.value == np.median(chains.kappa)
+    ends = np.quantile(chains.kappa, (0.025, 0.975)).tolist()
+    assert [kappa.interval.low, kappa.interval.high] == pytest.approx(ends, rel=1e-12)
+    assert found.raters[1].value == np.median(chains.bias[..., 1])
+    assert found.thresholds[2].value == np.median(chains.thresholds[..., 2])
+    assert kappa.interval.n_resamples == chains.kappa.size
+
+
+def test_the_scale_has_its_zero_and_its_unit(found: LatentTrait) -> None:
+    chains = found.chains
+    assert chains is not None
+    assert np.abs(chains.severity.mean(axis=-1)).max() < 1e-12
+    assert chains.shares.sum(axis=-1) == pytest.approx(np.ones(chains.shares.shape[:2]))
+    assert (np.diff(chains.thresholds, axis=-1) >= 0).all()
+    assert (chains.noise > 0).all()
+
+
+def test_the_other_prior_is_shown_beside(found: LatentTrait) -> None:
+    assert found.other is not None
+    assert found.other.prior == LatentPrior.other()
+    there, here = found.other.kappa.interval, found.kappa.interval
+    assert there is not None
+    assert here is not None
+    assert here.notes == (
+        f"under another prior {there.low:.3f} to {there.high:.3f}: "
+        f"{LatentPrior.other().words}",
+    )
+    assert found.other.other is None
+    alone = asked()
+    assert alone.other is None
+    assert alone.kappa.interval is not None
+    assert alone.kappa.interval.notes == ()
+    assert alone.kappa.value == found.kappa.value  # one prior does not move the other
+
+
+def test_the_distribution_of_kappa_can_be_had(found: LatentTrait) -> None:
+    assert found.kappa.interval is not None
+    law = found.kappa.interval.distribution
+    assert law is not None
+    assert (np.diff(law.values) >= 0).all()
+    assert law.weights.sum() == pytest.approx(1.0)
+
+
+def test_a_seed_repeats_every_byte(found: LatentTrait) -> None:
+    again = asked(keep_chains=True, compare=True)
+    assert again == found
+    assert again.chains is not None
+    assert found.chains is not None
+    for name in ("kappa", "severity", "bias", "noise", "thresholds", "shares"):
+        one, two = (getattr(of.chains, name) for of in (again, found))
+        assert one.tobytes() == two.tobytes()
+    assert asked(rng=2).kappa.value != found.kappa.value
+
+
+def test_a_generator_is_taken_and_a_fresh_seed_recorded(found: LatentTrait) -> None:
+    given = asked(rng=np.random.default_rng(1))
+    assert given.seed is None
+    assert given.kappa.value == found.kappa.value
+    fresh = asked(rng=None)
+    assert fresh.seed is not None
+    assert asked(rng=fresh.seed) == fresh
+
+
+def test_random_items_speak_of_both_populations(found: LatentTrait) -> None:
+    fixed, new = found, asked(items="random")
+    assert fixed.kappa.interval is not None
+    assert new.kappa.interval is not None
+    assert (fixed.kappa.interval.target, new.kappa.interval.target) == (
+        "raters",
+        "both",
+    )
+    assert new.raters[0].value == fixed.raters[0].value  # the same posterior
+    assert new.kappa.value != fixed.kappa.value
+
+
+def test_labels_give_the_names_and_what_has_no_rating_is_left_out() -> None:
+    table = pd.DataFrame(
+        [
+            ["1", "1+", None, "1"],
+            [None] * 4,
+            ["2", "2", None, None],
+            ["3", "2", None, "3"],
+        ],
+        index=["HM1", "HM2", "HM3", "HM4"],
+        columns=["A", "B", "C", "D"],
+    )
+    found = asked(table, categories=SCALE)
+    assert [one.name for one in found.items] == ["HM1", "HM3", "HM4"]
+    assert [one.name for one in found.raters] == ["A", "B", "D"]
+    assert (found.kappa.n_items, found.kappa.n_raters) == (3, 3)
+
+
+@pytest.mark.parametrize(
+    ("ratings", "options"),
+    [
+        (SMALL, {"categories": [1, 2, 3, 4]}),
+        ([[0, 0], [1, 1], [0, 1], [1, 1]], {"categories": [0, 1]}),
+        ([[1, 2], [3, 3]], {"categories": [1, 2, 3], "items": "random"}),
+        ([[3, 3, 3], [3, 3, 3], [3, 3, 2]], {"categories": [1, 2, 3, 4, 5]}),
+    ],
+    ids=["all grades", "two grades", "two by two", "one dissent"],
+)
+def test_small_studies_have_an_answer(
+    ratings: list[list[int]], options: dict[str, object]
+) -> None:
+    interval = asked(ratings, **options).kappa.interval
+    assert interval is not None
+    assert 0.0 <= interval.low < interval.high <= 1.0
+    assert interval.high - interval.low > 0.1  # they know little, and say so
+
+
+@pytest.mark.parametrize(
+    ("ratings", "options", "error", "said"),
+    [
+        (SMALL, {"items": "both"}, ParameterError, 'items: needs "fixed" or "random"'),
+        (SMALL, {"level": 95}, ParameterError, r"level: needs \(0, 1\), got 95"),
+        (
+            SMALL,
+            {"n_steps": 5},
+            ParameterError,
+            "n_steps, most_steps: need at least 20",
+        ),
+        (SMALL, {"rng": -1}, ParameterError, "rng: needs"),
+        (TABLE_V, {"categories": None}, ParameterError, "declared scale in order"),
+        ([[2, 2], [2, 2]], {"categories": None}, ParameterError, "needs two, got one"),
+        (SMALL, {"categories": [1, 2, 3]}, MasrelError, "4"),
+        ([[1, 2, 2]], {}, RatingsError, "needs two items .* got 1"),
+        ([[1, 2], [None, None]], {}, RatingsError, "needs two items .* got 1"),
+        ([[1, None], [None, 2]], {}, RatingsError, "an item rated by two raters"),
+        ([[1, 1], [4, 4], [2, None]], {}, RatingsError, "no two raters disagree"),
+        ([[2, 2], [2, 2]], {}, RatingsError, "no two raters disagree"),
+        ([], {}, RatingsError, "ratings"),
+    ],
+)
+def test_what_the_model_cannot_answer_is_refused(
+    ratings: list[list[object]],
+    options: dict[str, object],
+    error: type[MasrelError],
+    said: str,
+) -> None:
+    with pytest.raises(error, match=said):
+        asked(ratings, **options)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"item_share": (0.0, 1.0)},
+        {"noise_fraction": (1.0, float("nan"))},
+        {"noise_spread": -0.5},
+        {"concentration": float("inf")},
+    ],
+)
+def test_a_prior_has_to_be_one(wrong: dict[str, object]) -> None:
+    with pytest.raises(ParameterError, match=next(iter(wrong))):
+        LatentPrior(**wrong)  # type: ignore[arg-type]
+
+
+def test_what_has_not_converged_is_no_interval_but_says_how_many_more_steps(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(f"{SAMPLER}.LEAST_ESS", 4_000.0)
+    with pytest.raises(ConvergenceError, match="more steps are needed") as raised:
+        asked(n_steps=20, most_steps=40)
+    message = str(raised.value)
+    assert "after 40 steps" in message
+    more = re.search(r"about (\d+) more steps", message)
+    assert more is not None
+    # 24 chains of 40 steps are at most 960 draws, of which 4000 are wanted
+    assert int(more[1]) > 120
+
+
+def test_progress_counts_warm_up_and_both_priors() -> None:
+    steps: list[int] = []
+    found = asked(compare=True, progress=steps.append)
+    assert found.other is not None
+    assert sum(steps) == found.n_steps + found.other.n_steps + 2 * 75
+
+
+def test_a_rater_who_grades_high_and_one_who_is_careless_are_found() -> None:
+    rng = np.random.default_rng(3)
+    severity = np.repeat([-2.0, -1.0, 0.0, 1.0, 2.0], 4)
+    perceived = severity[:, None] + 0.2 * rng.normal(size=(20, 5))
+    perceived[:, 1] += 1.0
+    perceived[:, 3] += 1.2 * rng.normal(size=20)
+    codes = np.digitize(perceived, [-2.5, -1.5, -0.5, 0.5, 1.5, 2.5])
+    found = asked(codes, categories=list(range(7)))
+    bias = [one.value for one in found.raters]
+    noise = [one.value for one in found.noises]
+    assert (int(np.argmax(bias)), int(np.argmax(noise))) == (1, 3)
+    assert found.raters[1].interval.low > 0.0
+    others = max(noise[r] for r in (0, 2, 4))
+    assert found.noises[3].interval.low > others
+    # thresholds are about one apart, so that the bias is about one grade
+    apart = found.thresholds[3].value - found.thresholds[2].value
+    assert bias[1] - bias[0] == pytest.approx(apart, rel=0.35)
+    order = np.argsort([one.value for one in found.items])
+    assert (np.diff(severity[order]) >= -1.0).all()
+
+
+def extreme(found: LatentTrait) -> dict[str, float]:
+    return {
+        check.name: check.p_value
+        for check in found.checks
+        if not 0.005 <= check.p_value <= 0.995
+    }
+
+
+def test_the_predictive_check_is_calm_about_the_model_s_own_ratings() -> None:
+    # Posterior predictive p-values gather around 1/2, so that one of these 20 is beyond
+    # .005 or .995 far more rarely than in 1 of 5 runs of other seeds.
+    for seed in (1, 2):
+        study = drawn(
+            np.random.default_rng(seed), 12, 6, [-1.0, 0.0, 1.0],
+            share=0.8, fraction=0.6, spread=0.3,
+        )  # fmt: skip
+        assert extreme(asked(study.codes, categories=[0, 1, 2, 3])) == {}
+
+
+def test_raters_who_answer_at_random_agree_not_at_all_and_fit() -> None:
+    # That raters do not look at the items is one of the things the model can say.
+    codes = np.random.default_rng(5).integers(0, 4, (12, 6))
+    found = asked(codes, categories=[0, 1, 2, 3])
+    assert extreme(found) == {}
+    assert found.kappa.interval is not None
+    assert found.kappa.interval.high < 0.2
+
+
+@pytest.mark.slow
+def test_the_predictive_check_sees_an_item_of_two_minds() -> None:
+    # Half the raters take one item for the lowest, half for the highest.
+    codes = np.tile(np.array([0, 1, 2, 3, 4, 1, 2, 3])[:, None], 8)
+    codes[1, 0], codes[3, 5], codes[6, 2] = 2, 4, 1
+    codes[7, ::2], codes[7, 1::2] = 0, 4
+    found = asked(codes, categories=[0, 1, 2, 3, 4])
+    assert extreme(found)["widest spread of the grades of an item"] < 0.005
+
+
+def test_the_predictive_check_sees_a_rater_who_turns_the_scale_round() -> None:
+    rng = np.random.default_rng(2)
+    study = drawn(
+        rng, 14, 6, [-1.2, -0.4, 0.4, 1.2], share=0.95, fraction=0.7, spread=0.1
+    )
+    codes = study.codes.copy()
+    codes[:, 4] = 4 - codes[:, 4]
+    tight = LatentPrior(noise_spread=0.1)  # raters who are alike
+    found = asked(codes, categories=[0, 1, 2, 3, 4], prior=tight)
+    name = "widest distance of a rater from items' means"
+    assert extreme(found)[name] < 0.005
