@@ -30,6 +30,7 @@ VERBS = {
     "agree": "Agreement of any CSV file of ratings, no study needed.",
     "trace": "Torque trace of one stretch of one model.",
     "fit": "Identify a joint, or a device's friction, from recordings.",
+    "grading": "Regress grades on the models' parameters and the speed.",
     "device": "Bring a Puck up on its CAN bus: probe, check, zero, friction.",
     "demo": "The whole flow on the simulated device.",
 }
