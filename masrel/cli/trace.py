@@ -90,7 +90,7 @@ _N_SILENT = 500  # scenes: fewer take less than two seconds
 @click.option("--figure", type=_PATH, help="Draw this file: .png, .svg or .pdf.")
 @click.option(
     "--view", type=click.Choice(VIEWS), default="angle", show_default=True,
-    help="What --figure shows: torque against angle or time, or the catches.",
+    help="What --figure shows: torque by angle or time, the catches, or one of them.",
 )  # fmt: skip
 @click.option("--quiet", is_flag=True, help="Show no progress.")
 def command(

@@ -9,11 +9,11 @@ from masrel.cli.trace_scene import Scene
 from masrel.errors import ParameterError
 
 if TYPE_CHECKING:
-    from masrel.report.figures import CatchCurve, Form, StretchPanel
+    from masrel.report.figures import CatchCurve, CatchSchematic, Form, StretchPanel
 
 __all__ = ["VIEWS", "check_figure", "write_figure"]
 
-VIEWS = ("angle", "time", "catch")
+VIEWS = ("angle", "time", "catch", "schematic")
 
 N_PIXELS = 800
 """Points a line has: a panel is less wide than that."""
@@ -28,7 +28,7 @@ def check_figure(file: Path, view: str, scenes: Sequence[Scene]) -> None:
     ----------
     file : Path
         Where it is wanted.
-    view : {"angle", "time", "catch"}
+    view : {"angle", "time", "catch", "schematic"}
         What it shows.
     scenes : sequence of Scene
         The scenes.
@@ -37,7 +37,8 @@ def check_figure(file: Path, view: str, scenes: Sequence[Scene]) -> None:
     ------
     ParameterError
         If its name does not end as that of a figure, there are more models than fit
-        beside each other or more lines than can be told apart, or too few speeds.
+        beside each other or more lines than can be told apart, too few speeds, or
+        too many scenes for a schematic, or none with a catch.
     """
     if file.suffix.lower() not in _FORMS:
         raise ParameterError(
@@ -52,6 +53,15 @@ def check_figure(file: Path, view: str, scenes: Sequence[Scene]) -> None:
         )
     if view == "catch" and most < 2:
         raise ParameterError("--view catch: needs two or more speeds, got 1")
+    if view == "schematic":
+        from masrel.elbow import events
+
+        if len(scenes) != 1:
+            raise ParameterError(
+                f"--view schematic: shows one scene, got {len(scenes)}"
+            )
+        if events(scenes[0].parameters, scenes[0].motion).catch is None:
+            raise ParameterError("--view schematic: needs a stretch that catches")
 
 
 def write_figure(scenes: Sequence[Scene], view: str, file: Path) -> None:
@@ -61,8 +71,9 @@ def write_figure(scenes: Sequence[Scene], view: str, file: Path) -> None:
     ----------
     scenes : sequence of Scene
         The scenes.
-    view : {"angle", "time", "catch"}
-        Torque against angle, torque and angle against time, or what catches depend on.
+    view : {"angle", "time", "catch", "schematic"}
+        Torque against angle, torque and angle against time, what catches depend on, or
+        one catch with its constants.
     file : Path
         Where the figure goes.
     """
@@ -73,6 +84,8 @@ def write_figure(scenes: Sequence[Scene], view: str, file: Path) -> None:
     if view == "catch":
         curves = [_curve(name, own) for name, own in _by_model(scenes).items()]
         drawn = figures.draw_catches(curves, form=form, stamp=stamp)
+    elif view == "schematic":
+        drawn = figures.draw_schematic(_schematic(scenes[0]), form=form, stamp=stamp)
     else:
         against: Literal["angle", "time"] = "angle" if view == "angle" else "time"
         panels = [_panel(name, own) for name, own in _by_model(scenes).items()]
@@ -107,6 +120,36 @@ def _panel(name: str, own: Sequence[Scene]) -> "StretchPanel":
             )
         )
     return StretchPanel(title=name, lines=tuple(lines))
+
+
+def _schematic(scene: Scene) -> "CatchSchematic":
+    from masrel.elbow import outline, residual_torque
+    from masrel.report.figures import CatchSchematic
+
+    made = outline(scene.parameters, scene.motion, n_points=N_PIXELS)
+    found = made.events
+    if found.catch is None or found.catch_speed is None or found.peak_end is None:
+        raise ParameterError("--view schematic: needs a stretch that catches")
+    rise = scene.parameters.catch_torque_constant * found.catch_speed
+    residual = residual_torque(scene.parameters, scene.motion)
+    pre_end = residual - scene.parameters.residual_share * rise
+    return CatchSchematic(
+        title=scene.title,
+        time=made.time,
+        torque=made.torque,
+        phases=tuple((s.name, s.start, s.end) for s in found.phases),
+        catch=found.catch,
+        peak_end=found.peak_end,
+        catch_end=found.end if found.catch_end is None else found.catch_end,
+        pre_end=pre_end,
+        peak=pre_end + rise,
+        residual=residual,
+        residual_name=(
+            r"$Q\,H\,v_c$"
+            if scene.parameters.residual_reading == "residual"
+            else r"$(1-Q)\,H\,v_c$"
+        ),
+    )
 
 
 def _curve(name: str, own: Sequence[Scene]) -> "CatchCurve":

@@ -191,6 +191,18 @@ def test_a_figure_is_the_same_bytes_every_time(
     assert len(drawn[0]) > 5000
 
 
+@pytest.mark.parametrize(
+    "more", [[], ["--q-reading", "decrease"], ["--to-deg", 90, "--catch-rise-s", 0.03]]
+)
+def test_a_schematic_names_the_parts_of_a_catch(
+    more: list[object], tmp_path: Path
+) -> None:
+    path = tmp_path / "one.svg"
+    done = run(*STRETCH, *more, "--figure", path, "--view", "schematic")
+    assert done.exit_code == 0, done.output
+    assert path.stat().st_size > 10_000
+
+
 def test_lines_of_a_figure_have_as_many_points_as_pixels(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -226,6 +238,14 @@ def test_lines_of_a_figure_have_as_many_points_as_pixels(
         (["--at-deg", 170], "angles: need ones that the motion reaches, got 170"),
         (["--figure", "x.gif"], "--figure: needs a name that ends in .png"),
         (["--figure", "x.png", "--view", "catch"], "needs two or more speeds, got 1"),
+        (
+            ["--figure", "x.png", "--view", "schematic", "--to-deg", 80],
+            "--view schematic: needs a stretch that catches",
+        ),
+        (
+            ["--figure", "x.png", "--view", "schematic", "--model", "HM2"],
+            "--view schematic: shows one scene, got 2",
+        ),
         (
             ["--figure", "x.png", "--speeds-deg-s", 30, 90, 6],
             "--figure: shows 4 models at 5 speeds at most",

@@ -79,6 +79,21 @@ def test_any_samples_give_the_same_bits(
     check(joint, 0.5, np.cumsum(widths), angles, np.radians(speeds))
 
 
+def test_at_the_very_end_of_the_peak_the_torque_has_fallen() -> None:
+    # Samples every 1/64 s, exactly, and a peak of 8 of them: 100 deg/s from 60 deg
+    # passes 80 deg in sample 13, and sample 21 is exactly ΔT_peak later.
+    joint = replace(HM3, peak_duration=0.125)
+    times = np.arange(30) / 64.0
+    angles = np.radians(60.0) + np.radians(100.0) * times
+    speeds = np.full(30, np.radians(100.0))
+    check(joint, np.radians(60.0), times, angles, speeds)
+    torque, phase = sampled_columns(joint, np.radians(60.0), times, angles, speeds)
+    catch = int((phase == 1).argmax())
+    assert catch == 13
+    assert len(set(torque[catch : catch + 8].tolist())) == 1
+    assert torque[catch + 8] < torque[catch + 7]
+
+
 @pytest.mark.parametrize("block", [1, 2, 7])
 def test_blocks_of_any_size_give_the_same_bits(
     block: int, monkeypatch: pytest.MonkeyPatch

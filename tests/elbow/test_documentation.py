@@ -40,7 +40,7 @@ def output(*arguments: str, cwd: Path = ROOT) -> str:
 
 
 def test_there_are_examples_to_check() -> None:
-    assert (len(COMMANDS), len(EXAMPLES), len(FIGURES)) == (4, 4, 3)
+    assert (len(COMMANDS), len(EXAMPLES), len(FIGURES)) == (4, 4, 4)
 
 
 @pytest.mark.parametrize(("command", "said"), COMMANDS)

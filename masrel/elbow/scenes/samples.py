@@ -58,7 +58,7 @@ class PhaseSamples:
     is_doubtful : ndarray of bool
         Step through these.
     catch, fallen, post, post_end : ndarray of int
-        The catch, its residual torque, post-catch, and pre-catch again.
+        The catch, the end of ΔT_peak, post-catch, and pre-catch again.
     catch_angle, catch_speed, post_angle : ndarray
         At these samples, rad and rad/s.
     """
@@ -141,7 +141,7 @@ class _Search:
         return PhaseSamples(
             is_doubtful=self.doubtful,
             catch=catch,
-            fallen=np.where(caught, np.minimum(fallen, post), self.n),
+            fallen=np.where(caught, fallen, self.n),
             post=post,
             post_end=np.minimum(np.where(post < self.n, post_end, self.n), self.n),
             catch_angle=angle,

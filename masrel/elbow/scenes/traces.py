@@ -94,6 +94,15 @@ def _kinds(
     return found
 
 
+@dataclass(frozen=True, slots=True)
+class _Work:
+    """Buffers of one block, contiguous: what is worked on lies together."""
+
+    angle: Floats
+    share: Floats
+    spare: Floats
+
+
 class _Constant:
     """Angles and speeds of `ConstantSpeed`, operation by operation."""
 
@@ -111,12 +120,14 @@ class _Constant:
             is_rising=True,  # sums and products of floats keep their order
         )
 
-    def angle(self, rows: np.ndarray, time: Floats, out: Floats, _: Floats) -> None:
+    def angle(self, rows: np.ndarray, time: Floats, work: _Work) -> Floats:
+        out = work.angle
         np.multiply(self.speed[rows, np.newaxis], time, out=out)
         out += self.start[rows, np.newaxis]
+        return out
 
-    def damped(self, rows: np.ndarray, damping: Floats, out: Floats, _: Floats) -> None:
-        out[...] = damping * self.speed[rows, np.newaxis]
+    def damped(self, rows: np.ndarray, damping: Floats, _: _Work) -> Floats:
+        return damping * self.speed[rows, np.newaxis]
 
 
 class _Quintic:
@@ -148,25 +159,29 @@ class _Quintic:
             is_rising=False,
         )
 
-    def angle(self, rows: np.ndarray, time: Floats, out: Floats, s: Floats) -> None:
+    def angle(self, rows: np.ndarray, time: Floats, work: _Work) -> Floats:
+        s, out, cube = work.share, work.angle, work.spare
         np.divide(time, self.duration[rows, np.newaxis], out=s)
         np.multiply(6.0, s, out=out)
         out -= 15.0
         out *= s
         out += 10.0
-        cube = s * s
+        np.multiply(s, s, out=cube)
         cube *= s
         out *= cube
         out *= self.way[rows, np.newaxis]
         out += self.start[rows, np.newaxis]
+        return out
 
-    def damped(self, rows: np.ndarray, damping: Floats, out: Floats, s: Floats) -> None:
-        # s as `angle` left it
-        rest = 1.0 - s
+    def damped(self, rows: np.ndarray, damping: Floats, work: _Work) -> Floats:
+        # of the shares that `angle` left
+        s, rest = work.share, work.spare
+        np.subtract(1.0, s, out=rest)
         rest *= s
-        np.multiply((30.0 * self.speed[rows])[:, np.newaxis], rest, out=out)
-        out *= rest
-        out *= damping
+        np.multiply((30.0 * self.speed[rows])[:, np.newaxis], rest, out=s)
+        s *= rest
+        s *= damping
+        return s
 
 
 _LAWS: dict[type[Motion], "type[_Constant] | type[_Quintic]"] = {
@@ -277,27 +292,28 @@ class _Fill:
             if end < target.size:
                 target[end:] = np.nan
 
-    def _part(self, which: int, low: int, high: int, n_rows: int) -> Floats:
-        # contiguous: what is worked on lies together
-        part = self._buffers[which].ravel()[: n_rows * (high - low)]
-        return part.reshape(n_rows, high - low)
+    def _work(self, which: int, low: int, high: int, n_rows: int) -> _Work:
+        size = n_rows * (high - low)
+        return _Work(
+            *(
+                self._buffers[k].ravel()[:size].reshape(n_rows, high - low)
+                for k in (which, 3, 4)
+            )
+        )
 
     def _pre_catch(self, rows: np.ndarray, low: int, high: int, which: int) -> Floats:
-        angle, damped, share = (
-            self._part(k, low, high, rows.size) for k in (which, 3, 4)
-        )
-        joints = self.joints
-        self.law.angle(rows, self.time[low:high], angle, share)
-        self.law.damped(rows, joints.damping[rows, np.newaxis], damped, share)
-        angle -= self.rest[rows, np.newaxis]
-        angle *= joints.stiffness[rows, np.newaxis]
-        angle += damped  # (1)
-        return angle
+        work, joints = self._work(which, low, high, rows.size), self.joints
+        torque = self.law.angle(rows, self.time[low:high], work)
+        damped = self.law.damped(rows, joints.damping[rows, np.newaxis], work)
+        torque -= self.rest[rows, np.newaxis]
+        torque *= joints.stiffness[rows, np.newaxis]
+        torque += damped  # (1)
+        return torque
 
     def _post_catch(self, rows: np.ndarray, low: int, high: int) -> Floats:
-        angle, share = (self._part(k, low, high, rows.size) for k in (2, 4))
-        self.law.angle(rows, self.time[low:high], angle, share)
-        angle -= self.found.post_angle[rows, np.newaxis]
-        angle *= self.joints.post_catch_stiffness[rows, np.newaxis]
-        angle += self.residual[rows, np.newaxis]  # (5)
-        return angle
+        work = self._work(2, low, high, rows.size)
+        torque = self.law.angle(rows, self.time[low:high], work)
+        torque -= self.found.post_angle[rows, np.newaxis]
+        torque *= self.joints.post_catch_stiffness[rows, np.newaxis]
+        torque += self.residual[rows, np.newaxis]  # (5)
+        return torque

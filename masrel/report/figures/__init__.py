@@ -13,6 +13,7 @@ from masrel.report.figures.latent import (
     draw_latent,
     latent_file,
 )
+from masrel.report.figures.schematic import CatchSchematic, draw_schematic
 from masrel.report.figures.speeds import SpeedColumn, draw_speeds
 from masrel.report.figures.stretches import (
     StretchLine,
@@ -24,6 +25,7 @@ from masrel.report.figures.traces import TracePanel, draw_traces
 
 __all__ = [
     "CatchCurve",
+    "CatchSchematic",
     "Drawn",
     "ForestRow",
     "Form",
@@ -38,6 +40,7 @@ __all__ = [
     "draw_forest",
     "draw_grades",
     "draw_latent",
+    "draw_schematic",
     "draw_speeds",
     "draw_stretches",
     "draw_traces",
