@@ -75,7 +75,7 @@ def seconds() -> None:
         slow = i < 8
         start = math.radians(rng.uniform(30.0, 90.0) if slow else 30.0)
         end = start + math.radians(16.0) if slow else joint.range_end
-        mean = math.radians(9.5 if slow else rng.uniform(75.0, 120.0))
+        mean = math.radians(9.0 if slow else rng.uniform(75.0, 120.0))
         options = {"rng": rng, "duration": 2.0, "rest": 0.15, "name": f"trial {i}"}
         made = recording(joint, start=start, end=end, mean_speed=mean, **options)
         movements.append(made[0])
