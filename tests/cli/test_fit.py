@@ -2,14 +2,16 @@
 
 import csv
 import json
-import subprocess
 import sys
 import tomllib
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from masrel.cli import main
 from masrel.elbow import STANDARD_MODELS
 from masrel.elbow.identification import Movement
 from masrel.protocol import elbow_parameters, read_protocol
@@ -18,14 +20,27 @@ from tests.elbow.identification.test_friction import backdriven
 from tests.protocol.documents import VALID, write
 
 
-def masrel(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "masrel", "fit", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        check=False,
-        encoding="utf-8",
-    )
+@dataclass(frozen=True)
+class Done:
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+@pytest.fixture
+def masrel(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Callable[..., Done]:
+    """The command line in this process, with its exit code and both streams."""
+
+    def call(*arguments: str | Path) -> Done:
+        monkeypatch.setattr(sys, "argv", ["masrel", "fit", *map(str, arguments)])
+        with pytest.raises(SystemExit) as left:
+            main()
+        streams = capsys.readouterr()
+        return Done(int(left.value.code or 0), streams.out, streams.err)
+
+    return call
 
 
 def put(movement: Movement, folder: Path) -> Path:
@@ -46,7 +61,9 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     return [put(movement, folder) for movement in made]
 
 
-def test_a_fit_goes_into_a_protocol(files: list[Path], tmp_path: Path) -> None:
+def test_a_fit_goes_into_a_protocol(
+    masrel: Callable[..., Done], files: list[Path], tmp_path: Path
+) -> None:
     done = masrel(*files, "-o", tmp_path / "s3.toml", "--json", tmp_path / "fit.json")
     assert done.returncode == 0, done.stderr
     assert "SIMULATED DATA" in done.stdout
@@ -65,7 +82,9 @@ def test_a_fit_goes_into_a_protocol(files: list[Path], tmp_path: Path) -> None:
     assert joint.catch_slope == pytest.approx(0.35, rel=0.1)
 
 
-def test_json_on_stdout_is_one_document_and_nothing_else(files: list[Path]) -> None:
+def test_json_on_stdout_is_one_document_and_nothing_else(
+    masrel: Callable[..., Done], files: list[Path]
+) -> None:
     done = masrel(*files[:3], "--json", "-")
     document = json.loads(done.stdout)
     missing = {e["key"]: e for e in document["estimates"]}["catch_slope_s"]
@@ -75,14 +94,18 @@ def test_json_on_stdout_is_one_document_and_nothing_else(files: list[Path]) -> N
     assert document["simulated"] is True
 
 
-def test_only_slow_trials_make_no_model_file(files: list[Path], tmp_path: Path) -> None:
+def test_only_slow_trials_make_no_model_file(
+    masrel: Callable[..., Done], files: list[Path], tmp_path: Path
+) -> None:
     done = masrel(*files[:3], "-o", tmp_path / "s3.toml")
     assert done.returncode == 2
     assert "catch_angle_constant: there are only slow stretches" in done.stderr
     assert not (tmp_path / "s3.toml").exists()
 
 
-def test_figures_are_drawn(files: list[Path], tmp_path: Path) -> None:
+def test_figures_are_drawn(
+    masrel: Callable[..., Done], files: list[Path], tmp_path: Path
+) -> None:
     done = masrel(*files, "--figures", tmp_path, "--quiet")
     assert done.returncode == 0, done.stderr
     names = ("fit_catches", "fit_residuals", "fit_slow", "fit_trials")
@@ -90,7 +113,9 @@ def test_figures_are_drawn(files: list[Path], tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == expected
 
 
-def test_friction_is_fitted_and_drawn(tmp_path: Path) -> None:
+def test_friction_is_fitted_and_drawn(
+    masrel: Callable[..., Done], tmp_path: Path
+) -> None:
     path = put(backdriven(1), tmp_path)
     done = masrel(path, "--friction", "--figures", tmp_path / "out", "--json", "-")
     assert done.returncode == 0, done.stderr
@@ -112,7 +137,7 @@ def test_friction_is_fitted_and_drawn(tmp_path: Path) -> None:
     ],
 )
 def test_a_wrong_call_is_one_sentence(
-    files: list[Path], arguments: list[str], said: str
+    masrel: Callable[..., Done], files: list[Path], arguments: list[str], said: str
 ) -> None:
     done = masrel(*files[:2], *arguments)
     assert done.returncode == 2
@@ -120,7 +145,7 @@ def test_a_wrong_call_is_one_sentence(
     assert "Traceback" not in done.stderr
 
 
-def test_a_file_that_is_not_there_is_named() -> None:
+def test_a_file_that_is_not_there_is_named(masrel: Callable[..., Done]) -> None:
     done = masrel("absent.csv")
     assert done.returncode == 2
     assert "absent.csv: no such file" in done.stderr

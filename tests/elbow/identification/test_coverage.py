@@ -31,11 +31,11 @@ def covered(scatter: Scatter | None, seeds: range) -> dict[str, int]:
 
 
 def test_few_intervals_miss() -> None:
-    # 8 studies of 8 parameters: at 95 % coverage 3.2 of 64 miss on average. Were they
-    # independent, 11 or more would miss once in 2500 times; the seeds are fixed.
-    counts = covered(SCATTERED, range(8))
-    assert 64 - sum(counts.values()) <= 10
-    assert min(counts.values()) >= 5
+    # 5 studies of 8 parameters: at 95 % coverage 2 of 40 miss on average. Were they
+    # independent, 8 or more would miss once in 1000 times; the seeds are fixed.
+    counts = covered(SCATTERED, range(5))
+    assert 40 - sum(counts.values()) <= 7
+    assert min(counts.values()) >= 2
 
 
 @pytest.mark.slow

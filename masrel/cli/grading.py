@@ -1,0 +1,147 @@
+"""``masrel grading``: what grades follow, by ordered regression."""
+
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import click
+
+from masrel.cli.material import read_material
+from masrel.cli.notes import notes
+
+if TYPE_CHECKING:
+    from masrel.analysis.grading import GradeRegression
+
+__all__ = ["command"]
+
+
+@click.command("grading")
+@click.argument("study", type=click.Path(path_type=Path))
+@click.option(
+    "--ratings",
+    "ratings_file",
+    type=click.Path(path_type=Path),
+    help="File of ratings; default: the study's ratings.csv, else published.csv.",
+)
+@click.option(
+    "--on",
+    "predictors",
+    default="L,H,Q,D,speed",
+    show_default=True,
+    help="What grades are regressed on, in the order of their claim.",
+)
+@click.option(
+    "--models",
+    type=click.Choice(["standard", "dummy", "all"]),
+    default="all",
+    show_default=True,
+)
+@click.option("--session", help="Ratings of this session alone.")
+@click.option("--level", type=float, default=0.95, show_default=True)
+@click.option(
+    "--json",
+    "json_file",
+    type=click.Path(path_type=Path, allow_dash=True),
+    help="Write the result here; - prints it, and nothing else, on stdout.",
+)
+def command(
+    study: Path,
+    ratings_file: Path | None,
+    predictors: str,
+    models: str,
+    session: str | None,
+    level: float,
+    json_file: Path | None,
+) -> None:
+    """Regress the grades of STUDY on the models' L, H, Q, D and the speed.
+
+    Prints by how much one standard deviation of each multiplies the odds of a higher
+    grade, the others held.
+    """
+    from masrel.analysis.grading import grade_regression
+
+    material = read_material(study, ratings_file)
+    with notes():
+        found = grade_regression(
+            material.protocol,
+            material.ratings,
+            predictors=tuple(name.strip() for name in predictors.split(",")),
+            models=_role(models),
+            session=session,
+            level=level,
+        )
+    document = json.dumps(_document(found), indent=1, ensure_ascii=False)
+    if json_file == Path("-"):
+        click.echo(document)
+        return
+    if json_file is not None:
+        json_file.write_text(document + "\n", encoding="utf-8")
+    click.echo(_table(found))
+
+
+def _role(models: str) -> "Literal['standard', 'dummy', 'all']":
+    # what click has checked already, as a type
+    roles: dict[str, Literal["standard", "dummy", "all"]] = {
+        "standard": "standard",
+        "dummy": "dummy",
+        "all": "all",
+    }
+    return roles[models]
+
+
+def _document(found: "GradeRegression") -> dict[str, object]:
+    from dataclasses import asdict
+
+    def known(value: object) -> object:
+        if isinstance(value, float) and not math.isfinite(value):
+            return None
+        if isinstance(value, dict):
+            return {key: known(part) for key, part in value.items()}
+        if isinstance(value, list | tuple):
+            return [known(part) for part in value]
+        return value
+
+    return {key: known(value) for key, value in asdict(found).items()}
+
+
+def _table(found: "GradeRegression") -> str:
+    from masrel.report.tables import Column, Table, as_text, interval_words, number
+
+    rows = tuple(
+        (
+            effect.predictor,
+            f"{number(effect.per, 3)} {_unit(effect.predictor)}".strip(),
+            effect.odds_ratio,
+            interval_words(effect.low, effect.high, 2),
+        )
+        for effect in found.effects
+    )
+    notes_below = [
+        f"{found.n_ratings} ratings of {found.n_models} models by {found.n_raters} "
+        f"raters, {found.n_missing} without a grade or speed left out; errors are "
+        "clustered by rater.",
+        *(f"{name} is left out: {why}." for name, why in found.dropped),
+    ]
+    return as_text(
+        Table(
+            name="grading",
+            caption="Odds of a higher grade, per standard deviation",
+            columns=(
+                Column(key="predictor", heading="Predictor", align="left"),
+                Column(key="per", heading="Standard deviation"),
+                Column(key="odds_ratio", heading="Odds ratio", digits=2),
+                Column(key="interval", heading=f"{100.0 * found.level:g} % interval"),
+            ),
+            rows=rows,
+            notes=tuple(notes_below),
+            data="simulated" if found.simulated else "given",
+        )
+    )
+
+
+def _unit(predictor: str) -> str:
+    from masrel.analysis.grading import PREDICTORS
+
+    unit = PREDICTORS[predictor][1]
+    return "" if unit == "1" else unit

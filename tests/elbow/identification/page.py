@@ -1,0 +1,99 @@
+"""What docs/identification.md shows: its figures, its table of coverage, its time.
+
+python -m tests.elbow.identification.page figures
+python -m tests.elbow.identification.page coverage [STUDIES]
+python -m tests.elbow.identification.page time
+"""
+
+import math
+import statistics
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+from tqdm import tqdm
+
+from masrel.elbow import STANDARD_MODELS, fit, fit_friction
+from masrel.elbow.identification.results import QUANTITIES
+from masrel.report.figures.fit_catch import draw_catches
+from masrel.report.figures.fit_friction import draw_friction
+from masrel.report.figures.fit_residuals import draw_residuals
+from masrel.report.figures.fit_slow import draw_slow_trials
+from masrel.report.figures.fit_trial import draw_fast_trials
+from tests.elbow.identification.synthesis import Scatter, recording, study
+from tests.elbow.identification.test_friction import backdriven
+
+FIGURES = Path(__file__).parents[3] / "docs" / "figures"
+SCATTER = Scatter(
+    catch_angle=math.radians(2.0), catch_torque=0.1, catch_travel=math.radians(2.0)
+)
+HALF = Scatter(
+    catch_angle=math.radians(1.0), catch_torque=0.05, catch_travel=math.radians(1.0)
+)
+CASES = (
+    ("HM3", None, (60.0, 120.0)),
+    ("HM3", SCATTER, (60.0, 120.0)),
+    ("HM4", HALF, (40.0, 90.0)),
+)
+
+
+def figures() -> None:
+    """Draw the page's figures."""
+    found = fit(study(STANDARD_MODELS["HM3"], seed=5, n_slow=4, scatter=HALF))
+    stamp = "SIMULATED DATA"
+    drawn = {
+        "fit_slow": draw_slow_trials(found, stamp=stamp),
+        "fit_catches": draw_catches(found, stamp=stamp),
+        "fit_trials": draw_fast_trials(found, stamp=stamp),
+        "fit_residuals": draw_residuals(found, stamp=stamp),
+        "fit_friction": draw_friction(fit_friction([backdriven(1)]), stamp=stamp),
+    }
+    for name, figure in drawn.items():
+        (FIGURES / f"{name}.png").write_bytes(figure.png)
+
+
+def coverage(n_studies: int) -> None:
+    """Print how often 95 % intervals hold the truth, per cent."""
+    names = [name for name in QUANTITIES if name != "inertia"]
+    print("| case |", " | ".join(QUANTITIES[name].symbol for name in names), "|")
+    for model, scatter, speeds in CASES:
+        joint, counts = STANDARD_MODELS[model], dict.fromkeys(names, 0)
+        for seed in tqdm(range(1000, 1000 + n_studies), desc=model):
+            made = fit(study(joint, seed=seed, scatter=scatter, fast=speeds))
+            for name in names:
+                counts[name] += made[name].covers(getattr(joint, name))
+        shares = (f"{100.0 * counts[name] / n_studies:.1f}" for name in names)
+        print(f"| {model}, {scatter} |", " | ".join(shares), "|")
+
+
+def seconds() -> None:
+    """Print how long 24 trials of 2 s take, and of it the change points."""
+    rng = np.random.default_rng(1)
+    joint, movements = STANDARD_MODELS["HM3"], []
+    for i in range(24):
+        slow = i < 8
+        start = math.radians(rng.uniform(30.0, 90.0) if slow else 30.0)
+        end = start + math.radians(16.0) if slow else joint.range_end
+        mean = math.radians(9.0 if slow else rng.uniform(75.0, 120.0))
+        options = {"rng": rng, "duration": 2.0, "rest": 0.15, "name": f"trial {i}"}
+        made = recording(joint, start=start, end=end, mean_speed=mean, **options)
+        movements.append(made[0])
+    taken = []
+    for _ in range(7):
+        begun = time.perf_counter()
+        fit(movements)
+        taken.append(time.perf_counter() - begun)
+    print(f"24 trials of 2 s at 1 kHz: median {statistics.median(taken):.2f} s")
+
+
+if __name__ == "__main__":
+    what = sys.argv[1:2]
+    if what == ["figures"]:
+        figures()
+    elif what == ["coverage"]:
+        coverage(int(sys.argv[2]) if len(sys.argv) > 2 else 200)
+    elif what == ["time"]:
+        seconds()
+    else:
+        sys.exit(__doc__)
