@@ -9,6 +9,7 @@ __all__ = ["release"]
 
 _PATIENCE_S = 0.1  # also what a bus needs that restarts itself after bus off
 _ANSWER_S = 0.005
+_BLIND_AFTER_S = 0.05
 _PAUSE_S = 0.001  # between two tries
 
 
@@ -29,10 +30,10 @@ def release(node: PuckNode, *, torque_number: int, mode_number: int) -> None:
     """
     begun_ns = node.now_ns()
     reason = "it does not go to idle"
-    while node.now_ns() - begun_ns < _PATIENCE_S * 1e9:
+    while (since_s := (node.now_ns() - begun_ns) * 1e-9) < _PATIENCE_S:
         try:
             node.tell(torque_number, 0)
-            if _is_asleep(node):
+            if _is_asleep(node, blindly=since_s > _BLIND_AFTER_S):
                 return
             node.tell(mode_number, IDLE)
             node.tell(mode_number, IDLE)  # twice: a regular loss may not hit both
@@ -47,10 +48,12 @@ def release(node: PuckNode, *, torque_number: int, mode_number: int) -> None:
     )
 
 
-def _is_asleep(node: PuckNode) -> bool:
-    # One that was reset drives nothing, and has another property where MODE was. One
-    # that says nothing is taken to be awake: idling it matters more.
+def _is_asleep(node: PuckNode, *, blindly: bool) -> bool:
+    # One that was reset drives nothing, and has the lock of its memory where MODE was.
+    # One that says nothing for long is taken to be awake: idling it matters more.
     try:
         return node.ask(STATUS, patience_s=_ANSWER_S) == ASLEEP
-    except DeviceTimeoutError:
-        return False
+    except (DeviceTimeoutError, FrameError):
+        if blindly:
+            return False
+        raise
