@@ -22,6 +22,9 @@ NAMES = ("catch_angle_constant", "catch_slope")
 LEAST_SPAN = math.radians(5.0)
 """Mean speeds must span this, rad/s: less is one speed, which has no slope."""
 
+ITERATIONS = 20
+"""Of Gauss and Newton's method; the row is so nearly linear that five would do."""
+
 
 def line_row(
     catch: Catch, line: float, slope: float, slowest: float
@@ -124,9 +127,12 @@ def fit_catch_line(
     design = np.stack([np.ones_like(speeds), -speeds], axis=1)
     angles = np.array([catch.angle for catch in used])
     values = np.linalg.lstsq(design, angles, rcond=None)[0]
-    for _ in range(20):
-        found = solve(_rows(used, values, slowest))
-        values = values + found.values
+    for _ in range(ITERATIONS):
+        rows = _rows(used, values, slowest)
+        jacobian = np.concatenate([row.design for row in rows])
+        left = np.concatenate([row.target for row in rows])
+        values = values + np.linalg.lstsq(jacobian, left, rcond=None)[0]
+    found = solve(_rows(used, values, slowest))
     return Step(
         name="catch angles: L, α of (2)",
         estimates=fitted(

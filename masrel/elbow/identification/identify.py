@@ -136,9 +136,9 @@ def fit(
     ]
     stretches = _stretches(movements, window, limit)
     slow = [
-        slow_trial(stretch, name)
+        trial
         for name, stretch in stretches.items()
-        if stretch.pace == "slow"
+        if stretch.pace == "slow" and _is_used(trial := slow_trial(stretch, name))
     ]
     if not slow:
         raise RecordingError(_no_slow(stretches, limit))
@@ -151,6 +151,12 @@ def fit(
         if stretch.pace == "fast"
     ]
     return _together(movements, slow, fast, first, law, error, held, level)
+
+
+def _is_used(trial: Trial) -> bool:
+    if trial.pre_catch.time.size == 0:
+        _warn(f"{trial.name}: too short for the filter of slow stretches; not used")
+    return trial.pre_catch.time.size > 0
 
 
 def _stretches(
@@ -224,14 +230,7 @@ def _together(
         if trial.catch is not None and levels is not None
     ]
     steps = [first, *_catch_steps(catches, pairs, held, level)]
-    start = {name: math.nan for name in QUANTITIES if name != "inertia"}
-    start["inertia"] = math.nan
-    reasons = {}
-    for step in steps:
-        for estimate in step.estimates:
-            start[estimate.name] = estimate.value
-            if estimate.reason is not None:
-                reasons[estimate.name] = estimate.reason
+    start, reasons = _found_so_far(steps)
     if not catches:
         why = "there are only slow stretches, in which nothing catches"
         if fast:
@@ -257,6 +256,17 @@ def _together(
 
 
 _FIRST = ("damping", "stiffness", "inertia")
+
+
+def _found_so_far(steps: Sequence[Step]) -> tuple[dict[str, float], dict[str, str]]:
+    # what the steps found, nan for what they did not, and why they did not
+    values, reasons = dict.fromkeys(QUANTITIES, math.nan), {}
+    for step in steps:
+        for estimate in step.estimates:
+            values[estimate.name] = estimate.value
+            if estimate.reason is not None:
+                reasons[estimate.name] = estimate.reason
+    return values, reasons
 
 
 def _catch_steps(

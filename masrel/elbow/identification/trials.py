@@ -1,6 +1,5 @@
 """What a stretch says of the joint, once its catch is found."""
 
-import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -22,6 +21,9 @@ Floats = NDArray[np.float64]
 
 GUARD = 0.002
 """Samples this near to a step of torque are left out: it falls between two, s."""
+
+AFTER_WINDOW = 0.06
+"""Window of the filter of the angle after a catch, s."""
 
 SLOW_WINDOW, FAST_WINDOW = 0.25, 0.1
 """Windows of the filter of angle and torque before a catch, s. An encoder's steps take
@@ -247,94 +249,114 @@ def fast_trial(
     Trial
         With its catch, or a remark that says why it has none that can be used.
     """
-    limit = constants.speed_threshold
-    velocity = stretch.velocity
-    fastest = int(np.argmax(velocity))
-    onset = int(np.argmax(velocity >= limit))
-    slow = np.flatnonzero(velocity[fastest:] < limit)
-    stop = fastest + int(slow[0]) if slow.size else velocity.size
-    # the filter sees a hand stop half a window late or early
-    stop = max(fastest, stop - round(0.5 * window / stretch.samples.period))
+    onset, stop = _fast_part(stretch, constants.speed_threshold, window)
     if stretch.missing[:stop].any():
         return _unused(stretch, name, "a gap in the recording")
-    motion = (velocity, stretch.angle, stretch.acceleration)
-    pre = sum((x * y for x, y in zip(law, motion, strict=True)), 0.0 * velocity)
-    period = stretch.samples.period
-    changes = find_changes(
+    motion = (stretch.velocity, stretch.angle, stretch.acceleration)
+    pre = sum((x * y for x, y in zip(law, motion, strict=True)), 0.0 * motion[0])
+    found = find_changes(
         stretch.torque[:stop],
         pre[:stop],
         stretch.angle[:stop],
         first=onset,
-        peak=round(constants.peak_duration / period),
+        peak=round(constants.peak_duration / stretch.samples.period),
         additive=constants.post_catch == "additive",
         pushed=law[2] * stretch.acceleration[:stop] if law[2] else None,
     )
-    if changes.catch is None:
+    if found.catch is None:
         return _unused(stretch, name, "no catch that stands out of the noise")
-    places = (onset, changes.catch, stop)
-    has_inertia = law[2] != 0.0
-    return _caught(stretch, name, constants, window, places, changes.end, has_inertia)
+    places = _Places(onset=onset, catch=found.catch, end=found.end, stop=stop)
+    catch = _catch_at(stretch, places, constants)
+    before = _filtered(stretch, stretch.saturated, (0, places.catch), FAST_WINDOW)
+    why = ""
+    if stretch.saturated[:stop].any():
+        why = "torque is saturated: nothing after the catch is used"
+    elif before.time.size == 0:
+        why = "it catches at once: no torque before the catch to compare with"
+    smooth_end = constants.post_catch == "additive" or law[2] != 0.0
+    return Trial(
+        name=name,
+        pace="fast",
+        start=float(stretch.time[0]),
+        duration=float(stretch.time[-1] - stretch.time[0]),
+        peak_speed=stretch.peak_speed,
+        pre_catch=before,
+        after=None if why else _after(stretch, places, catch, constants, smooth_end),
+        catch=catch,
+        remark=why,
+    )
 
 
-def _caught(
-    stretch: Stretch,
-    name: str,
-    constants: ElbowParameters,
-    window: float,
-    places: tuple[int, int, int],
-    end: int | None,
-    has_inertia: bool,
-) -> Trial:
-    onset, begin, stop = places
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Places:
+    # samples of a stretch: movement onset, first of the catch, first after it, and
+    # first that is slow again
+    onset: int
+    catch: int
+    end: int | None
+    stop: int
+
+
+def _fast_part(stretch: Stretch, limit: float, window: float) -> tuple[int, int]:
+    # movement onset, and where the hand is slow again
+    velocity = stretch.velocity
+    fastest = int(np.argmax(velocity))
+    slow = np.flatnonzero(velocity[fastest:] < limit)
+    stop = fastest + int(slow[0]) if slow.size else velocity.size
+    # the filter sees a hand stop half a window late or early
+    stop = max(fastest, stop - round(0.5 * window / stretch.samples.period))
+    return int(np.argmax(velocity >= limit)), stop
+
+
+def _catch_at(stretch: Stretch, places: _Places, constants: ElbowParameters) -> Catch:
     time, period = stretch.time, stretch.samples.period
-    instant = float(time[begin]) - 0.5 * period
-    reach = slice(stretch.start, stretch.start + stop)
+    instant = float(time[places.catch]) - 0.5 * period  # between two samples
+    reach = slice(stretch.start, stretch.start + places.stop)
     angle, speed, acceleration = state_at_break(
         stretch.samples.time[reach], stretch.samples.angle[reach], instant
     )
-    onset_time, onset_angle = _crossing(stretch, onset, constants.speed_threshold)
-    mean_speed = (angle - onset_angle) / (instant - onset_time)
-    catch_end = None if end is None else float(time[end]) - 0.5 * period
-    last = float(time[stop - 1]) if catch_end is None else catch_end
+    onset, onset_angle = _crossing(stretch, places.onset, constants.speed_threshold)
+    mean_speed = (angle - onset_angle) / (instant - onset)
+    end = None if places.end is None else float(time[places.end]) - 0.5 * period
+    last = float(time[places.stop - 1]) if end is None else end
     travel = float(np.interp(last, time, stretch.angle)) - angle
     peak_end = instant + constants.peak_duration
-    catch = Catch(
+    return Catch(
         time=instant,
         angle=angle,
         speed=speed,
         acceleration=acceleration,
         mean_speed=mean_speed,
         # d/dθ of (θ - θ_on)/(t - t_on), with dt = dθ/ω
-        speed_gain=(1.0 - mean_speed / speed) / (instant - onset_time),
-        end=catch_end,
+        speed_gain=(1.0 - mean_speed / speed) / (instant - onset),
+        end=end,
         travel=travel,
         mean_catch_speed=travel / (last - instant),
-        within_peak=catch_end is not None and catch_end < peak_end - 2.0 * period,
+        within_peak=end is not None and end < peak_end - 2.0 * period,
     )
-    after = _part(stretch, slice(begin, stop), window=window)
-    if end is not None and (constants.post_catch == "additive" or has_inertia):
-        # speed and acceleration are regressors here: as before the catch
-        held = after.keep(after.time < last)
-        after = held.then(
-            _filtered(stretch, stretch.saturated, (end, stop), FAST_WINDOW)
-        )
-    steps = [instant, peak_end if not catch.within_peak else last]
-    if constants.post_catch == "additive" and catch_end is not None:
-        steps.append(catch_end)
-    near = np.min([np.abs(after.time - step) for step in steps], axis=0) < GUARD
-    cut = bool(stretch.saturated[:stop].any())
-    pre = _filtered(stretch, stretch.saturated, (0, begin), FAST_WINDOW)
-    return Trial(
-        name=name,
-        pace="fast",
-        start=float(time[0]),
-        duration=float(time[-1] - time[0]),
-        peak_speed=stretch.peak_speed,
-        pre_catch=pre,
-        after=None if cut else after.keep(~near),
-        catch=catch,
-        remark="torque is saturated: nothing after the catch is used" if cut else "",
-    )
+
+
+def _after(
+    stretch: Stretch,
+    places: _Places,
+    catch: Catch,
+    constants: ElbowParameters,
+    smooth_end: bool,
+) -> Part:
+    # samples from the catch on, without those next to a step of torque
+    part = _part(stretch, slice(places.catch, places.stop), smoothed_anew=True)
+    if catch.end is not None and places.end is not None and smooth_end:
+        # speed and acceleration are regressors here, as they are before the catch
+        ends = (places.end, places.stop)
+        later = _filtered(stretch, stretch.saturated, ends, FAST_WINDOW)
+        part = part.keep(part.time < catch.end).then(later)
+    steps = [catch.time, catch.time + constants.peak_duration]
+    if catch.end is not None:
+        steps[1] = min(steps[1], catch.end)
+        if constants.post_catch == "additive":
+            steps.append(catch.end)
+    near = np.min([np.abs(part.time - step) for step in steps], axis=0) < GUARD
+    return part.keep(~near)
 
 
 def _crossing(stretch: Stretch, place: int, limit: float) -> tuple[float, float]:
@@ -361,15 +383,15 @@ def _unused(stretch: Stretch, name: str, why: str) -> Trial:
     )
 
 
-def _part(stretch: Stretch, which: slice, window: float = math.nan) -> Part:
-    # with a window, motion is smoothed anew within the part, not across its ends
+def _part(stretch: Stretch, which: slice, *, smoothed_anew: bool = False) -> Part:
+    # smoothed anew, the motion within the part knows nothing of what is beyond it
     motion = stretch.angle, stretch.velocity, stretch.acceleration
-    if math.isnan(window):
-        angle, velocity, acceleration = (values[which] for values in motion)
-    else:
+    if smoothed_anew:
         angle, velocity, acceleration = differentiate(
-            stretch.raw_angle[which], stretch.samples.period, window
+            stretch.raw_angle[which], stretch.samples.period, AFTER_WINDOW
         )
+    else:
+        angle, velocity, acceleration = (values[which] for values in motion)
     return Part(
         time=stretch.time[which],
         angle=angle,

@@ -88,6 +88,7 @@ def recording(
     time = np.arange(speed.size) * STEP
     angle = start + _integral(speed)
     catch = _catch(joint, time, angle, speed, shift)
+    free = np.gradient(speed, STEP)  # before the hand yields to a catch
     if catch is not None:
         speed = _yield(speed, time, catch, hand)
         angle = start + _integral(speed)
@@ -95,7 +96,7 @@ def recording(
     at = np.arange(round(length * rate)) / rate
     inside = np.clip(at - rest, 0.0, time[-1])
     sampled = np.interp(inside, time, angle)
-    torque, truth = _torque(joint, time, angle, speed, catch, inside)
+    torque, truth = _torque(joint, time, angle, speed, catch, inside, free)
     felt = torque + offset + noise * rng.standard_normal(at.size)
     if encoder:
         sampled = np.round(sampled / encoder) * encoder
@@ -202,6 +203,7 @@ def _torque(
     speed: Floats,
     catch: float | None,
     at: Floats,
+    free: Floats,
 ) -> tuple[Floats, Truth]:
     # torque at the times `at`; a step is before or after a sample, never smeared
     rest = angle[0] if joint.rest_angle is None else joint.rest_angle
@@ -213,9 +215,8 @@ def _torque(
     onset = int(np.argmax(speed >= joint.speed_threshold))
     catch_angle = float(np.interp(catch, time, angle))
     catch_speed = float(np.interp(catch, time, speed))
-    before = time < catch
-    # the last difference before the catch already reaches over it
-    pre_end = float(np.interp(catch, time[before][:-1], law[before][:-1]))
+    pre_end = joint.damping * catch_speed + joint.stiffness * (catch_angle - rest)
+    pre_end += joint.inertia * float(np.interp(catch, time, free))
     released = catch_angle + joint.catch_travel
     catch_end = (
         float(np.interp(released, angle, time)) if released < angle[-1] else math.inf
