@@ -42,7 +42,7 @@ class Joined:
     --------
     There and back:
 
-    >>> from masrel.elbow import ConstantSpeed
+    >>> from masrel.elbow import ConstantSpeed, Reversed
     >>> there = ConstantSpeed(start=0.5, end=2.5, speed=1.0)
     >>> both = Joined([there, Reversed(motion=there)])
     >>> both.duration, float(both.angle(3.0)), float(both.velocity(3.0))
