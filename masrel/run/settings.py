@@ -31,6 +31,7 @@ def device_limits(settings: DeviceSettings) -> DeviceLimits:
         soft_stop_torque=settings.soft_stop_torque_nm,
         missed_ticks=settings.missed_ticks_limit,
         missed_replies=settings.missed_replies_limit,
+        missed_replies_per_100=settings.missed_replies_per_100_limit,
         stale_time=settings.stale_limit_ms * 1e-3,
         frozen_time=settings.frozen_limit_ms * 1e-3,
         standing_time=settings.standing_limit_ms * 1e-3,

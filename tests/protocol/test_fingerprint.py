@@ -78,6 +78,7 @@ def test_a_hash_is_that_of_canonical_json(tmp_path: Path) -> None:
         '"friction_coulomb_nm":0.189,"friction_viscous_nms_rad":0.168,'
         '"frozen_limit_ms":10.0,"full_speed_deg_s":2.0,"highest_angle_deg":185.0,'
         '"jump_limit_deg":0.3,"lowest_angle_deg":-5.0,"missed_replies_limit":2,'
+        '"missed_replies_per_100_limit":10,'
         '"missed_ticks_limit":20,"puck_channel":"can0","puck_direction":1,'
         '"puck_interface":"socketcan","puck_node":1,"ramp_ms":50.0,"rate_hz":1000,'
         '"slip_speed_drop_deg_s":40.0,"soft_stop_deg":5.0,"soft_stop_torque_nm":10.0,'

@@ -22,6 +22,7 @@ FIELDS = {
     "soft_stop_torque_nm": ("soft_stop_torque", 1.0),
     "missed_ticks_limit": ("missed_ticks", 1.0),
     "missed_replies_limit": ("missed_replies", 1.0),
+    "missed_replies_per_100_limit": ("missed_replies_per_100", 1.0),
     "stale_limit_ms": ("stale_time", 1e-3),
     "frozen_limit_ms": ("frozen_time", 1e-3),
     "standing_limit_ms": ("standing_time", 1e-3),
