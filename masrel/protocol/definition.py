@@ -158,6 +158,9 @@ class DeviceSettings(Table, frozen=True, kw_only=True):
     puck_channel: Text = "can0"
     puck_node: Annotated[int, Meta(ge=1, le=7)] = 1
     puck_direction: Literal[1, -1] = 1
+    puck_gear_ratio: Positive = 18.8
+    puck_checks_torque: bool = True
+    puck_properties: dict[str, int] | None = None
 
 
 class SimulatedRaters(Table, frozen=True, kw_only=True):
