@@ -6,8 +6,9 @@ All come from the exact events, and from integrals of polynomials: there is no t
 from collections.abc import Callable
 from decimal import Decimal
 
-from masrel.elbow.course import Course, course
+from masrel.elbow.course import course
 from masrel.elbow.legs import Section, catch_levels, legs, sections
+from masrel.elbow.moments import Course
 from masrel.elbow.motion import Motion
 from masrel.elbow.parameters import ElbowParameters
 from masrel.elbow.polynomial import (

@@ -7,7 +7,8 @@ https://doi.org/10.1109/TNSRE.2012.2195330, equations (2), (4), (6) and Fig. 7.
 from dataclasses import dataclass, field
 from decimal import Decimal
 
-from masrel.elbow.course import Course, Moment, Stretch, course
+from masrel.elbow.course import course
+from masrel.elbow.moments import Course, Moment, Stretch
 from masrel.elbow.motion import Motion
 from masrel.elbow.parameters import ElbowParameters
 from masrel.elbow.polynomial import exactly

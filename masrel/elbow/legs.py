@@ -8,7 +8,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from decimal import Decimal
 
-from masrel.elbow.course import Course, Moment, Stretch, rest_angle
+from masrel.elbow.course import rest_angle
+from masrel.elbow.moments import Course, Moment, Stretch
 from masrel.elbow.motion import Motion
 from masrel.elbow.parameters import ElbowParameters
 from masrel.elbow.piece import Piece

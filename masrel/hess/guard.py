@@ -4,6 +4,7 @@ import math
 
 from masrel.errors import LimitExceededError
 from masrel.hess.limits import DeviceLimits
+from masrel.hess.missing import MissingReplies
 
 __all__ = ["Guard"]
 
@@ -25,8 +26,8 @@ class Guard:
 
     Attributes
     ----------
-    n_missed_replies : int
-        Ticks without a new reading so far.
+    replies : MissingReplies
+        Ticks without a new reading.
 
     Examples
     --------
@@ -39,7 +40,6 @@ class Guard:
 
     __slots__ = (
         "_angle",
-        "_in_a_row",
         "_limits",
         "_moved_at",
         "_period",
@@ -49,7 +49,7 @@ class Guard:
         "_stop_slope",
         "_stopped_dead",
         "_time",
-        "n_missed_replies",
+        "replies",
     )
 
     def __init__(self, limits: DeviceLimits, period_s: float) -> None:
@@ -61,37 +61,13 @@ class Guard:
         self._raw_speed = 0.0  # between the last two readings, rad/s
         self._moved_at = 0.0  # when the angle changed last, s
         self._stopped_dead = False  # whether it moved fast one tick before that
-        self._in_a_row = 0
         self._sent = 0.0  # the last torque, N·m
         self._sent_at = math.inf  # nothing yet: the device holds zero
-        self.n_missed_replies = 0
+        self.replies = MissingReplies(limits, period_s)
 
     def is_new(self, time_s: float) -> bool:
         """Return whether a reading is newer than the last one."""
         return time_s > self._time
-
-    def no_reading(self, words: str) -> None:
-        """Count a tick without a new reading.
-
-        Parameters
-        ----------
-        words : str
-            What came instead.
-
-        Raises
-        ------
-        LimitExceededError
-            If there are more in a row than may pass.
-        """
-        self.n_missed_replies += 1
-        self._in_a_row += 1
-        if self._in_a_row > self._limits.missed_replies:
-            raise LimitExceededError(
-                f"missed replies: needs a new reading after at most "
-                f"{self._limits.missed_replies} ticks without, got {self._in_a_row} "
-                f"in a row ({words})",
-                "missed-replies",
-            )
 
     def reading(self, time_s: float, angle: float, age_s: float) -> None:
         """Check a new reading alone and against the one before.
@@ -124,7 +100,7 @@ class Guard:
                 f"{math.degrees(angle):.1f} deg",
                 "range",
             )
-        self._in_a_row = 0
+        self.replies.n_in_a_row = 0
         if self._time == -math.inf:
             self._moved_at = time_s
         else:

@@ -22,6 +22,12 @@ _POSITIVE = (
     "standing_torque",
     "watchdog_time",
 )
+_NOT_NEGATIVE = (
+    "missed_ticks",
+    "missed_replies",
+    "missed_replies_per_100",
+    "soft_stop_torque",
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,6 +56,9 @@ class DeviceLimits:
         Missed ticks that a presentation may have; one more stops it.
     missed_replies : int, optional
         Ticks in a row without a new reading that are let pass, torque held.
+    missed_replies_per_100 : int, optional
+        How many of any 100 ticks may be without a new reading; at least 100 for no
+        such limit.
     stale_time : float, optional
         Age of a reading at which it is too old, s.
     frozen_time : float, optional
@@ -84,6 +93,7 @@ class DeviceLimits:
     soft_stop_torque: float = 10.0
     missed_ticks: int = 20
     missed_replies: int = 2
+    missed_replies_per_100: int = 10
     stale_time: float = 0.005
     frozen_time: float = 0.010
     standing_time: float = 0.5
@@ -97,7 +107,7 @@ class DeviceLimits:
             value = getattr(self, name)
             if not 0.0 < value < math.inf:
                 raise ParameterError(f"{name}: needs a finite limit > 0, got {value}")
-        for name in ("missed_ticks", "missed_replies", "soft_stop_torque"):
+        for name in _NOT_NEGATIVE:
             value = getattr(self, name)
             if not 0 <= value < math.inf:
                 raise ParameterError(f"{name}: needs 0 or more, got {value}")

@@ -166,7 +166,7 @@ def run_presentation(
         "rate_hz": rate_hz,
         "scheduling": scheduling,
         "n_missed_ticks": ticks.n_missed,
-        "n_missed_replies": ticks.guard.n_missed_replies,
+        "n_missed_replies": ticks.guard.replies.n_missed,
         **_fault_facts(fault),
         "ended": ended,
         "grip_lost": controller.grip_lost,

@@ -188,11 +188,11 @@ class Ticks:
         try:
             time_ns, angle = self._device.read()
         except DeviceTimeoutError as error:
-            guard.no_reading(str(error))
+            guard.replies.another(self.time_s(), str(error))
             return False  # the device holds its torque
         time_s = (time_ns - self._start_ns) * 1e-9
         if not guard.is_new(time_s):
-            guard.no_reading(f"one of {time_s:.6f} s again")
+            guard.replies.another(self.time_s(), f"one of {time_s:.6f} s again")
             return False
         now_ns = self._clock.now_ns()
         self._latest = (time_s, angle, 0.0)

@@ -140,6 +140,7 @@ class DeviceSettings(Table, frozen=True, kw_only=True):
     soft_stop_torque_nm: Annotated[float, Meta(ge=0, le=28)] = 10.0
     missed_ticks_limit: Annotated[int, Meta(ge=0)] = 20
     missed_replies_limit: Annotated[int, Meta(ge=0, le=20)] = 2
+    missed_replies_per_100_limit: Annotated[int, Meta(ge=0, le=100)] = 10
     stale_limit_ms: Annotated[float, Meta(gt=0, le=50)] = 5.0
     frozen_limit_ms: Annotated[float, Meta(gt=0, le=100)] = 10.0
     standing_limit_ms: Annotated[float, Meta(gt=0, le=5000)] = 500.0
@@ -157,6 +158,9 @@ class DeviceSettings(Table, frozen=True, kw_only=True):
     puck_channel: Text = "can0"
     puck_node: Annotated[int, Meta(ge=1, le=7)] = 1
     puck_direction: Literal[1, -1] = 1
+    puck_gear_ratio: Positive = 18.8
+    puck_checks_torque: bool = True
+    puck_properties: dict[str, int] | None = None
 
 
 class SimulatedRaters(Table, frozen=True, kw_only=True):

@@ -26,13 +26,15 @@ from masrel.recording import write_recording
 from masrel.run.chain import Fact
 from masrel.run.fault import FaultRecord, fault_record
 from masrel.run.grades import Asked
-from masrel.run.settings import backend_options, device_limits, model_controller
+from masrel.run.settings import (
+    backend_options,
+    device_limits,
+    has_simulated_hand,
+    model_controller,
+)
 from masrel.run.simulated import intended_speed
 
-__all__ = ["SIMULATED_BACKEND", "Shown", "present", "recover", "spool_of"]
-
-SIMULATED_BACKEND = "simulated"
-"""The device that needs a simulated hand."""
+__all__ = ["Shown", "present", "recover", "spool_of"]
 
 LONGEST_STRETCH_S = 10.0
 """After this a presentation ends, wherever the arm is."""
@@ -179,7 +181,7 @@ def _on_device(
                 clock=clock,
                 hand=hand,
                 range_end=elbow_parameters(protocol, model).range_end,
-                options=backend_options(settings),
+                options=backend_options(settings, hand),
             )
         )
         watchdog = watched(device, limits.watchdog_time)
@@ -201,7 +203,7 @@ def _on_device(
 
 def _speed(protocol: Protocol, asked: Asked) -> float | None:
     # rad/s of the simulated hand; None when a person moves the arm
-    if protocol.device.backend != SIMULATED_BACKEND:
+    if not has_simulated_hand(protocol.device):
         return None
     shown = asked.presentation
     return math.radians(

@@ -12,7 +12,7 @@ from masrel.errors import ParameterError, ScheduleError
 from masrel.protocol import Protocol, StudyPaths
 from masrel.run.grades import GradeSource
 from masrel.run.log import SessionLog, utc_now
-from masrel.run.present import SIMULATED_BACKEND
+from masrel.run.settings import has_simulated_hand
 from masrel.run.walk import CLOCKS, ClockName, SessionSummary, Walk
 from masrel.schedule import Presentation, check_schedule, read_schedule
 
@@ -97,8 +97,8 @@ def run_session(
 def _check_clock(clock: str, protocol: Protocol) -> None:
     if clock not in CLOCKS:
         raise ParameterError(f"clock: needed one of {', '.join(CLOCKS)}, got {clock!r}")
-    backend = protocol.device.backend
-    if clock == "simulated" and backend != SIMULATED_BACKEND:
+    device = protocol.device
+    if clock == "simulated" and not has_simulated_hand(device):
         raise ParameterError(
-            f"clock: needed the real one for device {backend!r}, got 'simulated'"
+            f"clock: needed the real one for device {device.backend!r}, got 'simulated'"
         )

@@ -1,11 +1,23 @@
 """What the protocol's ``[device]`` means to the driver."""
 
+import dataclasses
 import math
+from typing import TYPE_CHECKING
 
-from masrel.hess import BackendOptions, Controller, DeviceLimits, Friction
+from masrel.errors import ParameterError
+from masrel.hess import BackendOptions, Controller, DeviceLimits, Friction, Hand
 from masrel.protocol import DeviceSettings, Protocol, elbow_parameters
 
-__all__ = ["backend_options", "device_limits", "model_controller"]
+if TYPE_CHECKING:
+    from masrel.hess.puck.options import PuckOptions
+
+__all__ = [
+    "backend_options",
+    "device_limits",
+    "has_simulated_hand",
+    "model_controller",
+    "moves_hardware",
+]
 
 
 def device_limits(settings: DeviceSettings) -> DeviceLimits:
@@ -31,6 +43,7 @@ def device_limits(settings: DeviceSettings) -> DeviceLimits:
         soft_stop_torque=settings.soft_stop_torque_nm,
         missed_ticks=settings.missed_ticks_limit,
         missed_replies=settings.missed_replies_limit,
+        missed_replies_per_100=settings.missed_replies_per_100_limit,
         stale_time=settings.stale_limit_ms * 1e-3,
         frozen_time=settings.frozen_limit_ms * 1e-3,
         standing_time=settings.standing_limit_ms * 1e-3,
@@ -72,8 +85,8 @@ def model_controller(protocol: Protocol, model: str) -> Controller:
     )
 
 
-def backend_options(settings: DeviceSettings) -> BackendOptions | None:
-    """Return what a protocol tells the backend alone.
+def has_simulated_hand(settings: DeviceSettings) -> bool:
+    """Return whether a simulated hand moves the arm.
 
     Parameters
     ----------
@@ -82,16 +95,91 @@ def backend_options(settings: DeviceSettings) -> BackendOptions | None:
 
     Returns
     -------
+    bool
+        True for the simulated device, and for a puck on python-can's "virtual" bus:
+        nobody but an emulated one can be there, the bus ends with this process.
+    """
+    return settings.backend == "simulated" or (
+        settings.backend == "puck" and settings.puck_interface == "virtual"
+    )
+
+
+def moves_hardware(settings: DeviceSettings) -> bool:
+    """Return whether a motor may move.
+
+    Parameters
+    ----------
+    settings : DeviceSettings
+        The table ``[device]``.
+
+    Returns
+    -------
+    bool
+        False for a simulated device, and for a puck on a bus without hardware.
+
+    Raises
+    ------
+    ParameterError
+        If an option of the backend is outside its range.
+    """
+    if settings.backend != "puck":
+        return settings.backend != "simulated"
+    return _puck_options(settings).moves_hardware
+
+
+def backend_options(
+    settings: DeviceSettings, hand: Hand | None = None
+) -> BackendOptions | None:
+    """Return what a protocol tells the backend alone.
+
+    Parameters
+    ----------
+    settings : DeviceSettings
+        The table ``[device]``.
+    hand : Hand or None, optional
+        The simulated hand, where there is one: a puck is then emulated, with the gear,
+        direction and properties that the protocol says it has.
+
+    Returns
+    -------
     BackendOptions or None
         None for a backend that needs to be told nothing.
+
+    Raises
+    ------
+    ParameterError
+        If an option of the backend is outside its range.
     """
     if settings.backend != "puck":
         return None
-    from masrel.hess.puck.options import PuckOptions  # only when chosen
+    options = _puck_options(settings)
+    if hand is None:
+        return options
+    from masrel.hess.puck.emulator_options import EmulatorOptions  # only when chosen
 
+    emulator = EmulatorOptions(
+        gear_ratio=options.gear_ratio,
+        direction=options.direction,
+        properties=options.properties,
+    )
+    return dataclasses.replace(options, emulator=emulator, angle_after_reset=hand.start)
+
+
+def _puck_options(settings: DeviceSettings) -> "PuckOptions":
+    from masrel.hess.puck.options import PuckOptions  # only when chosen
+    from masrel.hess.puck.properties import PropertyTable
+
+    numbers = settings.puck_properties
+    try:
+        properties = PropertyTable(numbers=numbers) if numbers is not None else None
+    except ParameterError as error:
+        raise ParameterError(f"[device] puck_{error}") from error
     return PuckOptions(
         interface=settings.puck_interface,
         channel=settings.puck_channel,
         puck=settings.puck_node,
         direction=settings.puck_direction,
+        gear_ratio=settings.puck_gear_ratio,
+        checks_torque=settings.puck_checks_torque,
+        properties=properties,
     )

@@ -18,8 +18,9 @@ from masrel.run.chain import Fact
 from masrel.run.fault import FaultRecord
 from masrel.run.grades import Asked, GradeSource
 from masrel.run.log import SessionLog
-from masrel.run.present import SIMULATED_BACKEND, Shown, present, recover
+from masrel.run.present import Shown, present, recover
 from masrel.run.replay import SessionState, replay
+from masrel.run.settings import moves_hardware
 from masrel.schedule import Presentation, Schedule
 
 __all__ = ["CLOCKS", "ClockName", "SessionSummary", "Walk"]
@@ -113,8 +114,7 @@ class Walk:
 
     @property
     def _is_simulated(self) -> bool:
-        on_simulator = self._protocol.device.backend == SIMULATED_BACKEND
-        return self._grades.simulated or on_simulator
+        return self._grades.simulated or not moves_hardware(self._protocol.device)
 
     def begin(self, schedule_sha256: str) -> None:
         """Log what this is; or, when the log says it, that it is still the same.

@@ -18,7 +18,7 @@ def test_the_first_two_shell_blocks_are_commands_of_one_line() -> None:
     assert "\n" not in main_job
     assert main_job.endswith("masrel demo out")
     assert "\n" not in tests
-    assert tests.endswith("pytest")
+    assert tests.endswith("python -m pytest -n auto")
 
 
 def test_the_python_example_prints_what_the_readme_says() -> None:

@@ -34,7 +34,7 @@ def check(found: list[Errors]) -> None:
 @pytest.mark.parametrize("wide", [False, True])
 @pytest.mark.parametrize("kind", KINDS)
 def test_random_scenes_are_exact(kind: str, wide: bool) -> None:
-    check(of_scenes(kind, wide=wide, seeds=range(1000, 1015)))
+    check(of_scenes(kind, wide=wide, seeds=range(1000, 1010)))
 
 
 @pytest.mark.slow

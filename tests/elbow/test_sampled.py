@@ -118,9 +118,13 @@ def test_sampled_torque_is_the_exact_torque_away_from_events(
     rate_hz = 500.0
     found = events(joint, motion)
     reached = {PHASES.index(span.name) for span in found.phases}
-    _, phases, torques = stepped(joint, motion, rate_hz)
+    sampled, phases, torques = stepped(joint, motion, rate_hz)
     if set(phases) != reached:
         return  # an event within a few samples of the end or of the threshold
+    if found.catch is not None and not (
+        -1 < (sampled.catch_time - found.catch) * rate_hz <= 1 + 1e-9
+    ):
+        return  # θ and θ_catch run all but side by side: see below
     marks = [span.start for span in found.phases] + [found.end]
     if found.peak_end is not None:
         marks.append(found.peak_end)
@@ -136,6 +140,25 @@ def test_sampled_torque_is_the_exact_torque_away_from_events(
     moved = law * speed + (joint.damping + joint.catch_torque_constant) * acceleration
     error = np.abs(np.array(torques)[away] - exact)
     assert (error <= 3 * moved / rate_hz + 1e-12).all()
+
+
+def test_a_catch_that_all_but_fails_may_be_seen_some_periods_early() -> None:
+    # Late in this stretch θ_catch rises with the falling mean, nearly as fast as θ: the
+    # onset, seen late, moves the catch by more than itself. With L larger by 0.02 deg
+    # there is no catch at all. It is still found as the rate grows.
+    joint = replace(HM3, catch_angle_constant=radians(127.82), catch_slope=0.3)
+    motion = minimum_jerk(71.5, start_deg=0.0, end_deg=102.125)
+    exact = events(joint, motion).catch
+    assert exact is not None
+    larger = replace(joint, catch_angle_constant=radians(127.84))
+    assert events(larger, motion).catch is None
+    late = [
+        stepped(joint, motion, rate_hz)[0].catch_time - exact
+        for rate_hz in (500.0, 4000.0, 64000.0)
+    ]
+    assert -5 / 500 < late[0] < -4 / 500
+    assert abs(late[2]) < abs(late[1]) < abs(late[0])
+    assert abs(late[2]) < 5e-5
 
 
 # By hand: HM3, stretched from 30 deg at 100 deg/s, seen at nine times only.

@@ -76,14 +76,16 @@ class FaultyDevice(Device):
         return 0.0 if math.isfinite(self.let_go_s) else self.commands[-1][1]
 
 
-def dropped(start_s: float, n: float = math.inf) -> ReadFault:
-    """No answer to n readings from a time on."""
+def dropped(start_s: float, n: float = math.inf, every: int = 1) -> ReadFault:
+    """No answer to the first of every so many of n readings from a time on."""
     count = 0
 
     def fault(time_s: float, reading: Reading) -> Reading:
         nonlocal count
-        if time_s >= start_s - 1e-9 and count < n:
-            count += 1
+        if time_s < start_s - 1e-9 or count >= n:
+            return reading
+        count += 1
+        if count % every == 1 % every:
             raise DeviceTimeoutError("no answer within a period")
         return reading
 

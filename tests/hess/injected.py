@@ -169,6 +169,18 @@ def injections() -> list[Injection]:
         device("one reply dropped", CATCH, None, reading(f.dropped(CATCH, 1))),
         device("two replies dropped", CATCH, None, reading(f.dropped(CATCH, 2))),
         device("three replies dropped", CATCH, lost, reading(f.dropped(CATCH, 3))),
+        device(
+            "every fourth reply dropped",
+            CATCH,
+            lost,
+            reading(f.dropped(CATCH, every=4)),
+        ),
+        device(
+            "every tenth reply dropped",
+            CATCH,
+            None,
+            reading(f.dropped(CATCH, every=10)),
+        ),
         device("replies cease in pre-catch", PRE, lost, reading(f.dropped(PRE))),
         device("replies cease in the catch", CATCH, lost, reading(f.dropped(CATCH))),
         device("replies cease in post-catch", POST, lost, reading(f.dropped(POST))),

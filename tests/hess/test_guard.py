@@ -1,6 +1,7 @@
 """Each limit passes what lies on it, and names what lies beyond."""
 
 import math
+from collections.abc import Callable
 from math import degrees, radians
 
 import pytest
@@ -11,6 +12,7 @@ from masrel.elbow import STANDARD_MODELS, MinimumJerk, trace
 from masrel.errors import LimitExceededError
 from masrel.hess import DeviceLimits
 from masrel.hess.guard import Guard
+from masrel.hess.missing import MissingReplies
 
 PERIOD = 0.001
 STEP = radians(0.005)  # of the encoder
@@ -102,7 +104,7 @@ def test_the_law_itself_passes_the_defaults(model: str, speed: float) -> None:
         watching.reading(time_s, round(angle / STEP) * STEP, 0.0)
         watching.speed(velocity)
         watching.torque(time_s, torque)
-    assert watching.n_missed_replies == 0
+    assert watching.replies.n_missed == 0
 
 
 # Angle and speed
@@ -219,15 +221,60 @@ def test_an_arm_that_trembles_by_one_step_may_be_held_for_long() -> None:
 
 def test_replies_may_be_missed_twice_in_a_row() -> None:
     made = guard()
-    for _ in range(3):
-        made.no_reading("no answer")
-        made.no_reading("no answer")
-        made.reading(made.n_missed_replies * PERIOD, 1.0, 0.0)
-    assert made.n_missed_replies == 6
-    made.no_reading("no answer")
-    made.no_reading("no answer")
+    for tick in range(0, 9, 3):
+        made.replies.another(tick * PERIOD, "no answer")
+        made.replies.another((tick + 1) * PERIOD, "no answer")
+        made.reading((tick + 2) * PERIOD, 1.0, 0.0)
+    assert made.replies.n_missed == 6
+    made.replies.another(0.009, "no answer")
+    made.replies.another(0.010, "no answer")
     with refusal("missed-replies", r"at most 2 ticks .* 3 in a row \(no answer\)"):
-        made.no_reading("no answer")
+        made.replies.another(0.011, "no answer")
+
+
+def missing(made: Guard, lost: Callable[[int], bool], n_ticks: int) -> int | None:
+    """Lose the replies of some ticks -> the tick that was one too many."""
+    for tick in range(n_ticks):
+        if not lost(tick):
+            made.reading(tick * PERIOD, 1.0, 0.0)
+            continue
+        try:
+            made.replies.another(tick * PERIOD, "no answer")
+        except LimitExceededError as error:
+            return tick if error.kind == "missed-replies" else None
+    return None
+
+
+@pytest.mark.parametrize(
+    ("every", "at"), [(2, 20), (4, 40), (9, 90), (10, None), (50, None)]
+)
+def test_a_share_of_missed_replies_is_named_at_the_eleventh_of_a_hundred(
+    every: int, at: int | None
+) -> None:
+    # Every ninth from 0 on: 0, 9, ..., 90 are eleven of the ticks 0 to 99. Every
+    # tenth are ten of any hundred, for ever.
+    assert missing(guard(), lambda tick: tick % every == 0, 1000) == at
+
+
+@given(
+    st.sets(st.integers(0, 400)), st.integers(0, 100), st.sampled_from([0.001, 0.0025])
+)
+def test_the_share_is_that_of_any_hundred_ticks(
+    lost: set[int], limit: int, period: float
+) -> None:
+    # The same by counting, in a window that ends with each lost reply
+    def too_many(tick: int) -> bool:
+        return len([one for one in lost if tick - 99 <= one <= tick]) > limit
+
+    limits = DeviceLimits(missed_replies=1000, missed_replies_per_100=limit)
+    replies = MissingReplies(limits, period)
+    for tick in sorted(lost):
+        if too_many(tick):
+            with refusal("missed-replies", rf"at most {limit} of 100 ticks without"):
+                replies.another(tick * period, "no answer")
+            return
+        replies.another(tick * period, "no answer")
+    assert replies.n_missed == len(lost)
 
 
 def test_one_missed_tick_too_many_is_named() -> None:

@@ -1,11 +1,14 @@
 """The sampler on laws whose answer is known."""
 
+from typing import Any
+
+import emcee
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from masrel.errors import ConvergenceError
-from masrel.intervals.mcmc import LARGEST_R_HAT, LEAST_ESS, sample
+from masrel.intervals.mcmc import LARGEST_R_HAT, LEAST_ESS, N_ENSEMBLES, sample
 
 Floats = NDArray[np.float64]
 
@@ -63,3 +66,25 @@ def test_the_generator_decides_every_draw(monkeypatch: pytest.MonkeyPatch) -> No
     np.random.seed(99)  # noqa: NPY002 - the global state must not matter
     assert one.tobytes() == drawn(2).tobytes()
     assert not np.array_equal(one, drawn(3))
+
+
+def test_every_ensemble_moves_by_differential_evolution_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # and never by the snooker move, which in emcee 3.1.6 does not keep the density
+    monkeypatch.setattr("masrel.intervals.mcmc.LEAST_ESS", 1.0)
+    monkeypatch.setattr("masrel.intervals.mcmc.LARGEST_R_HAT", 2.0)
+    moves: list[object] = []
+    plain = emcee.EnsembleSampler.__init__
+
+    def spied(self: object, *args: object, **options: Any) -> None:
+        moves.extend(move for move, _ in options["moves"])
+        plain(self, *args, **options)
+
+    monkeypatch.setattr(emcee.EnsembleSampler, "__init__", spied)
+    sample(
+        correlated_normal, 2, first,
+        generator=np.random.default_rng(1), n_steps=100, most_steps=100,
+    )  # fmt: skip
+    assert len(moves) == 2 * N_ENSEMBLES
+    assert {type(move) for move in moves} == {emcee.moves.DEMove}

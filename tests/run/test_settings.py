@@ -6,10 +6,18 @@ from math import radians
 import msgspec
 import pytest
 
-from masrel.hess import DeviceLimits
+from masrel.errors import ParameterError
+from masrel.hess import DeviceLimits, SimulatedHand
+from masrel.hess.puck.emulator_options import EmulatorOptions
 from masrel.hess.puck.options import PuckOptions
+from masrel.hess.puck.properties import property_table
 from masrel.protocol import DeviceSettings
-from masrel.run.settings import backend_options, device_limits
+from masrel.run.settings import (
+    backend_options,
+    device_limits,
+    has_simulated_hand,
+    moves_hardware,
+)
 
 # Key of [device] to field of DeviceLimits, and what one unit of the key is there
 FIELDS = {
@@ -22,6 +30,7 @@ FIELDS = {
     "soft_stop_torque_nm": ("soft_stop_torque", 1.0),
     "missed_ticks_limit": ("missed_ticks", 1.0),
     "missed_replies_limit": ("missed_replies", 1.0),
+    "missed_replies_per_100_limit": ("missed_replies_per_100", 1.0),
     "stale_limit_ms": ("stale_time", 1e-3),
     "frozen_limit_ms": ("frozen_time", 1e-3),
     "standing_limit_ms": ("standing_time", 1e-3),
@@ -53,20 +62,77 @@ def test_each_key_sets_its_limit_and_no_other(key: str) -> None:
     assert dataclasses.replace(made, **{field: getattr(before, field)}) == before
 
 
-def test_a_puck_is_told_where_it_is() -> None:
-    settings = DeviceSettings(
-        backend="puck",
-        puck_interface="virtual",
-        puck_channel="bench",
-        puck_node=3,
-        puck_direction=-1,
+PUCK = {
+    "backend": "puck",
+    "puck_interface": "pcan",
+    "puck_channel": "can3",
+    "puck_node": 3,
+    "puck_direction": -1,
+    "puck_gear_ratio": 20.5,
+    "puck_checks_torque": False,
+    "puck_properties": dict(property_table(148).numbers),
+}
+"""Each key that a puck has, and none of them at its default."""
+
+
+def puck(**changes: object) -> DeviceSettings:
+    return msgspec.convert({**PUCK, **changes}, DeviceSettings)
+
+
+def test_a_puck_is_told_what_the_protocol_says_of_it() -> None:
+    made = backend_options(puck())
+    assert made == PuckOptions(
+        interface="pcan",
+        channel="can3",
+        puck=3,
+        direction=-1,
+        gear_ratio=20.5,
+        checks_torque=False,
+        properties=property_table(148),
     )
-    made = backend_options(settings)
-    assert isinstance(made, PuckOptions)
-    assert (made.interface, made.channel, made.puck, made.direction) == (
-        "virtual",
-        "bench",
-        3,
-        -1,
-    )
+    assert backend_options(DeviceSettings(backend="puck")) == PuckOptions()
     assert backend_options(DeviceSettings()) is None
+
+
+def test_no_key_of_a_puck_is_left_out() -> None:
+    keys = {key for key in DeviceSettings.__struct_fields__ if key.startswith("puck")}
+    assert keys == set(PUCK) - {"backend"}
+    usual = DeviceSettings()
+    assert all(getattr(puck(), key) != getattr(usual, key) for key in PUCK)
+
+
+def test_an_emulated_puck_is_built_as_the_protocol_says() -> None:
+    hand = SimulatedHand(start=0.5, end=2.5, mean_speed=1.5)
+    made = backend_options(puck(puck_interface="virtual"), hand)
+    assert isinstance(made, PuckOptions)
+    assert made.angle_after_reset == 0.5
+    assert made.emulator == EmulatorOptions(
+        gear_ratio=20.5, direction=-1, properties=property_table(148)
+    )
+
+
+@pytest.mark.parametrize(
+    ("settings", "by_simulated_hand", "hardware"),
+    [
+        (DeviceSettings(), True, False),
+        (puck(puck_interface="virtual"), True, False),
+        (puck(puck_interface="socketcan", puck_channel="vcan0"), False, False),
+        (puck(puck_interface="udp_multicast"), False, False),
+        (puck(), False, True),
+        (puck(puck_interface="socketcan"), False, True),
+    ],
+)
+def test_what_is_simulated(
+    settings: DeviceSettings, by_simulated_hand: bool, hardware: bool
+) -> None:
+    assert has_simulated_hand(settings) == by_simulated_hand
+    assert moves_hardware(settings) == hardware
+
+
+def test_properties_that_lack_one_are_refused_with_their_key() -> None:
+    numbers = {**property_table(148).numbers}
+    del numbers["MT"]
+    with pytest.raises(
+        ParameterError, match=r"^\[device\] puck_properties: need MT too"
+    ):
+        backend_options(puck(puck_properties=numbers))

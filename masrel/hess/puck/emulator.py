@@ -109,7 +109,10 @@ class PuckEmulator:
         puck: int = 1,
     ) -> None:
         transmission = Transmission(
-            counts_per_turn=options.counts_per_turn, units_per_nm=options.units_per_nm
+            counts_per_turn=options.counts_per_turn,
+            units_per_nm=options.units_per_nm,
+            gear_ratio=options.gear_ratio,
+            direction=options.direction,
         )
         self._link = link
         self._clock = clock

@@ -7,6 +7,7 @@ from typing import Literal
 from masrel.errors import ParameterError
 from masrel.hess.puck.faults import InjectedFault
 from masrel.hess.puck.properties import PropertyTable
+from masrel.hess.puck.transmission import GEAR_RATIO
 
 __all__ = ["EmulatorOptions"]
 
@@ -27,6 +28,10 @@ class EmulatorOptions:
         How long it is off the bus while it wakes, s.
     counts_per_turn, units_per_nm : int
         Its CTS and IPNM.
+    gear_ratio : float
+        Turns of its motor for one of the elbow.
+    direction : {1, -1}
+        Whether its counts grow with extension.
     reply_bytes : {6, 4}
         Size of an answer that fits in either.
     is_flagged : bool
@@ -54,6 +59,8 @@ class EmulatorOptions:
     wake_s: float = 1.0
     counts_per_turn: int = 4096
     units_per_nm: int = 2700
+    gear_ratio: float = GEAR_RATIO
+    direction: Literal[1, -1] = 1
     reply_bytes: Literal[6, 4] = 6
     is_flagged: bool = False
     has_secondary: bool = False

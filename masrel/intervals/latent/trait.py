@@ -87,8 +87,8 @@ def latent_trait(
     thresholds that lies; θ_i ~ N(0, ρ), b_r ~ N(0, (1 - ρ)(1 - f)), and the
     logarithm of σ_r² is normal around that of (1 - ρ) f. Missing ratings are taken
     as missing at random. Kappa follows by quadrature from every draw. The posterior
-    is sampled by Hamiltonian proposals within emcee: on 4 items × 8 raters, 100
-    times fewer steps than differential evolution needs.
+    is sampled by Hamiltonian proposals within emcee, whose own moves need far more
+    steps in that many dimensions.
 
     References
     ----------

@@ -162,7 +162,7 @@ def _panel(axes: Axes, rows: Sequence[ScaleRow], colour: str, title: str) -> Non
         axes.plot([row.value], [at], **_DOT)
     axes.set_ylim(len(rows) - 0.5 + 0.5 * _EDGE, -0.5 - 0.5 * _EDGE)
     axes.set_yticks(range(len(rows)), [row.label for row in rows], fontsize=8)
-    axes.tick_params(axis="y", length=0)
+    axes.tick_params(axis="y", length=0, pad=7)
     axes.set_ylabel(title)
     axes.grid(axis="x")
 

@@ -8,6 +8,7 @@ import pytest
 from masrel.errors import BusError
 from masrel.hess import RealClock, SimulatedClock
 from masrel.hess.puck.bus import Frame, open_link
+from masrel.hess.puck.node import accepted_identifiers
 
 
 @pytest.fixture
@@ -108,3 +109,39 @@ def test_a_neighbour_acts_while_this_end_waits_on_a_simulated_clock() -> None:
         assert link.receive(7_000_000) is None
         assert clock.now_ns() == 7_000_000
         link.close()
+
+
+@pytest.mark.parametrize(
+    ("interface", "filters"),
+    [
+        (
+            "socketcan",
+            [
+                {"can_id": 0x423, "can_mask": 0x7FF, "extended": False},
+                {"can_id": 0x426, "can_mask": 0x7FF, "extended": False},
+            ],
+        ),
+        ("pcan", None),  # python-can would filter error frames out with the rest
+    ],
+)
+def test_the_kernel_is_asked_for_the_answers_of_one_puck_alone(
+    interface: str, filters: list | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: dict = {}
+    real = can.Bus
+
+    def opened(**settings):
+        asked.update(settings)
+        return real(interface="virtual", channel="filters", ignore_config=True)
+
+    monkeypatch.setattr(can, "Bus", opened)
+    open_link(
+        interface, "can0", clock=RealClock(), accepted=accepted_identifiers(1)
+    ).close()
+    assert asked == {
+        "interface": interface,
+        "channel": "can0",
+        "bitrate": 1_000_000,
+        "can_filters": filters,
+        "ignore_config": True,
+    }

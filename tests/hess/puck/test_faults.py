@@ -111,6 +111,8 @@ FAULTS: list[tuple[str, InjectedFault, str | None]] = [
     ("requests lost for 20 ms", short("dropped-requests", 0.02), LOST),
     ("every third request lost", fault("dropped-requests", CATCH, every=3), LOST),
     ("one reply lost", short("dropped-replies", 0.001), None),
+    ("every fourth reply lost", fault("dropped-replies", CATCH, every=4), LOST),
+    ("every tenth reply lost", fault("dropped-replies", CATCH, every=10), None),
     ("replies lost for 20 ms", short("dropped-replies", 0.02), LOST),
     ("replies lost for good", fault("dropped-replies", CATCH), LOST),
     ("one torque lost", short("dropped-torques", 0.001), None),
