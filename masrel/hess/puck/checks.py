@@ -76,11 +76,12 @@ def check(puck: Awake, options: PuckOptions) -> tuple[Check, ...]:
     if counts:
         checks += _position(counts, puck)
     checks.append(_torque_mode(node, table, options))
+    arrivals = node.arrivals
     checks.append(
         Check(
             name="error frames",
-            holds=node.n_errors == 0,
-            found=f"{node.n_errors}, and {node.n_foreign} frames of others",
+            holds=arrivals.n_errors == 0,
+            found=f"{arrivals.n_errors}, and {arrivals.n_foreign} frames of others",
         )
     )
     return tuple(checks)

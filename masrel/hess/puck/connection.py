@@ -6,12 +6,13 @@ from dataclasses import dataclass
 
 from masrel.hess.clock import Clock
 from masrel.hess.hand import Hand
+from masrel.hess.puck.arrivals import accepted_identifiers
 from masrel.hess.puck.bring_up import configure, wake
 from masrel.hess.puck.bus import Link, open_link
 from masrel.hess.puck.emulator import PuckEmulator
 from masrel.hess.puck.emulator_options import EmulatorOptions
 from masrel.hess.puck.identity import identify, table_of
-from masrel.hess.puck.node import PuckNode, accepted_identifiers
+from masrel.hess.puck.node import PuckNode
 from masrel.hess.puck.options import PuckOptions
 from masrel.hess.puck.properties import PropertyTable
 from masrel.hess.puck.transmission import Transmission

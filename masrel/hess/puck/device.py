@@ -13,9 +13,10 @@ from masrel.errors import (
 from masrel.hess.clock import Clock
 from masrel.hess.device import Device, IdleCommand, Reading
 from masrel.hess.puck import bring_up
+from masrel.hess.puck.arrivals import accepted_identifiers
 from masrel.hess.puck.bus import open_link
 from masrel.hess.puck.identity import Identity, identify, table_of
-from masrel.hess.puck.node import PuckNode, accepted_identifiers
+from masrel.hess.puck.node import PuckNode
 from masrel.hess.puck.options import PuckOptions
 from masrel.hess.puck.properties import PropertyTable
 from masrel.hess.puck.release import release

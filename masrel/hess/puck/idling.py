@@ -4,8 +4,9 @@ import atexit
 from collections.abc import Callable
 
 from masrel.hess.clock import RealClock
+from masrel.hess.puck.arrivals import accepted_identifiers
 from masrel.hess.puck.bus import open_link
-from masrel.hess.puck.node import PuckNode, accepted_identifiers
+from masrel.hess.puck.node import PuckNode
 from masrel.hess.puck.release import release
 
 __all__ = ["prepare"]

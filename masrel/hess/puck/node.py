@@ -4,18 +4,14 @@ import itertools
 
 from masrel.errors import BusError, DeviceTimeoutError
 from masrel.hess.clock import Clock
-from masrel.hess.puck.bus import BUS_OFF, BUS_RESTARTED, Frame, Link
-from masrel.hess.puck.frames import decode_reply, encode_get, encode_set
-from masrel.hess.puck.identifiers import (
-    POSITION_GROUP,
-    PROPERTY_GROUP,
-    from_puck,
-    to_puck,
-)
-from masrel.hess.puck.positions import Position, decode_position
+from masrel.hess.puck.arrivals import Arrivals
+from masrel.hess.puck.bus import Frame, Link
+from masrel.hess.puck.frames import encode_get, encode_set
+from masrel.hess.puck.identifiers import to_puck
+from masrel.hess.puck.positions import Position
 from masrel.hess.puck.properties import ID, ROLE, SERIAL_NUMBER, STATUS, VERSION
 
-__all__ = ["PuckNode", "accepted_identifiers"]
+__all__ = ["PuckNode"]
 
 _SAMPLING_NS = 75_000
 """A puck samples its encoder this long after it is asked; said by a public driver."""
@@ -24,34 +20,6 @@ _SAMPLING_NS = 75_000
 _MARKERS = (VERSION, ROLE, SERIAL_NUMBER, ID, STATUS)
 
 _MOST_WAITING = 1000  # frames; more than fit on the bus in 50 ms
-_ERROR_FRAMES = 10  # on a bus of one joint there should be none
-
-
-def accepted_identifiers(puck: int) -> tuple[int, int]:
-    """Return the only identifiers that a driver of one puck listens to.
-
-    Parameters
-    ----------
-    puck : int
-        Node of the puck.
-
-    Returns
-    -------
-    tuple of int
-        Its positions and its other answers. The safety module's broadcasts, other
-        pucks and what other hosts ask are not among them.
-
-    Raises
-    ------
-    FrameError
-        If there is no such node.
-
-    Examples
-    --------
-    >>> [hex(identifier) for identifier in accepted_identifiers(1)]
-    ['0x423', '0x426']
-    """
-    return from_puck(puck, POSITION_GROUP), from_puck(puck, PROPERTY_GROUP)
 
 
 class PuckNode:
@@ -70,11 +38,10 @@ class PuckNode:
     ----------
     puck : int
         Node of the puck.
+    arrivals : Arrivals
+        What has come in.
     heard : dict of int to int
         Answers nobody was waiting for, the last by property number.
-    n_foreign, n_late, n_errors : int
-        Frames that were not for this driver, positions that came when nobody
-        waited for one any more, and error frames.
 
     Raises
     ------
@@ -87,13 +54,9 @@ class PuckNode:
         "_in_doubt",
         "_link",
         "_markers",
-        "_positions",
-        "_properties",
         "_to",
+        "arrivals",
         "heard",
-        "n_errors",
-        "n_foreign",
-        "n_late",
         "puck",
     )
 
@@ -101,14 +64,11 @@ class PuckNode:
         self._link = link
         self._clock = clock
         self._to = to_puck(puck)
-        self._positions, self._properties = accepted_identifiers(puck)
         self._in_doubt = False
         self._markers = itertools.cycle(_MARKERS)
         self.puck = puck
-        self.heard: dict[int, int] = {}
-        self.n_foreign = 0
-        self.n_late = 0
-        self.n_errors = 0
+        self.arrivals = Arrivals(puck)
+        self.heard = self.arrivals.heard
 
     def tell(self, property_id: int, value: int) -> None:
         """Set a property; a puck does not acknowledge it.
@@ -181,7 +141,7 @@ class PuckNode:
                     f"puck {self.puck}: no answer for property {property_id} within "
                     f"{patience_s * 1e3:g} ms"
                 )
-            self._sort(frame)
+            self.arrivals.sort(frame)
         return self.heard.pop(property_id)
 
     def position(self, property_id: int, *, patience_s: float) -> tuple[int, int]:
@@ -232,12 +192,12 @@ class PuckNode:
         while found is None if marker is None else marker not in self.heard:
             frame = self._link.receive(deadline_ns)
             if frame is None:
-                self.n_late += found is not None  # that of an earlier question
+                self.arrivals.n_late += found is not None  # that of an earlier question
                 self._in_doubt = True
                 return None
-            position = self._sort(frame)
+            position = self.arrivals.sort(frame)
             if position is not None:
-                self.n_late += found is not None
+                self.arrivals.n_late += found is not None
                 found = position
         self._in_doubt = False  # nothing earlier can come any more
         return found
@@ -256,8 +216,8 @@ class PuckNode:
             frame = self._link.receive(0)
             if frame is None:
                 return
-            if self._sort(frame) is not None:
-                self.n_late += 1
+            if self.arrivals.sort(frame) is not None:
+                self.arrivals.n_late += 1
         raise BusError(f"puck {self.puck}: the bus is flooded with frames", "flooded")
 
     def now_ns(self) -> int:
@@ -279,33 +239,3 @@ class PuckNode:
             How long, s.
         """
         self._clock.sleep_until_ns(self._clock.now_ns() + round(duration_s * 1e9))
-
-    def _sort(self, frame: Frame) -> Position | None:
-        # -> the position if it is one; everything else goes where it belongs
-        if frame.is_error:
-            self._note_error(frame.identifier)
-        elif frame.identifier == self._positions:
-            return decode_position(frame.data)
-        elif frame.identifier == self._properties:
-            answer = decode_reply(frame.data)
-            self.heard[answer.property_id] = answer.value
-        else:
-            self.n_foreign += 1
-        return None
-
-    def _note_error(self, error_class: int) -> None:
-        if error_class & BUS_RESTARTED:
-            return
-        if error_class & BUS_OFF:
-            raise BusError(
-                f"puck {self.puck}: bus off, the host's controller has given up",
-                "bus-off",
-            )
-        self.n_errors += 1
-        if self.n_errors > _ERROR_FRAMES:
-            raise BusError(
-                f"puck {self.puck}: needs at most {_ERROR_FRAMES} error frames, the "
-                f"bus has reported {self.n_errors}, the last of class "
-                f"{error_class:#05x}",
-                "error-frames",
-            )

@@ -7,8 +7,8 @@ import pytest
 
 from masrel.errors import BusError
 from masrel.hess import RealClock, SimulatedClock
+from masrel.hess.puck.arrivals import accepted_identifiers
 from masrel.hess.puck.bus import Frame, open_link
-from masrel.hess.puck.node import accepted_identifiers
 
 
 @pytest.fixture

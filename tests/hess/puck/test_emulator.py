@@ -173,7 +173,7 @@ def test_noise_of_others_does_not_hide_its_answer(on) -> None:
     one = on(awake=True, is_noisy=True)
     for _ in range(3):
         assert one.node.position(P, patience_s=0.001)[1] == 19251
-    assert one.node.n_foreign == 12
+    assert one.node.arrivals.n_foreign == 12
     assert 0x540 in {
         frame.identifier
         for frame in frames_after(one, Frame(to_puck(1), encode_get(P)))
@@ -306,7 +306,7 @@ def test_a_late_answer_is_not_taken_for_the_next_one(on) -> None:
             previous = sampled_ns, counts
         one.clock.sleep_until_ns(next_ns)
     assert n_lost == 2
-    assert one.node.n_late == 2
+    assert one.node.arrivals.n_late == 2
 
 
 def test_a_second_answer_is_thrown_away(on) -> None:
@@ -314,7 +314,7 @@ def test_a_second_answer_is_thrown_away(on) -> None:
     for _ in range(5):
         one.node.position(P, patience_s=0.001)
         one.node.wait(0.001)
-    assert one.node.n_late == 4  # the last has not been listened to
+    assert one.node.arrivals.n_late == 4  # the last has not been listened to
 
 
 def test_a_short_answer_is_refused(on) -> None:
@@ -327,7 +327,7 @@ def test_error_frames_are_counted_and_too_many_refused(on) -> None:
     one = failing(on, "error-frames")
     for _ in range(10):
         one.node.position(P, patience_s=0.001)
-    assert one.node.n_errors == 10
+    assert one.node.arrivals.n_errors == 10
     with pytest.raises(BusError, match="at most 10 error frames") as caught:
         one.node.position(P, patience_s=0.001)
     assert caught.value.kind == "error-frames"
