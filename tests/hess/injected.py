@@ -100,7 +100,23 @@ def sending(fault: f.SendFault) -> Wrap:
     return lambda inner: f.FaultyDevice(inner, send_fault=fault)
 
 
-class Late(SimulatedClock):
+class InjectedClock(SimulatedClock):
+    """A simulated clock to which things happen some s after `begin`."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.begin_ns: int | None = None
+
+    def begin(self) -> None:
+        """The device is open: from here on the presentation is timed."""
+        self.begin_ns = self.now_ns()
+
+    def is_over(self, at_s: float, deadline_ns: int) -> bool:
+        begin_ns = self.begin_ns
+        return begin_ns is not None and deadline_ns >= begin_ns + round(at_s * 1e9)
+
+
+class Late(InjectedClock):
     """A machine that is away for some ms at chosen times."""
 
     def __init__(self, gaps: dict[float, float]) -> None:
@@ -109,22 +125,23 @@ class Late(SimulatedClock):
 
     def sleep_until_ns(self, deadline_ns: int) -> None:
         super().sleep_until_ns(deadline_ns)
-        for at_s in [at for at in self.gaps if deadline_ns >= round(at * 1e9)]:
+        for at_s in [at for at in self.gaps if self.is_over(at, deadline_ns)]:
             gap_ns = round(self.gaps.pop(at_s) * 1e9)
             super().sleep_until_ns(deadline_ns + gap_ns)
 
 
-class Signalling(SimulatedClock):
+class Signalling(InjectedClock):
     """Somebody presses Ctrl-C at a time."""
 
     def __init__(self, at_s: float) -> None:
         super().__init__()
-        self.at_ns: int | None = round(at_s * 1e9)
+        self.at_s = at_s
+        self.is_pressed = False
 
     def sleep_until_ns(self, deadline_ns: int) -> None:
         super().sleep_until_ns(deadline_ns)
-        if self.at_ns is not None and deadline_ns >= self.at_ns:
-            self.at_ns = None
+        if not self.is_pressed and self.is_over(self.at_s, deadline_ns):
+            self.is_pressed = True
             signal.raise_signal(signal.SIGINT)
 
 
@@ -392,6 +409,8 @@ def _injected(
         wrap = injection.wrap if is_first("device") else None
         device = (wrap or f.FaultyDevice)(inner)
         device.open()
+        if isinstance(options["clock"], InjectedClock):
+            options["clock"].begin()
         devices.append(device)
         return device
 

@@ -1,12 +1,14 @@
-"""A session on emulated pucks: a fault on the bus, and it goes on."""
+"""A session on emulated pucks: a fault, on the bus or off it, and it goes on."""
 
+import math
 from pathlib import Path
 
 import pytest
 
 from masrel.hess import Device, open_device
+from masrel.hess.puck.emulated import EmulatedPuckDevice
 from masrel.hess.puck.faults import FaultKind
-from tests.hess.injected import CATCH, Injection, outcome
+from tests.hess.injected import CATCH, Injection, injections, outcome
 from tests.hess.puck.rig import fault, puck_options
 
 
@@ -35,3 +37,49 @@ def test_after_a_fault_on_the_bus_the_session_goes_on(
     assert made.events[1:5] == ["presented", "fault", "presented", "grade"]
     assert made.resumes
     assert made.intact
+
+
+PAGE = Path(__file__).parents[3] / "docs" / "driver.md"
+INJECTIONS = {injection.name: injection for injection in injections()}
+
+
+def on_the_simulated_device(name: str) -> list[str]:
+    """What the page says came of a fault there: the cells of its row."""
+    rows = [
+        [cell.strip() for cell in line.strip("|\n").split("|")]
+        for line in PAGE.read_text(encoding="utf-8").splitlines()
+    ]
+    return next(cells for cells in rows if cells[0] == name and len(cells) == 8)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", INJECTIONS)
+def test_a_fault_does_on_a_puck_what_it_does_on_the_simulated_device(
+    name: str, tmp_path: Path
+) -> None:
+    pucks = []
+
+    def opener(_name: str, **others) -> Device:
+        device = open_device("puck", **others)
+        pucks.append(device)
+        return device
+
+    injection = INJECTIONS[name]
+    made = outcome(injection, tmp_path / "study", opener)
+    assert made.resumes
+    assert made.intact
+    _, named, noticed, held, *_ = on_the_simulated_device(name)
+    assert (made.kind or "let pass") == named
+    for device in pucks:
+        assert isinstance(device, EmulatedPuckDevice)
+        assert device.emulator.registers.mode == 0  # idle
+    if not noticed:
+        return
+    # A count is 0.0047 deg and not 0.005, a position 0.075 ms old
+    assert made.detected_ms == pytest.approx(float(noticed), abs=1.6)
+    assert made.held_nm == pytest.approx(float(held), abs=0.25)
+    if named != "released":
+        assert made.peak_nm <= made.held_nm
+    assert math.isnan(made.zero_ms) == (name == "bus cut for good" or injection.slip)
+    if math.isfinite(made.zero_ms):
+        assert made.zero_ms <= 100.0
