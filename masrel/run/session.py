@@ -43,7 +43,7 @@ def run_session(
     grades : GradeSource
         Who is asked for grades.
     clock : {"real", "simulated"}
-        The clock of the control loop; only the simulated device has both.
+        The clock of the control loop; "simulated" needs a simulated hand.
     progress : callable, optional
         Called with each presentation once it has its grade; at once for those
         that have it already.

@@ -24,9 +24,10 @@ def row(first: str) -> list[str]:
     return [cell.strip() for cell in line.strip("|").split("|")]
 
 
-def test_the_example_prints_what_the_page_says() -> None:
-    code = PAGE.split("```python\n")[1].split("```")[0]
-    printed = PAGE.split("```text\n")[1].split("```")[0]
+def test_the_examples_print_what_the_page_says() -> None:
+    # One after the other: the second goes on with the first
+    code = "\n".join(part.split("```")[0] for part in PAGE.split("```python\n")[1:])
+    printed = "".join(part.split("```")[0] for part in PAGE.split("```text\n")[1:])
     done = subprocess.run(
         [sys.executable, "-X", "utf8", "-c", code],
         capture_output=True,

@@ -73,6 +73,10 @@ class Faults(RuleBasedStateMachine):
     def drop(self, at: float, n: float) -> None:
         self.reads.append(f.dropped(at, n))
 
+    @rule(at=times, every=st.integers(2, 20))
+    def drop_some(self, at: float, every: int) -> None:
+        self.reads.append(f.dropped(at, every=every))
+
     @rule(at=times, by=st.floats(0.0, 0.02), n=few)
     def delay(self, at: float, by: float, n: float) -> None:
         self.reads.append(f.late(at, by, n))
