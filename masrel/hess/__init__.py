@@ -5,12 +5,15 @@ from masrel.hess.controller import Controller
 from masrel.hess.device import Device, IdleCommand, Reading
 from masrel.hess.fault import Fault
 from masrel.hess.friction import Friction, FrictionCompensation
-from masrel.hess.hand import Hand, SimulatedHand, YieldingHand
+from masrel.hess.hand import Hand
 from masrel.hess.limits import DeviceLimits
-from masrel.hess.loop import Presented, cut_off, run_presentation
+from masrel.hess.loop import run_presentation
+from masrel.hess.presented import Presented, cut_off
 from masrel.hess.registry import device_names, open_device
 from masrel.hess.setup import BackendOptions, DeviceSetup
+from masrel.hess.simulated_hand import SimulatedHand
 from masrel.hess.stop import EmergencyStop
+from masrel.hess.yielding_hand import YieldingHand
 
 __all__ = [
     "BackendOptions",

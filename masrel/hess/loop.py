@@ -5,10 +5,7 @@ import math
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
-
-import numpy as np
 
 from masrel.errors import DeviceError, OverrunWarning, ParameterError
 from masrel.hess.clock import Clock, RealClock
@@ -16,36 +13,17 @@ from masrel.hess.controller import Controller
 from masrel.hess.device import Device
 from masrel.hess.fault import Fault
 from masrel.hess.limits import DeviceLimits
+from masrel.hess.movement import movement_facts
+from masrel.hess.presented import Fact, Presented, fault_facts
 from masrel.hess.realtime import real_time
-from masrel.hess.samples import Samples, movement_facts, recorded_columns
-from masrel.hess.spool import Spool, read_spool
+from masrel.hess.samples import Samples
+from masrel.hess.spool import Spool
 from masrel.hess.stop import EmergencyStop
 from masrel.hess.ticks import Ticks, n_samples
 from masrel.hess.watchdog import NoWatchdog, Watching
 from masrel.recording import Recording
 
-__all__ = ["Presented", "cut_off", "run_presentation"]
-
-Fact = str | int | float | bool | None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Presented:
-    """One presentation, as it went.
-
-    Attributes
-    ----------
-    recording : Recording
-        Every tick that was run; its facts repeat the fields below.
-    fault : Fault or None
-        What stopped it; None when nothing did.
-    n_missed_ticks : int
-        Ticks skipped because the loop came too late for them.
-    """
-
-    recording: Recording
-    fault: Fault | None
-    n_missed_ticks: int
+__all__ = ["run_presentation"]
 
 
 def run_presentation(
@@ -90,7 +68,6 @@ def run_presentation(
         A button that the loop looks at in every tick.
     watchdog : Watching or None, optional
         Told every 5 ms that the loop is alive.
-
     spool : Path or None, optional
         A file that keeps every sample from the moment it is taken, for a process that
         is killed; `cut_off` reads it. Remove it when the recording is on disk.
@@ -167,59 +144,13 @@ def run_presentation(
         "scheduling": scheduling,
         "n_missed_ticks": ticks.n_missed,
         "n_missed_replies": ticks.guard.replies.n_missed,
-        **_fault_facts(fault),
+        **fault_facts(fault),
         "ended": ended,
         "grip_lost": controller.grip_lost,
         **movement_facts(columns, controller.speed_threshold, fault is not None),
     }
     recording = Recording(columns=columns, facts=facts)
     return Presented(recording=recording, fault=fault, n_missed_ticks=ticks.n_missed)
-
-
-def cut_off(spool: Path) -> Presented | None:
-    """Read what a presentation left whose process died.
-
-    Parameters
-    ----------
-    spool : Path
-        What `run_presentation` was given.
-
-    Returns
-    -------
-    Presented or None
-        Its recording, with a fault that says so; None when it had not begun.
-
-    Raises
-    ------
-    RecordingError
-        If it is no such file.
-    """
-    left = read_spool(spool)
-    if left is None:
-        return None
-    threshold = float(left.facts.pop("speed_threshold") or 0.0)
-    columns = recorded_columns(left.columns)
-    fault = Fault(
-        kind="process",
-        words="process: needs one that keeps its recording, this one ended before",
-        time_s=float(columns["time_s"][-1]),
-        torque_nm=float(columns["command_torque_nm"][-1]),
-    )
-    # What is missing between the first and the last tick; nobody counted why
-    n_due = round(float(np.ptp(columns["time_s"])) * float(left.facts["rate_hz"] or 0))
-    n_missed = n_due + 1 - columns["time_s"].size
-    facts: dict[str, Fact] = {
-        **left.facts,
-        "scheduling": None,
-        "n_missed_ticks": n_missed,
-        "n_missed_replies": None,
-        **_fault_facts(fault),
-        "ended": "fault",
-        "grip_lost": None,
-        **movement_facts(columns, threshold, True),
-    }
-    recording = Recording(columns=columns, facts=facts)
-    return Presented(recording=recording, fault=fault, n_missed_ticks=n_missed)
 
 
 def _check(
@@ -278,22 +209,6 @@ def _ramped_and_closed(ticks: Ticks, device: Device) -> list[str]:
     finally:
         unsafe = _close(device)
     return wrong if unsafe is None else [*wrong, f"closing it: {unsafe}"]
-
-
-def _fault_facts(fault: Fault | None) -> dict[str, Fact]:
-    if fault is None:
-        return {
-            "fault": None,
-            "fault_kind": None,
-            "fault_time_s": None,
-            "fault_torque_nm": None,
-        }
-    return {
-        "fault": fault.words,
-        "fault_kind": fault.kind,
-        "fault_time_s": fault.time_s,
-        "fault_torque_nm": fault.torque_nm,
-    }
 
 
 @contextmanager
