@@ -27,6 +27,8 @@ __all__ = [
     "EVENTS",
     "SceneTable",
     "check_starts",
+    "courses_of",
+    "efforts_of",
     "evaluate",
     "motions_of",
     "paired",
@@ -277,6 +279,50 @@ def motions_of(kind: type[Motion], stretches: Sequence[Motion]) -> Motions:
     return Motions(start=start, end=end, speed=speed)
 
 
+def courses_of(kind: type[Motion], joints: Joints, motions: Motions) -> Courses:
+    """Find the events of motions of one kind.
+
+    Parameters
+    ----------
+    kind : type
+        `ConstantSpeed` or `MinimumJerk`.
+    joints : Joints
+        The joints.
+    motions : Motions
+        The motions.
+
+    Returns
+    -------
+    Courses
+        Their events.
+    """
+    return _KINDS[kind].courses(joints, motions)
+
+
+def efforts_of(
+    kind: type[Motion], joints: Joints, motions: Motions, courses: Courses
+) -> Efforts:
+    """Prepare torques, work and impulse of motions of one kind.
+
+    Parameters
+    ----------
+    kind : type
+        `ConstantSpeed` or `MinimumJerk`.
+    joints : Joints
+        The joints.
+    motions : Motions
+        The motions.
+    courses : Courses
+        Their events.
+
+    Returns
+    -------
+    Efforts
+        Each is computed when it is asked for.
+    """
+    return Efforts(joints, motions, courses, _KINDS[kind].path(motions))
+
+
 def _together(
     kind: type[Motion],
     own: Sequence[ElbowParameters],
@@ -284,10 +330,9 @@ def _together(
     outputs: tuple[str, ...],
 ) -> tuple[Floats, np.ndarray]:
     # the outputs, and in which scenes they are not to be had so
-    of = _KINDS[kind]
     joints = joints_of(own)
     motions = motions_of(kind, stretches)
-    courses = of.courses(joints, motions)
+    courses = courses_of(kind, joints, motions)
     alone = courses.is_doubtful.copy()
     values = np.empty((len(own), len(outputs)))
     efforts = None
@@ -296,7 +341,7 @@ def _together(
             values[:, i] = _event(name, joints, courses)
             continue
         if efforts is None:
-            efforts = Efforts(joints, motions, courses, of.path(motions))
+            efforts = efforts_of(kind, joints, motions, courses)
         values[:, i], unknown = _effort(name, efforts)
         alone |= unknown
     return values, alone

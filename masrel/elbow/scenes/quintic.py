@@ -82,8 +82,9 @@ class _Quintics:
 
     def courses(self) -> Courses:
         joints, speed = self.joints, self.motions.speed
-        end = self._reaches(joints.range_end)
-        end = end.where(joints.range_end < self.motions.end, _like(speed, 1.0))
+        end, cut = _like(speed, 1.0), joints.range_end < self.motions.end
+        if cut.any():
+            end = self._reaches(joints.range_end).where(cut, end)
         onset, moves = self._onset()
         moves &= self._before(onset, end)
         slow = 1.0 - onset
@@ -196,7 +197,7 @@ class _Quintics:
         )
         tangent = _slope(line[:, own])
         place, step = Twofold(found), np.zeros(found.shape)
-        for _ in range(3):
+        for _ in range(2):
             mean = _mean_share(place, start) * product(slope, speed)
             step = (base + way * _way_share(place) + mean).high
             step = step / _horner(tangent, place.high)
@@ -232,7 +233,7 @@ def shares_of_way(share: Twofold) -> tuple[Twofold, Flags]:
             )
         place = Twofold(np.where(share.high > 0.5, 1.0 - x, x))
         step = np.zeros(x.shape)
-        for _ in range(3):
+        for _ in range(2):
             rest = place.high * (1.0 - place.high)
             step = (_way_share(place) - share).high / (30.0 * rest * rest)
             place = place - step

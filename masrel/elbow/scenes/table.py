@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from itertools import chain
 from operator import attrgetter
 
 import numpy as np
@@ -109,7 +110,12 @@ def joints_of(parameters: Sequence[ElbowParameters]) -> Joints:
         if place == len(distinct):
             distinct.append(one)
         index[i] = place
-    numbers = np.array([_read(one) for one in distinct], dtype=np.float64)[index].T
+    read = np.fromiter(
+        chain.from_iterable(map(_read, distinct)),
+        dtype=np.float64,
+        count=len(distinct) * len(_NUMBERS),
+    )
+    numbers = read.reshape(len(distinct), len(_NUMBERS))[index].T
     rests = [np.nan if p.rest_angle is None else p.rest_angle for p in distinct]
     columns = dict(zip(_NUMBERS, np.ascontiguousarray(numbers), strict=True))
     return Joints(

@@ -1,28 +1,43 @@
-"""Torque traces of many scenes in one array: what the driver would command for each.
+"""Torque traces of many scenes in one array: as the driver would, or exact.
 
-Rows are made block by block, in buffers that stay in the processor's cache; a phase is
-evaluated only in the columns where some row of the block is in it.
+Rows are made block by block, so that what is worked on stays in the processor's cache.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from masrel.elbow.course import end_time
+from masrel.elbow.events import events
 from masrel.elbow.motion import Floats, Motion
 from masrel.elbow.parameters import ElbowParameters
-from masrel.elbow.scenes.batch import check_starts, motions_of, paired
-from masrel.elbow.scenes.course import Motions
+from masrel.elbow.scenes.batch import (
+    check_starts,
+    courses_of,
+    efforts_of,
+    motions_of,
+    paired,
+)
+from masrel.elbow.scenes.course import Courses, Motions
+from masrel.elbow.scenes.exact import ExactRows
 from masrel.elbow.scenes.fill import BLOCK, Fill
 from masrel.elbow.scenes.rows import LAWS
 from masrel.elbow.scenes.samples import phase_samples
 from masrel.elbow.scenes.table import Joints, joints_of
+from masrel.elbow.torque import torque
 from masrel.elbow.trace import trace
 from masrel.errors import ParameterError
 
-__all__ = ["torque_traces"]
+__all__ = ["Reading", "torque_traces"]
+
+Reading = Literal["sampled", "exact"]
+"""Of the law: events at the samples that see them, or at their own times."""
+
+_CHUNK = 4096
+# scenes at a time
 
 
 def torque_traces(
@@ -30,8 +45,9 @@ def torque_traces(
     motions: Motion | Sequence[Motion],
     *,
     rate_hz: float = 1000.0,
+    reading: Reading = "sampled",
 ) -> Floats:
-    """Sample the torque of many scenes as the controller would command it.
+    """Give the torque of many scenes at evenly spaced times.
 
     Parameters
     ----------
@@ -41,18 +57,23 @@ def torque_traces(
         The motions, one a scene; or one for all.
     rate_hz : float, optional
         Samples a second.
+    reading : {"sampled", "exact"}, optional
+        Of the law: what the controller would command, which sees an event at the
+        sample after it; or the torque with every event at its exact time, inertia
+        included, which takes less time.
 
     Returns
     -------
     ndarray, shape (n_scenes, n_samples)
-        Row by row the bits of ``trace(...).torque``, N·m; ``nan`` from the end of a
-        motion on that is shorter than others.
+        N·m; ``nan`` from the end of a motion on that is shorter than others. Row by
+        row the bits of ``trace(...).torque``; or, exact, the numbers of `torque` to
+        rounding: within 2e-14 of the largest term of (1) and (5).
 
     Raises
     ------
     ParameterError
-        If `rate_hz` is not more than 0, the numbers of joints and motions do not fit,
-        or a motion starts at or beyond the end of range.
+        If `rate_hz` is not more than 0, `reading` is unknown, the numbers of joints
+        and motions do not fit, or a motion starts at or beyond the end of range.
 
     Examples
     --------
@@ -64,31 +85,55 @@ def torque_traces(
     (4, 1261)
     >>> bool((made[2] == trace(STANDARD_MODELS["HM3"], stretch).torque).all())
     True
+
+    With exact events, after half a second:
+
+    >>> exact = torque_traces(STANDARD_MODELS["HM3"], stretch, reading="exact")
+    >>> round(float(exact[0, 500]), 4)
+    4.5522
     """
     if not 0.0 < rate_hz < math.inf:
         raise ParameterError(f"rate_hz: needs more than 0, got {rate_hz}")
-    joints, moves = paired(parameters, motions)
+    if reading not in ("sampled", "exact"):
+        raise ParameterError(f'reading: needs "sampled" or "exact", got {reading!r}')
+    scenes = paired(parameters, motions)
     groups = [
-        _Group.of(kind, np.array(rows), joints, moves, rate_hz)
-        for kind, rows in _kinds(joints, moves).items()
+        _Group.of(kind, rows, scenes, rate_hz, reading)
+        for rows, kind in _groups(*scenes, reading)
     ]
-    out = np.empty((len(moves), max(int(group.n_samples.max()) for group in groups)))
+    longest = max(int(group.n_samples.max()) for group in groups)
+    out = np.empty((len(scenes[1]), longest))
     for group in groups:
         for i in group.rows[group.fill(out)].tolist():
-            torque = trace(joints[i], moves[i], rate_hz=rate_hz).torque
-            out[i, : torque.size] = torque
-            out[i, torque.size :] = np.nan
+            row = _alone(scenes[0][i], scenes[1][i], rate_hz, reading)
+            out[i, : row.size] = row
+            out[i, row.size :] = np.nan
     return out
 
 
-def _kinds(
-    joints: Sequence[ElbowParameters], moves: Sequence[Motion]
-) -> dict[type[Motion], list[int]]:
+def _alone(
+    joint: ElbowParameters, motion: Motion, rate_hz: float, reading: Reading
+) -> Floats:
+    if reading == "sampled":
+        return trace(joint, motion, rate_hz=rate_hz).torque
+    found = events(joint, motion)
+    time = np.arange(math.floor(found.end * rate_hz) + 1) / rate_hz
+    return torque(joint, motion, np.minimum(time, found.end), found=found)
+
+
+def _groups(
+    joints: Sequence[ElbowParameters], moves: Sequence[Motion], reading: Reading
+) -> Iterator[tuple[np.ndarray, type[Motion]]]:
+    # rows that one law fits; those of `Motion` go alone
     found: dict[type[Motion], list[int]] = {}
     for i, (joint, motion) in enumerate(zip(joints, moves, strict=True)):
-        is_plain = joint.post_catch == "continuous" and joint.catch_rise == 0.0
+        is_plain = joint.catch_rise == 0.0 and (
+            reading == "exact" or joint.post_catch == "continuous"
+        )
         found.setdefault(type(motion) if is_plain else Motion, []).append(i)
-    return found
+    for kind, rows in found.items():
+        for first in range(0, len(rows), _CHUNK):
+            yield np.array(rows[first : first + _CHUNK]), kind
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,42 +144,58 @@ class _Group:
     rows: np.ndarray
     n_samples: np.ndarray
     rate_hz: float
-    joints: Joints | None = None  # None: each is stepped through alone
+    joints: Joints | None = None  # None: each is made alone
     motions: Motions | None = None
+    courses: Courses | None = None  # None: events are sampled
 
     @classmethod
     def of(
         cls,
         kind: type[Motion],
         rows: np.ndarray,
-        joints: Sequence[ElbowParameters],
-        moves: Sequence[Motion],
+        scenes: tuple[Sequence[ElbowParameters], Sequence[Motion]],
         rate_hz: float,
+        reading: Reading,
     ) -> "_Group":
-        own = [joints[i] for i in rows.tolist()]
-        stretches = [moves[i] for i in rows.tolist()]
+        own, stretches = ([each[i] for i in rows.tolist()] for each in scenes)
         check_starts(own, stretches, rows)
-        columns, motions = None, None
+        columns, motions, courses = None, None, None
         alone = np.ones(rows.size, dtype=np.bool_)
         ends = np.empty(rows.size)
         if kind in LAWS:
             columns, motions = joints_of(own), motions_of(kind, stretches)
-            ends, alone = LAWS[kind].ends(columns, motions)
+            if reading == "exact":
+                courses = courses_of(kind, columns, motions)
+                ends, alone = courses.end.high.copy(), courses.is_doubtful
+            else:
+                ends, alone = LAWS[kind].ends(columns, motions)
         for i in np.flatnonzero(alone).tolist():
             ends[i] = end_time(own[i], stretches[i])
         n_samples = np.floor(ends * rate_hz).astype(np.intp) + 1
-        return cls(kind, rows, n_samples, rate_hz, columns, motions)
+        return cls(kind, rows, n_samples, rate_hz, columns, motions, courses)
 
     def fill(self, out: Floats) -> np.ndarray:
         """Write the rows, and return which of them are left."""
         if self.joints is None or self.motions is None:
             return np.ones(self.rows.size, dtype=np.bool_)
-        law = LAWS[self.kind](self.motions)
-        found = phase_samples(
-            self.joints, law.kinematics(), self.n_samples, self.rate_hz
-        )
+        if self.courses is None:
+            return self._fill_sampled(out, self.joints, self.motions)
+        columns = (self.motions, self.courses)
+        with np.errstate(all="ignore"):  # doubtful scenes may hold anything
+            efforts = efforts_of(self.kind, self.joints, *columns)
+            exact = ExactRows(
+                self.kind, *columns, efforts, self.n_samples, self.rate_hz
+            )
+        exact.fill(out, self.rows, np.flatnonzero(~self.courses.is_doubtful))
+        return self.courses.is_doubtful
+
+    def _fill_sampled(
+        self, out: Floats, joints: Joints, motions: Motions
+    ) -> np.ndarray:
+        law = LAWS[self.kind](motions)
+        found = phase_samples(joints, law.kinematics(), self.n_samples, self.rate_hz)
         time = np.arange(out.shape[1]) / self.rate_hz
-        columns = (self.joints, self.motions, law, found)
+        columns = (joints, motions, law, found)
         fill = Fill(*columns, self.n_samples, time, [out[i] for i in self.rows])
         rows = np.flatnonzero(~found.is_doubtful)
         rows = rows[np.argsort(found.catch[rows], kind="stable")]

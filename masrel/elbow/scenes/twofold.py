@@ -49,9 +49,11 @@ class Twofold:
         self.low = np.asarray(low, dtype=np.float64)
 
     def __add__(self, other: Operand) -> "Twofold":
-        b = _twofold(other)
-        s, e = _sum(self.high, b.high)
-        t, f = _sum(self.low, b.low)
+        if not isinstance(other, Twofold):
+            s, e = _sum(self.high, np.asarray(other))
+            return Twofold(*_quick(s, e + self.low))
+        s, e = _sum(self.high, other.high)
+        t, f = _sum(self.low, other.low)
         s, e = _quick(s, e + t)
         return Twofold(*_quick(s, e + f))
 
@@ -61,15 +63,17 @@ class Twofold:
         return Twofold(-self.high, -self.low)
 
     def __sub__(self, other: Operand) -> "Twofold":
-        return self + -_twofold(other)
+        return self + -other
 
     def __rsub__(self, other: Operand) -> "Twofold":
-        return _twofold(other) + -self
+        return -self + other
 
     def __mul__(self, other: Operand) -> "Twofold":
-        b = _twofold(other)
-        p, e = _product(self.high, b.high)
-        return Twofold(*_quick(p, e + (self.high * b.low + self.low * b.high)))
+        if not isinstance(other, Twofold):
+            p, e = _product(self.high, np.asarray(other))
+            return Twofold(*_quick(p, e + self.low * other))
+        p, e = _product(self.high, other.high)
+        return Twofold(*_quick(p, e + (self.high * other.low + self.low * other.high)))
 
     __rmul__ = __mul__
 
