@@ -30,7 +30,7 @@ def test_quantiles_of_a_normal_are_within_their_errors(
     monkeypatch.setattr("masrel.intervals.mcmc.LEAST_ESS", 4_000.0)
     draws = sample(
         correlated_normal, 2, first,
-        generator=np.random.default_rng(2), n_steps=800, most_steps=16_000,
+        generator=np.random.default_rng(2), n_steps=1500, most_steps=16_000,
     )  # fmt: skip
     for share, exact in ((0.025, -1.959964), (0.5, 0.0), (0.975, 1.959964)):
         # 4.5 errors, three times: once in 49 000 runs of other seeds

@@ -223,7 +223,11 @@ def of_distances(x: Floats) -> Floats:
     ("broken", "unknown"),
     [
         (Without(6, 7, of_logit), "ρ"),
-        (Without(10, 12, of_distances), "share of the third grade"),
+        pytest.param(
+            Without(10, 12, of_distances),
+            "share of the third grade",
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_a_missing_jacobian_is_caught(broken: Without, unknown: str) -> None:

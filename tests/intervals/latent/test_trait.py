@@ -26,13 +26,14 @@ def brief() -> Iterator[None]:
         patch.setattr(f"{SAMPLER}.LARGEST_R_HAT", 1.2)
         patch.setattr(f"{SAMPLER}._WARM_UP", (25, 25, 25))
         patch.setattr("masrel.intervals.latent.fit._N_CHAINS", 24)
+        patch.setattr("masrel.intervals.latent.fit._MOST_KAPPAS", 500)
         yield
 
 
 def asked(ratings: object = SMALL, **options: object) -> LatentTrait:
     given: dict[str, object] = {
         "items": "fixed",
-        "n_steps": 60,
+        "n_steps": 40,
         "rng": 1,
         "compare": False,
         **({} if "categories" in options else {"categories": [1, 2, 3, 4, 5]}),
