@@ -67,12 +67,12 @@ class Place:
 
     @property
     def severity(self) -> Floats:
-        """θ_i, (n, n_items)."""
+        """Severities θ_i, (n, n_items)."""
         return self.anchor + self.root * self.item
 
     @property
     def tau(self) -> Floats:
-        """τ_k, (n, n_categories - 1)."""
+        """Thresholds τ_k, (n, n_categories - 1)."""
         return self.anchor + self.root * self.threshold
 
     @property
