@@ -62,12 +62,13 @@ def of_any_raters(choice: Choice, excess: float) -> Interval:
     case, found = choice.case, choice.posterior
     if not case.value < 1.0:  # perfect, or undefined: one category
         return one_sided(choice)
-    middle = float(expit(found.logit.quantile(0.5)))
-    low = middle - math.hypot(middle - found.low, math.sqrt(excess))
-    high = middle + math.hypot(found.high - middle, math.sqrt(excess))
+    low, high = found.low, found.high
     method = "Dirichlet-multinomial posterior, exact"
     if excess:
         method += ", and the spread of raters"
+        middle = float(expit(found.logit.quantile(0.5)))
+        low = middle - math.hypot(middle - low, math.sqrt(excess))
+        high = middle + math.hypot(high - middle, math.sqrt(excess))
     notes = prior_notes(choice.counts, PRIOR, case.level, found.low, found.high)
     if not low <= case.value <= high:
         notes += ("widened to the estimate, which lies outside the posterior's",)

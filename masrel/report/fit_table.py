@@ -10,7 +10,8 @@ from masrel.elbow.identification.results import (
     FittedParameter,
     Quantity,
 )
-from masrel.report.tables import ABSENT, Column, Table, interval_words, number
+from masrel.report.rounding import ABSENT, interval_words, number, percent
+from masrel.report.tables import Column, Table
 
 __all__ = ["fit_table", "friction_table"]
 
@@ -40,8 +41,8 @@ def fit_table(fit: ElbowFit) -> Table:
     fast = len(fit.trials) - slow
     notes = (
         f"{slow} slow and {fast} fast trials; intervals are clustered by trial.",
-        f"Slow trials differ from (1) by {100.0 * fit.relative_error:.1f} % of their "
-        f"mean torque; all trials from the law by {number(fit.torque_sd, 3)} N·m "
+        f"Slow trials differ from (1) by {number(100.0 * fit.relative_error, 1)} % of "
+        f"their mean torque; all trials from the law by {number(fit.torque_sd, 3)} N·m "
         "(standard deviation).",
         "The column of a step takes what earlier steps found as known.",
         *fit.remarks,
@@ -65,7 +66,8 @@ def friction_table(fit: FrictionFit) -> Table:
     rows = tuple(_row(e, None, FRICTION[e.name]) for e in fit.estimates)
     notes = (
         f"{len(fit.strokes)} strokes; intervals are clustered by stroke.",
-        f"Torque differs from (7) by {100.0 * fit.relative_error:.1f} % of its mean.",
+        f"Torque differs from (7) by {number(100.0 * fit.relative_error, 1)} % of its "
+        "mean.",
     )
     return _table("friction", "Friction of the device", rows, notes, fit.simulated, fit)
 
@@ -109,7 +111,6 @@ def _table(
     simulated: bool,
     fit: ElbowFit | FrictionFit,
 ) -> Table:
-    percent = f"{100.0 * fit.level:g} % interval"
     return Table(
         name=name,
         caption=caption,
@@ -118,7 +119,7 @@ def _table(
             Column(key="unit", heading="Unit", align="left"),
             Column(key="value", heading="Value"),
             Column(key="standard_error", heading="SE"),
-            Column(key="interval", heading=percent),
+            Column(key="interval", heading=f"{percent(fit.level)} % interval"),
             Column(key="step", heading="Step alone"),
             Column(key="n_trials", heading="Trials"),
         ),

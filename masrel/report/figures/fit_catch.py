@@ -22,6 +22,7 @@ from masrel.report.figures.style import (
     finish,
     house_style,
 )
+from masrel.report.rounding import number
 
 __all__ = ["draw_catches"]
 
@@ -97,10 +98,10 @@ def _said(fit: ElbowFit, name: str, digits: int) -> str:
     if math.isnan(estimate.value):
         return f"{quantity.symbol} not determined"
     value = estimate.value * quantity.factor
-    said = f"{quantity.symbol} = {value:.{digits}f}"
+    said = f"{quantity.symbol} = {number(value, digits)}"
     if not math.isnan(estimate.standard_error):
         half = (estimate.high - estimate.value) * quantity.factor
-        said += f" ± {half:.{digits}f}"
+        said += f" ± {number(half, digits)}"
     return said + unit
 
 

@@ -13,6 +13,7 @@ from masrel.report.figures.style import (
     finish,
     house_style,
 )
+from masrel.report.rounding import number
 
 __all__ = ["draw_friction"]
 
@@ -70,8 +71,8 @@ def _said(fit: FrictionFit) -> str:
     lines = []
     for name, unit in units.items():
         estimate = fit[name]
-        said = f"{symbols[name]} = {estimate.value:.4f}"
+        said = f"{symbols[name]} = {number(estimate.value, 4)}"
         if not math.isnan(estimate.high):
-            said += f" ± {estimate.high - estimate.value:.4f}"
+            said += f" ± {number(estimate.high - estimate.value, 4)}"
         lines.append(f"{said} {unit}")
     return "\n".join(lines)

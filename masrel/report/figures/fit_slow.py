@@ -12,6 +12,7 @@ from masrel.report.figures.style import (
     finish,
     house_style,
 )
+from masrel.report.rounding import number
 
 __all__ = ["draw_slow_trials"]
 
@@ -75,5 +76,5 @@ def _trial(top: Axes, bottom: Axes, fit: ElbowFit, place: int) -> None:
     )
     size = float(np.abs(part.measured).mean())
     error = float(np.abs(part.measured - law).mean()) / size
-    top.set_title(f"mean error {100.0 * error:.1f} %")
+    top.set_title(f"mean error {number(100.0 * error, 1)} %")
     bottom.plot(time, np.degrees(part.velocity), color=BLACK, linewidth=1.0)

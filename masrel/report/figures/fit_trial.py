@@ -17,6 +17,7 @@ from masrel.report.figures.style import (
     finish,
     house_style,
 )
+from masrel.report.rounding import number
 
 __all__ = ["draw_fast_trials"]
 
@@ -101,7 +102,7 @@ def _trial(column: list[Axes], fit: ElbowFit, place: int) -> None:
     bottom.plot(time, np.degrees(speed), color=BLACK, linewidth=1.0)
     for axes in column:
         _shade(axes, trial, catch, float(time[-1]))
-    top.set_title(f"mean speed {math.degrees(catch.mean_speed):.0f} deg/s")
+    top.set_title(f"mean speed {number(math.degrees(catch.mean_speed), 0)} deg/s")
 
 
 def _shade(axes: Axes, trial: Trial, catch: Catch, last: float) -> None:
