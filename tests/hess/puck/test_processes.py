@@ -2,15 +2,20 @@
 
 python-can's bus inside a process cannot be shared; its multicast bus can, and so can
 SocketCAN's virtual device where the kernel has one.
+
+``python -m tests.hess.puck.test_processes N`` kills and stops a loop N times each, on
+the multicast bus, and prints how long the puck stayed in torque mode.
 """
 
 import os
 import signal
+import statistics
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from math import radians
 
 import pytest
@@ -59,14 +64,20 @@ def channel_of(interface: str) -> str:
 
 @pytest.fixture(params=["udp_multicast", "socketcan"])
 def bus(request: pytest.FixtureRequest) -> Iterator[tuple[str, str, PuckEmulator]]:
-    """A bus with an emulated puck on it that is served by a thread."""
-    interface = request.param
-    channel = channel_of(interface)
-    clock = RealClock()
     try:
-        link = open_link(interface, channel, clock=clock)
+        open_link(request.param, channel_of(request.param), clock=RealClock()).close()
     except BusError as error:
         pytest.skip(f"two processes can share no such bus here: {error}")
+    with served(request.param) as made:
+        yield made
+
+
+@contextmanager
+def served(interface: str) -> Iterator[tuple[str, str, PuckEmulator]]:
+    """A bus with an emulated puck on it that is served by a thread."""
+    channel = channel_of(interface)
+    clock = RealClock()
+    link = open_link(interface, channel, clock=clock)
     emulator = PuckEmulator(
         link=link,
         clock=clock,
@@ -77,10 +88,12 @@ def bus(request: pytest.FixtureRequest) -> Iterator[tuple[str, str, PuckEmulator
     stop = threading.Event()
     thread = threading.Thread(target=emulator.run, args=(stop,), daemon=True)
     thread.start()
-    yield interface, channel, emulator
-    stop.set()
-    thread.join()
-    emulator.close()
+    try:
+        yield interface, channel, emulator
+    finally:
+        stop.set()
+        thread.join()
+        emulator.close()
 
 
 def started(interface: str, channel: str, how: str) -> subprocess.Popen[str]:
@@ -108,19 +121,26 @@ def idle_after_s(emulator: PuckEmulator, patience_s: float) -> float | None:
     return None
 
 
-@pytest.mark.parametrize("blow", [signal.SIGKILL, signal.SIGSTOP])
-def test_a_watchdog_idles_the_puck_of_a_loop_that_is_killed_or_hangs(
+def idled_after_s(
     bus: tuple[str, str, PuckEmulator], blow: signal.Signals
-) -> None:
+) -> float | None:
+    """Send a signal to a watched loop -> how long its torque stood."""
     interface, channel, emulator = bus
     loop = started(interface, channel, "watched")
     try:
         assert emulator.registers.torque == -144  # 1 N·m
         os.kill(loop.pid, blow)
-        idle = idle_after_s(emulator, LONGEST_S)
+        return idle_after_s(emulator, LONGEST_S)
     finally:
         end(loop)
-    assert idle is not None
+
+
+@pytest.mark.parametrize("blow", [signal.SIGKILL, signal.SIGSTOP])
+def test_a_watchdog_idles_the_puck_of_a_loop_that_is_killed_or_hangs(
+    bus: tuple[str, str, PuckEmulator], blow: signal.Signals
+) -> None:
+    assert idled_after_s(bus, blow) is not None
+    _, _, emulator = bus
     assert emulator.registers.torque == 0
 
 
@@ -152,3 +172,14 @@ def test_a_bus_inside_the_process_has_no_watchdog() -> None:
     with opened(SimulatedClock(), loose()) as device:
         assert device.idle_command() is None
         assert watched(device, TIMEOUT_S) is None
+
+
+if __name__ == "__main__":
+    for blow in (signal.SIGKILL, signal.SIGSTOP):
+        times_ms = []
+        for _ in range(int(sys.argv[1])):
+            with served("udp_multicast") as made:
+                idle = idled_after_s(made, blow)
+                times_ms.append(1e3 * (LONGEST_S if idle is None else idle))
+        median_ms = statistics.median(times_ms)
+        print(f"{blow.name}: median {median_ms:.0f} ms, most {max(times_ms):.0f} ms")
