@@ -38,6 +38,9 @@ def test_few_intervals_miss() -> None:
     assert min(counts.values()) >= 2
 
 
+# A hand that wobbles above the threshold now and then makes a slow stretch one whose
+# catch is not seen; the fit leaves it out and says so.
+@pytest.mark.filterwarnings("ignore:slow .* no catch that stands out")
 @pytest.mark.slow
 @pytest.mark.parametrize("scatter", [None, SCATTERED], ids=["exact", "scattered"])
 def test_every_interval_covers_as_often_as_it_says(scatter: Scatter | None) -> None:
