@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["command"]
 
+_UNNAMED = ("percent_agreement", "fleiss_kappa")
 NO_INTERVAL = (
     "no interval: say what a new study would draw anew, with --target raters, items "
     "or both"
@@ -36,8 +37,7 @@ NO_INTERVAL = (
 )
 @click.option(
     "--coefficients",
-    default="percent_agreement,fleiss_kappa",
-    show_default=True,
+    show_default=",".join(_UNNAMED),
     help="Names of coefficients, separated by commas, or all.",
 )
 @click.option(
@@ -86,7 +86,7 @@ def command(
     rater: str | None,
     grade: str | None,
     categories: str | None,
-    coefficients: str,
+    coefficients: str | None,
     weights: "WeightName",  # checked where the weights are made
     target: Target | None,
     interval: str,
@@ -113,8 +113,10 @@ def command(
         raise ParameterError(f"{both} want the same stdout: choose one")
     if figure is not None:
         check_figure(figure, target)
+    names = _UNNAMED if coefficients is None else tuple(_listed(coefficients))
     wanted = Wanted(
-        coefficients=tuple(name.strip() for name in coefficients.split(",")),
+        coefficients=names,
+        named=coefficients is not None and names != ("all",),
         weights=weights,
         target=target,
         interval=interval,

@@ -26,6 +26,8 @@ class Wanted:
     ----------
     coefficients : tuple of str
         Names of the register, or ``("all",)``.
+    named : bool
+        Whether somebody asked for just these: then each must have the interval.
     weights : str
         Name of the weights, for coefficients that take any.
     target : {"items", "raters", "both"} or None
@@ -41,6 +43,7 @@ class Wanted:
     """
 
     coefficients: tuple[str, ...]
+    named: bool
     weights: "WeightName"
     target: Target | None
     interval: str
@@ -92,7 +95,7 @@ def estimate_session(ratings: "Ratings", session: str, wanted: Wanted) -> list[R
     ParameterError
         If a coefficient, weights or an interval does not exist or does not fit. Under
         ``"all"`` what does not fit two raters, or has no such interval, is left out or
-        said instead.
+        said instead; of coefficients that nobody named one at least must have it.
     RatingsError
         If the ratings do not fit a coefficient.
     """
@@ -102,7 +105,8 @@ def estimate_session(ratings: "Ratings", session: str, wanted: Wanted) -> list[R
     matrix = rating_matrix(ratings, session=session)
     values = ratings.scale.values
     counted = count_ratings(ratings.scale.weigh(matrix.grades), values)
-    rows = []
+    rows: list[Row] = []
+    refused: list[MasrelError] = []
     for entry in _entries(wanted, matrix):
         title, notes = entry.title, []
         weights: WeightName = wanted.weights if entry.weighted else "identity"
@@ -117,12 +121,15 @@ def estimate_session(ratings: "Ratings", session: str, wanted: Wanted) -> list[R
             interval = _interval(entry, counted, values, weights, wanted)
             estimate = replace(estimate, interval=interval or estimate.interval)
         except MasrelError as error:
-            if wanted.coefficients != _ANY_ORDER:
+            if wanted.named:
                 raise
+            refused.append(error)
             notes.append(f"no interval: {error}")
         rows.append(
             Row(session=session, title=title, estimate=estimate, notes=tuple(notes))
         )
+    if wanted.coefficients != _ANY_ORDER and refused and len(refused) == len(rows):
+        raise refused[0]
     return rows
 
 

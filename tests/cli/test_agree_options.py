@@ -456,6 +456,21 @@ def test_a_level_is_that_of_every_interval(masrel: Caller, wide: Path) -> None:
     assert icc["interval"]["method"] == "F distribution"
 
 
+def test_what_nobody_named_needs_no_posterior_and_what_was_named_does(
+    masrel: Caller, wide: Path
+) -> None:
+    call = ("agree", wide, "--target", "items", "--interval", "posterior")
+    done = masrel(*call)
+    assert "Percent agreement: no interval: coefficient: a posterior" in done.out
+    assert "Fleiss' κ: 95 % credible interval" in done.out
+    named = masrel(*call, "--coefficients", "percent_agreement,fleiss_kappa")
+    assert "got percent_agreement by 3" in refused(named)
+    # where nothing has it, the call was wrong
+    assert "a posterior speaks of other items" in refused(
+        masrel(*call[:3], "raters", *call[4:])
+    )
+
+
 def test_weights_that_a_named_coefficient_does_not_take_are_said(
     masrel: Caller, wide: Path
 ) -> None:
