@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
+from masrel.elbow.parameters import PostCatch, ResidualReading
 from masrel.estimates import Target
 
 __all__ = [
@@ -32,6 +33,7 @@ __all__ = [
 Identifier = Annotated[str, Meta(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,31}\Z")]
 Text = Annotated[str, Meta(min_length=1)]
 Angle = Annotated[float, Meta(gt=0, le=180)]
+RestAngle = Annotated[float, Meta(ge=0, le=180)]
 Positive = Annotated[float, Meta(gt=0)]
 NonNegative = Annotated[float, Meta(ge=0)]
 
@@ -69,7 +71,10 @@ class ElbowConstants(Table, frozen=True, kw_only=True):
     slowest_mean_speed_deg_s: NonNegative = 60.0
     smallest_catch_angle_deg: Angle = 60.0
     range_end_deg: Angle = 146.0
-    post_catch: Literal["continuous", "additive"] = "continuous"
+    rest_angle_deg: RestAngle | None = None
+    post_catch: PostCatch = "continuous"
+    residual_reading: ResidualReading = "residual"
+    catch_rise_s: NonNegative = 0.0
 
 
 class ModelConstants(Table, frozen=True, kw_only=True):
@@ -80,6 +85,10 @@ class ModelConstants(Table, frozen=True, kw_only=True):
     stiffness_nm_rad: NonNegative | None = None
     catch_slope_s: Positive | None = None
     post_catch_stiffness_nm_rad: NonNegative | None = None
+    rest_angle_deg: RestAngle | None = None
+    post_catch: PostCatch | None = None
+    residual_reading: ResidualReading | None = None
+    catch_rise_s: NonNegative | None = None
 
 
 class Model(Table, frozen=True, kw_only=True):

@@ -12,6 +12,14 @@ __all__ = ["presented_hash", "protocol_hash"]
 PRESENTED = ("scale", "elbow", "models", "schedule", "stretch", "device")
 """The tables that decide what a rater meets, besides the study's id."""
 
+LATER: dict[str, object] = {
+    "catch_rise_s": 0.0,
+    "residual_reading": "residual",
+    "rest_angle_deg": None,
+}
+"""Constants that protocols had no key for, with the defaults they then had: these do
+not enter, so that no schedule drawn before turns stale."""
+
 
 def protocol_hash(protocol: Protocol) -> str:
     """Hash the whole content of a protocol.
@@ -57,14 +65,21 @@ def presented_hash(protocol: Protocol) -> str:
 
 
 def _plain(content: object) -> dict[str, Any]:
-    # What a model shares with the others is not its own, and does not enter twice.
     plain: dict[str, Any] = msgspec.to_builtins(content)
+    elbow = plain["elbow"]
     for model in plain["models"]:
         own = {k: v for k, v in model.pop("constants").items() if v is not None}
+        # What a model shares with the others is not its own, and does not enter twice.
+        for key in ("post_catch", *LATER):
+            if key in own and own[key] == elbow[key]:
+                del own[key]
         if own:
             model["constants"] = own
         if model["file"] is None:
             del model["file"]
+    for key, default in LATER.items():
+        if elbow[key] == default:
+            del elbow[key]
     return plain
 
 

@@ -10,6 +10,8 @@ from masrel.elbow.identification.model_file import (
     CONSTANT_KEYS,
     FORMAT,
     MODEL_KEYS,
+    READING_KEYS,
+    VARIANT_KEYS,
 )
 from masrel.protocol.wording import got
 
@@ -82,7 +84,8 @@ def _read(path: Path) -> dict[str, Any] | str:
             f'needed a model file, whose format is "{FORMAT}", got {path} with '
             f"{got(content.get('format', 'none'))}"
         )
-    for table, known in (("model", MODEL_KEYS), ("constants", CONSTANT_KEYS)):
+    constants = (*CONSTANT_KEYS, *READING_KEYS, *VARIANT_KEYS)
+    for table, known in (("model", tuple(MODEL_KEYS)), ("constants", constants)):
         keys = content.get(table, {})
         foreign = [key for key in keys if key not in known]
         if not isinstance(keys, dict) or foreign:

@@ -2,6 +2,8 @@
 
 import math
 
+import msgspec
+
 from masrel.elbow.parameters import ElbowParameters
 from masrel.errors import ParameterError
 from masrel.protocol.definition import Protocol
@@ -51,27 +53,31 @@ def elbow_parameters(protocol: Protocol, model_id: str) -> ElbowParameters:
     if not found:
         known = ", ".join(model.id for model in protocol.models)
         raise ParameterError(f"model: needed one of {known}, got {model_id!r}")
-    (model,), shared, own = found, protocol.elbow, found[0].constants
+    (model,), shared = found, protocol.elbow
+    own = {
+        key: value
+        for key in model.constants.__struct_fields__
+        if (value := getattr(model.constants, key)) is not None
+    }
+    elbow = msgspec.structs.replace(shared, **own)
+    rest = elbow.rest_angle_deg
     return ElbowParameters(
         catch_angle_constant=math.radians(model.catch_angle_constant_deg),
         catch_torque_constant=model.catch_torque_nms_rad,
         residual_ratio=model.residual_ratio,
         catch_travel=math.radians(model.catch_travel_deg),
-        inertia=_either(own.inertia_kg_m2, shared.inertia_kg_m2),
-        damping=_either(own.damping_nms_rad, shared.damping_nms_rad),
-        stiffness=_either(own.stiffness_nm_rad, shared.stiffness_nm_rad),
-        catch_slope=_either(own.catch_slope_s, shared.catch_slope_s),
-        peak_duration=shared.peak_duration_s,
-        post_catch_stiffness=_either(
-            own.post_catch_stiffness_nm_rad, shared.post_catch_stiffness_nm_rad
-        ),
-        speed_threshold=math.radians(shared.speed_threshold_deg_s),
-        slowest_mean_speed=math.radians(shared.slowest_mean_speed_deg_s),
-        smallest_catch_angle=math.radians(shared.smallest_catch_angle_deg),
-        range_end=math.radians(shared.range_end_deg),
-        post_catch=shared.post_catch,
+        inertia=elbow.inertia_kg_m2,
+        damping=elbow.damping_nms_rad,
+        stiffness=elbow.stiffness_nm_rad,
+        catch_slope=elbow.catch_slope_s,
+        peak_duration=elbow.peak_duration_s,
+        post_catch_stiffness=elbow.post_catch_stiffness_nm_rad,
+        speed_threshold=math.radians(elbow.speed_threshold_deg_s),
+        slowest_mean_speed=math.radians(elbow.slowest_mean_speed_deg_s),
+        smallest_catch_angle=math.radians(elbow.smallest_catch_angle_deg),
+        range_end=math.radians(elbow.range_end_deg),
+        rest_angle=None if rest is None else math.radians(rest),
+        post_catch=elbow.post_catch,
+        residual_reading=elbow.residual_reading,
+        catch_rise=elbow.catch_rise_s,
     )
-
-
-def _either(own: float | None, shared: float) -> float:
-    return shared if own is None else own

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Any
 
-from masrel.protocol.wording import got
+from masrel.protocol.wording import got, with_id
 
 __all__ = ["plan_rules"]
 
@@ -28,9 +28,8 @@ def plan_rules(values: Values) -> Iterator[str]:
     plan = (values.get("analysis") or {}).get("estimates") or []
     for index, line in enumerate(plan):
         if line is not None:
-            ending = f" (id {got(line['id'])})" if "id" in line else ""
             for problem in _line(line, values):
-                yield f"analysis.estimates[{index}].{problem}{ending}"
+                yield f"analysis.estimates[{index}].{problem}{with_id(line)}"
 
 
 def _line(line: Values, values: Values) -> Iterator[str]:

@@ -3,8 +3,10 @@
 from collections.abc import Callable, Iterator
 from typing import Any
 
+from masrel.protocol.device_rules import device_rules
+from masrel.protocol.joint_rules import joint_rules
 from masrel.protocol.plan_rules import plan_rules
-from masrel.protocol.wording import got
+from masrel.protocol.wording import got, with_id
 
 __all__ = ["broken_rules"]
 
@@ -89,7 +91,7 @@ def _intended(values: Values) -> Iterator[str]:
         if grade is not None and grade not in grades:
             yield (
                 f"models[{index}].intended_grade: needed a grade of the scale "
-                f"({', '.join(grades)}), got {got(grade)}{_named(model)}"
+                f"({', '.join(grades)}), got {got(grade)}{with_id(model)}"
             )
 
 
@@ -103,13 +105,13 @@ def _raters(values: Values) -> Iterator[str]:
             if rater is not None and rater in named[:place]:
                 yield (
                     f"{where}: needed each rater once, got {got(rater)} again"
-                    f"{_named(session)}"
+                    f"{with_id(session)}"
                 )
             # With an unusable rater in the list, nobody can be said to be unknown.
             elif known and None not in known and rater not in (None, *known):
                 yield (
                     f"{where}: needed a rater of [[raters]] ({', '.join(known)}), "
-                    f"got {got(rater)}{_named(session)}"
+                    f"got {got(rater)}{with_id(session)}"
                 )
 
 
@@ -140,88 +142,6 @@ def _size(values: Values) -> Iterator[str]:
         )
 
 
-def _stretch(values: Values) -> Iterator[str]:
-    stretch, elbow = values.get("stretch") or {}, values.get("elbow") or {}
-    start, end = stretch.get("start_deg"), stretch.get("end_deg")
-    limit = elbow.get("range_end_deg")
-    if start is not None and end is not None and start >= end:
-        yield (
-            f"stretch.start_deg: needed less than stretch.end_deg ({end:g}), "
-            f"got {start:g}"
-        )
-    if end is not None and limit is not None and end > limit:
-        yield (
-            f"stretch.end_deg: needed at most elbow.range_end_deg ({limit:g}), "
-            f"got {end:g}"
-        )
-
-
-def _device(values: Values) -> Iterator[str]:
-    device, stretch = values.get("device") or {}, values.get("stretch") or {}
-    dead_zone, full_speed = (
-        device.get("dead_zone_deg_s"),
-        device.get("full_speed_deg_s"),
-    )
-    if dead_zone is not None and full_speed is not None and dead_zone >= full_speed:
-        yield (
-            f"device.dead_zone_deg_s: needed less than device.full_speed_deg_s "
-            f"({full_speed:g}), got {dead_zone:g}"
-        )
-    width = device.get("soft_stop_deg")
-    low, high = device.get("lowest_angle_deg"), device.get("highest_angle_deg")
-    start, end = stretch.get("start_deg"), stretch.get("end_deg")
-    if width is None:
-        return
-    if None not in (low, start) and start < low + width:
-        yield (
-            f"stretch.start_deg: needed at least device.lowest_angle_deg and the soft "
-            f"stop beside it ({low:g} + {width:g}), got {start:g}"
-        )
-    if None not in (high, end) and end > high - width:
-        yield (
-            f"stretch.end_deg: needed at most device.highest_angle_deg less the soft "
-            f"stop before it ({high:g} - {width:g}), got {end:g}"
-        )
-
-
-def _catch_angles(values: Values) -> Iterator[str]:
-    elbow = values.get("elbow") or {}
-    smallest = elbow.get("smallest_catch_angle_deg")  # θ_L of (6)
-    limit = elbow.get("range_end_deg")
-    if smallest is None:
-        return
-    if limit is not None and smallest >= limit:
-        yield (
-            f"elbow.smallest_catch_angle_deg: needed less than elbow.range_end_deg "
-            f"({limit:g}), got {smallest:g}"
-        )
-    for index, model in _entries(values, "models"):
-        constant = model.get("catch_angle_constant_deg")  # L of (2)
-        if constant is not None:
-            own = (model.get("constants") or {}).get("catch_slope_s")
-            shared = elbow if own is None else {**elbow, "catch_slope_s": own}
-            for problem in _catch_angle(constant, smallest, shared):
-                where = f"models[{index}].catch_angle_constant_deg"
-                yield f"{where}: {problem}{_named(model)}"
-
-
-def _catch_angle(constant: float, smallest: float, elbow: Values) -> Iterator[str]:
-    slope, slowest = elbow.get("catch_slope_s"), elbow.get("slowest_mean_speed_deg_s")
-    if constant <= smallest:
-        yield (
-            f"needed more than elbow.smallest_catch_angle_deg ({smallest:g}), "
-            f"got {constant:g}"
-        )
-    elif slope is not None and slowest is not None:
-        angle = constant - slope * slowest  # first line of (6), the largest of them
-        if angle < smallest:
-            yield (
-                f"needed a catch angle at elbow.slowest_mean_speed_deg_s of at least "
-                f"elbow.smallest_catch_angle_deg ({smallest:g}), got "
-                f"{constant:g} - {slope:g} * {slowest:g} = {angle:g}"
-            )
-
-
 def _sections(values: Values) -> Iterator[str]:
     sections = (values.get("report") or {}).get("sections") or []
     for index, section in enumerate(sections):
@@ -232,10 +152,6 @@ def _sections(values: Values) -> Iterator[str]:
             )
 
 
-def _named(entry: Values) -> str:
-    return f" (id {got(entry['id'])})" if "id" in entry else ""
-
-
 _RULES: tuple[Callable[[Values], Iterator[str]], ...] = (
     _grades,
     _ids,
@@ -243,9 +159,8 @@ _RULES: tuple[Callable[[Values], Iterator[str]], ...] = (
     _raters,
     _file_names,
     _size,
-    _stretch,
-    _device,
-    _catch_angles,
+    device_rules,
+    joint_rules,
     plan_rules,
     _sections,
 )

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from msgspec import inspect
 
-__all__ = ["got", "needed"]
+__all__ = ["got", "needed", "with_id"]
 
 _IDENTIFIER = (
     "a name of 1 to 32 letters, digits, '.', '_' or '-', "
@@ -106,3 +106,24 @@ def got(value: object) -> str:
     if isinstance(value, datetime.date | datetime.time):
         return value.isoformat()
     return str(value)
+
+
+def with_id(entry: Mapping[str, object]) -> str:
+    """Name an entry of an array of tables at the end of a message.
+
+    Parameters
+    ----------
+    entry : mapping
+        The entry.
+
+    Returns
+    -------
+    str
+        Its id in parentheses; empty when it has none.
+
+    Examples
+    --------
+    >>> with_id({"id": "HM3"}), with_id({})
+    (' (id "HM3")', '')
+    """
+    return f" (id {got(entry['id'])})" if "id" in entry else ""

@@ -34,6 +34,13 @@ def test_comments_layout_order_and_defaults_do_not_enter(tmp_path: Path) -> None
         (("scale", "grades"), ["0", "1", "1+", "2", "3"]),
         (("schedule", "seed"), 6),
         (("elbow", "catch_slope_s"), 0.3),
+        (("elbow", "rest_angle_deg"), 20.0),
+        (("elbow", "residual_reading"), "decrease"),
+        (("elbow", "catch_rise_s"), 0.02),
+        (("models", 1, "constants"), {"rest_angle_deg": 20.0}),
+        (("models", 1, "constants"), {"post_catch": "additive"}),
+        (("models", 1, "constants"), {"residual_reading": "decrease"}),
+        (("models", 1, "constants"), {"catch_rise_s": 0.02}),
         (("stretch", "start_deg"), 31.0),
         (("device", "torque_limit_nm"), 19.0),
     ],
@@ -103,3 +110,47 @@ def test_a_hash_is_that_of_canonical_json(tmp_path: Path) -> None:
     )
     expected = hashlib.sha256(text.encode("utf-8")).hexdigest()
     assert hashes(VALID, tmp_path)[1] == expected
+
+
+HASHES = {  # of protocol and of what is presented, before joints had variants
+    "hess2012": (
+        "c75e77d3b6a935f5af0272f4aebcc1ac71a629cbdc3785b8e1547dbbaf02f1cf",
+        "4e2ff35980dc9bd148d7b364448eea22dd3add991aca81869425309dd67a7bc5",
+    ),
+    "small": (
+        "3a06b00a10128161f2d1a53de31afc44599b9201cecfdca01a725e7192c8a9b2",
+        "47cd4ccbfc74809440d7f3252dc501007cdfca6aea827e2ecf904fad801e91d1",
+    ),
+}
+
+
+@pytest.mark.parametrize("study", sorted(HASHES))
+def test_the_bundled_studies_keep_their_hashes(study: str) -> None:
+    # Schedules that anybody drew from them stay good.
+    folder = Path(__file__).parents[2] / "studies" / study
+    protocol = read_protocol(folder / "protocol.toml")
+    assert (protocol_hash(protocol), presented_hash(protocol)) == HASHES[study]
+
+
+@pytest.mark.parametrize(
+    ("key", "default"),
+    [("residual_reading", "residual"), ("catch_rise_s", 0.0)],
+)
+def test_a_variant_at_its_default_is_no_change(
+    tmp_path: Path, key: str, default: object
+) -> None:
+    before = hashes(VALID, tmp_path)
+    assert hashes(changed("elbow", key, to=default), tmp_path) == before
+    own = changed("models", 0, "constants", to={key: default})
+    assert hashes(own, tmp_path) == before
+
+
+def test_a_model_that_says_what_all_follow_is_no_change(tmp_path: Path) -> None:
+    shared = {"post_catch": "additive", "rest_angle_deg": 25.0, "catch_rise_s": 0.01}
+    document = changed("elbow", to=shared)
+    before = hashes(document, tmp_path)
+    document["models"][0]["constants"] = shared
+    assert hashes(document, tmp_path) == before
+    # ... and at the default it is another law than the study's
+    document["models"][0]["constants"] = {"catch_rise_s": 0.0}
+    assert hashes(document, tmp_path) != before

@@ -58,6 +58,40 @@ def test_a_named_model_is_the_one_in_the_file(tmp_path: Path) -> None:
     )
 
 
+def test_a_file_keeps_the_law_its_numbers_were_fitted_with(tmp_path: Path) -> None:
+    # Q of a fit is a residual; under a study's other reading it would be another joint.
+    put(tmp_path)
+    document = named()
+    document["elbow"] = {"residual_reading": "decrease", "post_catch": "additive"}
+    protocol = read_protocol(write(document, tmp_path))
+    filed = elbow_parameters(protocol, protocol.models[0].id)
+    assert (filed.residual_reading, filed.post_catch) == ("residual", "continuous")
+    assert filed.residual_share == 0.6
+    beside = elbow_parameters(protocol, protocol.models[1].id)
+    assert (beside.residual_reading, beside.post_catch) == ("decrease", "additive")
+
+
+def test_a_file_written_before_laws_were_is_presented_as_it_was(tmp_path: Path) -> None:
+    path = put(tmp_path)
+    after = read_protocol(write(named(), tmp_path))
+    lines = path.read_text(encoding="utf-8").splitlines()
+    old = [one for one in lines if not one.startswith(("post_catch =", "residual_re"))]
+    assert len(old) == len(lines) - 2
+    path.write_text("\n".join(old), encoding="utf-8")
+    before = read_protocol(write(named(), tmp_path))
+    assert presented_hash(before) == presented_hash(after)
+
+
+def test_a_variant_in_both_places_is_refused(tmp_path: Path) -> None:
+    put(tmp_path, constants={"rest_angle_deg": 25.0})
+    document = named(constants={"rest_angle_deg": 26.0, "post_catch": "additive"})
+    with pytest.raises(ProtocolError) as raised:
+        read_protocol(write(document, tmp_path))
+    said = "\n".join(raised.value.problems)
+    assert "models[0].constants.rest_angle_deg: needed in s3.toml or here" in said
+    assert "models[0].constants.post_catch: needed in s3.toml or here" in said
+
+
 def test_both_hashes_follow_the_numbers_in_the_file(tmp_path: Path) -> None:
     path = write(named(), tmp_path)
     put(tmp_path)
@@ -88,7 +122,11 @@ def test_numbers_in_a_file_and_in_the_protocol_are_presented_alike(
     del entry["file"]
     entry |= {key: getattr(model, key) for key in KEYS}
     own = model.constants
-    entry["constants"] = {name: getattr(own, name) for name in own.__struct_fields__}
+    entry["constants"] = {
+        name: value
+        for name in own.__struct_fields__
+        if (value := getattr(own, name)) is not None
+    }
     written = read_protocol(write(inline, tmp_path))
     assert presented_hash(written) == presented_hash(filed)
 
@@ -101,6 +139,9 @@ def test_a_protocol_without_files_has_the_hash_it_had_before_there_were_any() ->
     for model in content["models"]:
         assert model.pop("file") is None
         assert set(model.pop("constants").values()) == {None}
+    assert content["elbow"].pop("rest_angle_deg") is None
+    assert content["elbow"].pop("residual_reading") == "residual"
+    assert content["elbow"].pop("catch_rise_s") == 0.0
     canonical = msgspec.json.encode(content, order="sorted")
     assert protocol_hash(protocol) == hashlib.sha256(canonical).hexdigest()
 

@@ -1,6 +1,7 @@
 """Degrees become radians once, and every constant reaches the joint model."""
 
 import math
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
@@ -21,7 +22,10 @@ ELBOW = {
     "slowest_mean_speed_deg_s": 45.0,
     "smallest_catch_angle_deg": 36.0,
     "range_end_deg": 150.0,
+    "rest_angle_deg": 18.0,
     "post_catch": "additive",
+    "residual_reading": "decrease",
+    "catch_rise_s": 0.02,
 }
 
 
@@ -38,7 +42,21 @@ def test_every_constant_is_taken_and_degrees_become_radians(tmp_path: Path) -> N
     assert found.slowest_mean_speed == pytest.approx(math.pi / 4, rel=1e-15)
     assert found.smallest_catch_angle == pytest.approx(math.pi / 5, rel=1e-15)
     assert found.range_end == pytest.approx(math.pi * 5 / 6, rel=1e-15)
-    assert (found.rest_angle, found.post_catch) == (None, "additive")
+    assert found.rest_angle == pytest.approx(math.pi / 10, rel=1e-15)
+    assert (found.post_catch, found.residual_reading) == ("additive", "decrease")
+    assert found.catch_rise == 0.02
+
+
+def test_every_parameter_of_a_joint_has_a_key(tmp_path: Path) -> None:
+    # Each key differs from the default above, or is one of a model's four.
+    protocol = read_protocol(write(changed("elbow", to=ELBOW), tmp_path))
+    found, plain = elbow_parameters(protocol, "D1"), STANDARD_MODELS["HM1"]
+    alike = {f.name for f in fields(found)} - {
+        f.name
+        for f in fields(found)
+        if getattr(found, f.name) != getattr(plain, f.name)
+    }
+    assert alike == set()
 
 
 def test_an_unknown_model_is_refused_with_those_there_are(tmp_path: Path) -> None:
@@ -70,3 +88,22 @@ def test_a_models_own_constants_take_the_place_of_the_shared_ones(
     assert (first.damping, first.catch_slope) == (0.9, 0.3)
     assert first.stiffness == second.stiffness
     assert second.damping == protocol.elbow.damping_nms_rad
+
+
+def test_a_model_may_follow_a_law_of_its_own(tmp_path: Path) -> None:
+    own = {
+        "rest_angle_deg": 36.0,
+        "post_catch": "continuous",
+        "residual_reading": "residual",
+        "catch_rise_s": 0.0,
+    }
+    document = changed("elbow", to=ELBOW)
+    document["models"][0]["constants"] = own
+    protocol = read_protocol(write(document, tmp_path))
+    first = elbow_parameters(protocol, "HM1")
+    assert first.rest_angle == pytest.approx(math.pi / 5, rel=1e-15)
+    assert (first.post_catch, first.residual_reading) == ("continuous", "residual")
+    assert first.catch_rise == 0.0
+    second = elbow_parameters(protocol, "D1")
+    assert (second.post_catch, second.residual_reading) == ("additive", "decrease")
+    assert second.catch_rise == 0.02

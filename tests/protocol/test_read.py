@@ -106,6 +106,49 @@ NUMBER = "a number above 0 and at most 180"
             'elbow.post_catch: needed one of "additive", "continuous", '
             'got "aditive"; did you mean additive?',
         ),
+        (
+            ("elbow", "residual_reading"),
+            "residuum",
+            'elbow.residual_reading: needed one of "decrease", "residual", '
+            'got "residuum"; did you mean residual?',
+        ),
+        (
+            ("elbow", "rest_angle_deg"),
+            "30",
+            "elbow.rest_angle_deg: needed a number at least 0 and at most 180, "
+            'got "30"',
+        ),
+        (
+            ("elbow", "catch_rise_s"),
+            0.2,
+            "elbow.catch_rise_s: needed at most elbow.peak_duration_s (0.1), got 0.2",
+        ),
+        (
+            ("models", 1, "constants"),
+            {"catch_rise_s": 0.11},
+            "models[1].constants.catch_rise_s: needed at most elbow.peak_duration_s "
+            '(0.1), got 0.11 (id "D1")',
+        ),
+        (
+            ("models", 1, "constants"),
+            {"rest_angle_deg": -1},
+            "models[1].constants.rest_angle_deg: needed a number at least 0 and at "
+            'most 180, got -1 (id "D1")',
+        ),
+        # 3.15 N·m/rad · 60 deg = 3.30 N·m hold an arm that only waits
+        (
+            ("elbow", "rest_angle_deg"),
+            90,
+            "elbow.rest_angle_deg: needed at most device.standing_torque_nm (2 N·m) "
+            "where the stretch starts, got 3.15 N·m/rad times 30 - 90 deg = -3.3 N·m",
+        ),
+        (
+            ("models", 0, "constants"),
+            {"rest_angle_deg": 0, "stiffness_nm_rad": 4},
+            "models[0].constants.rest_angle_deg: needed at most "
+            "device.standing_torque_nm (2 N·m) where the stretch starts, got 4 N·m/rad "
+            'times 30 - 0 deg = 2.09 N·m (id "HM1")',
+        ),
         # ids
         (
             ("study", "id"),

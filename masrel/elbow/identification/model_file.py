@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from dataclasses import fields
 from typing import TYPE_CHECKING
 
 from masrel.elbow.parameters import ElbowParameters
@@ -33,6 +34,15 @@ CONSTANT_KEYS = {
     "post_catch_stiffness_nm_rad": ("post_catch_stiffness", 1.0),
 }
 """Likewise the constants that a model may have of its own."""
+
+READING_KEYS = ("post_catch", "residual_reading")
+"""How H, Q and k_post are to be read: without it the numbers are another joint."""
+
+VARIANT_KEYS = {
+    "rest_angle_deg": ("rest_angle", _DEGREES),
+    "catch_rise_s": ("catch_rise", 1.0),
+}
+"""Constants that are written where they are not the default."""
 
 Document = dict[str, object]
 
@@ -80,10 +90,7 @@ def model_document(
             key: getattr(joint, name) * factor
             for key, (name, factor) in MODEL_KEYS.items()
         },
-        "constants": {
-            key: getattr(joint, name) * factor
-            for key, (name, factor) in CONSTANT_KEYS.items()
-        },
+        "constants": _constants(joint),
     }
     if fit is not None:
         document["remarks"] = list(fit.remarks)
@@ -93,6 +100,19 @@ def model_document(
             for name, sha256 in fit.sources.items()
         ]
     return document
+
+
+def _constants(joint: ElbowParameters) -> Document:
+    made: Document = {
+        key: getattr(joint, name) * factor
+        for key, (name, factor) in CONSTANT_KEYS.items()
+    }
+    made.update({key: getattr(joint, key) for key in READING_KEYS})
+    defaults = {field.name: field.default for field in fields(joint)}
+    for key, (name, factor) in VARIANT_KEYS.items():
+        if (value := getattr(joint, name)) != defaults[name]:
+            made[key] = value * factor
+    return made
 
 
 def _estimates(fit: "ElbowFit") -> list[Document]:

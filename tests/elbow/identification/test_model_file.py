@@ -1,6 +1,8 @@
 """A model file is TOML that says what it holds, to the last digit."""
 
+import math
 import tomllib
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -41,7 +43,31 @@ def test_degrees_stand_where_the_key_says_so() -> None:
         "stiffness_nm_rad": 3.15,
         "catch_slope_s": 0.35,
         "post_catch_stiffness_nm_rad": 5.8,
+        "post_catch": "continuous",
+        "residual_reading": "residual",
     }
+
+
+def test_a_file_says_how_its_numbers_are_to_be_read() -> None:
+    joint = replace(
+        STANDARD_MODELS["HM3"],
+        post_catch="additive",
+        residual_reading="decrease",
+        rest_angle=math.radians(20.0),
+        catch_rise=0.02,
+    )
+    made = model_document(joint, simulated=True, made_from="a test")
+    constants = tomllib.loads(as_toml(made))["constants"]
+    assert constants["post_catch"] == "additive"
+    assert constants["residual_reading"] == "decrease"
+    assert constants["rest_angle_deg"] == pytest.approx(20.0, rel=1e-15)
+    assert constants["catch_rise_s"] == 0.02
+
+
+def test_a_rest_at_full_flexion_is_written() -> None:
+    joint = replace(STANDARD_MODELS["HM3"], rest_angle=0.0)
+    made = model_document(joint, simulated=True, made_from="a test")
+    assert made["constants"]["rest_angle_deg"] == 0.0
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), None, b"x"])
