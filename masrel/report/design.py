@@ -1,6 +1,7 @@
 """Sections `design` and `grades`: what was presented to whom, and what they said."""
 
 from masrel.protocol import Protocol, Session
+from masrel.report.constants import constants_tables
 from masrel.report.grid import grade_grid
 from masrel.report.material import Drawing, Material, Paragraph, Section
 from masrel.report.tables import Column, Table, Value, as_given, counted, decimals_given
@@ -49,7 +50,7 @@ def design_section(material: Material) -> Section:
         blocks=(
             *(Paragraph(text=text) for text in said),
             _models_table(material),
-            _constants_table(material),
+            *constants_tables(material),
             _sessions_table(material),
         ),
     )
@@ -93,38 +94,6 @@ def _models_table(material: Material) -> Table:
             "residual over peak torque of the catch; D: angle travelled during the "
             "catch.",
         ),
-        data=material.data,
-    )
-
-
-def _constants_table(material: Material) -> Table:
-    elbow, stretch = material.protocol.elbow, material.protocol.stretch
-    rows = (
-        ("m", "inertia (kg·m²)", float(elbow.inertia_kg_m2)),
-        ("b", "damping (N·m·s/rad)", float(elbow.damping_nms_rad)),
-        ("k", "stiffness (N·m/rad)", float(elbow.stiffness_nm_rad)),
-        ("α", "catch slope (s)", float(elbow.catch_slope_s)),
-        ("ΔT_peak", "duration of the peak (s)", float(elbow.peak_duration_s)),
-        (
-            "k_post",
-            "post-catch stiffness (N·m/rad)",
-            float(elbow.post_catch_stiffness_nm_rad),
-        ),
-        ("ν_th", "speed threshold (deg/s)", float(elbow.speed_threshold_deg_s)),
-        ("ν_L", "slowest mean speed (deg/s)", float(elbow.slowest_mean_speed_deg_s)),
-        ("θ_L", "smallest catch angle (deg)", float(elbow.smallest_catch_angle_deg)),
-        ("θ_start", "start of a stretch (deg)", float(stretch.start_deg)),
-        ("θ_end", "end of the range of motion (deg)", float(elbow.range_end_deg)),
-    )
-    return Table(
-        name="constants",
-        caption="Constants all models share",
-        columns=(
-            Column(key="symbol", heading="Symbol", align="left"),
-            Column(key="meaning", heading="Meaning", align="left"),
-            Column(key="value", heading="Value"),
-        ),
-        rows=rows,
         data=material.data,
     )
 

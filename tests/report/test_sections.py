@@ -162,6 +162,57 @@ def test_the_parameters_are_shown_as_they_were_given(tmp_path: Path) -> None:
     assert re.search(r"\| HM1 \| standard \| 1 \| 130 \| 1.40 \| 0.1255 \| 60 \|", text)
 
 
+def with_laws(elbow: dict[str, object], own: dict[str, object]) -> Material:
+    """Table V under other laws: for all models, and for HM2."""
+    made = material(table_v(), "design", "traces")
+    protocol = msgspec.to_builtins(made.protocol)
+    protocol["elbow"] |= elbow
+    protocol["models"][1]["constants"] |= own
+    return dataclasses.replace(
+        made, protocol=msgspec.convert(protocol, type(made.protocol))
+    )
+
+
+def tables_of(made: Material, section: str) -> dict[str, Table]:
+    (found,) = (one for one in build_sections(made) if one.name == section)
+    return {block.name: block for block in found.blocks if isinstance(block, Table)}
+
+
+def test_laws_that_are_not_the_default_are_told() -> None:
+    elbow = {"residual_reading": "decrease", "rest_angle_deg": 20.0}
+    own = {"catch_rise_s": 0.03, "post_catch": "additive", "damping_nms_rad": 1.26}
+    tables = tables_of(with_laws(elbow, own), "design")
+    shared = {row[0]: row[2] for row in tables["constants"].rows}
+    assert shared["θ_rest"] == 20.0
+    assert shared["Q"] == "decrease after the peak over the rise"
+    assert "ΔT_rise" not in shared
+    # damping is that of all, and so no constant of its own
+    assert [(row[0], row[1], row[3]) for row in tables["own_constants"].rows] == [
+        ("HM2", "τ post-catch", "additive: to the torque of pre-catch"),
+        ("HM2", "ΔT_rise", 0.03),
+    ]
+    assert "but for those in the table below" in tables["constants"].caption
+
+
+def test_default_laws_are_not_told() -> None:
+    tables = tables_of(with_laws({}, {}), "design")
+    assert "own_constants" not in tables
+    symbols = [row[0] for row in tables["constants"].rows]
+    assert symbols == [
+        "m", "b", "k", "α", "ΔT_peak", "k_post", "ν_th", "ν_L", "θ_L", "θ_start",
+        "θ_end",
+    ]  # fmt: skip
+
+
+def test_peaks_of_the_report_are_those_of_the_models_law() -> None:
+    plain = tables_of(with_laws({}, {}), "traces")["peak_torque"]
+    other = tables_of(with_laws({}, {"rest_angle_deg": 20.0}), "traces")["peak_torque"]
+    # k · 10 deg more wherever the largest torque is, for HM2 alone
+    for before, after in zip(plain.rows, other.rows, strict=True):
+        more = radians(3.15 * 10.0) if before[0] == "HM2" else 0.0
+        assert after[1:] == pytest.approx([x + more for x in before[1:]], rel=1e-12)
+
+
 def test_many_models_are_drawn_four_to_a_figure() -> None:
     rows = ratings(
         *[("test", "R1", f"D{n:02}", "1") for n in range(1, 7)], mean_speed_deg_s=90.0
