@@ -1,8 +1,9 @@
 """The ticks of one presentation: pace, and what happens at each of them."""
 
 import math
+from contextlib import suppress
 
-from masrel.errors import ControllerError, DeviceTimeoutError
+from masrel.errors import ControllerError, DeviceError, DeviceTimeoutError
 from masrel.hess.clock import Clock
 from masrel.hess.controller import Controller
 from masrel.hess.device import Device
@@ -178,7 +179,7 @@ class Ticks:
         n_skipped = (now_ns - due_ns) // self._period_ns
         if n_skipped <= 0:
             return tick
-        self.n_missed += n_skipped
+        self.n_missed += min(n_skipped, self._n_ticks - tick)  # none after the last
         self.guard.missed_ticks(self.n_missed, (now_ns - self._sent_ns) * 1e-9)
         return tick + n_skipped
 
@@ -244,14 +245,16 @@ class Ticks:
         now_ns = begun_ns
         while torque != 0.0 and self._ramp_ns:
             n_over = (now_ns - begun_ns) // self._period_ns  # late ones are skipped
-            self._clock.sleep_until_ns(begun_ns + (n_over + 1) * self._period_ns)
+            next_ns = min((n_over + 1) * self._period_ns, self._ramp_ns)
+            self._clock.sleep_until_ns(begun_ns + next_ns)
             now_ns = self._clock.now_ns()
             left = 1.0 - (now_ns - begun_ns) / self._ramp_ns
             if left <= 0.0:
                 break
             self._device.command(torque * left)
             self.sent = torque * left
-            self._watchdog.beat()
+            with suppress(DeviceError):  # `finish` says so; the ramp has to go on
+                self._watchdog.beat()
             self._mark(now_ns, self.sent)
 
     def finish(self) -> None:

@@ -110,6 +110,7 @@ def test_the_presentation_is_not_prolonged_by_what_it_missed() -> None:
         device, presented = rest(clock, limits=limits_with(missed_ticks=30))
     assert ticks_ms(device) == list(range(15))
     assert presented.recording.facts["ended"] == "max-duration"
+    assert presented.n_missed_ticks == 5  # 15 to 19: there was no 20th to miss
 
 
 def test_the_time_in_the_recording_begins_at_zero_and_shows_the_gap() -> None:
@@ -185,6 +186,54 @@ def test_a_fault_brings_the_torque_to_zero_in_a_straight_line(ramp_time) -> None
     np.testing.assert_allclose(torque, line, atol=1e-9)
     assert torque[-1] == 0.0
     assert since[-1] <= ramp_time + 1e-9
+
+
+@pytest.mark.parametrize(
+    ("rate_hz", "ramp_time"), [(300, 0.1), (100, 0.095), (7, 0.1), (1000, 0.0505)]
+)
+def test_a_ramp_is_over_in_time_at_any_rate(rate_hz: int, ramp_time: float) -> None:
+    # 0.5 rad from where the model begins its spring gives 3.15 times that, until the
+    # arm is where it cannot be.
+    device, presented = rest(
+        SimulatedClock(),
+        angle=lambda t: START + 0.5 if t < 0.5 else radians(-8.0),
+        rate_hz=rate_hz,
+        max_duration_s=2.0,
+        limits=limits_with(ramp_time=ramp_time),
+    )
+    fault = presented.fault
+    assert fault is not None
+    assert fault.torque_nm == pytest.approx(1.575)
+    since_s = [time_ns * 1e-9 - fault.time_s for time_ns, _ in device.commands]
+    torques = [torque for _, torque in device.commands]
+    zero_s = since_s[torques.index(0.0)]
+    assert zero_s == pytest.approx(ramp_time, abs=1e-9)
+    for at_s, torque in zip(since_s, torques, strict=True):
+        if 0.0 < at_s < zero_s:
+            assert torque == pytest.approx(1.575 * (1.0 - at_s / ramp_time))
+
+
+def test_a_watchdog_that_ends_does_not_make_the_torque_fall_at_once() -> None:
+    class Ending:
+        def beat(self) -> None:
+            if clock.now_ns() >= 200 * PERIOD_NS:
+                raise DeviceError("watchdog: has ended")
+
+        rest = beat
+
+    clock = SimulatedClock()
+    device, presented = rest(
+        clock,
+        angle=lambda _: START + 0.5,
+        max_duration_s=0.4,
+        watchdog=Ending(),
+    )
+    assert presented.fault is not None
+    assert presented.fault.words == (
+        "watchdog: has ended; ramping down: watchdog: has ended"
+    )
+    ramp = [torque for time_ns, torque in device.commands if time_ns > 200 * PERIOD_NS]
+    assert ramp[:50] == pytest.approx([1.575 * (1 - n / 50) for n in range(1, 51)])
 
 
 def test_at_a_fault_zero_is_the_last_torque_and_the_device_is_let_go() -> None:
