@@ -66,7 +66,7 @@ def cut_off(spool: Path) -> Presented | None:
     )
     # What is missing between the first and the last tick; nobody counted why
     n_due = round(float(np.ptp(columns["time_s"])) * float(left.facts["rate_hz"] or 0))
-    n_missed = n_due + 1 - columns["time_s"].size
+    n_missed = max(0, n_due + 1 - columns["time_s"].size)  # a ramp adds rows
     facts: dict[str, Fact] = {
         **left.facts,
         "scheduling": None,

@@ -44,7 +44,7 @@ class Spool:
     Raises
     ------
     OSError
-        If the file cannot be written.
+        If the file cannot be written; what there is of it is removed.
     """
 
     __slots__ = ("_map", "words")
@@ -53,11 +53,15 @@ class Spool:
         header = json.dumps({**facts, "capacity": capacity}).encode()
         n_bytes = _HEADER + _WORD * (1 + N_COLUMNS * capacity)
         path.parent.mkdir(parents=True, exist_ok=True)
-        with path.open("w+b") as file:
-            file.write(header.ljust(_HEADER))
-            file.write(bytes(n_bytes - _HEADER))  # not sparse: the space is taken
-            file.flush()
-            self._map = mmap.mmap(file.fileno(), n_bytes)
+        try:
+            with path.open("w+b") as file:
+                file.write(header.ljust(_HEADER))
+                file.write(bytes(n_bytes - _HEADER))  # not sparse: the space is taken
+                file.flush()
+                self._map = mmap.mmap(file.fileno(), n_bytes)
+        except OSError:
+            path.unlink(missing_ok=True)  # nothing was sampled
+            raise
         self.words = memoryview(self._map)[_HEADER:].cast("d")
 
     def close(self) -> None:
@@ -104,14 +108,32 @@ def read_spool(path: Path) -> Spooled | None:
     if len(data) < _HEADER + _WORD or not data[:_HEADER].strip():
         return None  # it died while it laid the file down
     try:
-        facts = json.loads(data[:_HEADER])
-        capacity = int(facts.pop("capacity"))
-        words = np.frombuffer(data, dtype=np.float64, offset=_HEADER)
-        n = int(words[0])
-        columns = words[1 : 1 + N_COLUMNS * capacity].reshape(N_COLUMNS, capacity)
+        return _spooled(json.loads(data[:_HEADER]), data)
     except (ValueError, KeyError, TypeError) as error:
         raise RecordingError(
             f"{path}: needs the samples of a presentation that was cut off, got "
             f"something else ({error}); move it away to go on"
         ) from error
-    return Spooled(columns=columns[:, :n].copy(), facts=facts) if n else None
+
+
+def _spooled(facts: dict[str, Fact], data: bytes) -> Spooled | None:
+    # Raises ValueError, KeyError or TypeError where it is no such file.
+    if not isinstance(facts, dict):
+        raise TypeError(f"no facts but {facts}")
+    capacity, rate_hz = facts.pop("capacity"), facts["rate_hz"]
+    threshold = facts["speed_threshold"]
+    if not isinstance(capacity, int) or capacity < 1:
+        raise ValueError(f"a capacity of {capacity}")
+    for fact in (rate_hz, threshold):
+        if not isinstance(fact, int | float):
+            raise TypeError(f"{fact!r} where a number should be")
+    n = float(np.frombuffer(data, np.float64, count=1, offset=_HEADER)[0])
+    if n == 0.0:
+        return None  # not one sample, whether the file is whole or not
+    if not (n.is_integer() and 0.0 < n <= capacity):
+        raise ValueError(f"{n:g} samples where {capacity} fit in")
+    words = np.frombuffer(
+        data, np.float64, count=N_COLUMNS * capacity, offset=_HEADER + _WORD
+    )
+    columns = words.reshape(N_COLUMNS, capacity)[:, : int(n)]
+    return Spooled(columns=columns.copy(), facts=facts)

@@ -1,6 +1,8 @@
 """Samples in a file are there for whoever comes after the process that took them."""
 
+import errno
 import json
+import mmap
 from math import degrees, radians
 from pathlib import Path
 
@@ -60,7 +62,7 @@ def test_what_was_added_is_in_the_file(tmp_path: Path) -> None:
 
 def test_the_whole_file_is_there_before_the_first_sample(tmp_path: Path) -> None:
     path = tmp_path / "a.partial"
-    spool = Spool(path, 1000, {})
+    spool = Spool(path, 1000, FACTS)
     size = path.stat().st_size
     assert size == 4096 + 8 * (1 + 6 * 1000)
     assert path.stat().st_blocks * 512 >= size  # not sparse: the disk has given it
@@ -106,10 +108,36 @@ def test_what_was_cut_off_says_where(tmp_path: Path) -> None:
     assert left.n_missed_ticks == 2  # 2 ms at 2 kHz are five ticks, three are there
 
 
-@pytest.mark.parametrize("n_bytes", [0, 100, 4096, 4100])
+def test_a_ramp_between_two_ticks_is_no_tick_that_was_missed(tmp_path: Path) -> None:
+    path = tmp_path / "a.partial"
+    spool = Spool(path, 10, {**FACTS, "rate_hz": 1000})
+    samples = Samples(10, spool)
+    for time_s in (0.0, 0.001, 0.0013, 0.0016, 0.002):  # two rows between two ticks
+        samples.add(time_s, 0.5, 1.0, 2.0, 3.0, 1)
+    samples.close()
+    spool.close()
+    left = cut_off(path)
+    assert left is not None
+    assert left.n_missed_ticks == 0
+
+
+def test_a_disk_that_fills_while_it_is_laid_down_leaves_no_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    path = tmp_path / "a.partial"
+    monkeypatch.setattr(mmap, "mmap", full)  # the last thing that asks the disk
+    with pytest.raises(OSError, match="No space left"):
+        Spool(path, 10, FACTS)
+    assert not path.exists()
+
+
+@pytest.mark.parametrize("n_bytes", [0, 100, 4096, 4100, 4104, 4105, 4200])
 def test_a_file_that_was_never_laid_down_is_nothing(tmp_path, n_bytes: int) -> None:
     path = tmp_path / "a.partial"
-    written(path, 3)
+    written(path, 0)
     path.write_bytes(path.read_bytes()[:n_bytes])
     assert cut_off(path) is None
 
@@ -121,6 +149,17 @@ def test_a_file_that_was_never_laid_down_is_nothing(tmp_path, n_bytes: int) -> N
         json.dumps({"device": "none"}).encode().ljust(5000),
         json.dumps({"capacity": 7}).encode().ljust(4096) + np.ones(9).tobytes(),
         json.dumps({"capacity": None}).encode().ljust(4096) + np.ones(9).tobytes(),
+        json.dumps({"capacity": 1}).encode().ljust(4096) + np.ones(7).tobytes(),
+        json.dumps({**FACTS, "capacity": 1}).encode().ljust(4096)
+        + np.full(7, np.inf).tobytes(),
+        json.dumps({**FACTS, "capacity": -1}).encode().ljust(4096)
+        + np.ones(9).tobytes(),
+        json.dumps({**FACTS, "capacity": 1}).encode().ljust(4096)
+        + np.full(7, 5.0).tobytes(),
+        json.dumps({**FACTS, "rate_hz": "x", "capacity": 1}).encode().ljust(4096)
+        + np.ones(7).tobytes(),
+        b"5".ljust(4096) + np.ones(9).tobytes(),
+        b"[]".ljust(4096) + np.ones(9).tobytes(),
     ],
 )
 def test_anything_else_is_refused_with_a_way_out(tmp_path, content: bytes) -> None:
