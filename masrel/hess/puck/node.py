@@ -20,6 +20,7 @@ _SAMPLING_NS = 75_000
 _MARKERS = (VERSION, ROLE, SERIAL_NUMBER, ID, STATUS)
 
 _MOST_WAITING = 1000  # frames; more than fit on the bus in 50 ms
+_MOST_OVERDUE = 30  # more than fit on the bus in 1 ms
 
 
 class PuckNode:
@@ -54,6 +55,7 @@ class PuckNode:
         "_in_doubt",
         "_link",
         "_markers",
+        "_n_overdue",
         "_to",
         "arrivals",
         "heard",
@@ -65,6 +67,7 @@ class PuckNode:
         self._clock = clock
         self._to = to_puck(puck)
         self._in_doubt = False
+        self._n_overdue = 0  # frames that came after the deadline
         self._markers = itertools.cycle(_MARKERS)
         self.puck = puck
         self.arrivals = Arrivals(puck)
@@ -134,8 +137,9 @@ class PuckNode:
         self.listen()
         self.heard.pop(property_id, None)
         deadline_ns = self.inquire(property_id) + round(patience_s * 1e9)
+        self._n_overdue = 0
         while property_id not in self.heard:
-            frame = self._link.receive(deadline_ns)
+            frame = self._received(deadline_ns)
             if frame is None:
                 raise DeviceTimeoutError(
                     f"puck {self.puck}: no answer for property {property_id} within "
@@ -189,8 +193,9 @@ class PuckNode:
     def _marked_position(self, deadline_ns: int, marker: int | None) -> Position | None:
         # The first position that comes; with a marker, the last before its answer
         found: Position | None = None
+        self._n_overdue = 0
         while found is None if marker is None else marker not in self.heard:
-            frame = self._link.receive(deadline_ns)
+            frame = self._received(deadline_ns)
             if frame is None:
                 self.arrivals.n_late += found is not None  # that of an earlier question
                 self._in_doubt = True
@@ -201,6 +206,15 @@ class PuckNode:
                 found = position
         self._in_doubt = False  # nothing earlier can come any more
         return found
+
+    def _received(self, deadline_ns: int) -> Frame | None:
+        # What waits is taken after the deadline too, because this end may be late;
+        # but not without end, because others may never fall silent.
+        if self._clock.now_ns() > deadline_ns:
+            self._n_overdue += 1
+            if self._n_overdue > _MOST_OVERDUE:
+                return None
+        return self._link.receive(deadline_ns)
 
     def listen(self) -> None:
         """Take in what has come unasked: answers, errors, frames of others.

@@ -50,10 +50,10 @@ def release(node: PuckNode, *, torque_number: int, mode_number: int) -> None:
 
 def _is_asleep(node: PuckNode, *, blindly: bool) -> bool:
     # One that was reset drives nothing, and has the lock of its memory where MODE was.
-    # One that says nothing for long is taken to be awake: idling it matters more.
+    # One that is not heard for long is taken to be awake: idling it matters more.
     try:
         return node.ask(STATUS, patience_s=_ANSWER_S) == ASLEEP
-    except (DeviceTimeoutError, FrameError):
+    except (BusError, DeviceTimeoutError, FrameError):
         if blindly:
             return False
         raise
