@@ -6,7 +6,7 @@ import signal
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import TextIO
 
@@ -123,24 +123,37 @@ def stop_on_key(stop: EmergencyStop, keys: TextIO | None) -> Iterator[None]:
         yield
         return
     terminal = keys.fileno()
-    ended, end = os.pipe()
     settings = termios.tcgetattr(terminal)
+    tty.setcbreak(terminal)  # a key counts at once, without Enter
+    try:
+        with _waiting_for_key(stop, terminal):
+            yield
+    finally:
+        with suppress(termios.error):  # it may have gone away meanwhile
+            termios.tcsetattr(terminal, termios.TCSAFLUSH, settings)
+
+
+@contextmanager
+def _waiting_for_key(stop: EmergencyStop, terminal: int) -> Iterator[None]:
+    ended, end = os.pipe()
     waiting = threading.Thread(
         target=_wait_for_key, args=(stop, terminal, ended), daemon=True
     )
+    waiting.start()
     try:
-        tty.setcbreak(terminal)  # a key counts at once, without Enter
-        waiting.start()
         yield
     finally:
         os.close(end)
         waiting.join()
         os.close(ended)
-        termios.tcsetattr(terminal, termios.TCSAFLUSH, settings)
 
 
 def _wait_for_key(stop: EmergencyStop, terminal: int, ended: int) -> None:
     ready, _, _ = select.select([terminal, ended], [], [])
-    if terminal in ready:
-        os.read(terminal, 1)
-        stop.press("key")
+    if terminal not in ready:
+        return
+    try:
+        key = os.read(terminal, 1)
+    except OSError:
+        key = b""
+    stop.press("key" if key else "terminal lost")

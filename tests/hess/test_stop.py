@@ -134,6 +134,18 @@ def test_without_a_key_the_terminal_is_as_it_was(terminal) -> None:
     assert threading.active_count() == n_threads
 
 
+def test_a_terminal_that_goes_away_presses_it_and_is_left_alone() -> None:
+    # As when its window is closed. The signal that then comes is another test's.
+    keyboard, screen = pty.openpty()
+    stop = EmergencyStop()
+    with os.fdopen(screen, "r", encoding="utf-8") as keys, stop_on_key(stop, keys):
+        os.close(keyboard)
+        until = time.monotonic() + 10.0
+        while stop.reason is None and time.monotonic() < until:
+            time.sleep(0.005)
+    assert stop.reason == "terminal lost"
+
+
 def test_what_is_no_terminal_is_not_read(tmp_path) -> None:
     path = tmp_path / "answers"
     path.write_text("1+\n", encoding="utf-8")
