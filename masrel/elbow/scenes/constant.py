@@ -9,7 +9,7 @@ import numpy as np
 from masrel.elbow.motion import Floats
 from masrel.elbow.scenes.course import Courses, Flags, Motions
 from masrel.elbow.scenes.table import Joints
-from masrel.elbow.scenes.twofold import Twofold, difference, product
+from masrel.elbow.scenes.twofold import Twofold
 
 __all__ = ["constant_courses", "constant_ends"]
 
@@ -33,11 +33,11 @@ def constant_courses(joints: Joints, motions: Motions) -> Courses:
         Their events.
     """
     speed, start = motions.speed, motions.start
-    way = difference(np.minimum(motions.end, joints.range_end), start)
-    lowest = difference(joints.smallest_catch_angle, start)
+    way = Twofold.difference(np.minimum(motions.end, joints.range_end), start)
+    lowest = Twofold.difference(joints.smallest_catch_angle, start)
     # (2) with the first line of (6), as a way from the start
     held = np.maximum(speed, joints.slowest_mean_speed)
-    line = difference(joints.catch_angle_constant, start) - product(
+    line = Twofold.difference(joints.catch_angle_constant, start) - Twofold.product(
         joints.catch_slope, held
     )
     travel = lowest.where(lowest.high > line.high, line)  # (6), third line
@@ -85,5 +85,5 @@ def constant_ends(joints: Joints, motions: Motions) -> tuple[Floats, Flags]:
     is_doubtful : ndarray of bool, shape (n_scenes,)
         None of them is.
     """
-    way = difference(np.minimum(motions.end, joints.range_end), motions.start)
+    way = Twofold.difference(np.minimum(motions.end, joints.range_end), motions.start)
     return (way / motions.speed).high, np.zeros(motions.speed.shape, dtype=np.bool_)

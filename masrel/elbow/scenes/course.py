@@ -1,6 +1,7 @@
 """Where the events of many stretches are, in shares of their durations."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,23 @@ class Motions:
     start: Floats
     end: Floats
     speed: Floats
+
+    def rows(self, which: NDArray[np.intp]) -> "Motions":
+        """Return some of the stretches.
+
+        Parameters
+        ----------
+        which : ndarray of int
+            Their rows.
+
+        Returns
+        -------
+        Motions
+            Those.
+        """
+        return Motions(
+            start=self.start[which], end=self.end[which], speed=self.speed[which]
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,6 +80,33 @@ class Courses:
     catch_angle: Twofold
     catch_speed: Twofold
     mean_speed: Twofold
+
+    def replaced(self, rows: NDArray[np.intp], others: "Courses") -> "Courses":
+        """Return these with others in some rows.
+
+        Parameters
+        ----------
+        rows : ndarray of int
+            Which.
+        others : Courses
+            What stands there.
+
+        Returns
+        -------
+        Courses
+            All of them, with 32 digits where the others have them.
+        """
+        columns: dict[str, Any] = {}
+        for name in (field.name for field in fields(self)):
+            own, other = getattr(self, name), getattr(others, name)
+            if isinstance(own, Twofold):
+                low = np.broadcast_to(own.low, own.high.shape)
+                columns[name] = Twofold(own.high.copy(), low.copy())
+                columns[name].put(rows, other)
+            else:
+                columns[name] = own.copy()
+                columns[name][rows] = other
+        return Courses(**columns)
 
 
 def nearest(numbers: Twofold, known: Flags) -> Floats:

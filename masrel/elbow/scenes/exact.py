@@ -99,28 +99,35 @@ class ExactRows:
         levels = (self._peak[rows], self._residual[rows])
         lines = list(zip(*(each.tolist() for each in (*cuts, *levels)), strict=True))
         blocks = np.arange(0, rows.size, _ROWS)
-        reach = np.maximum.reduceat(ends, blocks).tolist()
-        low = np.minimum.reduceat(post, blocks).tolist()
-        high = np.maximum.reduceat(again, blocks).tolist()
+        columns = (
+            np.maximum.reduceat(self._catch[rows], blocks).tolist(),
+            np.minimum.reduceat(again, blocks).tolist(),
+            np.maximum.reduceat(ends, blocks).tolist(),
+            np.minimum.reduceat(post, blocks).tolist(),
+            np.maximum.reduceat(again, blocks).tolist(),
+        )
         at = places[rows]
-        for first, *columns in zip(blocks.tolist(), reach, low, high, strict=True):
+        for first, *reach in zip(blocks.tolist(), *columns, strict=True):
             some = slice(first, first + _ROWS)
             own, to = rows[some], at[some]
             if to[-1] - to[0] == own.size - 1:  # they are neighbours
                 block = out[to[0] : to[-1] + 1]
-                self._block(own, block, lines[some], *columns)
+                self._block(own, block, lines[some], reach)
             else:
                 block = np.empty((own.size, out.shape[1]))
-                self._block(own, block, lines[some], *columns)
+                self._block(own, block, lines[some], reach)
                 out[to] = block
 
     def _block(
-        self, rows: Indices, out: Floats, lines: _Lines, reach: int, low: int, high: int
+        self, rows: Indices, out: Floats, lines: _Lines, reach: list[int]
     ) -> None:
-        # (1) everywhere, and over it what is not pre-catch
-        self._multiply(self._before[rows], 0, reach, out)
-        if low < high:
-            self._multiply(self._after[rows], low, high, self._buffer)
+        # (1) but for columns in which no row is pre-catch, and over it what is not
+        last_catch, first_again, end, first_post, last_post = reach
+        before = self._before[rows]
+        self._multiply(before, 0, last_catch, out)
+        self._multiply(before, max(last_catch, first_again), end, out)
+        if first_post < last_post:
+            self._multiply(self._after[rows], first_post, last_post, self._buffer)
         for row, later, line in zip(out, self._buffer, lines, strict=False):
             c, f, p, e, end, peak, residual = line
             if c < end:

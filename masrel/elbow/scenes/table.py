@@ -102,14 +102,10 @@ def joints_of(parameters: Sequence[ElbowParameters]) -> Joints:
     Joints
         Their columns.
     """
-    places: dict[int, int] = {}
-    distinct: list[ElbowParameters] = []
-    index = np.empty(len(parameters), dtype=np.intp)
-    for i, one in enumerate(parameters):
-        place = places.setdefault(id(one), len(distinct))
-        if place == len(distinct):
-            distinct.append(one)
-        index[i] = place
+    own = {id(one): one for one in parameters}
+    distinct = list(own.values())
+    places = dict(zip(own, range(len(own)), strict=True))
+    index = np.fromiter(map(places.__getitem__, map(id, parameters)), dtype=np.intp)
     read = np.fromiter(
         chain.from_iterable(map(_read, distinct)),
         dtype=np.float64,

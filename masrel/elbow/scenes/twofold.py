@@ -10,7 +10,7 @@ import numpy as np
 
 from masrel.elbow.motion import Floats
 
-__all__ = ["Twofold", "difference", "product"]
+__all__ = ["Operand", "Twofold"]
 
 _SPLIT = 134217729.0  # 2²⁷ + 1, which halves the digits of a float
 
@@ -47,6 +47,38 @@ class Twofold:
     def __init__(self, high: Floats | float, low: Floats | float = 0.0) -> None:
         self.high = np.asarray(high, dtype=np.float64)
         self.low = np.asarray(low, dtype=np.float64)
+
+    @classmethod
+    def difference(cls, a: Floats | float, b: Floats | float) -> "Twofold":
+        """Subtract floats without rounding.
+
+        Parameters
+        ----------
+        a, b : ndarray or float
+            The two.
+
+        Returns
+        -------
+        Twofold
+            a - b.
+        """
+        return cls(*_sum(np.asarray(a), -np.asarray(b)))
+
+    @classmethod
+    def product(cls, a: Floats | float, b: Floats | float) -> "Twofold":
+        """Multiply floats without rounding.
+
+        Parameters
+        ----------
+        a, b : ndarray or float
+            The factors.
+
+        Returns
+        -------
+        Twofold
+            Their product.
+        """
+        return cls(*_product(np.asarray(a), np.asarray(b)))
 
     def __add__(self, other: Operand) -> "Twofold":
         if not isinstance(other, Twofold):
@@ -98,7 +130,7 @@ class Twofold:
             The roots; 0 of 0.
         """
         root = np.sqrt(self.high)
-        left = self - product(root, root)
+        left = self - Twofold.product(root, root)
         with np.errstate(divide="ignore", invalid="ignore"):
             more = np.where(root > 0.0, left.high / (2.0 * root), 0.0)
         return Twofold(*_quick(root, more))
@@ -123,37 +155,32 @@ class Twofold:
             np.where(condition, self.low, other.low),
         )
 
+    def take(self, rows: np.ndarray) -> "Twofold":
+        """Return some of the numbers.
 
-def product(a: Floats | float, b: Floats | float) -> Twofold:
-    """Multiply floats without rounding.
+        Parameters
+        ----------
+        rows : ndarray of int
+            Which.
 
-    Parameters
-    ----------
-    a, b : ndarray or float
-        The factors.
+        Returns
+        -------
+        Twofold
+            Those.
+        """
+        return Twofold(self.high[rows], self.low[rows])
 
-    Returns
-    -------
-    Twofold
-        Their product.
-    """
-    return Twofold(*_product(np.asarray(a), np.asarray(b)))
+    def put(self, rows: np.ndarray, others: "Twofold") -> None:
+        """Replace some of the numbers.
 
-
-def difference(a: Floats | float, b: Floats | float) -> Twofold:
-    """Subtract floats without rounding.
-
-    Parameters
-    ----------
-    a, b : ndarray or float
-        The two.
-
-    Returns
-    -------
-    Twofold
-        a - b.
-    """
-    return Twofold(*_sum(np.asarray(a), -np.asarray(b)))
+        Parameters
+        ----------
+        rows : ndarray of int
+            Which.
+        others : Twofold
+            What stands there from now on.
+        """
+        self.high[rows], self.low[rows] = others.high, others.low
 
 
 def _twofold(value: Operand) -> Twofold:
