@@ -8,9 +8,9 @@ import pytest
 
 from masrel.elbow import STANDARD_MODELS, MinimumJerk, events, torque_traces
 from masrel.elbow.scenes import sieve
-from masrel.elbow.scenes.batch import motions_of
 from masrel.elbow.scenes.course import nearest
 from masrel.elbow.scenes.digits import DIGITS_16
+from masrel.elbow.scenes.kinds import motions_of
 from masrel.elbow.scenes.quintic import quintic_courses
 from masrel.elbow.scenes.sieve import courses_for_samples
 from masrel.elbow.scenes.table import joints_of

@@ -3,9 +3,8 @@
 In: joints and motions. Out: the outputs asked for, of every scene.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from operator import attrgetter
 
 import numpy as np
 
@@ -13,12 +12,11 @@ from masrel.elbow.course import course
 from masrel.elbow.effort import effort
 from masrel.elbow.events import events_of
 from masrel.elbow.motion import Floats, Motion
-from masrel.elbow.motions import ConstantSpeed, MinimumJerk
 from masrel.elbow.parameters import ElbowParameters
-from masrel.elbow.scenes.constant import constant_courses
-from masrel.elbow.scenes.course import Courses, Motions, nearest
-from masrel.elbow.scenes.effort import Efforts, Path, constant_path, quintic_path
-from masrel.elbow.scenes.quintic import quintic_courses
+from masrel.elbow.scenes.course import Courses, nearest
+from masrel.elbow.scenes.effort import Efforts
+from masrel.elbow.scenes.kinds import KINDS, courses_of, efforts_of, motions_of
+from masrel.elbow.scenes.pairs import check_starts, paired
 from masrel.elbow.scenes.table import Joints, joints_of
 from masrel.errors import ParameterError
 
@@ -26,12 +24,7 @@ __all__ = [
     "EFFORTS",
     "EVENTS",
     "SceneTable",
-    "check_starts",
-    "courses_of",
-    "efforts_of",
     "evaluate",
-    "motions_of",
-    "paired",
 ]
 
 EVENTS = (
@@ -159,78 +152,13 @@ def evaluate(
         own = [joints[i] for i in rows.tolist()]
         stretches = [moves[i] for i in rows.tolist()]
         alone = np.ones(rows.size, dtype=np.bool_)
-        if kind in _KINDS:
+        if kind in KINDS:
             values[rows], alone = _together(kind, own, stretches, asked)
         for i in np.flatnonzero(alone).tolist():
             values[rows[i]] = _alone(own[i], stretches[i], asked)
         n_alone += int(alone.sum())
     values.setflags(write=False)
     return SceneTable(outputs=asked, values=values, n_alone=n_alone)
-
-
-def paired(
-    parameters: ElbowParameters | Sequence[ElbowParameters],
-    motions: Motion | Sequence[Motion],
-) -> tuple[Sequence[ElbowParameters], Sequence[Motion]]:
-    """Give every scene its joint and its motion.
-
-    Parameters
-    ----------
-    parameters : ElbowParameters or sequence of ElbowParameters
-        The joints, one a scene; or one for all.
-    motions : Motion or sequence of Motion
-        The motions, one a scene; or one for all.
-
-    Returns
-    -------
-    tuple of two sequences, each of length n_scenes
-        Joints and motions.
-
-    Raises
-    ------
-    ParameterError
-        If their numbers do not fit.
-    """
-    joints = [parameters] if isinstance(parameters, ElbowParameters) else parameters
-    moves = motions if isinstance(motions, Sequence) else [motions]
-    n = max(len(joints), len(moves)) if joints and moves else 0
-    if len(joints) not in (1, n) or len(moves) not in (1, n) or n == 0:
-        raise ParameterError(
-            "parameters, motions: need as many joints as motions, or one of either, "
-            f"got {len(joints)} and {len(moves)}"
-        )
-    return (
-        joints if len(joints) == n else [joints[0]] * n,
-        moves if len(moves) == n else [moves[0]] * n,
-    )
-
-
-def check_starts(
-    joints: Sequence[ElbowParameters], moves: Sequence[Motion], rows: np.ndarray
-) -> None:
-    """Check that no motion starts at or beyond the end of range.
-
-    Parameters
-    ----------
-    joints : sequence of ElbowParameters
-        The joints.
-    moves : sequence of Motion
-        The motions.
-    rows : ndarray of int
-        What number each has among those asked for.
-
-    Raises
-    ------
-    ParameterError
-        If one does; the message says which.
-    """
-    for i, joint, motion in zip(rows.tolist(), joints, moves, strict=True):
-        if motion.start >= joint.range_end:
-            raise ParameterError(
-                f"motions[{i}].start: needs less than the end of range, "
-                f"{np.degrees(joint.range_end):g} degrees, got "
-                f"{np.degrees(motion.start):g} degrees"
-            )
 
 
 def _groups(
@@ -244,83 +172,6 @@ def _groups(
         rows = np.array(own)
         for first in range(0, rows.size, chunk):
             yield rows[first : first + chunk], kind
-
-
-@dataclass(frozen=True, slots=True)
-class _Kind:
-    courses: Callable[[Joints, Motions], Courses]
-    path: Callable[[Motions], Path]
-    speed: str
-
-
-_KINDS: Mapping[type[Motion], _Kind] = {
-    ConstantSpeed: _Kind(constant_courses, constant_path, "speed"),
-    MinimumJerk: _Kind(quintic_courses, quintic_path, "mean_speed"),
-}
-
-
-def motions_of(kind: type[Motion], stretches: Sequence[Motion]) -> Motions:
-    """Put motions of one kind into columns.
-
-    Parameters
-    ----------
-    kind : type
-        `ConstantSpeed` or `MinimumJerk`.
-    stretches : sequence of Motion
-        The motions.
-
-    Returns
-    -------
-    Motions
-        Their columns.
-    """
-    read = attrgetter("start", "end", _KINDS[kind].speed)
-    start, end, speed = np.array([read(one) for one in stretches], dtype=np.float64).T
-    return Motions(start=start, end=end, speed=speed)
-
-
-def courses_of(kind: type[Motion], joints: Joints, motions: Motions) -> Courses:
-    """Find the events of motions of one kind.
-
-    Parameters
-    ----------
-    kind : type
-        `ConstantSpeed` or `MinimumJerk`.
-    joints : Joints
-        The joints.
-    motions : Motions
-        The motions.
-
-    Returns
-    -------
-    Courses
-        Their events.
-    """
-    return _KINDS[kind].courses(joints, motions)
-
-
-def efforts_of(
-    kind: type[Motion], joints: Joints, motions: Motions, courses: Courses
-) -> Efforts:
-    """Prepare torques, work and impulse of motions of one kind.
-
-    Parameters
-    ----------
-    kind : type
-        `ConstantSpeed` or `MinimumJerk`.
-    joints : Joints
-        The joints.
-    motions : Motions
-        The motions.
-    courses : Courses
-        Their events.
-
-    Returns
-    -------
-    Efforts
-        Each is computed when it is asked for.
-    """
-    return Efforts(joints, motions, courses, _KINDS[kind].path(motions))
 
 
 def _together(

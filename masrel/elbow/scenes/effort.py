@@ -7,138 +7,16 @@ Source: Park, Kim and Damiano (2012), IEEE TNSRE 20(3), 361-370,
 https://doi.org/10.1109/TNSRE.2012.2195330, equations (1), (3) and (5).
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from masrel.elbow.motion import Floats
 from masrel.elbow.scenes.course import Courses, Flags, Motions
+from masrel.elbow.scenes.path import Path
 from masrel.elbow.scenes.table import Joints
 
-__all__ = ["Efforts", "Path", "constant_path", "quintic_path"]
-
-_Law = Callable[[Floats], Floats]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Path:
-    """A kind of motion as functions of time, for one column of times.
-
-    Attributes
-    ----------
-    travel : callable
-        Angle gone since the start, rad.
-    velocity : callable
-        rad/s.
-    acceleration : callable
-        rad/s².
-    is_steady : bool
-        Whether the velocity is constant.
-    travel_integral : callable
-        ∫ travel dt from the start, rad s.
-    square_integral : callable
-        ∫ velocity² dt from the start, rad²/s.
-    turning : callable
-        From a stiffness and a damping, the time before which stiffness · travel +
-        damping · velocity rises and after which it falls, s.
-    """
-
-    travel: _Law
-    velocity: _Law
-    acceleration: _Law
-    is_steady: bool
-    travel_integral: _Law
-    square_integral: _Law
-    turning: Callable[[Floats, Floats], Floats]
-
-
-def constant_path(motions: Motions) -> Path:
-    """Return the functions of stretches at constant speed.
-
-    Parameters
-    ----------
-    motions : Motions
-        The stretches.
-
-    Returns
-    -------
-    Path
-        Their functions.
-    """
-    speed = motions.speed
-    return Path(
-        travel=lambda t: speed * t,
-        velocity=lambda t: speed + 0.0 * t,
-        acceleration=lambda t: 0.0 * t,
-        is_steady=True,
-        travel_integral=lambda t: 0.5 * speed * t * t,
-        square_integral=lambda t: speed * speed * t,
-        turning=lambda k, _: np.full(k.shape, np.inf),
-    )
-
-
-def quintic_path(motions: Motions) -> Path:
-    """Return the functions of minimum-jerk stretches.
-
-    Parameters
-    ----------
-    motions : Motions
-        The stretches.
-
-    Returns
-    -------
-    Path
-        Their functions.
-    """
-    way, speed = motions.end - motions.start, motions.speed
-    total = way / speed
-
-    def travel(t: Floats) -> Floats:
-        x = t / total
-        return np.asarray(way * (x * x * x * (10.0 + x * (6.0 * x - 15.0))))
-
-    def velocity(t: Floats) -> Floats:
-        rest = t / total * (1.0 - t / total)
-        return np.asarray(30.0 * speed * rest * rest)
-
-    def acceleration(t: Floats) -> Floats:
-        x = t / total
-        return np.asarray(60.0 * speed / total * x * (1.0 - x) * (1.0 - 2.0 * x))
-
-    def travel_integral(t: Floats) -> Floats:
-        x = t / total
-        power = x * x * x * x
-        return np.asarray(total * way * (power * (2.5 + x * (x - 3.0))))
-
-    def square_integral(t: Floats) -> Floats:
-        # 900 ∫ x⁴ (1 - x)⁴
-        x = t / total
-        power = x * x * x * x * x
-        inner = 900 / 5 + x * (-600.0 + x * (5400 / 7 + x * (-450.0 + x * 100.0)))
-        return np.asarray(way * speed * (power * inner))
-
-    def turning(k: Floats, b: Floats) -> Floats:
-        # k x (1 - x) + c (1 - 2x) = 0 with c = 2b/T, without cancellation
-        c = 2.0 * b / total
-        root = np.sqrt(k * k + 4.0 * c * c)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            x = np.where(
-                k > 2.0 * c,
-                (k - 2.0 * c + root) / (2.0 * k),
-                2.0 * c / (2.0 * c - k + root),
-            )
-        return np.asarray(np.where(root > 0.0, x, 0.5) * total)
-
-    return Path(
-        travel=travel,
-        velocity=velocity,
-        acceleration=acceleration,
-        is_steady=False,
-        travel_integral=travel_integral,
-        square_integral=square_integral,
-        turning=turning,
-    )
+__all__ = ["Efforts"]
 
 
 class Efforts:

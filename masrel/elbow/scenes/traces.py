@@ -15,16 +15,11 @@ from masrel.elbow.events import events
 from masrel.elbow.motion import Floats, Motion
 from masrel.elbow.motions import MinimumJerk
 from masrel.elbow.parameters import ElbowParameters
-from masrel.elbow.scenes.batch import (
-    check_starts,
-    courses_of,
-    efforts_of,
-    motions_of,
-    paired,
-)
 from masrel.elbow.scenes.course import Courses, Motions
 from masrel.elbow.scenes.exact import ExactRows
 from masrel.elbow.scenes.fill import BLOCK, Fill
+from masrel.elbow.scenes.kinds import courses_of, efforts_of, motions_of
+from masrel.elbow.scenes.pairs import check_starts, paired
 from masrel.elbow.scenes.rows import LAWS
 from masrel.elbow.scenes.samples import phase_samples
 from masrel.elbow.scenes.sieve import courses_for_samples
