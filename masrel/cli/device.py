@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 __all__ = ["command"]
 
 _N_NODES = 31
-_WATCHDOG_S = 0.05  # as in a protocol
 
 
 @click.group("device")
@@ -110,7 +109,8 @@ def friction_command(bench: Bench, arm_is_free: bool) -> None:
     The arm moves by itself, between 40 and 115 deg, at up to 80 deg/s, with at most
     2 N·m, for about 20 s.
     """
-    from masrel.hess.puck.friction import SPEEDS, fit_friction, steady_runs
+    from masrel.hess.puck.friction import fit_friction
+    from masrel.hess.puck.turning import LIMITS, SPEEDS, steady_runs
     from masrel.hess.watchdog import watched
 
     if not arm_is_free:
@@ -118,11 +118,14 @@ def friction_command(bench: Bench, arm_is_free: bool) -> None:
             "the arm will move by itself; when it is free, say --arm-is-free"
         )
     with (
+        bench.emergency_stop() as stop,
         bench.device() as device,
-        watched(device, _WATCHDOG_S) or nullcontext() as watchdog,
+        watched(device, LIMITS.watchdog_time) or nullcontext() as watchdog,
         bench.progress(2 * len(SPEEDS)) as progress,
     ):
-        runs = steady_runs(device, bench.clock, watchdog=watchdog, progress=progress)
+        runs = steady_runs(
+            device, bench.clock, watchdog=watchdog, stop=stop, progress=progress
+        )
         estimate = fit_friction(runs)
     bench.say(_friction_lines(estimate), dataclasses.asdict(estimate))
 

@@ -4,6 +4,7 @@ import dataclasses
 import functools
 import json
 import math
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,7 +19,7 @@ from masrel.hess.puck.options import PuckOptions
 from masrel.hess.puck.properties import PropertyTable, read_property_table
 
 if TYPE_CHECKING:
-    from masrel.hess import Device
+    from masrel.hess import Device, EmergencyStop
     from masrel.hess.puck.bus import Link
 
 __all__ = ["Bench", "for_a_puck"]
@@ -78,10 +79,21 @@ class Bench:
         )
 
     @contextmanager
+    def emergency_stop(self) -> "Iterator[EmergencyStop]":
+        """Give a button that signals press, and any key of the terminal."""
+        from masrel.hess import EmergencyStop
+        from masrel.hess.stop import stop_on_key, stop_on_signals
+
+        stop = EmergencyStop()
+        keys = None if self.hand is not None else sys.stdin  # an emulator is quick
+        with stop_on_signals(stop), stop_on_key(stop, keys):
+            yield stop
+
+    @contextmanager
     def progress(self, total: int) -> Iterator[Callable[[], None]]:
-        """Show a bar of steps."""
+        """Show a bar of steps on a terminal."""
         hidden = self.quiet or self.json_file == "-"
-        with tqdm(total=total, unit="", leave=False, disable=hidden) as bar:
+        with tqdm(total=total, unit="", leave=False, disable=hidden or None) as bar:
 
             def step() -> None:
                 bar.update()

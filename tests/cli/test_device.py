@@ -1,9 +1,13 @@
 """``masrel device`` against an emulated puck."""
 
 import json
+import signal
 from pathlib import Path
 
 import pytest
+
+from masrel.hess.puck import turning
+from masrel.hess.puck.turning import steady_runs
 
 from .process import Caller
 
@@ -24,6 +28,7 @@ def test_probe_says_who_is_there(masrel: Caller) -> None:
         "puck 1: motor, firmware 148, asleep",
         "(simulated: there is no hardware on this bus)",
     ]
+    assert done.err == ""  # no terminal, no progress bar
 
 
 def test_probe_says_that_nobody_is_there(masrel: Caller) -> None:
@@ -75,6 +80,21 @@ def test_friction_finds_that_of_the_emulated_arm(masrel: Caller) -> None:
     assert found["coulomb"] == pytest.approx(0.189, rel=0.015)
     assert abs(found["offset"]) < 0.002
     assert len(found["runs"]) == 8
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_a_signal_is_an_emergency_stop_while_the_arm_turns(
+    masrel: Caller, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    def signalled(*arguments, **options):
+        signal.raise_signal(signal.Signals[name])
+        return steady_runs(*arguments, **options)
+
+    monkeypatch.setattr(turning, "steady_runs", signalled)
+    done = masrel("device", "friction", "--arm-is-free", *EMULATED)
+    assert done.code == 1
+    assert f"emergency stop: signal {name}" in done.err
+    assert "Traceback" not in done.err
 
 
 def test_friction_does_not_move_an_arm_unasked(masrel: Caller) -> None:
