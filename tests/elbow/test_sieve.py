@@ -76,7 +76,7 @@ def test_an_event_at_a_sample_is_asked_again(late_s: float) -> None:
     with counted(sieve, "quintic_courses") as calls:
         courses_for_samples(*columns([(HM3, stretch)] * 3), rate_hz)
     assert calls == [1 if late_s > 1e-12 else 2]
-    row = torque_traces(HM3, stretch, rate_hz=rate_hz, reading="exact")[0]
+    row = torque_traces(HM3, stretch, rate_hz=rate_hz)[0]
     # the catch's torque jumps by H v_c, the law before it moves by far less
     rise = HM3.catch_torque_constant * events(HM3, stretch).catch_speed
     jumped = np.flatnonzero(np.diff(row) > 0.9 * rise) + 1

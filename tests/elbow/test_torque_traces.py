@@ -26,7 +26,7 @@ HM3 = STANDARD_MODELS["HM3"]
 
 
 def check(joints, motions, rate_hz: float) -> None:
-    made = torque_traces(joints, motions, rate_hz=rate_hz)
+    made = torque_traces(joints, motions, rate_hz=rate_hz, reading="sampled")
     for row, joint, motion in zip(made, joints, motions, strict=True):
         one = trace(joint, motion, rate_hz=rate_hz).torque
         assert row[: one.size].tolist() == one.tolist()
@@ -66,11 +66,12 @@ def test_plain_stretches_are_not_stepped_through_alone() -> None:
     joints = [STANDARD_MODELS[row.model] for row in rows]
     for kind in (constant, minimum_jerk):
         with counted(traces, "trace") as n_traces:
-            torque_traces(joints, [kind(row.speed_deg_s) for row in rows])
+            stretches = [kind(row.speed_deg_s) for row in rows]
+            torque_traces(joints, stretches, reading="sampled")
             assert n_traces == [0]
     additive = replace(HM3, post_catch="additive")
     with counted(traces, "trace") as n_traces:
-        torque_traces([HM3, additive], constant(92.0))
+        torque_traces([HM3, additive], constant(92.0), reading="sampled")
         assert n_traces == [1]  # the counter does count
 
 
@@ -78,7 +79,7 @@ def test_mixed_motions_keep_their_rows() -> None:
     motions = [minimum_jerk(92.0), constant(92.0), minimum_jerk(46.0), constant(46.0)]
     assert isinstance(motions[0], MinimumJerk)
     check([HM3] * 4, motions, 100.0)
-    made = torque_traces(HM3, motions, rate_hz=100.0)
+    made = torque_traces(HM3, motions, rate_hz=100.0, reading="sampled")
     assert isnan(made[0, -1])
     assert not isnan(made[2, -1])
 
@@ -102,7 +103,7 @@ def largest_term(joint: ElbowParameters, motion: Motion) -> float:
 
 def check_exact(joints, motions, rate_hz: float) -> set[str]:
     """Compare every sample with `torque`; return which phases there were."""
-    made = torque_traces(joints, motions, rate_hz=rate_hz, reading="exact")
+    made = torque_traces(joints, motions, rate_hz=rate_hz)
     seen = set()
     for row, joint, motion in zip(made, joints, motions, strict=True):
         found = events(joint, motion)
@@ -157,7 +158,7 @@ def test_scenes_at_a_sample_begin_the_later_phase() -> None:
         speed_threshold=0.25,
     )
     stretch = ConstantSpeed(start=0.0, end=1.5, speed=0.5)
-    (row,) = torque_traces(joint, stretch, rate_hz=8.0, reading="exact")
+    (row,) = torque_traces(joint, stretch, rate_hz=8.0)
     before, peak, residual = (
         joint.damping * 0.5
         + joint.stiffness * 0.5
@@ -181,26 +182,26 @@ def test_exact_plain_stretches_are_not_led_through_alone() -> None:
     additive = replace(HM3, post_catch="additive", inertia=0.1)
     for kind in (constant, minimum_jerk):
         with counted(traces, "torque") as n_alone:
-            torque_traces([HM3, additive], kind(92.0), reading="exact")
+            torque_traces([HM3, additive], kind(92.0))
             assert n_alone == [0]
     smoothed = replace(HM3, catch_rise=0.05)
     with counted(traces, "torque") as n_alone:
-        torque_traces([HM3, smoothed], constant(92.0), reading="exact")
+        torque_traces([HM3, smoothed], constant(92.0))
         assert n_alone == [1]  # the counter does count
 
 
 def test_exact_and_sampled_agree_but_for_the_sample_after_an_event() -> None:
     for kind in (constant, minimum_jerk):
         stretches = [kind(speed) for speed in (60.0, 92.0, 131.0)]
-        sampled = torque_traces(HM3, stretches, rate_hz=1e4)
-        exact = torque_traces(HM3, stretches, rate_hz=1e4, reading="exact")
+        sampled = torque_traces(HM3, stretches, rate_hz=1e4, reading="sampled")
+        exact = torque_traces(HM3, stretches, rate_hz=1e4)
         off = np.abs(exact - sampled) > 0.01  # N·m
         # the catch, the peak's end and the catch's end, each seen two samples late
         assert (off.sum(axis=1) <= 6).all()
 
 
 def test_an_unknown_reading_is_refused() -> None:
-    with pytest.raises(ParameterError, match=r'^reading: needs "sampled" or "exact"'):
+    with pytest.raises(ParameterError, match=r'^reading: needs "exact" or "sampled"'):
         torque_traces(HM3, constant(92.0), reading="continuous")
 
 
