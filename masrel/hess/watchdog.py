@@ -6,6 +6,7 @@ not be the only one who can take it back.
 
 import contextlib
 import os
+import select
 import subprocess
 import sys
 from types import TracebackType
@@ -16,7 +17,7 @@ from masrel.hess.device import Device, IdleCommand
 
 __all__ = ["NoWatchdog", "Watchdog", "Watching", "watched"]
 
-_READY_AFTER_S = 20.0  # a Python that starts on a busy machine
+_READY_AFTER_S = 20.0  # a Python that starts, or ends, on a busy machine
 
 
 class Watching(Protocol):
@@ -87,6 +88,14 @@ class Watchdog:
         )
         if process.stdin is None or process.stdout is None:
             raise DeviceError("watchdog: needs pipes, got none")
+        said, _, _ = select.select([process.stdout], [], [], _READY_AFTER_S)
+        if not said:
+            process.kill()
+            self._end()
+            raise DeviceError(
+                f"watchdog: needs a process that is ready within {_READY_AFTER_S:g} s, "
+                f"{command[3:]} is not"
+            )
         if process.stdout.readline() != b"ready\n":
             self._end()
             raise DeviceError(
@@ -144,7 +153,11 @@ class Watchdog:
         for pipe in (process.stdin, process.stdout):
             if pipe is not None:
                 pipe.close()
-        process.wait(_READY_AFTER_S)
+        try:
+            process.wait(_READY_AFTER_S)
+        except subprocess.TimeoutExpired:
+            process.kill()  # it has been told that there is nothing to idle
+            process.wait()
 
 
 def watched(device: Device, timeout_s: float) -> Watchdog | None:

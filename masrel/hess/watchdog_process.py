@@ -1,8 +1,8 @@
 """The process of a watchdog: waits for beats, idles the device when they stop.
 
 ``python -m masrel.hess.watchdog_process TIMEOUT_S MODULE ARGUMENT...`` reads beats from
-its standard input. It ends with 0 when it is told that all is well, and with 3 after it
-has idled the device.
+its standard input. It ends with 0 when it is told that all is well, with 3 after it
+has idled the device, and with 1 and a sentence when it cannot.
 """
 
 import contextlib
@@ -17,7 +17,7 @@ from masrel.errors import DeviceError
 
 __all__ = ["main", "watch"]
 
-_IDLED = 3
+_FAILED, _IDLED = 1, 3
 _TRIES = 5  # a bus that fails once may work a moment later
 _PRIORITY = 81  # above that of the loop, which may be what hangs
 
@@ -43,10 +43,14 @@ def main(arguments: list[str]) -> int:
         with contextlib.suppress(OSError):  # not permitted: as it is, then
             os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_PRIORITY))
     timeout_s, module, *rest = arguments
-    idle: Callable[[], None] = importlib.import_module(module).prepare(*rest)
-    sys.stdout.write("ready\n")
-    sys.stdout.flush()
-    return watch(0, float(timeout_s), idle)
+    try:
+        idle: Callable[[], None] = importlib.import_module(module).prepare(*rest)
+        sys.stdout.write("ready\n")
+        sys.stdout.flush()
+        return watch(0, float(timeout_s), idle)
+    except DeviceError as error:
+        sys.stderr.write(f"watchdog: {error}\n")
+        return _FAILED
 
 
 def watch(pipe: int, timeout_s: float, idle: Callable[[], None]) -> int:

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from masrel.errors import DeviceError
-from masrel.hess import IdleCommand
+from masrel.hess import IdleCommand, watchdog
 from masrel.hess.watchdog import Watchdog, watched
 from masrel.hess.watchdog_process import watch
 
@@ -101,10 +101,10 @@ def test_it_says_so_when_it_never_can(pipe) -> None:
 def test_a_loop_that_ends_well_leaves_the_device_to_itself(tmp_path: Path) -> None:
     path = tmp_path / "device"
     file = made(path)
-    with Watchdog(IdleCommand("tests.hess.shared", (str(path),)), 0.05) as watchdog:
+    with Watchdog(IdleCommand("tests.hess.shared", (str(path),)), 0.05) as dog:
         file.write(1.5, 1)
-        watchdog.beat()
-        watchdog.rest()
+        dog.beat()
+        dog.rest()
         time.sleep(0.15)
     assert file.read()[0] == 1.5
     assert file.read()[2] == 1
@@ -113,12 +113,12 @@ def test_a_loop_that_ends_well_leaves_the_device_to_itself(tmp_path: Path) -> No
 def test_a_dead_watchdog_is_noticed_by_the_loop(tmp_path: Path) -> None:
     path = tmp_path / "device"
     made(path)
-    with Watchdog(IdleCommand("tests.hess.shared", (str(path),)), 5.0) as watchdog:
-        assert watchdog._process is not None
-        watchdog._process.kill()
-        watchdog._process.wait()
+    with Watchdog(IdleCommand("tests.hess.shared", (str(path),)), 5.0) as dog:
+        assert dog._process is not None
+        dog._process.kill()
+        dog._process.wait()
         with pytest.raises(DeviceError, match="watchdog: has ended"):
-            watchdog.beat()
+            dog.beat()
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
@@ -129,6 +129,47 @@ def test_a_watchdog_that_cannot_reach_the_device_is_refused(tmp_path: Path) -> N
         Watchdog(nowhere, 0.05),
     ):
         pass
+
+
+def prepare() -> None:
+    """Never ready: what a process does that hangs before it holds the device."""
+    time.sleep(60.0)
+
+
+def test_a_watchdog_that_is_never_ready_is_refused(monkeypatch) -> None:
+    monkeypatch.setattr(watchdog, "_READY_AFTER_S", 0.2)
+    begun = time.monotonic()
+    with (
+        pytest.raises(DeviceError, match="watchdog: needs a process that is ready"),
+        Watchdog(IdleCommand("tests.hess.test_watchdog", ()), 0.05),
+    ):
+        pass
+    assert time.monotonic() - begun < 10.0  # and it was not left behind
+
+
+def test_a_watchdog_that_does_not_end_is_ended(tmp_path: Path, monkeypatch) -> None:
+    path = tmp_path / "device"
+    made(path)
+    with Watchdog(IdleCommand("tests.hess.shared", (str(path),)), 5.0) as dog:
+        process = dog._process
+        assert process is not None
+        process.send_signal(signal.SIGSTOP)
+        monkeypatch.setattr(watchdog, "_READY_AFTER_S", 0.2)
+    assert process.returncode == -signal.SIGKILL
+
+
+def test_the_process_says_in_one_line_why_it_cannot() -> None:
+    command = (sys.executable, "-m", "masrel.hess.watchdog_process", "0.05")
+    done = subprocess.run(
+        (*command, "masrel.hess.puck.idling", "none", "x", "1", "42", "8"),
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 1
+    assert done.stdout == ""
+    assert done.stderr.startswith("watchdog: puck: cannot open channel 'x' of ")
+    assert done.stderr.count("\n") == 1
 
 
 def test_only_a_device_that_another_process_can_reach_is_watched(tmp_path) -> None:
