@@ -75,7 +75,7 @@ def draw_integrators(
                 ha="left",
             )
     axes.axhline(18.8 / 2700.0, color=GREY, linewidth=0.8)
-    axes.text(0.3, 18.8 / 2700.0 * 1.2, "torque quantum", color=GREY, ha="center")
+    axes.text(0.05, 18.8 / 2700.0 * 1.2, "torque quantum", color=GREY, ha="center")
     axes.set_xlabel("processor time of a simulated second (s)")
     axes.set_ylabel("largest error of the hand's torque (N·m)")
     axes.grid(color="#DDDDDD", linewidth=0.6)
@@ -158,7 +158,8 @@ def draw_backdrive(path: Path) -> None:
     axes.set_xlabel("time (s)")
     axes.set_ylabel("torque of the hand (N·m)")
     axes.set_title("device alone, moved back and forth, simulated", fontsize=9)
-    axes.legend(frameon=False, loc="lower left", fontsize=8)
+    beside = {"loc": "center right", "bbox_to_anchor": (1.0, 0.78)}
+    axes.legend(frameon=False, fontsize=8, **beside)
     figure.savefig(path)
 
 

@@ -45,8 +45,9 @@ def draw_work(points: Sequence["Point"]) -> None:
             if way in ("stepped", "solve_ivp"):
                 for point, at, height in zip(own, x, y, strict=True):
                     axes.annotate(
-                        point.setting, (at, height), xytext=(5, 3), fontsize=6.5,
+                        point.setting, (at, height), xytext=(6, 4), fontsize=6.5,
                         textcoords="offset points", color=colour,
+                        bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.3},
                     )  # fmt: skip
         axes.set_xlabel("processor time of one stretch (ms)")
         axes.set_ylabel("largest error of catch\nand catch end (s)")
