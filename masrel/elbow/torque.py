@@ -193,10 +193,10 @@ def times_at(motion: Motion, angles: ArrayLike) -> Floats:
 
 
 def _first_time(motion: Motion, goal: float) -> float:
-    time, angle = ZERO, Decimal(goal)
     if goal == motion.start:
         return 0.0
-    for piece in motion.pieces():
+    time, angle = ZERO, Decimal(goal)
+    for piece in motion.pieces() if math.isfinite(goal) else ():
         above = (piece.angle[0] - angle, *piece.angle[1:])
         for low, high in pairwise(cuts((above,), ZERO, ONE)):
             if high < 1 or (value(above, low) > 0) != (value(above, high) > 0):

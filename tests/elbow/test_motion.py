@@ -143,3 +143,10 @@ def test_motions_are_frozen() -> None:
         stretch.speed = 1.0  # type: ignore[misc]
     assert degrees(stretch.speed) == pytest.approx(90.0)
     assert radians(30.0) == stretch.start
+
+
+@pytest.mark.parametrize("goal", [2.6, 0.4, float("nan"), float("inf")])
+def test_an_angle_that_is_not_reached_has_no_time(goal: float) -> None:
+    stretch = ConstantSpeed(start=0.5, end=2.5, speed=1.0)
+    with pytest.raises(ParameterError, match="angles: need ones that the motion reach"):
+        times_at(stretch, [goal])

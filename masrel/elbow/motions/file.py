@@ -1,6 +1,7 @@
 """Motions from files: a table of times and angles, or a recording of the loop."""
 
 import csv
+import math
 from pathlib import Path
 
 import numpy as np
@@ -47,8 +48,8 @@ def read_motion(path: Path, *, interpolation: Interpolation = "pchip") -> Record
     ...     read_motion(path).duration
     1.0
     """
-    if path.suffix in (".npz", ".json"):
-        columns = read_recording(path.with_suffix(".npz")).columns
+    if path.suffix.lower() in (".npz", ".json"):
+        columns = read_recording(_checked_pair(path)).columns
         samples = [list(columns[name]) for name in _COLUMNS]
     else:
         samples = _read_table(path)
@@ -62,11 +63,22 @@ def read_motion(path: Path, *, interpolation: Interpolation = "pchip") -> Record
         raise ParameterError(f"{path}: {error}") from error
 
 
+def _checked_pair(path: Path) -> Path:
+    # the npz of a recording, which is no motion without its facts
+    for suffix in (".npz", ".json"):
+        if not path.with_suffix(suffix).is_file():
+            raise RecordingError(
+                f"{path}: needs both files of a recording, got no "
+                f"{path.with_suffix(suffix).name} beside it"
+            )
+    return path.with_suffix(".npz")
+
+
 def _read_table(path: Path) -> list[list[float]]:
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             rows = list(csv.reader(file))
-    except (OSError, UnicodeDecodeError) as error:
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise RecordingError(f"{path}: cannot be read: {error}") from error
     names = [name.strip() for name in rows[0]] if rows else []
     missing = [name for name in _COLUMNS if name not in names]
@@ -75,15 +87,25 @@ def _read_table(path: Path) -> list[list[float]]:
             f"{path}: needs the columns {', '.join(_COLUMNS)} in row 1, "
             f"got {', '.join(names) or 'nothing'}"
         )
+    if twice := [name for name in _COLUMNS if names.count(name) > 1]:
+        raise RecordingError(f"{path}: needs one column {twice[0]} in row 1, got more")
     places = [names.index(name) for name in _COLUMNS]
     samples: list[list[float]] = [[], []]
     for number, row in enumerate(rows[1:], start=2):
         for name, place, column in zip(_COLUMNS, places, samples, strict=True):
             cell = row[place] if place < len(row) else ""
-            try:
-                column.append(float(cell))
-            except ValueError as error:
+            if (value := _number(cell)) is None:
                 raise RecordingError(
                     f"{path}, row {number}, {name}: needs a number, got {cell!r}"
-                ) from error
+                )
+            column.append(value)
     return samples
+
+
+def _number(cell: str) -> float | None:
+    # None for what is no finite number; 1_000 is one in Python, and in no table
+    try:
+        value = float(cell)
+    except ValueError:
+        return None
+    return value if math.isfinite(value) and "_" not in cell else None

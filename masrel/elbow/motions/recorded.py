@@ -163,7 +163,7 @@ def _checked(time: ArrayLike, angle: ArrayLike) -> tuple[Floats, Floats]:
     for name, column in (("time", times), ("angle", angles)):
         _refuse(~np.isfinite(column), f"{name}: needs finite numbers", column)
     behind = np.diff(times, prepend=-np.inf) <= 0.0
-    _refuse(behind, "time: needs to grow from row to row", times)
+    _refuse(behind, "time: needs to grow from sample to sample", times)
     outside = (angles < 0.0) | (angles > np.pi)
     _refuse(outside, "angle: needs 0 to 180 degrees", np.degrees(angles))
     return times, angles
@@ -172,4 +172,4 @@ def _checked(time: ArrayLike, angle: ArrayLike) -> tuple[Floats, Floats]:
 def _refuse(wrong: np.ndarray, needed: str, values: Floats) -> None:
     if wrong.any():
         row = int(wrong.argmax())
-        raise ParameterError(f"{needed}, got {values[row]:g} in row {row + 1}")
+        raise ParameterError(f"{needed}, got {values[row]:g} in sample {row + 1}")

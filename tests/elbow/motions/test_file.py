@@ -46,6 +46,11 @@ def test_a_recording_of_the_loop_is_a_motion(tmp_path: Path) -> None:
         ("t,angle_deg\n", "in row 1, got t, angle_deg"),
         ("time_s,angle_deg\n0,30\n1,x\n", r"row 3, angle_deg: needs a number, got 'x'"),
         ("time_s,angle_deg\n0,30\n1\n", r"row 3, angle_deg: needs a number, got ''"),
+        ("time_s,angle_deg\n0,30\n1,nan\n", r"row 3, angle_deg: .*, got 'nan'"),
+        ("time_s,angle_deg\n0,30\ninf,90\n", r"row 3, time_s: .*, got 'inf'"),
+        ("time_s,angle_deg\n0,3_0\n1,90\n", r"row 2, angle_deg: .*, got '3_0'"),
+        ("time_s,angle_deg,angle_deg\n0,1,2\n", r"needs one column angle_deg in row 1"),
+        ('time_s,angle_deg\n"' + "x" * 200_000 + '"\n', r"motion\.csv: cannot be read"),
     ],
 )
 def test_a_wrong_table_is_refused_with_its_place(
@@ -60,7 +65,6 @@ def test_a_wrong_table_is_refused_with_its_place(
     [
         ("time_s,angle_deg\n0,30\n", r"motion\.csv: time, angle: need two or more"),
         ("time_s,angle_deg\n0,30\n0,31\n", r"motion\.csv: time: needs to grow"),
-        ("time_s,angle_deg\n0,30\n1,nan\n", r"motion\.csv: angle: needs finite"),
     ],
 )
 def test_samples_that_are_no_motion_are_refused_with_the_file(
@@ -73,3 +77,11 @@ def test_samples_that_are_no_motion_are_refused_with_the_file(
 def test_no_file_is_said_to_be_none(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match=r"no\.csv: cannot be read"):
         read_motion(tmp_path / "no.csv")
+
+
+@pytest.mark.parametrize("name", ["half.npz", "half.json"])
+def test_half_a_recording_is_told_what_it_lacks(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_bytes(b"")
+    lacking = "half.json" if name == "half.npz" else "half.npz"
+    with pytest.raises(RecordingError, match=f"both files .*, got no {lacking}"):
+        read_motion(tmp_path / name)

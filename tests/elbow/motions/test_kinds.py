@@ -164,15 +164,15 @@ def test_two_samples_are_enough() -> None:
     [
         ([0.0], [0.5], "two or more samples and as many times as angles"),
         ([0.0, 1.0], [0.5], r"got shapes \(2,\) and \(1,\)"),
-        ([0.0, 1.0, 1.0], [0.5, 0.6, 0.7], "time: needs to grow.*got 1 in row 3"),
-        ([0.0, 2.0, 1.0], [0.5, 0.6, 0.7], "time: needs to grow.*got 1 in row 3"),
-        ([0.0, nan], [0.5, 0.6], "time: needs finite numbers, got nan in row 2"),
-        ([0.0, 1.0], [0.5, inf], "angle: needs finite numbers, got inf in row 2"),
-        ([0.0, 1.0], [-0.1, 0.5], "angle: needs 0 to 180 degrees, got -5.7.* in row 1"),
-        ([0.0, 1.0], [0.5, 57.0], "angle: needs 0 to 180 degrees, got 3265.* row 2"),
+        ([0.0, 1.0, 1.0], [0.5, 0.6, 0.7], "time: needs to grow.*got 1 in sample 3"),
+        ([0.0, 2.0, 1.0], [0.5, 0.6, 0.7], "time: needs to grow.*got 1 in sample 3"),
+        ([0.0, nan], [0.5, 0.6], "time: needs finite numbers, got nan in sample 2"),
+        ([0.0, 1.0], [0.5, inf], "angle: needs finite numbers, got inf in sample 2"),
+        ([0.0, 1.0], [-0.1, 0.5], "angle: needs 0 to 180 degrees, got -5.7.* in sample 1"),
+        ([0.0, 1.0], [0.5, 57.0], "angle: needs 0 to 180 degrees, got 3265.* sample 2"),
     ],
 )
-def test_wrong_samples_are_refused_with_their_row(time, angle, said: str) -> None:
+def test_wrong_samples_are_refused_with_their_place(time, angle, said: str) -> None:
     with pytest.raises(ParameterError, match=said):
         Recorded(time=time, angle=angle)
 
