@@ -168,7 +168,7 @@ def test_two_samples_are_enough() -> None:
         ([0.0, 2.0, 1.0], [0.5, 0.6, 0.7], "time: needs to grow.*got 1 in sample 3"),
         ([0.0, nan], [0.5, 0.6], "time: needs finite numbers, got nan in sample 2"),
         ([0.0, 1.0], [0.5, inf], "angle: needs finite numbers, got inf in sample 2"),
-        ([0.0, 1.0], [-0.1, 0.5], "angle: needs 0 to 180 degrees, got -5.7.* in sample 1"),
+        ([0.0, 1.0], [-0.1, 0.5], "angle: needs 0 to 180 degrees, got -5.7.* sample 1"),
         ([0.0, 1.0], [0.5, 57.0], "angle: needs 0 to 180 degrees, got 3265.* sample 2"),
     ],
 )
