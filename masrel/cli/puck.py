@@ -113,7 +113,7 @@ class Bench:
             if self.json_file == "-":
                 click.echo(text)
             else:
-                Path(self.json_file).write_text(text + "\n", encoding="utf-8")
+                _write(Path(self.json_file), text + "\n")
 
 
 _OPTIONS = (
@@ -199,9 +199,22 @@ def for_a_puck(function: Callable[..., None]) -> Callable[..., None]:
 
 
 def _emulated(options: PuckOptions) -> PuckOptions:
-    return dataclasses.replace(
-        options, emulator=EmulatorOptions(), angle_after_reset=_EMULATED_START
+    emulator = EmulatorOptions(
+        gear_ratio=options.gear_ratio,
+        direction=options.direction,
+        properties=options.properties,
     )
+    return dataclasses.replace(
+        options, emulator=emulator, angle_after_reset=_EMULATED_START
+    )
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        error.filename = str(path)  # a full disk does not say which file it was
+        raise
 
 
 def _free_hand() -> SimulatedHand:

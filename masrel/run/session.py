@@ -9,6 +9,7 @@ from collections.abc import Callable
 from datetime import datetime
 
 from masrel.errors import ParameterError, ScheduleError
+from masrel.hess import device_names
 from masrel.protocol import Protocol, StudyPaths
 from masrel.run.grades import GradeSource
 from masrel.run.log import SessionLog, utc_now
@@ -63,8 +64,8 @@ def run_session(
         If the log is damaged, of another schedule or protocol, was begun with
         another source of grades or device, or is open elsewhere.
     ParameterError
-        If `clock` is unknown or does not fit the device, or the source gives a
-        grade that is not of the scale.
+        If the device or `clock` is unknown or they do not fit each other, or the
+        source gives a grade that is not of the scale.
     DeviceError
         If the device cannot be used, or faults are not to be tried again.
     SessionStoppedError
@@ -78,7 +79,7 @@ def run_session(
     OverrunWarning
         If the control loop missed ticks.
     """
-    _check_clock(clock, protocol)
+    _check_device(clock, protocol)
     path = study.schedule_file(rater, session)
     schedule = read_schedule(path)
     check_schedule(schedule, protocol)
@@ -94,10 +95,15 @@ def run_session(
         return walk.to_the_end(progress)
 
 
-def _check_clock(clock: str, protocol: Protocol) -> None:
+def _check_device(clock: str, protocol: Protocol) -> None:
     if clock not in CLOCKS:
         raise ParameterError(f"clock: needed one of {', '.join(CLOCKS)}, got {clock!r}")
     device = protocol.device
+    names = [name for name in device_names() if name != "replay"]  # that has no hand
+    if device.backend not in names:
+        raise ParameterError(
+            f"device.backend: needed one of {', '.join(names)}, got {device.backend!r}"
+        )
     if clock == "simulated" and not has_simulated_hand(device):
         raise ParameterError(
             f"clock: needed the real one for device {device.backend!r}, got 'simulated'"

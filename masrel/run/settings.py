@@ -180,6 +180,7 @@ def _puck_options(settings: DeviceSettings) -> "PuckOptions":
         puck=settings.puck_node,
         direction=settings.puck_direction,
         gear_ratio=settings.puck_gear_ratio,
+        patience_s=min(0.001, 1.0 / settings.rate_hz),  # no longer than a tick
         checks_torque=settings.puck_checks_torque,
         properties=properties,
     )

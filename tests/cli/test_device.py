@@ -97,6 +97,15 @@ def test_a_signal_is_an_emergency_stop_while_the_arm_turns(
     assert "Traceback" not in done.err
 
 
+def test_an_emulated_puck_has_the_gear_that_is_said(masrel: Caller) -> None:
+    # Its arm is held at 60 deg, whatever the gear and the direction
+    mirrored = (*EMULATED, "--direction", -1, "--gear-ratio", 9.4)
+    done = masrel("device", "friction", "--arm-is-free", *mirrored, "--json", "-")
+    assert done.code == 0
+    found = json.loads(done.out)
+    assert found["viscous"] == pytest.approx(0.168, rel=0.03)
+
+
 def test_friction_does_not_move_an_arm_unasked(masrel: Caller) -> None:
     done = masrel("device", "friction", *EMULATED)
     assert done.code == 2
@@ -110,6 +119,8 @@ def test_friction_does_not_move_an_arm_unasked(masrel: Caller) -> None:
         (("check", "--puck", 9), 2, "puck: needs a motor's node, 1 to 7, got 9"),
         (("zero", *EMULATED), 2, "Missing option '--angle-deg'"),
         (("zero", "--angle-deg", 200, *EMULATED), 2, "200.0 is not in the range"),
+        (("zero", "--angle-deg", "nan", *EMULATED), 2, "angle: needs 0 to 180 deg"),
+        (("probe", *EMULATED, "--json", "/dev/full"), 2, "/dev/full: No space left"),
         (("check", "--properties", "none.toml"), 2, "none.toml: No such file"),
         (("check", "--channel", "can-none"), 1, "cannot open channel 'can-none'"),
         (

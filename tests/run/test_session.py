@@ -8,6 +8,7 @@ import signal
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Literal
 
 import msgspec
 import numpy as np
@@ -318,6 +319,20 @@ def test_an_unknown_clock_is_refused(small: Small) -> None:
             grades=ScriptGrades([]),
             clock="wall",  # type: ignore[arg-type]
         )
+
+
+@pytest.mark.parametrize("backend", ["nonesuch", "replay"])
+@pytest.mark.parametrize("clock", ["real", "simulated"])
+def test_a_device_that_no_session_can_use_is_refused(
+    small: Small, backend: str, clock: Literal["real", "simulated"]
+) -> None:
+    study, protocol = small
+    device = msgspec.structs.replace(protocol.device, backend=backend)
+    other = msgspec.structs.replace(protocol, device=device)
+    words = f"device.backend: needed one of puck, simulated, got '{backend}'"
+    with pytest.raises(ParameterError, match=words):
+        run_session(study, other, "R1", "test", grades=ScriptGrades([]), clock=clock)
+    assert not study.log_file("R1", "test").exists()
 
 
 def test_a_crash_while_presenting_leaves_only_what_was_done(

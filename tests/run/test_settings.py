@@ -136,3 +136,11 @@ def test_properties_that_lack_one_are_refused_with_their_key() -> None:
         ParameterError, match=r"^\[device\] puck_properties: need MT too"
     ):
         backend_options(puck(puck_properties=numbers))
+
+
+@pytest.mark.parametrize(("rate_hz", "patience_s"), [(250, 0.001), (2000, 0.0005)])
+def test_no_answer_is_waited_for_longer_than_a_tick(rate_hz, patience_s) -> None:
+    settings = DeviceSettings(backend="puck", rate_hz=rate_hz)
+    options = backend_options(settings)
+    assert isinstance(options, PuckOptions)
+    assert options.patience_s == patience_s

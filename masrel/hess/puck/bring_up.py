@@ -6,7 +6,7 @@ the two public drivers of the arm do. The permanent memory is never written.
 
 import math
 
-from masrel.errors import DeviceError
+from masrel.errors import DeviceError, ParameterError
 from masrel.hess.puck.node import PuckNode
 from masrel.hess.puck.options import PuckOptions
 from masrel.hess.puck.properties import (
@@ -120,7 +120,7 @@ def set_position(
     transmission : Transmission
         What it counts in.
     angle : float
-        Where the arm is held, rad.
+        Where the arm is held, rad; 0 to pi.
 
     Returns
     -------
@@ -129,9 +129,13 @@ def set_position(
 
     Raises
     ------
+    ParameterError
+        If no arm can be there.
     DeviceError
         If it is not idle, or its position does not read back.
     """
+    if not 0.0 <= angle <= math.pi:
+        raise ParameterError(f"angle: needs 0 to 180 degrees, got {angle} rad")
     mode = node.ask(table.number("MODE"))
     if mode != IDLE:
         raise DeviceError(
