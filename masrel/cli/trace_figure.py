@@ -51,17 +51,38 @@ def check_figure(file: Path, view: str, scenes: Sequence[Scene]) -> None:
             "--figure: shows 4 models at 5 speeds at most, or with --view catch 5 "
             f"models, got {len(models)} and {most}"
         )
-    if view == "catch" and most < 2:
-        raise ParameterError("--view catch: needs two or more speeds, got 1")
+    if view == "catch":
+        _check_catches(models)
     if view == "schematic":
-        from masrel.elbow import events
-
         if len(scenes) != 1:
             raise ParameterError(
                 f"--view schematic: shows one scene, got {len(scenes)}"
             )
-        if events(scenes[0].parameters, scenes[0].motion).catch is None:
+        if not _n_caught(scenes):
             raise ParameterError("--view schematic: needs a stretch that catches")
+
+
+def _check_catches(models: dict[str, list[Scene]]) -> None:
+    for name, own in models.items():
+        if len(own) < 2:
+            raise ParameterError(
+                f"--view catch: needs two or more speeds, got {len(own)}"
+            )
+        if (n_caught := _n_caught(own)) < 2:
+            raise ParameterError(
+                f"--view catch: needs two or more speeds at which {name} catches, got "
+                f"{n_caught} of {len(own)}"
+            )
+
+
+def _n_caught(scenes: Sequence[Scene]) -> int:
+    import numpy as np
+
+    from masrel.elbow import evaluate
+
+    joints = [scene.parameters for scene in scenes]
+    found = evaluate(joints, [scene.motion for scene in scenes], ["catch"])
+    return int(np.isfinite(found.column("catch")).sum())
 
 
 def write_figure(scenes: Sequence[Scene], view: str, file: Path) -> None:

@@ -1,33 +1,26 @@
-"""One scene of ``masrel trace``, a model and a motion: JSON, table row or samples."""
+"""One scene of ``masrel trace``, a model and a motion, and what JSON says of it."""
 
-import csv
-import io
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import click
+
+from masrel.cli.options import grouped
+from masrel.errors import ParameterError
+
 if TYPE_CHECKING:
     from masrel.elbow import ElbowParameters, Events, Motion
 
-__all__ = [
-    "OUTPUTS",
-    "TRACE_COLUMNS",
-    "Scene",
-    "document",
-    "samples",
-    "summary",
-    "table",
-]
-
-TRACE_COLUMNS = ("time_s", "angle_deg", "velocity_deg_s", "torque_nm", "phase")
+__all__ = ["OUTPUTS", "Scene", "Wanted", "document", "output_options"]
 
 OUTPUTS = {
-    "residual-torque": ("residual_torque_nm", "residual torque {:.3f} N·m"),
-    "work": ("work_j", "work {:.3f} J"),
-    "impulse": ("impulse_nms", "impulse {:.3f} N·m·s"),
+    "residual-torque": "residual_torque_nm",
+    "work": "work_j",
+    "impulse": "impulse_nms",
 }
-"""What may be asked for beside the peak: key of the document, and line."""
+"""What may be asked for beside the peak, and its key in the document."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,29 +59,63 @@ class Scene:
         return f"{self.model}, {self.kind} {self.speed_deg_s:g} deg/s"
 
 
-def document(
-    scene: Scene,
-    outputs: Sequence[str],
-    times: Sequence[float],
-    angles: Sequence[float],
-) -> dict[str, object]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wanted:
+    """What is asked of every scene beside events and peak.
+
+    Attributes
+    ----------
+    outputs : tuple of str
+        Of `OUTPUTS`.
+    times : tuple of float
+        Times at which the torque is asked for, s.
+    angles : tuple of float
+        Angles where it is asked for, deg.
+    """
+
+    outputs: tuple[str, ...]
+    times: tuple[float, ...]
+    angles: tuple[float, ...]
+
+
+output_options = grouped(
+    "wanted",
+    Wanted,
+    click.option(
+        "--output", "outputs", type=click.Choice(tuple(OUTPUTS)), multiple=True,
+        help="What to compute beside events and peak; may be given again.",
+    ),
+    click.option(
+        "--at-s", "times", type=float, multiple=True, help="Torque at this time."
+    ),
+    click.option(
+        "--at-deg", "angles", type=float, multiple=True,
+        help="Torque where this angle is first reached.",
+    ),
+)  # fmt: skip
+"""The options of outputs, given to a command as one argument `wanted`."""
+
+
+def document(scene: Scene, wanted: Wanted) -> dict[str, object]:
     """Solve a scene.
 
     Parameters
     ----------
     scene : Scene
         The scene.
-    outputs : sequence of str
-        Of `OUTPUTS`, what is asked for.
-    times : sequence of float
-        Times at which the torque is asked for, s.
-    angles : sequence of float
-        Angles where it is asked for, deg.
+    wanted : Wanted
+        What is asked of it.
 
     Returns
     -------
     dict
         What goes into JSON.
+
+    Raises
+    ------
+    ParameterError
+        If a time or angle is none of the motion, or an output is larger than a float
+        can be.
     """
     from masrel import elbow
 
@@ -110,16 +137,27 @@ def document(
         "work": elbow.work,
         "impulse": elbow.impulse,
     }
-    for name in outputs:
+    for name in wanted.outputs:
         value = functions[name](joint, motion)
-        made[OUTPUTS[name][0]] = None if math.isnan(value) else value
-    if times:
+        made[OUTPUTS[name]] = None if math.isnan(value) else value
+    if times := wanted.times:
         values = elbow.torque(joint, motion, times, found=found).tolist()
         made["torque_at_s"] = _pairs("time_s", times, values)
-    if angles:
+    if angles := wanted.angles:
         values = elbow.torque_at(joint, motion, [math.radians(a) for a in angles])
         made["torque_at_deg"] = _pairs("angle_deg", angles, values.tolist())
+    _refuse_infinite(scene, made)
     return made
+
+
+def _refuse_infinite(scene: Scene, made: dict[str, object]) -> None:
+    numbers = {key: value for key, value in made.items() if isinstance(value, float)}
+    for key, value in numbers.items():
+        if not math.isfinite(value):
+            raise ParameterError(
+                f"{scene.title}: {key}: needs a number that a float can hold, got "
+                f"{value:g}; some parameter or speed is too large"
+            )
 
 
 def _pairs(
@@ -146,117 +184,3 @@ def _phases(found: "Events") -> list[dict[str, object]]:
         }
         for span in found.phases
     ]
-
-
-def samples(scenes: Sequence[Scene], rate_hz: float) -> str:
-    """Write what the controller commands as CSV, scene after scene.
-
-    Parameters
-    ----------
-    scenes : sequence of Scene
-        The scenes; several are told apart by columns of their own.
-    rate_hz : float
-        Samples a second.
-
-    Returns
-    -------
-    str
-        The table.
-    """
-    import numpy as np
-
-    from masrel.elbow import trace
-    from masrel.recording import PHASES
-
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    several = len(scenes) > 1
-    writer.writerow((*(("model", "speed_deg_s") if several else ()), *TRACE_COLUMNS))
-    for scene in scenes:
-        made = trace(scene.parameters, scene.motion, rate_hz=rate_hz)
-        columns = (
-            made.time.tolist(),
-            np.degrees(made.angle).tolist(),
-            np.degrees(made.velocity).tolist(),
-            made.torque.tolist(),
-            [PHASES[code] for code in made.phase.tolist()],
-        )
-        names = (scene.model, scene.speed_deg_s) if several else ()
-        writer.writerows((*names, *row) for row in zip(*columns, strict=True))
-    return out.getvalue()
-
-
-def summary(made: dict[str, object], title: str) -> str:
-    """Write the document of one scene for a person.
-
-    Parameters
-    ----------
-    made : dict
-        The document.
-    title : str
-        Name of the scene.
-
-    Returns
-    -------
-    str
-        Its phases and outputs.
-    """
-    lines = [
-        title,
-        f"{'phase':<11}{'start s':>9}{'end s':>9}{'start deg':>11}{'end deg':>9}",
-    ]
-    phases = made["phases"]
-    lines += [
-        f"{span['name']:<11}{span['start_s']:>9.3f}{span['end_s']:>9.3f}"
-        f"{span['start_deg']:>11.2f}{span['end_deg']:>9.2f}"
-        for span in (phases if isinstance(phases, list) else [])
-    ]
-    lines.append(f"peak torque {made['peak_torque_nm']:.3f} N·m")
-    for key, line in OUTPUTS.values():
-        if key in made:
-            value = made[key]
-            lines.append(line.format(math.nan if value is None else value))
-    lines += [
-        f"torque at {row['time_s']:g} s {row['torque_nm']:.3f} N·m"
-        for row in _rows(made, "torque_at_s")
-    ]
-    lines += [
-        f"torque at {row['angle_deg']:g} deg {row['torque_nm']:.3f} N·m"
-        for row in _rows(made, "torque_at_deg")
-    ]
-    return "\n".join(lines)
-
-
-def _rows(made: dict[str, object], key: str) -> list[dict[str, float]]:
-    rows = made.get(key, [])
-    return rows if isinstance(rows, list) else []
-
-
-def table(documents: Sequence[dict[str, object]]) -> str:
-    """Write many scenes for a person, one a line.
-
-    Parameters
-    ----------
-    documents : sequence of dict
-        Their documents.
-
-    Returns
-    -------
-    str
-        Model, speed, catch angle, peak torque and what else was asked for.
-    """
-    extra = [key for key, _ in OUTPUTS.values() if key in documents[0]]
-    keys = ["speed_deg_s", "catch_angle_deg", "mean_speed_deg_s", "peak_torque_nm"]
-    keys += extra
-    widths = [len(key) + 2 for key in keys]
-    lines = [
-        f"{'model':<8}"
-        + "".join(f"{k:>{w}}" for k, w in zip(keys, widths, strict=True))
-    ]
-    for made in documents:
-        cells = [
-            f"{'–':>{width}}" if made[key] is None else f"{made[key]:>{width}.3f}"
-            for key, width in zip(keys, widths, strict=True)
-        ]
-        lines.append(f"{made['model']:<8}" + "".join(cells))
-    return "\n".join(lines)

@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from masrel.elbow.identification.model_file import (
     CONSTANT_KEYS,
     FORMAT,
@@ -13,9 +15,15 @@ from masrel.elbow.identification.model_file import (
     READING_KEYS,
     VARIANT_KEYS,
 )
+from masrel.elbow.parameters import ElbowParameters
+from masrel.errors import ProtocolError
+from masrel.protocol.decode import decode_table
+from masrel.protocol.definition import ElbowConstants, Model
+from masrel.protocol.joint_rules import joint_rules
+from masrel.protocol.models import joint_of
 from masrel.protocol.wording import got
 
-__all__ = ["Resolved", "resolve_model_files"]
+__all__ = ["Resolved", "read_model_file", "resolve_model_files"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,6 +77,39 @@ def resolve_model_files(raw: Mapping[str, object], folder: Path) -> Resolved:
             made[index] = _merged(entry, read, where, resolved.problems)
     resolved.raw["models"] = made
     return resolved
+
+
+def read_model_file(path: Path) -> ElbowParameters:
+    """Read the joint in a model file, with the usual constants for all else.
+
+    Parameters
+    ----------
+    path : Path
+        A model file, as ``masrel fit`` writes it.
+
+    Returns
+    -------
+    ElbowParameters
+        The joint.
+
+    Raises
+    ------
+    ProtocolError
+        If there is no such file, or it is no model file, or any key is wrong. Its
+        `problems` are all there are.
+    """
+    read = _read(path)
+    if isinstance(read, str):
+        raise ProtocolError(read)
+    raw = {**read.get("model", {}), "constants": read.get("constants", {})}
+    decoded = decode_table({"id": "model", **raw}, Model)
+    elbow = ElbowConstants()
+    numbers = {key: value for key, value in decoded.values.items() if key != "id"}
+    rules = joint_rules({"elbow": msgspec.to_builtins(elbow), "models": [numbers]})
+    problems = [*decoded.problems, *(rule.removeprefix("models[0].") for rule in rules)]
+    if problems:
+        raise ProtocolError(*(f"{path}: {problem}" for problem in problems))
+    return joint_of(msgspec.convert({"id": "model", **raw}, Model), elbow)
 
 
 def _read(path: Path) -> dict[str, Any] | str:

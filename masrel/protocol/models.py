@@ -6,10 +6,10 @@ import msgspec
 
 from masrel.elbow.parameters import ElbowParameters
 from masrel.errors import ParameterError
-from masrel.protocol.definition import Protocol
+from masrel.protocol.definition import ElbowConstants, Model, Protocol
 from masrel.scales import Scale
 
-__all__ = ["elbow_parameters", "scale_of"]
+__all__ = ["elbow_parameters", "joint_of", "scale_of"]
 
 
 def scale_of(protocol: Protocol) -> Scale:
@@ -53,7 +53,24 @@ def elbow_parameters(protocol: Protocol, model_id: str) -> ElbowParameters:
     if not found:
         known = ", ".join(model.id for model in protocol.models)
         raise ParameterError(f"model: needed one of {known}, got {model_id!r}")
-    (model,), shared = found, protocol.elbow
+    return joint_of(found[0], protocol.elbow)
+
+
+def joint_of(model: Model, shared: ElbowConstants) -> ElbowParameters:
+    """Return the joint of one model, in SI units.
+
+    Parameters
+    ----------
+    model : Model
+        The model; its angles are degrees.
+    shared : ElbowConstants
+        The constants for which it has none of its own.
+
+    Returns
+    -------
+    ElbowParameters
+        The joint; rad, rad/s, s.
+    """
     own = {
         key: value
         for key in model.constants.__struct_fields__

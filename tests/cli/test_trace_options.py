@@ -20,6 +20,7 @@ from masrel.elbow import (
     torque,
     work,
 )
+from masrel.elbow.identification import as_toml, model_document
 from masrel.errors import MasrelError
 from tests.elbow.stretches import constant, minimum_jerk
 
@@ -137,7 +138,8 @@ def test_outputs_are_those_of_the_library_and_only_those_asked_for() -> None:
 def test_a_slow_stretch_has_no_residual_to_show() -> None:
     slow = ("--model", "HM3", "--speed-deg-s", 10, "--output", "residual-torque")
     assert scene(*slow)["residual_torque_nm"] is None
-    assert run(*slow).stdout.splitlines()[-1] == "residual torque nan N·m"
+    shown = run(*slow).stdout.splitlines()
+    assert shown[-1] == "residual torque none: the stretch has no catch"
     assert residual_torque(HM3, constant(10.0)) != residual_torque(HM3, constant(92.0))
 
 
@@ -230,7 +232,32 @@ def test_lines_of_a_figure_have_as_many_points_as_pixels(
         (["--motion", "recording"], "--recording: goes with --motion recording"),
         (["--recording", "x.csv"], "--recording: goes with --motion recording"),
         (["--stop-at-s", 1], "--stop-at-s, --pause-s: each needs the other"),
-        (["--stop-at-s", 9, "--pause-s", 1], "begin, finish: need"),
+        (
+            ["--stop-at-s", 9, "--pause-s", 1],
+            "--stop-at-s: needs a time within the motion, 0 to 1.26087 s, got 9 s",
+        ),
+        (["--stop-at-s", "nan", "--pause-s", 1], "--stop-at-s: needs a time within"),
+        (["--stop-at-s", 1, "--pause-s", "nan"], "--pause-s: needs more than 0 and"),
+        (
+            ["--interpolation", "linear"],
+            "--interpolation: goes with --motion recording",
+        ),
+        (["--view", "time"], "--view: goes with --figure"),
+        (["--rate-hz", "nan"], "--rate-hz: needs a finite rate, got nan"),
+        (["--rate-hz", 1e12], "--csv: needs at most 5000000 samples, got 1.261e+12"),
+        (["--at-deg", "nan"], "angles: need ones that the motion reaches, got nan"),
+        (["--json", "no/such.json"], "--json: needs a folder that exists, got no/such"),
+        (["--figure", "no/such.png"], "--figure: needs a folder that exists, got no/"),
+        (
+            ["--motion", "minimum-jerk", "--inertia-kg-m2", 1e308],
+            "peak_torque_nm: needs a number that a float can hold, got inf",
+        ),
+        (
+            ["--model", "HM9"],
+            "needs one of HM1, HM2, HM3, HM4, or a model file (.toml)",
+        ),
+        (["--model", "no.toml"], "needed a model file, got no.toml: No such file"),
+        (["--model", "a.toml", "--study", "x"], "needed a protocol file, got"),
         (["--repeat", 0], "--repeat: needs 1 or more, got 0"),
         (["--catch-rise-s", 1], "catch_rise: needs 0 to peak_duration"),
         (["--inertia-kg-m2", -1], "inertia: needs 0 or more"),
@@ -238,6 +265,10 @@ def test_lines_of_a_figure_have_as_many_points_as_pixels(
         (["--at-deg", 170], "angles: need ones that the motion reaches, got 170"),
         (["--figure", "x.gif"], "--figure: needs a name that ends in .png"),
         (["--figure", "x.png", "--view", "catch"], "needs two or more speeds, got 1"),
+        (
+            ["--figure", "x.png", "--view", "catch", "--speed-deg-s", 5],
+            "needs two or more speeds at which HM3 catches, got 1 of 2",
+        ),
         (
             ["--figure", "x.png", "--view", "schematic", "--to-deg", 80],
             "--view schematic: needs a stretch that catches",
@@ -260,6 +291,115 @@ def test_a_wrong_option_is_refused_before_anything_is_written(
     assert isinstance(done.exception, MasrelError)
     assert said in str(done.exception)
     assert not left.exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--rate-hz", 100], "--rate-hz: goes with --csv"),
+        (["--csv", "-"], "--csv: needs the name of a file, got -"),
+        (
+            ["--csv", "no/such.csv"],
+            "--csv: needs a folder that exists, got no/such.csv",
+        ),
+    ],
+)
+def test_an_option_of_samples_goes_with_a_file(
+    arguments: list[object], said: str
+) -> None:
+    done = run(*STRETCH, *arguments)
+    assert isinstance(done.exception, MasrelError)
+    assert said in str(done.exception)
+
+
+def test_a_recording_has_its_own_ends(tmp_path: Path) -> None:
+    path = tmp_path / "motion.csv"
+    path.write_text("time_s,angle_deg\n0,30\n1,90\n", encoding="utf-8")
+    recording = ("--model", "HM3", "--motion", "recording", "--recording", path)
+    done = run(*recording, "--from-deg", 30)
+    assert "a recording starts and ends where it does" in str(done.exception)
+
+
+def test_more_speeds_than_anybody_reads_are_refused() -> None:
+    done = run("--model", "HM3", "--speeds-deg-s", 10, 90, 10**9)
+    assert done.exit_code == 2
+    assert "1000000000 is not in the range 2<=x<=100000" in done.stderr
+
+
+def test_numbers_that_are_very_long_or_short_stay_apart() -> None:
+    # 116 deg at 1e-9 deg/s: 1.16e11 s; at 1e6 deg/s 0.116 ms
+    slow = run("--model", "HM3", "--speed-deg-s", 1e-9).stdout.splitlines()
+    assert slow[2].split() == ["pre-catch", "0.000", "1.16e+11", "30.00", "146.00"]
+    fast = run("--model", "HM3", "--speed-deg-s", 1e6).stdout.splitlines()
+    assert fast[-2].split() == ["post-catch", "6e-05", "0.000116", "90.00", "146.00"]
+    many = run("--model", "HM3", "--speed-deg-s", 1e9, "--speed-deg-s", 1e-9).stdout
+    first, second = many.splitlines()[1:]
+    assert first.split()[:3] == ["HM3", "1e+09", "60.000"]
+    assert second.split() == ["HM3", "1e-09", "–", "–", "6.377"]
+
+
+def test_torques_at_places_are_shown_of_many_scenes_too() -> None:
+    many = ("--model", "HM2", *STRETCH, "--at-s", 0.5, "--at-deg", 90)
+    shown = run(*many).stdout.splitlines()
+    assert shown[0].endswith("torque_nm at 0.5 s  torque_nm at 90 deg")
+    for line, made in zip(shown[1:], scene(*many)["scenes"], strict=True):
+        at_time, at_angle = (
+            made[key][0]["torque_nm"] for key in ("torque_at_s", "torque_at_deg")
+        )
+        assert line.split()[-2:] == [f"{at_time:.3f}", f"{at_angle:.3f}"]
+
+
+# Model files
+
+
+def model_file(folder: Path, name: str = "S3.toml", **changes: object) -> Path:
+    made = model_document(HM3, simulated=True, made_from="a test")
+    made["constants"] = {**made["constants"], **changes}  # type: ignore[dict-item]
+    path = folder / name
+    path.write_text(as_toml(made), encoding="utf-8")
+    return path
+
+
+def test_a_fitted_model_is_traced_from_its_file(tmp_path: Path) -> None:
+    made = scene("--model", model_file(tmp_path), "--speed-deg-s", 92)
+    assert made["model"] == "S3"
+    assert made["peak_torque_nm"] == pytest.approx(
+        scene(*STRETCH)["peak_torque_nm"], rel=1e-14
+    )
+    variant = model_file(tmp_path, "S4.toml", rest_angle_deg=20.0)
+    moved = scene("--model", variant, "--speed-deg-s", 92)["peak_torque_nm"]
+    assert moved - made["peak_torque_nm"] == pytest.approx(radians(3.15 * 10))
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"catch_slope_s": -1.0}, "S3.toml: constants.catch_slope_s: needed a number"),
+        ({"catch_rise_s": 0.2}, "S3.toml: constants.catch_rise_s: needed at most"),
+        ({"slope": 1.0}, "needed keys of [constants] among"),
+    ],
+)
+def test_a_wrong_model_file_is_refused_with_its_key(
+    tmp_path: Path, changes: dict[str, object], said: str
+) -> None:
+    done = run("--model", model_file(tmp_path, **changes), "--speed-deg-s", 92)
+    assert isinstance(done.exception, MasrelError)
+    assert said in str(done.exception)
+
+
+def test_two_files_of_one_name_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "other").mkdir()
+    one, two = model_file(tmp_path), model_file(tmp_path / "other")
+    done = run("--model", one, "--model", two, "--speed-deg-s", 92)
+    assert "--model: needs models whose names differ, got two called S3" in str(
+        done.exception
+    )
+
+
+def test_a_study_takes_no_model_file(tmp_path: Path) -> None:
+    path = model_file(tmp_path)
+    done = run("--model", path, "--speed-deg-s", 92, "--study", tmp_path)
+    assert "--model: needs a model of --study, got the file" in str(done.exception)
 
 
 def test_a_recording_has_its_own_speed(tmp_path: Path) -> None:
