@@ -59,8 +59,9 @@ class Spool:
                 file.write(bytes(n_bytes - _HEADER))  # not sparse: the space is taken
                 file.flush()
                 self._map = mmap.mmap(file.fileno(), n_bytes)
-        except OSError:
+        except OSError as error:
             path.unlink(missing_ok=True)  # nothing was sampled
+            error.filename = str(path)  # a full disk does not say which file it was
             raise
         self.words = memoryview(self._map)[_HEADER:].cast("d")
 

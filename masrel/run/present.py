@@ -233,7 +233,11 @@ def _keep(presented: Presented, protocol: Protocol, asked: Asked, file: Path) ->
         "position": shown.position,
         "attempt": asked.attempt,
     }
-    checksum = write_recording(dataclasses.replace(recording, facts=facts), file)
+    try:
+        checksum = write_recording(dataclasses.replace(recording, facts=facts), file)
+    except OSError as error:
+        error.filename = str(file)  # a full disk does not say which file it was
+        raise
     for written in (file, file.with_suffix(".json")):
         _sync(written)  # before the log says that they are there
     spool_of(file).unlink(missing_ok=True)  # only now is it of no use

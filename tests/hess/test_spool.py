@@ -129,8 +129,9 @@ def test_a_disk_that_fills_while_it_is_laid_down_leaves_no_file(
 
     path = tmp_path / "a.partial"
     monkeypatch.setattr(mmap, "mmap", full)  # the last thing that asks the disk
-    with pytest.raises(OSError, match="No space left"):
+    with pytest.raises(OSError, match="No space left") as caught:
         Spool(path, 10, FACTS)
+    assert caught.value.filename == str(path)
     assert not path.exists()
 
 
