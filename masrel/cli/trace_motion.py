@@ -17,6 +17,8 @@ __all__ = ["KINDS", "Asked", "motion_of", "motion_options"]
 
 KINDS = ("constant", "minimum-jerk", "trapezoid", "recording")
 
+MOST_REPEATS = 1000  # which take a second to solve
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Asked:
@@ -71,8 +73,10 @@ class Asked:
             raise ParameterError(
                 f"--pause-s: needs more than 0 and finite, got {self.pause:g} s"
             )
-        if self.repeats < 1:
-            raise ParameterError(f"--repeat: needs 1 or more, got {self.repeats}")
+        if not 1 <= self.repeats <= MOST_REPEATS:
+            raise ParameterError(
+                f"--repeat: needs 1 to {MOST_REPEATS}, got {self.repeats}"
+            )
 
     @property
     def start_deg(self) -> float:
