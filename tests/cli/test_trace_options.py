@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from math import radians
 from pathlib import Path
 
@@ -203,6 +204,16 @@ def test_a_schematic_names_the_parts_of_a_catch(
     done = run(*STRETCH, *more, "--figure", path, "--view", "schematic")
     assert done.exit_code == 0, done.output
     assert path.stat().st_size > 10_000
+
+
+def test_phases_are_shaded_of_the_first_speed_that_catches(tmp_path: Path) -> None:
+    path = tmp_path / "one.svg"
+    for speeds, shaded in ((("10", "60", "90"), "60"), (("10", "12"), None)):
+        asked = [part for speed in speeds for part in ("--speed-deg-s", speed)]
+        assert run("--model", "HM3", *asked, "--figure", path).exit_code == 0
+        # text of an SVG is kept beside its shapes, as a comment
+        said = re.findall(r"<!-- (catch, \d+ deg/s) -->", path.read_text("utf-8"))
+        assert said == ([] if shaded is None else [f"catch, {shaded} deg/s"])
 
 
 def test_lines_of_a_figure_have_as_many_points_as_pixels(

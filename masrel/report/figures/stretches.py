@@ -32,7 +32,7 @@ _LINES: tuple[tuple[str, tuple[float, ...]], ...] = (
     (VERMILLION, (5, 1.5)),
     (BLACK, (1, 1.2)),
     (ORANGE, (5, 1.5, 1, 1.5)),
-    (GREY, _SOLID),
+    (GREY, (6, 1.2, 1.2, 1.2, 1.2, 1.2)),
 )
 
 
@@ -66,7 +66,7 @@ class StretchPanel:
     title : str
         The model.
     lines : tuple of StretchLine
-        Its motions; the phases of the first are shaded.
+        Its motions; the phases of one are shaded.
     """
 
     title: str
@@ -109,22 +109,34 @@ def draw_stretches(
             squeeze=False,
             height_ratios=(1.6, 1.0)[:n_rows],
         )
+        shaded = _shaded(panels)
         for column, panel in enumerate(panels):
-            _panel(list(grid[:, column]), panel, against)
+            _panel(list(grid[:, column]), panel, shaded, against)
         grid[0, 0].set_ylabel("torque (N·m)")
         grid[0, 0].set_ylim(bottom=min(0.0, grid[0, 0].get_ylim()[0]))
         if n_rows == 2:
             grid[1, 0].set_ylabel("angle (deg)")
             figure.align_ylabels(grid[:, 0])
-        _legend(figure, panels)
+        _legend(figure, panels, shaded)
         put_stamp(figure, stamp)
         return as_bytes(figure, form)
 
 
+def _shaded(panels: Sequence[StretchPanel]) -> int:
+    # which line has its phases shaded: the first that catches in any panel
+    for place in range(min(len(panel.lines) for panel in panels)):
+        if any(len(panel.lines[place].phases) > 1 for panel in panels):
+            return place
+    return 0
+
+
 def _panel(
-    rows: Sequence[Axes], panel: StretchPanel, against: Literal["angle", "time"]
+    rows: Sequence[Axes],
+    panel: StretchPanel,
+    shaded: int,
+    against: Literal["angle", "time"],
 ) -> None:
-    _shade(rows, panel.lines[0], against)
+    _shade(rows, panel.lines[shaded], against)
     for line, (colour, dashes) in zip(panel.lines, _styles(panel), strict=True):
         across = line.angle if against == "angle" else line.time
         columns = [line.torque] if against == "angle" else [line.torque, line.angle]
@@ -157,19 +169,19 @@ def _shade(
                 axes.axvline(at, color=GREY, linewidth=0.5, zorder=0.5)
 
 
-def _legend(figure: Figure, panels: Sequence[StretchPanel]) -> None:
+def _legend(figure: Figure, panels: Sequence[StretchPanel], shaded: int) -> None:
     # names of the lines if they are the same in every panel, and of the shades
     longest = max(panels, key=lambda panel: len(panel.lines))
     handles: list[Line2D | Patch] = [
         Line2D([], [], color=colour, dashes=dashes, linewidth=1.3, label=line.label)
         for line, (colour, dashes) in zip(longest.lines, _styles(longest), strict=True)
     ]
-    shaded = {name for panel in panels for name, _, _ in panel.lines[0].phases}
-    first = longest.lines[0].label
+    shades = {name for panel in panels for name, _, _ in panel.lines[shaded].phases}
+    which = longest.lines[shaded].label
     handles += [
-        Patch(facecolor=_SHADES[name], edgecolor=GREY, lw=0.4, label=f"{name}, {first}")
+        Patch(facecolor=_SHADES[name], edgecolor=GREY, lw=0.4, label=f"{name}, {which}")
         for name in ("catch", "post-catch")
-        if name in shaded
+        if name in shades
     ]
     n_columns = max(2, min(len(handles), 1 + 2 * len(panels)))
     figure.legend(
