@@ -1,16 +1,19 @@
 """What every device does, whichever backend it is: one suite for all names."""
 
 import gc
-import importlib
+import importlib.util
 import math
+import pkgutil
 import warnings
 from collections.abc import Callable
 from functools import cache
 from itertools import pairwise
 from math import radians
+from pathlib import Path
 
 import pytest
 
+from masrel import hess
 from masrel.elbow import STANDARD_MODELS
 from masrel.errors import DeviceError
 from masrel.hess import (
@@ -24,6 +27,7 @@ from masrel.hess import (
     SimulatedHand,
     device_names,
     open_device,
+    registry,
     run_presentation,
 )
 from masrel.hess.replay import ReplayOptions
@@ -99,6 +103,28 @@ def tick(clock: SimulatedClock, n: int = 1) -> None:
 
 def test_the_simulated_device_is_among_the_names() -> None:
     assert "simulated" in device_names()
+
+
+def test_every_registered_name_is_held_to_this_suite() -> None:
+    assert set(OPENERS) == {*device_names(), "scripted"}
+    assert set(WITH_ARM) == {*device_names()} - {"replay"}
+
+
+def test_every_backend_that_is_written_is_registered() -> None:
+    # A backend is a module with a function `build` of a setup.
+    written = {
+        module.name
+        for module in pkgutil.walk_packages(hess.__path__, "masrel.hess.")
+        if "\ndef build(setup: DeviceSetup)" in _source(module.name)
+    }
+    assert written == set(registry._BACKENDS.values())
+
+
+def _source(module: str) -> str:
+    found = importlib.util.find_spec(module)
+    assert found is not None
+    assert found.origin is not None
+    return Path(found.origin).read_text(encoding="utf-8")
 
 
 # Who it is

@@ -329,7 +329,7 @@ def outcome(
     opener: Callable[..., Device] = open_device,
 ) -> Outcome:
     """Run a session whose first presentation has the fault, to its end."""
-    study, protocol = _study(injection, folder)
+    study, protocol = small_study(folder, injection.speed)
     made = Outcome(name=injection.name)
     devices: list[f.FaultyDevice] = []
     with warnings.catch_warnings(), _injected(injection, opener, devices):
@@ -444,10 +444,13 @@ def _injected(
         yield
 
 
-def _study(injection: Injection, folder: pathlib.Path) -> tuple[StudyPaths, Protocol]:
+def small_study(
+    folder: pathlib.Path, speed_deg_s: float
+) -> tuple[StudyPaths, Protocol]:
+    """A study of one model and one rater, with its schedule drawn."""
     study = StudyPaths(folder)
     study.root.mkdir(exist_ok=True)
-    text = PROTOCOL.format(speed=injection.speed)
+    text = PROTOCOL.format(speed=speed_deg_s)
     study.protocol.write_text(text, encoding="utf-8")
     protocol = read_protocol(study.protocol)
     write_schedules(protocol, study)

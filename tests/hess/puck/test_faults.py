@@ -4,9 +4,11 @@
 """
 
 import math
+import tempfile
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -14,10 +16,15 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from masrel.errors import OverrunWarning
+from masrel.hess import Device, open_device
 from masrel.hess.puck.emulated import EmulatedPuckDevice
 from masrel.hess.puck.faults import FaultKind, InjectedFault
 from masrel.hess.puck.transmission import Transmission
-from tests.hess.puck.rig import fault, presented
+from masrel.recording import read_recording
+from masrel.run import SimulatedGrades, read_log, run_session
+from masrel.run import present as presenting
+from tests.hess.injected import small_study
+from tests.hess.puck.rig import fault, presented, puck_options
 
 PAGE = Path(__file__).parents[3] / "docs" / "hardware.md"
 PUCK = Transmission(counts_per_turn=4096, units_per_nm=2700)
@@ -179,6 +186,59 @@ def test_a_fault_of_the_bus(
         assert made.zero_ms <= 205.0
 
 
+@dataclass(frozen=True, kw_only=True)
+class Session:
+    """What came of a session whose first presentation had a fault."""
+
+    kind: str | None
+    events: list[str]
+    whole: bool  # the recording of the first presentation, up to the fault
+
+
+def session(injected: InjectedFault, folder: Path) -> Session:
+    """Run a session on emulated pucks, the first of which has a fault."""
+    faults = [(injected,)]
+
+    def opener(_name: str, *, hand, options, **others) -> Device:
+        assert options is None  # the study's own device is the simulated one
+        made = puck_options(hand, emulator={"faults": faults.pop() if faults else ()})
+        return open_device("puck", hand=hand, options=made, **others)
+
+    study, protocol = small_study(folder, 92.0)
+    grades = SimulatedGrades(protocol)
+    with (
+        warnings.catch_warnings(),
+        mock.patch.object(presenting, "open_device", opener),
+    ):
+        warnings.simplefilter("ignore", OverrunWarning)
+        run_session(study, protocol, "R1", "test", grades=grades, clock="simulated")
+    log = read_log(study.log_file("R1", "test"))
+    shown = next(event for event in log if event.kind == "presented")
+    recording = read_recording(study.sessions / str(shown.fields["recording"]))
+    noticed = next((event for event in log if event.kind == "fault"), None)
+    return Session(
+        kind=None if noticed is None else str(noticed.fields["kind"]),
+        events=[event.kind for event in log],
+        whole=whole(recording.columns["time_s"], recording.facts),
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "injected", "kind"), FAULTS, ids=[f[0] for f in FAULTS]
+)
+def test_after_a_fault_of_the_bus_the_session_goes_on(
+    name: str, injected: InjectedFault, kind: str | None, tmp_path: Path
+) -> None:
+    made = session(injected, tmp_path / "study")
+    assert made.kind == kind
+    assert made.whole
+    once = ["presented", "grade"]
+    again = ["presented", "fault", *once]
+    assert made.events == ["session", *(again if kind else once), "complete"]
+    assert row(name, outcome(injected)) + " yes |" in PAGE.read_text(encoding="utf-8")
+
+
 kinds = st.sampled_from(sorted({f.kind for _, f, _ in FAULTS}))
 
 
@@ -243,4 +303,6 @@ def test_a_thousand_sequences_of_faults_leave_no_torque(
 
 if __name__ == "__main__":
     for name, injected, _ in FAULTS:
-        print(row(name, outcome(injected)))
+        with tempfile.TemporaryDirectory() as folder:
+            goes_on = "grade" in session(injected, Path(folder) / "study").events
+        print(row(name, outcome(injected)), "yes |" if goes_on else "no |")

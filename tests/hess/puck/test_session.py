@@ -8,8 +8,9 @@ import pytest
 from masrel.hess import Device, open_device
 from masrel.hess.puck.emulated import EmulatedPuckDevice
 from masrel.hess.puck.faults import FaultKind
-from tests.hess.injected import CATCH, Injection, injections, outcome
-from tests.hess.puck.rig import fault, puck_options
+from tests.hess.injected import CATCH, injections, outcome
+from tests.hess.puck.rig import fault
+from tests.hess.puck.test_faults import session
 
 
 @pytest.mark.parametrize(
@@ -23,20 +24,12 @@ from tests.hess.puck.rig import fault, puck_options
 def test_after_a_fault_on_the_bus_the_session_goes_on(
     kind: FaultKind, named: str, tmp_path: Path
 ) -> None:
-    faults = [(fault(kind, CATCH, end_s=CATCH + 0.05),)]
-
-    def opener(_name: str, *, hand, options, **others) -> Device:
-        assert options is None  # the study's own device is the simulated one
-        emulator = {"faults": faults.pop() if faults else ()}
-        made = puck_options(hand, emulator=emulator)
-        return open_device("puck", hand=hand, options=made, **others)
-
-    injection = Injection(name=kind, at_s=CATCH, expected=named)
-    made = outcome(injection, tmp_path / "study", opener)
+    injected = fault(kind, CATCH, end_s=CATCH + 0.05)
+    made = session(injected, tmp_path / "study")
     assert made.kind == named
     assert made.events[1:5] == ["presented", "fault", "presented", "grade"]
-    assert made.resumes
-    assert made.intact
+    assert made.events[-1] == "complete"
+    assert made.whole
 
 
 PAGE = Path(__file__).parents[3] / "docs" / "driver.md"
