@@ -1,5 +1,6 @@
 """What docs/driver.md says is what the driver does."""
 
+import re
 import subprocess
 import sys
 from math import degrees
@@ -57,6 +58,24 @@ def test_every_key_of_a_limit_is_on_the_page() -> None:
     for key in DeviceSettings.__struct_fields__:
         if not key.startswith((*no_limits, "puck")):
             assert f"`{key}`" in PAGE
+
+
+def shown(value: object) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    return "none" if value is None else str(value).removesuffix(".0")
+
+
+@pytest.mark.parametrize("key", DeviceSettings.__struct_fields__)
+def test_every_key_of_a_device_has_its_default_and_a_reason(key: str) -> None:
+    rows = [
+        line.strip("| ").split("|") for line in PAGE.splitlines() if line[:1] == "|"
+    ]
+    *cells, reason = next(row for row in rows if f"`{key}`" in "".join(row[:-1]))
+    # "400 deg/s", "5 deg, 10 N·m", "−5 and 185 deg" or alone
+    words = re.split(r"[ ,`]+", " ".join(cells).replace("−", "-"))
+    assert shown(getattr(DeviceSettings(), key)) in words
+    assert len(reason) > 20
 
 
 def test_the_friction_is_the_default_one() -> None:
