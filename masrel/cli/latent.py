@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from masrel.cli.agreement_rows import scale_notes
+from masrel.cli.folders import check_folders
 from masrel.cli.latent_table import latent_document, latent_table
 from masrel.errors import ParameterError, RatingsError
 
@@ -87,6 +88,7 @@ def command(
         )
     if seed < 0:
         raise ParameterError(f"--seed: needs at least 0, got {seed}")
+    check_folders(json=json_file, figure=figure)
     from masrel.ratings import read_ratings
 
     ratings = read_ratings(
@@ -165,7 +167,8 @@ def _sample(
 
     matrix = rating_matrix(ratings, session=session)
     table = pd.DataFrame(matrix.grades, index=matrix.items, columns=matrix.raters)
-    with tqdm(desc="sampling", unit=" steps", disable=quiet) as bar:
+    # nothing is shown of a call that is refused at once
+    with tqdm(desc="sampling", unit=" steps", delay=0.01, disable=quiet) as bar:
         return latent_trait(
             table,
             items=items,

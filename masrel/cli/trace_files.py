@@ -12,6 +12,7 @@ from typing import Any, TextIO
 import click
 from tqdm import tqdm
 
+from masrel.cli.folders import check_folders
 from masrel.cli.options import grouped
 from masrel.cli.trace_figure import VIEWS, check_figure, write_figure
 from masrel.cli.trace_scene import Scene
@@ -77,19 +78,7 @@ class Files:
         ParameterError
             If a folder does not exist, or the figure cannot show these scenes.
         """
-        wanted = {
-            "--csv": self.csv_file,
-            "--json": None
-            if self.json_file in (None, "-")
-            else Path(self.json_file or ""),
-            "--figure": self.figure,
-        }
-        for option, file in wanted.items():
-            if file is not None and not file.parent.is_dir():
-                raise ParameterError(
-                    f"{option}: needs a folder that exists, got {file}, where "
-                    f"{file.parent} is none"
-                )
+        check_folders(csv=self.csv_file, json=self.json_file, figure=self.figure)
         if self.figure is not None:
             check_figure(self.figure, self.view or VIEWS[0], scenes)
 

@@ -45,8 +45,8 @@ def meaning(interval: Interval, noun: Noun) -> str:
 if these raters graded other items like these, without end, lies above the lower end \
 with probability 95 %.
     """
-    bounded = interval.method.endswith("one-sided")
-    name = f"{interval.kind.capitalize()} {'bound' if bounded else 'interval'}"
+    kind = "bound" if _is_bound(interval) else "interval"
+    name = f"{interval.kind.capitalize()} {kind}"
     return f"{name}{origin(interval, noun)}: {promise(interval, noun)}."
 
 
@@ -72,15 +72,24 @@ def promise(interval: Interval, noun: Noun) -> str:
             f"if {population}, again and again, about {level} of the intervals made "
             "this way would hold the value that all such studies together would give"
         )
-    bounded = interval.method.endswith("one-sided")
-    given = "these ratings and the prior"
-    if interval.target != "items":  # the model knows of no rater
-        given = "these ratings, the prior and raters who differ by chance alone"
-    where = "above the lower end" if bounded else "inside"
+    where = "above the lower end" if _is_bound(interval) else "inside"
     return (
-        f"given {given}, the value that would be found if {population}, "
+        f"given {_given(interval)}, the value that would be found if {population}, "
         f"without end, lies {where} with probability {level}"
     )
+
+
+def _given(interval: Interval) -> str:
+    # what a probability rests on; of other raters a model must say how they differ
+    if interval.target == "items":
+        return "these ratings and the prior"
+    if interval.method.startswith("Dirichlet-multinomial"):  # it knows of no rater
+        return "these ratings, the prior and raters who differ by chance alone"
+    return "these ratings, the prior and the model of how raters differ"
+
+
+def _is_bound(interval: Interval) -> bool:
+    return interval.method.endswith("one-sided")
 
 
 def aside(interval: Interval) -> str:
@@ -96,7 +105,7 @@ def aside(interval: Interval) -> str:
     str
         Nothing where they do not.
     """
-    if interval.method.endswith("one-sided"):
+    if _is_bound(interval):
         return "one-sided"
     if interval.method.endswith(_WIDER):
         return "posterior, wider by the spread of raters"

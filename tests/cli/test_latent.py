@@ -132,6 +132,8 @@ def test_progress_is_shown_unless_quiet(masrel: Caller, wide: Path) -> None:
         (NUMBERS, ("--seed", "-1"), "--seed: needs at least 0"),
         (NUMBERS, ("--figure", "scale.jpg"), "--figure: needs a name that ends in"),
         (NUMBERS, ("--json", "-", "--csv"), "want the same stdout"),
+        (NUMBERS, ("--json", "no/such.json"), "--json: needs a folder that exists"),
+        (NUMBERS, ("--figure", "no/such.png"), "--figure: needs a folder that exists"),
         ("patient,Kim,Lee\nA,1,1\nB,2,2\n", (), "no two raters disagree"),
         ("patient,Kim,Lee\nA,1,2\n", (), "needs two items"),
     ],
@@ -141,7 +143,8 @@ def test_what_cannot_be_done_is_one_sentence(
 ) -> None:
     file = tmp_path / "ratings.csv"
     file.write_text(text, encoding="utf-8")
-    done = masrel("latent", file, "--items", "fixed", "--quiet", *options)
+    # not --quiet: no bar is shown of a call that is refused
+    done = masrel("latent", file, "--items", "fixed", *options)
     assert done.code == 2
     assert done.out == ""
     assert said in done.err

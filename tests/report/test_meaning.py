@@ -31,6 +31,18 @@ CASES = [
         "inside with probability 90 %.",
     ),
     (
+        interval("credible", "ordinal latent-trait model, emcee", "raters"),
+        "Credible interval: given these ratings, the prior and the model of how raters "
+        f"differ, the value that would be found if {OTHER_RATERS}, without end, lies "
+        "inside with probability 90 %.",
+    ),
+    (
+        interval("credible", "ordinal latent-trait model, emcee", "both"),
+        "Credible interval: given these ratings, the prior and the model of how raters "
+        f"differ, the value that would be found if {BOTH}, without end, lies inside "
+        "with probability 90 %.",
+    ),
+    (
         interval("credible", f"{POSTERIOR}, one-sided", "items"),
         "Credible bound: given these ratings and the prior, the value that would be "
         f"found if {OTHER_ITEMS}, without end, lies above the lower end with "

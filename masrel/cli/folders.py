@@ -1,0 +1,36 @@
+"""Whether files that a verb is to write have a folder, asked before anything is done."""
+
+from pathlib import Path
+
+from masrel.errors import ParameterError
+
+__all__ = ["check_folders"]
+
+
+def check_folders(**files: Path | str | None) -> None:
+    """Check that the folders of files to be written exist.
+
+    Parameters
+    ----------
+    **files : Path, str or None
+        Option, without its hyphens, to the file it names; None for none, and "-" for
+        the screen.
+
+    Raises
+    ------
+    ParameterError
+        If a folder does not exist; the message names the option.
+
+    Examples
+    --------
+    >>> check_folders(json="-", figure=None)
+    """
+    for option, name in files.items():
+        if name is None or str(name) == "-":
+            continue
+        folder = Path(name).parent
+        if not folder.is_dir():
+            raise ParameterError(
+                f"--{option}: needs a folder that exists, got {name}, where {folder} "
+                "is none"
+            )
