@@ -11,9 +11,10 @@ from masrel.errors import DeviceError, OverrunWarning, ParameterError
 from masrel.hess.clock import Clock, RealClock
 from masrel.hess.controller import Controller
 from masrel.hess.device import Device
+from masrel.hess.ending import run_to_the_end
 from masrel.hess.fault import Fault
 from masrel.hess.limits import DeviceLimits
-from masrel.hess.movement import movement_facts
+from masrel.hess.movement import Columns, movement_facts
 from masrel.hess.presented import Fact, Presented, fault_facts
 from masrel.hess.realtime import real_time
 from masrel.hess.samples import Samples
@@ -109,13 +110,9 @@ def run_presentation(
     _check(device, controller, rate_hz, max_duration_s, end_angle)
     n_ticks = math.ceil(max_duration_s * rate_hz)
     capacity = n_samples(n_ticks, rate_hz, limits)
-    known: dict[str, Fact] = {
-        "simulated": device.simulated,
-        "device": device.name,
-        "rate_hz": rate_hz,
-        "speed_threshold": controller.speed_threshold,
-    }
-    with _samples(spool, capacity, known) as samples:
+    known: dict[str, Fact] = {"simulated": device.simulated, "device": device.name}
+    known["rate_hz"] = rate_hz
+    with _samples(spool, capacity, known, controller.speed_threshold) as samples:
         ticks = Ticks(
             device,
             controller,
@@ -128,27 +125,13 @@ def run_presentation(
             stop or EmergencyStop(),
             watchdog or NoWatchdog(),
         )
-        with _scheduled(clock) as scheduling, _collector_off():
-            ended, fault = _guarded(ticks, device)
+        with _scheduled(clock) as known["scheduling"], _collector_off():
+            ended, fault = run_to_the_end(ticks)
         columns = samples.columns()
     if ticks.n_missed:
-        warnings.warn(
-            f"the control loop missed {ticks.n_missed} ticks; they were skipped",
-            OverrunWarning,
-            stacklevel=2,
-        )
-    facts: dict[str, Fact] = {
-        "simulated": device.simulated,
-        "device": device.name,
-        "rate_hz": rate_hz,
-        "scheduling": scheduling,
-        "n_missed_ticks": ticks.n_missed,
-        "n_missed_replies": ticks.guard.replies.n_missed,
-        **fault_facts(fault),
-        "ended": ended,
-        "grip_lost": controller.grip_lost,
-        **movement_facts(columns, controller.speed_threshold, fault is not None),
-    }
+        words = f"the control loop missed {ticks.n_missed} ticks; they were skipped"
+        warnings.warn(words, OverrunWarning, stacklevel=2)
+    facts = {**known, **_facts(ticks, controller, columns, ended, fault)}
     recording = Recording(columns=columns, facts=facts)
     return Presented(recording=recording, fault=fault, n_missed_ticks=ticks.n_missed)
 
@@ -177,46 +160,32 @@ def _check(
         raise DeviceError(f"{device.name}: needs an open device to present on")
 
 
-def _guarded(ticks: Ticks, device: Device) -> tuple[str, Fault | None]:
-    # -> how it ended, fault; whatever happens, the torque is zero afterwards
-    try:
-        ended = ticks.run()
-        ticks.finish()
-    except DeviceError as error:
-        time_s, torque = ticks.time_s(), ticks.sent
-        words = [str(error), *_ramped_and_closed(ticks, device)]
-        ticks.mark_end()
-        fault = Fault(
-            kind=error.kind, words="; ".join(words), time_s=time_s, torque_nm=torque
-        )
-        return "fault", fault
-    except BaseException as error:
-        unsafe = _close(device)  # before anything else, whatever came
-        if unsafe is not None:
-            error.add_note(f"closing the device: {unsafe}")
-        raise
-    return ended, None
-
-
-def _ramped_and_closed(ticks: Ticks, device: Device) -> list[str]:
-    # -> what went wrong with that, in words; it is closed in any case
-    wrong = []
-    try:
-        ticks.ramp_down()
-        ticks.finish()
-    except DeviceError as error:
-        wrong.append(f"ramping down: {error}")
-    finally:
-        unsafe = _close(device)
-    return wrong if unsafe is None else [*wrong, f"closing it: {unsafe}"]
+def _facts(
+    ticks: Ticks,
+    controller: Controller,
+    columns: Columns,
+    ended: str,
+    fault: Fault | None,
+) -> dict[str, Fact]:
+    # What is known of a presentation once it is over
+    return {
+        "n_missed_ticks": ticks.n_missed,
+        "n_missed_replies": ticks.guard.replies.n_missed,
+        **fault_facts(fault),
+        "ended": ended,
+        "grip_lost": controller.grip_lost,
+        **movement_facts(columns, controller.speed_threshold, fault is not None),
+    }
 
 
 @contextmanager
 def _samples(
-    spool: Path | None, capacity: int, known: dict[str, Fact]
+    spool: Path | None, capacity: int, known: dict[str, Fact], threshold: float
 ) -> Iterator[Samples]:
     # In memory, or in a file that outlives this process
-    file = None if spool is None else Spool(spool, capacity, known)
+    file = None
+    if spool is not None:
+        file = Spool(spool, capacity, {**known, "speed_threshold": threshold})
     samples = Samples(capacity, file)
     try:
         yield samples
@@ -246,12 +215,3 @@ def _collector_off() -> Iterator[None]:
     finally:
         if collecting:
             gc.enable()
-
-
-def _close(device: Device) -> str | None:
-    # Zero torque, then let go; -> what went wrong with that, or None
-    try:
-        device.close()
-    except DeviceError as error:
-        return str(error)
-    return None

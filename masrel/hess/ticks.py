@@ -1,9 +1,8 @@
 """The ticks of one presentation: pace, and what happens at each of them."""
 
 import math
-from contextlib import suppress
 
-from masrel.errors import ControllerError, DeviceError, DeviceTimeoutError
+from masrel.errors import ControllerError, DeviceTimeoutError
 from masrel.hess.clock import Clock
 from masrel.hess.controller import Controller
 from masrel.hess.device import Device
@@ -74,8 +73,10 @@ class Ticks:
 
     Attributes
     ----------
-    samples : Samples
-        One per tick that was run.
+    device, clock, watchdog, samples
+        As given.
+    period_ns, ramp_ns : int
+        From tick to tick, and how long a fault takes to bring the torque to zero, ns.
     n_missed : int
         Ticks that were skipped.
     guard : Guard
@@ -85,24 +86,24 @@ class Ticks:
     """
 
     __slots__ = (
-        "_clock",
         "_controller",
-        "_device",
         "_end_angle",
         "_estimate",
         "_latest",
         "_n_ticks",
-        "_period_ns",
-        "_ramp_ns",
         "_resting_since",
         "_sent_ns",
         "_start_ns",
         "_stop",
-        "_watchdog",
+        "clock",
+        "device",
         "guard",
         "n_missed",
+        "period_ns",
+        "ramp_ns",
         "samples",
         "sent",
+        "watchdog",
     )
 
     def __init__(
@@ -118,19 +119,19 @@ class Ticks:
         stop: EmergencyStop,
         watchdog: Watching,
     ) -> None:
-        self._device = device
+        self.device = device
         self._controller = controller
-        self._clock = clock
+        self.clock = clock
         self._n_ticks = n_ticks
-        self._period_ns = round(1e9 / rate_hz)
-        self._ramp_ns = round(limits.ramp_time * 1e9)
+        self.period_ns = round(1e9 / rate_hz)
+        self.ramp_ns = round(limits.ramp_time * 1e9)
         self._end_angle = end_angle - _ARRIVAL_TOLERANCE
         self._estimate = VelocityEstimate()
         self._start_ns = self._sent_ns = 0
         self._latest: tuple[float, float, float] | None = None
         self._resting_since = math.inf
         self._stop = stop
-        self._watchdog = watchdog
+        self.watchdog = watchdog
         self.guard = Guard(limits, 1.0 / rate_hz)
         self.n_missed = 0
         self.sent = 0.0
@@ -150,10 +151,10 @@ class Ticks:
             If the device fails, a limit is exceeded, the controller fails, or the
             emergency stop is pressed.
         """
-        self._start_ns = self._sent_ns = self._clock.now_ns()
-        stop, device, beat = self._stop, self._device, self._watchdog.beat
-        check_every = max(1, round(_CHECK_EVERY_S * 1e9 / self._period_ns))
-        beat_every = max(1, round(_BEAT_EVERY_S * 1e9 / self._period_ns))
+        self._start_ns = self._sent_ns = self.clock.now_ns()
+        stop, device, beat = self._stop, self.device, self.watchdog.beat
+        check_every = max(1, round(_CHECK_EVERY_S * 1e9 / self.period_ns))
+        beat_every = max(1, round(_BEAT_EVERY_S * 1e9 / self.period_ns))
         next_check, next_beat = check_every, 0
         tick = 0
         while tick < self._n_ticks:
@@ -173,10 +174,10 @@ class Ticks:
     def _wait_for(self, tick: int) -> int:
         # Sleeps until the tick is due -> the tick that is due then. Those whose time
         # is over are skipped and counted: sent late, they would come in a burst.
-        due_ns = self._start_ns + tick * self._period_ns  # absolute: no drift
-        self._clock.sleep_until_ns(due_ns)
-        now_ns = self._clock.now_ns()
-        n_skipped = (now_ns - due_ns) // self._period_ns
+        due_ns = self._start_ns + tick * self.period_ns  # absolute: no drift
+        self.clock.sleep_until_ns(due_ns)
+        now_ns = self.clock.now_ns()
+        n_skipped = (now_ns - due_ns) // self.period_ns
         if n_skipped <= 0:
             return tick
         self.n_missed += min(n_skipped, self._n_ticks - tick)  # none after the last
@@ -187,7 +188,7 @@ class Ticks:
         # Read, check, estimate, decide, check, send, record -> whether it is over
         guard = self.guard
         try:
-            time_ns, angle = self._device.read()
+            time_ns, angle = self.device.read()
         except DeviceTimeoutError as error:
             guard.replies.another(self.time_s(), str(error))
             return False  # the device holds its torque
@@ -195,7 +196,7 @@ class Ticks:
         if not guard.is_new(time_s):
             guard.replies.another(self.time_s(), f"one of {time_s:.6f} s again")
             return False
-        now_ns = self._clock.now_ns()
+        now_ns = self.clock.now_ns()
         self._latest = (time_s, angle, 0.0)
         guard.reading(time_s, angle, (now_ns - time_ns) * 1e-9)
         velocity = self._estimate.update(time_s, angle)
@@ -204,7 +205,7 @@ class Ticks:
         controller = self._controller
         torque = self._decide(time_s, angle, velocity) + guard.soft_stop(angle)
         guard.torque(time_s, torque)
-        self._device.command(torque)
+        self.device.command(torque)
         self.sent = torque
         self._sent_ns = now_ns
         self.samples.add(
@@ -227,35 +228,7 @@ class Ticks:
 
     def time_s(self) -> float:
         """Return the time since the presentation began, s."""
-        return (self._clock.now_ns() - self._start_ns) * 1e-9
-
-    def ramp_down(self) -> None:
-        """Bring the torque to zero in a straight line, and record that.
-
-        The rows hold the last reading: nothing is read any more, because reading may
-        be what failed.
-
-        Raises
-        ------
-        DeviceError
-            If the device does not take the torques.
-        """
-        begun_ns, torque = self._clock.now_ns(), self.sent
-        self._mark(begun_ns, torque)
-        now_ns = begun_ns
-        while torque != 0.0 and self._ramp_ns:
-            n_over = (now_ns - begun_ns) // self._period_ns  # late ones are skipped
-            next_ns = min((n_over + 1) * self._period_ns, self._ramp_ns)
-            self._clock.sleep_until_ns(begun_ns + next_ns)
-            now_ns = self._clock.now_ns()
-            left = 1.0 - (now_ns - begun_ns) / self._ramp_ns
-            if left <= 0.0:
-                break
-            self._device.command(torque * left)
-            self.sent = torque * left
-            with suppress(DeviceError):  # `finish` says so; the ramp has to go on
-                self._watchdog.beat()
-            self._mark(now_ns, self.sent)
+        return (self.clock.now_ns() - self._start_ns) * 1e-9
 
     def finish(self) -> None:
         """Send zero torque, and let the watchdog rest.
@@ -265,16 +238,20 @@ class Ticks:
         DeviceError
             If the device does not take it, or the watchdog has ended.
         """
-        self._device.command(0.0)
+        self.device.command(0.0)
         self.sent = 0.0
-        self._watchdog.rest()
+        self.watchdog.rest()
 
-    def mark_end(self) -> None:
-        """Add a last sample with zero torque, now that it has been sent."""
-        self._mark(self._clock.now_ns(), 0.0)
+    def mark(self, now_ns: int, torque: float) -> None:
+        """Add a row without a reading, which holds the last one; none if none was.
 
-    def _mark(self, now_ns: int, torque: float) -> None:
-        # One row that holds what was read last; nothing when nothing was
+        Parameters
+        ----------
+        now_ns : int
+            The time, ns.
+        torque : float
+            What the device holds then, N·m.
+        """
         if self._latest is None:
             return
         _, angle, velocity = self._latest

@@ -1,0 +1,93 @@
+"""How a presentation ends: with zero torque, and after a fault with a closed device."""
+
+from contextlib import suppress
+
+from masrel.errors import DeviceError
+from masrel.hess.device import Device
+from masrel.hess.fault import Fault
+from masrel.hess.ticks import Ticks
+
+__all__ = ["run_to_the_end"]
+
+
+def run_to_the_end(ticks: Ticks) -> tuple[str, Fault | None]:
+    """Run ticks until they end; whatever ends them, the torque is zero afterwards.
+
+    Parameters
+    ----------
+    ticks : Ticks
+        Those of one presentation, on an open device.
+
+    Returns
+    -------
+    str
+        "arrived", "max-duration" or "fault".
+    Fault or None
+        What stopped them; the device is then closed.
+
+    Raises
+    ------
+    BaseException
+        Whatever is no `DeviceError`, once the device has been closed, with a note
+        when that failed.
+    """
+    try:
+        ended = ticks.run()
+        ticks.finish()
+    except DeviceError as error:
+        time_s, torque = ticks.time_s(), ticks.sent
+        words = [str(error), *_ramped_and_closed(ticks)]
+        ticks.mark(ticks.clock.now_ns(), 0.0)
+        fault = Fault(
+            kind=error.kind, words="; ".join(words), time_s=time_s, torque_nm=torque
+        )
+        return "fault", fault
+    except BaseException as error:
+        unsafe = _close(ticks.device)  # before anything else, whatever came
+        if unsafe is not None:
+            error.add_note(f"closing the device: {unsafe}")
+        raise
+    return ended, None
+
+
+def _ramped_and_closed(ticks: Ticks) -> list[str]:
+    # -> what went wrong with that, in words; it is closed in any case
+    wrong = []
+    try:
+        _ramp_down(ticks)
+        ticks.finish()
+    except DeviceError as error:
+        wrong.append(f"ramping down: {error}")
+    finally:
+        unsafe = _close(ticks.device)
+    return wrong if unsafe is None else [*wrong, f"closing it: {unsafe}"]
+
+
+def _ramp_down(ticks: Ticks) -> None:
+    # In a straight line to zero, and recorded. Nothing is read any more, because
+    # reading may be what failed.
+    clock, ramp_ns, torque = ticks.clock, ticks.ramp_ns, ticks.sent
+    begun_ns = now_ns = clock.now_ns()
+    ticks.mark(begun_ns, torque)
+    while torque != 0.0 and ramp_ns:
+        n_over = (now_ns - begun_ns) // ticks.period_ns  # late ones are skipped
+        next_ns = min((n_over + 1) * ticks.period_ns, ramp_ns)
+        clock.sleep_until_ns(begun_ns + next_ns)
+        now_ns = clock.now_ns()
+        left = 1.0 - (now_ns - begun_ns) / ramp_ns
+        if left <= 0.0:
+            break
+        ticks.device.command(torque * left)
+        ticks.sent = torque * left
+        with suppress(DeviceError):  # `finish` says so; the ramp has to go on
+            ticks.watchdog.beat()
+        ticks.mark(now_ns, ticks.sent)
+
+
+def _close(device: Device) -> str | None:
+    # Zero torque, then let go; -> what went wrong with that, or None
+    try:
+        device.close()
+    except DeviceError as error:
+        return str(error)
+    return None
