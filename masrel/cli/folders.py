@@ -1,4 +1,4 @@
-"""Whether files that a verb is to write have a folder, asked before anything is done."""
+"""Whether files to be written have a folder, asked before anything is computed."""
 
 from pathlib import Path
 

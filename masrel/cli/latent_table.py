@@ -91,6 +91,27 @@ def _rows(found: "LatentTrait") -> Iterator[tuple["Value", ...]]:
 
 
 def _notes(found: "LatentTrait") -> Iterator[str]:
+    yield from _meanings(found)
+    yield f"Prior: {found.prior.words}."
+    if found.other is not None:
+        yield f"Other prior: {found.other.prior.words}."
+    said = unlikely(found)
+    if said:
+        yield (
+            "The model does not make ratings like these (predictive check): "
+            f"{'; '.join(said)}."
+        )
+    else:
+        yield "The model makes ratings like these (predictive check)."
+    yield (
+        f"{found.n_chains} chains of {found.n_steps} steps; R-hat at most "
+        f"{found.r_hat:.4f}, effective size at least {found.ess:.0f}; seed "
+        f"{found.seed}."
+    )
+
+
+def _meanings(found: "LatentTrait") -> Iterator[str]:
+    # what the numbers speak of, and their unit
     from masrel.report.rounding import number, percent
 
     interval = found.kappa.interval
@@ -113,22 +134,6 @@ def _notes(found: "LatentTrait") -> Iterator[str]:
             f"Neighbouring thresholds are {number(apart, 2)} apart on average: a bias "
             "of that is about one grade."
         )
-    yield f"Prior: {found.prior.words}."
-    if found.other is not None:
-        yield f"Other prior: {found.other.prior.words}."
-    said = unlikely(found)
-    if said:
-        yield (
-            "The model does not make ratings like these (predictive check): "
-            f"{'; '.join(said)}."
-        )
-    else:
-        yield "The model makes ratings like these (predictive check)."
-    yield (
-        f"{found.n_chains} chains of {found.n_steps} steps; R-hat at most "
-        f"{found.r_hat:.4f}, effective size at least {found.ess:.0f}; seed "
-        f"{found.seed}."
-    )
 
 
 def unlikely(found: "LatentTrait") -> list[str]:

@@ -1,0 +1,158 @@
+"""Where ``masrel agree`` puts what it found: the screen, JSON, and a figure."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from masrel.cli.agreement_figure import check_figure, write_figure
+from masrel.cli.agreement_rows import Row, Wanted
+from masrel.cli.agreement_table import agreement_table
+from masrel.cli.folders import check_folders
+from masrel.cli.options import grouped
+from masrel.errors import ParameterError
+from masrel.estimates import as_document
+
+if TYPE_CHECKING:
+    from masrel.ratings import Ratings
+    from masrel.report.tables import Table
+
+__all__ = ["NO_INTERVAL", "Output", "output_options", "put"]
+
+NO_INTERVAL = (
+    "no interval: say what a new study would draw anew, with --target raters, items "
+    "or both"
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Output:
+    """What is written and printed.
+
+    Attributes
+    ----------
+    json_file : Path or None
+        Where JSON goes; "-" is the screen.
+    figure : Path or None
+        Where a figure goes.
+    csv, latex : bool
+        In which form the table is printed; as text when neither.
+    """
+
+    json_file: Path | None
+    figure: Path | None
+    csv: bool
+    latex: bool
+
+    def __post_init__(self) -> None:
+        forms = {"--json -": self.prints_json, "--csv": self.csv, "--latex": self.latex}
+        printed = [name for name, wanted in forms.items() if wanted]
+        if len(printed) > 1:
+            both = " and ".join(printed)
+            raise ParameterError(f"{both} want the same stdout: choose one")
+        check_folders(json=self.json_file, figure=self.figure)
+
+    @property
+    def prints_json(self) -> bool:
+        """Whether JSON, and nothing else, is printed."""
+        return self.json_file == Path("-")
+
+    def check(self, wanted: Wanted) -> None:
+        """Refuse a figure that cannot be drawn, before anything is computed."""
+        if self.figure is not None:
+            check_figure(self.figure, wanted.target)
+
+
+output_options = grouped(
+    "output",
+    Output,
+    click.option(
+        "--json",
+        "json_file",
+        type=click.Path(path_type=Path, allow_dash=True),
+        help="Write the estimates here; - prints them, and nothing else, on stdout.",
+    ),
+    click.option(
+        "--figure",
+        type=click.Path(path_type=Path, dir_okay=False),
+        help="Draw the intervals into this .png, .svg or .pdf; needs --target.",
+    ),
+    click.option("--csv", "csv", is_flag=True, help="Print every digit as CSV."),
+    click.option("--latex", "latex", is_flag=True, help="Print a LaTeX table."),
+)
+"""The options of output, given to a command as one argument `output`."""
+
+
+def put(
+    output: Output,
+    rows: list[Row],
+    ratings: "Ratings",
+    wanted: Wanted,
+    *,
+    file: Path,
+    by: str | None,
+    about: tuple[str, ...],
+) -> None:
+    """Write and print estimates.
+
+    Parameters
+    ----------
+    output : Output
+        Where to.
+    rows : list of Row
+        The estimates.
+    ratings : Ratings
+        What they were made from.
+    wanted : Wanted
+        What was asked for.
+    file : Path
+        Where the ratings came from.
+    by : str or None
+        The column that tells sessions apart, if there is more than one.
+    about : tuple of str
+        What to say of the ratings.
+
+    Raises
+    ------
+    OSError
+        If a file cannot be written.
+    """
+    if output.json_file is not None:
+        _write_json(rows, by, output.json_file)
+    if output.prints_json:
+        click.echo("".join(f"{note}\n" for note in about), err=True, nl=False)
+    else:
+        data = "simulated" if ratings.simulated else "foreign"
+        _print(agreement_table(rows, file, by, wanted, about, data), output)
+    if wanted.target is None:
+        click.echo(NO_INTERVAL, err=True)
+    elif output.figure is not None:
+        write_figure(rows, ratings, by, wanted.target, output.figure)
+        click.echo(f"figure: {output.figure}", err=True)
+
+
+def _write_json(rows: list[Row], by: str | None, file: Path) -> None:
+    documents = [
+        {**({} if by is None else {by: row.session}), **as_document(row.estimate)}
+        for row in rows
+    ]
+    text = json.dumps(
+        {"estimates": documents}, indent=1, ensure_ascii=False, allow_nan=False
+    )
+    if file == Path("-"):
+        click.echo(text)
+    else:
+        file.write_text(text + "\n", encoding="utf-8", newline="\n")
+
+
+def _print(table: "Table", output: Output) -> None:
+    from masrel.report.latex import as_latex
+    from masrel.report.tables import as_csv, as_text
+
+    form = as_csv if output.csv else as_latex if output.latex else as_text
+    click.echo(form(table).rstrip("\n"))
+    if output.csv:  # which has no place for notes
+        for note in table.notes:
+            click.echo(note, err=True)

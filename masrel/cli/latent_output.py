@@ -1,0 +1,174 @@
+"""Where ``masrel latent`` puts what it found: the screen, JSON, and a figure."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from masrel.cli.folders import check_folders
+from masrel.cli.latent_table import latent_document, latent_table
+from masrel.cli.options import grouped
+from masrel.errors import ParameterError
+
+if TYPE_CHECKING:
+    from masrel.intervals.latent.result import LatentTrait
+    from masrel.intervals.quantity import Quantity
+    from masrel.ratings import Ratings
+    from masrel.report.figures import Form, ScaleRow
+    from masrel.report.tables import Table
+
+__all__ = ["Output", "output_options", "put"]
+
+_FORMS: dict[str, "Form"] = {".png": "png", ".svg": "svg", ".pdf": "pdf"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Output:
+    """What is written and printed.
+
+    Attributes
+    ----------
+    json_file : Path or None
+        Where JSON goes; "-" is the screen.
+    figure : Path or None
+        Where a figure goes.
+    csv : bool
+        Whether the table is printed as CSV.
+    """
+
+    json_file: Path | None
+    figure: Path | None
+    csv: bool
+
+    def __post_init__(self) -> None:
+        if self.csv and self.prints_json:
+            raise ParameterError("--json - and --csv want the same stdout: choose one")
+        if self.figure is not None and self.figure.suffix.lower() not in _FORMS:
+            raise ParameterError(
+                "--figure: needs a name that ends in .png, .svg or .pdf, got "
+                f"{self.figure}"
+            )
+        check_folders(json=self.json_file, figure=self.figure)
+
+    @property
+    def prints_json(self) -> bool:
+        """Whether JSON, and nothing else, is printed."""
+        return self.json_file == Path("-")
+
+
+output_options = grouped(
+    "output",
+    Output,
+    click.option(
+        "--json",
+        "json_file",
+        type=click.Path(path_type=Path, allow_dash=True),
+        help="Write the result here; - prints it, and nothing else, on stdout.",
+    ),
+    click.option(
+        "--figure",
+        type=click.Path(path_type=Path, dir_okay=False),
+        help="Draw the scale into this .png, .svg or .pdf.",
+    ),
+    click.option("--csv", "csv", is_flag=True, help="Print every digit as CSV."),
+)
+"""The options of output, given to a command as one argument `output`."""
+
+
+def put(
+    output: Output,
+    found: "LatentTrait",
+    ratings: "Ratings",
+    *,
+    file: Path,
+    about: tuple[str, ...],
+) -> None:
+    """Write and print a result.
+
+    Parameters
+    ----------
+    output : Output
+        Where to.
+    found : LatentTrait
+        The result.
+    ratings : Ratings
+        What it was made from.
+    file : Path
+        Where the ratings came from.
+    about : tuple of str
+        What to say of the ratings.
+
+    Raises
+    ------
+    OSError
+        If a file cannot be written.
+    """
+    if output.json_file is not None:
+        _write_json(found, output.json_file)
+    if output.prints_json:
+        _tell(about)
+    else:
+        data = "simulated" if ratings.simulated else "foreign"
+        _print(latent_table(found, file, about, data), csv=output.csv)
+    if output.figure is not None:
+        _draw(found, ratings, output.figure)
+        click.echo(f"figure: {output.figure}", err=True)
+
+
+def _write_json(found: "LatentTrait", file: Path) -> None:
+    text = json.dumps(
+        latent_document(found), indent=1, ensure_ascii=False, allow_nan=False
+    )
+    if file == Path("-"):
+        click.echo(text)
+    else:
+        file.write_text(text + "\n", encoding="utf-8", newline="\n")
+
+
+def _print(table: "Table", *, csv: bool) -> None:
+    from masrel.report.tables import as_csv, as_text
+
+    click.echo((as_csv if csv else as_text)(table).rstrip("\n"))
+    if csv:  # which has no place for notes
+        _tell(table.notes)
+
+
+def _tell(notes: tuple[str, ...]) -> None:
+    click.echo("".join(f"{note}\n" for note in notes), err=True, nl=False)
+
+
+def _draw(found: "LatentTrait", ratings: "Ratings", file: Path) -> None:
+    # Imported here: a table loads nothing that draws.
+    from masrel.report.figures import LatentScale, latent_file
+
+    scale = LatentScale(
+        items=tuple(map(_row, found.items)),
+        thresholds=tuple(map(_row, found.thresholds)),
+        raters=tuple(
+            _row(bias, noise.value)
+            for bias, noise in zip(found.raters, found.noises, strict=True)
+        ),
+        grades=ratings.scale.grades,
+        level=found.items[0].interval.level,
+    )
+    file.write_bytes(
+        latent_file(
+            scale,
+            stamp="SIMULATED DATA" if ratings.simulated else "",
+            form=_FORMS[file.suffix.lower()],
+        )
+    )
+
+
+def _row(of: "Quantity", noise: float | None = None) -> "ScaleRow":
+    from masrel.report.figures import ScaleRow
+
+    return ScaleRow(
+        label=of.name,
+        value=of.value,
+        low=of.interval.low,
+        high=of.interval.high,
+        noise=noise,
+    )
