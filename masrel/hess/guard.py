@@ -46,7 +46,6 @@ class Guard:
         "_raw_speed",
         "_sent",
         "_sent_at",
-        "_stop_slope",
         "_stopped_dead",
         "_time",
         "replies",
@@ -55,7 +54,6 @@ class Guard:
     def __init__(self, limits: DeviceLimits, period_s: float) -> None:
         self._limits = limits
         self._period = period_s
-        self._stop_slope = limits.soft_stop_torque / limits.soft_stop_width
         self._time = -math.inf  # of the last reading, s
         self._angle = 0.0
         self._raw_speed = 0.0  # between the last two readings, rad/s
@@ -171,27 +169,6 @@ class Guard:
                 "speed",
             )
 
-    def soft_stop(self, angle: float) -> float:
-        """Return what the soft stops push back with.
-
-        Parameters
-        ----------
-        angle : float
-            Elbow angle within the range, rad.
-
-        Returns
-        -------
-        float
-            Torque to add to the command, N·m: positive near the highest angle,
-            negative near the lowest, 0 between.
-        """
-        limits = self._limits
-        beyond = angle - (limits.highest_angle - limits.soft_stop_width)
-        if beyond > 0.0:
-            return self._stop_slope * beyond
-        beyond = angle - (limits.lowest_angle + limits.soft_stop_width)
-        return self._stop_slope * beyond if beyond < 0.0 else 0.0
-
     def torque(self, time_s: float, torque: float) -> None:
         """Check a torque before it is sent.
 
@@ -226,32 +203,3 @@ class Guard:
                 )
         self._sent = torque
         self._sent_at = time_s
-
-    def missed_ticks(self, n_missed: int, gap_s: float) -> None:
-        """Check how many ticks have been missed so far, and how many at once.
-
-        Parameters
-        ----------
-        n_missed : int
-            Ticks missed since the presentation began.
-        gap_s : float
-            How long nothing has been sent, s.
-
-        Raises
-        ------
-        LimitExceededError
-            If there are too many, or the gap is as long as the watchdog waits.
-        """
-        limits = self._limits
-        if gap_s >= limits.watchdog_time:
-            raise LimitExceededError(
-                f"silence: needs a command every {limits.watchdog_time * 1e3:g} ms, "
-                f"the loop sent none for {gap_s * 1e3:.1f} ms",
-                "overrun",
-            )
-        if n_missed > limits.missed_ticks:
-            raise LimitExceededError(
-                f"missed ticks: needs at most {limits.missed_ticks} in a presentation, "
-                f"the loop missed {n_missed}",
-                "overrun",
-            )

@@ -8,7 +8,9 @@ from masrel.hess.controller import Controller
 from masrel.hess.device import Device
 from masrel.hess.guard import Guard
 from masrel.hess.limits import DeviceLimits
+from masrel.hess.overrun import check_overrun
 from masrel.hess.samples import Samples
+from masrel.hess.soft_stops import SoftStops
 from masrel.hess.stop import EmergencyStop
 from masrel.hess.velocity import VelocityEstimate
 from masrel.hess.watchdog import Watching
@@ -90,11 +92,13 @@ class Ticks:
         "_end_angle",
         "_estimate",
         "_latest",
+        "_limits",
         "_n_ticks",
         "_resting_since",
         "_sent_ns",
         "_start_ns",
         "_stop",
+        "_stops",
         "clock",
         "device",
         "guard",
@@ -132,6 +136,8 @@ class Ticks:
         self._resting_since = math.inf
         self._stop = stop
         self.watchdog = watchdog
+        self._limits = limits
+        self._stops = SoftStops(limits)
         self.guard = Guard(limits, 1.0 / rate_hz)
         self.n_missed = 0
         self.sent = 0.0
@@ -181,7 +187,8 @@ class Ticks:
         if n_skipped <= 0:
             return tick
         self.n_missed += min(n_skipped, self._n_ticks - tick)  # none after the last
-        self.guard.missed_ticks(self.n_missed, (now_ns - self._sent_ns) * 1e-9)
+        gap_s = (now_ns - self._sent_ns) * 1e-9
+        check_overrun(self._limits, self.n_missed, gap_s)
         return tick + n_skipped
 
     def _tick(self) -> bool:
@@ -203,7 +210,7 @@ class Ticks:
         self._latest = (time_s, angle, velocity)
         guard.speed(velocity)
         controller = self._controller
-        torque = self._decide(time_s, angle, velocity) + guard.soft_stop(angle)
+        torque = self._decide(time_s, angle, velocity) + self._stops.torque(angle)
         guard.torque(time_s, torque)
         self.device.command(torque)
         self.sent = torque

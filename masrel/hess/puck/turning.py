@@ -10,6 +10,7 @@ from masrel.hess.clock import Clock
 from masrel.hess.device import Device
 from masrel.hess.guard import Guard
 from masrel.hess.limits import DeviceLimits
+from masrel.hess.overrun import check_overrun
 from masrel.hess.puck.friction import SteadyRun
 from masrel.hess.stop import EmergencyStop
 from masrel.hess.velocity import VelocityEstimate
@@ -167,7 +168,7 @@ class _Turning:
         self._due_ns = max(self._due_ns, now_ns - _PERIOD_NS) + _PERIOD_NS
         self._stop.check()
         guard = self._guard
-        guard.missed_ticks(0, (now_ns - self._sent_ns) * 1e-9)  # silence alone
+        check_overrun(LIMITS, 0, (now_ns - self._sent_ns) * 1e-9)  # silence alone
         try:
             time_ns, angle = self._device.read()
         except DeviceTimeoutError:
