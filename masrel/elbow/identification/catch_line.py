@@ -10,9 +10,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from masrel.elbow.identification.catch import Catch
 from masrel.elbow.identification.clusters import ClusteredFit, Rows, solve
 from masrel.elbow.identification.results import Step, fitted
-from masrel.elbow.identification.trials import Catch
 from masrel.elbow.parameters import ElbowParameters
 
 __all__ = ["fit_catch_line", "line_row", "on_the_line"]

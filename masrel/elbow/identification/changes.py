@@ -32,10 +32,13 @@ class Changes:
         First sample of the catch, or None.
     end : int or None
         First sample after the catch, or None if it does not end.
+    residual_sd : float
+        Standard deviation of torque about the best of all pairs, N·m.
     """
 
     catch: int | None
     end: int | None
+    residual_sd: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +113,7 @@ def find_changes(
     starts = np.arange(first + 1, n - 2, step)
     ends = np.append(np.arange(first + 2, n - 1, step), n)
     if starts.size == 0:
-        return Changes(catch=None, end=None)
+        return Changes(catch=None, end=None, residual_sd=math.nan)
     # First both coarsely, then the catch to the sample, then the end to the sample.
     gap = step
     for finer in (False, True, True):
@@ -125,16 +128,17 @@ def find_changes(
     least = float(squares[place])
     sd = math.sqrt(max(least, 0.0) / max(n - 6, 1))
     if _rise(torque, pre_catch, catch, min(catch + peak, end)) < LEAST_SIGNAL * sd:
-        return Changes(catch=None, end=None)
+        return Changes(catch=None, end=None, residual_sd=sd)
     if end == n:
-        return Changes(catch=catch, end=None)
+        return Changes(catch=catch, end=None, residual_sd=sd)
     endless = _squares(sums, angle, starts, np.array([n]), (peak, 0), offset)[:, 0]
     climbs = additive or (
         _climb(sums, angle, min(catch + peak, end), end) >= LEAST_SIGNAL * sd
     )
     if climbs and float(endless.min()) - least >= LEAST_GAIN * sd**2:
-        return Changes(catch=catch, end=end)
-    return Changes(catch=int(starts[int(np.argmin(endless))]), end=None)
+        return Changes(catch=catch, end=end, residual_sd=sd)
+    catch = int(starts[int(np.argmin(endless))])
+    return Changes(catch=catch, end=None, residual_sd=sd)
 
 
 def _sums(torque: Floats, rest: Floats, later: Floats, angle: Floats) -> _Sums:

@@ -11,8 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from masrel.elbow.identification.catch import Catch
 from masrel.elbow.identification.catch_line import line_row
-from masrel.elbow.identification.trials import Catch, Part, Trial
+from masrel.elbow.identification.censored import beyond
+from masrel.elbow.identification.clusters import Rows, without_own
+from masrel.elbow.identification.horizon import Horizon
+from masrel.elbow.identification.part import Part
+from masrel.elbow.identification.trials import Trial
 from masrel.elbow.parameters import ElbowParameters
 
 __all__ = ["Equations", "Known", "Spreads"]
@@ -56,12 +61,15 @@ class Known:
         What residuals are divided by.
     on_line : bool
         Whether the trial's catch lies on the line of (2).
+    horizon : Horizon or None
+        Behind which its catch ends, if it does not end before.
     """
 
     names: tuple[str, ...]
     constants: ElbowParameters
     spreads: Spreads
     on_line: bool
+    horizon: Horizon | None = None
 
 
 class Equations:
@@ -281,7 +289,57 @@ class Equations:
             size, travel = spreads.travel, mine.get("travel", catch.travel)
             slopes = {"catch_travel": 1.0 / size, "travel": -1.0 / size}
             rows.append(((now["catch_travel"] - travel) / size, slopes))  # (4)
+        horizon = self._known.horizon
+        if horizon is not None and "catch_travel" in now:
+            left, slope, _ = beyond(now["catch_travel"], horizon, spreads.travel)
+            rows.append((left, {"catch_travel": slope}))
         return rows
+
+    def travel(self, own: Floats) -> float | None:
+        """Angle travelled in the trial's catch.
+
+        Parameters
+        ----------
+        own : ndarray, shape (n_own,)
+            The trial's own parameters.
+
+        Returns
+        -------
+        float or None
+            rad; None if the catch does not end.
+        """
+        catch = self._catch
+        if catch is None or catch.end is None:
+            return None
+        mine: dict[str, float] = dict(zip(self._own, own.tolist(), strict=True))
+        return mine.get("travel", catch.travel)
+
+    def rows(self, shared: Floats, own: Floats) -> Rows:
+        """Linear rows that say of the parameters what the trial does.
+
+        Parameters
+        ----------
+        shared : ndarray, shape (n_shared,)
+            Shared parameters.
+        own : ndarray, shape (n_own,)
+            The trial's own.
+
+        Returns
+        -------
+        Rows
+            Of the shared ones, where they are; without what the own explain.
+        """
+        residuals, by_shared, by_own = self.at(shared, own)
+        names, horizon = self._known.names, self._known.horizon
+        if horizon is not None and "catch_travel" in names:
+            place = names.index("catch_travel")
+            spread = self._known.spreads.travel
+            _, slope, root = beyond(float(shared[place]), horizon, spread)
+            # the last row: as steep as the likelihood is curved, and of equal score
+            if slope != 0.0:
+                residuals[-1] *= slope / -root
+                by_shared[-1] *= -root / slope
+        return without_own(by_own, by_shared, -residuals)
 
     def torque(self, shared: Floats, own: Floats) -> Floats:
         """Torque of the law at the trial's samples, with its own constant.

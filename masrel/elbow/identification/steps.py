@@ -1,198 +1,28 @@
-"""The fits of the source one by one: slow trials, catch angles, catch torques.
+"""Step 4: H, Q, D and k_post of (3) to (5), each on its own.
 
 Source: Park, Kim and Damiano (2012), IEEE TNSRE 20(3), 361-370,
-https://doi.org/10.1109/TNSRE.2012.2195330, equations (1)-(6), Figs. 3-5.
+https://doi.org/10.1109/TNSRE.2012.2195330, equations (3)-(5), Figs. 4 and 5.
 """
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from masrel.elbow.identification.clusters import Rows, solve, without_own
-from masrel.elbow.identification.results import Step, fitted
-from masrel.elbow.identification.trials import Catch, Part, Trial
-from masrel.elbow.parameters import ElbowParameters
+from masrel.elbow.identification.catch import Catch
+from masrel.elbow.identification.censored import CensoredTravels, fit_censored
+from masrel.elbow.identification.clusters import Rows, solve
+from masrel.elbow.identification.horizon import Horizon
+from masrel.elbow.identification.levels import CatchLevels
+from masrel.elbow.identification.results import FittedParameter, Step, fitted
 
 __all__ = [
-    "CatchLevels",
-    "PreCatchLaw",
-    "catch_levels",
+    "can_be_censored",
+    "censored_travel",
     "fit_catch_torque",
     "fit_catch_travel",
     "fit_post_catch",
-    "fit_slow",
 ]
-
-Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PreCatchLaw:
-    """b, k and m of (1).
-
-    Attributes
-    ----------
-    damping, stiffness, inertia : float
-        N·m·s/rad, N·m/rad, kg·m².
-    """
-
-    damping: float
-    stiffness: float
-    inertia: float
-
-    def torque(self, part: Part) -> Floats:
-        """Torque of (1) without the constant k·θ_rest.
-
-        Parameters
-        ----------
-        part : Part
-            Samples.
-
-        Returns
-        -------
-        ndarray, shape (n_samples,)
-            N·m.
-        """
-        law = self.damping * part.velocity + self.stiffness * part.angle
-        return np.asarray(law + self.inertia * part.acceleration)
-
-    def at(self, catch: Catch) -> float:
-        """Torque of (1) at the start of a catch, without the constant.
-
-        Parameters
-        ----------
-        catch : Catch
-            The catch.
-
-        Returns
-        -------
-        float
-            N·m.
-        """
-        law = self.damping * catch.speed + self.stiffness * catch.angle
-        return law + self.inertia * catch.acceleration
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CatchLevels:
-    """What is read off the torque of one catch.
-
-    Attributes
-    ----------
-    peak : float
-        Peak above the end of pre-catch, H·v_c of (3), N·m.
-    residual : float
-        Residual above it, Q·H·v_c, N·m; ``nan`` if nothing was recorded after the peak.
-    climb : Rows
-        Torque above the residual after the catch against angle travelled since.
-    """
-
-    peak: float
-    residual: float
-    climb: Rows = field(repr=False)
-
-
-def fit_slow(
-    trials: Sequence[Trial], *, with_inertia: bool, level: float
-) -> tuple[Step, float]:
-    """Fit b, k and m to slow trials: step 1.
-
-    Parameters
-    ----------
-    trials : sequence of Trial
-        Slow trials, at least one. Each has a constant of its own, -k·θ_rest of (1)
-        and the sensor's zero.
-    with_inertia : bool
-        Whether m is fitted.
-    level : float
-        Level of the intervals.
-
-    Returns
-    -------
-    tuple of Step and float
-        The fit, and the paper's mean relative error (Fig. 3): mean distance from
-        the law over mean torque, both absolute.
-    """
-    rows = []
-    for trial in trials:
-        part = trial.pre_catch
-        columns = [part.velocity, part.angle]
-        columns += [part.acceleration] if with_inertia else []
-        own = np.ones((part.torque.size, 1))
-        rows.append(without_own(own, np.stack(columns, axis=1), part.torque))
-    names = ("damping", "stiffness", *(("inertia",) if with_inertia else ()))
-    fit = solve(rows, n_own=len(trials))
-    far, squares, size = 0.0, 0.0, 0.0
-    for trial, row in zip(trials, rows, strict=True):
-        part = trial.pre_catch
-        law = part.torque - (row.target - row.design @ fit.values)
-        far += float(np.abs(part.measured - law).sum())
-        squares += float(((part.measured - law) ** 2).sum())
-        size += float(np.abs(part.measured).sum())
-    error = far / size if size > 0.0 else math.nan
-    n_samples = sum(trial.pre_catch.measured.size for trial in trials)
-    step = Step(
-        name="slow trials: b, k of (1)",
-        estimates=fitted(names, fit, level),
-        residual_sd=math.sqrt(squares / n_samples),
-    )
-    return step, error
-
-
-def catch_levels(
-    trial: Trial, law: PreCatchLaw, constants: ElbowParameters
-) -> CatchLevels | None:
-    """Read peak, residual and climb off the torque of a trial.
-
-    Parameters
-    ----------
-    trial : Trial
-        A trial.
-    law : PreCatchLaw
-        b, k and m.
-    constants : ElbowParameters
-        ΔT_peak and the reading of (5).
-
-    Returns
-    -------
-    CatchLevels or None
-        None without a catch whose torque can be used.
-    """
-    catch, after, pre = trial.catch, trial.after, trial.pre_catch
-    if catch is None or after is None or pre.torque.size == 0 or after.torque.size == 0:
-        return None
-    own = float((pre.torque - law.torque(pre)).mean())  # -k·θ_rest
-    above = after.torque - (own + law.at(catch))  # over τ_pre_end of (3)
-    end = math.inf if catch.end is None else catch.end
-    in_peak = after.time < min(catch.time + constants.peak_duration, end)
-    later = after.time >= end
-    past = np.where(later, after.angle - (catch.angle + catch.travel), 0.0)
-    torque = above - np.where(later, law.inertia * after.acceleration, 0.0)
-    if constants.post_catch == "additive":
-        torque = np.where(later, after.torque - law.torque(after) - own, above)
-    climb, residual = _climb(past[~in_peak], torque[~in_peak])
-    return CatchLevels(
-        peak=float(above[in_peak].mean()) if in_peak.any() else math.nan,
-        residual=residual,
-        climb=climb,
-    )
-
-
-def _climb(past: Floats, torque: Floats) -> tuple[Rows, float]:
-    # a level and a slope; the level alone is the residual torque
-    nothing = Rows(design=np.zeros((1, 1)), target=np.zeros(1))
-    if torque.size == 0:
-        return nothing, math.nan
-    if not past.any():
-        return nothing, float(torque.mean())
-    own = np.ones((past.size, 1))
-    rows = without_own(own, past[:, None], torque)
-    moved = float((rows.design[:, 0] ** 2).sum())
-    slope = float(rows.design[:, 0] @ rows.target) / moved
-    return rows, float(torque.mean()) - slope * float(past.mean())
 
 
 def fit_catch_torque(
@@ -231,33 +61,86 @@ def fit_catch_torque(
     )
 
 
-def fit_catch_travel(catches: Sequence[Catch], *, level: float) -> Step:
+def fit_catch_travel(
+    catches: Sequence[Catch], horizons: Sequence[Horizon], *, level: float
+) -> Step:
     """Average the angle travelled during the catch, ΔT_c·v̄_c of (4): D.
 
     Parameters
     ----------
     catches : sequence of Catch
-        Catches; those that did not end within their stretch say nothing of D.
+        Catches.
+    horizons : sequence of Horizon
+        Of those that do not end within their stretch, as far as they have one.
     level : float
         Level of the intervals.
 
     Returns
     -------
     Step
-        D.
+        D: the mean if all catches end, otherwise where the likelihood of all travels
+        is largest, those behind a horizon censored there.
     """
-    rows = [
-        Rows(design=np.ones((1, 1)), target=np.array([catch.travel]))
-        for catch in catches
-        if catch.end is not None
-    ]
+    title, name = "catch travel: D of (4)", "catch_travel"
+    seen = [catch.travel for catch in catches if catch.end is not None]
+    if horizons and can_be_censored(seen):
+        estimate, spread = censored_travel(seen, horizons, level=level)
+        return Step(name=title, estimates=(estimate,), residual_sd=spread)
+    rows = [Rows(design=np.ones((1, 1)), target=np.array([each])) for each in seen]
     longest = max((catch.travel for catch in catches), default=0.0)
     reason = "no catch ends within its stretch"
     if catches:
         reason += f"; D is more than {math.degrees(longest):.4g} deg"
-    return _one(
-        "catch travel: D of (4)", "catch_travel", rows, level, {"catch_travel": reason}
+    return _one(title, name, rows, level, {name: reason})
+
+
+def can_be_censored(seen: Sequence[float]) -> bool:
+    """Say whether travels that were seen tell how much travels differ.
+
+    Parameters
+    ----------
+    seen : sequence of float
+        Travels of catches that end, rad.
+
+    Returns
+    -------
+    bool
+        Whether there are two that differ.
+    """
+    return len(set(seen)) > 1
+
+
+def censored_travel(
+    seen: Sequence[float], horizons: Sequence[Horizon], *, level: float
+) -> tuple[FittedParameter, float]:
+    """Estimate D where some catches outlast their stretch.
+
+    Parameters
+    ----------
+    seen : sequence of float
+        Travels of catches that end, rad; two or more that differ.
+    horizons : sequence of Horizon
+        Of the others.
+    level : float
+        Level of the interval.
+
+    Returns
+    -------
+    tuple of FittedParameter and float
+        D, and the standard deviation of travels, rad.
+    """
+    found = fit_censored(CensoredTravels.of(seen, horizons), level=level)
+    estimate = FittedParameter(
+        name="catch_travel",
+        value=found.mean,
+        standard_error=found.standard_error,
+        freedom=found.freedom,
+        low=found.low,
+        high=found.high,
+        level=level,
+        n_trials=len(seen) + len(horizons),
     )
+    return estimate, found.sd
 
 
 def fit_post_catch(levels: Sequence[CatchLevels], *, level: float) -> Step:

@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from masrel.elbow.identification.clusters import ClusteredFit, solve, without_own
+from masrel.elbow.identification.clusters import ClusteredFit, solve
 from masrel.elbow.identification.equations import Equations, Known, Spreads
+from masrel.elbow.identification.horizon import Horizon
 from masrel.elbow.identification.trials import Trial
 from masrel.elbow.parameters import ElbowParameters
 
@@ -40,6 +41,8 @@ class Together:
         Per trial, the law at its samples, N·m.
     torque_sd : float
         Standard deviation of measured torque about it, N·m.
+    travels : tuple of float or None
+        Per trial the angle travelled in its catch, rad; None if that does not end.
     n_evaluations : int
         Evaluations of the residuals of all trials.
     """
@@ -48,6 +51,7 @@ class Together:
     fit: ClusteredFit
     fitted_torque: tuple[Floats, ...] = field(repr=False)
     torque_sd: float
+    travels: tuple[float | None, ...]
     n_evaluations: int
 
 
@@ -57,6 +61,7 @@ def refine(
     constants: ElbowParameters,
     spreads: Spreads,
     on_line: Sequence[bool],
+    horizons: Sequence[Horizon | None],
 ) -> Together:
     """Fit every parameter to every trial at once.
 
@@ -72,6 +77,8 @@ def refine(
         What residuals are divided by.
     on_line : sequence of bool
         Of which trials the catch lies on the line of (2).
+    horizons : sequence of Horizon or None
+        Behind which of them catches end that do not end before.
 
     Returns
     -------
@@ -87,9 +94,15 @@ def refine(
     equations = [
         Equations(
             trial,
-            Known(names=names, constants=constants, spreads=spreads, on_line=on),
+            Known(
+                names=names,
+                constants=constants,
+                spreads=spreads,
+                on_line=on,
+                horizon=horizon,
+            ),
         )
-        for trial, on in zip(trials, on_line, strict=True)
+        for trial, on, horizon in zip(trials, on_line, horizons, strict=True)
     ]
     system = _System(equations, len(names))
     shared = np.array([start[name] for name in names])
@@ -141,12 +154,13 @@ class _System:
 def _finish(
     trials: Sequence[Trial], system: _System, names: tuple[str, ...], vector: Floats
 ) -> Together:
-    rows, torques, squares, count = [], [], 0.0, 0
+    rows, torques, travels, squares, count = [], [], [], 0.0, 0
     shared = vector[: len(names)]
     for place, trial in enumerate(trials):
-        residuals, by_shared, by_own = system.of_trial(vector, place)
-        rows.append(without_own(by_own, by_shared, -residuals))
-        law = system.equations[place].torque(shared, vector[system.own[place]])
+        equations, own = system.equations[place], vector[system.own[place]]
+        rows.append(equations.rows(shared, own))
+        travels.append(equations.travel(own))
+        law = equations.torque(shared, own)
         measured = trial.pre_catch.measured
         if trial.after is not None:
             measured = np.concatenate([measured, trial.after.measured])
@@ -168,5 +182,6 @@ def _finish(
         fit=fit,
         fitted_torque=tuple(torques),
         torque_sd=math.sqrt(squares / max(count - n_own - len(names), 1)),
+        travels=tuple(travels),
         n_evaluations=system.n_evaluations,
     )

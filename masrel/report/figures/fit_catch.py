@@ -7,13 +7,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from masrel.elbow.identification.catch import Catch
+from masrel.elbow.identification.law import PreCatchLaw
+from masrel.elbow.identification.levels import CatchLevels, catch_levels
 from masrel.elbow.identification.results import QUANTITIES, ElbowFit
-from masrel.elbow.identification.steps import (
-    CatchLevels,
-    PreCatchLaw,
-    catch_levels,
-)
-from masrel.elbow.identification.trials import Catch
 from masrel.report.figures.style import (
     BLACK,
     BLUE,

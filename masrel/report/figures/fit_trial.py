@@ -6,8 +6,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from masrel.elbow.identification.catch import Catch
 from masrel.elbow.identification.results import ElbowFit
-from masrel.elbow.identification.trials import Catch, Trial
+from masrel.elbow.identification.trials import Trial
 from masrel.report.figures.style import (
     BLACK,
     BLUE,

@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
+from masrel.elbow.identification.catch import Catch
 from masrel.elbow.identification.catch_line import (
     fit_catch_line,
     line_row,
     on_the_line,
 )
-from masrel.elbow.identification.trials import Catch
 from masrel.elbow.parameters import STANDARD_MODELS
 
 HM3 = STANDARD_MODELS["HM3"]
@@ -29,6 +29,7 @@ def catch(angle: float, mean_speed: float, gain: float) -> Catch:
         travel=0.3,
         mean_catch_speed=2.0,
         within_peak=False,
+        residual_sd=0.1,
     )
 
 

@@ -6,7 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from masrel.elbow.identification.censored import beyond
 from masrel.elbow.identification.equations import Equations, Known, Spreads
+from masrel.elbow.identification.horizon import Horizon
+from masrel.elbow.identification.law import PreCatchLaw
 from masrel.elbow.identification.results import QUANTITIES
 from masrel.elbow.identification.samples import even_samples
 from masrel.elbow.identification.stretches import find_stretches
@@ -29,7 +32,9 @@ def caught(joint: ElbowParameters, speed: float, seed: int = 1) -> Trial:
     (stretch,) = find_stretches(
         even_samples(movement), window=0.06, slow_below=math.radians(20.0)
     )
-    law = (joint.damping, joint.stiffness, joint.inertia)
+    law = PreCatchLaw(
+        damping=joint.damping, stiffness=joint.stiffness, inertia=joint.inertia
+    )
     return fast_trial(stretch, "trial", joint, law, 0.06)
 
 
@@ -98,3 +103,38 @@ def test_the_law_is_evaluated_on_few_rows_before_the_residual_torque() -> None:
     held = int((trial.after.time >= trial.catch.time + joint.peak_duration).sum())  # type: ignore[union-attr]
     assert rows <= held + 6 + 3
     assert trial.pre_catch.time.size > 300
+
+
+def test_a_censored_travel_adds_one_row_of_d_alone() -> None:
+    joint = STANDARD_MODELS["HM1"]
+    behind = Horizon(travel=joint.catch_travel - 0.02, softness=0.004)
+    plain, censored = (
+        Equations(
+            caught(joint, 85.0),
+            Known(
+                names=NAMES,
+                constants=joint,
+                spreads=SPREADS,
+                on_line=True,
+                horizon=each,
+            ),
+        )
+        for each in (None, behind)
+    )
+    shared = np.array([getattr(joint, name) for name in NAMES])
+    mine = plain.start(dict(zip(NAMES, shared.tolist(), strict=True)))
+    residuals, by_shared, by_own = censored.at(shared, mine)
+    np.testing.assert_array_equal(residuals[:-1], plain.at(shared, mine)[0])
+    left, slope, root = beyond(joint.catch_travel, behind, SPREADS.travel)
+    place = NAMES.index("catch_travel")
+    expected = np.zeros(len(NAMES))
+    expected[place] = slope
+    assert residuals[-1] == left
+    np.testing.assert_array_equal(by_shared[-1], expected)
+    assert not by_own[-1].any()
+    # linear rows: the same score, and as much information as the likelihood is curved
+    row = censored.rows(shared, mine)
+    assert row.design[-1, place] ** 2 == pytest.approx(root**2, rel=1e-12)
+    score = row.design[-1, place] * row.target[-1]
+    assert score == pytest.approx(-left * slope, rel=1e-12)
+    assert censored.travel(mine) is None

@@ -18,7 +18,7 @@ from masrel.errors import (
 )
 from tests.elbow.identification.synthesis import Scatter, recording, study
 
-HM3 = STANDARD_MODELS["HM3"]
+HM2, HM3 = STANDARD_MODELS["HM2"], STANDARD_MODELS["HM3"]
 SCATTER = Scatter(
     catch_angle=math.radians(2.0), catch_torque=0.1, catch_travel=math.radians(2.0)
 )
@@ -158,6 +158,63 @@ def test_a_joint_whose_catch_never_ends_leaves_d_and_k_post_open() -> None:
     )
     assert "no stretch goes on after" in str(made["post_catch_stiffness"].reason)
     assert made["catch_torque_constant"].covers(1.4)
+
+
+@pytest.fixture(scope="module")
+def outlasting() -> ElbowFit:
+    """Thirteen of sixteen catches outlast their stretch."""
+    return fit(study(STANDARD_MODELS["HM2"], seed=3, scatter=SCATTER, fast=(70, 130)))
+
+
+def test_catches_that_outlast_their_stretch_count_as_longer(
+    outlasting: ElbowFit,
+) -> None:
+    made = outlasting["catch_travel"]
+    catches = [trial.catch for trial in outlasting.trials if trial.catch is not None]
+    seen = [catch.travel for catch in catches if catch.end is not None]
+    assert (len(seen), len(catches)) == (3, 16)
+    # what was seen to end is short: the truth lies above its mean
+    assert np.mean(seen) < HM2.catch_travel
+    assert made.value > np.mean(seen) + math.radians(1.0)
+    assert made.covers(HM2.catch_travel)
+    assert made.high - made.value > made.value - made.low
+    assert (made.n_trials, made.freedom) == (16, 3 + 13 / 2 - 1)
+    assert made.reason is None
+    assert outlasting.remarks == (
+        "13 of 16 catches do not end within their stretch: D counts each as longer "
+        "than what could be seen of it (censored), and takes travels to be normal",
+    )
+
+
+def test_correlations_hold_where_travels_are_censored(outlasting: ElbowFit) -> None:
+    matrix = outlasting.correlation
+    assert np.isfinite(matrix).all()
+    np.testing.assert_allclose(np.diag(matrix), 1.0, rtol=1e-12)
+    assert np.linalg.eigvalsh(matrix).min() > 0.0
+    assert (np.abs(matrix) <= 1.0 + 1e-12).all()
+
+
+def test_the_step_and_the_last_fit_agree_on_censored_travels(
+    outlasting: ElbowFit,
+) -> None:
+    # the last fit moves each end by a fraction of a degree
+    (step,) = [s for s in outlasting.steps if s.name.startswith("catch travel")]
+    alone, last = step["catch_travel"], outlasting["catch_travel"]
+    assert last.value == pytest.approx(alone.value, abs=math.radians(0.3))
+    assert last.freedom == alone.freedom
+
+
+def test_one_catch_that_ends_says_nothing_of_how_travels_differ() -> None:
+    movements = study(HM2, seed=3, scatter=SCATTER, fast=(70, 130))
+    kept = [m for m in movements if m.name not in ("fast 8", "fast 10")]
+    with pytest.warns(SmallSampleWarning, match="catch_travel"):
+        made = fit(kept)
+    assert math.isnan(made["catch_travel"].low)
+    assert not math.isnan(made["catch_travel"].value)
+    assert (
+        "13 of 14 catches do not end within their stretch and say nothing"
+        in " ".join(made.remarks)
+    )
 
 
 def test_one_speed_gives_no_line(movements: list[Movement]) -> None:
