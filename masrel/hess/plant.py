@@ -2,75 +2,16 @@
 
 import math
 from collections import deque
-from dataclasses import dataclass, field
 
 from masrel.errors import ParameterError
-from masrel.hess.friction import Friction
 from masrel.hess.hand import Hand
+from masrel.hess.plant_parameters import PlantParameters
 from masrel.hess.propagation import Propagator, propagator
 
-__all__ = ["Plant", "PlantParameters"]
+__all__ = ["Plant"]
 
 _LOWER, _FREE, _UPPER = -1, 0, 1  # which end stop the arm touches
 _FINEST = 10  # halvings of a step in which something changes: 0.5 ms / 1024
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PlantParameters:
-    """What the simulated arm, motor and amplifier are like, in SI units.
-
-    Attributes
-    ----------
-    friction : Friction
-        Inertia of the motor and friction, (7).
-    arm_inertia : float
-        Inertia of the mannequin's forearm and hand, kg·m². Not printed in the
-        source: a rod of 0.8 kg and 0.25 m and a hand of 0.3 kg at 0.33 m give 0.05.
-    range_end : float
-        Where the arm meets its end stop, rad; the other one is at 0.
-    stop_stiffness, stop_damping : float
-        Of both end stops, N·m/rad and N·m·s/rad: 10 N·m move one by 0.03 deg, and
-        the arm does not bounce.
-    torque_step : float
-        Quantum of the commanded torque, N·m; 0 for none. One unit of an amplifier
-        with 2700 units to the N·m behind a gear of 18.8:1.
-    lag_time : float
-        Time constant of the current loop, s; 0 for none. Not printed; chosen.
-    delay : float
-        From the command until the current begins to follow, s. Not printed; chosen.
-    step_ns : int
-        Step of the integration, ns.
-
-    Raises
-    ------
-    ParameterError
-        If a value is outside its range.
-    """
-
-    friction: Friction = field(default_factory=Friction)
-    arm_inertia: float = 0.05
-    range_end: float = math.radians(146.0)
-    stop_stiffness: float = 20_000.0
-    stop_damping: float = 50.0
-    torque_step: float = 18.8 / 2700.0
-    lag_time: float = 0.0005
-    delay: float = 0.0005
-    step_ns: int = 500_000
-
-    def __post_init__(self) -> None:
-        zero_or_more = ("arm_inertia", "torque_step", "lag_time", "delay")
-        for name in (*zero_or_more, "stop_stiffness", "stop_damping"):
-            if not 0.0 <= getattr(self, name) < math.inf:
-                raise ParameterError(
-                    f"{name}: needs 0 or more, got {getattr(self, name)}"
-                )
-        if not 0.0 < self.range_end <= math.pi:
-            raise ParameterError(
-                "range_end: needs more than 0 and at most 180 degrees, "
-                f"got {self.range_end} rad"
-            )
-        if self.step_ns < 1:
-            raise ParameterError(f"step_ns: needs 1 or more, got {self.step_ns}")
 
 
 class Plant:
@@ -290,30 +231,27 @@ class Plant:
         made = self._propagators.get((self._holds, self._contact, level))
         if made is None:
             made = self._propagator(step, level)
-        slide, angle, velocity = self._slide, self.angle, self.velocity
-        lag = made.lag * self._lag
+        slide, angle, velocity, lag = self._slide, self.angle, self.velocity, self._lag
+        aa, as_, al, af, ag, sa, ss, sl, sf, sg, lag_left = made
+        new_lag = lag_left * lag
         if slide:
             slope = (new_force - force) / step
-            (aa, as_, al, af, ag, sa, ss, sl, sf, sg, _) = made
             driven = force - slide * self._coulomb
-            lagging = self._lag
             angle, velocity = (
-                aa * angle + as_ * velocity + al * lagging + af * driven + ag * slope,
-                sa * angle + ss * velocity + sl * lagging + sf * driven + sg * slope,
+                aa * angle + as_ * velocity + al * lag + af * driven + ag * slope,
+                sa * angle + ss * velocity + sl * lag + sf * driven + sg * slope,
             )
             turned = velocity * slide < 0.0
         else:
-            net = new_force - lag - self._stiffness() * angle
+            net = new_force - new_lag - self._stiffness() * angle
             turned = abs(net) > self._coulomb  # it breaks away
-        if angle > self._range_end:
-            contact = _UPPER
-        else:
-            contact = _LOWER if angle < 0.0 else _FREE
+        beyond = _UPPER if angle > self._range_end else _FREE
+        contact = _LOWER if angle < 0.0 else beyond
         holds = self._holds and end < self._hand.slip_time
         changes = turned or contact != self._contact or holds != self._holds
         if changes and level < _FINEST:
             return False
-        self._time, self.angle, self.velocity, self._lag = end, angle, velocity, lag
+        self._time, self.angle, self.velocity, self._lag = end, angle, velocity, new_lag
         self._force = new_force
         if changes:
             self._change(contact, holds, turned)

@@ -6,11 +6,32 @@ from array import array
 import numpy as np
 from numpy.typing import NDArray
 
+from masrel.hess.limits import DeviceLimits
 from masrel.hess.spool import N_COLUMNS, Spool
 
-__all__ = ["Samples", "recorded_columns"]
+__all__ = ["Samples", "n_samples", "recorded_columns"]
 
 Columns = dict[str, NDArray[np.float64]]
+
+
+def n_samples(n_ticks: int, rate_hz: int, limits: DeviceLimits) -> int:
+    """Return how many samples so many ticks can leave.
+
+    Parameters
+    ----------
+    n_ticks : int
+        Ticks after which the presentation ends.
+    rate_hz : int
+        Ticks a second.
+    limits : DeviceLimits
+        What the loop lets pass.
+
+    Returns
+    -------
+    int
+        One a tick, and the ramp of a fault, what it was, and zero at its end.
+    """
+    return n_ticks + math.ceil(limits.ramp_time * rate_hz) + 3
 
 
 class Samples:

@@ -7,7 +7,8 @@ from masrel.errors import DeviceError, ParameterError
 from masrel.hess.clock import Clock
 from masrel.hess.device import Device, Reading
 from masrel.hess.hand import Hand
-from masrel.hess.plant import Plant, PlantParameters
+from masrel.hess.plant import Plant
+from masrel.hess.plant_parameters import PlantParameters
 from masrel.hess.setup import DeviceSetup
 
 __all__ = ["SimulatedDevice", "build"]

@@ -15,7 +15,7 @@ from masrel.hess.stop import EmergencyStop
 from masrel.hess.velocity import VelocityEstimate
 from masrel.hess.watchdog import Watching
 
-__all__ = ["Ticks", "n_samples"]
+__all__ = ["Ticks"]
 
 # A hand that presses against the end stop rests within a few tenths of a degree of
 # it; one encoder step makes 0.8 deg/s; 0.1 s is shorter than a person's reaction.
@@ -25,26 +25,6 @@ _ARRIVAL_TIME_S = 0.1
 
 _CHECK_EVERY_S = 0.05  # how often the device is asked for its state
 _BEAT_EVERY_S = 0.005  # how often the watchdog is told that the loop is alive
-
-
-def n_samples(n_ticks: int, rate_hz: int, limits: DeviceLimits) -> int:
-    """Return how many samples so many ticks can leave.
-
-    Parameters
-    ----------
-    n_ticks : int
-        Ticks after which the presentation ends.
-    rate_hz : int
-        Ticks a second.
-    limits : DeviceLimits
-        What the loop lets pass.
-
-    Returns
-    -------
-    int
-        One a tick, and the ramp of a fault, what it was, and zero at its end.
-    """
-    return n_ticks + math.ceil(limits.ramp_time * rate_hz) + 3
 
 
 class Ticks:
@@ -67,7 +47,7 @@ class Ticks:
     end_angle : float
         Where the stretch is meant to end, rad.
     samples : Samples
-        Where it writes to; `n_samples` fit in.
+        Where it writes to; `masrel.hess.samples.n_samples` fit in.
     stop : EmergencyStop
         The button it looks at.
     watchdog : Watching

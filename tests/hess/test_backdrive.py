@@ -6,7 +6,7 @@ from math import radians
 import pytest
 
 from masrel.hess import Friction, FrictionCompensation, SimulatedClock
-from masrel.hess.plant import PlantParameters
+from masrel.hess.plant_parameters import PlantParameters
 from masrel.hess.simulated import SimulatedDevice
 from masrel.hess.velocity import VelocityEstimate
 

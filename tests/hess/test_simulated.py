@@ -5,7 +5,7 @@ import pytest
 
 from masrel.errors import DeviceError, ParameterError
 from masrel.hess import Friction, SimulatedClock, SimulatedHand
-from masrel.hess.plant import PlantParameters
+from masrel.hess.plant_parameters import PlantParameters
 from masrel.hess.simulated import SimulatedDevice
 
 # An amplifier that gives any torque at once
