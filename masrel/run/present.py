@@ -170,9 +170,7 @@ def _on_device(
     settings, stretch = protocol.device, protocol.stretch
     start, end = math.radians(stretch.start_deg), math.radians(stretch.end_deg)
     speed = _speed(protocol, asked)
-    hand = (
-        None if speed is None else SimulatedHand(start=start, end=end, mean_speed=speed)
-    )
+    hand = _hand(start, end, speed)
     model = asked.presentation.model
     with contextlib.ExitStack() as held:
         device = held.enter_context(
@@ -199,6 +197,12 @@ def _on_device(
             watchdog=watchdog,
             spool=spool,
         )
+
+
+def _hand(start: float, end: float, speed: float | None) -> SimulatedHand | None:
+    if speed is None:
+        return None
+    return SimulatedHand(start=start, end=end, mean_speed=speed)
 
 
 def _speed(protocol: Protocol, asked: Asked) -> float | None:

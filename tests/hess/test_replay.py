@@ -1,13 +1,11 @@
 """A recording played back asks the same of the controller, and gets the same answer."""
 
 from dataclasses import replace
-from math import pi, radians
+from math import radians
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from masrel.elbow import STANDARD_MODELS
 from masrel.errors import DeviceError
@@ -19,8 +17,7 @@ from masrel.hess import (
     open_device,
     run_presentation,
 )
-from masrel.hess.replay import ReplayDevice, ReplayOptions, recorded_angles
-from masrel.hess.velocity import VelocityEstimate
+from masrel.hess.replay import ReplayDevice, ReplayOptions
 from masrel.recording import (
     RECORDING_COLUMNS,
     Recording,
@@ -110,35 +107,6 @@ def test_on_a_real_clock_it_takes_its_time() -> None:
             reading = device.read()
             assert reading.time_ns <= clock.now_ns()
     assert clock.now_ns() - begun_ns >= 19_000_000
-
-
-# From degrees back to radians
-
-
-@given(
-    st.lists(st.floats(0.0, pi), min_size=1, max_size=30),
-    st.lists(st.integers(500_000, 3_000_000), min_size=30, max_size=30),
-)
-def test_angles_come_back_to_the_last_bit_or_to_the_same_speeds(
-    angles: list[float], steps_ns: list[int]
-) -> None:
-    times = [sum(steps_ns[:n]) * 1e-9 for n in range(len(angles))]
-    estimate = VelocityEstimate()
-    speeds = [
-        float(np.degrees(estimate.update(time, angle)))
-        for time, angle in zip(times, angles, strict=True)
-    ]
-    degrees = [float(np.degrees(angle)) for angle in angles]
-    found, is_exact = recorded_angles(times, degrees, speeds)
-    assert is_exact
-    # Not always the same floats: several may have these degrees and these speeds.
-    assert [float(np.degrees(angle)) for angle in found] == degrees
-    assert np.max(np.abs(np.array(found) - angles)) <= 2 * np.spacing(pi)
-    again = VelocityEstimate()
-    assert [
-        float(np.degrees(again.update(time, angle)))
-        for time, angle in zip(times, found, strict=True)
-    ] == speeds
 
 
 def test_speeds_of_another_estimate_leave_the_nearest_radians() -> None:

@@ -72,24 +72,13 @@ class PuckEmulator:
         options: EmulatorOptions,
         puck: int = 1,
     ) -> None:
-        transmission = Transmission(
-            counts_per_turn=options.counts_per_turn,
-            units_per_nm=options.units_per_nm,
-            gear_ratio=options.gear_ratio,
-            direction=options.direction,
-        )
         self._link = link
         self._clock = clock
         self._puck = puck
         self._due = DueActs()
         self.faults = ActiveFaults(options.faults)
         self.registers = Registers(options, puck)
-        self.motor = EmulatedMotor(
-            hand=hand,
-            range_end=range_end,
-            transmission=transmission,
-            braking=options.braking,
-        )
+        self.motor = _motor(hand, range_end, options)
         if not options.awake:  # counts from where it was when it was switched on
             self.registers.offset = -self.motor.counts(clock.now_ns())
         self._voice = EmulatedVoice(
@@ -197,3 +186,18 @@ class PuckEmulator:
     def _act(self, now_ns: int) -> None:
         self._due.act(now_ns)
         self.motor.advance(now_ns)
+
+
+def _motor(hand: Hand, range_end: float, options: EmulatorOptions) -> EmulatedMotor:
+    transmission = Transmission(
+        counts_per_turn=options.counts_per_turn,
+        units_per_nm=options.units_per_nm,
+        gear_ratio=options.gear_ratio,
+        direction=options.direction,
+    )
+    return EmulatedMotor(
+        hand=hand,
+        range_end=range_end,
+        transmission=transmission,
+        braking=options.braking,
+    )
