@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from masrel.cli.puck import Bench, for_a_puck
+from masrel.cli.bench import Bench
+from masrel.cli.puck import for_a_puck
 
 if TYPE_CHECKING:
     from masrel.hess.puck.friction import FrictionEstimate
