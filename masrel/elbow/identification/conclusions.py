@@ -14,7 +14,6 @@ from masrel.elbow.identification.results import (
     Step,
     fitted,
 )
-from masrel.elbow.identification.steps import censored_travel
 from masrel.elbow.identification.together import Together
 from masrel.elbow.identification.trials import Trial
 
@@ -55,6 +54,7 @@ def unfound(steps: Sequence[Step], fast: Sequence[Trial]) -> dict[str, str]:
 
 def all_estimates(
     last: Together,
+    steps: Sequence[Step],
     horizons: Sequence[Horizon | None],
     reasons: Mapping[str, str],
     level: float,
@@ -65,6 +65,8 @@ def all_estimates(
     ----------
     last : Together
         The last fit.
+    steps : sequence of Step
+        The fits before it.
     horizons : sequence of Horizon or None
         Behind which of its trials' catches end that do not end before.
     reasons : mapping of str to str
@@ -79,15 +81,14 @@ def all_estimates(
 
     Notes
     -----
-    Where travels are censored, D has the likelihood of the travels that the last fit
-    has found, spread and all: least squares hold that spread, and know less than
-    they say.
+    Where travels are censored, D is that of its step. Least squares hold the spread
+    of travels and know less than they say; and they draw each end towards D, by which
+    that spread would come out too small.
     """
     found = {e.name: e for e in fitted(last.names, last.fit, level, reasons)}
-    behind = [each for each in horizons if each is not None]
-    if behind:
-        seen = [travel for travel in last.travels if travel is not None]
-        found["catch_travel"], _ = censored_travel(seen, behind, level=level)
+    if any(each is not None for each in horizons):
+        whole = {e.name: e for step in steps for e in step.estimates}
+        found["catch_travel"] = whole["catch_travel"]
     return tuple(
         found[name] if name in found else _undetermined(name, reasons.get(name), level)
         for name in QUANTITIES

@@ -295,25 +295,6 @@ class Equations:
             rows.append((left, {"catch_travel": slope}))
         return rows
 
-    def travel(self, own: Floats) -> float | None:
-        """Angle travelled in the trial's catch.
-
-        Parameters
-        ----------
-        own : ndarray, shape (n_own,)
-            The trial's own parameters.
-
-        Returns
-        -------
-        float or None
-            rad; None if the catch does not end.
-        """
-        catch = self._catch
-        if catch is None or catch.end is None:
-            return None
-        mine: dict[str, float] = dict(zip(self._own, own.tolist(), strict=True))
-        return mine.get("travel", catch.travel)
-
     def rows(self, shared: Floats, own: Floats) -> Rows:
         """Linear rows that say of the parameters what the trial does.
 

@@ -75,7 +75,7 @@ def fit_joint(
     start |= {e.name: e.value for step in steps for e in step.estimates}
     on_line = _on_line(trials, constants)
     last = refine(trials, start, constants, _spreads(steps), on_line, horizons)
-    estimates = all_estimates(last, horizons, unfound(steps, fast), level)
+    estimates = all_estimates(last, steps, horizons, unfound(steps, fast), level)
     return ElbowFit(
         estimates=estimates,
         correlation=correlation(last, estimates),

@@ -18,7 +18,6 @@ from masrel.elbow.identification.results import FittedParameter, Step, fitted
 
 __all__ = [
     "can_be_censored",
-    "censored_travel",
     "fit_catch_torque",
     "fit_catch_travel",
     "fit_post_catch",
@@ -84,8 +83,18 @@ def fit_catch_travel(
     title, name = "catch travel: D of (4)", "catch_travel"
     seen = [catch.travel for catch in catches if catch.end is not None]
     if horizons and can_be_censored(seen):
-        estimate, spread = censored_travel(seen, horizons, level=level)
-        return Step(name=title, estimates=(estimate,), residual_sd=spread)
+        found = fit_censored(CensoredTravels.of(seen, horizons), level=level)
+        estimate = FittedParameter(
+            name=name,
+            value=found.mean,
+            standard_error=found.standard_error,
+            freedom=found.freedom,
+            low=found.low,
+            high=found.high,
+            level=level,
+            n_trials=len(seen) + len(horizons),
+        )
+        return Step(name=title, estimates=(estimate,), residual_sd=found.sd)
     rows = [Rows(design=np.ones((1, 1)), target=np.array([each])) for each in seen]
     longest = max((catch.travel for catch in catches), default=0.0)
     reason = "no catch ends within its stretch"
@@ -108,39 +117,6 @@ def can_be_censored(seen: Sequence[float]) -> bool:
         Whether there are two that differ.
     """
     return len(set(seen)) > 1
-
-
-def censored_travel(
-    seen: Sequence[float], horizons: Sequence[Horizon], *, level: float
-) -> tuple[FittedParameter, float]:
-    """Estimate D where some catches outlast their stretch.
-
-    Parameters
-    ----------
-    seen : sequence of float
-        Travels of catches that end, rad; two or more that differ.
-    horizons : sequence of Horizon
-        Of the others.
-    level : float
-        Level of the interval.
-
-    Returns
-    -------
-    tuple of FittedParameter and float
-        D, and the standard deviation of travels, rad.
-    """
-    found = fit_censored(CensoredTravels.of(seen, horizons), level=level)
-    estimate = FittedParameter(
-        name="catch_travel",
-        value=found.mean,
-        standard_error=found.standard_error,
-        freedom=found.freedom,
-        low=found.low,
-        high=found.high,
-        level=level,
-        n_trials=len(seen) + len(horizons),
-    )
-    return estimate, found.sd
 
 
 def fit_post_catch(levels: Sequence[CatchLevels], *, level: float) -> Step:

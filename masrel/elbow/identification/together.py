@@ -41,8 +41,6 @@ class Together:
         Per trial, the law at its samples, N·m.
     torque_sd : float
         Standard deviation of measured torque about it, N·m.
-    travels : tuple of float or None
-        Per trial the angle travelled in its catch, rad; None if that does not end.
     n_evaluations : int
         Evaluations of the residuals of all trials.
     """
@@ -51,7 +49,6 @@ class Together:
     fit: ClusteredFit
     fitted_torque: tuple[Floats, ...] = field(repr=False)
     torque_sd: float
-    travels: tuple[float | None, ...]
     n_evaluations: int
 
 
@@ -154,12 +151,11 @@ class _System:
 def _finish(
     trials: Sequence[Trial], system: _System, names: tuple[str, ...], vector: Floats
 ) -> Together:
-    rows, torques, travels, squares, count = [], [], [], 0.0, 0
+    rows, torques, squares, count = [], [], 0.0, 0
     shared = vector[: len(names)]
     for place, trial in enumerate(trials):
         equations, own = system.equations[place], vector[system.own[place]]
         rows.append(equations.rows(shared, own))
-        travels.append(equations.travel(own))
         law = equations.torque(shared, own)
         measured = trial.pre_catch.measured
         if trial.after is not None:
@@ -182,6 +178,5 @@ def _finish(
         fit=fit,
         fitted_torque=tuple(torques),
         torque_sd=math.sqrt(squares / max(count - n_own - len(names), 1)),
-        travels=tuple(travels),
         n_evaluations=system.n_evaluations,
     )

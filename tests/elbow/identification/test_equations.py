@@ -137,4 +137,3 @@ def test_a_censored_travel_adds_one_row_of_d_alone() -> None:
     assert row.design[-1, place] ** 2 == pytest.approx(root**2, rel=1e-12)
     score = row.design[-1, place] * row.target[-1]
     assert score == pytest.approx(-left * slope, rel=1e-12)
-    assert censored.travel(mine) is None
