@@ -1,11 +1,8 @@
-"""One presentation of one model: the device, the loop, and the recording on disk."""
+"""One presentation of one model on the device of its study."""
 
 import contextlib
-import dataclasses
 import math
-import os
 import sys
-from dataclasses import dataclass
 from pathlib import Path
 
 from masrel.hess import (
@@ -15,17 +12,14 @@ from masrel.hess import (
     Presented,
     RealClock,
     SimulatedHand,
-    cut_off,
     open_device,
     run_presentation,
 )
 from masrel.hess.stop import stop_on_key, stop_on_signals
 from masrel.hess.watchdog import watched
 from masrel.protocol import Protocol, elbow_parameters
-from masrel.recording import write_recording
-from masrel.run.chain import Fact
-from masrel.run.fault import FaultRecord, fault_record
 from masrel.run.grades import Asked
+from masrel.run.kept import Shown, keep, spool_of
 from masrel.run.settings import (
     backend_options,
     device_limits,
@@ -34,35 +28,10 @@ from masrel.run.settings import (
 )
 from masrel.run.simulated import intended_speed
 
-__all__ = ["Shown", "present", "recover", "spool_of"]
+__all__ = ["present"]
 
 LONGEST_STRETCH_S = 10.0
 """After this a presentation ends, wherever the arm is."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Shown:
-    """What a presentation left.
-
-    Attributes
-    ----------
-    sha256 : str
-        Checksum of the recording.
-    mean_speed_deg_s : float or None
-        Mean speed before the catch, deg/s; None when the arm never moved.
-    n_missed_ticks : int
-        Ticks the loop skipped.
-    fault : FaultRecord or None
-        What stopped it, or None.
-    simulated : bool
-        Whether no hardware moved.
-    """
-
-    sha256: str
-    mean_speed_deg_s: float | None
-    n_missed_ticks: int
-    fault: FaultRecord | None
-    simulated: bool
 
 
 def present(
@@ -106,57 +75,7 @@ def present(
             held.enter_context(stop_on_key(stop, sys.stdin))
         spool = spool_of(file)
         presented = _on_device(protocol, asked, clock, limits, stop, spool)
-    return _keep(presented, protocol, asked, file)
-
-
-def spool_of(file: Path) -> Path:
-    """Return where samples are kept while the recording is made.
-
-    Parameters
-    ----------
-    file : Path
-        The recording's ``.npz`` file.
-
-    Returns
-    -------
-    Path
-        A file beside it.
-    """
-    return file.with_suffix(".partial")
-
-
-def recover(protocol: Protocol, asked: Asked, *, file: Path) -> Shown | None:
-    """Make a recording of what a process left that died while presenting.
-
-    Parameters
-    ----------
-    protocol : Protocol
-        As for `present`.
-    asked : Asked
-        What was being presented.
-    file : Path
-        The recording's ``.npz`` file.
-
-    Returns
-    -------
-    Shown or None
-        What is to be logged; None when no process died here, or before it began.
-
-    Raises
-    ------
-    RecordingError
-        If what lies there is something else.
-    OSError
-        If the recording cannot be written.
-    """
-    spool = spool_of(file)
-    if not spool.exists():
-        return None
-    presented = cut_off(spool)
-    if presented is None:
-        spool.unlink()
-        return None
-    return _keep(presented, protocol, asked, file)
+    return keep(presented, protocol, asked, file)
 
 
 def _on_device(
@@ -222,42 +141,3 @@ def _longest(travel: float, speed: float | None) -> float:
         if speed is None
         else max(LONGEST_STRETCH_S, 2.0 * travel / speed)
     )
-
-
-def _keep(presented: Presented, protocol: Protocol, asked: Asked, file: Path) -> Shown:
-    shown, recording = asked.presentation, presented.recording
-    facts: dict[str, Fact] = {
-        **recording.facts,
-        "study": protocol.study.id,
-        "rater": asked.rater,
-        "session": asked.session,
-        "code": shown.code,
-        "model": shown.model,
-        "repeat": shown.repeat,
-        "position": shown.position,
-        "attempt": asked.attempt,
-    }
-    try:
-        checksum = write_recording(dataclasses.replace(recording, facts=facts), file)
-    except OSError as error:
-        error.filename = str(file)  # a full disk does not say which file it was
-        raise
-    for written in (file, file.with_suffix(".json")):
-        _sync(written)  # before the log says that they are there
-    spool_of(file).unlink(missing_ok=True)  # only now is it of no use
-    speed = facts["mean_speed_deg_s"]
-    return Shown(
-        sha256=checksum,
-        mean_speed_deg_s=None if speed is None else float(speed),
-        n_missed_ticks=presented.n_missed_ticks,
-        fault=fault_record(presented),
-        simulated=bool(facts["simulated"]),
-    )
-
-
-def _sync(path: Path) -> None:
-    descriptor = os.open(path, os.O_RDWR)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

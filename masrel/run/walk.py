@@ -17,8 +17,9 @@ from masrel.protocol import Protocol, StudyPaths, presented_hash, protocol_hash
 from masrel.run.chain import Fact
 from masrel.run.fault import FaultRecord
 from masrel.run.grades import Asked, GradeSource
+from masrel.run.kept import Shown, recover
 from masrel.run.log import SessionLog
-from masrel.run.present import Shown, present, recover
+from masrel.run.present import present
 from masrel.run.replay import SessionState, replay
 from masrel.run.settings import moves_hardware
 from masrel.schedule import Presentation, Schedule
