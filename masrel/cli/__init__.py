@@ -31,6 +31,7 @@ VERBS = {
     "latent": "Biases and noises of raters of any CSV file, items on one scale.",
     "trace": "Torque trace of one stretch of one model.",
     "fit": "Identify a joint, or a device's friction, from recordings.",
+    "between": "Models between models: dummies that hide a study's standards.",
     "grading": "Regress grades on the models' parameters and the speed.",
     "device": "Bring a Puck up on its CAN bus: probe, check, zero, friction.",
     "demo": "The whole flow on the simulated device.",
