@@ -13,7 +13,8 @@ from masrel.cli.bench import RANGE_END, Bench
 from masrel.hess import RealClock, SimulatedClock, SimulatedHand
 from masrel.hess.puck.emulator_options import EmulatorOptions
 from masrel.hess.puck.options import PuckOptions
-from masrel.hess.puck.properties import PropertyTable, read_property_table
+from masrel.hess.puck.properties import PropertyTable
+from masrel.hess.puck.property_file import read_property_table
 
 __all__ = ["for_a_puck"]
 

@@ -3,13 +3,7 @@
 import math
 from typing import ClassVar
 
-from masrel.errors import (
-    BusError,
-    DeviceError,
-    DeviceTimeoutError,
-    IdledError,
-    LimitExceededError,
-)
+from masrel.errors import DeviceError, LimitExceededError
 from masrel.hess.clock import Clock
 from masrel.hess.device import Device, IdleCommand, Reading
 from masrel.hess.puck import bring_up
@@ -18,17 +12,14 @@ from masrel.hess.puck.bus import open_link
 from masrel.hess.puck.identity import Identity, identify, table_of
 from masrel.hess.puck.node import PuckNode
 from masrel.hess.puck.options import PuckOptions
+from masrel.hess.puck.polls import Polls
 from masrel.hess.puck.properties import PropertyTable
 from masrel.hess.puck.release import release
-from masrel.hess.puck.states import TORQUE
 from masrel.hess.puck.transmission import Transmission
 
 __all__ = ["PuckDevice"]
 
 _LOWEST_ANGLE, _HIGHEST_ANGLE = math.radians(-5.0), math.radians(185.0)
-_UNANSWERED_POLLS = 2  # one may get lost
-_LOST_TORQUES = 1  # the next comes after a tick
-
 _SHARED_INTERFACES = frozenset({"socketcan", "udp_multicast"})
 _IDLING_MODULE = "masrel.hess.puck.idling"
 
@@ -38,9 +29,8 @@ class PuckDevice(Device):
 
     The torque is set by a frame to this puck alone, not by the packed frame that sets
     four: that one would set the torques of its neighbours, and which of the four a
-    puck obeys hangs on two more of its properties. No setting is acknowledged, so
-    that every `poll_ticks` torques the puck is asked for its mode and for the torque
-    it holds, in turn. Nobody waits for the answer: it comes before the next position.
+    puck obeys hangs on two more of its properties. No setting is acknowledged: `Polls`
+    ask now and then whether it obeys.
 
     Parameters
     ----------
@@ -63,12 +53,7 @@ class PuckDevice(Device):
     def __init__(self, options: PuckOptions, *, clock: Clock) -> None:
         self._options = options
         self._clock = clock
-        self._until_poll = options.poll_ticks
-        self._polls_mode = True  # the next time; its torque the time after
-        self._n_unanswered = 0
-        self._told = 0  # current units, when its torque was asked for
-        self._n_lost = 0
-        self._highest = 0
+        self._highest = 0  # current units
         self._node: PuckNode
         self._table: PropertyTable
         self.transmission: Transmission
@@ -117,7 +102,15 @@ class PuckDevice(Device):
                 f"puck {node.puck}: needs an arm between -5 and 185 deg, it reports "
                 f"{math.degrees(turns.angle(counts)):.1f}; run masrel device zero"
             )
-        self._numbers = table.number("P"), table.number("T"), table.number("MODE")
+        self._position_number = table.number("P")
+        self._torque_number, self._mode_number = table.number("T"), table.number("MODE")
+        self._polls = Polls(
+            node,
+            torque_number=self._torque_number,
+            mode_number=self._mode_number,
+            every=options.poll_ticks,
+            checks_torque=options.checks_torque,
+        )
         try:
             bring_up.activate(node, table)
             if options.checks_torque:
@@ -127,22 +120,13 @@ class PuckDevice(Device):
             raise
 
     def _read(self) -> Reading:
-        position, torque, mode = self._numbers
-        node = self._node
-        time_ns, counts = node.position(position, patience_s=self._options.patience_s)
-        heard = node.heard
-        if heard:
-            if mode in heard:
-                self._check_mode(heard[mode])
-            if torque in heard:
-                self._check_torque(heard[torque])
-            heard.clear()
-        if self._n_unanswered > _UNANSWERED_POLLS:
-            raise self._unanswered()
+        time_ns, counts = self._node.position(
+            self._position_number, patience_s=self._options.patience_s
+        )
+        self._polls.hear()
         return Reading(time_ns, self.transmission.angle(counts))
 
     def _send(self, torque_nm: float) -> None:
-        _, torque, _ = self._numbers
         units = self.transmission.units(torque_nm)
         if abs(units) > self._highest:
             raise LimitExceededError(
@@ -150,63 +134,11 @@ class PuckDevice(Device):
                 f"puck, got {torque_nm:.3f} N·m",
                 "torque",
             )
-        self._node.tell(torque, units)
-        self._until_poll -= 1
-        if self._until_poll == 0:
-            self._until_poll = self._options.poll_ticks
-            self._poll(units)
-
-    def _poll(self, units: int) -> None:
-        # An unanswered one is complained of when the next position is read: a torque
-        # that is being taken back must not be kept from it.
-        _, torque, mode = self._numbers
-        self._n_unanswered += 1  # until the answer comes
-        if self._polls_mode or not self._options.checks_torque:
-            self._node.inquire(mode)
-        else:
-            self._told = units
-            self._node.inquire(torque)
-        self._polls_mode = not self._polls_mode
+        self._node.tell(self._torque_number, units)
+        self._polls.sent(units)
 
     def _check(self) -> None:
-        # In the loop the answers to polls come with readings; here it is waited for.
-        _, _, mode = self._numbers
-        try:
-            found = self._node.ask(mode, patience_s=self._options.patience_s)
-        except DeviceTimeoutError:
-            self._n_unanswered += 1
-            if self._n_unanswered > _UNANSWERED_POLLS:
-                raise self._unanswered() from None
-        else:
-            self._check_mode(found)
-
-    def _check_mode(self, mode: int) -> None:
-        self._n_unanswered = 0
-        if mode != TORQUE:
-            raise IdledError(
-                f"puck {self._node.puck}: needs MODE {TORQUE}, somebody else "
-                f"has set it to {mode}; an emergency stop, or a pendant?"
-            )
-
-    def _check_torque(self, units: int) -> None:
-        self._n_unanswered = 0
-        if units == self._told:
-            self._n_lost = 0
-            return
-        self._n_lost += 1
-        if self._n_lost > _LOST_TORQUES:
-            raise BusError(
-                f"puck {self._node.puck}: needs the torque it was told, "
-                f"{self._told} current units, holds {units}, "
-                f"{self._n_lost} times in a row: torques get lost",
-                "lost-torques",
-            )
-
-    def _unanswered(self) -> DeviceTimeoutError:
-        return DeviceTimeoutError(
-            f"puck {self._node.puck}: has not said its mode or torque "
-            f"{self._n_unanswered} times in a row"
-        )
+        self._polls.ask_mode(patience_s=self._options.patience_s)
 
     def _stop(self) -> None:
         try:
@@ -215,8 +147,11 @@ class PuckDevice(Device):
             self._disconnect()
 
     def _release(self) -> None:
-        _, torque, mode = self._numbers
-        release(self._node, torque_number=torque, mode_number=mode)
+        release(
+            self._node,
+            torque_number=self._torque_number,
+            mode_number=self._mode_number,
+        )
 
     def idle_command(self) -> IdleCommand | None:
         """Return how another process can idle the puck, once it is open.
@@ -231,5 +166,5 @@ class PuckDevice(Device):
         if options.interface not in _SHARED_INTERFACES:
             return None
         where = (options.interface, options.channel, str(options.puck))
-        _, torque, mode = self._numbers
-        return IdleCommand(_IDLING_MODULE, (*where, str(torque), str(mode)))
+        numbers = (str(self._torque_number), str(self._mode_number))
+        return IdleCommand(_IDLING_MODULE, (*where, *numbers))

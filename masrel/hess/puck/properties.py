@@ -4,10 +4,8 @@ The same number means another property on another firmware, and setting the wron
 may move an arm: a firmware whose numbers are not known is refused.
 """
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 from masrel.errors import DeviceError, ParameterError
 
@@ -21,7 +19,6 @@ __all__ = [
     "VERSION",
     "PropertyTable",
     "property_table",
-    "read_property_table",
 ]
 
 # The same for every type and firmware
@@ -192,41 +189,3 @@ def property_table(firmware: int) -> PropertyTable:
     swapped = firmware >= _SWAPPED
     later = {"EN": 94, "HOLD": 77} if swapped else {"EN": 77, "HOLD": 94}
     return PropertyTable(numbers={**_MODERN, **later})
-
-
-def read_property_table(path: Path) -> PropertyTable:
-    """Read the property numbers of a firmware that the driver does not know.
-
-    Parameters
-    ----------
-    path : Path
-        A TOML file with one table, ``[properties]``: a number for every name.
-
-    Returns
-    -------
-    PropertyTable
-        Names and numbers.
-
-    Raises
-    ------
-    ParameterError
-        If the file is not such a table.
-    OSError
-        If it cannot be read.
-    """
-    try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise ParameterError(f"{path}: not TOML ({error})") from error
-    if set(document) != {"properties"} or not isinstance(document["properties"], dict):
-        raise ParameterError(f"{path}: needs one table, [properties]")
-    numbers = document["properties"]
-    for name, number in numbers.items():
-        if type(number) is not int:
-            raise ParameterError(
-                f"{path}: properties.{name}: needs a whole number, got {number!r}"
-            )
-    try:
-        return PropertyTable(numbers=numbers)
-    except ParameterError as error:
-        raise ParameterError(f"{path}: {error}") from error
