@@ -1,7 +1,8 @@
 """Each limit passes what lies on it, and names what lies beyond."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from math import degrees, radians
 
 import pytest
@@ -29,18 +30,11 @@ def fed(made: Guard, angles: list[float], start: int = 0) -> Guard:
     return made
 
 
-def raises_limit(kind: str, words: str):
-    class Expected:
-        def __enter__(self) -> None:
-            self.caught = pytest.raises(LimitExceededError, match=words)
-            self.info = self.caught.__enter__()
-
-        def __exit__(self, *error: object) -> bool:
-            passed = self.caught.__exit__(*error)
-            assert self.info.value.kind == kind
-            return bool(passed)
-
-    return Expected()
+@contextmanager
+def raises_limit(kind: str, words: str) -> Iterator[None]:
+    with pytest.raises(LimitExceededError, match=words) as caught:
+        yield
+    assert caught.value.kind == kind
 
 
 # Torque
@@ -51,6 +45,8 @@ def test_a_torque_within_the_limit_passes_slowly(first: float, second: float) ->
     made = guard(torque=20.0)
     made.torque(0.0, 0.6 * first)
     made.torque(1.0, second)  # a second later
+    with raises_limit("torque", "torque: needs at most 20 N·m, got"):
+        made.torque(2.0, math.copysign(20.001, second))
 
 
 @pytest.mark.parametrize("torque", [20.001, -20.001, math.inf, -math.inf, math.nan])
@@ -166,6 +162,9 @@ def test_a_gap_widens_what_may_follow() -> None:
     # 20 ticks without a reading: an arm can have gained 300 deg/s in each of them
     made = fed(guard(), [1.5] * 3)
     made.reading(0.022, 1.5 + radians(0.3 * 19.9), 0.0)
+    made = fed(guard(), [1.5] * 3)
+    with raises_limit("jump", r"got one 0\.3\d deg a tick from there"):
+        made.reading(0.022, 1.5 + radians(0.3 * 20.5), 0.0)
 
 
 def test_an_arm_that_stops_dead_is_named_after_ten_milliseconds() -> None:

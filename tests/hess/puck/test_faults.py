@@ -259,7 +259,7 @@ def fault_sequences(draw) -> tuple[InjectedFault, ...]:
     return tuple(made)
 
 
-def the_invariants_hold(faults: tuple[InjectedFault, ...]) -> None:
+def assert_invariants(faults: tuple[InjectedFault, ...]) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", OverrunWarning)
         done, device, _ = presented(*faults)
@@ -289,7 +289,7 @@ many = settings(
 def test_some_sequences_of_faults_leave_no_torque(
     faults: tuple[InjectedFault, ...],
 ) -> None:
-    the_invariants_hold(faults)
+    assert_invariants(faults)
 
 
 @pytest.mark.slow
@@ -298,7 +298,7 @@ def test_some_sequences_of_faults_leave_no_torque(
 def test_a_thousand_sequences_of_faults_leave_no_torque(
     faults: tuple[InjectedFault, ...],
 ) -> None:
-    the_invariants_hold(faults)
+    assert_invariants(faults)
 
 
 if __name__ == "__main__":
