@@ -6,34 +6,33 @@ quantitative measures indicating the degree of spasticity" (section V).
 
 import math
 import warnings
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
-from scipy.optimize import linprog
 from scipy.special import stdtrit
 
+from masrel.analysis.ordinal import (
+    OrdinalData,
+    OrdinalFit,
+    fit_ordinal,
+    is_separated,
+    odds_ratio,
+)
+from masrel.analysis.predictors import PREDICTORS, independent, ratings_with
 from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
 from masrel.protocol import Protocol
 from masrel.ratings import Ratings
 
-__all__ = ["PREDICTORS", "Effect", "GradeRegression", "grade_regression"]
+__all__ = ["Effect", "GradeRegression", "grade_regression"]
 
-Floats = NDArray[np.float64]
-
-Predictor = Literal["L", "H", "Q", "D", "speed"]
-
-PREDICTORS: dict[str, tuple[str, str]] = {
-    "L": ("catch_angle_constant_deg", "deg"),
-    "H": ("catch_torque_nms_rad", "N·m·s/rad"),
-    "Q": ("residual_ratio", "1"),
-    "D": ("catch_travel_deg", "deg"),
-    "speed": ("mean_speed_deg_s", "deg/s"),
-}
-"""Predictor to its key of a model, or column of the ratings, and its unit."""
+SEPARATED = (
+    "these predictors separate some grades from others without a miss, so that the "
+    "likelihood has no maximum; fewer predictors, or more raters, may help"
+)
+"""Why a regression has no values."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -107,14 +106,6 @@ class GradeRegression:
     reason: str | None = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Data:
-    values: Floats = field(repr=False)  # (n_ratings, n_predictors), standardized
-    scale: Floats = field(repr=False)  # (n_predictors,)
-    codes: NDArray[np.int64] = field(repr=False)  # 0 for the least grade given
-    raters: NDArray[np.int64] = field(repr=False)
-
-
 def grade_regression(
     protocol: Protocol,
     ratings: Ratings,
@@ -174,6 +165,34 @@ def grade_regression(
        estimates in logistic regression models. Biometrika, 71(1), 1-10.
        https://doi.org/10.1093/biomet/71.1.1
     """
+    _check_options(predictors, level)
+    table, n_missing = ratings_with(protocol, ratings, predictors, models, session)
+    grades = tuple(g for g in ratings.scale.grades if (table["grade"] == g).any())
+    data, dropped, scale = _standardized(table, grades, predictors)
+    reason = None
+    if is_separated(data):
+        reason = SEPARATED
+        warnings.warn(reason, UndefinedStatisticWarning, stacklevel=2)
+    found = _nothing(data) if reason else fit_ordinal(data)
+    counts = np.bincount(data.codes)
+    return GradeRegression(
+        effects=_effects(found, scale, int(data.raters.max()) + 1, level),
+        dropped=dropped,
+        thresholds=tuple(found.thresholds.tolist()),
+        grades=grades,
+        n_ratings=len(table),
+        n_raters=table["rater"].nunique(),
+        n_models=table["model"].nunique(),
+        n_missing=n_missing,
+        log_likelihood=found.log_likelihood,
+        log_likelihood_alone=float((counts * np.log(counts / counts.sum())).sum()),
+        level=level,
+        simulated=ratings.simulated,
+        reason=reason,
+    )
+
+
+def _check_options(predictors: Sequence[str], level: float) -> None:
     unknown = [name for name in predictors if name not in PREDICTORS]
     if unknown or not predictors or len(set(predictors)) < len(predictors):
         raise ParameterError(
@@ -182,180 +201,55 @@ def grade_regression(
         )
     if not 0.5 < level < 1.0:
         raise ParameterError(f"level: needs more than 0.5 and less than 1, got {level}")
-    table, n_missing = _rows(protocol, ratings, predictors, models, session)
-    grades = tuple(g for g in ratings.scale.grades if (table["grade"] == g).any())
+
+
+def _standardized(
+    table: pd.DataFrame, grades: tuple[str, ...], predictors: Sequence[str]
+) -> tuple[OrdinalData, tuple[tuple[str, str], ...], dict[str, float]]:
+    # what is regressed, what is dropped and why, and the standard deviations
     n_raters = table["rater"].nunique()
     if len(grades) < 2 or n_raters < 2:
         raise RatingsError(
             "a regression of grades needs two grades and two raters or more, got "
             f"{len(grades)} and {n_raters} in {len(table)} ratings with every predictor"
         )
-    kept, dropped = _independent(table, predictors)
+    kept, dropped = independent(table, predictors)
     values = table[kept].to_numpy(dtype=np.float64)
     scale = values.std(axis=0, ddof=1)
-    data = _Data(
+    data = OrdinalData(
         values=(values - values.mean(axis=0)) / scale,
-        scale=scale,
         codes=np.array([grades.index(g) for g in table["grade"]]),
         raters=pd.factorize(table["rater"])[0].astype(np.int64),
     )
-    shape = {
-        "dropped": tuple(dropped),
-        "grades": grades,
-        "n_ratings": len(table),
-        "n_raters": n_raters,
-        "n_models": table["model"].nunique(),
-        "n_missing": n_missing,
-        "level": level,
-        "simulated": ratings.simulated,
-    }
-    return _regression(data, kept, level, shape)
+    return data, tuple(dropped), dict(zip(kept, scale.tolist(), strict=True))
 
 
-def _rows(
-    protocol: Protocol,
-    ratings: Ratings,
-    predictors: Sequence[str],
-    models: str,
-    session: str | None,
-) -> tuple[pd.DataFrame, int]:
-    # ratings with a grade and every predictor, and how many have not
-    table = ratings.table
-    if session is not None:
-        if session not in {s.id for s in protocol.sessions}:
-            known = ", ".join(s.id for s in protocol.sessions)
-            raise ParameterError(f"session: needs one of {known}, got {session!r}")
-        table = table[table["session"] == session]
-    asked = {m.id: m for m in protocol.models if models in ("all", m.role)}
-    table = table[table["model"].isin(asked)].copy()
-    for name in predictors:
-        key = PREDICTORS[name][0]
-        if name == "speed":
-            table[name] = table[key]
-        else:
-            table[name] = [float(getattr(asked[m], key)) for m in table["model"]]
-    whole = table.dropna(subset=["grade", *predictors])
-    return whole, len(table) - len(whole)
+def _nothing(data: OrdinalData) -> OrdinalFit:
+    n_predictors = data.values.shape[1]
+    return OrdinalFit(
+        coefficients=np.full(n_predictors, math.nan),
+        covariance=np.full((n_predictors, n_predictors), math.nan),
+        thresholds=np.full(int(data.codes.max()), math.nan),
+        log_likelihood=math.nan,
+    )
 
 
-def _independent(
-    table: pd.DataFrame, predictors: Sequence[str]
-) -> tuple[list[str], list[tuple[str, str]]]:
-    kept: list[str] = []
-    dropped: list[tuple[str, str]] = []
-    basis = np.ones((len(table), 1)) / math.sqrt(len(table))
-    for name in predictors:
-        column = table[name].to_numpy(dtype=np.float64)
-        about = column - column.mean()
-        left = column - basis @ (basis.T @ column)
-        left = left - basis @ (basis.T @ left)
-        size = float(np.linalg.norm(column))
-        if np.linalg.norm(about) <= 1e-9 * size:
-            dropped.append((name, "it is the same in all ratings"))
-        elif np.linalg.norm(left) <= 1e-9 * size:
-            others = ", ".join(kept)
-            dropped.append((name, f"it is a combination of {others} in these ratings"))
-        else:
-            kept.append(name)
-            basis = np.column_stack([basis, left / np.linalg.norm(left)])
-    if not kept:
-        raise RatingsError(f"predictors: {'; '.join(': '.join(d) for d in dropped)}")
-    return kept, dropped
-
-
-def _regression(
-    data: _Data, kept: Sequence[str], level: float, shape: dict[str, object]
-) -> GradeRegression:
-    counts = np.bincount(data.codes)
-    alone = float((counts * np.log(counts / counts.sum())).sum())
-    n_thresholds = counts.size - 1
-    if _is_separated(data):
-        reason = (
-            "these predictors separate some grades from others without a miss, so that "
-            "the likelihood has no maximum; fewer predictors, or more raters, may help"
-        )
-        warnings.warn(reason, UndefinedStatisticWarning, stacklevel=3)
-        nan = math.nan
-        return GradeRegression(
-            effects=tuple(
-                Effect(
-                    predictor=name,
-                    per=float(sd),
-                    odds_ratio=nan,
-                    coefficient=nan,
-                    standard_error=nan,
-                    low=nan,
-                    high=nan,
-                )
-                for name, sd in zip(kept, data.scale, strict=True)
-            ),
-            thresholds=(nan,) * n_thresholds,
-            log_likelihood=nan,
-            log_likelihood_alone=alone,
-            reason=reason,
-            **shape,  # type: ignore[arg-type]
-        )
-    values, covariance, thresholds, likelihood = _fitted(data)
-    n_raters = int(data.raters.max()) + 1
+def _effects(
+    found: OrdinalFit, scale: Mapping[str, float], n_raters: int, level: float
+) -> tuple[Effect, ...]:
     quantile = float(stdtrit(n_raters - 1, 0.5 + 0.5 * level))
-    errors = np.sqrt(np.diag(covariance))
-    return GradeRegression(
-        effects=tuple(
-            Effect(
-                predictor=name,
-                per=float(sd),
-                odds_ratio=math.exp(value),
-                coefficient=float(value),
-                standard_error=float(error),
-                low=math.exp(value - quantile * error),
-                high=math.exp(value + quantile * error),
-            )
-            for name, sd, value, error in zip(
-                kept, data.scale, values, errors, strict=True
-            )
-        ),
-        thresholds=tuple(thresholds.tolist()),
-        log_likelihood=likelihood,
-        log_likelihood_alone=alone,
-        **shape,  # type: ignore[arg-type]
+    errors = np.sqrt(np.diag(found.covariance)).tolist()
+    return tuple(
+        Effect(
+            predictor=name,
+            per=per,
+            odds_ratio=odds_ratio(value),
+            coefficient=value,
+            standard_error=error,
+            low=odds_ratio(value - quantile * error),
+            high=odds_ratio(value + quantile * error),
+        )
+        for (name, per), value, error in zip(
+            scale.items(), found.coefficients.tolist(), errors, strict=True
+        )
     )
-
-
-def _is_separated(data: _Data) -> bool:
-    # A direction (β, τ) in which no rating's interval τ_(g-1) < x·β < τ_g shrinks at
-    # either end, and some end moves away: then the likelihood grows for ever.
-    n, p = data.values.shape
-    n_thresholds = int(data.codes.max())
-    upper, lower = data.codes < n_thresholds, data.codes > 0
-    rows = np.zeros((int(upper.sum() + lower.sum()), p + n_thresholds))
-    ends = int(upper.sum())
-    rows[:ends, :p] = data.values[upper]
-    rows[np.arange(ends), p + data.codes[upper]] = -1.0  # x·β ≤ τ_g
-    rows[ends:, :p] = -data.values[lower]
-    rows[np.arange(ends, rows.shape[0]), p + data.codes[lower] - 1] = 1.0
-    found = linprog(
-        rows.sum(axis=0),  # the smaller, the further the ends move away
-        A_ub=rows,
-        b_ub=np.zeros(rows.shape[0]),
-        bounds=(-1.0, 1.0),
-        method="highs",
-    )
-    return bool(found.fun < -1e-7 * n)
-
-
-def _fitted(data: _Data) -> tuple[Floats, Floats, Floats, float]:
-    # coefficients, their covariance clustered by rater, thresholds, log-likelihood
-    from statsmodels.miscmodels.ordinal_model import OrderedModel
-
-    model = OrderedModel(data.codes, data.values, distr="logit")
-    found = model.fit(method="bfgs", disp=False, gtol=1e-8, maxiter=1000)
-    p = data.values.shape[1]
-    inverse = np.linalg.inv(model.hessian(found.params))
-    scores = np.asarray(model.score_obs(found.params))
-    n_raters = int(data.raters.max()) + 1
-    by_rater = np.zeros((n_raters, scores.shape[1]))
-    np.add.at(by_rater, data.raters, scores)
-    meat = by_rater.T @ by_rater * n_raters / (n_raters - 1)
-    covariance = (inverse @ meat @ inverse)[:p, :p]
-    thresholds = np.asarray(model.transform_threshold_params(found.params))[1:-1]
-    return np.asarray(found.params[:p]), covariance, thresholds, float(found.llf)

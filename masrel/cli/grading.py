@@ -11,7 +11,7 @@ from masrel.cli.material import read_material
 from masrel.cli.notes import notes
 
 if TYPE_CHECKING:
-    from masrel.analysis.grading import GradeRegression
+    from masrel.analysis.grading import Effect, GradeRegression
 
 __all__ = ["command"]
 
@@ -106,42 +106,42 @@ def _document(found: "GradeRegression") -> dict[str, object]:
 
 
 def _table(found: "GradeRegression") -> str:
-    from masrel.report.tables import Column, Table, as_text, interval_words, number
+    from masrel.report.tables import Column, Table, as_text
 
-    rows = tuple(
-        (
-            effect.predictor,
-            f"{number(effect.per, 3)} {_unit(effect.predictor)}".strip(),
-            effect.odds_ratio,
-            interval_words(effect.low, effect.high, 2),
-        )
-        for effect in found.effects
+    table = Table(
+        name="grading",
+        caption="Odds of a higher grade, per standard deviation",
+        columns=(
+            Column(key="predictor", heading="Predictor", align="left"),
+            Column(key="per", heading="Standard deviation"),
+            Column(key="odds_ratio", heading="Odds ratio", digits=2),
+            Column(key="interval", heading=f"{100.0 * found.level:g} % interval"),
+        ),
+        rows=tuple(_row(effect) for effect in found.effects),
+        notes=(
+            f"{found.n_ratings} ratings of {found.n_models} models by "
+            f"{found.n_raters} raters, {found.n_missing} without a grade or speed left "
+            "out; errors are clustered by rater.",
+            *(f"{name} is left out: {why}." for name, why in found.dropped),
+        ),
+        data="simulated" if found.simulated else "given",
     )
-    notes_below = [
-        f"{found.n_ratings} ratings of {found.n_models} models by {found.n_raters} "
-        f"raters, {found.n_missing} without a grade or speed left out; errors are "
-        "clustered by rater.",
-        *(f"{name} is left out: {why}." for name, why in found.dropped),
-    ]
-    return as_text(
-        Table(
-            name="grading",
-            caption="Odds of a higher grade, per standard deviation",
-            columns=(
-                Column(key="predictor", heading="Predictor", align="left"),
-                Column(key="per", heading="Standard deviation"),
-                Column(key="odds_ratio", heading="Odds ratio", digits=2),
-                Column(key="interval", heading=f"{100.0 * found.level:g} % interval"),
-            ),
-            rows=rows,
-            notes=tuple(notes_below),
-            data="simulated" if found.simulated else "given",
-        )
+    return as_text(table)
+
+
+def _row(effect: "Effect") -> tuple[str, str, float, str]:
+    from masrel.report.tables import interval_words, number
+
+    return (
+        effect.predictor,
+        f"{number(effect.per, 3)} {_unit(effect.predictor)}".strip(),
+        effect.odds_ratio,
+        interval_words(effect.low, effect.high, 2),
     )
 
 
 def _unit(predictor: str) -> str:
-    from masrel.analysis.grading import PREDICTORS
+    from masrel.analysis.predictors import PREDICTORS
 
     unit = PREDICTORS[predictor][1]
     return "" if unit == "1" else unit

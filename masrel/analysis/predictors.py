@@ -1,0 +1,116 @@
+"""What grades can be regressed on: a model's parameters and the stretching speed."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from masrel.errors import ParameterError, RatingsError
+from masrel.protocol import Protocol
+from masrel.ratings import Ratings
+
+__all__ = ["PREDICTORS", "independent", "ratings_with"]
+
+PREDICTORS: dict[str, tuple[str, str]] = {
+    "L": ("catch_angle_constant_deg", "deg"),
+    "H": ("catch_torque_nms_rad", "N·m·s/rad"),
+    "Q": ("residual_ratio", "1"),
+    "D": ("catch_travel_deg", "deg"),
+    "speed": ("mean_speed_deg_s", "deg/s"),
+}
+"""Predictor to its key of a model, or column of the ratings, and its unit."""
+
+
+def ratings_with(
+    protocol: Protocol,
+    ratings: Ratings,
+    predictors: Sequence[str],
+    models: str,
+    session: str | None,
+) -> tuple[pd.DataFrame, int]:
+    """Put every predictor beside its grade.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        The study, which has the models' parameters.
+    ratings : Ratings
+        Its ratings with their speeds.
+    predictors : sequence of str
+        Of `PREDICTORS`.
+    models : {"standard", "dummy", "all"}
+        Which models.
+    session : str or None
+        Which session; all if None.
+
+    Returns
+    -------
+    tuple of DataFrame and int
+        Ratings with a grade and every predictor, and how many have not.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such session.
+    """
+    table = ratings.table
+    if session is not None:
+        if session not in {s.id for s in protocol.sessions}:
+            known = ", ".join(s.id for s in protocol.sessions)
+            raise ParameterError(f"session: needs one of {known}, got {session!r}")
+        table = table[table["session"] == session]
+    asked = {m.id: m for m in protocol.models if models in ("all", m.role)}
+    table = table[table["model"].isin(asked)].copy()
+    for name in predictors:
+        key = PREDICTORS[name][0]
+        if name == "speed":
+            table[name] = table[key]
+        else:
+            table[name] = [float(getattr(asked[m], key)) for m in table["model"]]
+    whole = table.dropna(subset=["grade", *predictors])
+    return whole, len(table) - len(whole)
+
+
+def independent(
+    table: pd.DataFrame, predictors: Sequence[str]
+) -> tuple[list[str], list[tuple[str, str]]]:
+    """Keep of the predictors those that are no combination of earlier ones.
+
+    Parameters
+    ----------
+    table : DataFrame
+        Ratings with a column each.
+    predictors : sequence of str
+        In the order of their claim.
+
+    Returns
+    -------
+    tuple of two list
+        Those that are kept, and the others, each with the reason.
+
+    Raises
+    ------
+    RatingsError
+        If none is left.
+    """
+    kept: list[str] = []
+    dropped: list[tuple[str, str]] = []
+    basis = np.ones((len(table), 1)) / math.sqrt(len(table))
+    for name in predictors:
+        column = table[name].to_numpy(dtype=np.float64)
+        about = column - column.mean()
+        left = column - basis @ (basis.T @ column)
+        left = left - basis @ (basis.T @ left)
+        size = float(np.linalg.norm(column))
+        if np.linalg.norm(about) <= 1e-9 * size:
+            dropped.append((name, "it is the same in all ratings"))
+        elif np.linalg.norm(left) <= 1e-9 * size:
+            others = ", ".join(kept)
+            dropped.append((name, f"it is a combination of {others} in these ratings"))
+        else:
+            kept.append(name)
+            basis = np.column_stack([basis, left / np.linalg.norm(left)])
+    if not kept:
+        raise RatingsError(f"predictors: {'; '.join(': '.join(d) for d in dropped)}")
+    return kept, dropped
