@@ -96,15 +96,15 @@ def test_forty_digits_find_the_same_maximum_and_information(softness: float) -> 
     assert found.sd == pytest.approx(float(sd), rel=1e-12)
     made = travels(SEEN, LIMITS, softness).information(found.mean, found.sd)
     np.testing.assert_allclose(made, second, rtol=1e-9)
-    # 5 seen and 4 that count half: s² of 7 values is over 6
-    error = math.sqrt(np.linalg.inv(np.array(second))[0, 0] * 7.0 / 6.0)
+    # of the 5 that were seen, one is spent on the mean
+    error = math.sqrt(np.linalg.inv(np.array(second))[0, 0] * 5.0 / 4.0)
     assert found.standard_error == pytest.approx(error, rel=1e-9)
 
 
 def test_the_ends_of_the_interval_are_where_the_profile_has_fallen_enough() -> None:
     found, data = fitted(SEEN, LIMITS), travels(SEEN, LIMITS)
-    t = float(stdtrit(6.0, 0.975))
-    fall = 3.5 * math.log1p(t**2 / 6.0)  # n = 5 + 4/2 values
+    t = float(stdtrit(4.0, 0.975))
+    fall = 2.5 * math.log1p(t**2 / 4.0)  # half of n·ln(1 + t²/(n - 1)), 5 seen
     top = data.log_likelihood(found.mean, found.sd)
     for end in (found.low, found.high):
         sds = np.linspace(0.5 * found.sd, 6.0 * found.sd, 20_001)
