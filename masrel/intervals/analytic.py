@@ -11,13 +11,10 @@ from masrel.agreement.coding import Label
 from masrel.agreement.weights import WeightName
 from masrel.errors import ParameterError, UndefinedStatisticWarning
 from masrel.estimates import Interval, Target
-from masrel.intervals.case import (
-    Statistic,
-    normal,
-    open_case,
-    student_t,
-    warn_small,
-)
+from masrel.intervals.case import open_case
+from masrel.intervals.quantiles import normal, student_t
+from masrel.intervals.samples import warn_small
+from masrel.intervals.statistic import Statistic
 from masrel.intervals.transforms import Transform, around
 
 __all__ = ["Distribution", "analytic"]

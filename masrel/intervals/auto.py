@@ -12,9 +12,10 @@ from masrel.agreement.registry import Coefficient
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Interval, Target
 from masrel.intervals.analytic import analytic
-from masrel.intervals.case import Statistic, find_entry, open_case
+from masrel.intervals.case import open_case
 from masrel.intervals.jackknife import jackknife
 from masrel.intervals.posterior import SPOKEN_OF
+from masrel.intervals.statistic import Statistic, find_entry
 
 if TYPE_CHECKING:
     from masrel.agreement.weights import WeightName

@@ -13,7 +13,7 @@ from masrel.agreement.coding import Label
 from masrel.agreement.weights import WeightName
 from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target
-from masrel.intervals.case import Case, Statistic, open_case, warn_small
+from masrel.intervals.case import Case, open_case
 from masrel.intervals.resampling.draws import Effort, draw_resamples
 from masrel.intervals.resampling.endpoints import Kind, Rule
 from masrel.intervals.resampling.exact import enumerate_resamples
@@ -25,7 +25,9 @@ from masrel.intervals.resampling.slopes import (
     standard_errors,
     studentized,
 )
+from masrel.intervals.samples import warn_small
 from masrel.intervals.seeds import check_rng, recorded_generator
+from masrel.intervals.statistic import Statistic
 
 __all__ = ["Exact", "Kind", "bootstrap"]
 

@@ -2,7 +2,7 @@
 
 import math
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import get_args
 
@@ -12,27 +12,17 @@ from numpy.typing import ArrayLike, NDArray
 from masrel.agreement.coding import CodedRatings, Label
 from masrel.agreement.kernel import Floats, Kernel
 from masrel.agreement.patterns import distinct_patterns
-from masrel.agreement.registry import Coefficient, coefficient
+from masrel.agreement.registry import Coefficient
 from masrel.agreement.weights import WeightName, declared_weights
-from masrel.errors import ParameterError, SmallSampleWarning, UndefinedStatisticWarning
-from masrel.estimates import Estimate, Interval, Target, Unit
+from masrel.errors import ParameterError, UndefinedStatisticWarning
+from masrel.estimates import Interval, Target, Unit
+from masrel.intervals.features import features_of
+from masrel.intervals.statistic import Statistic, find_entry, kernel_of
 
 __all__ = [
     "Case",
-    "Statistic",
-    "blocks",
-    "features_of",
-    "find_entry",
-    "kernel_of",
-    "normal",
     "open_case",
-    "student_t",
-    "warn_small",
 ]
-
-Statistic = str | Callable[..., Estimate] | Coefficient
-
-_BLOCK = 1 << 14  # items at once: what is made of them takes more room than they do
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -148,31 +138,6 @@ class Case:
         )
 
 
-def find_entry(statistic: Statistic) -> Coefficient:
-    """Find a coefficient in the register.
-
-    Parameters
-    ----------
-    statistic : str, callable or Coefficient
-        Name of a coefficient, or its public function.
-
-    Returns
-    -------
-    Coefficient
-        Its entry.
-
-    Raises
-    ------
-    ParameterError
-        If it is none.
-    """
-    if isinstance(statistic, Coefficient):
-        return statistic
-    if isinstance(statistic, str):
-        return coefficient(statistic)
-    return coefficient(getattr(statistic, "__name__", repr(statistic)))
-
-
 def open_case(
     statistic: Statistic,
     ratings: object,
@@ -220,13 +185,7 @@ def open_case(
     if not 0.0 < level < 1.0:
         raise ParameterError(f"level: needs (0, 1), got {level}")
     coded = entry.code(ratings, categories)
-    fewest, most = entry.n_raters
-    columns = coded.codes.shape[1]
-    if entry.shape == "ratings" and (
-        columns < fewest or (most is not None and columns > most)
-    ):
-        wanted = f"{fewest}" if most == fewest else f"at least {fewest}"
-        raise ParameterError(f"{entry.title} needs {wanted} raters, got {columns}")
+    _check_raters(entry, coded)
     kernel = kernel_of(entry)
     v = declared_weights(weights, coded.categories, declared=coded.declared).as_floats()
     codes, times = distinct_patterns(coded.codes, coded.n_categories)
@@ -247,143 +206,11 @@ def open_case(
     )
 
 
-def kernel_of(entry: Coefficient) -> Kernel:
-    """Return a coefficient as a function of sums over items.
-
-    Parameters
-    ----------
-    entry : Coefficient
-        The coefficient.
-
-    Returns
-    -------
-    Kernel
-        Its kernel.
-
-    Raises
-    ------
-    ParameterError
-        If it is no such function: it has an interval of its own, or none.
-    """
-    if entry.kernel is None:
-        raise ParameterError(
-            f"coefficient: {entry.title} is no function of sums over items: there is "
-            "no such interval of it"
-        )
-    return entry.kernel
-
-
-def blocks(n_items: int) -> Iterator[slice]:
-    """Cut items into blocks, so that what is made of them stays small.
-
-    Parameters
-    ----------
-    n_items : int
-        How many there are.
-
-    Yields
-    ------
-    slice
-        One block after the other.
-
-    Examples
-    --------
-    >>> list(blocks(20_000))
-    [slice(0, 16384, None), slice(16384, 20000, None)]
-    """
-    for start in range(0, n_items, _BLOCK):
-        yield slice(start, min(start + _BLOCK, n_items))
-
-
-def features_of(kernel: Kernel, coded: CodedRatings, v: Floats) -> Floats:
-    """Return the features of items, made a block at a time.
-
-    Parameters
-    ----------
-    kernel : Kernel
-        A coefficient.
-    coded : CodedRatings
-        The ratings.
-    v : ndarray, shape (n_categories, n_categories)
-        Disagreement of two categories.
-
-    Returns
-    -------
-    ndarray, shape (n_items, n_features)
-        The features.
-    """
-    n_items = len(coded.codes)
-    if n_items <= _BLOCK:
-        return kernel.features(coded, v)
-    found = None
-    for items in blocks(n_items):
-        rows = kernel.features(replace(coded, codes=coded.codes[items]), v)
-        if found is None:
-            found = np.empty((n_items, rows.shape[1]))
-        found[items] = rows
-    return np.asarray(found)
-
-
-def warn_small(count: int, least: int, what: str) -> tuple[str, ...]:
-    """Warn below a number of items or raters, and return the note of it.
-
-    Parameters
-    ----------
-    count, least : int
-        How many there are, and how many are enough.
-    what : str
-        Of what, such as ``"raters"``.
-
-    Returns
-    -------
-    tuple of str
-        One note for the result, or none.
-
-    Warns
-    -----
-    SmallSampleWarning
-        If there are too few.
-    """
-    if count >= least:
-        return ()
-    note = f"{count} {what}: below {least} the interval may cover less than it says"
-    warnings.warn(note, SmallSampleWarning, stacklevel=4)
-    return (note,)
-
-
-def student_t(level: float, df: float) -> float:
-    """Return the two-sided quantile of Student's t.
-
-    Parameters
-    ----------
-    level : float
-        Probability between its negative and it.
-    df : float
-        Degrees of freedom.
-
-    Returns
-    -------
-    float
-        The quantile at (1 + level) / 2.
-    """
-    from scipy.special import stdtrit  # loaded only when an interval is asked for
-
-    return float(stdtrit(df, 0.5 + 0.5 * level))
-
-
-def normal(level: float) -> float:
-    """Return the two-sided quantile of the standard normal.
-
-    Parameters
-    ----------
-    level : float
-        Probability between its negative and it.
-
-    Returns
-    -------
-    float
-        The quantile at (1 + level) / 2.
-    """
-    from scipy.special import ndtri
-
-    return float(ndtri(0.5 + 0.5 * level))
+def _check_raters(entry: Coefficient, coded: CodedRatings) -> None:
+    fewest, most = entry.n_raters
+    columns = coded.codes.shape[1]
+    if entry.shape == "ratings" and (
+        columns < fewest or (most is not None and columns > most)
+    ):
+        wanted = f"{fewest}" if most == fewest else f"at least {fewest}"
+        raise ParameterError(f"{entry.title} needs {wanted} raters, got {columns}")

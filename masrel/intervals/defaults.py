@@ -9,10 +9,11 @@ import dataclasses
 import math
 
 from masrel.estimates import Interval
-from masrel.intervals.case import Case, student_t
+from masrel.intervals.case import Case
 from masrel.intervals.choice import FEW, SEVERAL, Choice
 from masrel.intervals.jackknife import around_estimate
 from masrel.intervals.modelled import lifted, of_any_raters, of_two_raters, one_sided
+from masrel.intervals.quantiles import student_t
 from masrel.intervals.spread import Spread, excess_of_raters, spread
 from masrel.intervals.transforms import around
 

@@ -11,8 +11,11 @@ from masrel.agreement.coding import Label
 from masrel.agreement.weights import WeightName
 from masrel.errors import ParameterError, RatingsError
 from masrel.estimates import Estimate, Interval
-from masrel.intervals.case import Case, Statistic, open_case, student_t, warn_small
+from masrel.intervals.case import Case, open_case
+from masrel.intervals.quantiles import student_t
+from masrel.intervals.samples import warn_small
 from masrel.intervals.spread import jackknife_variance, without_item
+from masrel.intervals.statistic import Statistic
 
 __all__ = ["Design", "difference"]
 

@@ -8,13 +8,10 @@ from numpy.typing import ArrayLike
 from masrel.agreement.coding import Label
 from masrel.agreement.weights import WeightName
 from masrel.estimates import Interval, Target
-from masrel.intervals.case import (
-    Case,
-    Statistic,
-    open_case,
-    student_t,
-)
+from masrel.intervals.case import Case, open_case
+from masrel.intervals.quantiles import student_t
 from masrel.intervals.spread import Spread, spread
+from masrel.intervals.statistic import Statistic
 
 __all__ = ["around_estimate", "jackknife"]
 

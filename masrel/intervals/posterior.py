@@ -9,8 +9,9 @@ from numpy.typing import ArrayLike
 from masrel.agreement.coding import Label
 from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target
-from masrel.intervals.case import Case, Statistic, open_case
+from masrel.intervals.case import Case, open_case
 from masrel.intervals.dirichlet.prior import Prior, PriorName
+from masrel.intervals.statistic import Statistic
 
 if TYPE_CHECKING:
     from masrel.agreement.weights import WeightName

@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 
 from masrel.agreement.kernel import Floats
 from masrel.errors import ParameterError
-from masrel.intervals.case import Case, blocks, features_of, warn_small
+from masrel.intervals.case import Case
+from masrel.intervals.features import blocks, features_of
+from masrel.intervals.samples import warn_small
 
 __all__ = ["Spread", "excess_of_raters", "jackknife_variance", "spread", "without_item"]
 

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from masrel.agreement.kernel import Floats
 from masrel.errors import ParameterError
-from masrel.intervals.case import Case, blocks
+from masrel.intervals.case import Case
+from masrel.intervals.features import blocks
 from masrel.intervals.resampling.lattice import Lattice, lattice_of
 from masrel.intervals.resampling.numerators import Integers
 

@@ -1,0 +1,64 @@
+"""The features of items, whose sums are what a coefficient depends on."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from masrel.agreement.coding import CodedRatings
+from masrel.agreement.kernel import Floats, Kernel
+
+__all__ = ["blocks", "features_of"]
+
+_BLOCK = 1 << 14  # items at once: what is made of them takes more room than they do
+
+
+def blocks(n_items: int) -> Iterator[slice]:
+    """Cut items into blocks, so that what is made of them stays small.
+
+    Parameters
+    ----------
+    n_items : int
+        How many there are.
+
+    Yields
+    ------
+    slice
+        One block after the other.
+
+    Examples
+    --------
+    >>> list(blocks(20_000))
+    [slice(0, 16384, None), slice(16384, 20000, None)]
+    """
+    for start in range(0, n_items, _BLOCK):
+        yield slice(start, min(start + _BLOCK, n_items))
+
+
+def features_of(kernel: Kernel, coded: CodedRatings, v: Floats) -> Floats:
+    """Return the features of items, made a block at a time.
+
+    Parameters
+    ----------
+    kernel : Kernel
+        A coefficient.
+    coded : CodedRatings
+        The ratings.
+    v : ndarray, shape (n_categories, n_categories)
+        Disagreement of two categories.
+
+    Returns
+    -------
+    ndarray, shape (n_items, n_features)
+        The features.
+    """
+    n_items = len(coded.codes)
+    if n_items <= _BLOCK:
+        return kernel.features(coded, v)
+    found = None
+    for items in blocks(n_items):
+        rows = kernel.features(replace(coded, codes=coded.codes[items]), v)
+        if found is None:
+            found = np.empty((n_items, rows.shape[1]))
+        found[items] = rows
+    return np.asarray(found)

@@ -1,0 +1,34 @@
+"""Whether a sample is too small for an interval to cover as it says."""
+
+import warnings
+
+from masrel.errors import SmallSampleWarning
+
+__all__ = ["warn_small"]
+
+
+def warn_small(count: int, least: int, what: str) -> tuple[str, ...]:
+    """Warn below a number of items or raters, and return the note of it.
+
+    Parameters
+    ----------
+    count, least : int
+        How many there are, and how many are enough.
+    what : str
+        Of what, such as ``"raters"``.
+
+    Returns
+    -------
+    tuple of str
+        One note for the result, or none.
+
+    Warns
+    -----
+    SmallSampleWarning
+        If there are too few.
+    """
+    if count >= least:
+        return ()
+    note = f"{count} {what}: below {least} the interval may cover less than it says"
+    warnings.warn(note, SmallSampleWarning, stacklevel=4)
+    return (note,)
