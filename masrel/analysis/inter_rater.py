@@ -1,9 +1,7 @@
 """Agreement between raters in one session."""
 
-import dataclasses
-
 from masrel.agreement import coefficient
-from masrel.analysis.interval import planned_interval, stream_seed
+from masrel.analysis.planned import with_interval
 from masrel.analysis.results import PlannedEstimate
 from masrel.analysis.selection import absence, rated_models
 from masrel.protocol import EstimatePlan, Protocol, scale_of
@@ -55,22 +53,10 @@ def inter_rater(
         weights=line.weights,
         level=protocol.analysis.level,
     )
-    interval = planned_interval(
-        line.interval,
-        line.coefficient,
-        grades,
-        target=line.target,
-        categories=categories,
-        weights=line.weights,
-        level=protocol.analysis.level,
-        n_resamples=protocol.analysis.n_resamples,
-        seed=stream_seed(protocol.analysis.seed, line.id),
-    )
     return PlannedEstimate(
         line=line,
         items=matrix.items,
         raters=matrix.raters,
         n_missing=matrix.n_missing,
-        # An intraclass correlation comes with an interval of its own.
-        estimate=dataclasses.replace(estimate, interval=interval or estimate.interval),
+        estimate=with_interval(estimate, line, protocol, grades, line.id),
     )

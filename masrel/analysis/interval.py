@@ -2,6 +2,7 @@
 
 import hashlib
 from collections.abc import Sequence
+from typing import TypedDict
 
 from masrel.agreement.coding import Label
 from masrel.agreement.weights import WeightName
@@ -9,6 +10,8 @@ from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target
 
 __all__ = ["planned_interval", "stream_seed"]
+
+_KINDS = ("auto", "analytic", "jackknife", "bootstrap", "posterior")
 
 
 def planned_interval(
@@ -59,53 +62,33 @@ def planned_interval(
     """
     if kind == "none":
         return None
+    if kind not in _KINDS:
+        raise ParameterError(
+            f"interval: needs one of none, {', '.join(_KINDS)}, got {kind!r}"
+        )
     # Imported here: asking for a kappa alone loads no interval.
     from masrel import intervals
 
+    asked = _Asked(target=target, categories=categories, weights=weights, level=level)
     if kind == "auto":
-        return intervals.estimate(
-            coefficient,
-            ratings,
-            target=target,
-            categories=categories,
-            weights=weights,
-            level=level,
-        ).interval
-    if kind in ("analytic", "jackknife"):
-        exact = intervals.analytic if kind == "analytic" else intervals.jackknife
-        return exact(
-            coefficient,
-            ratings,
-            target=target,
-            categories=categories,
-            weights=weights,
-            level=level,
-        )
+        return intervals.estimate(coefficient, ratings, **asked).interval
+    if kind == "analytic":
+        return intervals.analytic(coefficient, ratings, **asked)
+    if kind == "jackknife":
+        return intervals.jackknife(coefficient, ratings, **asked)
     if kind == "bootstrap":
         return intervals.bootstrap(
-            coefficient,
-            ratings,
-            target=target,
-            categories=categories,
-            weights=weights,
-            level=level,
-            n_resamples=n_resamples,
-            rng=seed,
+            coefficient, ratings, **asked, n_resamples=n_resamples, rng=seed
         )
-    if kind == "posterior":
-        return intervals.posterior(
-            coefficient,
-            ratings,
-            target=target,
-            categories=categories,
-            weights=weights,
-            level=level,
-            rng=seed,
-        )
-    raise ParameterError(
-        "interval: needs one of none, auto, analytic, jackknife, bootstrap, posterior, "
-        f"got {kind!r}"
-    )
+    return intervals.posterior(coefficient, ratings, **asked, rng=seed)
+
+
+class _Asked(TypedDict):
+    # what every method takes
+    target: Target
+    categories: Sequence[Label]
+    weights: WeightName
+    level: float
 
 
 def stream_seed(root: int, purpose: str) -> int:

@@ -3,10 +3,9 @@
 import dataclasses
 
 from masrel.agreement import coefficient, cohen_kappa
-from masrel.analysis.interval import planned_interval, stream_seed
+from masrel.analysis.planned import with_interval
 from masrel.analysis.results import PlannedEstimate, RaterEstimate
 from masrel.analysis.selection import absence, rated_models
-from masrel.estimates import Estimate
 from masrel.protocol import EstimatePlan, Protocol, scale_of
 from masrel.ratings import Ratings, RetestPairs, retest_pairs
 
@@ -75,7 +74,7 @@ def _over_raters(
     estimate = over_raters(weighed, categories=categories, weights=line.weights)
     return PlannedEstimate(
         line=line,
-        estimate=_with_interval(estimate, line, protocol, weighed, line.id),
+        estimate=with_interval(estimate, line, protocol, weighed, line.id),
         by_rater=tuple(
             RaterEstimate(
                 rater=rater,
@@ -99,7 +98,7 @@ def _each_rater(
         by_rater=tuple(
             RaterEstimate(
                 rater=rater,
-                estimate=_with_interval(
+                estimate=with_interval(
                     own(
                         of_rater,
                         categories=categories,
@@ -115,24 +114,3 @@ def _each_rater(
             for rater, of_rater in zip(pairs.raters, weighed, strict=True)
         ),
     )
-
-
-def _with_interval(
-    estimate: Estimate,
-    line: EstimatePlan,
-    protocol: Protocol,
-    pairs: object,
-    purpose: str,
-) -> Estimate:
-    interval = planned_interval(
-        line.interval,
-        line.coefficient,
-        pairs,
-        target=line.target,
-        categories=scale_of(protocol).values,
-        weights=line.weights,
-        level=protocol.analysis.level,
-        n_resamples=protocol.analysis.n_resamples,
-        seed=stream_seed(protocol.analysis.seed, purpose),
-    )
-    return dataclasses.replace(estimate, interval=interval or estimate.interval)
