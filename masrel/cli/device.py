@@ -132,6 +132,8 @@ def friction_command(bench: Bench, arm_is_free: bool) -> None:
 
 
 def _described(one: "Found") -> str:
+    if one.firmware is None:
+        return f"puck {one.puck}: {one.kind}"
     state = "awake" if one.is_awake else "asleep"
     support = "" if one.is_supported else ", NOT SUPPORTED"
     said = "".join(f", {name} {value}" for name, value in one.properties.items())

@@ -68,7 +68,7 @@ def run_presentation(
     stop : EmergencyStop or None, optional
         A button that the loop looks at in every tick.
     watchdog : Watching or None, optional
-        Told every 5 ms that the loop is alive.
+        Told every 5 ms, or four times as often as it demands, that the loop is alive.
     spool : Path or None, optional
         A file that keeps every sample from the moment it is taken, for a process that
         is killed; `cut_off` reads it. Remove it when the recording is on disk.
@@ -82,7 +82,8 @@ def run_presentation(
     ------
     ParameterError
         If the rate or the duration is not above 0, the rate is not the controller's,
-        the controller has been used, or `end_angle` is not finite.
+        the controller has been used, `end_angle` is not finite, or the watchdog waits
+        less than two ticks.
     DeviceError
         If the device is not open to begin with.
     OSError
@@ -107,7 +108,7 @@ def run_presentation(
     >>> presented.recording.facts["phases"]
     'pre-catch, catch, post-catch, pre-catch'
     """
-    _check(device, controller, rate_hz, max_duration_s, end_angle)
+    _check(device, controller, limits, rate_hz, max_duration_s, end_angle)
     n_ticks = math.ceil(max_duration_s * rate_hz)
     capacity = n_samples(n_ticks, rate_hz, limits)
     known: dict[str, Fact] = {"simulated": device.simulated, "device": device.name}
@@ -139,6 +140,7 @@ def run_presentation(
 def _check(
     device: Device,
     controller: Controller,
+    limits: DeviceLimits,
     rate_hz: int,
     max_duration_s: float,
     end_angle: float,
@@ -150,6 +152,11 @@ def _check(
         )
     if not math.isfinite(end_angle):
         raise ParameterError(f"end_angle: needs a finite angle, got {end_angle} rad")
+    if limits.watchdog_time * rate_hz < 2.0:
+        raise ParameterError(
+            f"watchdog_time: needs two ticks or more, at {rate_hz} Hz "
+            f"{2.0 / rate_hz:g} s, got {limits.watchdog_time:g} s"
+        )
     if rate_hz != controller.rate_hz:
         raise ParameterError(
             f"rate_hz: needs the controller's {controller.rate_hz} Hz, got {rate_hz}"

@@ -140,7 +140,8 @@ class Ticks:
         self._start_ns = self._sent_ns = self.clock.now_ns()
         stop, device, beat = self._stop, self.device, self.watchdog.beat
         check_every = max(1, round(_CHECK_EVERY_S * 1e9 / self.period_ns))
-        beat_every = max(1, round(_BEAT_EVERY_S * 1e9 / self.period_ns))
+        beat_every_s = min(_BEAT_EVERY_S, 0.25 * self._limits.watchdog_time)
+        beat_every = max(1, round(beat_every_s * 1e9 / self.period_ns))
         next_check, next_beat = check_every, 0
         tick = 0
         while tick < self._n_ticks:

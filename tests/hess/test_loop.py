@@ -199,7 +199,7 @@ def test_a_ramp_is_over_in_time_at_any_rate(rate_hz: int, ramp_time: float) -> N
         angle=lambda t: START + 0.5 if t < 0.5 else radians(-8.0),
         rate_hz=rate_hz,
         max_duration_s=2.0,
-        limits=limits_with(ramp_time=ramp_time),
+        limits=limits_with(ramp_time=ramp_time, watchdog_time=1.0),
     )
     fault = presented.fault
     assert fault is not None
@@ -441,6 +441,22 @@ def test_the_watchdog_hears_every_5_ms_and_is_let_rest_at_the_end() -> None:
     assert heard == [0.0, 5.0, 10.0, 15.0, 20.0, "rest"]
 
 
+def test_a_watchdog_that_waits_less_hears_more_often() -> None:
+    heard = []
+
+    class Watching:
+        def beat(self) -> None:
+            heard.append(clock.now_ns() / PERIOD_NS)
+
+        def rest(self) -> None:
+            pass
+
+    clock = SimulatedClock()
+    limits = limits_with(watchdog_time=0.004)
+    rest(clock, watchdog=Watching(), limits=limits, max_duration_s=0.005)
+    assert heard == [0.0, 1.0, 2.0, 3.0, 4.0]  # four times before it would be too late
+
+
 # Exceptions that are no fault of the device
 
 
@@ -665,6 +681,22 @@ def test_what_cannot_be_run_is_refused_before_anything_moves(change) -> None:
             run_presentation(device, controller, clock=clock, limits=LIMITS, **options)
         assert device.n_reads == 0
         assert device.commands == []
+
+
+@pytest.mark.parametrize(("rate_hz", "watchdog_time"), [(7, 0.1), (1000, 0.0015)])
+def test_a_watchdog_that_cannot_hear_every_tick_in_time_is_refused(
+    rate_hz: int, watchdog_time: float
+) -> None:
+    clock = SimulatedClock()
+    limits = limits_with(watchdog_time=watchdog_time)
+    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START, rate_hz=rate_hz)
+    with (
+        ScriptedDevice(clock) as device,
+        pytest.raises(ParameterError, match="watchdog_time: needs two ticks or more"),
+    ):
+        run_presentation(
+            device, controller, clock=clock, limits=limits, rate_hz=rate_hz
+        )
 
 
 def test_a_rate_that_is_not_the_controllers_is_refused() -> None:

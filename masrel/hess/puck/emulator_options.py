@@ -22,6 +22,8 @@ class EmulatorOptions:
         What it answers for VERS.
     role : int
         What it answers for ROLE; the lowest five bits are 0 for a motor.
+    has_error : bool
+        Whether it reports an error, STAT 1.
     awake : bool
         Whether it is awake from the beginning, its position set.
     wake_s : float
@@ -55,6 +57,7 @@ class EmulatorOptions:
 
     firmware: int = 148
     role: int = 0
+    has_error: bool = False
     awake: bool = False
     wake_s: float = 1.0
     counts_per_turn: int = 4096

@@ -11,7 +11,7 @@ from masrel.hess.puck.properties import (
     VERSION,
     property_table,
 )
-from masrel.hess.puck.states import ASLEEP, IDLE, READY
+from masrel.hess.puck.states import ASLEEP, BROKEN, IDLE, READY
 
 __all__ = ["Registers"]
 
@@ -77,6 +77,7 @@ class Registers:
         self.offset = 0
         self.mode = IDLE
         self.torque = 0
+        self._has_error = options.has_error
         self._is_awake = options.awake
         if not options.awake:
             self.fall_asleep()
@@ -133,6 +134,8 @@ class Registers:
         int or None
             Its value; None where it does not answer.
         """
+        if number == STATUS and self._has_error:
+            return BROKEN
         if number == STATUS:
             return READY if self._is_awake else ASLEEP
         if not self._is_awake and number not in MONITOR_ANSWERS:

@@ -8,7 +8,8 @@ from masrel.hess.clock import Clock
 from masrel.hess.puck.bus import Link
 from masrel.hess.puck.identity import ROLE_MASK, identify, table_of
 from masrel.hess.puck.node import PuckNode
-from masrel.hess.puck.properties import PropertyTable
+from masrel.hess.puck.properties import STATUS, PropertyTable
+from masrel.hess.puck.states import ASLEEP, READY
 
 __all__ = ["Found", "probe"]
 
@@ -35,11 +36,11 @@ class Found:
     puck : int
         Its node.
     kind : str
-        What it is, from its ROLE.
+        What it is, from its ROLE, or that it is in error.
     is_awake : bool
         Whether it has left its monitor.
-    firmware : int
-        VERS.
+    firmware : int or None
+        VERS; None where it is in error.
     is_supported : bool
         Whether this driver can drive it.
     properties : dict of str to int
@@ -49,7 +50,7 @@ class Found:
     puck: int
     kind: str
     is_awake: bool
-    firmware: int
+    firmware: int | None
     is_supported: bool
     properties: dict[str, int]
 
@@ -95,6 +96,9 @@ def probe(
 
 def _probed(node: PuckNode, properties: PropertyTable | None) -> Found | None:
     try:
+        status = node.ask(STATUS, patience_s=_PROBE_PATIENCE_S)
+        if status not in (ASLEEP, READY):
+            return _unusable(node.puck, status)
         identity = identify(node, patience_s=_PROBE_PATIENCE_S)
     except DeviceTimeoutError:
         return None
@@ -115,4 +119,15 @@ def _probed(node: PuckNode, properties: PropertyTable | None) -> Found | None:
         firmware=identity.firmware,
         is_supported=table is not None,
         properties=said,
+    )
+
+
+def _unusable(puck: int, status: int) -> Found:
+    return Found(
+        puck=puck,
+        kind=f"in error, STAT {status}",
+        is_awake=False,
+        firmware=None,
+        is_supported=False,
+        properties={},
     )

@@ -113,6 +113,9 @@ def test_probe_tells_what_it_can_drive_from_what_it_cannot() -> None:
     assert found().properties == {}  # asleep it says no more
     assert found(role=2).kind == "safety module"
     assert found(role=9).kind == "unknown, ROLE 9"
+    broken = found(has_error=True)  # and the nodes after it are asked all the same
+    assert (broken.kind, broken.firmware) == ("in error, STAT 1", None)
+    assert not broken.is_supported
     other = found(awake=True, firmware=40, properties=property_table(148))
     assert (other.is_supported, other.properties) == (False, {})
 
