@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 from masrel.agreement.coding import Label
 from masrel.agreement.weights import WeightName
 from masrel.errors import ParameterError, UndefinedStatisticWarning
-from masrel.estimates import Interval, Target
-from masrel.intervals.case import open_case
+from masrel.estimates import Estimate, Interval, Target
+from masrel.intervals.case import Case, open_case
 from masrel.intervals.quantiles import normal, student_t
 from masrel.intervals.samples import warn_small
 from masrel.intervals.statistic import Statistic
@@ -96,35 +96,51 @@ def analytic(
         weights=weights,
         level=level,
     )
-    if target != "items":
-        raise ParameterError(
-            'target: the delta method speaks of other items only, so "items"; for '
-            f'other raters use the jackknife; got "{target}"'
-        )
+    _check_target(case)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UndefinedStatisticWarning)  # said below
         estimate = case.entry(ratings, categories=categories, weights=weights)
     method = f"delta method, {_WORDS[distribution]}"
-    error = estimate.standard_error
-    if estimate.reason is not None or not error > 0.0:
-        reason = estimate.reason or (
-            "the standard error is 0: every item agrees alike, which does not mean "
-            "that there is no uncertainty"
-        )
-        if math.isnan(error) and estimate.reason is None:
-            reason = "one item has no standard error"
+    reason = _undefined(estimate)
+    if reason is not None:
         return case.undefined(reason, method=method, unit=None)
     notes = warn_small(estimate.n_items, 10, "items")
-    if distribution == "normal":
-        half = normal(level) * error
-    else:
-        half = student_t(level, estimate.n_items - 1) * error
-    transform = _TRANSFORMS.get(distribution, "none")
-    low, high = around(estimate.value, half, transform, case.entry.lowest)
+    low, high = _ends(case, estimate, distribution)
     if math.isnan(low):
         reason = "the estimate is not inside the ends of the parameter space"
         return case.undefined(reason, method=method, unit=None)
     return case.closed(low, high, method=method, unit=None, notes=notes)
+
+
+def _check_target(case: Case) -> None:
+    if case.target != "items":
+        raise ParameterError(
+            'target: the delta method speaks of other items only, so "items"; for '
+            f'other raters use the jackknife; got "{case.target}"'
+        )
+
+
+def _undefined(estimate: Estimate) -> str | None:
+    # why there is no interval, if there is none
+    if estimate.reason is not None or estimate.standard_error > 0.0:
+        return estimate.reason
+    if math.isnan(estimate.standard_error):
+        return "one item has no standard error"
+    return (
+        "the standard error is 0: every item agrees alike, which does not mean that "
+        "there is no uncertainty"
+    )
+
+
+def _ends(
+    case: Case, estimate: Estimate, distribution: Distribution
+) -> tuple[float, float]:
+    if distribution == "normal":
+        half = normal(case.level) * estimate.standard_error
+    else:
+        half = student_t(case.level, estimate.n_items - 1) * estimate.standard_error
+    transform = _TRANSFORMS.get(distribution, "none")
+    return around(estimate.value, half, transform, case.entry.lowest)
 
 
 _WORDS = {

@@ -15,7 +15,7 @@ from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target
 from masrel.intervals.case import Case, open_case
 from masrel.intervals.resampling.draws import Effort, draw_resamples
-from masrel.intervals.resampling.endpoints import Kind, Rule
+from masrel.intervals.resampling.endpoints import Ends, Kind, Rule
 from masrel.intervals.resampling.exact import enumerate_resamples
 from masrel.intervals.resampling.pool import Pool, cluster_pool, item_pool, rater_pool
 from masrel.intervals.resampling.resamples import Resamples
@@ -179,9 +179,22 @@ def bootstrap(
     ends = rule.ends(found.source) if found.has_spread else None
     if ends is None:
         return case.undefined(_no_ends(found), method=method, unit=target)
-    said = (*notes, *found.notes, *_endless(found))
+    closed = case.closed(
+        ends.low,
+        ends.high,
+        method=method,
+        unit=target,
+        notes=(*notes, *found.notes, *_endless(found)),
+    )
+    return _drawn(closed, found, ends, seed, kind)
+
+
+def _drawn(
+    interval: Interval, found: Resamples, ends: Ends, seed: int | None, kind: Kind
+) -> Interval:
+    # the interval with what is to know of its resamples
     return dataclasses.replace(
-        case.closed(ends.low, ends.high, method=method, unit=target, notes=said),
+        interval,
         n_resamples=found.n_resamples,
         n_undefined=found.n_undefined,
         monte_carlo_error=ends.errors,

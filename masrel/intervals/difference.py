@@ -115,6 +115,12 @@ def difference(
         case.entry(ratings, categories=categories, weights=weights)
         for case, ratings in zip(cases, (first, second), strict=True)
     ]
+    return _estimate(cases, estimates, variance, df)
+
+
+def _estimate(
+    cases: list[Case], estimates: list[Estimate], variance: float, df: float
+) -> Estimate:
     before, after = estimates
     value = before.value - after.value
     reason = before.reason or after.reason

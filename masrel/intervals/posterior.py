@@ -145,12 +145,7 @@ def posterior(
         from masrel.intervals.table.interval import table_interval
 
         return table_interval(case, concentration, n_draws=n_draws, rng=rng)
-    if not spoken_of:
-        raise ParameterError(
-            "model: the Dirichlet-multinomial model speaks of unweighted fleiss_kappa, "
-            "and of scott_pi and krippendorff_alpha, whose value in the population is "
-            f'the same; for two raters "table" speaks of others; got {asked}'
-        )
+    _check_dirichlet(spoken_of, asked)
     from masrel.intervals.dirichlet.interval import rho_interval
 
     return rho_interval(
@@ -172,6 +167,15 @@ def _check_options(case: Case, model: Model, method: Method) -> None:
         raise ParameterError(
             "target: a posterior speaks of other items, so "
             f'"items"; for other raters use the jackknife; got "{case.target}"'
+        )
+
+
+def _check_dirichlet(spoken_of: bool, asked: str) -> None:
+    if not spoken_of:
+        raise ParameterError(
+            "model: the Dirichlet-multinomial model speaks of unweighted fleiss_kappa, "
+            "and of scott_pi and krippendorff_alpha, whose value in the population is "
+            f'the same; for two raters "table" speaks of others; got {asked}'
         )
 
 

@@ -15,82 +15,11 @@ from scipy.special import expit, ndtri
 
 from masrel.agreement.coding import Codes
 from masrel.agreement.kernel import Floats
-from masrel.intervals.latent.traits import Traits
+from masrel.intervals.latent.place import Place
 
-__all__ = ["Coordinates", "Place"]
+__all__ = ["Coordinates"]
 
 _PLAIN = 5.0  # variance of items' means over its error, where ratings place items
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Place:
-    """Positions taken apart, in units of c.
-
-    Attributes
-    ----------
-    item : ndarray, shape (n, n_items)
-        u_i = (θ_i - α) / c.
-    bias, noise : ndarray, shape (n, n_raters)
-        b_r / c and σ_r / c.
-    threshold : ndarray, shape (n, n_categories - 1)
-        T_k = (τ_k - α) / c.
-    own : ndarray, shape (n, n_items)
-        The items' coordinates.
-    b, w : ndarray, shape (n, n_raters)
-        b_r / ω and w_r.
-    logit_share, logit_fraction, log_spread : ndarray, shape (n, 1)
-        logit ρ, logit f, log η.
-    share, root, fraction, spread : ndarray, shape (n, 1)
-        ρ, c, f and η.
-    anchor : ndarray, shape (n, 1)
-        α.
-    gap : ndarray, shape (n, n_categories - 2)
-        Distances of neighbouring T_k.
-    """
-
-    item: Floats = field(compare=False, repr=False)
-    bias: Floats = field(compare=False, repr=False)
-    noise: Floats = field(compare=False, repr=False)
-    threshold: Floats = field(compare=False, repr=False)
-    own: Floats = field(compare=False, repr=False)
-    b: Floats = field(compare=False, repr=False)
-    w: Floats = field(compare=False, repr=False)
-    logit_share: Floats = field(compare=False, repr=False)
-    logit_fraction: Floats = field(compare=False, repr=False)
-    log_spread: Floats = field(compare=False, repr=False)
-    share: Floats = field(compare=False, repr=False)
-    root: Floats = field(compare=False, repr=False)
-    fraction: Floats = field(compare=False, repr=False)
-    spread: Floats = field(compare=False, repr=False)
-    anchor: Floats = field(compare=False, repr=False)
-    gap: Floats = field(compare=False, repr=False)
-
-    @property
-    def severity(self) -> Floats:
-        """Severities θ_i, (n, n_items)."""
-        return self.anchor + self.root * self.item
-
-    @property
-    def tau(self) -> Floats:
-        """Thresholds τ_k, (n, n_categories - 1)."""
-        return self.anchor + self.root * self.threshold
-
-    @property
-    def traits(self) -> Traits:
-        """All on the scale where a rating has variance 1."""
-        rest = (self.root**2)[:, 0]
-        fraction = self.fraction[:, 0]
-        return Traits(
-            severity=self.severity,
-            bias=self.root * self.bias,
-            noise=self.root * self.noise,
-            thresholds=self.tau,
-            item_share=self.share[:, 0],
-            noise_fraction=fraction,
-            noise_spread=self.spread[:, 0],
-            bias_variance=rest * expit(-self.logit_fraction[:, 0]),
-            noise_variance=rest * fraction,
-        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -183,19 +112,11 @@ class Coordinates:
         share, fraction, spread = expit(rho), expit(f), np.exp(eta)
         root = np.sqrt(expit(-rho))
         gap = np.exp(position[:, at + 4 :])
-        threshold = np.hstack(
-            [
-                -_from_right(gap[:, : self.middle]),
-                np.zeros_like(anchor),
-                gap[:, self.middle :].cumsum(axis=1),
-            ]
-        )
+        threshold = self._thresholds(gap)
+        by_ratings = own + threshold @ self.between.T
+        by_prior = (np.sqrt(share) * own - anchor) / root
         return Place(
-            item=np.where(
-                self.placed,
-                own + threshold @ self.between.T,
-                (np.sqrt(share) * own - anchor) / root,
-            ),
+            item=np.where(self.placed, by_ratings, by_prior),
             bias=np.sqrt(expit(-f)) * b,
             noise=np.sqrt(fraction) * np.exp(spread * w),
             threshold=threshold,
@@ -212,6 +133,12 @@ class Coordinates:
             anchor=anchor,
             gap=gap,
         )
+
+    def _thresholds(self, gap: Floats) -> Floats:
+        # T_k from their distances, (n, n_categories - 1); that of α is 0
+        below = -_from_right(gap[:, : self.middle])
+        above = gap[:, self.middle :].cumsum(axis=1)
+        return np.hstack([below, np.zeros((len(gap), 1)), above])
 
     def log_jacobian(self, place: Place) -> Floats:
         """Return log |∂(θ, τ) / ∂(their coordinates)|, (n,), without items' √ρ.

@@ -10,8 +10,9 @@ import numpy as np
 
 from masrel.agreement.coding import Codes
 from masrel.agreement.kernel import Floats
-from masrel.intervals.latent.coordinates import Coordinates, Place
+from masrel.intervals.latent.coordinates import Coordinates
 from masrel.intervals.latent.likelihood import Cells, CellSlopes
+from masrel.intervals.latent.place import Place
 from masrel.intervals.latent.prior import LatentPrior
 from masrel.intervals.latent.traits import Traits, grade_shares, normal
 

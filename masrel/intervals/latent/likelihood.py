@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from masrel.agreement.coding import Codes
 from masrel.agreement.kernel import Floats
-from masrel.intervals.latent.coordinates import Place
+from masrel.intervals.latent.place import Place
 from masrel.intervals.latent.traits import between, normal
 
 __all__ = ["CellSlopes", "Cells"]

@@ -136,24 +136,32 @@ def retest_model(
     found = _integrate(used, believed, shares)
     kappa = _quantity("kappa, mean of raters", found.quantiles, level, "raters")
     other, other_kappa = _most_moved(used, believed, kappa, coded.n_categories, shares)
+    spread = found.spread_quantiles(shares)
     return RetestModel(
         kappa=kappa,
         spread=_quantity(
-            "kappa, standard deviation over raters",
-            found.spread_quantiles(shares),
-            level,
-            "raters",
+            "kappa, standard deviation over raters", spread, level, "raters"
         ),
-        raters=tuple(
-            _quantity(
-                f"rater {rater + 1}", found.rater_quantiles(at, shares), level, "items"
-            )
-            for at, rater in enumerate(tables)
-        ),
+        raters=_of_raters(found, list(tables), shares, level),
         n_pairs=tuple(int(table.sum()) for table in used),
         prior=_words(believed),
         other_kappa=other_kappa,
         other_prior=_words(other),
+    )
+
+
+def _of_raters(
+    found: "RetestPosterior",
+    raters: Sequence[int],
+    shares: Sequence[float],
+    level: float,
+) -> tuple[Quantity, ...]:
+    # of each rater with pairs, under the number he or she has in the study
+    return tuple(
+        _quantity(
+            f"rater {rater + 1}", found.rater_quantiles(at, shares), level, "items"
+        )
+        for at, rater in enumerate(raters)
     )
 
 

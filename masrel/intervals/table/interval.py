@@ -91,29 +91,37 @@ def table_interval(
         else TablePrior.of(concentration, q)
     )
     asked = _Asked(case, rng, one_sided)
-    found, (low, high) = asked.posterior(table + prior.cells, n_draws)
-    drawn = found.n_draws is not None
-    words = f"{n_draws} draws" if drawn else "exact"
-    notes = (f"left out, items of a single rating: {n_single}",) if n_single else ()
+    found, ends = asked.posterior(table + prior.cells, n_draws)
+    said = (f"left out, items of a single rating: {n_single}",) if n_single else ()
+    notes = (*said, *_prior_notes(asked, table, prior, ends))
+    return _interval(asked, found, ends, prior, notes)
+
+
+def _interval(
+    asked: "_Asked",
+    found: TablePosterior,
+    ends: tuple[float, float],
+    prior: TablePrior,
+    notes: tuple[str, ...],
+) -> Interval:
+    case, (low, high) = asked.case, ends
+    method = "Dirichlet posterior of the table of two raters, exact"
+    errors = None
+    if found.n_draws is not None:
+        method = method.replace("exact", f"{found.n_draws} draws")
+        above = 0.0 if asked.one_sided else found.quantile_error(high)
+        errors = (found.quantile_error(low), above)
     return Interval(
         low=low,
         high=high,
         level=case.level,
         kind="credible",
-        method=f"Dirichlet posterior of the table of two raters, {words}"
-        + (", one-sided" if one_sided else ""),
+        method=f"{method}, one-sided" if asked.one_sided else method,
         target=case.target,
         n_resamples=found.n_draws,
-        monte_carlo_error=(
-            (
-                found.quantile_error(low),
-                0.0 if one_sided else found.quantile_error(high),
-            )
-            if drawn
-            else None
-        ),
+        monte_carlo_error=errors,
         seed=asked.seed,
-        notes=(*notes, *_prior_notes(asked, table, prior, (low, high))),
+        notes=notes,
         distribution=found.distribution(
             *_reach(case, low, high),
             f"posterior of {case.entry.title}, prior {prior.words}",
