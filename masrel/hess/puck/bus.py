@@ -32,6 +32,18 @@ BITRATE = 1_000_000
 # Classes of error in the identifier of SocketCAN's error frames (linux/can/error.h)
 CONTROLLER_ERROR, BUS_OFF, BUS_RESTARTED = 0x004, 0x040, 0x100
 
+# What python-can's interfaces raise where an adapter or its maker's library is missing,
+# or where they have to be told more than a channel
+_NOT_OPENED = (
+    can.CanError,
+    ImportError,
+    NameError,
+    NotImplementedError,
+    OSError,
+    TypeError,
+    ValueError,
+)
+
 _FILTERS_IN_KERNEL = frozenset({"socketcan"})
 
 
@@ -221,7 +233,7 @@ def open_link(
             ignore_config=True,  # what is opened is what was asked for
             **_settings(interface, channel),
         )
-    except (can.CanError, NotImplementedError, OSError, ValueError) as error:
+    except _NOT_OPENED as error:
         raise BusError(
             f"puck: cannot open channel {channel!r} of interface {interface!r} "
             f"({error})"

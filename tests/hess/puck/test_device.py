@@ -150,6 +150,18 @@ def test_a_bus_that_is_not_there_is_said() -> None:
         open_device("puck", clock=RealClock(), options=options)
 
 
+@pytest.mark.parametrize(
+    "interface", ["canalystii", "kvaser", "neovi", "pcan", "slcan", "socketcand"]
+)
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_an_adapter_that_is_not_there_is_said(interface: str) -> None:
+    # Each of python-can's interfaces says so in a way of its own.
+    options = PuckOptions(interface=interface, channel="0")
+    words = f"puck: cannot open channel '0' of interface '{interface}'"
+    with pytest.raises(BusError, match=words):
+        open_device("puck", clock=RealClock(), options=options)
+
+
 def test_an_interface_that_nobody_knows_is_said() -> None:
     options = PuckOptions(interface="telepathy", channel="1")
     with pytest.raises(BusError, match="of interface 'telepathy'"):
