@@ -4,12 +4,12 @@ import json
 import math
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
+from masrel.cli.fit_figures import draw_friction_fit, draw_joint_fit
 from masrel.cli.notes import notes
 from masrel.errors import ParameterError
 
@@ -115,7 +115,7 @@ def command(
     if model_file is not None:
         _write_model(found, model_file)
     if folder is not None:
-        _draw_joint(found, folder)
+        draw_joint_fit(found, folder)
     _say(found, json_file)
 
 
@@ -176,10 +176,7 @@ def _friction(
 
     found = fit_friction(movements, level=level)
     if folder is not None:
-        from masrel.report.figures.fit_friction import draw_friction
-
-        with _files(folder) as write:
-            write("fit_friction", draw_friction(found, stamp=_stamp(found)))
+        draw_friction_fit(found, folder)
     _say(found, json_file)
 
 
@@ -195,46 +192,6 @@ def _write_model(found: "ElbowFit", path: Path) -> None:
     )
     path.write_text(as_toml(document), encoding="utf-8")
     click.echo(f"model: {path}", err=True)
-
-
-def _stamp(found: "ElbowFit | FrictionFit") -> str:
-    return "SIMULATED DATA" if found.simulated else ""
-
-
-def _draw_joint(found: "ElbowFit", folder: Path) -> None:
-    from masrel.report.figures.fit_catch import draw_catches
-    from masrel.report.figures.fit_residuals import draw_residuals
-    from masrel.report.figures.fit_slow import draw_slow_trials
-    from masrel.report.figures.fit_trial import draw_fast_trials
-
-    stamp = _stamp(found)
-    with _files(folder) as write:
-        write("fit_slow", draw_slow_trials(found, stamp=stamp))
-        write("fit_residuals", draw_residuals(found, stamp=stamp))
-        if any(trial.after is not None for trial in found.trials):
-            write("fit_trials", draw_fast_trials(found, stamp=stamp))
-            write("fit_catches", draw_catches(found, stamp=stamp))
-
-
-@contextmanager
-def _files(folder: Path) -> "Iterator[_Write]":
-    folder.mkdir(parents=True, exist_ok=True)
-    yield _Write(folder)
-    click.echo(f"figures: {folder}", err=True)
-
-
-class _Write:
-    # writes the two files of a figure into a folder
-
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-
-    def __call__(self, name: str, drawn: object) -> None:
-        from masrel.report.figures.style import Drawn
-
-        if isinstance(drawn, Drawn):
-            (self._folder / f"{name}.png").write_bytes(drawn.png)
-            (self._folder / f"{name}.svg").write_bytes(drawn.svg)
 
 
 def _say(found: "ElbowFit | FrictionFit", json_file: Path | None) -> None:

@@ -4,11 +4,11 @@ import math
 from typing import TYPE_CHECKING
 
 from masrel.elbow.identification.friction import FrictionFit
+from masrel.elbow.identification.quantities import QUANTITIES, Quantity
 from masrel.report.fit_table import FRICTION
 
 if TYPE_CHECKING:
     from masrel.elbow.identification import ElbowFit, FittedParameter
-    from masrel.elbow.identification.results import Quantity
     from masrel.elbow.identification.trials import Trial
 
 __all__ = ["fit_document"]
@@ -29,17 +29,7 @@ def fit_document(fit: "ElbowFit | FrictionFit") -> dict[str, object]:
         correlation of a device. ``nan`` is None, with its reason.
     """
     if isinstance(fit, FrictionFit):
-        return {
-            "simulated": fit.simulated,
-            "level": fit.level,
-            "n_strokes": len(fit.strokes),
-            "relative_error": fit.relative_error,
-            "torque_sd_nm": fit.torque_sd,
-            "estimates": [_estimate(e, FRICTION[e.name]) for e in fit.estimates],
-            "correlation": _matrix(fit.correlation.tolist()),
-        }
-    from masrel.elbow.identification.results import QUANTITIES
-
+        return _device(fit)
     return {
         "simulated": fit.simulated,
         "level": fit.level,
@@ -62,7 +52,19 @@ def fit_document(fit: "ElbowFit | FrictionFit") -> dict[str, object]:
     }
 
 
-def _estimate(estimate: "FittedParameter", quantity: "Quantity") -> dict[str, object]:
+def _device(fit: FrictionFit) -> dict[str, object]:
+    return {
+        "simulated": fit.simulated,
+        "level": fit.level,
+        "n_strokes": len(fit.strokes),
+        "relative_error": fit.relative_error,
+        "torque_sd_nm": fit.torque_sd,
+        "estimates": [_estimate(e, FRICTION[e.name]) for e in fit.estimates],
+        "correlation": _matrix(fit.correlation.tolist()),
+    }
+
+
+def _estimate(estimate: "FittedParameter", quantity: Quantity) -> dict[str, object]:
     factor = quantity.factor
     return {
         "key": quantity.key,

@@ -4,12 +4,8 @@ import math
 from collections.abc import Sequence
 
 from masrel.elbow.identification.friction import FrictionFit
-from masrel.elbow.identification.results import (
-    QUANTITIES,
-    ElbowFit,
-    FittedParameter,
-    Quantity,
-)
+from masrel.elbow.identification.quantities import QUANTITIES, Quantity
+from masrel.elbow.identification.results import ElbowFit, FittedParameter
 from masrel.report.rounding import ABSENT, interval_words, number, percent
 from masrel.report.tables import Column, Table
 

@@ -1,28 +1,22 @@
-"""Travels of catches of which some outlast their stretch: a censored likelihood.
-
-A catch that goes on where its stretch ends has a travel that is larger than what was
-seen of it. Leaving it out keeps the short travels and loses the long ones; here it is
-an observation censored on the right.
+"""The fit of travels of which some were not seen to end, and its row in the last fit.
 
 Source: Park, Kim and Damiano (2012), IEEE TNSRE 20(3), 361-370,
 https://doi.org/10.1109/TNSRE.2012.2195330, equation (4) and Fig. 5.
 """
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
-from scipy.special import erfcx, log_ndtr, stdtrit
+from scipy.special import log_ndtr, stdtrit
 
 from masrel.elbow.identification.horizon import Horizon
+from masrel.elbow.identification.travels import CensoredTravels, mills
 from masrel.errors import ConvergenceError
 
-__all__ = ["CensoredTravels", "TravelFit", "beyond", "fit_censored"]
-
-Floats = NDArray[np.float64]
+__all__ = ["TravelFit", "beyond", "fit_censored"]
 
 DOUBLINGS = 60
 """Of a step towards a change of sign, before the search is given up."""
@@ -50,122 +44,6 @@ class TravelFit:
     freedom: float
     low: float
     high: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CensoredTravels:
-    """Travels that were seen, and horizons behind which the others lie.
-
-    Attributes
-    ----------
-    seen : ndarray, shape (n_seen,)
-        Travels of catches that end, rad.
-    limit, softness : ndarray, shape (n_beyond,)
-        Horizons of the others, rad.
-    """
-
-    seen: Floats = field(compare=False, repr=False)
-    limit: Floats = field(compare=False, repr=False)
-    softness: Floats = field(compare=False, repr=False)
-
-    @classmethod
-    def of(
-        cls, seen: Sequence[float], horizons: Sequence[Horizon]
-    ) -> "CensoredTravels":
-        """Put travels and horizons into columns.
-
-        Parameters
-        ----------
-        seen : sequence of float
-            Travels of catches that end, rad.
-        horizons : sequence of Horizon
-            Those of the catches that do not.
-
-        Returns
-        -------
-        CensoredTravels
-            Both.
-        """
-        return cls(
-            seen=np.array(seen, dtype=np.float64),
-            limit=np.array([horizon.travel for horizon in horizons]),
-            softness=np.array([horizon.softness for horizon in horizons]),
-        )
-
-    def log_likelihood(self, mean: float, sd: float) -> float:
-        """Evaluate the log-likelihood of normal travels, without its constant.
-
-        Parameters
-        ----------
-        mean, sd : float
-            Of the travels, rad.
-
-        Returns
-        -------
-        float
-            Densities of those seen, and chances of the others to lie beyond.
-        """
-        spread = (self.seen - mean) / sd
-        z, _ = self._beyond(mean, sd)
-        density = -0.5 * float(spread @ spread) - self.seen.size * math.log(sd)
-        return density + float(log_ndtr(z).sum())
-
-    def score(self, mean: float, sd: float) -> tuple[float, float]:
-        """Differentiate the log-likelihood.
-
-        Parameters
-        ----------
-        mean, sd : float
-            Of the travels, rad.
-
-        Returns
-        -------
-        tuple of two float
-            By the mean and by the standard deviation, 1/rad.
-        """
-        spread = (self.seen - mean) / sd
-        z, size = self._beyond(mean, sd)
-        ratio = _mills(z)
-        by_mean = float(spread.sum()) / sd + float((ratio / size).sum())
-        by_sd = (float(spread @ spread) - spread.size) / sd
-        return by_mean, by_sd - float((ratio * z * sd / size**2).sum())
-
-    def information(self, mean: float, sd: float) -> Floats:
-        """Give minus the second derivatives of the log-likelihood.
-
-        Parameters
-        ----------
-        mean, sd : float
-            Of the travels, rad.
-
-        Returns
-        -------
-        ndarray, shape (2, 2)
-            By mean and standard deviation, 1/rad².
-        """
-        spread = (self.seen - mean) / sd
-        z, size = self._beyond(mean, sd)
-        ratio = _mills(z)
-        curve = ratio * (z + ratio)  # -d²/dz² ln Φ
-        turn = -z * sd / size**2  # dz/dsd
-        turn2 = z * (3.0 * sd**2 - size**2) / size**4  # d²z/dsd²
-        by_mean = spread.size / sd**2 + float((curve / size**2).sum())
-        both = 2.0 * float(spread.sum()) / sd**2
-        both += float((curve * turn / size + ratio * sd / size**3).sum())
-        by_sd = (3.0 * float(spread @ spread) - spread.size) / sd**2
-        by_sd += float((curve * turn**2 - ratio * turn2).sum())
-        return np.array([[by_mean, both], [both, by_sd]])
-
-    def _beyond(self, mean: float, sd: float) -> tuple[Floats, Floats]:
-        # standardized distance of the mean beyond each horizon, and what it is
-        # divided by: travels scatter, and so does what is seen of an end
-        size = np.sqrt(sd**2 + self.softness**2)
-        return (mean - self.limit) / size, size
-
-
-def _mills(z: Floats) -> Floats:
-    # z (n,) -> φ/Φ at z, without cancellation however far below
-    return np.asarray(math.sqrt(2.0 / math.pi) / erfcx(-z / math.sqrt(2.0)))
 
 
 def beyond(mean: float, horizon: Horizon, sd: float) -> tuple[float, float, float]:
@@ -197,7 +75,7 @@ def beyond(mean: float, horizon: Horizon, sd: float) -> tuple[float, float, floa
     size = math.hypot(sd, horizon.softness)
     z = (mean - horizon.travel) / size
     left = math.sqrt(-2.0 * float(log_ndtr(z)))
-    ratio = float(_mills(np.array(z)))
+    ratio = float(mills(np.array(z)))
     if left == 0.0:  # so far beyond that a float64 knows of no chance to lie before
         return 0.0, 0.0, 0.0
     return left, -ratio / (size * left), math.sqrt(ratio * (z + ratio)) / size

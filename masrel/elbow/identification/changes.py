@@ -108,13 +108,41 @@ def find_changes(
     if pushed is not None and not additive:
         later = torque - pushed
     sums = _sums(torque, torque - pre_catch, later, angle)
-    n = torque.size
+    if torque.size - 2 <= first + 1:
+        return Changes(catch=None, end=None, residual_sd=math.nan)
+    found = _search(sums, angle, first, peak, offset)
+    catch, end, n = found.catch, found.end, torque.size
+    sd = math.sqrt(max(found.squares, 0.0) / max(n - 6, 1))
+    if _rise(torque, pre_catch, catch, min(catch + peak, end)) < LEAST_SIGNAL * sd:
+        return Changes(catch=None, end=None, residual_sd=sd)
+    if end == n:
+        return Changes(catch=catch, end=None, residual_sd=sd)
+    starts = found.starts
+    endless = _squares(sums, angle, starts, np.array([n]), (peak, 0), offset)[:, 0]
+    climbs = additive or (
+        _climb(sums, angle, min(catch + peak, end), end) >= LEAST_SIGNAL * sd
+    )
+    if climbs and float(endless.min()) - found.squares >= LEAST_GAIN * sd**2:
+        return Changes(catch=catch, end=end, residual_sd=sd)
+    catch = int(starts[int(np.argmin(endless))])
+    return Changes(catch=catch, end=None, residual_sd=sd)
+
+
+@dataclass(frozen=True, slots=True)
+class _Best:
+    # the pair of least squares, and the starts near it
+    catch: int
+    end: int
+    squares: float
+    starts: Ints
+
+
+def _search(sums: _Sums, angle: Floats, first: int, peak: int, offset: Floats) -> _Best:
+    # First both coarsely, then the catch to the sample, then the end to the sample.
+    n = angle.size
     step = max(1, n // COARSE)
     starts = np.arange(first + 1, n - 2, step)
     ends = np.append(np.arange(first + 2, n - 1, step), n)
-    if starts.size == 0:
-        return Changes(catch=None, end=None, residual_sd=math.nan)
-    # First both coarsely, then the catch to the sample, then the end to the sample.
     gap = step
     for finer in (False, True, True):
         squares = _squares(sums, angle, starts, ends, (peak, gap), offset)
@@ -125,20 +153,7 @@ def find_changes(
         if finer:
             ends = np.append(np.arange(first + 2, n - 1), n)
         gap = 0
-    least = float(squares[place])
-    sd = math.sqrt(max(least, 0.0) / max(n - 6, 1))
-    if _rise(torque, pre_catch, catch, min(catch + peak, end)) < LEAST_SIGNAL * sd:
-        return Changes(catch=None, end=None, residual_sd=sd)
-    if end == n:
-        return Changes(catch=catch, end=None, residual_sd=sd)
-    endless = _squares(sums, angle, starts, np.array([n]), (peak, 0), offset)[:, 0]
-    climbs = additive or (
-        _climb(sums, angle, min(catch + peak, end), end) >= LEAST_SIGNAL * sd
-    )
-    if climbs and float(endless.min()) - least >= LEAST_GAIN * sd**2:
-        return Changes(catch=catch, end=end, residual_sd=sd)
-    catch = int(starts[int(np.argmin(endless))])
-    return Changes(catch=catch, end=None, residual_sd=sd)
+    return _Best(catch, end, float(squares[place]), starts)
 
 
 def _sums(torque: Floats, rest: Floats, later: Floats, angle: Floats) -> _Sums:

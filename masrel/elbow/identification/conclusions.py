@@ -8,12 +8,8 @@ from numpy.typing import NDArray
 
 from masrel.elbow.identification.catch import Catch
 from masrel.elbow.identification.horizon import Horizon
-from masrel.elbow.identification.results import (
-    QUANTITIES,
-    FittedParameter,
-    Step,
-    fitted,
-)
+from masrel.elbow.identification.quantities import QUANTITIES
+from masrel.elbow.identification.results import FittedParameter, Step, fitted
 from masrel.elbow.identification.together import Together
 from masrel.elbow.identification.trials import Trial
 

@@ -6,70 +6,23 @@ https://doi.org/10.1109/TNSRE.2012.2195330, equations (1)-(6).
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from masrel.elbow.identification.catch import Catch
-from masrel.elbow.identification.catch_line import line_row
 from masrel.elbow.identification.censored import beyond
 from masrel.elbow.identification.clusters import Rows, without_own
-from masrel.elbow.identification.horizon import Horizon
 from masrel.elbow.identification.part import Part
+from masrel.elbow.identification.scatter import Known, catch_rows
 from masrel.elbow.identification.trials import Trial
-from masrel.elbow.parameters import ElbowParameters
 
-__all__ = ["Equations", "Known", "Spreads"]
+__all__ = ["Equations"]
 
 Floats = NDArray[np.float64]
 
 PRE_CATCH = ("damping", "stiffness", "inertia")
 """Parameters of (1): velocity, angle and acceleration are what multiplies them."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Spreads:
-    """What a residual of each kind is divided by.
-
-    Attributes
-    ----------
-    torque, peak, residual : float
-        N·m.
-    catch_angle, travel : float
-        rad.
-    """
-
-    torque: float
-    peak: float
-    residual: float
-    catch_angle: float
-    travel: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Known:
-    """What the equations of a trial do not change.
-
-    Attributes
-    ----------
-    names : tuple of str
-        The shared parameters, in the order of the vector.
-    constants : ElbowParameters
-        ΔT_peak, ν_L and the reading of (5).
-    spreads : Spreads
-        What residuals are divided by.
-    on_line : bool
-        Whether the trial's catch lies on the line of (2).
-    horizon : Horizon or None
-        Behind which its catch ends, if it does not end before.
-    """
-
-    names: tuple[str, ...]
-    constants: ElbowParameters
-    spreads: Spreads
-    on_line: bool
-    horizon: Horizon | None = None
 
 
 class Equations:
@@ -203,7 +156,7 @@ class Equations:
             share = float(constant @ values) / size if size else 0.0
             made.append((values - share * constant) / self._known.spreads.torque)
         columns = dict(zip(columns, made[1:], strict=True))
-        rows = self._catch_rows(now, mine)
+        rows = catch_rows(self._known, (self._line, self._catch), now, mine)
         residuals = np.append(made[0], [left for left, _ in rows])
         jacobian = [
             self._column(name, columns, rows)
@@ -256,44 +209,6 @@ class Equations:
         past = self._tail - mine.get("travel", catch.travel)
         over = past > 0.0 if self._tail_over is None else self._tail_over
         return np.where(over, past, 0.0), over
-
-    def _catch_rows(
-        self, now: Mapping[str, float], mine: Mapping[str, float]
-    ) -> list[tuple[float, dict[str, float]]]:
-        # what the trial's own values scatter about: residual and its derivatives
-        spreads, rows = self._known.spreads, []
-        if self._line is not None and "catch_slope" in now:
-            slowest, size = (
-                self._known.constants.slowest_mean_speed,
-                spreads.catch_angle,
-            )
-            line, slope = now["catch_angle_constant"], now["catch_slope"]
-            left, by_line, by_slope = line_row(self._line, line, slope, slowest)
-            slopes = {"catch_angle_constant": by_line, "catch_slope": by_slope}
-            slopes = {name: value / size for name, value in slopes.items()}
-            rows.append((left / size, slopes))
-        catch = self._catch
-        if catch is None:
-            return rows
-        if "peak" in mine and "catch_torque_constant" in now:
-            size = spreads.peak
-            left = now["catch_torque_constant"] * catch.speed - mine["peak"]  # (3)
-            slopes = {"catch_torque_constant": catch.speed / size, "peak": -1.0 / size}
-            rows.append((left / size, slopes))
-        if "residual" in mine and "peak" in mine and "residual_ratio" in now:
-            size, ratio, peak = spreads.residual, now["residual_ratio"], mine["peak"]
-            slopes = {"residual_ratio": peak / size, "peak": ratio / size}
-            slopes["residual"] = -1.0 / size
-            rows.append(((ratio * peak - mine["residual"]) / size, slopes))  # (3)
-        if catch.end is not None and "catch_travel" in now:
-            size, travel = spreads.travel, mine.get("travel", catch.travel)
-            slopes = {"catch_travel": 1.0 / size, "travel": -1.0 / size}
-            rows.append(((now["catch_travel"] - travel) / size, slopes))  # (4)
-        horizon = self._known.horizon
-        if horizon is not None and "catch_travel" in now:
-            left, slope, _ = beyond(now["catch_travel"], horizon, spreads.travel)
-            rows.append((left, {"catch_travel": slope}))
-        return rows
 
     def rows(self, shared: Floats, own: Floats) -> Rows:
         """Linear rows that say of the parameters what the trial does.

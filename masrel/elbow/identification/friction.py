@@ -4,58 +4,27 @@ Source: Park, Kim and Damiano (2012), IEEE TNSRE 20(3), 361-370,
 https://doi.org/10.1109/TNSRE.2012.2195330, section III.B.2 and Fig. 8.
 """
 
-import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from masrel.elbow.identification.clusters import Rows, solve, without_own
-from masrel.elbow.identification.kinematics import filter_alike, window_length
 from masrel.elbow.identification.movement import Movement
 from masrel.elbow.identification.reading import read_movement
 from masrel.elbow.identification.results import FittedParameter, fitted
-from masrel.elbow.identification.samples import Samples, even_samples
+from masrel.elbow.identification.samples import even_samples
+from masrel.elbow.identification.strokes import Moved, Stroke, find_strokes
 from masrel.errors import RecordingError, RecordingWarning
 
-__all__ = ["FrictionFit", "Stroke", "fit_friction"]
+__all__ = ["FrictionFit", "fit_friction"]
 
 Floats = NDArray[np.float64]
 
 NAMES = ("inertia", "viscous", "coulomb")
-
-MOVING = math.radians(5.0)
-"""Slower, the direction of motion is not certain and the device may stick, rad/s."""
-
-WINDOW = 0.1
-"""Window of the filter of angle and torque, s."""
-
-SHORTEST = 0.1
-"""A stroke lasts at least this long, s."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Stroke:
-    """A movement in one direction, as the fit sees it.
-
-    Attributes
-    ----------
-    recording : str
-        Where it is from.
-    time, velocity, acceleration, torque, fitted : ndarray, shape (n_samples,)
-        s, rad/s, rad/s², N·m (smoothed by one filter), and the law, N·m.
-    """
-
-    recording: str
-    time: Floats = field(compare=False, repr=False)
-    velocity: Floats = field(compare=False, repr=False)
-    acceleration: Floats = field(compare=False, repr=False)
-    torque: Floats = field(compare=False, repr=False)
-    fitted: Floats = field(compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,28 +96,11 @@ def fit_friction(
         entry if isinstance(entry, Movement) else read_movement(Path(entry))
         for entry in recordings
     ]
-    parts = [
-        (movement.name, stroke)
-        for movement in movements
-        for stroke in _strokes(even_samples(movement))
-    ]
-    forward = sum(stroke[1].mean() > 0.0 for _, stroke in parts)
-    if min(forward, len(parts) - forward) < 2:
-        raise RecordingError(
-            "recordings: friction needs two strokes or more in each direction, got "
-            f"{forward} in extension and {len(parts) - forward} in flexion"
-        )
+    parts = _parts(movements)
     rows = _rows(parts)
     fit = solve(rows, n_own=len(movements))
     estimates = fitted(NAMES, fit, level)
-    for estimate in estimates:
-        if estimate.value < 0.0:
-            warnings.warn(
-                f"{estimate.name} is negative ({estimate.value:.4g}): is torque that "
-                "of the hand, counted as the angle is?",
-                RecordingWarning,
-                stacklevel=2,
-            )
+    _warn_of_negative(estimates)
     strokes = _fitted_strokes(parts, rows, fit.values)
     far = np.concatenate([stroke.torque - stroke.fitted for stroke in strokes])
     size = np.concatenate([stroke.torque for stroke in strokes])
@@ -164,34 +116,34 @@ def fit_friction(
     )
 
 
-_Part = tuple[Floats, Floats, Floats, Floats]  # time, velocity, acceleration, torque
+def _parts(movements: Sequence[Movement]) -> list[tuple[str, Moved]]:
+    # strokes with the name of their recording
+    parts = [
+        (movement.name, stroke)
+        for movement in movements
+        for stroke in find_strokes(even_samples(movement))
+    ]
+    forward = sum(stroke[1].mean() > 0.0 for _, stroke in parts)
+    if min(forward, len(parts) - forward) < 2:
+        raise RecordingError(
+            "recordings: friction needs two strokes or more in each direction, got "
+            f"{forward} in extension and {len(parts) - forward} in flexion"
+        )
+    return parts
 
 
-def _strokes(samples: Samples) -> list[_Part]:
-    margin = window_length(WINDOW, samples.period) // 2 + 1
-    _, velocity, acceleration, torque = filter_alike(
-        samples.angle, samples.torque, samples.period, WINDOW
-    )
-    time = samples.time[margin:-margin]
-    unusable = np.convolve(
-        samples.missing | samples.saturated, np.ones(2 * margin + 1), mode="valid"
-    )
-    # sgn of (7) is one number within the window of the filter, or it is not used
-    direction = np.where(np.abs(velocity) > MOVING, np.sign(velocity), 0.0)
-    direction[unusable > 0.5] = 0.0
-    edges = np.flatnonzero(np.diff(direction, prepend=0.0, append=0.0))
-    found = []
-    for start, stop in pairwise(edges):
-        inner = slice(start + margin, stop - margin)
-        long = (stop - start - 2 * margin) * samples.period >= SHORTEST
-        if direction[start] != 0.0 and long:
-            found.append(
-                (time[inner], velocity[inner], acceleration[inner], torque[inner])
+def _warn_of_negative(estimates: Sequence[FittedParameter]) -> None:
+    for estimate in estimates:
+        if estimate.value < 0.0:
+            warnings.warn(
+                f"{estimate.name} is negative ({estimate.value:.4g}): is torque that "
+                "of the hand, counted as the angle is?",
+                RecordingWarning,
+                stacklevel=3,
             )
-    return found
 
 
-def _rows(parts: Sequence[tuple[str, _Part]]) -> list[Rows]:
+def _rows(parts: Sequence[tuple[str, Moved]]) -> list[Rows]:
     # the constant of a recording is taken out of all its strokes together
     made: list[Rows] = []
     for name in dict.fromkeys(name for name, _ in parts):
@@ -215,7 +167,7 @@ def _rows(parts: Sequence[tuple[str, _Part]]) -> list[Rows]:
 
 
 def _fitted_strokes(
-    parts: Sequence[tuple[str, _Part]], rows: Sequence[Rows], values: Floats
+    parts: Sequence[tuple[str, Moved]], rows: Sequence[Rows], values: Floats
 ) -> tuple[Stroke, ...]:
     return tuple(
         Stroke(

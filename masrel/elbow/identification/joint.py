@@ -15,11 +15,12 @@ from masrel.elbow.identification.conclusions import (
     remarks,
     unfound,
 )
-from masrel.elbow.identification.equations import Spreads
 from masrel.elbow.identification.horizon import Horizon, horizon
 from masrel.elbow.identification.levels import CatchLevels, catch_levels
 from masrel.elbow.identification.movement import Movement
-from masrel.elbow.identification.results import QUANTITIES, ElbowFit, Step
+from masrel.elbow.identification.quantities import QUANTITIES
+from masrel.elbow.identification.results import ElbowFit, Step
+from masrel.elbow.identification.scatter import Spreads
 from masrel.elbow.identification.slow import SlowFit
 from masrel.elbow.identification.steps import (
     can_be_censored,

@@ -10,11 +10,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from masrel.elbow.identification.catch import Catch
-from masrel.elbow.identification.censored import CensoredTravels, fit_censored
+from masrel.elbow.identification.censored import fit_censored
 from masrel.elbow.identification.clusters import Rows, solve
 from masrel.elbow.identification.horizon import Horizon
 from masrel.elbow.identification.levels import CatchLevels
 from masrel.elbow.identification.results import FittedParameter, Step, fitted
+from masrel.elbow.identification.travels import CensoredTravels
 
 __all__ = [
     "can_be_censored",

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from masrel.elbow.identification.clusters import ClusteredFit, solve
-from masrel.elbow.identification.equations import Equations, Known, Spreads
+from masrel.elbow.identification.equations import Equations
 from masrel.elbow.identification.horizon import Horizon
+from masrel.elbow.identification.scatter import Known, Spreads
 from masrel.elbow.identification.trials import Trial
 from masrel.elbow.parameters import ElbowParameters
 

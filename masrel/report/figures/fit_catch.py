@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 from masrel.elbow.identification.catch import Catch
 from masrel.elbow.identification.law import PreCatchLaw
 from masrel.elbow.identification.levels import CatchLevels, catch_levels
-from masrel.elbow.identification.results import QUANTITIES, ElbowFit
+from masrel.elbow.identification.quantities import QUANTITIES
+from masrel.elbow.identification.results import ElbowFit
 from masrel.report.figures.style import (
     BLACK,
     BLUE,

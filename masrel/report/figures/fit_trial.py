@@ -1,10 +1,12 @@
 """Fast trials with their phases and the law, in the manner of Figs. 2 and 4."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from masrel.elbow.identification.catch import Catch
 from masrel.elbow.identification.results import ElbowFit
@@ -79,24 +81,8 @@ def _trial(column: list[Axes], fit: ElbowFit, place: int) -> None:
     top, middle, bottom = column
     time = np.concatenate([pre.time, after.time]) - trial.start
     measured = np.concatenate([pre.measured, after.measured])
-    law = fit.fitted_torque[place]
-    n = pre.time.size
-    for part in (slice(0, n), slice(n, None)):
-        top.plot(
-            time[part],
-            measured[part],
-            color=GREY,
-            linewidth=0.6,
-            label="measured" if part.start == 0 else None,
-        )
-        top.plot(
-            time[part],
-            law[part],
-            color=BLACK,
-            linewidth=1.3,
-            linestyle=(0, (5, 1.5)),
-            label="law, fitted" if part.start == 0 else None,
-        )
+    torques = np.stack([measured, fit.fitted_torque[place]])
+    _torque(top, np.split(time, [pre.time.size]), np.split(torques, [pre.time.size], 1))
     angle = np.concatenate([pre.angle, after.angle])
     speed = np.concatenate([pre.velocity, after.velocity])
     middle.plot(time, np.degrees(angle), color=BLACK, linewidth=1.0)
@@ -104,6 +90,30 @@ def _trial(column: list[Axes], fit: ElbowFit, place: int) -> None:
     for axes in column:
         _shade(axes, trial, catch, float(time[-1]))
     top.set_title(f"mean speed {number(math.degrees(catch.mean_speed), 0)} deg/s")
+
+
+def _torque(
+    axes: Axes,
+    times: Sequence[NDArray[np.float64]],
+    torques: Sequence[NDArray[np.float64]],
+) -> None:
+    # measured and fitted, before the catch and from it on: no line joins the two
+    for first, time, (measured, law) in zip((True, False), times, torques, strict=True):
+        axes.plot(
+            time,
+            measured,
+            color=GREY,
+            linewidth=0.6,
+            label="measured" if first else None,
+        )
+        axes.plot(
+            time,
+            law,
+            color=BLACK,
+            linewidth=1.3,
+            linestyle=(0, (5, 1.5)),
+            label="law, fitted" if first else None,
+        )
 
 
 def _shade(axes: Axes, trial: Trial, catch: Catch, last: float) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 from tqdm import tqdm
 
 from masrel.elbow import STANDARD_MODELS, fit, fit_friction
-from masrel.elbow.identification.results import QUANTITIES
+from masrel.elbow.identification.quantities import QUANTITIES
 from masrel.report.figures.fit_catch import draw_catches
 from masrel.report.figures.fit_friction import draw_friction
 from masrel.report.figures.fit_residuals import draw_residuals

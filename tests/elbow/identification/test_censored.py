@@ -10,13 +10,9 @@ from hypothesis import strategies as st
 from scipy import stats
 from scipy.special import stdtrit
 
-from masrel.elbow.identification.censored import (
-    CensoredTravels,
-    TravelFit,
-    beyond,
-    fit_censored,
-)
+from masrel.elbow.identification.censored import TravelFit, beyond, fit_censored
 from masrel.elbow.identification.horizon import Horizon
+from masrel.elbow.identification.travels import CensoredTravels
 
 SEEN = [0.81, 0.83, 0.86, 0.84, 0.88]
 LIMITS = [0.82, 0.85, 0.9, 0.87]

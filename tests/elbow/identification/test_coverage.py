@@ -10,7 +10,7 @@ import math
 import pytest
 
 from masrel.elbow import STANDARD_MODELS, fit
-from masrel.elbow.identification.results import QUANTITIES
+from masrel.elbow.identification.quantities import QUANTITIES
 from tests.elbow.identification.synthesis import Scatter, study
 
 HM3 = STANDARD_MODELS["HM3"]

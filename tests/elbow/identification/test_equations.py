@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from masrel.elbow.identification.censored import beyond
-from masrel.elbow.identification.equations import Equations, Known, Spreads
+from masrel.elbow.identification.equations import Equations
 from masrel.elbow.identification.horizon import Horizon
 from masrel.elbow.identification.law import PreCatchLaw
-from masrel.elbow.identification.results import QUANTITIES
+from masrel.elbow.identification.quantities import QUANTITIES
 from masrel.elbow.identification.samples import even_samples
+from masrel.elbow.identification.scatter import Known, Spreads
 from masrel.elbow.identification.stretches import find_stretches
 from masrel.elbow.identification.trials import Trial, fast_trial
 from masrel.elbow.parameters import STANDARD_MODELS, ElbowParameters

@@ -9,7 +9,7 @@ import pytest
 
 from masrel.elbow import STANDARD_MODELS, ElbowParameters, fit
 from masrel.elbow.identification import ElbowFit, Movement
-from masrel.elbow.identification.results import QUANTITIES
+from masrel.elbow.identification.quantities import QUANTITIES
 from masrel.errors import (
     ParameterError,
     RecordingError,
