@@ -25,6 +25,7 @@ from masrel.agreement.krippendorff import (
 )
 from masrel.agreement.light import light_kappa
 from masrel.agreement.long import code_long
+from masrel.agreement.margins import bhapkar, stuart_maxwell
 from masrel.agreement.percent import percent_agreement, percent_agreement_from_counts
 from masrel.agreement.pooled_pairs import pooled_kappa
 from masrel.agreement.registry import COEFFICIENTS, Coefficient, coefficient
@@ -32,13 +33,7 @@ from masrel.agreement.robinson import robinson_a
 from masrel.agreement.scott import scott_pi, scott_pi_from_table
 from masrel.agreement.significance import Significance, p_value
 from masrel.agreement.stratified import stratified_kappa
-from masrel.agreement.symmetry import (
-    bhapkar,
-    bowker,
-    contingency_table,
-    mcnemar,
-    stuart_maxwell,
-)
+from masrel.agreement.symmetry import bowker, contingency_table, mcnemar
 from masrel.agreement.weights import Weights, declared_weights
 
 __all__ = [

@@ -3,9 +3,10 @@
 import math
 from dataclasses import dataclass
 
+from masrel.agreement.undefined import undefined
 from masrel.estimates import Estimate
 
-__all__ = ["Significance", "p_value"]
+__all__ = ["Significance", "chi_squared", "p_value"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,3 +84,57 @@ def p_value(estimate: Estimate) -> float:
         return 1.0 if estimate.value == 0.0 else 0.0
     t = abs(estimate.value / estimate.standard_error)
     return min(1.0, 2.0 * float(stdtr(estimate.n_items - 1, -t)))
+
+
+def chi_squared(
+    name: str,
+    hypothesis: str,
+    above: float,
+    below: int,
+    df: int,
+    n_items: int,
+    without: str,
+) -> Significance:
+    """Refer a ratio to the chi-squared law.
+
+    Parameters
+    ----------
+    name, hypothesis : str
+        Name of the test, and what it asks.
+    above, below : float, int
+        The statistic as numerator and denominator.
+    df : int
+        Degrees of freedom.
+    n_items : int
+        Items it rests on.
+    without : str
+        Why the denominator can be 0, as a clause.
+
+    Returns
+    -------
+    Significance
+        Undefined where the denominator is 0.
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        If the denominator is 0.
+    """
+    from scipy.special import chdtrc
+
+    if below == 0:  # an empty sum is 0; of no degrees of freedom it says nothing
+        statistic, p = 0.0 if df == 0 else math.nan, math.nan
+        reason = undefined(name, f"0/0: {without}")
+    else:
+        statistic, reason = above / below, None
+        p = float(chdtrc(df, statistic))
+    return Significance(
+        name=name,
+        hypothesis=hypothesis,
+        statistic=statistic,
+        distribution="chi-squared",
+        df=(float(df),),
+        p_value=p,
+        n_items=n_items,
+        reason=reason,
+    )

@@ -12,7 +12,7 @@ from masrel.agreement import (
     COEFFICIENTS,
     arrays,
     count_ratings,
-    counting,
+    distinct,
     few_items,
     fleiss_kappa,
     gwet_ac,
@@ -62,7 +62,7 @@ def test_several_coefficients_of_counted_ratings_look_at_the_ratings_once(
     meter: Meter,
 ) -> None:
     meter.watch(arrays, "_codes")
-    meter.watch(counting, "_keys")
+    meter.watch(distinct, "_keys")
     counted = count_ratings(RATINGS)
     once = meter.calls.copy()
     assert once["_codes"] == 1
