@@ -445,12 +445,12 @@ def _injected(
 
 
 def small_study(
-    folder: pathlib.Path, speed_deg_s: float
+    folder: pathlib.Path, speed_deg_s: float, *, device: str = ""
 ) -> tuple[StudyPaths, Protocol]:
     """A study of one model and one rater, with its schedule drawn."""
     study = StudyPaths(folder)
     study.root.mkdir(exist_ok=True)
-    text = PROTOCOL.format(speed=speed_deg_s)
+    text = PROTOCOL.format(speed=speed_deg_s) + device
     study.protocol.write_text(text, encoding="utf-8")
     protocol = read_protocol(study.protocol)
     write_schedules(protocol, study)

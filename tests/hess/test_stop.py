@@ -2,12 +2,15 @@
 
 import os
 import pty
+import select
 import signal
+import subprocess
 import sys
 import termios
 import threading
 import time
 from math import radians
+from pathlib import Path
 
 import pytest
 
@@ -23,7 +26,9 @@ from masrel.hess import (
     run_presentation,
 )
 from masrel.hess.stop import stop_on_key, stop_on_signals
+from masrel.run import read_log
 
+from .injected import small_study
 from .rig import END, START
 
 
@@ -120,6 +125,44 @@ def test_any_key_of_a_terminal_presses_it(terminal) -> None:
             time.sleep(0.005)
     assert stop.reason == "key"
     assert termios.tcgetattr(keys) == settings
+
+
+def test_a_key_stops_the_presentation_of_a_session(tmp_path: Path) -> None:
+    # As a person has it: a terminal, the real clock, and a device that is at work
+    patient = "[device]\nmissed_ticks_limit = 10000\nwatchdog_ms = 100\n"
+    study, _ = small_study(tmp_path / "study", 60.0, device=patient)
+    keyboard, screen = pty.openpty()
+    command = (sys.executable, "-m", "masrel", "run", str(study.root), "--rater", "R1")
+    session = subprocess.Popen(
+        (*command, "--session", "test", "--clock", "real", "--quiet"),
+        stdin=screen,
+        stdout=screen,
+        stderr=subprocess.DEVNULL,
+    )
+    os.close(screen)
+
+    def read_until(words: bytes) -> None:
+        shown = b""
+        while words not in shown:
+            ready, _, _ = select.select([keyboard], [], [], 30.0)
+            assert ready, shown
+            shown += os.read(keyboard, 4096)
+
+    with session:
+        read_until(b"Enter to begin")
+        os.write(keyboard, b"\n")
+        until = time.monotonic() + 30.0
+        while not list(study.sessions.rglob("*.partial")):
+            assert time.monotonic() < until
+            time.sleep(0.002)
+        os.write(keyboard, b"x")
+        read_until(b"Present it again?")
+        os.write(keyboard, b"no\n")
+        assert session.wait(30.0) == 1
+    os.close(keyboard)
+    log = read_log(study.log_file("R1", "test"))
+    assert [event.kind for event in log][:3] == ["session", "presented", "fault"]
+    assert log[2].fields["words"] == "emergency stop: key"
 
 
 def test_without_a_key_the_terminal_is_as_it_was(terminal) -> None:
