@@ -175,6 +175,18 @@ class _Sums(NamedTuple):
         below = sum(map(mul, totals, products))
         return cls(n_items, sum(totals), pairs, above, products, below)
 
+    def agreements(self, denominator: int) -> tuple[float, float]:
+        """Return 1 - D_o and 1 - D_e, v_kl being over a denominator."""
+        n, over = self.n_ratings, self.pairs * denominator
+        over_e = n * (n - 1) * denominator
+        return (n * over - self.above) / (n * over), (over_e - self.below) / over_e
+
+    @property
+    def alpha(self) -> float:
+        """1 - D_o / D_e, in one division."""
+        d_e = self.below * self.pairs
+        return (d_e - (self.n_ratings - 1) * self.above) / d_e
+
 
 def _estimate(counted: CountedRatings, v: Weights, population: int | None) -> Estimate:
     table = counted.items
@@ -191,13 +203,9 @@ def _estimate(counted: CountedRatings, v: Weights, population: int | None) -> Es
     value = observed = chance = math.nan
     error: float | Callable[[], float] = math.nan
     if found is not None and v.reason is None:
-        n, over = found.n_ratings, found.pairs * v.denominator
-        observed = (n * over - found.above) / (n * over)
-        over_e = n * (n - 1) * v.denominator
-        chance = (over_e - found.below) / over_e
+        observed, chance = found.agreements(v.denominator)
         if reason is None:
-            d_e = found.below * found.pairs
-            value = (d_e - (n - 1) * found.above) / d_e
+            value = found.alpha
             error = partial(_error, table, v, found, population)
     return Estimate(
         coefficient="krippendorff_alpha",

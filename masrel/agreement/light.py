@@ -99,15 +99,26 @@ def light_kappa(
         for pair in pairs
     ]
     reason = _reason(pairs, sums, v)
-    value = observed = chance = math.nan
     error: float | Callable[[], float] = math.nan
+    if reason is None:
+        error = partial(_error, coded, v, pairs, sums, population)
+    return _estimate(coded, v, sums, reason, error)
+
+
+def _estimate(
+    coded: CodedRatings,
+    v: Weights,
+    sums: list[PairSums],
+    reason: str | None,
+    error: float | Callable[[], float],
+) -> Estimate:
+    value = observed = chance = math.nan
     if v.reason is None and all(s.n for s in sums):
         w = v.denominator
         observed = _mean([1 - Fraction(s.above, s.n * w) for s in sums])
         chance = _mean([1 - Fraction(s.below, s.n * s.n * w) for s in sums])
     if reason is None:
         value = _mean([1 - Fraction(s.n * s.above, s.below) for s in sums])
-        error = partial(_error, coded, v, pairs, sums, population)
     return Estimate(
         coefficient="light_kappa",
         weights=v.name,

@@ -176,13 +176,11 @@ def pooled_estimate(
         reason = undefined(coefficient.title, weights.reason)
     else:
         chance = coefficient.expected(tally.shares, weights)
-        d_o, over_o = observed.numerator, observed.denominator
-        d_e, over_e = chance.numerator, chance.denominator
-        p_o, p_e = (over_o - d_o) / over_o, (over_e - d_e) / over_e
-        if d_e == 0:
+        p_o, p_e = _agreements(observed, chance)
+        if chance.numerator == 0:
             reason = undefined(coefficient.title, NO_CHANCE)
         else:
-            value = (d_e * over_o - d_o * over_e) / (d_e * over_o)
+            value = _value(observed, chance)
             scene = _Scene(coefficient, items, weights, tally, observed, chance)
             error = partial(_error, scene, options)
     return Estimate(
@@ -197,6 +195,20 @@ def pooled_estimate(
         n_categories=items.n_categories,
         reason=reason,
     )
+
+
+def _agreements(observed: Observed, chance: Expected) -> tuple[float, float]:
+    # 1 - D_o and 1 - D_e
+    d_o, over_o = observed.numerator, observed.denominator
+    d_e, over_e = chance.numerator, chance.denominator
+    return (over_o - d_o) / over_o, (over_e - d_e) / over_e
+
+
+def _value(observed: Observed, chance: Expected) -> float:
+    # 1 - D_o / D_e, in one division
+    apart = observed.numerator * chance.denominator
+    by_chance = chance.numerator * observed.denominator
+    return (by_chance - apart) / by_chance
 
 
 class _Scene(NamedTuple):

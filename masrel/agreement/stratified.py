@@ -81,22 +81,12 @@ def stratified_kappa(
     """
     coded = code_strata(pairs, categories)
     v = declared_weights(weights, coded.categories, declared=coded.declared)
-    strata = [
-        found
-        for codes in strata_of(coded)
-        if (found := PairSums.of(pair_table(codes, coded.n_categories), v)).n
-    ]
+    strata = _strata(coded, v)
     apart = sum([Fraction(s.above, s.n * v.denominator) for s in strata], Fraction(0))
     by_chance = sum(
         [Fraction(s.below, s.n * s.n * v.denominator) for s in strata], Fraction(0)
     )
-    reason = None
-    if not strata:
-        reason = undefined("stratified kappa", NO_PAIR)
-    elif v.reason is not None:
-        reason = undefined("stratified kappa", v.reason)
-    elif by_chance == 0:
-        reason = undefined("stratified kappa", NO_CHANCE)
+    reason = _reason(strata, by_chance, v)
     value = observed = chance = math.nan
     error: float | Callable[[], float] = math.nan
     if strata and v.reason is None:
@@ -117,6 +107,22 @@ def stratified_kappa(
         n_categories=coded.n_categories,
         reason=reason,
     )
+
+
+def _strata(coded: CodedRatings, v: Weights) -> list[PairSums]:
+    # of each rater with a pair
+    tables = (pair_table(codes, coded.n_categories) for codes in strata_of(coded))
+    return [found for table in tables if (found := PairSums.of(table, v)).n]
+
+
+def _reason(strata: list[PairSums], by_chance: Fraction, v: Weights) -> str | None:
+    if not strata:
+        return undefined("stratified kappa", NO_PAIR)
+    if v.reason is not None:
+        return undefined("stratified kappa", v.reason)
+    if by_chance == 0:
+        return undefined("stratified kappa", NO_CHANCE)
+    return None
 
 
 def _error(
