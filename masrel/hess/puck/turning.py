@@ -115,7 +115,7 @@ class _Turning:
         self._estimate = VelocityEstimate()
         self._guard = Guard(LIMITS, _PERIOD_NS * 1e-9)
         self._start_ns = self._due_ns = self._sent_ns = clock.now_ns()
-        self.angle = 0.0
+        self.angle = math.nan  # until it has been read
         self._velocity = 0.0
         self._n_missed = 0  # readings in a row
 
@@ -124,7 +124,8 @@ class _Turning:
         return self.angle < 0.5 * (_LOWEST + _HIGHEST)
 
     def check_direction(self) -> None:
-        self._tick(0.0)
+        while math.isnan(self.angle):
+            self._tick(0.0)
         start, begun_ns = self.angle, self._clock.now_ns()
         if not _LOWEST - _MARGIN <= start <= _HIGHEST + _MARGIN:
             raise DeviceError(

@@ -57,6 +57,21 @@ def test_an_arm_near_its_end_is_not_turned() -> None:
         steady_runs(device, clock)
 
 
+def test_a_first_reading_that_is_lost_is_waited_for() -> None:
+    class Losing(SimulatedDevice):
+        n_lost = 0
+
+        def _read(self):
+            if self.n_lost < 2:
+                self.n_lost += 1
+                raise DeviceTimeoutError("no answer")
+            return super()._read()
+
+    clock = SimulatedClock()
+    with Losing(clock=clock, hand=loose(60.0)) as device:
+        assert len(steady_runs(device, clock, speeds=(radians(80.0),))) == 2
+
+
 class Reversed(SimulatedDevice):
     """Its motor turns the other way."""
 
