@@ -2,9 +2,9 @@
 
 from masrel.errors import BusError
 from masrel.hess.puck.bus import BUS_OFF, BUS_RESTARTED, Frame
-from masrel.hess.puck.frames import decode_reply
 from masrel.hess.puck.identifiers import POSITION_GROUP, PROPERTY_GROUP, from_puck
 from masrel.hess.puck.positions import Position, decode_position
+from masrel.hess.puck.replies import decode_reply
 
 __all__ = ["Arrivals", "accepted_identifiers"]
 

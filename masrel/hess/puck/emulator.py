@@ -15,10 +15,10 @@ from masrel.hess.puck.due import DueActs
 from masrel.hess.puck.emulated_settings import EmulatedSettings
 from masrel.hess.puck.emulator_options import EmulatorOptions
 from masrel.hess.puck.faults import ActiveFaults
-from masrel.hess.puck.frames import decode_request
 from masrel.hess.puck.identifiers import HOST, TORQUE_GROUP, split_identifier
 from masrel.hess.puck.motor import EmulatedMotor
 from masrel.hess.puck.registers import Registers
+from masrel.hess.puck.requests import decode_request
 from masrel.hess.puck.torques import decode_torques
 from masrel.hess.puck.transmission import Transmission
 from masrel.hess.puck.voice import EmulatedVoice

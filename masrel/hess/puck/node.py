@@ -6,10 +6,10 @@ from masrel.errors import BusError, DeviceTimeoutError
 from masrel.hess.clock import Clock
 from masrel.hess.puck.arrivals import Arrivals
 from masrel.hess.puck.bus import Frame, Link
-from masrel.hess.puck.frames import encode_get, encode_set
 from masrel.hess.puck.identifiers import to_puck
 from masrel.hess.puck.positions import Position
 from masrel.hess.puck.properties import ID, ROLE, SERIAL_NUMBER, STATUS, VERSION
+from masrel.hess.puck.requests import encode_get, encode_set
 
 __all__ = ["PuckNode"]
 

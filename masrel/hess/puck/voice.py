@@ -4,7 +4,6 @@ from masrel.hess.puck.bus import Frame, Link
 from masrel.hess.puck.due import DueActs
 from masrel.hess.puck.emulator_options import EmulatorOptions
 from masrel.hess.puck.faults import ActiveFaults
-from masrel.hess.puck.frames import encode_reply
 from masrel.hess.puck.identifiers import (
     POSITION_GROUP,
     PROPERTY_GROUP,
@@ -15,6 +14,7 @@ from masrel.hess.puck.identifiers import (
 from masrel.hess.puck.motor import EmulatedMotor
 from masrel.hess.puck.positions import encode_position
 from masrel.hess.puck.registers import Registers
+from masrel.hess.puck.replies import encode_reply
 
 __all__ = ["EmulatedVoice"]
 

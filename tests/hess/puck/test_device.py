@@ -27,10 +27,10 @@ from masrel.hess.puck.device import PuckDevice
 from masrel.hess.puck.emulated import EmulatedPuckDevice, UnwiredPuckDevice
 from masrel.hess.puck.emulator_options import EmulatorOptions
 from masrel.hess.puck.faults import FaultKind
-from masrel.hess.puck.frames import decode_request, encode_set
 from masrel.hess.puck.options import PuckOptions
 from masrel.hess.puck.positions import decode_position, encode_position
 from masrel.hess.puck.properties import property_table
+from masrel.hess.puck.requests import decode_request, encode_set
 from masrel.hess.puck.transmission import Transmission
 from masrel.hess.setup import DeviceSetup
 from tests.hess.puck.rig import (

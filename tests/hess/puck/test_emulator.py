@@ -8,8 +8,8 @@ from masrel.errors import BusError, DeviceTimeoutError, FrameError, ParameterErr
 from masrel.hess.puck.bus import Frame
 from masrel.hess.puck.emulator_options import EmulatorOptions
 from masrel.hess.puck.faults import InjectedFault
-from masrel.hess.puck.frames import encode_get
 from masrel.hess.puck.identifiers import to_group, to_puck
+from masrel.hess.puck.requests import encode_get
 from masrel.hess.puck.torques import encode_torques
 from tests.hess.puck.rig import Bench, bench, fault, loose
 

@@ -5,16 +5,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from masrel.errors import FrameError
-from masrel.hess.puck.frames import (
-    PropertyValue,
-    Request,
-    decode_reply,
-    decode_request,
-    encode_get,
-    encode_reply,
-    encode_set,
-)
 from masrel.hess.puck.positions import decode_position
+from masrel.hess.puck.replies import PropertyValue, decode_reply, encode_reply
+from masrel.hess.puck.requests import Request, decode_request, encode_get, encode_set
 from masrel.hess.puck.torques import decode_torques
 
 int32 = st.integers(-(2**31), 2**31 - 1)

@@ -16,7 +16,7 @@ def run(code: str) -> subprocess.CompletedProcess[str]:
     "code",
     [
         "import masrel.hess.puck",
-        "import masrel.hess.puck.frames, masrel.hess.puck.positions",
+        "import masrel.hess.puck.requests, masrel.hess.puck.replies",
         "from masrel.hess.puck import PuckOptions; PuckOptions()",
         "from masrel.cli import cli\ntry: cli(['device', '-h'])\nexcept SystemExit: 0",
     ],
