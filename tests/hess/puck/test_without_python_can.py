@@ -17,6 +17,7 @@ def run(code: str) -> subprocess.CompletedProcess[str]:
     [
         "import masrel.hess.puck",
         "import masrel.hess.puck.requests, masrel.hess.puck.replies",
+        "import masrel.hess.puck.positions, masrel.hess.puck.torques",
         "from masrel.hess.puck import PuckOptions; PuckOptions()",
         "from masrel.cli import cli\ntry: cli(['device', '-h'])\nexcept SystemExit: 0",
     ],
