@@ -62,6 +62,15 @@ def _plan_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
             yield f'{where}.{error} (id "{line.id}")'
 
 
+def _device_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
+    from masrel.run.settings import check_backend  # loads numpy
+
+    try:
+        check_backend(protocol.device)
+    except ParameterError as error:
+        yield f"{study.protocol}: {error}"
+
+
 def _ratings_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
     files = [f for f in (study.ratings_file, study.published_file) if f.is_file()]
     if not files:
@@ -77,6 +86,7 @@ def _ratings_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
 
 _CHECKERS: tuple[Callable[[Protocol, StudyPaths], Iterable[str]], ...] = (
     _plan_problems,
+    _device_problems,
     schedule_problems,
     _ratings_problems,
 )

@@ -9,11 +9,10 @@ from collections.abc import Callable
 from datetime import datetime
 
 from masrel.errors import ParameterError, ScheduleError
-from masrel.hess import device_names
 from masrel.protocol import Protocol, StudyPaths
 from masrel.run.grades import GradeSource
 from masrel.run.log import SessionLog, utc_now
-from masrel.run.settings import has_simulated_hand
+from masrel.run.settings import check_backend, has_simulated_hand
 from masrel.run.walk import CLOCKS, ClockName, SessionSummary, Walk
 from masrel.schedule import Presentation, check_schedule, read_schedule
 
@@ -99,11 +98,7 @@ def _check_device(clock: str, protocol: Protocol) -> None:
     if clock not in CLOCKS:
         raise ParameterError(f"clock: needed one of {', '.join(CLOCKS)}, got {clock!r}")
     device = protocol.device
-    names = [name for name in device_names() if name != "replay"]  # that has no hand
-    if device.backend not in names:
-        raise ParameterError(
-            f"device.backend: needed one of {', '.join(names)}, got {device.backend!r}"
-        )
+    check_backend(device)
     if clock == "simulated" and not has_simulated_hand(device):
         raise ParameterError(
             f"clock: needed the real one for device {device.backend!r}, got 'simulated'"

@@ -5,7 +5,14 @@ import math
 from typing import TYPE_CHECKING
 
 from masrel.errors import ParameterError
-from masrel.hess import BackendOptions, Controller, DeviceLimits, Friction, Hand
+from masrel.hess import (
+    BackendOptions,
+    Controller,
+    DeviceLimits,
+    Friction,
+    Hand,
+    device_names,
+)
 from masrel.protocol import DeviceSettings, Protocol, elbow_parameters
 
 if TYPE_CHECKING:
@@ -13,11 +20,36 @@ if TYPE_CHECKING:
 
 __all__ = [
     "backend_options",
+    "check_backend",
     "device_limits",
     "has_simulated_hand",
     "model_controller",
     "moves_hardware",
 ]
+
+
+def check_backend(settings: DeviceSettings) -> None:
+    """Do nothing if a session can be run on the device of a protocol.
+
+    Parameters
+    ----------
+    settings : DeviceSettings
+        The table ``[device]``.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such device, nobody can move it, or an option of it is
+        outside its range.
+    """
+    names = [name for name in device_names() if name != "replay"]  # that has no hand
+    if settings.backend not in names:
+        raise ParameterError(
+            f"device.backend: needed one of {', '.join(names)}, "
+            f"got {settings.backend!r}"
+        )
+    device_limits(settings)
+    backend_options(settings)
 
 
 def device_limits(settings: DeviceSettings) -> DeviceLimits:

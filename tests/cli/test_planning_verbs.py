@@ -39,6 +39,15 @@ def test_a_new_study_is_checked_drawn_and_checked_again(study: Path) -> None:
     assert "2 of 2 schedules drawn" in out
 
 
+def test_a_device_that_there_is_not_is_a_problem(study: Path) -> None:
+    protocol = study / "protocol.toml"
+    text = protocol.read_text(encoding="utf-8")
+    other = text.replace('backend = "simulated"', 'backend = "nonesuch"')
+    protocol.write_text(other, encoding="utf-8")
+    _, err = masrel("check", study, code=2)
+    assert "protocol.toml: device.backend: needed one of puck, simulated, got" in err
+
+
 def test_the_published_study_is_a_template(tmp_path: Path) -> None:
     masrel("init", tmp_path / "new", "--study", "hess2012")
     out, _ = masrel("check", tmp_path / "new")
