@@ -83,7 +83,7 @@ def write_figure(
 
 
 def _line(row: Row, several: bool, target: Target) -> "ForestRow":
-    from masrel.report.estimate_rows import as_words, has_zero
+    from masrel.report.estimate_words import as_words, has_zero
     from masrel.report.figures import ForestRow
 
     estimate = row.estimate

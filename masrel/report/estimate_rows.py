@@ -1,32 +1,27 @@
-"""Estimates as the rows of tables and figures: their names, texts and remarks."""
+"""Estimates as the rows of tables and figures, with texts and remarks."""
 
-import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from masrel.agreement import COEFFICIENTS
 from masrel.analysis import PlannedEstimate
 from masrel.estimates import Estimate, Interval
+from masrel.report.estimate_words import (
+    TARGETS,
+    as_words,
+    coefficient_name,
+    has_zero,
+    interval_name,
+)
 from masrel.report.meaning import aside, meaning
-from masrel.report.tables import UNDEFINED, counted, interval_words, number, percent
+from masrel.report.tables import counted
 
 __all__ = [
-    "TARGETS",
     "EstimateRow",
-    "as_words",
     "coefficient_name",
     "estimate_rows",
-    "has_zero",
     "interval_name",
     "meanings",
 ]
-
-TARGETS = {
-    "raters": "other raters",
-    "items": "other models",
-    "both": "other raters and models",
-}
-"""Target of an interval to what it speaks of."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,89 +103,6 @@ class EstimateRow:
         return tuple(dict.fromkeys(text for text in said if text))
 
 
-def has_zero(coefficient: str | None) -> bool:
-    """Return whether 0 is what chance gives of a coefficient.
-
-    Parameters
-    ----------
-    coefficient : str or None
-        Its name in an estimate; of none there is no zero.
-
-    Returns
-    -------
-    bool
-        Not of a share, nor of a measure of order; of an ICC and a κ.
-    """
-    if coefficient is None:
-        return False
-    entry = COEFFICIENTS.get(coefficient)  # the forms of ICC have entries of their own
-    return entry is None or entry.chance_corrected
-
-
-def as_words(estimate: Estimate) -> str:
-    """Return a value with its interval, as shown.
-
-    Parameters
-    ----------
-    estimate : Estimate
-        The estimate.
-
-    Returns
-    -------
-    str
-        Such as ``"0.626 [0.320, 0.933]"``, or that it is undefined.
-    """
-    if not math.isfinite(estimate.value):
-        return UNDEFINED
-    value, interval = number(estimate.value, 3), estimate.interval
-    if interval is None:
-        return value
-    return f"{value} {interval_words(interval.low, interval.high)}"
-
-
-def coefficient_name(coefficient: str, weights: str = "identity") -> str:
-    """Return a coefficient's name for a reader.
-
-    Parameters
-    ----------
-    coefficient : str
-        Its name in code.
-    weights : str, optional
-        Name of its weights.
-
-    Returns
-    -------
-    str
-        Its name in print.
-
-    Examples
-    --------
-    >>> coefficient_name("fleiss_kappa", "quadratic")
-    "Fleiss' κ, quadratic weights"
-    """
-    title = COEFFICIENTS[coefficient].title
-    if weights != "identity":
-        title = f"{title}, {weights} weights"
-    # A share as all others are: 1 is all, not 100.
-    return f"{title} (0–1)" if coefficient == "percent_agreement" else title
-
-
-def interval_name(interval: Interval) -> str:
-    """Return level, kind and method of an interval.
-
-    Parameters
-    ----------
-    interval : Interval
-        The interval.
-
-    Returns
-    -------
-    str
-        Such as ``"95 % confidence, rater jackknife, t(7)"``.
-    """
-    return f"{percent(interval.level)} % {interval.kind}, {interval.method}"
-
-
 def estimate_rows(planned: Sequence[PlannedEstimate]) -> tuple[EstimateRow, ...]:
     """Lay out planned estimates, each followed by those of its raters.
 
@@ -204,37 +116,31 @@ def estimate_rows(planned: Sequence[PlannedEstimate]) -> tuple[EstimateRow, ...]
     tuple of EstimateRow
         The rows. A line with estimates per rater only has no row of its own.
     """
-    rows = []
-    for entry in planned:
-        sessions = " and ".join(entry.line.sessions)
-        if entry.estimate is not None or not entry.by_rater:
-            rows.append(
-                EstimateRow(
-                    name=entry.line.id,
-                    coefficient=coefficient_name(
-                        entry.line.coefficient, entry.line.weights
-                    ),
-                    models=entry.line.models,
-                    sessions=sessions,
-                    estimate=entry.estimate,
-                    reason=entry.reason,
-                )
-            )
-        rows.extend(
-            EstimateRow(
-                name=f"{entry.line.id}: {own.rater}",
-                coefficient=coefficient_name(
-                    own.estimate.coefficient, entry.line.weights
-                ),
-                models=entry.line.models,
-                sessions=sessions,
-                estimate=own.estimate,
-                reason=None,
-                is_own=True,
-            )
-            for own in entry.by_rater
+    return tuple(row for entry in planned for row in _rows(entry))
+
+
+def _rows(entry: PlannedEstimate) -> Iterator[EstimateRow]:
+    line = entry.line
+    sessions = " and ".join(line.sessions)
+    if entry.estimate is not None or not entry.by_rater:
+        yield EstimateRow(
+            name=line.id,
+            coefficient=coefficient_name(line.coefficient, line.weights),
+            models=line.models,
+            sessions=sessions,
+            estimate=entry.estimate,
+            reason=entry.reason,
         )
-    return tuple(rows)
+    for own in entry.by_rater:
+        yield EstimateRow(
+            name=f"{line.id}: {own.rater}",
+            coefficient=coefficient_name(own.estimate.coefficient, line.weights),
+            models=line.models,
+            sessions=sessions,
+            estimate=own.estimate,
+            reason=None,
+            is_own=True,
+        )
 
 
 def meanings(rows: Sequence[EstimateRow]) -> tuple[str, ...]:

@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 
 from masrel.estimates import Interval
-from masrel.report.estimate_rows import TARGETS, EstimateRow, interval_name
+from masrel.report.estimate_rows import EstimateRow
+from masrel.report.estimate_words import TARGETS, interval_name
 from masrel.report.tables import (
     ABSENT,
     LANDIS_KOCH,

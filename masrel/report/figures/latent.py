@@ -109,14 +109,9 @@ def _figure(scale: LatentScale) -> Figure:
     panels = figure.subplots(3, 1, sharex=True, height_ratios=sizes)
     left, right = _reach(scale)
     panels[0].set_xlim(left, right)
-    for axes, rows, colour, title in zip(
-        panels,
-        (scale.items, scale.thresholds, scale.raters),
-        (ORANGE, GREY, BLUE),
-        ("severity", "thresholds", "bias of raters"),
-        strict=True,
-    ):
-        _panel(axes, rows, colour, title)
+    _panel(panels[0], scale.items, ORANGE, "severity")
+    _panel(panels[1], scale.thresholds, GREY, "thresholds")
+    _panel(panels[2], scale.raters, BLUE, "bias of raters")
     for axes in panels[:2]:
         for threshold in scale.thresholds:
             axes.axvline(threshold.value, **_THRESHOLD, zorder=0.5)
