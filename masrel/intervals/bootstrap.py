@@ -13,19 +13,15 @@ from masrel.agreement.coding import Label
 from masrel.agreement.weights import WeightName
 from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target
-from masrel.intervals.case import Case, open_case
+from masrel.intervals.case import open_case
 from masrel.intervals.resampling.draws import Effort, draw_resamples
 from masrel.intervals.resampling.endpoints import Ends, Kind, Rule
 from masrel.intervals.resampling.exact import enumerate_resamples
-from masrel.intervals.resampling.pool import Pool, cluster_pool, item_pool, rater_pool
+from masrel.intervals.resampling.ground import pool_of, rule_of
+from masrel.intervals.resampling.pool import Pool
 from masrel.intervals.resampling.resamples import Resamples
 from masrel.intervals.resampling.samplers import sampler_of
-from masrel.intervals.resampling.slopes import (
-    acceleration,
-    standard_errors,
-    studentized,
-)
-from masrel.intervals.samples import warn_small
+from masrel.intervals.resampling.slopes import studentized
 from masrel.intervals.seeds import check_rng, recorded_generator
 from masrel.intervals.statistic import Statistic
 
@@ -167,8 +163,8 @@ def bootstrap(
         weights=weights,
         level=level,
     )
-    pool, notes, what = _pool(case, clusters)
-    rule = _rule(case, pool, kind)
+    pool, notes, what = pool_of(case, clusters)
+    rule = rule_of(case, pool, kind)
     method = f"{kind} bootstrap{what}"
     reason = _no_ground(rule)
     if reason is not None:
@@ -232,39 +228,6 @@ def _resamples(
             return every, None
     generator, seed = recorded_generator(rng)
     return draw_resamples(sampler_of(pool, statistic), rule, effort, generator), seed
-
-
-def _pool(
-    case: Case, clusters: Sequence[object] | NDArray[Any] | None
-) -> tuple[Pool, tuple[str, ...], str]:
-    # what is resampled, what to say of it, and its name where it is not the unit
-    if case.target == "both":
-        raise ParameterError(
-            'target: the bootstrap resamples "items" or "raters"; for both use the '
-            "jackknife"
-        )
-    if case.target == "raters":
-        if clusters is not None:
-            raise ParameterError('clusters: are of items, and need target="items"')
-        pool = rater_pool(case)
-        return pool, warn_small(pool.n, 5, "raters"), ""
-    if clusters is None:
-        pool = item_pool(case)
-        return pool, warn_small(pool.n, 16, "items"), ""
-    pool = cluster_pool(case, clusters)
-    return pool, warn_small(pool.n, 16, "clusters"), f" of {pool.n} clusters"
-
-
-def _rule(case: Case, pool: Pool, kind: Kind) -> Rule:
-    rule = Rule(kind=kind, level=case.level, value=case.value)
-    if math.isnan(case.value):
-        return rule
-    if kind == "bca":
-        return dataclasses.replace(rule, skew=acceleration(pool))
-    if kind == "studentized":
-        (error,) = standard_errors(pool, pool.times[None].astype(np.float64))
-        return dataclasses.replace(rule, error=float(error))
-    return rule
 
 
 def _no_ground(rule: Rule) -> str | None:

@@ -1,0 +1,94 @@
+"""What a bootstrap draws, and the rule by which its ends come from it."""
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from masrel.errors import ParameterError
+from masrel.intervals.case import Case
+from masrel.intervals.resampling.endpoints import Kind, Rule
+from masrel.intervals.resampling.pool import Pool, cluster_pool, item_pool, rater_pool
+from masrel.intervals.resampling.slopes import acceleration, standard_errors
+from masrel.intervals.samples import warn_small
+
+__all__ = ["pool_of", "rule_of"]
+
+
+def pool_of(
+    case: Case, clusters: Sequence[object] | NDArray[Any] | None
+) -> tuple[Pool, tuple[str, ...], str]:
+    """Find out what is resampled.
+
+    Parameters
+    ----------
+    case : Case
+        The question.
+    clusters : sequence or None
+        Label of the cluster each item belongs to.
+
+    Returns
+    -------
+    Pool
+        The units that are drawn.
+    tuple of str
+        What to say of them.
+    str
+        Their name where it is not that of the target; empty elsewhere.
+
+    Raises
+    ------
+    ParameterError
+        If these units cannot be resampled.
+
+    Warns
+    -----
+    SmallSampleWarning
+        Below 16 items or clusters, or 5 raters.
+    """
+    if case.target == "both":
+        raise ParameterError(
+            'target: the bootstrap resamples "items" or "raters"; for both use the '
+            "jackknife"
+        )
+    if case.target == "raters":
+        if clusters is not None:
+            raise ParameterError('clusters: are of items, and need target="items"')
+        pool = rater_pool(case)
+        return pool, warn_small(pool.n, 5, "raters"), ""
+    if clusters is None:
+        pool = item_pool(case)
+        return pool, warn_small(pool.n, 16, "items"), ""
+    pool = cluster_pool(case, clusters)
+    return pool, warn_small(pool.n, 16, "clusters"), f" of {pool.n} clusters"
+
+
+def rule_of(case: Case, pool: Pool, kind: Kind) -> Rule:
+    """Prepare how ends come from resamples.
+
+    Parameters
+    ----------
+    case : Case
+        The question.
+    pool : Pool
+        What is resampled.
+    kind : {"percentile", "basic", "bca", "studentized"}
+        The kind of ends.
+
+    Returns
+    -------
+    Rule
+        With the skew of BCa, or the error of the estimate to studentize by.
+    """
+    rule = Rule(kind=kind, level=case.level, value=case.value)
+    if math.isnan(case.value):
+        return rule
+    if kind == "bca":
+        return dataclasses.replace(rule, skew=acceleration(pool))
+    if kind == "studentized":
+        (error,) = standard_errors(pool, pool.times[None].astype(np.float64))
+        return dataclasses.replace(rule, error=float(error))
+    return rule
