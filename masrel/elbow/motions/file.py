@@ -2,6 +2,7 @@
 
 import csv
 import math
+from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
@@ -21,8 +22,9 @@ def read_motion(path: Path, *, interpolation: Interpolation = "pchip") -> Record
     Parameters
     ----------
     path : Path
-        CSV with a row of names, of which ``time_s`` and ``angle_deg`` are read; or one
-        of the two files of a `masrel.recording.Recording`.
+        CSV with a row of names, of which ``time_s`` and ``angle_deg`` are read; lines
+        before it that begin with # are passed over. Or one of the two files of a
+        `masrel.recording.Recording`.
     interpolation : {"pchip", "linear"}, optional
         What happens between samples.
 
@@ -80,18 +82,21 @@ def _read_table(path: Path) -> list[list[float]]:
             rows = list(csv.reader(file))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise RecordingError(f"{path}: cannot be read: {error}") from error
-    names = [name.strip() for name in rows[0]] if rows else []
+    head = 1 + sum(1 for _ in takewhile(_is_remark, rows))  # row of the names
+    names = [name.strip() for name in rows[head - 1]] if len(rows) >= head else []
     missing = [name for name in _COLUMNS if name not in names]
     if missing:
         raise RecordingError(
-            f"{path}: needs the columns {', '.join(_COLUMNS)} in row 1, "
+            f"{path}: needs the columns {', '.join(_COLUMNS)} in row {head}, "
             f"got {', '.join(names) or 'nothing'}"
         )
     if twice := [name for name in _COLUMNS if names.count(name) > 1]:
-        raise RecordingError(f"{path}: needs one column {twice[0]} in row 1, got more")
+        raise RecordingError(
+            f"{path}: needs one column {twice[0]} in row {head}, got more"
+        )
     places = [names.index(name) for name in _COLUMNS]
     samples: list[list[float]] = [[], []]
-    for number, row in enumerate(rows[1:], start=2):
+    for number, row in enumerate(rows[head:], start=head + 1):
         for name, place, column in zip(_COLUMNS, places, samples, strict=True):
             cell = row[place] if place < len(row) else ""
             if (value := _number(cell)) is None:
@@ -100,6 +105,11 @@ def _read_table(path: Path) -> list[list[float]]:
                 )
             column.append(value)
     return samples
+
+
+def _is_remark(row: list[str]) -> bool:
+    # such as "# simulated: true", before the names
+    return bool(row) and row[0].lstrip().startswith("#")
 
 
 def _number(cell: str) -> float | None:

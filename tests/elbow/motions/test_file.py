@@ -45,6 +45,9 @@ def test_a_recording_of_the_loop_is_a_motion(tmp_path: Path) -> None:
         ("", r"motion\.csv: needs the columns time_s, angle_deg in row 1, got nothing"),
         ("t,angle_deg\n", "in row 1, got t, angle_deg"),
         ("time_s,angle_deg\n0,30\n1,x\n", r"row 3, angle_deg: needs a number, got 'x'"),
+        ("# a\n# b\ntime_s,angle_deg\n0,30\n1,x\n", r"row 5, angle_deg: .* got 'x'"),
+        ("# a\nt,angle_deg\n", "in row 2, got t, angle_deg"),
+        ("# a\n", "in row 2, got nothing"),
         ("time_s,angle_deg\n0,30\n1\n", r"row 3, angle_deg: needs a number, got ''"),
         ("time_s,angle_deg\n0,30\n1,nan\n", r"row 3, angle_deg: .*, got 'nan'"),
         ("time_s,angle_deg\n0,30\ninf,90\n", r"row 3, time_s: .*, got 'inf'"),
@@ -85,3 +88,11 @@ def test_half_a_recording_is_told_what_it_lacks(tmp_path: Path, name: str) -> No
     lacking = "half.json" if name == "half.npz" else "half.npz"
     with pytest.raises(RecordingError, match=f"both files .*, got no {lacking}"):
         read_motion(tmp_path / name)
+
+
+def test_remarks_before_the_names_are_passed_over(tmp_path: Path) -> None:
+    rows = "time_s,angle_deg\n0,30\n1,90\n"
+    plain = read_motion(written(tmp_path, rows))
+    remarked = read_motion(written(tmp_path, "# simulated: true\n" + rows))
+    assert (remarked.start, remarked.end) == (plain.start, plain.end)
+    assert remarked.duration == plain.duration
