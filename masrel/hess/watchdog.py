@@ -10,7 +10,7 @@ import select
 import subprocess
 import sys
 from types import TracebackType
-from typing import Protocol, Self
+from typing import IO, Protocol, Self
 
 from masrel.errors import DeviceError
 from masrel.hess.device import Device, IdleCommand
@@ -88,23 +88,29 @@ class Watchdog:
         )
         if process.stdin is None or process.stdout is None:
             raise DeviceError("watchdog: needs pipes, got none")
-        said, _, _ = select.select([process.stdout], [], [], _READY_AFTER_S)
-        if not said:
+        self._wait_until_ready(process, process.stdout)
+        self._pipe = process.stdin.fileno()
+        os.set_blocking(self._pipe, False)
+        return self
+
+    def _wait_until_ready(
+        self, process: subprocess.Popen[bytes], said: IO[bytes]
+    ) -> None:
+        name = " ".join((self._idle.module, *self._idle.arguments))
+        ready, _, _ = select.select([said], [], [], _READY_AFTER_S)
+        if not ready:
             process.kill()
             self._end()
             raise DeviceError(
                 f"watchdog: needs a process that is ready within {_READY_AFTER_S:g} s, "
-                f"{command[3:]} is not"
+                f"{name} is not"
             )
-        if process.stdout.readline() != b"ready\n":
+        if said.readline() != b"ready\n":
             self._end()
             raise DeviceError(
-                f"watchdog: needs a process that can idle the device, {command[3:]} "
+                f"watchdog: needs a process that can idle the device, {name} "
                 f"ended with {process.returncode}"
             )
-        self._pipe = process.stdin.fileno()
-        os.set_blocking(self._pipe, False)
-        return self
 
     def beat(self) -> None:
         """Tell the process that this one is alive and will say so again in time.

@@ -96,13 +96,7 @@ class PuckDevice(Device):
         self._highest = math.floor(options.largest_torque / turns.torque_step)
         if not identity.is_awake and options.angle_after_reset is not None:
             bring_up.set_position(node, table, turns, options.angle_after_reset)
-        _, counts = node.position(table.number("P"), patience_s=0.05)
-        if not _LOWEST_ANGLE <= turns.angle(counts) <= _HIGHEST_ANGLE:
-            raise DeviceError(
-                f"puck {node.puck}: needs an arm between -5 and 185 deg, it reports "
-                f"{math.degrees(turns.angle(counts)):.1f}; run masrel device zero"
-            )
-        self._position_number = table.number("P")
+        self._check_angle()
         self._torque_number, self._mode_number = table.number("T"), table.number("MODE")
         self._polls = Polls(
             node,
@@ -111,10 +105,23 @@ class PuckDevice(Device):
             every=options.poll_ticks,
             checks_torque=options.checks_torque,
         )
+        self._activate()
+
+    def _check_angle(self) -> None:
+        self._position_number = number = self._table.number("P")
+        _, counts = self._node.position(number, patience_s=0.05)
+        angle = self.transmission.angle(counts)
+        if not _LOWEST_ANGLE <= angle <= _HIGHEST_ANGLE:
+            raise DeviceError(
+                f"puck {self._node.puck}: needs an arm between -5 and 185 deg, it "
+                f"reports {math.degrees(angle):.1f}; run masrel device zero"
+            )
+
+    def _activate(self) -> None:
         try:
-            bring_up.activate(node, table)
-            if options.checks_torque:
-                bring_up.check_torque(node, table)
+            bring_up.activate(self._node, self._table)
+            if self._options.checks_torque:
+                bring_up.check_torque(self._node, self._table)
         except BaseException:
             self._release()
             raise
