@@ -199,7 +199,9 @@ def _robust(
         sides = np.array([r.T @ w for r, w in zip(triangles, weights, strict=True)])
         matrix = np.diag([float(w @ w) for w in weights])
         matrix = matrix - sides @ inverse @ sides.T
-        freedom[place] = np.trace(matrix) ** 2 / (matrix**2).sum()
+        squares = float((matrix**2).sum())
+        # as many trials as parameters fit exactly: nothing is left to differ
+        freedom[place] = np.trace(matrix) ** 2 / squares if squares else math.nan
     return covariance, freedom
 
 

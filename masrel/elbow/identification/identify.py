@@ -83,7 +83,7 @@ def fit(
     RecordingWarning
         If a recording or stretch is not used, or b or k comes out negative.
     SmallSampleWarning
-        If one trial alone determines a parameter.
+        If no more trials determine a parameter than it takes.
 
     References
     ----------
@@ -208,8 +208,8 @@ def _warn_of_lone(found: ElbowFit) -> None:
     ]
     if lone:
         warnings.warn(
-            f"{', '.join(lone)}: one trial alone says nothing of how trials differ; "
-            "there is no interval",
+            f"{', '.join(lone)}: too few trials to say how trials differ; there is no "
+            "interval",
             SmallSampleWarning,
             stacklevel=3,
         )

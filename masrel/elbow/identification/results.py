@@ -213,6 +213,8 @@ def fitted(
         elif fit.n_trials[place] < 2 or not half > 0.0:
             error = half = freedom = math.nan
             reason = "an interval by trial needs two trials that differ"
+            if fit.n_trials[place] >= 2:
+                reason = "these trials fit exactly: an interval needs more that differ"
         made.append(
             FittedParameter(
                 name=name,

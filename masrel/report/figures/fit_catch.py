@@ -20,7 +20,7 @@ from masrel.report.figures.style import (
     finish,
     house_style,
 )
-from masrel.report.rounding import number
+from masrel.report.rounding import interval_words, number
 
 __all__ = ["draw_catches"]
 
@@ -97,10 +97,14 @@ def _said(fit: ElbowFit, name: str, digits: int) -> str:
         return f"{quantity.symbol} not determined"
     value = estimate.value * quantity.factor
     said = f"{quantity.symbol} = {number(value, digits)}"
+    above, below = estimate.high - estimate.value, estimate.value - estimate.low
+    if math.isclose(above, below, rel_tol=1e-9):
+        return f"{said} ± {number(above * quantity.factor, digits)}{unit}"
+    said += unit
     if not math.isnan(estimate.standard_error):
-        half = (estimate.high - estimate.value) * quantity.factor
-        said += f" ± {number(half, digits)}"
-    return said + unit
+        ends = estimate.low * quantity.factor, estimate.high * quantity.factor
+        said += f" {interval_words(*ends, digits)}"
+    return said
 
 
 def _angles(axes: Axes, fit: ElbowFit, catches: list[Catch]) -> None:
@@ -159,7 +163,7 @@ def _peaks(axes: Axes, fit: ElbowFit, pairs: list[tuple[Catch, CatchLevels]]) ->
     _through_zero(axes, np.degrees(speeds), fit["catch_torque_constant"].value, 180.0)
     axes.set_title(_said(fit, "catch_torque_constant", 3))
     axes.set_xlabel("speed at the catch (deg/s)")
-    axes.set_ylabel("peak above pre-catch (N·m)")
+    axes.set_ylabel("peak\nabove pre-catch (N·m)")
 
 
 def _residuals(
@@ -171,7 +175,7 @@ def _residuals(
     _through_zero(axes, peaks, fit["residual_ratio"].value, math.pi)
     axes.set_title(_said(fit, "residual_ratio", 3))
     axes.set_xlabel("peak above pre-catch (N·m)")
-    axes.set_ylabel("residual above pre-catch (N·m)")
+    axes.set_ylabel("residual\nabove pre-catch (N·m)")
 
 
 def _through_zero(

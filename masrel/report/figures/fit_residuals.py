@@ -98,7 +98,8 @@ def _cloud(
     total = np.bincount(which, weights=y, minlength=BINS)
     full = count >= 20
     middle = 0.5 * (edges[1:] + edges[:-1])
-    axes.plot(middle[full], total[full] / count[full], color=BLACK, linewidth=1.4)
+    mean = np.where(full, total / np.maximum(count, 1), np.nan)  # a gap stays one
+    axes.plot(middle, mean, color=BLACK, linewidth=1.4)
     axes.axhline(0.0, color=BLACK, linewidth=0.6)
     reach = 1.05 * float(np.quantile(np.abs(y), 0.999))
     axes.set_ylim(-reach, reach)

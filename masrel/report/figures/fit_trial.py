@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -68,9 +69,18 @@ def draw_fast_trials(fit: ElbowFit, *, stamp: str) -> Drawn:
         for axes in grid[2]:
             axes.set_xlabel("time in the stretch (s)")
             axes.set_ylim(bottom=0.0)
-        handles, labels = grid[0, 0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=4)
+        _legend(figure, grid[0].tolist())
         return finish(figure, stamp)
+
+
+def _legend(figure: Figure, row: list[Axes]) -> None:
+    shown: dict[str, Artist] = {}  # not every trial has every phase
+    for axes in row:
+        handles, labels = axes.get_legend_handles_labels()
+        shown.update(zip(labels, handles, strict=True))
+    figure.legend(
+        list(shown.values()), list(shown), loc="outside lower center", ncols=4
+    )
 
 
 def _trial(column: list[Axes], fit: ElbowFit, place: int) -> None:

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from masrel.elbow.identification.clusters import Rows, solve, without_own
+from masrel.elbow.identification.results import fitted
 
 
 def trials(seed: int, sizes: Sequence[int], n_parameters: int = 2) -> list[Rows]:
@@ -148,3 +149,18 @@ def test_intervals_of_few_unlike_trials_hold_what_they_say() -> None:
         half = stdtrit(fit.freedom[1], 0.975) * math.sqrt(fit.covariance[1, 1])
         covered += abs(fit.values[1] - 2.0) <= half
     assert 361 <= covered <= 396
+
+
+def test_as_many_trials_as_parameters_leave_no_freedom() -> None:
+    # two points on a line: no warning of 0/0, and no interval
+    rows = [
+        Rows(design=np.array([[1.0, x]]), target=np.array([y]))
+        for x, y in ((1.0, 3.0), (2.0, 5.0))
+    ]
+    found = solve(rows)
+    np.testing.assert_allclose(found.values, [1.0, 2.0], atol=1e-12)
+    estimates = fitted(("a", "b"), found, 0.95)
+    assert all(np.isnan(estimate.low) for estimate in estimates)
+    assert {estimate.reason for estimate in estimates} == {
+        "these trials fit exactly: an interval needs more that differ"
+    }

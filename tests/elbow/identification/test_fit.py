@@ -216,7 +216,7 @@ def test_one_catch_that_ends_says_nothing_of_how_travels_differ() -> None:
 
 def test_one_speed_gives_no_line(movements: list[Movement]) -> None:
     lone = [movements[8], *movements[:8]]
-    with pytest.warns(SmallSampleWarning, match="one trial alone says nothing"):
+    with pytest.warns(SmallSampleWarning, match="too few trials to say how trials"):
         made = fit(lone)
     assert "needs catches at mean speeds that differ by 5 deg/s" in str(
         made["catch_slope"].reason

@@ -245,3 +245,47 @@ def test_a_torque_without_noise_that_holds_levels_is_not_saturated(
         warnings.simplefilter("error")
         read = read_movement(put(tmp_path, table(**good(torque_nm=levels))))
     assert not read.saturated.any()
+
+
+def test_columns_that_are_not_asked_for_may_be_anything(tmp_path: Path) -> None:
+    lines = table(**good()).splitlines()
+    noted = [f"{lines[0]},phase", *(f"{line},at rest" for line in lines[1:])]
+    read = read_movement(put(tmp_path, "\n".join(noted)))
+    np.testing.assert_allclose(read.torque, TORQUE, rtol=1e-12)
+    path = tmp_path / "trial.npz"
+    np.savez(path, emg=np.zeros((TIME.size, 4)), rater=np.array("R1"), **good())
+    np.testing.assert_allclose(read_movement(path).torque, TORQUE)
+
+
+@pytest.mark.parametrize("cell", ["inf", "-Infinity", "1_000", "1e999"])
+def test_numbers_that_are_none_are_refused_with_their_place(
+    tmp_path: Path, cell: str
+) -> None:
+    lines = table(**good()).splitlines()
+    lines[5] = f"{lines[5].rpartition(',')[0]},{cell}"
+    path = put(tmp_path, "\n".join(lines))
+    with pytest.raises(RecordingError, match=f"line 6, column torque_nm.*{cell}"):
+        read_movement(path)
+
+
+def test_archives_that_hold_something_else_are_refused(tmp_path: Path) -> None:
+    lone = tmp_path / "lone.npy"
+    np.save(lone, ANGLE)
+    lone = lone.rename(tmp_path / "lone.npz")
+    with pytest.raises(RecordingError, match="one array without a name"):
+        read_movement(lone)
+    path = tmp_path / "trial.npz"
+    np.savez(path, **{**good(), "torque_nm": TORQUE + 0j})
+    with pytest.raises(RecordingError, match="column torque_nm needs numbers"):
+        read_movement(path)
+    beyond = TORQUE.copy()
+    beyond[7] = np.inf
+    np.savez(path, **{**good(), "torque_nm": beyond})
+    with pytest.raises(RecordingError, match=r"sample 7 .* column torque_nm"):
+        read_movement(path)
+    np.savez_compressed(path, **good())
+    content = bytearray(path.read_bytes())
+    content[200:260] = bytes(60)
+    path.write_bytes(bytes(content))
+    with pytest.raises(RecordingError, match="not an archive of columns"):
+        read_movement(path)
