@@ -3,7 +3,7 @@
 from masrel.report.material import Material
 from masrel.report.tables import Column, Table, Value
 
-__all__ = ["constants_tables"]
+__all__ = ["constants_tables", "reading_of_q"]
 
 _NUMBERS = {
     "inertia_kg_m2": ("m", "inertia (kg·m²)"),
@@ -52,6 +52,29 @@ def constants_tables(material: Material) -> tuple[Table, ...]:
     """
     own = _own_rows(material)
     return (_shared(material, others=bool(own)), *_own(material, own))
+
+
+def reading_of_q(material: Material) -> str:
+    """Say what Q is a share of.
+
+    Parameters
+    ----------
+    material : Material
+        What the report is made from.
+
+    Returns
+    -------
+    str
+        A noun phrase that holds for every model.
+    """
+    protocol = material.protocol
+    shared = protocol.elbow.residual_reading
+    own = {m.constants.residual_reading or shared for m in protocol.models}
+    if own == {"residual"}:
+        return "residual over peak torque of the catch"
+    if own == {"decrease"}:
+        return "decrease after the peak of the catch over the rise to it"
+    return "share of the peak of the catch, as each model reads it (see below)"
 
 
 def _shared(material: Material, *, others: bool) -> Table:

@@ -1,7 +1,7 @@
 """Sections `design` and `grades`: what was presented to whom, and what they said."""
 
 from masrel.protocol import Protocol, Session
-from masrel.report.constants import constants_tables
+from masrel.report.constants import constants_tables, reading_of_q
 from masrel.report.grid import grade_grid
 from masrel.report.material import Drawing, Material, Paragraph, Section
 from masrel.report.tables import Column, Table, Value, as_given, counted, decimals_given
@@ -91,8 +91,7 @@ def _models_table(material: Material) -> Table:
         ),
         notes=(
             "L: catch angle constant; H: catch torque per stretching speed; Q: "
-            "residual over peak torque of the catch; D: angle travelled during the "
-            "catch.",
+            f"{reading_of_q(material)}; D: angle travelled during the catch.",
         ),
         data=material.data,
     )

@@ -194,6 +194,21 @@ def test_laws_that_are_not_the_default_are_told() -> None:
     assert "but for those in the table below" in tables["constants"].caption
 
 
+@pytest.mark.parametrize(
+    ("elbow", "own", "said"),
+    [
+        ({}, {}, "Q: residual over peak torque of the catch;"),
+        ({"residual_reading": "decrease"}, {}, "Q: decrease after the peak of the"),
+        ({}, {"residual_reading": "decrease"}, "Q: share of the peak of the catch, as"),
+    ],
+)
+def test_q_is_explained_as_the_models_read_it(
+    elbow: dict[str, object], own: dict[str, object], said: str
+) -> None:
+    (note,) = tables_of(with_laws(elbow, own), "design")["models"].notes
+    assert said in note
+
+
 def test_default_laws_are_not_told() -> None:
     tables = tables_of(with_laws({}, {}), "design")
     assert "own_constants" not in tables
