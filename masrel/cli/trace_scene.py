@@ -132,11 +132,21 @@ def document(scene: Scene, wanted: Wanted) -> dict[str, object]:
         "peak_torque_nm": elbow.peak_torque(joint, motion),
         "phases": _phases(found),
     }
+    made.update(_asked(scene, wanted, found))
+    _refuse_infinite(scene, made)
+    return made
+
+
+def _asked(scene: Scene, wanted: Wanted, found: "Events") -> dict[str, object]:
+    from masrel import elbow
+
+    joint, motion = scene.parameters, scene.motion
     functions = {
         "residual-torque": elbow.residual_torque,
         "work": elbow.work,
         "impulse": elbow.impulse,
     }
+    made: dict[str, object] = {}
     for name in wanted.outputs:
         value = functions[name](joint, motion)
         made[OUTPUTS[name]] = None if math.isnan(value) else value
@@ -146,7 +156,6 @@ def document(scene: Scene, wanted: Wanted) -> dict[str, object]:
     if angles := wanted.angles:
         values = elbow.torque_at(joint, motion, [math.radians(a) for a in angles])
         made["torque_at_deg"] = _pairs("angle_deg", angles, values.tolist())
-    _refuse_infinite(scene, made)
     return made
 
 

@@ -496,3 +496,12 @@ def test_notes_name_the_session_where_it_is_not_all(
     table = masrel(*call, "--csv")
     assert "undefined" not in table.out
     assert "Fleiss' κ (one): undefined: 0/0" in table.err
+
+
+@pytest.mark.parametrize("option", ["--json", "--figure"])
+def test_a_file_without_a_folder_is_refused_before_anything_is_computed(
+    masrel: Caller, wide: Path, option: str
+) -> None:
+    done = masrel("agree", wide, "--target", "both", option, "no/such.svg")
+    assert (done.code, done.out) == (2, "")
+    assert f"{option}: needs a folder that exists, got no/such.svg" in done.err
