@@ -103,8 +103,12 @@ def command(
     its confidence interval, clustered by trial, and what these trials do not
     determine.
     """
-    if of_device and model_file is not None:
-        raise ParameterError("--output: a model file is of a joint, not of a device")
+    if of_device:
+        _check_device_options(model_file, slow_below, inertia, post_catch)
+    if slow_below is not None and not slow_below > 0.0:
+        raise ParameterError(
+            f"--slow-below: needs more than 0 deg/s, got {slow_below:g}"
+        )
     named = _pairs("--column", columns), _pairs("--unit", units)
     with notes():
         movements = [_read(path, *named) for path in _shown(recordings, quiet=quiet)]
@@ -117,6 +121,23 @@ def command(
     if folder is not None:
         draw_joint_fit(found, folder)
     _say(found, json_file)
+
+
+def _check_device_options(
+    model_file: Path | None, slow_below: float | None, inertia: str, post_catch: str
+) -> None:
+    if model_file is not None:
+        raise ParameterError("--output: a model file is of a joint, not of a device")
+    given = {
+        "--slow-below": slow_below is not None,
+        "--inertia": inertia != "zero",
+        "--post-catch": post_catch != "continuous",
+    }
+    idle = [option for option, is_given in given.items() if is_given]
+    if idle:
+        raise ParameterError(
+            f"{idle[0]}: says something of a joint, not of a device (--friction)"
+        )
 
 
 def _pairs(option: str, given: tuple[str, ...]) -> dict[str, str]:

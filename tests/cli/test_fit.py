@@ -149,3 +149,36 @@ def test_a_file_that_is_not_there_is_named(masrel: Callable[..., Done]) -> None:
     done = masrel("absent.csv")
     assert done.returncode == 2
     assert "absent.csv: no such file" in done.stderr
+
+
+def test_options_of_a_joint_are_refused_for_a_device(
+    masrel: Callable[..., Done], files: list[Path]
+) -> None:
+    for option, value in (
+        ("--slow-below", "10"),
+        ("--inertia", "fitted"),
+        ("--post-catch", "additive"),
+    ):
+        done = masrel("--friction", files[0], option, value)
+        assert done.returncode == 2
+        assert done.stderr == (
+            f"masrel: {option}: says something of a joint, not of a device "
+            "(--friction)\n"
+        )
+
+
+@pytest.mark.parametrize("speed", ["-3", "0", "nan"])
+def test_a_limit_that_is_none_is_refused_in_its_unit(
+    masrel: Callable[..., Done], files: list[Path], speed: str
+) -> None:
+    done = masrel(files[0], "--slow-below", speed)
+    assert done.returncode == 2
+    assert done.stderr == (
+        f"masrel: --slow-below: needs more than 0 deg/s, got {speed}\n"
+    )
+
+
+def test_a_folder_is_no_recording(masrel: Callable[..., Done], tmp_path: Path) -> None:
+    done = masrel(tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == f"masrel: {tmp_path}: a folder; needs a file\n"

@@ -66,7 +66,8 @@ def read_movement(
     Columns that are not named here, such as EMG, are left alone.
     """
     if not path.is_file():
-        raise RecordingError(f"{path}: no such file")
+        why = "a folder; needs a file" if path.is_dir() else "no such file"
+        raise RecordingError(f"{path}: {why}")
     content = path.read_bytes()
     table: Table = (
         read_archive(path) if path.suffix == ".npz" else read_text(path, content)

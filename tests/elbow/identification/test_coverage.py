@@ -9,24 +9,29 @@ import math
 
 import pytest
 
-from masrel.elbow import STANDARD_MODELS, fit
+from masrel.elbow import STANDARD_MODELS, ElbowParameters, fit
 from masrel.elbow.identification.quantities import QUANTITIES
 from tests.elbow.identification.synthesis import Scatter, study
 
-HM3 = STANDARD_MODELS["HM3"]
+HM2, HM3 = STANDARD_MODELS["HM2"], STANDARD_MODELS["HM3"]
 SCATTERED = Scatter(
     catch_angle=math.radians(2.0), catch_torque=0.1, catch_travel=math.radians(2.0)
 )
 NAMES = [name for name in QUANTITIES if name != "inertia"]
 
 
-def covered(scatter: Scatter | None, seeds: range) -> dict[str, int]:
+def covered(
+    scatter: Scatter | None,
+    seeds: range,
+    joint: ElbowParameters = HM3,
+    fast: tuple[float, float] = (60.0, 120.0),
+) -> dict[str, int]:
     """How often each parameter's 95 % interval holds the truth."""
     counts = dict.fromkeys(NAMES, 0)
     for seed in seeds:
-        made = fit(study(HM3, seed=seed, scatter=scatter))
+        made = fit(study(joint, seed=seed, scatter=scatter, fast=fast))
         for name in NAMES:
-            counts[name] += made[name].covers(getattr(HM3, name))
+            counts[name] += made[name].covers(getattr(joint, name))
     return counts
 
 
@@ -47,5 +52,18 @@ def test_every_interval_covers_as_often_as_it_says(scatter: Scatter | None) -> N
     # 200 studies: an interval of true coverage 95 % is within 180 to 196 but once in
     # 200 times; the seeds are fixed, so that this is a statement about the method.
     counts = covered(scatter, range(1000, 1200))
+    shares = {name: count / 200 for name, count in counts.items()}
+    assert all(0.90 <= share <= 0.98 for share in shares.values()), shares
+
+
+# In one of the studies a single catch ends: no interval of D and k_post, a miss.
+@pytest.mark.filterwarnings("ignore:catch_travel, post_catch_stiffness. too few trials")
+@pytest.mark.filterwarnings("ignore:slow .* no catch that stands out")
+@pytest.mark.slow
+def test_intervals_cover_where_two_thirds_of_the_catches_outlast_their_stretch() -> (
+    None
+):
+    # as above; leaving those catches out, D covers 89 %, and travels are too short
+    counts = covered(SCATTERED, range(1000, 1200), HM2, (70.0, 130.0))
     shares = {name: count / 200 for name, count in counts.items()}
     assert all(0.90 <= share <= 0.98 for share in shares.values()), shares

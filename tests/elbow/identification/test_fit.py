@@ -230,7 +230,7 @@ def test_one_speed_gives_no_line(movements: list[Movement]) -> None:
 def test_one_slow_trial_has_values_without_intervals(
     movements: list[Movement],
 ) -> None:
-    with pytest.warns(SmallSampleWarning, match="damping, stiffness: one trial"):
+    with pytest.warns(SmallSampleWarning, match="damping, stiffness: too few trials"):
         made = fit(movements[:1])
     assert made["damping"].value == pytest.approx(HM3.damping, rel=0.2)
     assert math.isnan(made["damping"].low)
