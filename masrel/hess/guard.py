@@ -182,7 +182,8 @@ class Guard:
         Raises
         ------
         LimitExceededError
-            If it is too large or builds up too fast.
+            If it is too large, builds up too fast, or is more to begin with than an
+            arm at rest may bear.
         """
         limits = self._limits
         if not -limits.torque <= torque <= limits.torque:
@@ -195,6 +196,8 @@ class Guard:
             interval = time_s - self._sent_at
             if interval < self._period:
                 interval = self._period
+                if self._sent_at == math.inf:
+                    self._begins_with(torque)
             if abs(torque - before) > limits.torque_rate * interval:
                 raise LimitExceededError(
                     f"torque rate: needs at most {limits.torque_rate:g} N·m/s, "
@@ -203,3 +206,14 @@ class Guard:
                 )
         self._sent = torque
         self._sent_at = time_s
+
+    def _begins_with(self, torque: float) -> None:
+        # A hand that has only just taken the arm does not expect more
+        limit = self._limits.standing_torque
+        if not -limit <= torque <= limit:
+            raise LimitExceededError(
+                f"start: needs at most {limit:g} N·m in the first tick, an arm at "
+                f"{math.degrees(self._angle):.1f} deg asks for {torque:.3f} N·m; bring "
+                "it to where the stretch starts",
+                "start",
+            )

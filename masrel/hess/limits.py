@@ -64,7 +64,8 @@ class DeviceLimits:
     frozen_time : float, optional
         How long an arm that was moving may read one angle to the last step, s.
     standing_time, standing_torque : float, optional
-        How long any arm may do so while more than this torque is sent, s and N·m.
+        How long any arm may do so while more than this torque is sent, s and N·m. The
+        first torque may not be more either.
     jump_angle : float, optional
         How far a reading may lie from where the speed before would have it, a tick
         later, rad.

@@ -24,6 +24,12 @@ def guard(**limits: float) -> Guard:
     return Guard(DeviceLimits(**limits), PERIOD)
 
 
+def begun(**limits: float) -> Guard:
+    made = guard(**limits)
+    made.torque(-PERIOD, 0.0)  # so that a tick may have any torque
+    return made
+
+
 def fed(made: Guard, angles: list[float], start: int = 0) -> Guard:
     for tick, angle in enumerate(angles, start):
         made.reading(tick * PERIOD, angle, 0.0)
@@ -42,7 +48,7 @@ def raises_limit(kind: str, words: str) -> Iterator[None]:
 
 @given(st.floats(-20.0, 20.0), st.floats(-20.0, 20.0))
 def test_a_torque_within_the_limit_passes_slowly(first: float, second: float) -> None:
-    made = guard(torque=20.0)
+    made = begun(torque=20.0)
     made.torque(0.0, 0.6 * first)
     made.torque(1.0, second)  # a second later
     with raises_limit("torque", "torque: needs at most 20 N·m, got"):
@@ -59,7 +65,7 @@ def test_a_torque_beyond_it_either_way_is_named(torque: float) -> None:
     ("before", "after"), [(0.0, 12.1), (3.0, 15.2), (-3.0, 9.2), (-1.0, -13.2)]
 )
 def test_a_torque_that_builds_up_too_fast_is_named(before, after) -> None:
-    made = guard(torque_rate=12_000.0)
+    made = begun(torque_rate=12_000.0)
     made.torque(0.0, before)
     with raises_limit("torque-rate", r"torque rate: needs at most 12000 N·m/s, got"):
         made.torque(PERIOD, after)
@@ -69,7 +75,7 @@ def test_a_torque_that_builds_up_too_fast_is_named(before, after) -> None:
     ("before", "after"), [(0.0, 11.9), (11.0, 0.0), (-11.0, 0.0), (11.0, 0.5)]
 )
 def test_torque_is_taken_away_as_fast_as_it_likes(before, after) -> None:
-    made = guard(torque_rate=12_000.0)
+    made = begun(torque_rate=12_000.0)
     made.torque(0.0, before)
     made.torque(PERIOD, after)
     made = guard(torque_rate=1.0)
@@ -78,6 +84,17 @@ def test_torque_is_taken_away_as_fast_as_it_likes(before, after) -> None:
     made = guard(torque_rate=1.0)
     made.torque(0.0, 0.001)
     made.torque(PERIOD, 0.0)
+
+
+@pytest.mark.parametrize("torque", [2.001, -2.001, 11.0])
+def test_an_arm_away_from_its_start_is_not_loaded_at_once(torque: float) -> None:
+    made = fed(guard(), [2.5])
+    words = r"start: needs at most 2 N·m in the first tick, an arm at 143\.2 deg asks"
+    with raises_limit("start", words):
+        made.torque(0.0, torque)
+    made = guard()
+    made.torque(0.0, math.copysign(2.0, torque))
+    made.torque(PERIOD, torque)  # what comes later may be more
 
 
 # HM4 needs more than 20 N·m from 85 deg/s on.
@@ -120,7 +137,7 @@ def test_a_speed_either_way_is_named(velocity: float) -> None:
 
 
 def test_what_lies_on_the_limits_passes() -> None:
-    made = guard(torque=20.0, speed=7.0, torque_rate=1e6)
+    made = begun(torque=20.0, speed=7.0, torque_rate=1e6)
     made.speed(-7.0)
     made.speed(7.0)
     made.torque(0.0, 20.0)
@@ -189,7 +206,7 @@ def test_a_slow_arm_may_come_to_rest() -> None:
 
 
 def test_a_standing_torque_on_an_arm_at_rest_is_named_after_half_a_second() -> None:
-    made = guard()
+    made = begun()
     made.torque(0.0, 2.1)
     fed(made, [1.5] * 501)
     with raises_limit(
@@ -203,7 +220,7 @@ def test_a_standing_torque_on_an_arm_at_rest_is_named_after_half_a_second() -> N
 
 
 def test_an_arm_that_trembles_by_one_step_may_be_held_for_long() -> None:
-    made = guard()
+    made = begun()
     made.torque(0.0, 10.0)
     fed(made, [1.5 + STEP * (tick // 300 % 2) for tick in range(3000)])
     assert made.is_new(3.0)

@@ -4,6 +4,7 @@ import gc
 import json
 import math
 import warnings
+from dataclasses import replace
 from math import radians
 
 import numpy as np
@@ -128,6 +129,10 @@ def test_another_rate_has_another_period() -> None:
 
 
 # Faults
+
+
+# For arms that begin where the model asks for torque at once
+LOADED = replace(LIMITS, standing_torque=20.0)
 
 
 def limits_with(**change: float) -> DeviceLimits:
@@ -394,11 +399,22 @@ def test_a_soft_stop_pushes_back_and_the_model_does_not_know(
     controller = Controller(STANDARD_MODELS["HM3"], start_angle=start)
     with ScriptedDevice(clock, lambda _: start) as device:
         presented = run_presentation(
-            device, controller, clock=clock, limits=LIMITS, max_duration_s=0.05
+            device, controller, clock=clock, limits=LOADED, max_duration_s=0.05
         )
     columns = presented.recording.columns
     np.testing.assert_allclose(columns["command_torque_nm"], pushed_nm, rtol=1e-12)
     np.testing.assert_array_equal(columns["model_torque_nm"], 0.0)
+
+
+def test_an_arm_that_is_not_at_its_start_is_a_fault_before_any_torque() -> None:
+    # At 145 deg the spring alone would ask for 3.15 · 115° = 6.3 N·m.
+    device, presented = rest(SimulatedClock(), angle=lambda _: radians(145.0))
+    fault = presented.fault
+    assert fault is not None
+    assert fault.kind == "start"
+    assert "at 145.0 deg asks for 6.322 N·m; bring it to where" in fault.words
+    assert fault.torque_nm == 0.0
+    assert [torque for _, torque in device.commands] == [0.0] * len(device.commands)
 
 
 def test_the_device_is_asked_for_its_state_every_50_ms() -> None:
@@ -543,7 +559,10 @@ def test_a_stretch_may_use_the_whole_range(start_deg: float, end_deg: float) -> 
 
 def test_a_rest_before_the_end_does_not_end_it() -> None:
     device, presented = rest(
-        SimulatedClock(), angle=lambda _: radians(142.9), max_duration_s=0.3
+        SimulatedClock(),
+        angle=lambda _: radians(142.9),
+        max_duration_s=0.3,
+        limits=LOADED,
     )
     assert presented.recording.facts["ended"] == "max-duration"
     assert len(ticks_ms(device)) == 300
@@ -560,7 +579,7 @@ def test_a_rest_that_is_broken_off_begins_anew() -> None:
         SimulatedClock(),
         angle=angle,
         max_duration_s=1.0,
-        limits=limits_with(**lenient, frozen_time=1.0),
+        limits=limits_with(**lenient, frozen_time=1.0, standing_torque=20.0),
     )
     # There again at 61 ms, at rest when the low-pass has forgotten the jump.
     assert presented.recording.facts["ended"] == "arrived"
@@ -580,7 +599,7 @@ def test_without_a_fault_it_ends_with_zero_torque_and_stays_open() -> None:
     device = ScriptedDevice(clock, lambda _: radians(145.0))
     controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
     with device:
-        presented = run_presentation(device, controller, clock=clock, limits=LIMITS)
+        presented = run_presentation(device, controller, clock=clock, limits=LOADED)
         assert presented.recording.facts["ended"] == "arrived"
         assert device.is_open
         assert device.commands[-1][1] == 0.0
@@ -713,9 +732,9 @@ def test_a_controller_that_has_been_used_is_refused() -> None:
     clock = SimulatedClock()
     controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
     with ScriptedDevice(clock, lambda _: radians(145.0)) as device:
-        run_presentation(device, controller, clock=clock, limits=LIMITS)
+        run_presentation(device, controller, clock=clock, limits=LOADED)
         with pytest.raises(ParameterError, match="controller: needs a new one"):
-            run_presentation(device, controller, clock=clock, limits=LIMITS)
+            run_presentation(device, controller, clock=clock, limits=LOADED)
         assert device.is_open
 
 
