@@ -167,6 +167,7 @@ def _write_samples(
 ) -> None:
     # what the controller commands; several scenes are told apart by columns
     several = len(scenes) > 1
+    out.write("# simulated: true\n")
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow((*(("model", "speed_deg_s") if several else ()), *TRACE_COLUMNS))
     with bar:

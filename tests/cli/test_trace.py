@@ -128,6 +128,7 @@ def test_samples_are_those_of_the_sampled_law(tmp_path: Path) -> None:
     path = tmp_path / "trace.csv"
     stretch("HM3", 92, "--csv", path, "--rate-hz", "100")
     with path.open(encoding="utf-8", newline="") as file:
+        assert file.readline() == "# simulated: true\n"
         rows = list(csv.DictReader(file))
     assert list(rows[0]) == [
         "time_s",

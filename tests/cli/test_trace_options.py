@@ -166,6 +166,7 @@ def test_models_times_speeds_make_a_table_and_a_list(tmp_path: Path) -> None:
     path = tmp_path / "all.csv"
     run(*asked, "--csv", path, "--rate-hz", 50)
     with path.open(encoding="utf-8", newline="") as file:
+        assert file.readline() == "# simulated: true\n"
         rows = list(csv.DictReader(file))
     assert list(rows[0])[:3] == ["model", "speed_deg_s", "time_s"]
     assert {(row["model"], row["speed_deg_s"]) for row in rows} == {
