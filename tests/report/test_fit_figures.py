@@ -12,7 +12,7 @@ from masrel.report.figures.fit_slow import draw_slow_trials
 from masrel.report.figures.fit_trial import draw_fast_trials
 from masrel.report.fit_table import fit_table, friction_table
 from masrel.report.tables import as_text
-from tests.elbow.identification.synthesis import study
+from tests.elbow.identification.synthesis import Scatter, study
 from tests.elbow.identification.test_friction import backdriven
 
 DRAWN = [draw_catches, draw_residuals, draw_slow_trials, draw_fast_trials]
@@ -52,3 +52,30 @@ def test_friction_has_its_figure_and_table() -> None:
     found = fit_friction([backdriven(1)])
     assert draw_friction(found, stamp="SIMULATED DATA").svg.startswith(b"<?xml")
     assert [row[0] for row in friction_table(found).rows] == ["I", "B", "β"]
+
+
+@pytest.fixture(scope="module")
+def outlasting() -> ElbowFit:
+    """Most catches outlast their stretch, the slowest among them."""
+    scatter = Scatter(catch_travel=0.035)
+    joint = STANDARD_MODELS["HM2"]
+    return fit(study(joint, seed=3, n_slow=4, scatter=scatter, fast=(70.0, 130.0)))
+
+
+def test_an_interval_that_is_not_even_is_written_with_both_ends(
+    outlasting: ElbowFit,
+) -> None:
+    travel = outlasting["catch_travel"]
+    assert travel.high - travel.value > 1.01 * (travel.value - travel.low)
+    low, high = (f"{np.degrees(end):.2f}" for end in (travel.low, travel.high))
+    drawn = draw_catches(outlasting, stamp="SIMULATED DATA").svg.decode("utf-8")
+    assert f"[{low}, {high}]" in drawn
+    slope = outlasting["catch_slope"]
+    assert f"α = {slope.value:.3f} ± {slope.high - slope.value:.3f} s" in drawn
+
+
+def test_every_phase_that_is_drawn_is_in_the_legend(outlasting: ElbowFit) -> None:
+    ends = [t.catch.end for t in outlasting.trials if t.catch is not None]
+    assert None in ends
+    drawn = draw_fast_trials(outlasting, stamp="SIMULATED DATA").svg.decode("utf-8")
+    assert drawn.count("<!-- catch -->") == drawn.count("<!-- post-catch -->") == 1
