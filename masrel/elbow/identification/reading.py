@@ -80,10 +80,9 @@ def read_movement(
     _check_lengths(path, {found[key].name: values[key] for key in values})
     whole = np.isfinite(np.stack(list(values.values()))).all(axis=0)
     if not whole.all():
+        empty = {found[key].name: int(np.isnan(values[key]).sum()) for key in values}
         warnings.warn(
-            f"{path}: {int((~whole).sum())} rows have an empty cell and are left out",
-            RecordingWarning,
-            stacklevel=2,
+            _left_out(path, int((~whole).sum()), empty), RecordingWarning, stacklevel=2
         )
     si = {key: values[key][whole] * found[key].factor for key in values}
     return Movement(
@@ -102,3 +101,10 @@ def _check_lengths(path: Path, columns: Mapping[str, NDArray[np.float64]]) -> No
     if len(set(sizes.values())) > 1:
         said = ", ".join(f"{name} {size}" for name, size in sizes.items())
         raise RecordingError(f"{path}: columns need one length, got {said}")
+
+
+def _left_out(path: Path, n_rows: int, empty: Mapping[str, int]) -> str:
+    said = ", ".join(f"{name} {count}" for name, count in empty.items() if count)
+    rows = "1 row has" if n_rows == 1 else f"{n_rows} rows have"
+    left = "is" if n_rows == 1 else "are"
+    return f"{path}: {rows} an empty cell ({said}) and {left} left out"

@@ -111,7 +111,10 @@ def test_rows_with_an_empty_cell_are_left_out_and_counted(tmp_path: Path) -> Non
     for row in (7, 8):
         lines[row] = lines[row].rsplit(",", 1)[0] + ","
     path = put(tmp_path, "\n".join(lines))
-    with pytest.warns(RecordingWarning, match="2 rows have an empty cell"):
+    with pytest.warns(
+        RecordingWarning,
+        match=r"2 rows have an empty cell \(torque_nm 2\) and are left",
+    ):
         read = read_movement(path)
     assert read.time.size == TIME.size - 2
 
