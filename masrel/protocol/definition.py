@@ -102,6 +102,7 @@ class Model(Table, frozen=True, kw_only=True):
     residual_ratio: Annotated[float, Meta(ge=0, lt=1)]  # Q
     catch_travel_deg: Angle  # D
     file: Text | None = None
+    simulated: bool = False
     constants: ModelConstants = ModelConstants()
 
 

@@ -60,7 +60,8 @@ def presented_hash(protocol: Protocol) -> str:
     tables = {name: getattr(protocol, name) for name in PRESENTED}
     content = _plain({"study": protocol.study.id, **tables})
     for model in content["models"]:
-        model.pop("file", None)  # the numbers are what is felt, wherever they stood
+        for key in ("file", "simulated"):  # the numbers are what is felt
+            model.pop(key, None)
     return _digest(content)
 
 
@@ -75,8 +76,9 @@ def _plain(content: object) -> dict[str, Any]:
                 del own[key]
         if own:
             model["constants"] = own
-        if model["file"] is None:
-            del model["file"]
+        for key, absent in (("file", None), ("simulated", False)):
+            if model[key] is absent:
+                del model[key]
     for key, default in LATER.items():
         if elbow[key] == default:
             del elbow[key]

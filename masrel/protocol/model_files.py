@@ -142,6 +142,7 @@ def _merged(
     entry: Mapping[str, Any], read: Mapping[str, Any], where: str, problems: list[str]
 ) -> dict[str, object]:
     model, constants = read.get("model", {}), read.get("constants", {})
+    model = {**model, "simulated": read.get("simulated", False)}
     own = entry.get("constants", {})
     for key in model:
         if key in entry:

@@ -73,6 +73,13 @@ def _models_table(material: Material) -> Table:
         tuple(float(getattr(model, key)) for key, _ in _PARAMETERS) for model in models
     ]
     digits = [decimals_given(values) for values in zip(*parameters, strict=True)]
+    notes = [
+        "L: catch angle constant; H: catch torque per stretching speed; Q: "
+        f"{reading_of_q(material)}; D: angle travelled during the catch."
+    ]
+    simulated = ", ".join(model.id for model in models if model.simulated)
+    if simulated:
+        notes.append(f"Fitted to SIMULATED recordings: {simulated}.")
     return Table(
         name="models",
         caption="Haptic models and their parameters",
@@ -89,10 +96,7 @@ def _models_table(material: Material) -> Table:
             (model.id, model.role, model.intended_grade, *own)
             for model, own in zip(models, parameters, strict=True)
         ),
-        notes=(
-            "L: catch angle constant; H: catch torque per stretching speed; Q: "
-            f"{reading_of_q(material)}; D: angle travelled during the catch.",
-        ),
+        notes=tuple(notes),
         data=material.data,
     )
 

@@ -92,6 +92,18 @@ def test_a_variant_in_both_places_is_refused(tmp_path: Path) -> None:
     assert "models[0].constants.post_catch: needed in s3.toml or here" in said
 
 
+def test_a_file_says_whether_it_comes_from_simulated_recordings(tmp_path: Path) -> None:
+    put(tmp_path)
+    protocol = read_protocol(write(named(), tmp_path))
+    assert [model.simulated for model in protocol.models] == [True, False]
+    with pytest.raises(ProtocolError) as raised:
+        read_protocol(write(named(simulated=False), tmp_path))
+    (problem,) = raised.value.problems
+    assert problem.endswith(
+        "models[0].simulated: needed in s3.toml or here, got it in both"
+    )
+
+
 def test_both_hashes_follow_the_numbers_in_the_file(tmp_path: Path) -> None:
     path = write(named(), tmp_path)
     put(tmp_path)
@@ -138,6 +150,7 @@ def test_a_protocol_without_files_has_the_hash_it_had_before_there_were_any() ->
     content = msgspec.to_builtins(protocol)
     for model in content["models"]:
         assert model.pop("file") is None
+        assert model.pop("simulated") is False
         assert set(model.pop("constants").values()) == {None}
     assert content["elbow"].pop("rest_angle_deg") is None
     assert content["elbow"].pop("residual_reading") == "residual"

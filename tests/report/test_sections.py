@@ -209,6 +209,24 @@ def test_q_is_explained_as_the_models_read_it(
     assert said in note
 
 
+def test_models_from_simulated_recordings_are_labelled() -> None:
+    made = material(table_v(), "design")
+    models = made.protocol.models
+    fitted = msgspec.structs.replace(models[1], simulated=True)
+    protocol = msgspec.structs.replace(
+        made.protocol, models=(models[0], fitted, *models[2:])
+    )
+    for each, notes in ((protocol, [f"Fitted to SIMULATED recordings: {fitted.id}."]),
+                        (made.protocol, [])):  # fmt: skip
+        (section,) = build_sections(dataclasses.replace(made, protocol=each))
+        (table,) = [
+            block
+            for block in section.blocks
+            if isinstance(block, Table) and block.name == "models"
+        ]
+        assert list(table.notes[1:]) == notes
+
+
 def test_default_laws_are_not_told() -> None:
     tables = tables_of(with_laws({}, {}), "design")
     assert "own_constants" not in tables
