@@ -67,7 +67,7 @@ def _simulate(study: StudyPaths, protocol: Protocol, *, quiet: bool) -> None:
     occasions = [(s.id, rater) for s in protocol.sessions for rater in s.raters]
     n_presentations = len(occasions) * len(protocol.models) * protocol.schedule.repeats
     with tqdm(
-        total=n_presentations, desc="presentations", unit="", disable=quiet
+        total=n_presentations, desc="presentations", unit="", disable=quiet or None
     ) as bar:
         for session, rater in occasions:
             run_session(
@@ -119,7 +119,7 @@ def _report(
         in_person = read_in_person(study.in_person_file)
     analysis = analyze(protocol, ratings, in_person=in_person)
     write_analysis(analysis, analysis_file)
-    with tqdm(desc=destination.name, unit=" files", disable=quiet) as bar:
+    with tqdm(desc=destination.name, unit=" files", disable=quiet or None) as bar:
         files = write_report(
             protocol,
             ratings,

@@ -113,7 +113,7 @@ def _sample(
     matrix = rating_matrix(ratings, session=session)
     table = pd.DataFrame(matrix.grades, index=matrix.items, columns=matrix.raters)
     # nothing is shown of a call that is refused at once
-    with tqdm(desc="sampling", unit=" steps", delay=0.01, disable=quiet) as bar:
+    with tqdm(desc="sampling", unit=" steps", delay=0.01, disable=quiet or None) as bar:
         return latent_trait(
             table,
             items=items,

@@ -43,7 +43,7 @@ def command(
         analysis = analyze(
             material.protocol, material.ratings, in_person=material.in_person
         )
-    with tqdm(desc="report", unit=" parts", disable=quiet) as bar:
+    with tqdm(desc="report", unit=" parts", disable=quiet or None) as bar:
 
         def progress(part: str) -> None:
             bar.set_postfix_str(part, refresh=False)

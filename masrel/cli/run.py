@@ -96,7 +96,7 @@ def _run(
     hidden = quiet or grades == "console"
     with (
         notes(),
-        tqdm(total=n_presentations, unit="", desc=rater, disable=hidden) as bar,
+        tqdm(total=n_presentations, unit="", desc=rater, disable=hidden or None) as bar,
     ):
         done = run_session(
             paths,

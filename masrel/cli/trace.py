@@ -61,7 +61,7 @@ def command(
     files.check(scenes)
     documents = [
         document(scene, wanted)
-        for scene in tqdm(scenes, desc="scenes", delay=1.0, disable=quiet)
+        for scene in tqdm(scenes, desc="scenes", delay=1.0, disable=quiet or None)
     ]
     write_files(files, scenes, documents, quiet=quiet)
     if files.json_file == "-":

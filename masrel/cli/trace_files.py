@@ -138,7 +138,7 @@ def write_files(
                 out,
                 scenes,
                 rate_hz,
-                tqdm(total=n_rows, desc="samples", delay=1.0, disable=quiet),
+                tqdm(total=n_rows, desc="samples", delay=1.0, disable=quiet or None),
             )
     if files.figure is not None:
         write_figure(scenes, files.view or VIEWS[0], files.figure)

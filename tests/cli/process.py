@@ -31,3 +31,8 @@ class Caller:
             main()
         out, err = self._capsys.readouterr()
         return Done(code=ended.value.code, out=out, err=err)
+
+    def at_a_terminal(self, *arguments: object) -> Done:
+        """Call it with an stderr that says it is a terminal."""
+        self._monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+        return self(*arguments)

@@ -118,8 +118,9 @@ def test_the_figure_shows_items_thresholds_and_raters(
         assert words in drawn
 
 
-def test_progress_is_shown_unless_quiet(masrel: Caller, wide: Path) -> None:
-    assert "sampling" in masrel("latent", wide, "--items", "fixed", "--one-prior").err
+def test_progress_is_shown_at_a_terminal(masrel: Caller, wide: Path) -> None:
+    done = masrel.at_a_terminal("latent", wide, "--items", "fixed", "--one-prior")
+    assert "sampling" in done.err
 
 
 @pytest.mark.parametrize(

@@ -53,10 +53,14 @@ def test_the_page_is_written_and_its_place_printed(masrel: Caller, study: Path) 
     }
 
 
-def test_progress_is_on_stderr_unless_quiet(masrel: Caller, study: Path) -> None:
+def test_progress_is_on_a_terminal_unless_quiet(masrel: Caller, study: Path) -> None:
+    page = f"{study / 'report' / 'report.html'}\n"
     done = masrel("report", study)
-    assert done.out == f"{study / 'report' / 'report.html'}\n"
+    assert (done.out, done.err) == (page, "")
+    done = masrel.at_a_terminal("report", study)
+    assert done.out == page
     assert "report" in done.err
+    assert masrel.at_a_terminal("report", study, "--quiet").err == ""
 
 
 def test_another_folder_gets_the_same_bytes(
