@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from masrel.errors import ParameterError, RatingsError
-from masrel.protocol import Protocol
+from masrel.protocol import Protocol, elbow_parameters
 from masrel.ratings import Ratings
 
 __all__ = ["PREDICTORS", "independent", "ratings_with"]
@@ -66,6 +66,9 @@ def ratings_with(
         key = PREDICTORS[name][0]
         if name == "speed":
             table[name] = table[key]
+        elif name == "Q":  # one meaning, whichever way a model reads its Q
+            shares = {m: elbow_parameters(protocol, m).residual_share for m in asked}
+            table[name] = [shares[m] for m in table["model"]]
         else:
             table[name] = [float(getattr(asked[m], key)) for m in table["model"]]
     whole = table.dropna(subset=["grade", *predictors])

@@ -116,11 +116,11 @@ def command(
             _friction(movements, level, folder, json_file)
             return
         found = _joint(movements, slow_below, inertia, post_catch, level)
-    if model_file is not None:
-        _write_model(found, model_file)
     if folder is not None:
         draw_joint_fit(found, folder)
     _say(found, json_file)
+    if model_file is not None:
+        _write_model(found, model_file)
 
 
 def _check_device_options(

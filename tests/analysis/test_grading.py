@@ -3,6 +3,7 @@
 import math
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 import statsmodels.api as sm
@@ -152,6 +153,21 @@ def test_speed_alone_is_a_question_that_has_an_answer() -> None:
     assert effect.odds_ratio < 1.0
     assert effect.low < effect.odds_ratio < effect.high
     assert isinstance(found, GradeRegression)
+
+
+def test_q_is_the_residual_whichever_way_a_model_reads_it(tmp_path: Path) -> None:
+    protocol, ratings = made_up(tmp_path)
+    first = grade_regression(protocol, ratings, predictors=("Q", "speed"))
+    replace = msgspec.structs.replace
+    decrease = replace(protocol.elbow, residual_reading="decrease")
+    models = tuple(
+        replace(model, residual_ratio=1.0 - model.residual_ratio)
+        for model in protocol.models
+    )
+    other = replace(protocol, elbow=decrease, models=models)
+    again = grade_regression(other, ratings, predictors=("Q", "speed"))
+    ratios = [[e.odds_ratio for e in found.effects] for found in (first, again)]
+    assert ratios[1] == pytest.approx(ratios[0], rel=1e-9)
 
 
 def test_a_constant_predictor_is_named(tmp_path: Path) -> None:

@@ -99,6 +99,7 @@ def test_only_slow_trials_make_no_model_file(
 ) -> None:
     done = masrel(*files[:3], "-o", tmp_path / "s3.toml")
     assert done.returncode == 2
+    assert "Parameters of the joint" in done.stdout  # what there is, is shown
     assert "catch_angle_constant: there are only slow stretches" in done.stderr
     assert not (tmp_path / "s3.toml").exists()
 

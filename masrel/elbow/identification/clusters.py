@@ -81,10 +81,11 @@ def without_own(own: Floats, design: Floats, target: Floats) -> Rows:
     basis, triangle = np.linalg.qr(own)
     scale = np.linalg.norm(own, axis=0)
     basis = basis[:, np.abs(np.diag(triangle)) > RANK_TOLERANCE * scale]
-    return Rows(
-        design=design - basis @ (basis.T @ design),
-        target=target - basis @ (basis.T @ target),
-    )
+    left = design - basis @ (basis.T @ design)
+    # What is left of a column that they explain whole is rounding, and no witness.
+    size = np.linalg.norm(design, axis=0)
+    left[:, np.linalg.norm(left, axis=0) <= RANK_TOLERANCE * size] = 0.0
+    return Rows(design=left, target=target - basis @ (basis.T @ target))
 
 
 def solve(trials: Sequence[Rows], *, n_own: int = 0) -> ClusteredFit:

@@ -183,8 +183,8 @@ def _check_law(law: PreCatchLaw) -> None:
     values = {"damping": law.damping, "stiffness": law.stiffness}
     if any(math.isnan(value) for value in (*values.values(), law.inertia)):
         raise RecordingError(
-            "recordings: the slow stretches do not tell b from k; they need a speed "
-            "that varies, or trials at different speeds"
+            "recordings: the slow stretches do not tell b, k and a constant torque "
+            "apart; they need a speed that varies within a stretch"
         )
     for name, value in values.items():
         if value < 0.0:

@@ -125,6 +125,20 @@ def test_columns_that_say_the_same_are_both_undefined() -> None:
     assert fit.values[2] == pytest.approx(1.0, rel=1e-12)
 
 
+def test_what_own_parameters_explain_but_for_rounding_tells_nothing() -> None:
+    # a speed that is constant in every trial, beside a constant of each trial's own
+    rng = np.random.default_rng(3)
+    rows = []
+    for speed in (0.1396263, 0.1570796, 0.2):
+        angle = np.cumsum(rng.uniform(0.5, 1.5, 40)) * speed
+        design = np.stack([np.full(40, speed), angle], axis=1)
+        own = np.ones((40, 1))
+        rows.append(without_own(own, design, 1.26 * speed + 3.15 * angle))
+    fit = solve(rows, n_own=3)
+    assert math.isnan(fit.values[0])
+    assert fit.values[1] == pytest.approx(3.15, rel=1e-12)
+
+
 def test_one_trial_has_values_and_no_covariance() -> None:
     fit = solve(trials(4, [8]))
     assert np.isfinite(fit.values).all()

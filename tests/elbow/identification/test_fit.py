@@ -7,7 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from masrel.elbow import STANDARD_MODELS, ElbowParameters, fit
+from masrel.elbow import (
+    STANDARD_MODELS,
+    ConstantSpeed,
+    ElbowParameters,
+    fit,
+    trace,
+)
 from masrel.elbow.identification import ElbowFit, Movement
 from masrel.elbow.identification.quantities import QUANTITIES
 from masrel.errors import (
@@ -149,6 +155,25 @@ def test_only_slow_trials_say_what_they_cannot(movements: list[Movement]) -> Non
     whole = made.joint(missing=HM3)
     assert whole.catch_slope == HM3.catch_slope
     assert whole.damping == made["damping"].value
+
+
+def test_slow_stretches_at_constant_speeds_do_not_tell_b(
+    movements: list[Movement],
+) -> None:
+    # b·θ̇ is then a constant, which each trial has of its own
+    slow = []
+    for speed in (6.0, 8.0, 9.0):
+        stretch = ConstantSpeed(
+            start=math.radians(30), end=math.radians(70), speed=math.radians(speed)
+        )
+        made = trace(HM3, stretch)
+        slow.append(
+            Movement(
+                name=f"{speed:g}", time=made.time, angle=made.angle, torque=made.torque
+            )
+        )
+    with pytest.raises(RecordingError, match="a speed that varies within a stretch"):
+        fit([*slow, *movements[8:]])
 
 
 def test_a_joint_whose_catch_never_ends_leaves_d_and_k_post_open() -> None:
