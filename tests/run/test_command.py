@@ -11,6 +11,7 @@ from masrel.cli import cli
 from masrel.protocol import Protocol, StudyPaths
 from masrel.run import read_log
 from masrel.schedule import read_schedule
+from tests.cli.process import Caller
 
 Small = tuple[StudyPaths, Protocol]
 
@@ -36,7 +37,7 @@ def test_simulated_sessions_become_a_table(small: Small) -> None:
     who = ("--rater", "R1", "--session", "test")
     out, err = typed("run", study.root, *who, "--grades", "simulated")
     assert out.startswith("session test of R1 is complete: 3 grades (simulated) in ")
-    assert "3/3" in err
+    assert err == ""  # no terminal, no bar
     header = read_log(study.log_file("R1", "test"))[0].fields
     assert (header["grades"], header["clock"]) == ("simulated", "simulated")
     out, _ = typed("ratings", study.root)
@@ -48,9 +49,21 @@ def test_simulated_sessions_become_a_table(small: Small) -> None:
     assert other.read_bytes() == first
 
 
-def test_quiet_says_nothing(small: Small) -> None:
+def test_a_terminal_sees_the_presentations_counted(
+    small: Small, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     who = ("--rater", "R1", "--session", "test", "--grades", "simulated")
-    assert typed("run", small[0].root, *who, "--quiet") == ("", "")
+    done = Caller(monkeypatch, capsys).at_a_terminal("run", small[0].root, *who)
+    assert "3/3" in done.err
+
+
+def test_quiet_says_nothing(
+    small: Small, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    who = ("--rater", "R1", "--session", "test", "--grades", "simulated")
+    run = ("run", small[0].root, *who, "--quiet")
+    done = Caller(monkeypatch, capsys).at_a_terminal(*run)
+    assert (done.code, done.out, done.err) == (0, "", "")
 
 
 def test_a_person_is_asked_and_may_be_corrected(small: Small) -> None:
