@@ -15,7 +15,9 @@ from tests.elbow.stretches import joints, motions
 HM3 = STANDARD_MODELS["HM3"]
 
 
-def check(joint: ElbowParameters, start: float, *samples: np.ndarray) -> set[int]:
+def assert_same_bits(
+    joint: ElbowParameters, start: float, *samples: np.ndarray
+) -> set[int]:
     """Compare with stepping, bit for bit, and return the phases seen."""
     stepped = SampledJoint(joint, start_angle=start)
     torques, phases = [], []
@@ -39,7 +41,7 @@ def test_random_motions_give_the_same_bits(kind: str, rate_hz: float) -> None:
             continue
         made = trace(joint, motion, rate_hz=rate_hz)
         columns = (made.time, made.angle, made.velocity)
-        seen |= check(joint, motion.start, *columns)
+        seen |= assert_same_bits(joint, motion.start, *columns)
         torque, _ = sampled_columns(joint, motion.start, *columns)
         assert made.torque.tolist() == torque.tolist()
     assert seen == {0, 1, 2}
@@ -48,7 +50,7 @@ def test_random_motions_give_the_same_bits(kind: str, rate_hz: float) -> None:
 @given(joint=joints(), motion=motions(), rate_hz=st.floats(20.0, 400.0))
 def test_any_stretch_gives_the_same_bits(joint, motion, rate_hz: float) -> None:
     made = trace(joint, motion, rate_hz=rate_hz)
-    check(joint, motion.start, made.time, made.angle, made.velocity)
+    assert_same_bits(joint, motion.start, made.time, made.angle, made.velocity)
 
 
 # Speeds that have nothing to do with the angles, at, above and below both thresholds:
@@ -76,7 +78,7 @@ def test_any_samples_give_the_same_bits(
         catch_rise=rise,
     )
     widths, speeds, angles = (np.array(column) for column in zip(*rows, strict=True))
-    check(joint, 0.5, np.cumsum(widths), angles, np.radians(speeds))
+    assert_same_bits(joint, 0.5, np.cumsum(widths), angles, np.radians(speeds))
 
 
 def test_at_the_very_end_of_the_peak_the_torque_has_fallen() -> None:
@@ -86,7 +88,7 @@ def test_at_the_very_end_of_the_peak_the_torque_has_fallen() -> None:
     times = np.arange(30) / 64.0
     angles = np.radians(60.0) + np.radians(100.0) * times
     speeds = np.full(30, np.radians(100.0))
-    check(joint, np.radians(60.0), times, angles, speeds)
+    assert_same_bits(joint, np.radians(60.0), times, angles, speeds)
     torque, phase = sampled_columns(joint, np.radians(60.0), times, angles, speeds)
     catch = int((phase == 1).argmax())
     assert catch == 13
@@ -102,7 +104,7 @@ def test_blocks_of_any_size_give_the_same_bits(
     for kind in KINDS:
         joint, motion = random_scene(np.random.default_rng(5), kind, wide=False)
         made = trace(joint, motion, rate_hz=200.0)
-        check(joint, motion.start, made.time, made.angle, made.velocity)
+        assert_same_bits(joint, motion.start, made.time, made.angle, made.velocity)
 
 
 def test_no_samples_give_nothing() -> None:

@@ -20,7 +20,7 @@ def of_scenes(kind: str, *, wide: bool, seeds: range) -> list[Errors]:
     return found
 
 
-def check(found: list[Errors]) -> None:
+def assert_exact(found: list[Errors]) -> None:
     assert all(one.holds for one in found)
     # nearest floats, as `events` says: half a unit and what the reference's own
     # rounding of a motion's constants leaves
@@ -34,14 +34,14 @@ def check(found: list[Errors]) -> None:
 @pytest.mark.parametrize("wide", [False, True])
 @pytest.mark.parametrize("kind", KINDS)
 def test_random_scenes_are_exact(kind: str, wide: bool) -> None:
-    check(of_scenes(kind, wide=wide, seeds=range(1000, 1010)))
+    assert_exact(of_scenes(kind, wide=wide, seeds=range(1000, 1010)))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("wide", [False, True])
 @pytest.mark.parametrize("kind", KINDS)
 def test_thousands_of_random_scenes_are_exact(kind: str, wide: bool) -> None:
-    check(of_scenes(kind, wide=wide, seeds=range(250)))
+    assert_exact(of_scenes(kind, wide=wide, seeds=range(250)))
 
 
 @pytest.mark.parametrize("scene", CORNERS.values(), ids=CORNERS)

@@ -12,7 +12,7 @@ from masrel.elbow.scenes.course import nearest
 from masrel.elbow.scenes.digits import DIGITS_16
 from masrel.elbow.scenes.kinds import motions_of
 from masrel.elbow.scenes.quintic import quintic_courses
-from masrel.elbow.scenes.sieve import courses_for_samples
+from masrel.elbow.scenes.sieve import quintic_courses_for_samples
 from masrel.elbow.scenes.table import joints_of
 from tests.elbow.scenes import random_scene
 from tests.elbow.stretches import counted, minimum_jerk, table_v
@@ -64,7 +64,7 @@ def test_plain_stretches_are_settled_by_16_digits() -> None:
         (STANDARD_MODELS[r.model], minimum_jerk(r.speed_deg_s)) for r in table_v()
     ]
     with counted(sieve, "quintic_courses") as calls:
-        courses_for_samples(*columns(scenes), 1000.0)
+        quintic_courses_for_samples(*columns(scenes), 1000.0)
     assert calls == [1]
 
 
@@ -74,7 +74,7 @@ def test_an_event_at_a_sample_is_asked_again(late_s: float) -> None:
     stretch = minimum_jerk(92.0)
     rate_hz = 10.0 / (events(HM3, stretch).catch + late_s)
     with counted(sieve, "quintic_courses") as calls:
-        courses_for_samples(*columns([(HM3, stretch)] * 3), rate_hz)
+        quintic_courses_for_samples(*columns([(HM3, stretch)] * 3), rate_hz)
     assert calls == [1 if late_s > 1e-12 else 2]
     row = torque_traces(HM3, stretch, rate_hz=rate_hz)[0]
     # the catch's torque jumps by H v_c, the law before it moves by far less
@@ -87,7 +87,7 @@ def test_rows_asked_again_stand_where_they_were() -> None:
     stretches = [minimum_jerk(speed) for speed in (92.0, 64.0, 75.0)]
     rate_hz = 10.0 / events(HM3, stretches[1]).catch
     scenes = [(HM3, stretch) for stretch in stretches]
-    found = courses_for_samples(*columns(scenes), rate_hz)
+    found = quintic_courses_for_samples(*columns(scenes), rate_hz)
     assert found.catch.high.tolist() == pytest.approx(
         [events(HM3, stretch).catch for stretch in stretches], rel=1e-14
     )
@@ -120,5 +120,5 @@ def test_an_end_of_the_catch_near_the_end_of_the_stretch_is_asked_again(
     with np.errstate(all="ignore"):
         found = quintic_courses(*columns([(joint, stretch)]), DIGITS_16)
     assert found.is_doubtful.all()
-    exact = courses_for_samples(*columns([(joint, stretch)]), 1000.0)
+    exact = quintic_courses_for_samples(*columns([(joint, stretch)]), 1000.0)
     assert exact.leaves.tolist() == [apart < 0.0]

@@ -25,7 +25,7 @@ from tests.elbow.stretches import constant, counted, minimum_jerk, table_v
 HM3 = STANDARD_MODELS["HM3"]
 
 
-def check(joints, motions, rate_hz: float) -> None:
+def assert_rows_are_traces(joints, motions, rate_hz: float) -> None:
     made = torque_traces(joints, motions, rate_hz=rate_hz, reading="sampled")
     for row, joint, motion in zip(made, joints, motions, strict=True):
         one = trace(joint, motion, rate_hz=rate_hz).torque
@@ -45,7 +45,7 @@ def test_every_row_has_the_bits_of_one_trace(kind: str, rate_hz: float) -> None:
     # at most 5 s, to be quick
     scenes = [s for s in scenes if s[1].start < s[0].range_end and s[1].duration < 5.0]
     joints, motions = zip(*scenes[:n], strict=True)
-    check(joints, motions, rate_hz)
+    assert_rows_are_traces(joints, motions, rate_hz)
 
 
 # From catches at once to none, from slow to fast, and ends that cut every phase
@@ -58,7 +58,7 @@ def test_a_grid_of_stretches_has_the_bits(kind) -> None:
         for start, end in ((30.0, 146.0), (0.0, 175.0), (95.0, 120.0), (30.0, 80.0))
     ]
     joints, motions = zip(*scenes, strict=True)
-    check(joints, motions, 250.0)
+    assert_rows_are_traces(joints, motions, 250.0)
 
 
 def test_plain_stretches_are_not_stepped_through_alone() -> None:
@@ -78,7 +78,7 @@ def test_plain_stretches_are_not_stepped_through_alone() -> None:
 def test_mixed_motions_keep_their_rows() -> None:
     motions = [minimum_jerk(92.0), constant(92.0), minimum_jerk(46.0), constant(46.0)]
     assert isinstance(motions[0], MinimumJerk)
-    check([HM3] * 4, motions, 100.0)
+    assert_rows_are_traces([HM3] * 4, motions, 100.0)
     made = torque_traces(HM3, motions, rate_hz=100.0, reading="sampled")
     assert isnan(made[0, -1])
     assert not isnan(made[2, -1])
@@ -101,7 +101,7 @@ def largest_term(joint: ElbowParameters, motion: Motion) -> float:
     )
 
 
-def check_exact(joints, motions, rate_hz: float) -> set[str]:
+def assert_rows_are_torques(joints, motions, rate_hz: float) -> set[str]:
     """Compare every sample with `torque`; return which phases there were."""
     made = torque_traces(joints, motions, rate_hz=rate_hz)
     seen = set()
@@ -128,7 +128,7 @@ def test_exact_rows_are_the_torque_of_one_scene(kind: str, rate_hz: float) -> No
     ]
     scenes = [s for s in scenes if s[1].start < s[0].range_end and s[1].duration < 5.0]
     joints, motions = zip(*scenes[:n], strict=True)
-    seen = check_exact(joints, motions, rate_hz)
+    seen = assert_rows_are_torques(joints, motions, rate_hz)
     assert {"pre-catch", "catch", "post-catch"} <= seen or n == 6
 
 
@@ -142,7 +142,11 @@ def test_a_grid_of_exact_stretches_is_the_torque_of_one(kind) -> None:
         for start, end in ((30.0, 146.0), (0.0, 175.0), (95.0, 120.0), (30.0, 80.0))
     ]
     joints, motions = zip(*scenes, strict=True)
-    assert check_exact(joints, motions, 250.0) == {"pre-catch", "catch", "post-catch"}
+    assert assert_rows_are_torques(joints, motions, 250.0) == {
+        "pre-catch",
+        "catch",
+        "post-catch",
+    }
 
 
 def test_scenes_at_a_sample_begin_the_later_phase() -> None:
@@ -175,7 +179,7 @@ def test_scenes_at_a_sample_begin_the_later_phase() -> None:
 
 def test_mixed_motions_keep_their_rows_when_exact() -> None:
     motions = [minimum_jerk(92.0), constant(92.0), minimum_jerk(46.0), constant(46.0)]
-    check_exact([HM3] * 120, motions * 30, 100.0)
+    assert_rows_are_torques([HM3] * 120, motions * 30, 100.0)
 
 
 def test_exact_plain_stretches_are_not_led_through_alone() -> None:

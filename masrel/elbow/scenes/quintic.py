@@ -97,6 +97,7 @@ class _Quintics:
         leaves = catches & self._before(released, way_share(end) * self.way)
         # a late one matters less: no torque jumps by a speed there
         left = self._solved(released / self.way, leaves, 0.1)
+        # to the last bit with any digits: stretches often end at a sample
         duration = Twofold.difference(self.motions.end, self.motions.start) / speed
         duration = self.number(duration.high, duration.low)
         post_end = slow.where(slow.high > left.high, left)

@@ -12,13 +12,15 @@ from masrel.elbow.scenes.quintic import quintic_courses
 from masrel.elbow.scenes.table import Joints
 from masrel.elbow.scenes.twofold import Twofold
 
-__all__ = ["courses_for_samples"]
+__all__ = ["quintic_courses_for_samples"]
 
 _NEAR = 1e-11
 # of the number of samples so far; places are right to 1e-13 or so
 
 
-def courses_for_samples(joints: Joints, motions: Motions, rate_hz: float) -> Courses:
+def quintic_courses_for_samples(
+    joints: Joints, motions: Motions, rate_hz: float
+) -> Courses:
     """Find the events of minimum-jerk stretches that will be sampled.
 
     Parameters

@@ -13,16 +13,14 @@ import numpy as np
 from masrel.elbow.course import end_time
 from masrel.elbow.events import events
 from masrel.elbow.motion import Floats, Motion
-from masrel.elbow.motions import MinimumJerk
 from masrel.elbow.parameters import ElbowParameters
 from masrel.elbow.scenes.course import Courses, Motions
 from masrel.elbow.scenes.exact import ExactRows
 from masrel.elbow.scenes.fill import BLOCK, Fill
-from masrel.elbow.scenes.kinds import courses_of, efforts_of, motions_of
+from masrel.elbow.scenes.kinds import courses_for_samples, efforts_of, motions_of
 from masrel.elbow.scenes.pairs import check_starts, paired
 from masrel.elbow.scenes.rows import LAWS
 from masrel.elbow.scenes.samples import phase_samples
-from masrel.elbow.scenes.sieve import courses_for_samples
 from masrel.elbow.scenes.table import Joints, joints_of
 from masrel.elbow.torque import torque
 from masrel.elbow.trace import trace
@@ -162,11 +160,7 @@ class _Group:
         if kind in LAWS:
             columns, motions = joints_of(own), motions_of(kind, stretches)
             if reading == "exact":
-                courses = (
-                    courses_for_samples(columns, motions, rate_hz)
-                    if kind is MinimumJerk
-                    else courses_of(kind, columns, motions)
-                )
+                courses = courses_for_samples(kind, columns, motions, rate_hz)
                 ends, alone = courses.end.high.copy(), courses.is_doubtful
             else:
                 ends, alone = LAWS[kind].ends(columns, motions)
