@@ -22,13 +22,6 @@ TWO_SESSIONS = "session,item,rater,grade,source\n" + "".join(
 
 
 @pytest.fixture
-def masrel(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Caller:
-    return Caller(monkeypatch, capsys)
-
-
-@pytest.fixture
 def readable(monkeypatch: pytest.MonkeyPatch) -> None:
     # With text kept as text the SVG says what can be read in the figure.
     monkeypatch.setitem(STYLE, "svg.fonttype", "none")

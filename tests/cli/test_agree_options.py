@@ -38,13 +38,6 @@ OF_ANY_NUMBER = (
 
 
 @pytest.fixture
-def masrel(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Caller:
-    return Caller(monkeypatch, capsys)
-
-
-@pytest.fixture
 def wide(tmp_path: Path) -> Path:
     path = tmp_path / "wide.csv"
     path.write_text(WIDE, encoding="utf-8")

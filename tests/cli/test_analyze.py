@@ -39,13 +39,6 @@ sections = ["design", "agreement", "test-retest", "intended", "in-person"]
 
 
 @pytest.fixture
-def masrel(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Caller:
-    return Caller(monkeypatch, capsys)
-
-
-@pytest.fixture
 def study(tmp_path: Path) -> Path:
     """The published study with a shorter plan."""
     root = tmp_path / "study"

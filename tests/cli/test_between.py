@@ -14,11 +14,6 @@ STANDARDS = ("HM1", "HM2", "HM3", "HM4")
 PUBLISHED = Path(__file__).parents[2] / "studies" / "hess2012" / "protocol.toml"
 
 
-@pytest.fixture
-def call(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Caller:
-    return Caller(monkeypatch, capsys)
-
-
 def refused(done: Done) -> str:
     """The one sentence on stderr of a call that was wrong."""
     assert done.code == 2
@@ -39,9 +34,9 @@ def simulated(path: Path, *, is_it: str = "true") -> Path:
     return path
 
 
-def test_files_hold_the_models_of_the_rule(call: Caller, tmp_path: Path) -> None:
+def test_files_hold_the_models_of_the_rule(masrel: Caller, tmp_path: Path) -> None:
     folder = tmp_path / "new" / "dummies"
-    done = call("between", *STANDARDS, "-n", "12", "-o", folder)
+    done = masrel("between", *STANDARDS, "-n", "12", "-o", folder)
     assert done.code == 0
     expected = intermediate_models(STANDARD_MODELS, 12)
     assert sorted(path.stem for path in folder.iterdir()) == list(expected)
@@ -60,11 +55,11 @@ def test_files_hold_the_models_of_the_rule(call: Caller, tmp_path: Path) -> None
 
 
 def test_a_study_can_name_them_and_has_the_published_dummies(
-    call: Caller, tmp_path: Path
+    masrel: Caller, tmp_path: Path
 ) -> None:
     study = tmp_path / "study"
-    assert call("init", study, "--study", "hess2012").code == 0
-    assert call("between", *STANDARDS, "-n", 12, "-o", study / "models").code == 0
+    assert masrel("init", study, "--study", "hess2012").code == 0
+    assert masrel("between", *STANDARDS, "-n", 12, "-o", study / "models").code == 0
     protocol = study / "protocol.toml"
     kept, in_dummy = [], False
     for line in protocol.read_text(encoding="utf-8").splitlines():
@@ -77,7 +72,7 @@ def test_a_study_can_name_them_and_has_the_published_dummies(
             continue
         kept.append(line)
     protocol.write_text("\n".join(kept) + "\n", encoding="utf-8")
-    done = call("check", study)
+    done = masrel("check", study)
     assert (done.code, done.err) == (0, "")
     written, named = read_protocol(PUBLISHED), read_protocol(protocol)
     for number in range(1, 13):
@@ -89,20 +84,22 @@ def test_a_study_can_name_them_and_has_the_published_dummies(
         )
 
 
-def test_what_lies_next_to_simulated_is_simulated(call: Caller, tmp_path: Path) -> None:
+def test_what_lies_next_to_simulated_is_simulated(
+    masrel: Caller, tmp_path: Path
+) -> None:
     file = simulated(tmp_path / "käte.toml")
-    done = call("between", "HM1", "HM2", file, "-n", "2", "--json", "-")
+    done = masrel("between", "HM1", "HM2", file, "-n", "2", "--json", "-")
     document = json.loads(done.out)
     assert [model["simulated"] for model in document["models"]] == [False, True]
     assert document["simulated"] is True
     assert "käte" in document["models"][1]["made_from"]
     assert "sha256" in document["models"][1]["made_from"]
-    shown = call("between", "HM1", "HM2", file, "-n", "2")
+    shown = masrel("between", "HM1", "HM2", file, "-n", "2")
     assert shown.out.startswith("SIMULATED DATA")
 
 
-def test_json_is_one_document_and_nothing_else(call: Caller, tmp_path: Path) -> None:
-    done = call("between", "HM1", "HM2", "-n", "1", "-o", tmp_path, "--json", "-")
+def test_json_is_one_document_and_nothing_else(masrel: Caller, tmp_path: Path) -> None:
+    done = masrel("between", "HM1", "HM2", "-n", "1", "-o", tmp_path, "--json", "-")
     document = json.loads(done.out)
     (model,) = document["models"]
     assert (model["name"], model["from"], model["to"]) == ("D01", "HM1", "HM2")
@@ -110,21 +107,21 @@ def test_json_is_one_document_and_nothing_else(call: Caller, tmp_path: Path) -> 
     assert model["file"] == str(tmp_path / "D01.toml")
     assert model["model"]["catch_torque_nms_rad"] == 1.7  # (1.4 + 2.0)/2
     file = tmp_path / "all.json"
-    assert call("between", "HM1", "HM2", "-n", "1", "--json", file).code == 0
+    assert masrel("between", "HM1", "HM2", "-n", "1", "--json", file).code == 0
     assert json.loads(file.read_text("utf-8"))["models"][0]["file"] is None
 
 
-def test_nothing_is_overwritten_unless_asked(call: Caller, tmp_path: Path) -> None:
+def test_nothing_is_overwritten_unless_asked(masrel: Caller, tmp_path: Path) -> None:
     (tmp_path / "D02.toml").write_text("mine", encoding="utf-8")
     arguments = ("between", "HM1", "HM2", "-n", "2", "-o", tmp_path)
-    said = refused(call(*arguments))
+    said = refused(masrel(*arguments))
     assert said == (
         f"--output: {tmp_path} holds D02.toml already; --overwrite replaces what is "
         "there"
     )
     assert [path.name for path in tmp_path.iterdir()] == ["D02.toml"]
     assert (tmp_path / "D02.toml").read_text(encoding="utf-8") == "mine"
-    assert call(*arguments, "--overwrite").code == 0
+    assert masrel(*arguments, "--overwrite").code == 0
     assert read_model_file(tmp_path / "D02.toml").residual_ratio == 0.25
 
 
@@ -145,9 +142,9 @@ def test_nothing_is_overwritten_unless_asked(call: Caller, tmp_path: Path) -> No
     ],
 )
 def test_calls_that_are_wrong_are_refused(
-    call: Caller, arguments: tuple[str, ...], message: str
+    masrel: Caller, arguments: tuple[str, ...], message: str
 ) -> None:
-    assert message in refused(call("between", *arguments))
+    assert message in refused(masrel("between", *arguments))
 
 
 @pytest.mark.parametrize(
@@ -160,38 +157,38 @@ def test_calls_that_are_wrong_are_refused(
     ],
 )
 def test_files_that_are_no_models_are_refused(
-    call: Caller, tmp_path: Path, content: bytes, message: str
+    masrel: Caller, tmp_path: Path, content: bytes, message: str
 ) -> None:
     path = tmp_path / "other.toml"
     path.write_bytes(content)
-    said = refused(call("between", "HM1", path, "-n", "1"))
+    said = refused(masrel("between", "HM1", path, "-n", "1"))
     assert message in said
     assert "other.toml" in said
 
 
 def test_a_file_that_hides_whether_it_is_simulated_is_refused(
-    call: Caller, tmp_path: Path
+    masrel: Caller, tmp_path: Path
 ) -> None:
     path = simulated(tmp_path / "a.toml", is_it='"no"')
-    said = refused(call("between", "HM1", path, "-n", "1"))
+    said = refused(masrel("between", "HM1", path, "-n", "1"))
     assert "a.toml: simulated must be true or false" in said
     kept = path.read_text(encoding="utf-8").replace('simulated = "no"\n', "")
     path.write_text(kept, encoding="utf-8")
-    assert "got nothing" in refused(call("between", "HM1", path, "-n", "1"))
+    assert "got nothing" in refused(masrel("between", "HM1", path, "-n", "1"))
 
 
 def test_models_that_read_the_law_differently_have_nothing_between(
-    call: Caller, tmp_path: Path
+    masrel: Caller, tmp_path: Path
 ) -> None:
     path = simulated(tmp_path / "a.toml")
     with path.open("a", encoding="utf-8") as file:
         file.write('[constants]\npost_catch = "additive"\n')
-    said = refused(call("between", "HM1", path, "-n", "1"))
+    said = refused(masrel("between", "HM1", path, "-n", "1"))
     assert said.startswith("models: HM1 and a need one post_catch")
 
 
-def test_a_folder_that_is_a_file_is_refused(call: Caller, tmp_path: Path) -> None:
+def test_a_folder_that_is_a_file_is_refused(masrel: Caller, tmp_path: Path) -> None:
     path = tmp_path / "file"
     path.write_text("", encoding="utf-8")
-    said = refused(call("between", "HM1", "HM2", "-n", "1", "-o", path))
+    said = refused(masrel("between", "HM1", "HM2", "-n", "1", "-o", path))
     assert str(path) in said

@@ -14,13 +14,6 @@ from .process import Caller
 EMULATED = ("--interface", "virtual", "--channel", "cli", "--emulate")
 
 
-@pytest.fixture
-def masrel(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Caller:
-    return Caller(monkeypatch, capsys)
-
-
 def test_probe_says_who_is_there(masrel: Caller) -> None:
     done = masrel("device", "probe", *EMULATED)
     assert done.code == 0

@@ -2,45 +2,19 @@
 
 import csv
 import json
-import sys
 import tomllib
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from masrel.cli import main
 from masrel.elbow import STANDARD_MODELS
 from masrel.elbow.identification import Movement
 from masrel.protocol import elbow_parameters, read_protocol
+from tests.cli.process import Caller
 from tests.elbow.identification.synthesis import study
 from tests.elbow.identification.test_friction import backdriven
 from tests.protocol.documents import VALID, write
-
-
-@dataclass(frozen=True)
-class Done:
-    returncode: int
-    stdout: str
-    stderr: str
-
-
-@pytest.fixture
-def masrel(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Callable[..., Done]:
-    """The command line in this process, with its exit code and both streams."""
-
-    def call(*arguments: str | Path) -> Done:
-        monkeypatch.setattr(sys, "argv", ["masrel", "fit", *map(str, arguments)])
-        with pytest.raises(SystemExit) as left:
-            main()
-        streams = capsys.readouterr()
-        return Done(int(left.value.code or 0), streams.out, streams.err)
-
-    return call
 
 
 def put(movement: Movement, folder: Path) -> Path:
@@ -62,12 +36,14 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
 
 
 def test_a_fit_goes_into_a_protocol(
-    masrel: Callable[..., Done], files: list[Path], tmp_path: Path
+    masrel: Caller, files: list[Path], tmp_path: Path
 ) -> None:
-    done = masrel(*files, "-o", tmp_path / "s3.toml", "--json", tmp_path / "fit.json")
-    assert done.returncode == 0, done.stderr
-    assert "SIMULATED DATA" in done.stdout
-    assert "3 slow and 6 fast trials" in done.stdout
+    done = masrel(
+        "fit", *files, "-o", tmp_path / "s3.toml", "--json", tmp_path / "fit.json"
+    )
+    assert done.code == 0, done.err
+    assert "SIMULATED DATA" in done.out
+    assert "3 slow and 6 fast trials" in done.out
     model = tomllib.loads((tmp_path / "s3.toml").read_text(encoding="utf-8"))
     assert model["simulated"] is True
     assert len(model["recordings"]) == 9
@@ -83,10 +59,10 @@ def test_a_fit_goes_into_a_protocol(
 
 
 def test_json_on_stdout_is_one_document_and_nothing_else(
-    masrel: Callable[..., Done], files: list[Path]
+    masrel: Caller, files: list[Path]
 ) -> None:
-    done = masrel(*files[:3], "--json", "-")
-    document = json.loads(done.stdout)
+    done = masrel("fit", *files[:3], "--json", "-")
+    document = json.loads(done.out)
     missing = {e["key"]: e for e in document["estimates"]}["catch_slope_s"]
     assert missing["value"] is None
     assert "only slow stretches" in missing["reason"]
@@ -95,32 +71,30 @@ def test_json_on_stdout_is_one_document_and_nothing_else(
 
 
 def test_only_slow_trials_make_no_model_file(
-    masrel: Callable[..., Done], files: list[Path], tmp_path: Path
+    masrel: Caller, files: list[Path], tmp_path: Path
 ) -> None:
-    done = masrel(*files[:3], "-o", tmp_path / "s3.toml")
-    assert done.returncode == 2
-    assert "Parameters of the joint" in done.stdout  # what there is, is shown
-    assert "catch_angle_constant: there are only slow stretches" in done.stderr
+    done = masrel("fit", *files[:3], "-o", tmp_path / "s3.toml")
+    assert done.code == 2
+    assert "Parameters of the joint" in done.out  # what there is, is shown
+    assert "catch_angle_constant: there are only slow stretches" in done.err
     assert not (tmp_path / "s3.toml").exists()
 
 
-def test_figures_are_drawn(
-    masrel: Callable[..., Done], files: list[Path], tmp_path: Path
-) -> None:
-    done = masrel(*files, "--figures", tmp_path, "--quiet")
-    assert done.returncode == 0, done.stderr
+def test_figures_are_drawn(masrel: Caller, files: list[Path], tmp_path: Path) -> None:
+    done = masrel("fit", *files, "--figures", tmp_path, "--quiet")
+    assert done.code == 0, done.err
     names = ("fit_catches", "fit_residuals", "fit_slow", "fit_trials")
     expected = [f"{name}.{form}" for name in names for form in ("png", "svg")]
     assert sorted(path.name for path in tmp_path.iterdir()) == expected
 
 
-def test_friction_is_fitted_and_drawn(
-    masrel: Callable[..., Done], tmp_path: Path
-) -> None:
+def test_friction_is_fitted_and_drawn(masrel: Caller, tmp_path: Path) -> None:
     path = put(backdriven(1), tmp_path)
-    done = masrel(path, "--friction", "--figures", tmp_path / "out", "--json", "-")
-    assert done.returncode == 0, done.stderr
-    document = json.loads(done.stdout)
+    done = masrel(
+        "fit", path, "--friction", "--figures", tmp_path / "out", "--json", "-"
+    )
+    assert done.code == 0, done.err
+    document = json.loads(done.out)
     values = {e["key"]: e["value"] for e in document["estimates"]}
     assert values["viscous_nms_rad"] == pytest.approx(0.168, rel=0.02)
     assert (tmp_path / "out" / "fit_friction.png").stat().st_size > 10_000
@@ -138,31 +112,31 @@ def test_friction_is_fitted_and_drawn(
     ],
 )
 def test_a_wrong_call_is_one_sentence(
-    masrel: Callable[..., Done], files: list[Path], arguments: list[str], said: str
+    masrel: Caller, files: list[Path], arguments: list[str], said: str
 ) -> None:
-    done = masrel(*files[:2], *arguments)
-    assert done.returncode == 2
-    assert said in done.stderr
-    assert "Traceback" not in done.stderr
+    done = masrel("fit", *files[:2], *arguments)
+    assert done.code == 2
+    assert said in done.err
+    assert "Traceback" not in done.err
 
 
-def test_a_file_that_is_not_there_is_named(masrel: Callable[..., Done]) -> None:
-    done = masrel("absent.csv")
-    assert done.returncode == 2
-    assert "absent.csv: no such file" in done.stderr
+def test_a_file_that_is_not_there_is_named(masrel: Caller) -> None:
+    done = masrel("fit", "absent.csv")
+    assert done.code == 2
+    assert "absent.csv: no such file" in done.err
 
 
 def test_options_of_a_joint_are_refused_for_a_device(
-    masrel: Callable[..., Done], files: list[Path]
+    masrel: Caller, files: list[Path]
 ) -> None:
     for option, value in (
         ("--slow-below", "10"),
         ("--inertia", "fitted"),
         ("--post-catch", "additive"),
     ):
-        done = masrel("--friction", files[0], option, value)
-        assert done.returncode == 2
-        assert done.stderr == (
+        done = masrel("fit", "--friction", files[0], option, value)
+        assert done.code == 2
+        assert done.err == (
             f"masrel: {option}: says something of a joint, not of a device "
             "(--friction)\n"
         )
@@ -170,16 +144,14 @@ def test_options_of_a_joint_are_refused_for_a_device(
 
 @pytest.mark.parametrize("speed", ["-3", "0", "nan"])
 def test_a_limit_that_is_none_is_refused_in_its_unit(
-    masrel: Callable[..., Done], files: list[Path], speed: str
+    masrel: Caller, files: list[Path], speed: str
 ) -> None:
-    done = masrel(files[0], "--slow-below", speed)
-    assert done.returncode == 2
-    assert done.stderr == (
-        f"masrel: --slow-below: needs more than 0 deg/s, got {speed}\n"
-    )
+    done = masrel("fit", files[0], "--slow-below", speed)
+    assert done.code == 2
+    assert done.err == (f"masrel: --slow-below: needs more than 0 deg/s, got {speed}\n")
 
 
-def test_a_folder_is_no_recording(masrel: Callable[..., Done], tmp_path: Path) -> None:
-    done = masrel(tmp_path)
-    assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr == f"masrel: {tmp_path}: a folder; needs a file\n"
+def test_a_folder_is_no_recording(masrel: Caller, tmp_path: Path) -> None:
+    done = masrel("fit", tmp_path)
+    assert (done.code, done.out) == (2, "")
+    assert done.err == f"masrel: {tmp_path}: a folder; needs a file\n"

@@ -43,13 +43,6 @@ def _defaults() -> dict[str, object]:
 
 
 @pytest.fixture
-def masrel(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Caller:
-    return Caller(monkeypatch, capsys)
-
-
-@pytest.fixture
 def wide(tmp_path: Path) -> Path:
     file = tmp_path / "wide.csv"
     file.write_text(WIDE, encoding="utf-8")

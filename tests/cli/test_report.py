@@ -12,13 +12,6 @@ STUDY = Path(__file__).parents[2] / "studies/hess2012"
 
 
 @pytest.fixture
-def masrel(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Caller:
-    return Caller(monkeypatch, capsys)
-
-
-@pytest.fixture
 def study(tmp_path: Path) -> Path:
     """The published study: no estimates, one section with a figure and one without."""
     root = tmp_path / "study"
