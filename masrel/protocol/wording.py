@@ -40,6 +40,10 @@ def _phrase(info: inspect.Type) -> str:
     if isinstance(info, inspect.UnionType):
         kinds = [t for t in info.types if not isinstance(t, inspect.NoneType)]
         return " or ".join(_phrase(kind) for kind in kinds)
+    if isinstance(info, inspect.BoolType):
+        return "true or false"
+    if isinstance(info, inspect.DictType):
+        return f"a table in which each value is {_phrase(info.value_type)}"
     if isinstance(info, inspect.FloatType):
         return "a number" + _range(info)
     if isinstance(info, inspect.IntType):

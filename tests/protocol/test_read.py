@@ -67,6 +67,17 @@ NUMBER = "a number above 0 and at most 180"
         (("raters",), {}, "raters: needed an array of tables [[raters]], got a table"),
         (("study",), [], "study: needed a table, got an array of 0"),
         (("sessions", 0), "x", 'sessions[0]: needed a table, got "x"'),
+        (
+            ("device",),
+            {"puck_checks_torque": "yes"},
+            'device.puck_checks_torque: needed true or false, got "yes"',
+        ),
+        (
+            ("device",),
+            {"puck_properties": 42},
+            "device.puck_properties: needed a table in which each value is a whole "
+            "number, got 42",
+        ),
         # ranges, both ends
         (
             ("models", 1, "catch_angle_constant_deg"),
