@@ -128,12 +128,13 @@ def _read(path: Path) -> dict[str, Any] | str:
     constants = (*CONSTANT_KEYS, *READING_KEYS, *VARIANT_KEYS)
     for table, known in (("model", tuple(MODEL_KEYS)), ("constants", constants)):
         keys = content.get(table, {})
+        if not isinstance(keys, dict):
+            return f"needed a table [{table}], got {got(keys)} in {path}"
         foreign = [key for key in keys if key not in known]
-        if not isinstance(keys, dict) or foreign:
-            came = got(keys) if not foreign else ", ".join(foreign)
+        if foreign:
             return (
-                f"needed keys of [{table}] among {', '.join(known)}, got {came} in "
-                f"{path}"
+                f"needed keys of [{table}] among {', '.join(known)}, got "
+                f"{', '.join(foreign)} in {path}"
             )
     return content
 
@@ -157,5 +158,4 @@ def _merged(
                     "it in both"
                 )
         own = {**constants, **own}
-
     return {**model, **entry, "constants": own}

@@ -169,6 +169,14 @@ def test_a_protocol_without_files_has_the_hash_it_had_before_there_were_any() ->
             'format = "masrel joint model 1"\n[model]\nid = "X"\n',
             r"models\[0\].file: needed keys of \[model\] among .*, got id in",
         ),
+        (
+            'format = "masrel joint model 1"\nmodel = 5\n',
+            r"models\[0\].file: needed a table \[model\], got 5 in .*s3.toml",
+        ),
+        (
+            'format = "masrel joint model 1"\nconstants = ["damping_nms_rad"]\n',
+            r"models\[0\].file: needed a table \[constants\], got an array of 1 in",
+        ),
     ],
 )
 def test_a_file_that_is_no_model_file_is_one_problem(
