@@ -33,7 +33,8 @@ def protocol_hash(protocol: Protocol) -> str:
     -------
     str
         SHA-256, 64 hexadecimal digits. Comments, order of keys and layout of the
-        file do not enter. Of a model file its numbers enter, and its name.
+        file do not enter. Of a model file its numbers enter, its name, and whether
+        it comes from simulated recordings.
     """
     return _digest(_plain(protocol))
 
