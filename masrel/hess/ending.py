@@ -32,6 +32,16 @@ def run_to_the_end(ticks: Ticks) -> tuple[str, Fault | None]:
         when that failed.
     """
     try:
+        return _run(ticks)
+    except BaseException as error:
+        unsafe = _close(ticks.device)  # before anything else, whatever came
+        if unsafe is not None:
+            error.add_note(f"closing the device: {unsafe}")
+        raise
+
+
+def _run(ticks: Ticks) -> tuple[str, Fault | None]:
+    try:
         ended = ticks.run()
         ticks.finish()
     except DeviceError as error:
@@ -42,24 +52,18 @@ def run_to_the_end(ticks: Ticks) -> tuple[str, Fault | None]:
             kind=error.kind, words="; ".join(words), time_s=time_s, torque_nm=torque
         )
         return "fault", fault
-    except BaseException as error:
-        unsafe = _close(ticks.device)  # before anything else, whatever came
-        if unsafe is not None:
-            error.add_note(f"closing the device: {unsafe}")
-        raise
     return ended, None
 
 
 def _ramped_and_closed(ticks: Ticks) -> list[str]:
-    # -> what went wrong with that, in words; it is closed in any case
+    # -> what went wrong with that, in words
     wrong = []
     try:
         _ramp_down(ticks)
         ticks.finish()
     except DeviceError as error:
         wrong.append(f"ramping down: {error}")
-    finally:
-        unsafe = _close(ticks.device)
+    unsafe = _close(ticks.device)
     return wrong if unsafe is None else [*wrong, f"closing it: {unsafe}"]
 
 

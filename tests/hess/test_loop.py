@@ -510,6 +510,26 @@ def test_an_exception_says_when_the_zero_was_not_taken() -> None:
     assert caught.value.__notes__ == ["closing the device: scripted: does not listen"]
 
 
+def test_an_exception_within_the_ramp_of_a_fault_is_treated_alike() -> None:
+    class InterruptedClock(SimulatedClock):
+        def sleep_until_ns(self, deadline_ns: int) -> None:
+            super().sleep_until_ns(deadline_ns)
+            if deadline_ns > 20 * PERIOD_NS:  # the fault is noticed in tick 12
+                raise KeyboardInterrupt
+
+    clock = InterruptedClock()
+    device = ScriptedDevice(clock, lambda time_s: START + 2.0 * time_s)
+    device.silent_after = 10
+    device.deaf_after = 18  # ten ticks, and eight commands of the ramp
+    device.open()
+    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
+    with pytest.raises(KeyboardInterrupt) as caught:
+        run_presentation(device, controller, clock=clock, limits=LIMITS)
+    assert len(device.commands) == 18
+    assert caught.value.__notes__ == ["closing the device: scripted: does not listen"]
+    assert device.stopped
+
+
 @pytest.mark.parametrize("collecting", [True, False])
 def test_the_collector_is_off_during_the_ticks_and_as_before_afterwards(
     collecting: bool,
