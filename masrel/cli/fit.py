@@ -2,10 +2,9 @@
 
 import json
 import math
-import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import click
 
@@ -15,8 +14,11 @@ from masrel.errors import ParameterError
 
 if TYPE_CHECKING:
     from masrel.elbow.identification import ElbowFit, FrictionFit, Movement
+    from masrel.elbow.parameters import PostCatch
 
 __all__ = ["command"]
+
+Inertia = Literal["zero", "fitted"]
 
 
 @click.command("fit")
@@ -89,8 +91,8 @@ def command(
     units: tuple[str, ...],
     columns: tuple[str, ...],
     slow_below: float | None,
-    inertia: str,
-    post_catch: str,
+    inertia: Inertia,
+    post_catch: "PostCatch",
     level: float,
     folder: Path | None,
     json_file: Path | None,
@@ -124,7 +126,10 @@ def command(
 
 
 def _check_device_options(
-    model_file: Path | None, slow_below: float | None, inertia: str, post_catch: str
+    model_file: Path | None,
+    slow_below: float | None,
+    inertia: Inertia,
+    post_catch: "PostCatch",
 ) -> None:
     if model_file is not None:
         raise ParameterError("--output: a model file is of a joint, not of a device")
@@ -153,8 +158,8 @@ def _pairs(option: str, given: tuple[str, ...]) -> dict[str, str]:
 def _shown(paths: tuple[Path, ...], *, quiet: bool) -> "Iterator[Path]":
     from tqdm import tqdm
 
-    is_hidden = quiet or not sys.stderr.isatty()
-    yield from tqdm(paths, desc="reading", unit="file", disable=is_hidden, delay=1.0)
+    hidden = quiet or None  # None: shown at a terminal alone
+    yield from tqdm(paths, desc="reading", unit="file", disable=hidden, delay=1.0)
 
 
 def _read(path: Path, columns: dict[str, str], units: dict[str, str]) -> "Movement":
@@ -166,8 +171,8 @@ def _read(path: Path, columns: dict[str, str], units: dict[str, str]) -> "Moveme
 def _joint(
     movements: "list[Movement]",
     slow_below: float | None,
-    inertia: str,
-    post_catch: str,
+    inertia: Inertia,
+    post_catch: "PostCatch",
     level: float,
 ) -> "ElbowFit":
     from dataclasses import replace
@@ -175,13 +180,10 @@ def _joint(
     from masrel.elbow import STANDARD_MODELS
     from masrel.elbow.identification import fit
 
-    constants = STANDARD_MODELS["HM1"]
-    if post_catch == "additive":
-        constants = replace(constants, post_catch="additive")
     return fit(
         movements,
-        constants=constants,
-        inertia="fitted" if inertia == "fitted" else "zero",
+        constants=replace(STANDARD_MODELS["HM1"], post_catch=post_catch),
+        inertia=inertia,
         slow_below=None if slow_below is None else math.radians(slow_below),
         level=level,
     )

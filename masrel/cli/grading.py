@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
+from masrel.cli.columns import listed
 from masrel.cli.material import read_material
 from masrel.cli.notes import notes
 
@@ -49,7 +50,7 @@ def command(
     study: Path,
     ratings_file: Path | None,
     predictors: str,
-    models: str,
+    models: Literal["standard", "dummy", "all"],
     session: str | None,
     level: float,
     json_file: Path | None,
@@ -66,8 +67,8 @@ def command(
         found = grade_regression(
             material.protocol,
             material.ratings,
-            predictors=tuple(name.strip() for name in predictors.split(",")),
-            models=_role(models),
+            predictors=tuple(listed(predictors)),
+            models=models,
             session=session,
             level=level,
         )
@@ -78,16 +79,6 @@ def command(
     if json_file is not None:
         json_file.write_text(document + "\n", encoding="utf-8")
     click.echo(_table(found))
-
-
-def _role(models: str) -> "Literal['standard', 'dummy', 'all']":
-    # what click has checked already, as a type
-    roles: dict[str, Literal["standard", "dummy", "all"]] = {
-        "standard": "standard",
-        "dummy": "dummy",
-        "all": "all",
-    }
-    return roles[models]
 
 
 def _document(found: "GradeRegression") -> dict[str, object]:
@@ -124,7 +115,7 @@ def _table(found: "GradeRegression") -> str:
             "out; errors are clustered by rater.",
             *(f"{name} is left out: {why}." for name, why in found.dropped),
         ),
-        data="simulated" if found.simulated else "given",
+        data="simulated" if found.simulated else "foreign",
     )
     return as_text(table)
 
