@@ -43,7 +43,7 @@ def fit_table(fit: ElbowFit) -> Table:
         "The column of a step takes what earlier steps found as known.",
         *fit.remarks,
     )
-    return _table("joint", "Parameters of the joint", rows, notes, fit.simulated, fit)
+    return _table("joint", "Parameters of the joint", rows, notes, fit)
 
 
 def friction_table(fit: FrictionFit) -> Table:
@@ -65,7 +65,7 @@ def friction_table(fit: FrictionFit) -> Table:
         f"Torque differs from (7) by {number(100.0 * fit.relative_error, 1)} % of its "
         "mean.",
     )
-    return _table("friction", "Friction of the device", rows, notes, fit.simulated, fit)
+    return _table("friction", "Friction of the device", rows, notes, fit)
 
 
 def _row(
@@ -104,7 +104,6 @@ def _table(
     caption: str,
     rows: Sequence[tuple[str | int, ...]],
     notes: tuple[str, ...],
-    simulated: bool,
     fit: ElbowFit | FrictionFit,
 ) -> Table:
     return Table(
@@ -121,5 +120,5 @@ def _table(
         ),
         rows=tuple(rows),
         notes=notes,
-        data="simulated" if simulated else "recorded",
+        data="simulated" if fit.simulated else "recorded",
     )
