@@ -117,7 +117,6 @@ class _Turning:
         self._start_ns = self._due_ns = self._sent_ns = clock.now_ns()
         self.angle = math.nan  # until it has been read
         self._velocity = 0.0
-        self._n_missed = 0  # readings in a row
 
     @property
     def is_low(self) -> bool:
@@ -172,13 +171,15 @@ class _Turning:
         check_overrun(LIMITS, 0, (now_ns - self._sent_ns) * 1e-9)  # silence alone
         try:
             time_ns, angle = self._device.read()
-        except DeviceTimeoutError:
-            self._n_missed += 1
-            if self._n_missed > LIMITS.missed_replies:
-                raise
+        except DeviceTimeoutError as error:
+            guard.replies.another(self._since_start_s(now_ns), str(error))
             return  # the device holds its torque
-        self._n_missed = 0
-        time_s = (time_ns - self._start_ns) * 1e-9
+        time_s = self._since_start_s(time_ns)
+        if not guard.is_new(time_s):
+            guard.replies.another(
+                self._since_start_s(now_ns), f"one of {time_s:.6f} s again"
+            )
+            return
         guard.reading(time_s, angle, (self._clock.now_ns() - time_ns) * 1e-9)
         self.angle = angle
         self._velocity = self._estimate.update(time_s, angle)
@@ -187,6 +188,9 @@ class _Turning:
         self._device.command(-torque_nm)
         self._sent_ns = now_ns
         self._watchdog.beat()
+
+    def _since_start_s(self, time_ns: int) -> float:
+        return (time_ns - self._start_ns) * 1e-9
 
 
 def _mean(steady: list[tuple[float, float]], speed: float) -> SteadyRun:

@@ -5,7 +5,12 @@ from math import radians
 
 import pytest
 
-from masrel.errors import DeviceError, DeviceTimeoutError, EmergencyStopError
+from masrel.errors import (
+    DeviceError,
+    DeviceTimeoutError,
+    EmergencyStopError,
+    LimitExceededError,
+)
 from masrel.hess import EmergencyStop, SimulatedClock, SimulatedHand, open_device
 from masrel.hess.puck.friction import fit_friction
 from masrel.hess.puck.turning import steady_runs
@@ -175,6 +180,9 @@ def test_the_watchdog_hears_every_tick() -> None:
     assert watchdog.n_rests == 1
 
 
+SILENT = r"needs a new reading after at most 2 ticks .*no position within 1 ms"
+
+
 @pytest.mark.parametrize(("lost_s", "ends"), [(0.0015, False), (0.01, True)])
 def test_two_lost_readings_in_a_row_are_let_pass(lost_s: float, ends: bool) -> None:
     clock = SimulatedClock()
@@ -182,7 +190,38 @@ def test_two_lost_readings_in_a_row_are_let_pass(lost_s: float, ends: bool) -> N
     two = (radians(60.0), radians(80.0))
     with opened(clock, loose(60.0), emulator={"faults": faults}) as device:
         if ends:
-            with pytest.raises(DeviceTimeoutError, match="no position within 1 ms"):
+            with pytest.raises(LimitExceededError, match=SILENT) as caught:
                 steady_runs(device, clock, speeds=two)
+            assert caught.value.kind == "missed-replies"  # as in a presentation
         else:
             assert len(steady_runs(device, clock, speeds=two)) == 4
+
+
+def test_every_fourth_lost_reading_ends_it_as_it_ends_a_presentation() -> None:
+    clock = SimulatedClock()
+    faults = (fault("dropped-replies", 0.6, every=4),)
+    with (
+        opened(clock, loose(60.0), emulator={"faults": faults}) as device,
+        pytest.raises(LimitExceededError, match="at most 10 of 100 ticks"),
+    ):
+        steady_runs(device, clock, speeds=(radians(60.0), radians(80.0)))
+
+
+def test_a_reading_that_comes_again_is_none() -> None:
+    class Repeating(SimulatedDevice):
+        n_read = 0
+
+        def _read(self):
+            self.n_read += 1
+            if self.n_read <= 500:
+                self.last = super()._read()
+            return self.last
+
+    clock = SimulatedClock()
+    with (
+        Repeating(clock=clock, hand=loose(60.0)) as device,
+        pytest.raises(
+            LimitExceededError, match=r"3 in a row \(one of 0.499000 s again"
+        ),
+    ):
+        steady_runs(device, clock, speeds=(radians(60.0), radians(80.0)))
