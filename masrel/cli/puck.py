@@ -1,6 +1,5 @@
 """The options that say which puck a command of ``masrel device`` is for."""
 
-import dataclasses
 import functools
 import math
 from collections.abc import Callable
@@ -11,7 +10,6 @@ import click
 
 from masrel.cli.bench import RANGE_END, Bench
 from masrel.hess import RealClock, SimulatedClock, SimulatedHand
-from masrel.hess.puck.emulator_options import EmulatorOptions
 from masrel.hess.puck.options import PuckOptions
 from masrel.hess.puck.properties import PropertyTable
 from masrel.hess.puck.property_file import read_property_table
@@ -99,22 +97,11 @@ def _bench(
     options: PuckOptions, emulate: bool, json_file: str | None, quiet: bool
 ) -> Bench:
     return Bench(
-        options=_emulated(options) if emulate else options,
+        options=options.emulated(_EMULATED_START) if emulate else options,
         clock=SimulatedClock() if emulate else RealClock(),
         hand=_free_hand() if emulate else None,
         json_file=json_file,
         quiet=quiet,
-    )
-
-
-def _emulated(options: PuckOptions) -> PuckOptions:
-    emulator = EmulatorOptions(
-        gear_ratio=options.gear_ratio,
-        direction=options.direction,
-        properties=options.properties,
-    )
-    return dataclasses.replace(
-        options, emulator=emulator, angle_after_reset=_EMULATED_START
     )
 
 

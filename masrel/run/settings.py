@@ -1,6 +1,5 @@
 """What the protocol's ``[device]`` means to the driver."""
 
-import dataclasses
 import math
 from typing import TYPE_CHECKING
 
@@ -185,16 +184,7 @@ def backend_options(
     if settings.backend != "puck":
         return None
     options = _puck_options(settings)
-    if hand is None:
-        return options
-    from masrel.hess.puck.emulator_options import EmulatorOptions  # only when chosen
-
-    emulator = EmulatorOptions(
-        gear_ratio=options.gear_ratio,
-        direction=options.direction,
-        properties=options.properties,
-    )
-    return dataclasses.replace(options, emulator=emulator, angle_after_reset=hand.start)
+    return options if hand is None else options.emulated(hand.start)
 
 
 def _puck_options(settings: DeviceSettings) -> "PuckOptions":

@@ -7,7 +7,6 @@ from masrel.hess.clock import SimulatedClock
 from masrel.hess.hand import Hand
 from masrel.hess.puck.device import PuckDevice
 from masrel.hess.puck.emulated import EmulatedPuckDevice, UnwiredPuckDevice
-from masrel.hess.puck.emulator_options import EmulatorOptions
 from masrel.hess.puck.options import PuckOptions
 from masrel.hess.setup import DeviceSetup
 
@@ -29,12 +28,8 @@ def emulated_options(hand: Hand) -> PuckOptions:
     PuckOptions
         For `open_device`.
     """
-    return PuckOptions(
-        interface="virtual",
-        channel=f"masrel-{next(_channels)}",
-        angle_after_reset=hand.start,
-        emulator=EmulatorOptions(),
-    )
+    channel = f"masrel-{next(_channels)}"
+    return PuckOptions(interface="virtual", channel=channel).emulated(hand.start)
 
 
 def build(setup: DeviceSetup) -> PuckDevice:

@@ -1,8 +1,8 @@
 """What a puck's backend can be told."""
 
 import math
-from dataclasses import dataclass, field
-from typing import Literal
+from dataclasses import dataclass, field, replace
+from typing import Literal, Self
 
 from masrel.errors import ParameterError
 from masrel.hess.puck.emulator_options import EmulatorOptions
@@ -103,3 +103,34 @@ class PuckOptions(BackendOptions):
         return self.interface not in _WITHOUT_HARDWARE and not self.channel.startswith(
             "vcan"
         )
+
+    def emulated(self, start: float) -> Self:
+        """Return the same for an emulated puck of this gear, direction and firmware.
+
+        Parameters
+        ----------
+        start : float
+            Where its arm is held when it is opened, rad.
+
+        Returns
+        -------
+        PuckOptions
+            With an emulator.
+
+        Raises
+        ------
+        ParameterError
+            If the bus is not inside this process.
+
+        Examples
+        --------
+        >>> options = PuckOptions(interface="virtual", direction=-1).emulated(0.5)
+        >>> options.emulator.direction
+        -1
+        """
+        emulator = EmulatorOptions(
+            gear_ratio=self.gear_ratio,
+            direction=self.direction,
+            properties=self.properties,
+        )
+        return replace(self, emulator=emulator, angle_after_reset=start)
