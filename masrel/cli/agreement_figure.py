@@ -4,16 +4,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from masrel.cli.agreement_rows import Row
+from masrel.cli.output import figure_form
 from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target
 
 if TYPE_CHECKING:
     from masrel.ratings import Ratings
-    from masrel.report.figures import ForestRow, Form
+    from masrel.report.figures import ForestRow
 
 __all__ = ["check_figure", "write_figure"]
 
-_FORMS: dict[str, "Form"] = {".png": "png", ".svg": "svg", ".pdf": "pdf"}
 _POPULATION = {
     "items": "other items",
     "raters": "other raters",
@@ -36,10 +36,7 @@ def check_figure(file: Path, target: Target | None) -> None:
     ParameterError
         If its name does not end as that of a figure, or there are no intervals.
     """
-    if file.suffix.lower() not in _FORMS:
-        raise ParameterError(
-            f"--figure: needs a name that ends in .png, .svg or .pdf, got {file}"
-        )
+    figure_form(file)
     if target is None:
         raise ParameterError(
             "--figure: shows intervals, so it needs --target raters, items or both"
@@ -77,7 +74,7 @@ def write_figure(
         [_line(row, several, target) for row in rows],
         axis_label=f"agreement (1 is perfect); intervals for {_POPULATION[target]}",
         stamp="SIMULATED DATA" if ratings.simulated else "",
-        form=_FORMS[file.suffix.lower()],
+        form=figure_form(file),
     )
     file.write_bytes(drawn)
 

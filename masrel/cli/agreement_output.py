@@ -1,6 +1,5 @@
 """Where ``masrel agree`` puts what it found: the screen, JSON, and a figure."""
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,12 +11,12 @@ from masrel.cli.agreement_rows import Row, Wanted
 from masrel.cli.agreement_table import agreement_table
 from masrel.cli.folders import check_folders
 from masrel.cli.options import grouped
+from masrel.cli.output import print_table, tell, write_json
 from masrel.errors import ParameterError
 from masrel.estimates import as_document
 
 if TYPE_CHECKING:
     from masrel.ratings import Ratings
-    from masrel.report.tables import Table
 
 __all__ = ["NO_INTERVAL", "Output", "output_options", "put"]
 
@@ -122,10 +121,11 @@ def put(
     if output.json_file is not None:
         _write_json(rows, by, output.json_file)
     if output.prints_json:
-        click.echo("".join(f"{note}\n" for note in about), err=True, nl=False)
+        tell(about)
     else:
         data = "simulated" if ratings.simulated else "foreign"
-        _print(agreement_table(rows, file, by, wanted, about, data), output)
+        table = agreement_table(rows, file, by, wanted, about, data)
+        print_table(table, csv=output.csv, latex=output.latex)
     if wanted.target is None:
         click.echo(NO_INTERVAL, err=True)
     elif output.figure is not None:
@@ -138,21 +138,4 @@ def _write_json(rows: list[Row], by: str | None, file: Path) -> None:
         {**({} if by is None else {by: row.session}), **as_document(row.estimate)}
         for row in rows
     ]
-    text = json.dumps(
-        {"estimates": documents}, indent=1, ensure_ascii=False, allow_nan=False
-    )
-    if file == Path("-"):
-        click.echo(text)
-    else:
-        file.write_text(text + "\n", encoding="utf-8", newline="\n")
-
-
-def _print(table: "Table", output: Output) -> None:
-    from masrel.report.latex import as_latex
-    from masrel.report.tables import as_csv, as_text
-
-    form = as_csv if output.csv else as_latex if output.latex else as_text
-    click.echo(form(table).rstrip("\n"))
-    if output.csv:  # which has no place for notes
-        for note in table.notes:
-            click.echo(note, err=True)
+    write_json({"estimates": documents}, file)

@@ -1,11 +1,11 @@
 """``masrel between``: model files at even steps between models."""
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
+from masrel.cli.output import write_json
 from masrel.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -66,13 +66,10 @@ def command(
         raise ParameterError("--overwrite: needs --output: nothing is written without")
     made = between([read_source(model) for model in models], n_models)
     files = [] if folder is None else _write(made, folder, overwrite=overwrite)
-    document = json.dumps(_document(made, files), indent=1, ensure_ascii=False)
-    if json_file == Path("-"):
-        click.echo(document)
-        return
     if json_file is not None:
-        json_file.write_text(document + "\n", encoding="utf-8")
-    click.echo(_table(made))
+        write_json(_document(made, files), json_file)
+    if json_file != Path("-"):
+        click.echo(_table(made))
 
 
 def _write(made: "list[Between]", folder: Path, *, overwrite: bool) -> list[Path]:

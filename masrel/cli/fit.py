@@ -1,6 +1,5 @@
 """``masrel fit``: identify a joint, or a device's friction, from recordings."""
 
-import json
 import math
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,6 +9,7 @@ import click
 
 from masrel.cli.fit_figures import draw_friction_fit, draw_joint_fit
 from masrel.cli.notes import notes
+from masrel.cli.output import write_json
 from masrel.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -218,14 +218,12 @@ def _write_model(found: "ElbowFit", path: Path) -> None:
 
 
 def _say(found: "ElbowFit | FrictionFit", json_file: Path | None) -> None:
-    from masrel.cli.fit_document import fit_document
-
-    document = json.dumps(fit_document(found), indent=1, ensure_ascii=False)
-    if json_file == Path("-"):
-        click.echo(document)
-        return
     if json_file is not None:
-        json_file.write_text(document + "\n", encoding="utf-8")
+        from masrel.cli.fit_document import fit_document
+
+        write_json(fit_document(found), json_file)
+    if json_file == Path("-"):
+        return
     from masrel.elbow.identification import ElbowFit
     from masrel.report.fit_table import fit_table, friction_table
     from masrel.report.tables import as_text

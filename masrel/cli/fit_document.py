@@ -33,7 +33,7 @@ def fit_document(fit: "ElbowFit | FrictionFit") -> dict[str, object]:
     return {
         "simulated": fit.simulated,
         "level": fit.level,
-        "relative_error": fit.relative_error,
+        "relative_error": _known(fit.relative_error),
         "torque_sd_nm": fit.torque_sd,
         "estimates": [_estimate(e, QUANTITIES[e.name]) for e in fit.estimates],
         "correlation": _matrix(fit.correlation.tolist()),
@@ -57,7 +57,7 @@ def _device(fit: FrictionFit) -> dict[str, object]:
         "simulated": fit.simulated,
         "level": fit.level,
         "n_strokes": len(fit.strokes),
-        "relative_error": fit.relative_error,
+        "relative_error": _known(fit.relative_error),
         "torque_sd_nm": fit.torque_sd,
         "estimates": [_estimate(e, FRICTION[e.name]) for e in fit.estimates],
         "correlation": _matrix(fit.correlation.tolist()),

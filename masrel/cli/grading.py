@@ -1,6 +1,5 @@
 """``masrel grading``: what grades follow, by ordered regression."""
 
-import json
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -10,6 +9,7 @@ import click
 from masrel.cli.columns import listed
 from masrel.cli.material import read_material
 from masrel.cli.notes import notes
+from masrel.cli.output import write_json
 
 if TYPE_CHECKING:
     from masrel.analysis.grading import Effect, GradeRegression
@@ -72,13 +72,10 @@ def command(
             session=session,
             level=level,
         )
-    document = json.dumps(_document(found), indent=1, ensure_ascii=False)
-    if json_file == Path("-"):
-        click.echo(document)
-        return
     if json_file is not None:
-        json_file.write_text(document + "\n", encoding="utf-8")
-    click.echo(_table(found))
+        write_json(_document(found), json_file)
+    if json_file != Path("-"):
+        click.echo(_table(found))
 
 
 def _document(found: "GradeRegression") -> dict[str, object]:

@@ -1,6 +1,5 @@
 """Where ``masrel latent`` puts what it found: the screen, JSON, and a figure."""
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,18 +9,16 @@ import click
 from masrel.cli.folders import check_folders
 from masrel.cli.latent_table import latent_document, latent_table
 from masrel.cli.options import grouped
+from masrel.cli.output import figure_form, print_table, tell, write_json
 from masrel.errors import ParameterError
 
 if TYPE_CHECKING:
     from masrel.intervals.latent.result import LatentTrait
     from masrel.intervals.quantity import Quantity
     from masrel.ratings import Ratings
-    from masrel.report.figures import Form, ScaleRow
-    from masrel.report.tables import Table
+    from masrel.report.figures import ScaleRow
 
 __all__ = ["Output", "output_options", "put"]
-
-_FORMS: dict[str, "Form"] = {".png": "png", ".svg": "svg", ".pdf": "pdf"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,11 +42,8 @@ class Output:
     def __post_init__(self) -> None:
         if self.csv and self.prints_json:
             raise ParameterError("--json - and --csv want the same stdout: choose one")
-        if self.figure is not None and self.figure.suffix.lower() not in _FORMS:
-            raise ParameterError(
-                "--figure: needs a name that ends in .png, .svg or .pdf, got "
-                f"{self.figure}"
-            )
+        if self.figure is not None:
+            figure_form(self.figure)
         check_folders(json=self.json_file, figure=self.figure)
 
     @property
@@ -106,37 +100,15 @@ def put(
         If a file cannot be written.
     """
     if output.json_file is not None:
-        _write_json(found, output.json_file)
+        write_json(latent_document(found), output.json_file)
     if output.prints_json:
-        _tell(about)
+        tell(about)
     else:
         data = "simulated" if ratings.simulated else "foreign"
-        _print(latent_table(found, file, about, data), csv=output.csv)
+        print_table(latent_table(found, file, about, data), csv=output.csv)
     if output.figure is not None:
         _draw(found, ratings, output.figure)
         click.echo(f"figure: {output.figure}", err=True)
-
-
-def _write_json(found: "LatentTrait", file: Path) -> None:
-    text = json.dumps(
-        latent_document(found), indent=1, ensure_ascii=False, allow_nan=False
-    )
-    if file == Path("-"):
-        click.echo(text)
-    else:
-        file.write_text(text + "\n", encoding="utf-8", newline="\n")
-
-
-def _print(table: "Table", *, csv: bool) -> None:
-    from masrel.report.tables import as_csv, as_text
-
-    click.echo((as_csv if csv else as_text)(table).rstrip("\n"))
-    if csv:  # which has no place for notes
-        _tell(table.notes)
-
-
-def _tell(notes: tuple[str, ...]) -> None:
-    click.echo("".join(f"{note}\n" for note in notes), err=True, nl=False)
 
 
 def _draw(found: "LatentTrait", ratings: "Ratings", file: Path) -> None:
@@ -157,7 +129,7 @@ def _draw(found: "LatentTrait", ratings: "Ratings", file: Path) -> None:
         latent_file(
             scale,
             stamp="SIMULATED DATA" if ratings.simulated else "",
-            form=_FORMS[file.suffix.lower()],
+            form=figure_form(file),
         )
     )
 

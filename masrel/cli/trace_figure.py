@@ -5,11 +5,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from masrel.cli.output import figure_form
 from masrel.cli.trace_scene import Scene
 from masrel.errors import ParameterError
 
 if TYPE_CHECKING:
-    from masrel.report.figures import CatchCurve, CatchSchematic, Form, StretchPanel
+    from masrel.report.figures import CatchCurve, CatchSchematic, StretchPanel
 
 __all__ = ["VIEWS", "check_figure", "write_figure"]
 
@@ -17,8 +18,6 @@ VIEWS = ("angle", "time", "catch", "schematic")
 
 N_PIXELS = 800
 """Points a line has: a panel is less wide than that."""
-
-_FORMS: dict[str, "Form"] = {".png": "png", ".svg": "svg", ".pdf": "pdf"}
 
 
 def check_figure(file: Path, view: str, scenes: Sequence[Scene]) -> None:
@@ -40,10 +39,7 @@ def check_figure(file: Path, view: str, scenes: Sequence[Scene]) -> None:
         beside each other or more lines than can be told apart, too few speeds, or
         too many scenes for a schematic, or none with a catch.
     """
-    if file.suffix.lower() not in _FORMS:
-        raise ParameterError(
-            f"--figure: needs a name that ends in .png, .svg or .pdf, got {file}"
-        )
+    figure_form(file)
     models = _by_model(scenes)
     most = max(len(own) for own in models.values())
     if len(models) > 5 or (view != "catch" and (len(models) > 4 or most > 5)):
@@ -100,7 +96,7 @@ def write_figure(scenes: Sequence[Scene], view: str, file: Path) -> None:
     """
     from masrel.report import figures
 
-    form = _FORMS[file.suffix.lower()]
+    form = figure_form(file)
     stamp = "computed from the joint model, not measured"
     if view == "catch":
         curves = [_curve(name, own) for name, own in _by_model(scenes).items()]

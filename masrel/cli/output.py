@@ -1,0 +1,109 @@
+"""Where a verb puts what it found: JSON, a table, and the form of a figure."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from masrel.errors import ParameterError
+
+if TYPE_CHECKING:
+    from masrel.report.figures import Form
+    from masrel.report.tables import Table
+
+__all__ = ["figure_form", "print_table", "tell", "write_json"]
+
+_FORMS: dict[str, "Form"] = {".png": "png", ".svg": "svg", ".pdf": "pdf"}
+
+
+def write_json(document: dict[str, object], file: Path) -> None:
+    """Write a document, or print it.
+
+    Parameters
+    ----------
+    document : dict
+        Plain values, no ``nan`` among them.
+    file : Path
+        Where to; "-" is the screen.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+
+    Examples
+    --------
+    >>> write_json({"symbol": "θ"}, Path("-"))
+    {
+     "symbol": "θ"
+    }
+    """
+    text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
+    if file == Path("-"):
+        click.echo(text)
+    else:
+        file.write_text(text + "\n", encoding="utf-8", newline="\n")
+
+
+def print_table(table: "Table", *, csv: bool, latex: bool = False) -> None:
+    """Print a table.
+
+    Parameters
+    ----------
+    table : Table
+        The table.
+    csv : bool
+        Whether as CSV, its notes on stderr: CSV has no place for them.
+    latex : bool, optional
+        Whether as LaTeX; as text when neither.
+    """
+    from masrel.report.latex import as_latex
+    from masrel.report.tables import as_csv, as_text
+
+    form = as_csv if csv else as_latex if latex else as_text
+    click.echo(form(table).rstrip("\n"))
+    if csv:
+        tell(table.notes)
+
+
+def tell(notes: tuple[str, ...]) -> None:
+    """Say notes on stderr, one a line.
+
+    Parameters
+    ----------
+    notes : tuple of str
+        What to say; nothing if there is none.
+    """
+    click.echo("".join(f"{note}\n" for note in notes), err=True, nl=False)
+
+
+def figure_form(file: Path) -> "Form":
+    """Return in which form a figure is wanted.
+
+    Parameters
+    ----------
+    file : Path
+        Where ``--figure`` wants it.
+
+    Returns
+    -------
+    {"png", "svg", "pdf"}
+        As its name ends.
+
+    Raises
+    ------
+    ParameterError
+        If it ends otherwise.
+
+    Examples
+    --------
+    >>> figure_form(Path("scale.PDF"))
+    'pdf'
+    """
+    form = _FORMS.get(file.suffix.lower())
+    if form is None:
+        raise ParameterError(
+            f"--figure: needs a name that ends in .png, .svg or .pdf, got {file}"
+        )
+    return form
