@@ -15,14 +15,14 @@ from masrel.hess.ending import run_to_the_end
 from masrel.hess.fault import Fault
 from masrel.hess.limits import DeviceLimits
 from masrel.hess.movement import Columns, movement_facts
-from masrel.hess.presented import Fact, Presented, fault_facts
+from masrel.hess.presented import Presented, fault_facts
 from masrel.hess.realtime import real_time
 from masrel.hess.samples import Samples, n_samples
 from masrel.hess.spool import Spool
 from masrel.hess.stop import EmergencyStop
 from masrel.hess.ticks import Ticks
 from masrel.hess.watchdog import NoWatchdog, Watching
-from masrel.recording import Recording
+from masrel.recording import Fact, Recording
 
 __all__ = ["run_presentation"]
 

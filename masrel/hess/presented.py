@@ -9,11 +9,9 @@ from masrel.hess.fault import Fault
 from masrel.hess.movement import movement_facts
 from masrel.hess.samples import recorded_columns
 from masrel.hess.spool import read_spool
-from masrel.recording import Recording
+from masrel.recording import Fact, Recording
 
-__all__ = ["Fact", "Presented", "cut_off", "fault_facts"]
-
-Fact = str | int | float | bool | None
+__all__ = ["Presented", "cut_off", "fault_facts"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -49,6 +49,7 @@ class Samples:
         "_angle",
         "_command",
         "_model",
+        "_parts",
         "_phase",
         "_time",
         "_velocity",
@@ -64,9 +65,9 @@ class Samples:
             words = spool.words
         self._words = words
         starts = range(1, n_words, max(capacity, 1))
-        parts = [words[start : start + capacity] for start in starts]
-        self._time, self._angle, self._velocity = parts[:3]
-        self._model, self._command, self._phase = parts[3:]
+        self._parts = [words[start : start + capacity] for start in starts]
+        self._time, self._angle, self._velocity = self._parts[:3]
+        self._model, self._command, self._phase = self._parts[3:]
         self.n = 0
 
     def add(
@@ -128,29 +129,14 @@ class Samples:
         dict of str to ndarray, shape (n,)
             One array per name of `masrel.recording.RECORDING_COLUMNS`.
         """
-        parts = (
-            self._time,
-            self._angle,
-            self._velocity,
-            self._model,
-            self._command,
-            self._phase,
-        )
         written = np.empty((N_COLUMNS, self.n))
-        for row, part in zip(written, parts, strict=True):
+        for row, part in zip(written, self._parts, strict=True):
             row[:] = part[: self.n]
         return recorded_columns(written)
 
     def close(self) -> None:
         """Let go of a spool's memory, so that it can be closed; nothing is left."""
-        for part in (
-            self._time,
-            self._angle,
-            self._velocity,
-            self._model,
-            self._command,
-            self._phase,
-        ):
+        for part in self._parts:
             part.release()
 
 

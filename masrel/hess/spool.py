@@ -14,14 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.errors import RecordingError
+from masrel.recording import Fact
 
 __all__ = ["N_COLUMNS", "Spool", "Spooled", "read_spool"]
 
 N_COLUMNS = 6
 _HEADER = 4096  # bytes for the facts, a page
 _WORD = 8  # bytes of a float64
-
-Fact = str | int | float | bool | None
 
 
 class Spool:
