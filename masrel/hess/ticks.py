@@ -242,11 +242,12 @@ class Ticks:
         """
         if self._latest is None:
             return
-        _, angle, velocity = self._latest
-        time_s = max((now_ns - self._start_ns) * 1e-9, self._latest[0])
-        controller = self._controller
-        model, phase = controller.model_torque, controller.phase
+        read_s, angle, velocity = self._latest
+        time_s = max((now_ns - self._start_ns) * 1e-9, read_s)
         if time_s <= self.samples.last_time_s:
             self.samples.replace_command(torque)
             return
-        self.samples.add(time_s, angle, velocity, model, torque, phase)
+        controller = self._controller
+        self.samples.add(
+            time_s, angle, velocity, controller.model_torque, torque, controller.phase
+        )
