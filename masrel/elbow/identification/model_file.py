@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import TYPE_CHECKING
 
+from masrel.elbow.identification.quantities import DEGREES, QUANTITIES
 from masrel.elbow.parameters import ElbowParameters
 from masrel.errors import ParameterError
 
@@ -16,30 +17,29 @@ __all__ = ["FORMAT", "as_toml", "model_document"]
 FORMAT = "masrel joint model 1"
 """What the key ``format`` of a model file says."""
 
-_DEGREES = 180.0 / math.pi
 
-MODEL_KEYS = {
-    "catch_angle_constant_deg": ("catch_angle_constant", _DEGREES),  # L
-    "catch_torque_nms_rad": ("catch_torque_constant", 1.0),  # H
-    "residual_ratio": ("residual_ratio", 1.0),  # Q
-    "catch_travel_deg": ("catch_travel", _DEGREES),  # D
-}
+def _keys(*names: str) -> dict[str, tuple[str, float]]:
+    return {QUANTITIES[name].key: (name, QUANTITIES[name].factor) for name in names}
+
+
+MODEL_KEYS = _keys(
+    "catch_angle_constant",  # L
+    "catch_torque_constant",  # H
+    "residual_ratio",  # Q
+    "catch_travel",  # D
+)
 """Key of a protocol's model to the parameter and its unit in SI units."""
 
-CONSTANT_KEYS = {
-    "inertia_kg_m2": ("inertia", 1.0),
-    "damping_nms_rad": ("damping", 1.0),
-    "stiffness_nm_rad": ("stiffness", 1.0),
-    "catch_slope_s": ("catch_slope", 1.0),
-    "post_catch_stiffness_nm_rad": ("post_catch_stiffness", 1.0),
-}
+CONSTANT_KEYS = _keys(
+    "inertia", "damping", "stiffness", "catch_slope", "post_catch_stiffness"
+)
 """Likewise the constants that a model may have of its own."""
 
 READING_KEYS = ("post_catch", "residual_reading")
 """How H, Q and k_post are to be read: without it the numbers are another joint."""
 
 VARIANT_KEYS = {
-    "rest_angle_deg": ("rest_angle", _DEGREES),
+    "rest_angle_deg": ("rest_angle", DEGREES),
     "catch_rise_s": ("catch_rise", 1.0),
 }
 """Constants that are written where they are not the default."""
@@ -116,11 +116,10 @@ def _constants(joint: ElbowParameters) -> Document:
 
 
 def _estimates(fit: "ElbowFit") -> list[Document]:
-    names = {name: key for key, (name, _) in {**MODEL_KEYS, **CONSTANT_KEYS}.items()}
-    factors = dict({**MODEL_KEYS, **CONSTANT_KEYS}.values())
     made = []
     for estimate in fit.estimates:
-        factor = factors[estimate.name]
+        quantity = QUANTITIES[estimate.name]
+        factor = quantity.factor
         numbers = {
             "value": estimate.value * factor,
             "standard_error": estimate.standard_error * factor,
@@ -128,7 +127,7 @@ def _estimates(fit: "ElbowFit") -> list[Document]:
             "high": estimate.high * factor,
             "degrees_of_freedom": estimate.freedom,
         }
-        entry: Document = {"key": names[estimate.name], "level": estimate.level}
+        entry: Document = {"key": quantity.key, "level": estimate.level}
         entry.update({k: v for k, v in numbers.items() if math.isfinite(v)})
         entry["n_trials"] = estimate.n_trials
         if estimate.reason is not None:

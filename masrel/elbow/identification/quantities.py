@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-__all__ = ["QUANTITIES", "Quantity"]
+__all__ = ["DEGREES", "QUANTITIES", "Quantity"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,14 +28,15 @@ class Quantity:
     factor: float = 1.0
 
 
-_DEGREES = 180.0 / math.pi
+DEGREES = 180.0 / math.pi
+"""Of a radian."""
 
 QUANTITIES: dict[str, Quantity] = {
     "damping": Quantity(symbol="b", key="damping_nms_rad", unit="N·m·s/rad"),
     "stiffness": Quantity(symbol="k", key="stiffness_nm_rad", unit="N·m/rad"),
     "inertia": Quantity(symbol="m", key="inertia_kg_m2", unit="kg·m²"),
     "catch_angle_constant": Quantity(
-        symbol="L", key="catch_angle_constant_deg", unit="deg", factor=_DEGREES
+        symbol="L", key="catch_angle_constant_deg", unit="deg", factor=DEGREES
     ),
     "catch_slope": Quantity(symbol="α", key="catch_slope_s", unit="s"),
     "catch_torque_constant": Quantity(
@@ -43,7 +44,7 @@ QUANTITIES: dict[str, Quantity] = {
     ),
     "residual_ratio": Quantity(symbol="Q", key="residual_ratio", unit="1"),
     "catch_travel": Quantity(
-        symbol="D", key="catch_travel_deg", unit="deg", factor=_DEGREES
+        symbol="D", key="catch_travel_deg", unit="deg", factor=DEGREES
     ),
     "post_catch_stiffness": Quantity(
         symbol="k_post", key="post_catch_stiffness_nm_rad", unit="N·m/rad"
