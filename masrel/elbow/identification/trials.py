@@ -146,19 +146,15 @@ def _changes(
     ends: tuple[int, int],
 ) -> Changes:
     onset, stop = ends
-    pre = (
-        law.damping * stretch.velocity
-        + law.stiffness * stretch.angle
-        + law.inertia * stretch.acceleration
-    )
+    part = part_of(stretch, slice(0, stop))
     return find_changes(
-        stretch.torque[:stop],
-        pre[:stop],
-        stretch.angle[:stop],
+        part.torque,
+        law.torque(part),
+        part.angle,
         first=onset,
         peak=round(constants.peak_duration / stretch.samples.period),
         additive=constants.post_catch == "additive",
-        pushed=law.inertia * stretch.acceleration[:stop] if law.inertia else None,
+        pushed=law.inertia * part.acceleration if law.inertia else None,
     )
 
 
@@ -186,13 +182,12 @@ def _after(
 
 
 def _unused(stretch: Stretch, name: str, why: str) -> Trial:
-    nothing = np.zeros(stretch.time.size, dtype=np.bool_)
     return Trial(
         name=name,
         pace="fast",
         start=float(stretch.time[0]),
         duration=float(stretch.time[-1] - stretch.time[0]),
         peak_speed=stretch.peak_speed,
-        pre_catch=part_of(stretch, slice(0, stretch.time.size)).keep(nothing),
+        pre_catch=part_of(stretch, slice(0, 0)),
         remark=f"not used: {why}",
     )
