@@ -167,8 +167,17 @@ class Link:
             self._clock.sleep_until_ns(due_ns)
 
     def close(self) -> None:
-        """Leave the bus; doing it twice does nothing more."""
-        self._bus.shutdown()
+        """Leave the bus; doing it twice does nothing more.
+
+        Raises
+        ------
+        BusError
+            If the adapter does not let go.
+        """
+        try:
+            self._bus.shutdown()
+        except (can.CanError, OSError) as error:
+            raise BusError(f"puck: the bus cannot be left ({error})") from error
 
     def _received(self, timeout_s: float) -> Frame | None:
         # A timeout of 0 does not wait.

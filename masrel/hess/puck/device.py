@@ -1,9 +1,10 @@
 """The puck as a device: read and commanded once a tick, idled when it is closed."""
 
 import math
+from contextlib import suppress
 from typing import ClassVar
 
-from masrel.errors import DeviceError, LimitExceededError
+from masrel.errors import BusError, DeviceError, LimitExceededError
 from masrel.hess.clock import Clock
 from masrel.hess.device import Device, IdleCommand, Reading
 from masrel.hess.puck import bring_up
@@ -64,7 +65,7 @@ class PuckDevice(Device):
         try:
             self._bring_up()
         except BaseException:
-            self._disconnect()
+            self._abandon()
             raise
 
     def _connect(self) -> None:
@@ -78,6 +79,10 @@ class PuckDevice(Device):
 
     def _disconnect(self) -> None:
         self._link.close()
+
+    def _abandon(self) -> None:
+        with suppress(BusError):  # what is on its way to the caller matters more
+            self._disconnect()
 
     def _bring_up(self) -> None:
         options = self._options
@@ -150,8 +155,10 @@ class PuckDevice(Device):
     def _stop(self) -> None:
         try:
             self._release()
-        finally:
-            self._disconnect()
+        except BaseException:
+            self._abandon()
+            raise
+        self._disconnect()
 
     def _release(self) -> None:
         release(

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from math import degrees, radians
 
+import can
 import numpy as np
 import pytest
 
@@ -429,3 +430,28 @@ def test_a_bus_that_comes_back_while_closing_is_used() -> None:
     clock.sleep_until_ns(clock.now_ns() + 15_000_000)
     device.close()
     assert device.emulator.registers.mode == 0
+
+
+@pytest.mark.parametrize(
+    ("faults", "said"),
+    [
+        ((), "the bus cannot be left"),
+        ((fault("unplugged", 0.4),), "SWITCH ITS SUPPLY OFF"),  # more important
+    ],
+)
+def test_an_adapter_that_does_not_let_go_is_a_fault_of_the_bus(faults, said) -> None:
+    # As one on a serial port does that has been pulled out
+    clock = SimulatedClock()
+    device = opened(clock, loose(), emulator={"faults": faults})
+    bus = device._link._bus
+    shut_down = bus.shutdown
+
+    def failing() -> None:
+        shut_down()
+        raise can.CanOperationError("no such port")
+
+    bus.shutdown = failing
+    clock.sleep_until_ns(clock.now_ns() + 500_000_000)
+    with pytest.raises(DeviceError, match=said):
+        device.close()
+    bus.shutdown = shut_down
