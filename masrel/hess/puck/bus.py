@@ -4,7 +4,8 @@ A frame that a bus reports is a `Frame`, an error that python-can raises a
 `DeviceError`, a wait ends at a time on the loop's clock.
 """
 
-from typing import Any, NamedTuple, Protocol
+from types import TracebackType
+from typing import Any, NamedTuple, Protocol, Self
 
 from masrel.errors import BusError, DeviceError
 from masrel.hess.clock import Clock
@@ -78,7 +79,7 @@ class Neighbour(Protocol):
 
 
 class Link:
-    """One end of a bus.
+    """One end of a bus; a context manager that leaves it.
 
     Parameters
     ----------
@@ -99,6 +100,21 @@ class Link:
         self._bus = bus
         self._clock = clock
         self._neighbour = neighbour
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        try:
+            self.close()
+        except BusError:
+            if error is None:  # else that one matters more
+                raise
 
     def send(self, frame: Frame) -> int:
         """Send a frame.

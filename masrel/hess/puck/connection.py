@@ -1,7 +1,7 @@
 """Join a bus for a while, and wake a puck on it; nothing moves."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 
 from masrel.hess.clock import Clock
@@ -74,31 +74,30 @@ def connected(
     Raises
     ------
     DeviceError
-        If the bus cannot be opened.
+        If the bus cannot be opened, or left without an error before that.
     """
-    emulator = None
-    if hand is not None:
-        emulator = PuckEmulator(
-            link=open_link(options.interface, options.channel, clock=clock),
-            clock=clock,
-            hand=hand,
-            range_end=range_end,
-            options=options.emulator or EmulatorOptions(),
-            puck=options.puck,
+    with ExitStack() as held:
+        emulator = None
+        if hand is not None:
+            emulator = PuckEmulator(
+                link=held.enter_context(
+                    open_link(options.interface, options.channel, clock=clock)
+                ),
+                clock=clock,
+                hand=hand,
+                range_end=range_end,
+                options=options.emulator or EmulatorOptions(),
+                puck=options.puck,
+            )
+        yield held.enter_context(
+            open_link(
+                options.interface,
+                options.channel,
+                clock=clock,
+                accepted=None if hears_all else accepted_identifiers(options.puck),
+                neighbour=emulator,
+            )
         )
-    link = open_link(
-        options.interface,
-        options.channel,
-        clock=clock,
-        accepted=None if hears_all else accepted_identifiers(options.puck),
-        neighbour=emulator,
-    )
-    try:
-        yield link
-    finally:
-        link.close()
-        if emulator is not None:
-            emulator.close()
 
 
 def awake(link: Link, clock: Clock, options: PuckOptions) -> Awake:

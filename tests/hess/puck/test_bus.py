@@ -4,11 +4,12 @@ import time
 
 import can
 import pytest
+from can.interfaces.virtual import VirtualBus
 
 from masrel.errors import BusError
 from masrel.hess import RealClock, SimulatedClock
 from masrel.hess.puck.arrivals import accepted_identifiers
-from masrel.hess.puck.bus import Frame, open_link
+from masrel.hess.puck.bus import Frame, Link, open_link
 
 
 @pytest.fixture
@@ -76,6 +77,25 @@ def test_a_closed_bus_is_said_to_be(ends) -> None:
     assert caught.value.kind == "bus"
     with pytest.raises(BusError, match="the bus cannot be read"):
         link.receive(0)
+
+
+@pytest.mark.parametrize(
+    ("before", "said"),
+    [(None, "the bus cannot be left"), ("still under torque", "still under torque")],
+)
+def test_a_bus_that_cannot_be_left_hides_no_error_before(before, said: str) -> None:
+    class Stuck(VirtualBus):
+        def shutdown(self) -> None:
+            super().shutdown()
+            raise can.CanOperationError("no such port")
+
+    def leave() -> None:
+        with Link(Stuck(channel="stuck"), RealClock()):
+            if before is not None:
+                raise BusError(before)
+
+    with pytest.raises(BusError, match=said):
+        leave()
 
 
 class Metronome:
