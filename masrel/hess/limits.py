@@ -5,7 +5,10 @@ from dataclasses import dataclass
 
 from masrel.errors import ParameterError
 
-__all__ = ["LONGEST_RAMP_S", "DeviceLimits"]
+__all__ = ["HIGHEST_ANGLE", "LONGEST_RAMP_S", "LOWEST_ANGLE", "DeviceLimits"]
+
+LOWEST_ANGLE, HIGHEST_ANGLE = math.radians(-5.0), math.radians(185.0)
+"""No elbow is outside, rad; 5 deg because an end stop gives way a little."""
 
 LONGEST_RAMP_S = 0.1
 """A fault's torque is zero after this at the latest, s."""
@@ -88,8 +91,8 @@ class DeviceLimits:
     torque: float = 20.0
     torque_rate: float = 12_000.0
     speed: float = math.radians(400.0)
-    lowest_angle: float = math.radians(-5.0)
-    highest_angle: float = math.radians(185.0)
+    lowest_angle: float = LOWEST_ANGLE
+    highest_angle: float = HIGHEST_ANGLE
     soft_stop_width: float = math.radians(5.0)
     soft_stop_torque: float = 10.0
     missed_ticks: int = 20

@@ -5,6 +5,7 @@ import statistics
 from dataclasses import dataclass
 
 from masrel.errors import DeviceError, DeviceTimeoutError
+from masrel.hess.limits import HIGHEST_ANGLE, LOWEST_ANGLE
 from masrel.hess.puck.bring_up import activate, check_torque
 from masrel.hess.puck.connection import Awake
 from masrel.hess.puck.node import PuckNode
@@ -20,7 +21,6 @@ _LONGEST_ANSWER_S = (
     0.0007  # of the millisecond; the rest is for the torque and the host
 )
 _SHARE_IN_TIME = 0.99
-_LOWEST_ANGLE, _HIGHEST_ANGLE = math.radians(-5.0), math.radians(185.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,7 +127,7 @@ def _position(counts: list[int], puck: Awake) -> list[Check]:
     return [
         Check(
             name="position",
-            holds=_LOWEST_ANGLE <= angle <= _HIGHEST_ANGLE,
+            holds=LOWEST_ANGLE <= angle <= HIGHEST_ANGLE,
             found=f"{math.degrees(angle):.2f} deg; {look}",
         ),
         Check(

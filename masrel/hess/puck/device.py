@@ -7,6 +7,7 @@ from typing import ClassVar
 from masrel.errors import BusError, DeviceError, LimitExceededError
 from masrel.hess.clock import Clock
 from masrel.hess.device import Device, IdleCommand, Reading
+from masrel.hess.limits import HIGHEST_ANGLE, LOWEST_ANGLE
 from masrel.hess.puck import bring_up
 from masrel.hess.puck.arrivals import accepted_identifiers
 from masrel.hess.puck.bus import open_link
@@ -20,7 +21,6 @@ from masrel.hess.puck.transmission import Transmission
 
 __all__ = ["PuckDevice"]
 
-_LOWEST_ANGLE, _HIGHEST_ANGLE = math.radians(-5.0), math.radians(185.0)
 _SHARED_INTERFACES = frozenset({"socketcan", "udp_multicast"})
 _IDLING_MODULE = "masrel.hess.puck.idling"
 
@@ -116,7 +116,7 @@ class PuckDevice(Device):
         self._position_number = number = self._table.number("P")
         _, counts = self._node.position(number, patience_s=0.05)
         angle = self.transmission.angle(counts)
-        if not _LOWEST_ANGLE <= angle <= _HIGHEST_ANGLE:
+        if not LOWEST_ANGLE <= angle <= HIGHEST_ANGLE:
             raise DeviceError(
                 f"puck {self._node.puck}: needs an arm between -5 and 185 deg, it "
                 f"reports {math.degrees(angle):.1f}; run masrel device zero"
