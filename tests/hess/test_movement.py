@@ -68,13 +68,13 @@ def test_without_an_extension_there_is_none(velocity: list[float]) -> None:
 
 def test_a_fault_before_the_catch_leaves_no_mean_speed() -> None:
     found = columns([0, 30, 30, 999], angle_deg=[30, 33, 36, 136], phase=[0] * 4)
-    assert movement_facts(found, THRESHOLD, None)["mean_speed_deg_s"] is not None
-    assert movement_facts(found, THRESHOLD, "speed")["mean_speed_deg_s"] is None
+    assert movement_facts(found, THRESHOLD, False)["mean_speed_deg_s"] is not None
+    assert movement_facts(found, THRESHOLD, True)["mean_speed_deg_s"] is None
 
 
 def test_a_fault_after_the_catch_leaves_it() -> None:
     found = columns([0, 30, 30, 999], angle_deg=[30, 33, 36, 136], phase=[0, 0, 1, 1])
-    facts = movement_facts(found, THRESHOLD, "speed")
+    facts = movement_facts(found, THRESHOLD, True)
     assert facts["mean_speed_deg_s"] == pytest.approx(30.0)
 
 
