@@ -46,7 +46,8 @@ def prevalence_index(table: ArrayLike) -> float:
     >>> prevalence_index([[20, 5], [5, 10]])
     0.25
     """
-    (a, _), (_, d), n = *_two_by_two(table), _size(table)
+    (a, b), (c, d) = _two_by_two(table)
+    n = a + b + c + d
     return abs(a - d) / n if n else _no_item("the prevalence index")
 
 
@@ -83,7 +84,8 @@ def bias_index(table: ArrayLike) -> float:
     >>> bias_index([[20, 6], [4, 10]])
     0.05
     """
-    (_, b), (c, _), n = *_two_by_two(table), _size(table)
+    (a, b), (c, d) = _two_by_two(table)
+    n = a + b + c + d
     return abs(b - c) / n if n else _no_item("the bias index")
 
 
@@ -139,10 +141,6 @@ def _two_by_two(table: ArrayLike) -> list[list[int]]:
         raise CountsError(f"table: needs 2 × 2, got {len(cells)} × {len(cells)}")
     found: list[list[int]] = cells.tolist()
     return found
-
-
-def _size(table: ArrayLike) -> int:
-    return int(check_table(table).sum())
 
 
 def _no_item(title: str) -> float:
