@@ -59,7 +59,6 @@ def stuart_maxwell(table: ArrayLike) -> Significance:
         1 if df else 0,
         df,
         int(cells.sum()),
-        "no item changed",
     )
 
 
@@ -115,7 +114,6 @@ def bhapkar(table: ArrayLike) -> Significance:
         1 if df else 0,
         df,
         n,
-        "no item changed",
     )
 
 

@@ -93,22 +93,19 @@ def chi_squared(
     below: int,
     df: int,
     n_items: int,
-    without: str,
 ) -> Significance:
-    """Refer a ratio to the chi-squared law.
+    """Refer a ratio of two ratings' changes to the chi-squared law.
 
     Parameters
     ----------
     name, hypothesis : str
         Name of the test, and what it asks.
     above, below : float, int
-        The statistic as numerator and denominator.
+        The statistic as numerator and denominator, which is 0 if no item changed.
     df : int
         Degrees of freedom.
     n_items : int
         Items it rests on.
-    without : str
-        Why the denominator can be 0, as a clause.
 
     Returns
     -------
@@ -124,7 +121,7 @@ def chi_squared(
 
     if below == 0:  # an empty sum is 0; of no degrees of freedom it says nothing
         statistic, p = 0.0 if df == 0 else math.nan, math.nan
-        reason = undefined(name, f"0/0: {without}")
+        reason = undefined(name, "0/0: no item changed")
     else:
         statistic, reason = above / below, None
         p = float(chdtrc(df, statistic))

@@ -121,9 +121,7 @@ def mcnemar(table: ArrayLike, *, kind: McnemarKind = "exact") -> Significance:
             n_items=n_items,
         )
     apart = max(abs(b - c) - 1, 0) if kind == "corrected" else abs(b - c)
-    return chi_squared(
-        "mcnemar", hypothesis, apart * apart, b + c, 1, n_items, "no item changed"
-    )
+    return chi_squared("mcnemar", hypothesis, apart * apart, b + c, 1, n_items)
 
 
 def _both_tails(fewer: int, n: int) -> float:
@@ -187,5 +185,4 @@ def bowker(table: ArrayLike) -> Significance:
         common if pairs else 0,
         len(pairs),
         sum(map(sum, cells)),
-        "no item changed",
     )
