@@ -10,18 +10,11 @@ from masrel.report.estimate_words import (
     as_words,
     coefficient_name,
     has_zero,
-    interval_name,
 )
 from masrel.report.meaning import aside, meaning
 from masrel.report.tables import counted
 
-__all__ = [
-    "EstimateRow",
-    "coefficient_name",
-    "estimate_rows",
-    "interval_name",
-    "meanings",
-]
+__all__ = ["EstimateRow", "estimate_rows", "meanings"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

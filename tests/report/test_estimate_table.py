@@ -9,13 +9,9 @@ import pytest
 
 from masrel.analysis import PlannedEstimate, RaterEstimate
 from masrel.estimates import Estimate, Interval
-from masrel.report.estimate_rows import (
-    coefficient_name,
-    estimate_rows,
-    interval_name,
-    meanings,
-)
+from masrel.report.estimate_rows import estimate_rows, meanings
 from masrel.report.estimate_table import estimate_table
+from masrel.report.estimate_words import coefficient_name, interval_name
 from masrel.report.tables import Table, as_csv, as_text, on_page
 from tests.analysis.studies import plan
 
