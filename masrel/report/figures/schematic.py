@@ -11,6 +11,7 @@ from masrel.report.figures.style import (
     BLUE,
     DASHES,
     GREY,
+    SHADES,
     Form,
     as_bytes,
     house_style,
@@ -19,7 +20,6 @@ from masrel.report.figures.style import (
 
 __all__ = ["CatchSchematic", "draw_schematic"]
 
-_SHADES = {"pre-catch": "#FFFFFF", "catch": "#D9D9D9", "post-catch": "#F0F0F0"}
 _NUMERALS = ("i", "ii", "iii", "iv")
 
 
@@ -79,7 +79,7 @@ def draw_schematic(stretch: CatchSchematic, *, form: Form, stamp: str) -> bytes:
         highest = max(float(stretch.torque.max()), stretch.peak)
         axes.set_ylim(min(0.0, float(stretch.torque.min())), 1.22 * highest)
         for (name, start, end), numeral in zip(stretch.phases, _NUMERALS, strict=False):
-            axes.axvspan(start, end, color=_SHADES[name], linewidth=0, zorder=0)
+            axes.axvspan(start, end, color=SHADES[name], linewidth=0, zorder=0)
             axes.text(
                 0.5 * (start + end), 1.19 * highest, f"({numeral})\n{name}",
                 ha="center", va="top", fontsize=8,

@@ -16,6 +16,7 @@ from masrel.report.figures.style import (
     BLUE,
     GREY,
     ORANGE,
+    SHADES,
     VERMILLION,
     Form,
     as_bytes,
@@ -25,7 +26,6 @@ from masrel.report.figures.style import (
 
 __all__ = ["StretchLine", "StretchPanel", "draw_stretches"]
 
-_SHADES = {"pre-catch": "#FFFFFF", "catch": "#D9D9D9", "post-catch": "#F0F0F0"}
 _SOLID: tuple[float, ...] = (1.0, 0.0)
 _LINES: tuple[tuple[str, tuple[float, ...]], ...] = (
     (BLUE, _SOLID),
@@ -159,7 +159,7 @@ def _shade(
             inside = (line.time >= start) & (line.time <= end)
             start, end = line.angle[inside].min(), line.angle[inside].max()
         for axes in rows:
-            axes.axvspan(start, end, color=_SHADES[name], linewidth=0, zorder=0)
+            axes.axvspan(start, end, color=SHADES[name], linewidth=0, zorder=0)
     if len({name for name, _, _ in line.phases}) > 1:
         for axes in rows:
             for _, start, _ in line.phases[1:]:
@@ -179,7 +179,7 @@ def _legend(figure: Figure, panels: Sequence[StretchPanel], shaded: int) -> None
     shades = {name for panel in panels for name, _, _ in panel.lines[shaded].phases}
     which = longest.lines[shaded].label
     handles += [
-        Patch(facecolor=_SHADES[name], edgecolor=GREY, lw=0.4, label=f"{name}, {which}")
+        Patch(facecolor=SHADES[name], edgecolor=GREY, lw=0.4, label=f"{name}, {which}")
         for name in ("catch", "post-catch")
         if name in shades
     ]

@@ -26,6 +26,7 @@ __all__ = [
     "DASHES",
     "GREY",
     "ORANGE",
+    "SHADES",
     "VERMILLION",
     "Drawn",
     "Form",
@@ -46,6 +47,9 @@ VERMILLION = "#D55E00"
 
 DASHES = (0, (4, 3))
 """Line style of what is a reference, not data."""
+
+SHADES = {"pre-catch": "#FFFFFF", "catch": "#D9D9D9", "post-catch": "#F0F0F0"}
+"""Background of each phase of a stretch."""
 
 STYLE: "dict[RcKeyType, object]" = {
     "font.family": "DejaVu Sans",  # ships with matplotlib: the same everywhere
