@@ -33,8 +33,8 @@ BITRATE = 1_000_000
 # Classes of error in the identifier of SocketCAN's error frames (linux/can/error.h)
 CONTROLLER_ERROR, BUS_OFF, BUS_RESTARTED = 0x004, 0x040, 0x100
 
-# What python-can's interfaces raise where an adapter or its maker's library is missing,
-# or where they have to be told more than a channel
+# What python-can raises where it knows no such interface, and its interfaces where an
+# adapter or its maker's library is missing or they have to be told more than a channel
 _NOT_OPENED = (
     can.CanError,
     ImportError,
