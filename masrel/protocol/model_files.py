@@ -143,7 +143,8 @@ def _merged(
     entry: Mapping[str, Any], read: Mapping[str, Any], where: str, problems: list[str]
 ) -> dict[str, object]:
     model, constants = read.get("model", {}), read.get("constants", {})
-    model = {**model, "simulated": read.get("simulated", False)}
+    if "simulated" in read:
+        model = {**model, "simulated": read["simulated"]}
     own = entry.get("constants", {})
     for key in model:
         if key in entry:

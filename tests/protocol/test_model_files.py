@@ -104,6 +104,15 @@ def test_a_file_says_whether_it_comes_from_simulated_recordings(tmp_path: Path) 
     )
 
 
+def test_of_a_file_that_does_not_say_it_the_protocol_may(tmp_path: Path) -> None:
+    path = put(tmp_path)
+    text = path.read_text("utf-8").replace("simulated = true\n", "")
+    path.write_text(text, "utf-8")
+    for said in (False, True):
+        protocol = read_protocol(write(named(simulated=said), tmp_path))
+        assert protocol.models[0].simulated is said
+
+
 def test_both_hashes_follow_the_numbers_in_the_file(tmp_path: Path) -> None:
     path = write(named(), tmp_path)
     put(tmp_path)
