@@ -104,6 +104,12 @@ def analytic(
     reason = _undefined(estimate)
     if reason is not None:
         return case.undefined(reason, method=method, unit=None)
+    return _closed(case, estimate, distribution, method)
+
+
+def _closed(
+    case: Case, estimate: Estimate, distribution: Distribution, method: str
+) -> Interval:
     notes = warn_small(estimate.n_items, 10, "items")
     low, high = _ends(case, estimate, distribution)
     if math.isnan(low):

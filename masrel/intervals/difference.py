@@ -115,27 +115,26 @@ def difference(
         case.entry(ratings, categories=categories, weights=weights)
         for case, ratings in zip(cases, (first, second), strict=True)
     ]
-    return _estimate(cases, estimates, variance, df)
+    interval = _interval(cases, estimates, variance, df)
+    return _estimate(estimates, interval, variance)
 
 
 def _estimate(
-    cases: list[Case], estimates: list[Estimate], variance: float, df: float
+    estimates: list[Estimate], interval: Interval, variance: float
 ) -> Estimate:
     before, after = estimates
-    value = before.value - after.value
-    reason = before.reason or after.reason
     return Estimate(
         coefficient=f"difference of {before.coefficient}",
         weights=before.weights,
-        value=value,
+        value=before.value - after.value,
         standard_error=math.sqrt(variance),
-        interval=_interval(cases, value, variance, df, reason),
+        interval=interval,
         observed=before.observed - after.observed,
         chance=before.chance - after.chance,
         n_items=min(before.n_items, after.n_items),
         n_raters=min(before.n_raters, after.n_raters),
         n_categories=before.n_categories,
-        reason=reason,
+        reason=before.reason or after.reason,
     )
 
 
@@ -173,8 +172,10 @@ def _independent(one: Case, other: Case) -> tuple[float, float]:
 
 
 def _interval(
-    cases: list[Case], value: float, variance: float, df: float, reason: str | None
+    cases: list[Case], estimates: list[Estimate], variance: float, df: float
 ) -> Interval:
+    before, after = estimates
+    value, reason = before.value - after.value, before.reason or after.reason
     method = "item jackknife of the difference, t"
     fewest = min(cases, key=lambda case: case.n_items)
     if reason is None and math.isnan(variance):

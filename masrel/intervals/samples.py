@@ -30,5 +30,6 @@ def warn_small(count: int, least: int, what: str) -> tuple[str, ...]:
     if count >= least:
         return ()
     note = f"{count} {what}: below {least} the interval may cover less than it says"
+    # called by what a method calls: the warning points to who called the method
     warnings.warn(note, SmallSampleWarning, stacklevel=4)
     return (note,)
