@@ -96,8 +96,10 @@ def find_changes(
 
     Notes
     -----
-    A catch whose rise, or an end whose climb, is below three standard deviations of
-    the residuals is not told from noise, and is none.
+    A catch whose rise, or an end whose climb, is below `LEAST_SIGNAL` standard
+    deviations of the residuals is not told from noise, and is none; nor is an end
+    that takes less than `LEAST_GAIN` residual variances off the sum of squares. If
+    post-catch is additive, that gain alone decides of an end.
     """
     angle = angle - angle.mean()
     torque, pre_catch = torque - torque.mean(), pre_catch - pre_catch.mean()
