@@ -164,13 +164,17 @@ def _slow_trials(stretches: Mapping[str, Stretch], limit: float) -> list[Trial]:
             if trial.pre_catch.time.size:
                 used.append(trial)
             else:
-                _warn(f"{name}: too short for the filter of slow stretches; not used")
+                why = trial.remark or "too short for the filter of slow stretches"
+                _warn(f"{name}: {why}; not used")
     if not used:
         raise RecordingError(_no_slow(stretches, limit))
     return used
 
 
 def _no_slow(stretches: Mapping[str, Stretch], limit: float) -> str:
+    n_slow = sum(stretch.pace == "slow" for stretch in stretches.values())
+    if n_slow:
+        return f"recordings: b and k need a slow stretch; none of {n_slow} can be used"
     slowest = min(stretch.peak_speed for stretch in stretches.values())
     return (
         "recordings: b and k need a slow stretch, one whose speed stays below "

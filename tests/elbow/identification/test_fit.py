@@ -271,6 +271,20 @@ def test_without_a_slow_trial_it_says_how_fast_the_slowest_is(
     assert len(made.trials) == 8
 
 
+def test_slow_stretches_of_which_none_can_be_used_are_not_called_fast() -> None:
+    slow = study(HM3, seed=5, n_slow=2, n_fast=0)
+    with pytest.warns(RecordingWarning, match="the sensor is saturated"):
+        stuck = [
+            Movement(name=m.name, time=m.time, angle=m.angle, torque=0.0 * m.torque)
+            for m in slow
+        ]
+    with (
+        pytest.warns(RecordingWarning, match="missing or saturated; not used"),
+        pytest.raises(RecordingError, match="slow stretch; none of 2 can be used"),
+    ):
+        fit(stuck)
+
+
 def test_a_saturated_torque_is_left_out_and_said() -> None:
     movements = study(HM3, seed=5)
     fast = movements[8]
