@@ -1,72 +1,34 @@
 """``masrel agree``: agreement of any CSV file of ratings, no study needed."""
 
 import warnings
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from masrel.cli.agreement_output import Output, output_options, put
-from masrel.cli.agreement_rows import Row, Wanted, estimate_session, scale_notes
-from masrel.cli.columns import Columns, column_options, listed
+from masrel.cli.agreement_rows import (
+    USUAL,
+    Row,
+    Wanted,
+    estimate_session,
+    scale_notes,
+)
+from masrel.cli.columns import Columns, column_options
 from masrel.cli.options import grouped
 from masrel.errors import MasrelWarning, RatingsError
-from masrel.estimates import Target
 
 if TYPE_CHECKING:
-    from masrel.agreement.weights import WeightName
     from masrel.ratings import Ratings
 
 __all__ = ["command"]
 
-_UNNAMED = ("percent_agreement", "fleiss_kappa")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Asked:
-    """What is asked of every session, as the command line has it.
-
-    Attributes
-    ----------
-    coefficients : str or None
-        Names of the register, separated by commas; None for the usual ones.
-    weights, target, interval, level, n_resamples, seed, words
-        As of `masrel.cli.agreement_rows.Wanted`.
-    """
-
-    coefficients: str | None
-    weights: "WeightName"  # checked where the weights are made
-    target: Target | None
-    interval: str
-    level: float
-    n_resamples: int
-    seed: int
-    words: str | None
-
-    def wanted(self) -> Wanted:
-        """Return it with the coefficients one by one."""
-        given = self.coefficients
-        names = _UNNAMED if given is None else tuple(listed(given))
-        return Wanted(
-            coefficients=names,
-            named=given is not None and names != ("all",),
-            weights=self.weights,
-            target=self.target,
-            interval=self.interval,
-            level=self.level,
-            n_resamples=self.n_resamples,
-            seed=self.seed,
-            words=self.words,
-        )
-
-
-_asked_options = grouped(
-    "asked",
-    Asked,
+_wanted_options = grouped(
+    "wanted",
+    Wanted,
     click.option(
         "--coefficients",
-        show_default=",".join(_UNNAMED),
+        show_default=",".join(USUAL),
         help="Names of coefficients, separated by commas, or all.",
     ),
     click.option(
@@ -104,11 +66,11 @@ _asked_options = grouped(
 @click.command("agree")
 @click.argument("file", type=click.Path(path_type=Path))
 @column_options
-@_asked_options
+@_wanted_options
 @click.option("--by", type=click.Choice(["session"]), help="Estimate each session.")
 @output_options
 def command(
-    file: Path, columns: Columns, asked: Asked, by: str | None, output: Output
+    file: Path, columns: Columns, wanted: Wanted, by: str | None, output: Output
 ) -> None:
     """Estimate the agreement of the raters in FILE.
 
@@ -116,7 +78,6 @@ def command(
     named) or one row an item and one column a rater. Missing grades are empty or NA.
     Grades that are all numbers weigh by value, others by their place in the scale.
     """
-    wanted = asked.wanted()
     output.check(wanted)
     ratings = columns.read(file)
     about = scale_notes(ratings, wanted.weights)

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from masrel.cli.columns import listed
 from masrel.errors import MasrelError, ParameterError
 from masrel.estimates import Estimate, Interval, Target
 from masrel.scales import MODIFIED_ASHWORTH
@@ -13,21 +14,22 @@ if TYPE_CHECKING:
     from masrel.agreement.weights import WeightName
     from masrel.ratings import RatingMatrix, Ratings
 
-__all__ = ["Row", "Wanted", "estimate_session", "scale_notes"]
+__all__ = ["USUAL", "Row", "Wanted", "estimate_session", "scale_notes"]
+
+USUAL = ("percent_agreement", "fleiss_kappa")
+"""Coefficients that are estimated where none is named."""
 
 _ANY_ORDER = ("all",)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Wanted:
-    """What the caller wants of every session.
+    """What is wanted of every session, as the command line has it.
 
     Attributes
     ----------
-    coefficients : tuple of str
-        Names of the register, or ``("all",)``.
-    named : bool
-        Whether somebody asked for just these: then each must have the interval.
+    coefficients : str or None
+        Names of the register, separated by commas, or ``"all"``; None for `USUAL`.
     weights : str
         Name of the weights, for coefficients that take any.
     target : {"items", "raters", "both"} or None
@@ -42,15 +44,24 @@ class Wanted:
         Whose words for values.
     """
 
-    coefficients: tuple[str, ...]
-    named: bool
-    weights: "WeightName"
+    coefficients: str | None
+    weights: "WeightName"  # checked where the weights are made
     target: Target | None
     interval: str
     level: float
     n_resamples: int
     seed: int
     words: str | None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The coefficients one by one, or ``("all",)``."""
+        return USUAL if self.coefficients is None else tuple(listed(self.coefficients))
+
+    @property
+    def named(self) -> bool:
+        """Whether somebody asked for just these: each must have the interval then."""
+        return self.coefficients is not None and self.names != _ANY_ORDER
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,7 +123,7 @@ def estimate_session(ratings: "Ratings", session: str, wanted: Wanted) -> list[R
         weights: WeightName = wanted.weights if entry.weighted else "identity"
         if weights != "identity":
             title += f", {weights}"
-        elif weights != wanted.weights and wanted.coefficients != _ANY_ORDER:
+        elif weights != wanted.weights and wanted.names != _ANY_ORDER:
             notes.append("unweighted, there are no weights for it")
         estimate = entry(
             counted, categories=values, weights=weights, level=wanted.level
@@ -128,7 +139,7 @@ def estimate_session(ratings: "Ratings", session: str, wanted: Wanted) -> list[R
         rows.append(
             Row(session=session, title=title, estimate=estimate, notes=tuple(notes))
         )
-    if wanted.coefficients != _ANY_ORDER and refused and len(refused) == len(rows):
+    if wanted.names != _ANY_ORDER and refused and len(refused) == len(rows):
         raise refused[0]
     return rows
 
@@ -179,14 +190,14 @@ def _is_number(grade: str) -> bool:
 def _entries(wanted: Wanted, matrix: "RatingMatrix") -> list["Coefficient"]:
     from masrel.agreement import COEFFICIENTS, coefficient
 
-    if wanted.coefficients == _ANY_ORDER:
+    if wanted.names == _ANY_ORDER:
         n_raters = len(matrix.raters)
         return [
             entry
             for entry in COEFFICIENTS.values()
             if entry.shape == "ratings" and n_raters <= (entry.n_raters[1] or n_raters)
         ]
-    entries = [coefficient(name) for name in wanted.coefficients]
+    entries = [coefficient(name) for name in wanted.names]
     for entry in entries:
         if entry.shape == "pairs":
             raise ParameterError(
@@ -206,7 +217,7 @@ def _interval(
     from masrel.analysis.interval import planned_interval
 
     comes_with_one = entry.own_interval and (
-        wanted.interval == "auto" or wanted.coefficients == _ANY_ORDER
+        wanted.interval == "auto" or wanted.names == _ANY_ORDER
     )
     if wanted.target is None or comes_with_one:
         return None
