@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from masrel.cli.columns import listed
+from masrel.cli.folders import check_folders
 from masrel.cli.material import read_material
 from masrel.cli.notes import notes
 from masrel.cli.output import write_json
@@ -60,6 +61,7 @@ def command(
     Prints by how much one standard deviation of each multiplies the odds of a higher
     grade, the others held.
     """
+    check_folders(json=json_file)
     from masrel.analysis.grading import grade_regression
 
     material = read_material(study, ratings_file)
