@@ -23,25 +23,8 @@ _MISSING, _UNKNOWN = -1, -2
 def array_codes(
     labels: Array, declared: tuple[Label, ...] | None
 ) -> tuple[Codes, tuple[Label, ...]]:
-    """Turn an array of labels into codes.
-
-    Parameters
-    ----------
-    labels : ndarray, shape (n_items, n_raters)
-        Numbers, text or objects.
-    declared : tuple or None
-        The scale; the labels met when None.
-
-    Returns
-    -------
-    tuple of ndarray and tuple
-        Codes, -1 where missing, shape (n_items, n_raters), and the scale.
-
-    Raises
-    ------
-    RatingsError
-        If a label is not among the categories.
-    """
+    """Turn an array of labels into codes."""
+    # Takes labels (n_items, n_raters)
     kind = labels.dtype.kind
     is_text = declared is not None and isinstance(declared[0], str)
     if kind not in "iufU" or (declared is not None and is_text != (kind == "U")):

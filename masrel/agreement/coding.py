@@ -140,20 +140,7 @@ def code_ratings(
 
 
 def check_scale(known: tuple[Label, ...], categories: Sequence[Label]) -> None:
-    """Check that ratings which have a scale are asked for on no other.
-
-    Parameters
-    ----------
-    known : tuple of str, int or float
-        Their scale.
-    categories : sequence of str, int or float
-        The scale asked for.
-
-    Raises
-    ------
-    ParameterError
-        If it is another.
-    """
+    """Check that ratings which have a scale are asked for on no other."""
     if check_categories(categories) != known:
         raise ParameterError(
             f"categories: the ratings are on the scale {known}, got {tuple(categories)}"
@@ -161,18 +148,7 @@ def check_scale(known: tuple[Label, ...], categories: Sequence[Label]) -> None:
 
 
 def unmasked(ratings: Any) -> NDArray[Any]:
-    """Make what is masked missing.
-
-    Parameters
-    ----------
-    ratings : MaskedArray
-        Labels.
-
-    Returns
-    -------
-    ndarray
-        The labels; None where one is masked, or ``nan`` among floats.
-    """
+    """Make what is masked missing."""
     masked = np.ma.getmaskarray(ratings)
     if not masked.any():
         return np.asarray(ratings.data)
@@ -187,18 +163,7 @@ def _coded(codes: Codes, categories: tuple[Label, ...], declared: bool) -> Coded
 
 
 def complete(coded: CodedRatings) -> CodedRatings:
-    """Keep the items that every rater rated.
-
-    Parameters
-    ----------
-    coded : CodedRatings
-        Any ratings.
-
-    Returns
-    -------
-    CodedRatings
-        The same categories, perhaps no item.
-    """
+    """Keep the items that every rater rated."""
     whole = (coded.codes >= 0).all(axis=1)
     if whole.all():
         return coded
@@ -243,25 +208,8 @@ def _is_row(row: object) -> bool:
 def label_rows(
     ratings: object, categories: Sequence[Label] | None
 ) -> tuple[list[list[object]], tuple[Label, ...]]:
-    """Check the shape of a nested sequence of labels and find its scale.
-
-    Parameters
-    ----------
-    ratings : nested sequence, shape (n_items, n_raters)
-        Labels.
-    categories : sequence of str, int or float, or None
-        The declared scale in order; the labels met when None.
-
-    Returns
-    -------
-    tuple of list and tuple
-        The rows, and the scale; labels may not be of it.
-
-    Raises
-    ------
-    RatingsError
-        If it is no such table, or the categories are no scale.
-    """
+    """Check the shape of a nested sequence of labels and find its scale."""
+    # Takes ratings (n_items, n_raters)
     rows = _rows(ratings)
     if categories is None:
         return rows, labels_met(itertools.chain.from_iterable(rows))

@@ -124,25 +124,7 @@ def cohen_kappa_from_table(
 
 
 def two_raters(coded: CodedRatings, title: str) -> CodedRatings:
-    """Return ratings that are of two raters.
-
-    Parameters
-    ----------
-    coded : CodedRatings
-        Any ratings.
-    title : str
-        Who asks, for the message.
-
-    Returns
-    -------
-    CodedRatings
-        The same.
-
-    Raises
-    ------
-    RatingsError
-        If there are more or fewer columns than two.
-    """
+    """Return ratings that are of two raters."""
     n_columns = coded.codes.shape[1]
     if n_columns != 2:
         raise RatingsError(f"{title} needs the ratings of two raters, got {n_columns}")

@@ -22,48 +22,22 @@ Integers = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True)
 class Margins:
-    """Disagreement by chance, Σ_{g≠h} Σ_kl v_kl p_gk p_hl / (r (r - 1)), in integers.
+    """Chance disagreement, Σ_{g≠h} Σ_kl v_kl p_gk p_hl / (r (r - 1)), in integers."""
 
-    Attributes
-    ----------
-    raters : list of int
-        Columns that have ratings, g.
-    n_ratings : list of int
-        How many each, n_g.
-    multiple : int
-        A multiple of every n_g.
-    shares : list of list of int, shape (r, n_categories)
-        p_gk times `multiple`.
-    products : list of list of int, shape (r, n_categories)
-        h_gk = Σ_l v_kl Σ_{h≠g} p_hl, times `multiple` and the weights' denominator.
-    numerator, denominator : int
-        D_e.
-    """
-
-    raters: list[int]
-    n_ratings: list[int]
-    multiple: int
-    shares: list[list[int]]
+    raters: list[int]  # columns that have ratings, g
+    n_ratings: list[int]  # how many each, n_g
+    multiple: int  # A multiple of every n_g
+    shares: list[list[int]]  # (r, n_categories): p_gk times `multiple`
+    # (r, n_categories): h_gk = Σ_l v_kl Σ_{h≠g} p_hl, times `multiple` and the weights'
+    # denominator
     products: list[list[int]]
+    # numerator, denominator: D_e
     numerator: int
     denominator: int
 
     @classmethod
     def of(cls, coded: CodedRatings, v: Weights) -> "Margins":
-        """Sum the ratings of each rater.
-
-        Parameters
-        ----------
-        coded : CodedRatings
-            The ratings.
-        v : Weights
-            Disagreement of two categories.
-
-        Returns
-        -------
-        Margins
-            The sums.
-        """
+        """Sum the ratings of each rater."""
         q = coded.n_categories
         counts = [
             np.bincount(column[column >= 0], minlength=q).tolist()
@@ -96,18 +70,9 @@ class Margins:
         )
 
     def moves(self, n: int) -> list[list[Fraction]]:
-        """Return what a rating of k by rater g moves D_e by, times n items.
-
-        Parameters
-        ----------
-        n : int
-            Items with any rating.
-
-        Returns
-        -------
-        list of list of Fraction, shape (r, n_categories)
-            (n/n_g) 2 (h_gk - Σ_l h_gl p_gl) / (r (r - 1)).
-        """
+        """Return what a rating of k by rater g moves D_e by, times n items."""
+        # -> (r, n_categories)
+        # (n/n_g) 2 (h_gk - Σ_l h_gl p_gl) / (r (r - 1)).
         found = []
         for n_g, shares, h in zip(
             self.n_ratings, self.shares, self.products, strict=True
@@ -127,28 +92,9 @@ def influence_squares(
     margins: Margins,
     as_irrcac: bool,
 ) -> float:
-    """Return Σ_i u_i² of Conger's kappa, u_i being n times what item i moves it by.
-
-    Parameters
-    ----------
-    coded : CodedRatings
-        The ratings; every rater has some.
-    v : Weights
-        Disagreement of two categories.
-    observed : Observed
-        Disagreement of two raters of an item, D_o.
-    margins : Margins
-        Disagreement by chance, D_e.
-    as_irrcac : bool
-        Whether an item without a pair counts as one with a kappa of 0.
-
-    Returns
-    -------
-    float
-        With d_i an item's disagreement and s_i = 1 if it has a pair,
-        D_e u_i = (D_o/D_e) Σ_g moves_g - (n/n') (d_i - D_o s_i). In fractions where
-        floats would cancel.
-    """
+    """Return Σ_i u_i² of Conger's kappa, u_i being n times what item i moves it by."""
+    # With d_i an item's disagreement and s_i = 1 if it has a pair, D_e u_i = (D_o/D_e)
+    # Σ_g moves_g - (n/n') (d_i - D_o s_i). In fractions where floats would cancel.
     rows, times = distinct_patterns(coded.codes, coded.n_categories)
     rated = (rows >= 0).any(axis=1)
     rows, times, n = rows[rated], times[rated], coded.n_items

@@ -204,27 +204,8 @@ def _count_complete(
 def take_counts(
     counts: ArrayLike, categories: Sequence[Label] | None
 ) -> CountedRatings:
-    """Take a table of counts as counted ratings, equal rows together.
-
-    Parameters
-    ----------
-    counts : array_like of int, shape (n_items, n_categories)
-        Raters per item and category.
-    categories : sequence of str, int or float, or None
-        The declared scale in order; 1 to n_categories when None.
-
-    Returns
-    -------
-    CountedRatings
-        As many raters as the largest row sum.
-
-    Raises
-    ------
-    CountsError
-        If it is not a table of counts.
-    ParameterError
-        If there are not as many categories as columns.
-    """
+    """Take a table of counts as counted ratings, equal rows together."""
+    # Takes counts (n_items, n_categories)
     table = check_counts(counts)
     return CountedRatings(
         categories=tuple(column_categories(categories, table.shape[1])),

@@ -14,23 +14,8 @@ Integers = NDArray[np.int64]
 
 
 def check_counts(counts: ArrayLike) -> Integers:
-    """Check a table of counts.
-
-    Parameters
-    ----------
-    counts : array_like of int, shape (n_items, n_categories)
-        Raters per item and category; rows may have different sums.
-
-    Returns
-    -------
-    ndarray of int64, shape (n_items, n_categories)
-        The same table.
-
-    Raises
-    ------
-    CountsError
-        If it is not a table of whole numbers of at least 0 and below 2^53.
-    """
+    """Check a table of counts."""
+    # counts (n_items, n_categories) -> (n_items, n_categories)
     try:
         table = np.asarray(counts)
     except ValueError as error:
@@ -55,27 +40,7 @@ def check_counts(counts: ArrayLike) -> Integers:
 def column_categories(
     categories: Sequence[Label] | None, n_columns: int
 ) -> Sequence[Label]:
-    """Return the declared scale of a table of counts, 1 to n_columns unless given.
-
-    Parameters
-    ----------
-    categories : sequence of str, int or float, or None
-        The scale in order.
-    n_columns : int
-        Columns of the counts.
-
-    Returns
-    -------
-    sequence of str, int or float
-        One category a column.
-
-    Raises
-    ------
-    ParameterError
-        If there are not as many categories as columns.
-    RatingsError
-        If the categories are no scale.
-    """
+    """Return the declared scale of a table of counts, 1 to n_columns unless given."""
     if categories is None:
         return range(1, n_columns + 1)
     declared = check_categories(categories)
@@ -88,23 +53,8 @@ def column_categories(
 
 
 def check_table(table: ArrayLike) -> Integers:
-    """Check a contingency table of two raters.
-
-    Parameters
-    ----------
-    table : array_like of int, shape (n_categories, n_categories)
-        Items per category of the first and of the second rater.
-
-    Returns
-    -------
-    ndarray of int64, shape (n_categories, n_categories)
-        The same table.
-
-    Raises
-    ------
-    CountsError
-        If it is not a square table of whole numbers of at least 0.
-    """
+    """Check a contingency table of two raters."""
+    # table (n_categories, n_categories) -> (n_categories, n_categories)
     checked = check_counts(table)
     if checked.shape[0] != checked.shape[1]:
         raise CountsError(

@@ -20,18 +20,8 @@ _BLOCK = 1 << 16  # items counted at once, so that they stay in the cache
 
 
 def item_counts(coded: CodedRatings) -> Integers:
-    """Count the raters of each category, item by item.
-
-    Parameters
-    ----------
-    coded : CodedRatings
-        The ratings; missing ones are not counted.
-
-    Returns
-    -------
-    ndarray of int64, shape (n_items, n_categories)
-        Raters per item and category.
-    """
+    """Count the raters of each category, item by item."""
+    # -> (n_items, n_categories)
     n_items, n_raters = coded.codes.shape
     if coded.codes.size * coded.n_categories <= _FEW_PLACES:
         width = coded.n_categories + 1  # code -1 is the first
@@ -50,18 +40,7 @@ def item_counts(coded: CodedRatings) -> Integers:
 
 
 def coded_items(coded: CodedRatings) -> ItemTable:
-    """Count the raters of each category, equal items together.
-
-    Parameters
-    ----------
-    coded : CodedRatings
-        The ratings; missing ones are not counted.
-
-    Returns
-    -------
-    FewItems or ManyItems
-        Distinct items with how often each occurs.
-    """
+    """Count the raters of each category, equal items together."""
     n_items, n_raters = coded.codes.shape
     if coded.codes.size <= FEW:
         return _few(coded.codes.tolist(), coded.n_categories)
@@ -106,18 +85,8 @@ def _few(codes: list[list[int]], n_categories: int) -> FewItems:
 
 
 def rows_alike(counts: Integers) -> ItemTable:
-    """Count equal rows of a table of counts together.
-
-    Parameters
-    ----------
-    counts : ndarray of int64, shape (n_items, n_categories)
-        Raters per item and category.
-
-    Returns
-    -------
-    FewItems or ManyItems
-        Distinct rows with how often each occurs.
-    """
+    """Count equal rows of a table of counts together."""
+    # Takes counts (n_items, n_categories)
     base = int(counts.max()) + 1
     if counts.size > FEW and base ** counts.shape[1] <= _MOST_KEYS:
         powers = base ** np.arange(counts.shape[1], dtype=np.int64)

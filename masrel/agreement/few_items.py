@@ -22,24 +22,9 @@ class _Alike(NamedTuple):
 
 
 class FewItems:
-    """Distinct items as Python integers; all sums are exact.
+    """Distinct items as Python integers; all sums are exact."""
 
-    Parameters
-    ----------
-    rows : list of sequence of int, shape (n_distinct, n_categories)
-        Raters per category.
-    times : list of int, shape (n_distinct,)
-        How often each occurs.
-    n_categories : int
-        Declared categories.
-
-    Attributes
-    ----------
-    rows, times, n_categories
-        As given.
-    sizes : list of int
-        The numbers of ratings of an item that there are, least first.
-    """
+    # Takes rows (n_distinct, n_categories), times (n_distinct,)
 
     __slots__ = ("_by_size", "_tally", "n_categories", "rows", "sizes", "times")
 
@@ -56,18 +41,7 @@ class FewItems:
         self._tally = add_up(groups, identity_weights(n_categories))
 
     def tally(self, weights: Weights) -> Tally:
-        """Add the items up.
-
-        Parameters
-        ----------
-        weights : Weights
-            Disagreement of two categories.
-
-        Returns
-        -------
-        Tally
-            The sums.
-        """
+        """Add the items up."""
         if weights.numerators is None:
             return self._tally
         weighted = []
@@ -79,20 +53,7 @@ class FewItems:
         return add_up(weighted, weights)
 
     def square_sum(self, weights: Weights, function: Linear) -> tuple[int, int]:
-        """Return Σ_i function(item)² as numerator and denominator.
-
-        Parameters
-        ----------
-        weights : Weights
-            Disagreement of two categories.
-        function : Linear
-            A function of an item.
-
-        Returns
-        -------
-        tuple of int
-            Numerator and denominator.
-        """
+        """Return Σ_i function(item)² as numerator and denominator."""
         total = 0
         for size, alike in self._by_size.items():
             a, b, e = function.by_size[size]
@@ -109,20 +70,7 @@ class FewItems:
     def rounded_square_sum(
         self, weights: Weights, function: RoundedLinear
     ) -> float | None:
-        """Return Σ_i function(item)² from floats, or None if its terms cancel.
-
-        Parameters
-        ----------
-        weights : Weights
-            Disagreement of two categories.
-        function : RoundedLinear
-            A function of an item.
-
-        Returns
-        -------
-        float or None
-            The sum.
-        """
+        """Return Σ_i function(item)² from floats, or None if its terms cancel."""
         counts = np.array(self.rows, dtype=np.int64)
         times = np.array(self.times, dtype=np.int64)
         sizes = np.array(list(map(sum, self.rows)), dtype=object)

@@ -139,20 +139,7 @@ def fleiss_kappa_from_counts(
 
 
 def expected_disagreement(shares: Shares, weights: Weights) -> Expected:
-    """Return Σ_kl v_kl p_k p_l, 1 - P̄_e of [1] in `fleiss_kappa`.
-
-    Parameters
-    ----------
-    shares : Shares
-        Shares of the categories, p.
-    weights : Weights
-        Disagreement of two categories, v.
-
-    Returns
-    -------
-    Expected
-        The disagreement by chance.
-    """
+    """Return Σ_kl v_kl p_k p_l, 1 - P̄_e of [1] in `fleiss_kappa`."""
     products = weights.products(shares.numerators)
     return Expected(
         sum(map(mul, shares.numerators, products)),
@@ -161,20 +148,7 @@ def expected_disagreement(shares: Shares, weights: Weights) -> Expected:
 
 
 def expected_slopes(shares: Shares, weights: Weights) -> Slopes:
-    """Return 2 Σ_l v_kl p_l, the slope of `expected_disagreement` in p_k.
-
-    Parameters
-    ----------
-    shares : Shares
-        Shares of the categories, p.
-    weights : Weights
-        Disagreement of two categories, v.
-
-    Returns
-    -------
-    Slopes
-        One a category.
-    """
+    """Return 2 Σ_l v_kl p_l, the slope of `expected_disagreement` in p_k."""
     return Slopes(
         [2 * vp for vp in weights.products(shares.numerators)],
         shares.total * weights.denominator,

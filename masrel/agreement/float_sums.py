@@ -21,26 +21,8 @@ def float_square_sum(
     weights: Weights,
     function: RoundedLinear,
 ) -> float | None:
-    """Return Σ_i function(item)², or None if its terms cancel.
-
-    Parameters
-    ----------
-    counts : ndarray of int64, shape (n_distinct, n_categories)
-        Raters per category.
-    times : ndarray of int64, shape (n_distinct,)
-        How often each row occurs.
-    sizes : ndarray of int64 or int, shape (n_distinct,)
-        Ratings of each row.
-    weights : Weights
-        Disagreement of two categories.
-    function : RoundedLinear
-        A function of an item.
-
-    Returns
-    -------
-    float or None
-        The sum, unless more than three digits of it were lost.
-    """
+    """Return Σ_i function(item)², or None if its terms cancel."""
+    # Takes counts (n_distinct, n_categories), times (n_distinct,), sizes (n_distinct,)
     slopes = np.zeros(counts.shape[1])
     slopes[: len(function.slopes)] = function.slopes
     met, at = np.unique(sizes, return_inverse=True)
@@ -57,40 +39,14 @@ def float_square_sum(
 
 
 def cancelled(value: Floats, terms: Floats, times: Integers) -> bool:
-    """Return whether values are small beside the terms they are sums of.
-
-    Parameters
-    ----------
-    value, terms : ndarray, shape (n_distinct,)
-        Sums, and the sums of the absolute values of their terms.
-    times : ndarray of int64, shape (n_distinct,)
-        How often each occurs.
-
-    Returns
-    -------
-    bool
-        Whether the square sum of the values has lost more than three digits.
-    """
+    """Return whether values are small beside the terms they are sums of."""
+    # Takes value, terms (n_distinct,), times (n_distinct,)
     squares, of_terms = (float((times * x * x).sum()) for x in (value, terms))
     return of_terms > _CANCELLED**2 * squares
 
 
 def rounded(function: Linear, denominator: int) -> RoundedLinear:
-    """Return a function in floats.
-
-    Parameters
-    ----------
-    function : Linear
-        A function in integers, which may be too large for floats; their ratios are
-        not.
-    denominator : int
-        That of the weights, which V is multiplied by in integers.
-
-    Returns
-    -------
-    RoundedLinear
-        The same.
-    """
+    """Return a function in floats."""
     largest = max(map(abs, function.slopes), default=0) or 1
     by_size = {
         size: (

@@ -25,27 +25,8 @@ _MISSING, _UNKNOWN = -1, -2
 def frame_codes(
     frame: Any, declared: tuple[Label, ...] | None
 ) -> tuple[Codes, tuple[Label, ...], bool]:
-    """Turn a DataFrame of labels into codes, without importing pandas.
-
-    Parameters
-    ----------
-    frame : DataFrame, shape (n_items, n_raters)
-        One column a rater.
-    declared : tuple or None
-        The scale. When None, the categories of the columns if pandas has them as
-        ordered and the same in all; else the labels met.
-
-    Returns
-    -------
-    tuple of ndarray, tuple and bool
-        Codes, -1 where missing, shape (n_items, n_raters), the scale, and whether
-        it was declared.
-
-    Raises
-    ------
-    RatingsError
-        If it is empty, or a label is not among the categories.
-    """
+    """Turn a DataFrame of labels into codes, without importing pandas."""
+    # Takes frame (n_items, n_raters)
     if len(frame.shape) != 2:
         raise RatingsError(
             "ratings: needs two dimensions (items, raters), got shape "

@@ -26,74 +26,41 @@ class Expected(NamedTuple):
 
 
 class Slopes(NamedTuple):
-    """Slopes of D_e in each share, ∂D_e / ∂p_k = numerators_k / denominator.
+    """Slopes of D_e in each share, ∂D_e / ∂p_k = numerators_k / denominator."""
 
-    Without numerators, D_e does not depend on the shares.
-    """
+    # Without numerators, D_e does not depend on the shares.
 
     numerators: Sequence[int] = ()
     denominator: int = 1
 
 
 class Linear(NamedTuple):
-    """A linear function of an item: a[n] V + b[n] + e[n] Σ_k slopes_k n_k.
+    """A linear function of an item: a[n] V + b[n] + e[n] Σ_k slopes_k n_k."""
 
-    V is the item's disagreement Σ_kl v_kl n_k n_l and n its number of ratings. All
-    numbers are integers, to be divided by `denominator`.
+    # V is the item's disagreement Σ_kl v_kl n_k n_l and n its number of ratings. All
+    # numbers are integers, to be divided by `denominator`.
 
-    Attributes
-    ----------
-    by_size : mapping of int to tuple of int
-        n to a, b and e.
-    slopes : sequence of int, shape (n_categories,)
-        The slopes; may be empty where every e is 0.
-    denominator : int
-        What all is divided by.
-    """
-
-    by_size: Mapping[int, tuple[int, int, int]]
+    by_size: Mapping[int, tuple[int, int, int]]  # n to a, b and e
+    # (n_categories,): the slopes; may be empty where every e is 0
     slopes: Sequence[int]
-    denominator: int
+    denominator: int  # what all is divided by
 
 
 class RoundedLinear(NamedTuple):
-    """A linear function of an item as `Linear`, in floats, and V as it is.
+    """A linear function of an item as `Linear`, in floats, and V as it is."""
 
-    Attributes
-    ----------
-    by_size : mapping of int to tuple of float
-        n to a, b and e.
-    slopes : sequence of float, shape (n_categories,)
-        The slopes; may be empty where every e is 0.
-    """
-
-    by_size: Mapping[int, tuple[float, float, float]]
+    by_size: Mapping[int, tuple[float, float, float]]  # n to a, b and e
+    # (n_categories,): the slopes; may be empty where every e is 0
     slopes: Sequence[float]
 
 
 def pooled_influence(
     tally: Tally, observed: Observed, chance: Expected, slopes: Slopes
 ) -> Linear:
-    """Return how much an item moves 1 - D_o / D_e, times the number of items.
-
-    Parameters
-    ----------
-    tally : Tally
-        Sums over all items.
-    observed : Observed
-        Their disagreement, D_o.
-    chance : Expected
-        Disagreement by chance, D_e.
-    slopes : Slopes
-        Its slopes in the shares.
-
-    Returns
-    -------
-    Linear
-        -u_i of item i. With d_i its disagreement, s_i = 1 if it has a pair, x_ik its
-        shares and h_k = ∂D_e/∂p_k, -D_e u_i is
-        (n/n') (d_i - D_o s_i) - (D_o/D_e) Σ_k h_k (x_ik - p_k).
-    """
+    """Return how much an item moves 1 - D_o / D_e, times the number of items."""
+    # -u_i of item i. With d_i its disagreement, s_i = 1 if it has a pair, x_ik its
+    # shares and h_k = ∂D_e/∂p_k, -D_e u_i is (n/n') (d_i - D_o s_i) - (D_o/D_e) Σ_k h_k
+    # (x_ik - p_k).
     n, shares, h = tally.n_rated, tally.shares, slopes.numerators
     over_h = slopes.denominator * shares.total if h else 1
     mean_h = sum(map(mul, h, shares.numerators))
@@ -131,20 +98,8 @@ def _reduced(function: Linear, numerator: int) -> Linear:
 def as_irrcac(
     influence: Linear, tally: Tally, observed: Observed, chance: Expected
 ) -> Linear:
-    """Return what irrCAC takes in place of the influence of an item.
-
-    Parameters
-    ----------
-    influence : Linear
-        -u_i of `pooled_influence`.
-    tally, observed, chance
-        As there.
-
-    Returns
-    -------
-    Linear
-        -u_i - κ (s_i n/n' - 1): an item without a pair counts as one with a κ of 0.
-    """
+    """Return what irrCAC takes in place of the influence of an item."""
+    # -u_i - κ (s_i n/n' - 1): an item without a pair counts as one with a κ of 0.
     n_usable = observed.n_usable
     kappa = chance.numerator * observed.denominator
     below = kappa * n_usable
@@ -160,20 +115,7 @@ def as_irrcac(
 def rounded_influence(
     tally: Tally, observed: Observed, chance: Expected, slopes: Slopes, as_irrcac: bool
 ) -> RoundedLinear:
-    """Return how much an item moves 1 - D_o / D_e, from floats.
-
-    Parameters
-    ----------
-    tally, observed, chance, slopes
-        As of `pooled_influence`.
-    as_irrcac : bool
-        Whether to return what `as_irrcac` does.
-
-    Returns
-    -------
-    RoundedLinear
-        The same function, where the whole numbers would be too long.
-    """
+    """Return how much an item moves 1 - D_o / D_e, from floats."""
     n, n_usable = tally.n_rated, observed.n_usable
     d_e = chance.numerator / chance.denominator
     ratio = (observed.numerator * chance.denominator) / (

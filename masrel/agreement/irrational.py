@@ -11,46 +11,14 @@ _PI = Fraction(3141592653589793238462643383279502884197169399375105820974944, 10
 
 
 def square_root(value: Fraction) -> Fraction:
-    """Return √value, rounded down to 40 decimals; exact for a square of such.
-
-    Parameters
-    ----------
-    value : Fraction
-        At least 0.
-
-    Returns
-    -------
-    Fraction
-        The root.
-
-    Examples
-    --------
-    >>> square_root(Fraction(1, 4))
-    Fraction(1, 2)
-    """
+    """Return √value, rounded down to 40 decimals; exact for a square of such."""
     return Fraction(
         math.isqrt(value.numerator * _SCALE**2 // value.denominator), _SCALE
     )
 
 
 def sine_squared(turns: Fraction) -> Fraction:
-    """Return sin²(π · turns) = (1 - cos(2π · turns)) / 2, to 40 decimals.
-
-    Parameters
-    ----------
-    turns : Fraction
-        Within [0, 1].
-
-    Returns
-    -------
-    Fraction
-        The value; symmetric about 1/2, so that equal arcs weigh the same.
-
-    Examples
-    --------
-    >>> sine_squared(Fraction(1, 2)), sine_squared(Fraction(1, 6)) == Fraction(1, 4)
-    (Fraction(1, 1), True)
-    """
+    """Return sin²(π · turns) = (1 - cos(2π · turns)) / 2, to 40 decimals."""
     arc = min(turns, 1 - turns)  # sin² is the same on both sides of a half turn
     angle = 2 * _PI * min(arc, Fraction(1, 2) - arc)  # in [0, π/2]
     # Series of the cosine, in integers with ten digits more than are kept.

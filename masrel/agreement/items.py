@@ -21,20 +21,8 @@ ItemTable = FewItems | ManyItems
 
 
 def item_table(counts: Integers, times: Integers | None = None) -> ItemTable:
-    """Choose how distinct items are kept.
-
-    Parameters
-    ----------
-    counts : ndarray of int64, shape (n_rows, n_categories)
-        Raters per category.
-    times : ndarray of int64, shape (n_rows,), optional
-        How often each row occurs; once each unless given.
-
-    Returns
-    -------
-    FewItems or ManyItems
-        The table.
-    """
+    """Choose how distinct items are kept."""
+    # Takes counts (n_rows, n_categories), times (n_rows,)
     if counts.size <= _FEW:
         how_often = [1] * len(counts) if times is None else times.tolist()
         return FewItems(counts.tolist(), how_often, counts.shape[1])

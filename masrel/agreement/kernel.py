@@ -25,79 +25,38 @@ _BLOCK = 1 << 14  # items whose categories are spread out at once
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Kernel:
-    """A coefficient as a function of sums of item features.
+    """A coefficient as a function of sums of item features."""
 
-    `v` is the disagreement of two categories, shape (n_categories, n_categories).
+    # `v` is the disagreement of two categories, shape (n_categories, n_categories).
 
-    Attributes
-    ----------
-    features : callable
-        CodedRatings and v to an array of shape (n_items, n_features).
-    value : callable
-        Sums of shape (..., n_features) and v to values of shape (...), ``nan``
-        where undefined.
-    rater_sums : callable or None
-        Distinct rows of CodedRatings, how often each occurs, and v, to a callable: how
-        often each rater is taken, shape (..., n_raters), to sums of shape
-        (..., n_features). A rater is never paired with a copy of itself. None where
-        raters cannot be resampled.
-    """
-
+    # codedRatings and v to an array of shape (n_items, n_features)
     features: Callable[[CodedRatings, Floats], Floats]
+    # sums of shape (..., n_features) and v to values of shape (...), ``nan`` where
+    # undefined
     value: Callable[[Floats, Floats], Floats]
+    # distinct rows of CodedRatings, how often each occurs, and v, to a callable: how
+    # often each rater is taken, shape (..., n_raters), to sums of shape (...,
+    # n_features). A rater is never paired with a copy of itself. None where raters
+    # cannot be resampled.
     rater_sums: Callable[[CodedRatings, Integers, Floats], RaterSums] | None = None
 
 
 def divide(numerator: Floats, denominator: Floats) -> Floats:
-    """Divide, with ``nan`` and no noise where the denominator is 0.
-
-    Parameters
-    ----------
-    numerator, denominator : ndarray, shape (...)
-        What to divide.
-
-    Returns
-    -------
-    ndarray, shape (...)
-        The ratios.
-    """
+    """Divide, with ``nan`` and no noise where the denominator is 0."""
+    # numerator, denominator (...) -> (...)
     if np.count_nonzero(denominator) == np.size(denominator):  # as a rule
         return np.asarray(numerator / denominator)
     return np.asarray(numerator / np.where(denominator == 0.0, np.nan, denominator))
 
 
 def weighted_disagreement(counts: Floats, v: Floats) -> Floats:
-    """Return Σ_kl v_kl n_k n_l of counts.
-
-    Parameters
-    ----------
-    counts : ndarray, shape (..., n_categories)
-        Raters per category.
-    v : ndarray, shape (n_categories, n_categories)
-        Disagreement of two categories.
-
-    Returns
-    -------
-    ndarray, shape (...)
-        Disagreeing ordered pairs of raters, weighted.
-    """
+    """Return Σ_kl v_kl n_k n_l of counts."""
+    # counts (..., n_categories), v (n_categories, n_categories) -> (...)
     return np.asarray(np.einsum("...k,...k->...", counts @ v, counts))
 
 
 def pooled_kernel(expected: Callable[[Floats, Floats], Floats | float]) -> Kernel:
-    """Return the kernel of a coefficient of unnamed raters, 1 - D_o / D_e.
-
-    Parameters
-    ----------
-    expected : callable
-        Shares (..., n_categories) and v to the disagreement by chance (...).
-
-    Returns
-    -------
-    Kernel
-        Features are an item's disagreement, whether it has a pair, whether it has a
-        rating, and its shares of the categories.
-    """
+    """Return the kernel of a coefficient of unnamed raters, 1 - D_o / D_e."""
 
     def features(coded: CodedRatings, v: Floats) -> Floats:
         return _of_counts(item_counts(coded).astype(np.float64), v)

@@ -21,18 +21,7 @@ Label = str | int | float
 
 
 def is_missing(label: object) -> bool:
-    """Return whether a label is None, ``nan``, or pandas' NA or NaT.
-
-    Parameters
-    ----------
-    label : object
-        Anything.
-
-    Returns
-    -------
-    bool
-        Whether there is no rating.
-    """
+    """Return whether a label is None, ``nan``, or pandas' NA or NaT."""
     if label is None:
         return True
     if isinstance(label, str):
@@ -44,23 +33,7 @@ def is_missing(label: object) -> bool:
 
 
 def check_categories(categories: Sequence[Label]) -> tuple[Label, ...]:
-    """Check a declared scale.
-
-    Parameters
-    ----------
-    categories : sequence of str, int or float
-        The scale in order.
-
-    Returns
-    -------
-    tuple of str, int or float
-        The same.
-
-    Raises
-    ------
-    RatingsError
-        If there is none, one is missing or repeated, or text and numbers mix.
-    """
+    """Check a declared scale."""
     if isinstance(categories, str) or not isinstance(categories, Iterable):
         raise RatingsError(
             f"categories: needs a sequence of at least one label, got {categories!r}"
@@ -80,23 +53,7 @@ def check_categories(categories: Sequence[Label]) -> tuple[Label, ...]:
 
 
 def labels_met(labels: Iterable[object]) -> tuple[Label, ...]:
-    """Return the distinct labels in order: numbers by value, text by alphabet.
-
-    Parameters
-    ----------
-    labels : iterable
-        Labels, some of them missing.
-
-    Returns
-    -------
-    tuple of str, int or float
-        Each label once.
-
-    Raises
-    ------
-    RatingsError
-        If text and numbers mix.
-    """
+    """Return the distinct labels in order: numbers by value, text by alphabet."""
     try:
         met: set[Any] = set(labels)
     except TypeError as error:
@@ -124,18 +81,7 @@ def _one_kind(labels: Iterable[Any], where: str) -> None:
 
 
 def code_type(n_categories: int) -> type[np.signedinteger[Any]]:
-    """Return the smallest integers that hold the codes of some categories.
-
-    Parameters
-    ----------
-    n_categories : int
-        How many.
-
-    Returns
-    -------
-    type
-        A numpy integer type.
-    """
+    """Return the smallest integers that hold the codes of some categories."""
     if n_categories <= 127:
         return np.int8
     return np.int16 if n_categories <= 32_767 else np.int32
@@ -144,27 +90,7 @@ def code_type(n_categories: int) -> type[np.signedinteger[Any]]:
 def lookup(
     label: object, position: dict[object, int], row: int, column: int | str
 ) -> int:
-    """Return the code of one label.
-
-    Parameters
-    ----------
-    label : object
-        A label, or a missing value.
-    position : dict
-        Label to code.
-    row, column : int, or str
-        Where it stands, for the message.
-
-    Returns
-    -------
-    int
-        Its code; -1 when missing.
-
-    Raises
-    ------
-    RatingsError
-        If it is not among the categories.
-    """
+    """Return the code of one label."""
     if is_missing(label):
         return -1
     try:

@@ -61,10 +61,8 @@ class ManyItems:
     def square_sum(
         self, weights: Weights, function: Linear
     ) -> tuple[float, int] | tuple[int, int]:
-        """Return Σ_i function(item)² as numerator and denominator.
-
-        Each item is computed in floats, unless its terms cancel; then in integers.
-        """
+        """Return Σ_i function(item)² as numerator and denominator."""
+        # Each item is computed in floats, unless its terms cancel; then in integers.
         function_in_floats = rounded(function, weights.denominator)
         squares = self.rounded_square_sum(weights, function_in_floats)
         if squares is None:

@@ -21,40 +21,9 @@ Metric = Literal["nominal", "ordinal", "interval", "ratio"]
 
 
 def metric_weights(metric: Metric, counted: CountedRatings) -> Weights:
-    """Return squared differences of categories as weights of disagreement.
-
-    Parameters
-    ----------
-    metric : {"nominal", "ordinal", "interval", "ratio"}
-        The difference function.
-    counted : CountedRatings
-        The ratings. Numbers differ by value, text by rank in the declared scale; the
-        ordinal metric counts the pairable ratings between two categories.
-
-    Returns
-    -------
-    Weights
-        δ² of every pair of categories, exact.
-
-    Raises
-    ------
-    ParameterError
-        If the metric is none, two values sum to 0 under "ratio", or the scale of
-        text was not declared: its order is not known.
-
-    References
-    ----------
-    .. [1] Krippendorff, K. (2004). Content Analysis, 2nd ed., pp. 232-236.
-
-    Examples
-    --------
-    From the middle of 2 ratings over 3 to the middle of 4 it is 1 + 3 + 2 = 6:
-
-    >>> from masrel.agreement.counting import take_counts
-    >>> counted = take_counts([[2, 3, 4]], ["a", "b", "c"])
-    >>> float(metric_weights("ordinal", counted).as_floats()[0, 2])
-    36.0
-    """
+    """Return squared differences of categories as weights of disagreement."""
+    # δ² of every pair of categories, exact.
+    # [1] Krippendorff, K. (2004). Content Analysis, 2nd ed., pp. 232-236.
     if metric not in get_args(Metric):
         raise ParameterError(
             f"metric: needs one of {', '.join(get_args(Metric))}, got {metric!r}"

@@ -18,20 +18,8 @@ Table = NDArray[np.int64]
 
 
 def pair_table(codes: Codes, n_categories: int) -> Table:
-    """Count the pairs of two columns of codes.
-
-    Parameters
-    ----------
-    codes : ndarray of int, shape (n_items, 2)
-        Codes of two ratings; pairs with a missing one are left out.
-    n_categories : int
-        Declared categories.
-
-    Returns
-    -------
-    ndarray of int64, shape (n_categories, n_categories)
-        Items per pair of categories.
-    """
+    """Count the pairs of two columns of codes."""
+    # codes (n_items, 2) -> (n_categories, n_categories)
     side = n_categories + 1
     # Missing, -1, becomes the last row and column, which is cut off.
     flat = codes[:, 0].astype(np.int32) * side + codes[:, 1] + side + 1
@@ -41,11 +29,10 @@ def pair_table(codes: Codes, n_categories: int) -> Table:
 
 @dataclass(frozen=True, slots=True)
 class PairSums:
-    """What kappa of a table of pairs is made of, in integers.
+    """What kappa of a table of pairs is made of, in integers."""
 
-    With t the table and n its sum, D_o = `above` / (n · w) and D_e = `below` /
-    (n² · w), where w is the denominator of the weights.
-    """
+    # With t the table and n its sum, D_o = `above` / (n · w) and D_e = `below` / (n² ·
+    # w), where w is the denominator of the weights.
 
     cells: list[list[int]]
     n: int
@@ -56,20 +43,8 @@ class PairSums:
 
     @classmethod
     def of(cls, table: Table, v: Weights) -> "PairSums":
-        """Sum a table of pairs.
-
-        Parameters
-        ----------
-        table : ndarray of int64, shape (n_categories, n_categories)
-            Items per pair of categories.
-        v : Weights
-            Disagreement of two categories.
-
-        Returns
-        -------
-        PairSums
-            Its sums.
-        """
+        """Sum a table of pairs."""
+        # Takes table (n_categories, n_categories)
         cells: list[list[int]] = table.tolist()
         first = [sum(row) for row in cells]
         second = [sum(column) for column in zip(*cells, strict=True)]
@@ -88,10 +63,9 @@ class PairSums:
         return cls(cells, n, above, below, to_second, v.products(first))
 
     def influence(self, k: int, l: int, v: Weights) -> int:  # noqa: E741 - as in the formula
-        """Return the influence of an item in cell (k, l), times `below`² / n.
-
-        An item moves D_o by v_kl - D_o, and D_e by Σ_m (v_km p_.m + v_ml p_m.) - 2 D_e.
-        """
+        """Return the influence of an item in cell (k, l), times `below`² / n."""
+        # An item moves D_o by v_kl - D_o, and D_e by Σ_m (v_km p_.m + v_ml p_m.) - 2
+        # D_e.
         if v.numerators is None:
             own = 0 if k == l else 1
         else:
@@ -111,31 +85,7 @@ def kappa_of_sums(
     n_items: int,
     n_raters: int,
 ) -> Estimate:
-    """Make kappa of a table of pairs, 1 - D_o / D_e, with one division.
-
-    Parameters
-    ----------
-    found : PairSums
-        Sums of the table.
-    v : Weights
-        Disagreement of two categories.
-    name, title : str
-        The coefficient, in code and for a reader.
-    error : callable
-        Its standard error, where it is defined.
-    n_items, n_raters : int
-        As the result has them.
-
-    Returns
-    -------
-    Estimate
-        Undefined without pairs, or where D_e is 0.
-
-    Warns
-    -----
-    UndefinedStatisticWarning
-        If it is undefined.
-    """
+    """Make kappa of a table of pairs, 1 - D_o / D_e, with one division."""
     n, reason = found.n, None
     if n == 0:
         reason = undefined(title, NO_PAIR)

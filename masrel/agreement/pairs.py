@@ -17,25 +17,8 @@ __all__ = ["code_strata", "strata_of"]
 def code_strata(
     pairs: object, categories: Sequence[Label] | None = None
 ) -> CodedRatings:
-    """Check pairs of ratings per rater and lay them side by side as codes.
-
-    Parameters
-    ----------
-    pairs : nested sequence or array_like, shape (n_raters, n_items, 2)
-        Per rater, the grades of both sessions.
-    categories : sequence of str, int or float, optional
-        The declared scale in order.
-
-    Returns
-    -------
-    CodedRatings
-        Codes of shape (n_items, 2 n_raters), the two of a rater beside each other.
-
-    Raises
-    ------
-    RatingsError
-        If the pairs are not such a table.
-    """
+    """Check pairs of ratings per rater and lay them side by side as codes."""
+    # Takes pairs (n_raters, n_items, 2)
     if isinstance(pairs, CodedRatings):
         if categories is not None:
             check_scale(pairs.categories, categories)
@@ -79,17 +62,7 @@ def _plain(table: object, rater: int) -> list[list[object]]:
 
 
 def strata_of(coded: CodedRatings) -> list[Codes]:
-    """Take pairs that lie side by side apart, rater by rater.
-
-    Parameters
-    ----------
-    coded : CodedRatings
-        Codes of shape (n_items, 2 n_raters).
-
-    Returns
-    -------
-    list of ndarray, shape (n_items, 2)
-        One a rater.
-    """
+    """Take pairs that lie side by side apart, rater by rater."""
+    # -> (n_items, 2)
     width = coded.codes.shape[1]
     return [coded.codes[:, start : start + 2] for start in range(0, width, 2)]

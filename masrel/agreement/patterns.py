@@ -15,20 +15,8 @@ _FEW = 1 << 10  # items for which one call costs less than a few for each rater
 
 
 def distinct_patterns(codes: Codes, n_categories: int) -> tuple[Integers, Integers]:
-    """Put equal rows of codes together.
-
-    Parameters
-    ----------
-    codes : ndarray of int, shape (n_items, n_raters)
-        Codes, -1 where missing.
-    n_categories : int
-        Declared categories.
-
-    Returns
-    -------
-    tuple of ndarray of int64
-        Distinct rows, shape (n_distinct, n_raters), and how often each occurs.
-    """
+    """Put equal rows of codes together."""
+    # Takes codes (n_items, n_raters)
     n_items, n_raters = codes.shape
     base = n_categories + 1
     n_keys = base**n_raters  # a row is one number with n_raters digits

@@ -49,21 +49,14 @@ _LONG = 500  # bits of a multiple of all numbers of ratings that integers are sl
 
 
 class PooledCoefficient(NamedTuple):
-    """What tells coefficients of unnamed raters apart.
+    """What tells coefficients of unnamed raters apart."""
 
-    Attributes
-    ----------
-    name, title : str
-        In code and for a reader.
-    expected : callable
-        Shares and weights to the disagreement by chance.
-    slopes : callable or None
-        Shares and weights to its slopes in the shares; None where no share matters.
-    """
-
+    # name, title: in code and for a reader
     name: str
     title: str
+    # shares and weights to the disagreement by chance
     expected: Callable[[Shares, Weights], Expected]
+    # shares and weights to its slopes in the shares; None where no share matters
     slopes: Callable[[Shares, Weights], Slopes] | None = None
 
 
@@ -79,22 +72,8 @@ class Options(NamedTuple):
 def estimate_ratings(
     coefficient: PooledCoefficient, ratings: object, options: Options
 ) -> Estimate:
-    """Check ratings and options, and estimate the coefficient.
-
-    Parameters
-    ----------
-    coefficient : PooledCoefficient
-        Which.
-    ratings : nested sequence, array_like or DataFrame, shape (n_items, n_raters)
-        Labels.
-    options : Options
-        As they were given.
-
-    Returns
-    -------
-    Estimate
-        The coefficient.
-    """
+    """Check ratings and options, and estimate the coefficient."""
+    # Takes ratings (n_items, n_raters)
     counted = count_ratings(ratings, options.categories)
     weights = declared_weights(
         options.weights, counted.categories, declared=counted.declared
@@ -107,22 +86,8 @@ def estimate_ratings(
 def estimate_counts(
     coefficient: PooledCoefficient, counts: ArrayLike, options: Options
 ) -> Estimate:
-    """Check counts and options, and estimate the coefficient.
-
-    Parameters
-    ----------
-    coefficient : PooledCoefficient
-        Which.
-    counts : array_like of int, shape (n_items, n_categories)
-        Raters per item and category.
-    options : Options
-        As they were given.
-
-    Returns
-    -------
-    Estimate
-        The coefficient.
-    """
+    """Check counts and options, and estimate the coefficient."""
+    # Takes counts (n_items, n_categories)
     counted = take_counts(counts, options.categories)
     return estimate_ratings(coefficient, counted, options._replace(categories=None))
 
@@ -134,36 +99,7 @@ def pooled_estimate(
     weights: Weights,
     options: Options,
 ) -> Estimate:
-    """Estimate 1 - D_o / D_e with one division of integers.
-
-    Parameters
-    ----------
-    coefficient : PooledCoefficient
-        Which.
-    items : FewItems or ManyItems
-        The items.
-    n_raters : int
-        Raters with at least one rating.
-    weights : Weights
-        Disagreement of two categories.
-    options : Options
-        Of which the standard error's are read.
-
-    Returns
-    -------
-    Estimate
-        The coefficient; undefined without a pair of ratings or where D_e is 0.
-
-    Raises
-    ------
-    ParameterError
-        If an option is none.
-
-    Warns
-    -----
-    UndefinedStatisticWarning
-        If it is undefined.
-    """
+    """Estimate 1 - D_o / D_e with one division of integers."""
     check_variance(options.variance)
     tally = items.tally(weights)
     check_population(options.population, tally.n_rated)

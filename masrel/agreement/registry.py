@@ -105,10 +105,8 @@ class Coefficient:
         weights: "WeightName | ArrayLike" = "identity",
         level: float = 0.95,
     ) -> Estimate:
-        """Estimate the coefficient, as its public function does.
-
-        The level is that of an interval which comes with it.
-        """
+        """Estimate the coefficient, as its public function does."""
+        # The level is that of an interval which comes with it.
         if self.weighted:
             return self.function(ratings, categories=categories, weights=weights)
         if not (isinstance(weights, str) and weights == "identity"):

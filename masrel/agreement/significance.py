@@ -94,29 +94,7 @@ def chi_squared(
     df: int,
     n_items: int,
 ) -> Significance:
-    """Refer a ratio of two ratings' changes to the chi-squared law.
-
-    Parameters
-    ----------
-    name, hypothesis : str
-        Name of the test, and what it asks.
-    above, below : float, int
-        The statistic as numerator and denominator, which is 0 if no item changed.
-    df : int
-        Degrees of freedom.
-    n_items : int
-        Items it rests on.
-
-    Returns
-    -------
-    Significance
-        Undefined where the denominator is 0.
-
-    Warns
-    -----
-    UndefinedStatisticWarning
-        If the denominator is 0.
-    """
+    """Refer a ratio of two ratings' changes to the chi-squared law."""
     from scipy.special import chdtrc
 
     if below == 0:  # an empty sum is 0; of no degrees of freedom it says nothing

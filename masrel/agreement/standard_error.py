@@ -18,23 +18,10 @@ _VARIANCES = get_args(Variance)
 def standard_error(
     squares: float, over: float, n_items: int, population: int | None
 ) -> float:
-    """Return the standard error of an estimate from how much each item moves it.
-
-    Parameters
-    ----------
-    squares, over : int or float
-        Σ_i u_i² is `squares` / `over`, u_i being n times what the estimate changes by
-        when item i counts a little more.
-    n_items : int
-        How many items, n.
-    population : int or None
-        Items there are in all, N.
-
-    Returns
-    -------
-    float
-        √[(1 - n/N) Σ_i u_i² / (n (n - 1))]; ``nan`` of a single item.
-    """
+    """Return the standard error of an estimate from how much each item moves it."""
+    # squares, over: Σ_i u_i² is `squares` / `over`, u_i being n times what the estimate
+    # changes by when item i counts a little more.
+    # √[(1 - n/N) Σ_i u_i² / (n (n - 1))]; ``nan`` of a single item.
     if n_items < 2:
         return math.nan
     variance = squares / (over * n_items * (n_items - 1))
@@ -44,18 +31,7 @@ def standard_error(
 
 
 def check_variance(variance: str) -> None:
-    """Check the name of a standard error.
-
-    Parameters
-    ----------
-    variance : str
-        A name.
-
-    Raises
-    ------
-    ParameterError
-        If there is none of that name.
-    """
+    """Check the name of a standard error."""
     if variance not in _VARIANCES:
         raise ParameterError(
             f"variance: needs one of {', '.join(_VARIANCES)}, got {variance!r}"
@@ -63,20 +39,7 @@ def check_variance(variance: str) -> None:
 
 
 def check_population(population: int | None, n_items: int) -> None:
-    """Check the size of a finite population.
-
-    Parameters
-    ----------
-    population : int or None
-        Items there are in all.
-    n_items : int
-        Items that were rated.
-
-    Raises
-    ------
-    ParameterError
-        If there are fewer items than were rated.
-    """
+    """Check the size of a finite population."""
     if population is None:
         return
     if not isinstance(population, int | np.integer) or population < max(n_items, 1):

@@ -12,91 +12,46 @@ __all__ = ["Observed", "Shares", "SizeGroup", "Tally", "add_up"]
 
 
 class SizeGroup(NamedTuple):
-    """Sums over the items that have the same number of ratings.
+    """Sums over the items that have the same number of ratings."""
 
-    Attributes
-    ----------
-    size : int
-        Ratings of each item, at least 1.
-    n_items : int
-        How many items.
-    totals : list of int, shape (n_categories,)
-        Ratings per category.
-    disagreement : int
-        Σ_i Σ_kl v_kl n_ik n_il, times the denominator of the weights.
-    """
-
-    size: int
-    n_items: int
-    totals: list[int]
-    disagreement: int
+    size: int  # ratings of each item, at least 1
+    n_items: int  # how many items
+    totals: list[int]  # (n_categories,): ratings per category
+    disagreement: int  # Σ_i Σ_kl v_kl n_ik n_il, times the denominator of the weights
 
 
 class Observed(NamedTuple):
-    """Disagreement observed, D_o = numerator / denominator, and what it is made of.
+    """Disagreement observed, D_o = numerator / denominator, and what it is made of."""
 
-    Attributes
-    ----------
-    n_usable : int
-        Items with at least two ratings.
-    multiple : int
-        A multiple of n (n - 1) for every number of ratings n.
-    numerator, denominator : int
-        The mean over usable items of Σ_kl v_kl n_ik n_il / (n_i (n_i - 1)).
-    """
-
-    n_usable: int
-    multiple: int
+    n_usable: int  # items with at least two ratings
+    multiple: int  # A multiple of n (n - 1) for every number of ratings n
+    # numerator, denominator: the mean over usable items of Σ_kl v_kl n_ik n_il / (n_i
+    # (n_i - 1))
     numerator: int
     denominator: int
 
 
 class Shares(NamedTuple):
-    """Shares of the categories, p_k = numerators_k / total.
+    """Shares of the categories, p_k = numerators_k / total."""
 
-    A share is the mean over rated items of the part of an item's raters who chose it.
-    """
+    # A share is the mean over rated items of the part of an item's raters who chose it.
 
     numerators: list[int]
     total: int
 
 
 class Tally(NamedTuple):
-    """Sums over all items.
+    """Sums over all items."""
 
-    Attributes
-    ----------
-    groups : list of SizeGroup
-        Items by their number of ratings; those without any are left out.
-    n_rated : int
-        Items with at least one rating.
-    observed : Observed or None
-        None if no item has two ratings.
-    shares : Shares
-        Of the rated items.
-    """
-
+    # items by their number of ratings; those without any are left out
     groups: list[SizeGroup]
-    n_rated: int
-    observed: Observed | None
-    shares: Shares
+    n_rated: int  # items with at least one rating
+    observed: Observed | None  # none if no item has two ratings
+    shares: Shares  # of the rated items
 
 
 def add_up(groups: list[SizeGroup], weights: Weights) -> Tally:
-    """Add groups of items up.
-
-    Parameters
-    ----------
-    groups : list of SizeGroup
-        Items by their number of ratings.
-    weights : Weights
-        What their disagreement was weighed by.
-
-    Returns
-    -------
-    Tally
-        The sums.
-    """
+    """Add groups of items up."""
     n_rated = sum([group.n_items for group in groups])
     return Tally(groups, n_rated, _observed(groups, weights), _shares(groups, n_rated))
 

@@ -11,25 +11,7 @@ NO_CHANCE = "0/0: chance agreement is 1, all ratings are in one category"
 
 
 def undefined(title: str, reason: str) -> str:
-    """Warn that a statistic is undefined, and return why.
-
-    Parameters
-    ----------
-    title : str
-        The statistic, for the warning.
-    reason : str
-        Why; it goes into the result.
-
-    Returns
-    -------
-    str
-        The reason.
-
-    Warns
-    -----
-    UndefinedStatisticWarning
-        Always.
-    """
+    """Warn that a statistic is undefined, and return why."""
     warnings.warn(
         f"{title} is undefined: {reason}", UndefinedStatisticWarning, stacklevel=4
     )

@@ -16,26 +16,8 @@ __all__ = ["complete_values"]
 def complete_values(
     ratings: Any, categories: Sequence[Label] | None
 ) -> NDArray[np.float64]:
-    """Return the values of items that every rater rated.
-
-    Parameters
-    ----------
-    ratings : nested sequence, array_like or DataFrame, shape (n_items, n_raters)
-        Labels or numbers; None and ``nan`` are missing.
-    categories : sequence or None
-        The declared scale in order: numbers count by value, text by rank from 1.
-        Without it the ratings must be numbers.
-
-    Returns
-    -------
-    ndarray, shape (n_complete_items, n_raters)
-        Values.
-
-    Raises
-    ------
-    RatingsError
-        If the ratings are not such a table, or text without declared categories.
-    """
+    """Return the values of items that every rater rated."""
+    # ratings (n_items, n_raters) -> (n_complete_items, n_raters)
     if isinstance(ratings, np.ma.MaskedArray):
         ratings = unmasked(ratings)
     if categories is None and isinstance(ratings, np.ndarray):

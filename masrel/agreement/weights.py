@@ -94,18 +94,7 @@ class Weights:
 
 @cache
 def identity_weights(n_categories: int) -> Weights:
-    """Return the weights that count two different categories as a full miss.
-
-    Parameters
-    ----------
-    n_categories : int
-        Declared categories.
-
-    Returns
-    -------
-    Weights
-        Without a matrix.
-    """
+    """Return the weights that count two different categories as a full miss."""
     return Weights(name="identity", n_categories=n_categories)
 
 
@@ -190,23 +179,7 @@ def declared_weights(
 
 
 def category_values(categories: Sequence[Label]) -> list[Fraction]:
-    """Return what categories weigh: numbers by value, text by rank from 1.
-
-    Parameters
-    ----------
-    categories : sequence of str, int or float
-        The declared scale in order.
-
-    Returns
-    -------
-    list of Fraction
-        The values, exact.
-
-    Raises
-    ------
-    ParameterError
-        If a number is not finite.
-    """
+    """Return what categories weigh: numbers by value, text by rank from 1."""
     if isinstance(categories[0], str):
         return [Fraction(rank) for rank in range(1, len(categories) + 1)]
     found = []

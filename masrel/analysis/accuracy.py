@@ -18,29 +18,11 @@ __all__ = ["in_person_agreement", "intended_agreement"]
 
 
 def intended_agreement(protocol: Protocol, ratings: Ratings) -> IntendedAgreement:
-    """Count how many raters gave each standard model its intended grade.
-
-    The session is the first of the protocol that has ratings.
-
-    Parameters
-    ----------
-    protocol : Protocol
-        The study's protocol.
-    ratings : Ratings
-        The ratings.
-
-    Returns
-    -------
-    IntendedAgreement
-        Per standard model with an intended grade; mean and standard deviation
-        (n − 1) over these models, as below Table V of the source.
-
-    References
-    ----------
-    .. [1] Park, H.-S., Kim, J., Damiano, D. L. (2012). Development of a Haptic Elbow
-       Spasticity Simulator (HESS). IEEE TNSRE, 20(3), 361-370, section IV.B.
-       https://doi.org/10.1109/TNSRE.2012.2195330
-    """
+    """Count how many raters gave each standard model its intended grade."""
+    # The session is the first of the protocol that has ratings.
+    # [1] Park, H.-S., Kim, J., Damiano, D. L. (2012). Development of a Haptic Elbow
+    # Spasticity Simulator (HESS). IEEE TNSRE, 20(3), 361-370, section IV.B.
+    # https://doi.org/10.1109/TNSRE.2012.2195330
     session = first_session(protocol, ratings)
     if session is None:
         return _nothing("no session of the protocol has ratings")
@@ -68,20 +50,7 @@ def intended_agreement(protocol: Protocol, ratings: Ratings) -> IntendedAgreemen
 
 
 def first_session(protocol: Protocol, ratings: Ratings) -> str | None:
-    """Return the first session of the protocol that has ratings.
-
-    Parameters
-    ----------
-    protocol : Protocol
-        The study's protocol.
-    ratings : Ratings
-        The ratings.
-
-    Returns
-    -------
-    str or None
-        Its id, or None when there is none.
-    """
+    """Return the first session of the protocol that has ratings."""
     present = set(ratings.table["session"])
     return next((s.id for s in protocol.sessions if s.id in present), None)
 
@@ -116,30 +85,9 @@ def _model_agreement(
 def in_person_agreement(
     protocol: Protocol, ratings: Ratings, in_person: InPerson | None
 ) -> InPersonAgreement:
-    """Pair grades given in person with the same rater's haptic grades.
-
-    A file of in-person grades that holds haptic grades too is paired row by row;
-    one that holds none is paired with the first session of the ratings.
-
-    Parameters
-    ----------
-    protocol : Protocol
-        The study's protocol.
-    ratings : Ratings
-        The ratings.
-    in_person : InPerson or None
-        Grades given in person; None when the study has none.
-
-    Returns
-    -------
-    InPersonAgreement
-        Every pair, how many there are, how many are equal.
-
-    Raises
-    ------
-    RatingsError
-        If a haptic grade of the file is not the one in the ratings.
-    """
+    """Pair grades given in person with the same rater's haptic grades."""
+    # A file of in-person grades that holds haptic grades too is paired row by row; one
+    # that holds none is paired with the first session of the ratings.
     session = first_session(protocol, ratings)
     if in_person is None:
         return _unpaired(session, "no grades given in person belong to these ratings")

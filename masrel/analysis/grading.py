@@ -37,73 +37,46 @@ SEPARATED = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Effect:
-    """What one predictor does to the grade, the others held.
+    """What one predictor does to the grade, the others held."""
 
-    Attributes
-    ----------
-    predictor : str
-        Its name, of `PREDICTORS`.
-    per : float
-        One standard deviation of it among the ratings, in its unit: the step that
-        the odds ratio is for.
-    odds_ratio : float
-        By how much that step multiplies the odds of a higher grade; ``nan`` when
-        undefined.
-    coefficient, standard_error : float
-        Its logarithm, with an error clustered by rater.
-    low, high : float
-        Confidence interval of the odds ratio, from t with raters - 1 degrees.
-    """
-
-    predictor: str
+    predictor: str  # its name, of `PREDICTORS`
+    # one standard deviation of it among the ratings, in its unit: the step that the
+    # odds ratio is for
     per: float
+    # by how much that step multiplies the odds of a higher grade; ``nan`` when
+    # undefined
     odds_ratio: float
+    # coefficient, standard_error: its logarithm, with an error clustered by rater
     coefficient: float
     standard_error: float
+    # low, high: confidence interval of the odds ratio, from t with raters - 1 degrees
     low: float
     high: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GradeRegression:
-    """An ordered logistic regression of grades.
+    """An ordered logistic regression of grades."""
 
-    Attributes
-    ----------
-    effects : tuple of Effect
-        One a predictor that is in the regression.
-    dropped : tuple of tuple of str
-        Predictors that are not, each with the reason.
-    thresholds : tuple of float
-        Where one grade turns into the next, on the scale of the coefficients.
-    grades : tuple of str
-        The grades that were given, in order.
-    n_ratings, n_raters, n_models, n_missing : int
-        Ratings used, of how many raters and models; ratings without a grade or
-        speed, left out.
-    log_likelihood, log_likelihood_alone : float
-        Of the regression, and of the thresholds without any predictor.
-    level : float
-        Level of the intervals.
-    simulated : bool
-        Whether any rating is simulated.
-    reason : str or None
-        Why there are no values, or None.
-    """
-
-    effects: tuple[Effect, ...]
+    effects: tuple[Effect, ...]  # one a predictor that is in the regression
+    # predictors that are not, each with the reason
     dropped: tuple[tuple[str, str], ...]
+    # where one grade turns into the next, on the scale of the coefficients
     thresholds: tuple[float, ...]
-    grades: tuple[str, ...]
+    grades: tuple[str, ...]  # the grades that were given, in order
+    # n_ratings, n_raters, n_models, n_missing: ratings used, of how many raters and
+    # models; ratings without a grade or speed, left out
     n_ratings: int
     n_raters: int
     n_models: int
     n_missing: int
+    # log_likelihood, log_likelihood_alone: of the regression, and of the thresholds
+    # without any predictor
     log_likelihood: float
     log_likelihood_alone: float
-    level: float
-    simulated: bool
-    reason: str | None = None
+    level: float  # level of the intervals
+    simulated: bool  # whether any rating is simulated
+    reason: str | None = None  # why there are no values, or None
 
 
 def grade_regression(
@@ -115,56 +88,15 @@ def grade_regression(
     session: str | None = None,
     level: float = 0.95,
 ) -> GradeRegression:
-    """Regress grades on L, H, Q, D and the stretching speed.
-
-    Parameters
-    ----------
-    protocol : Protocol
-        The study, which has the models' parameters.
-    ratings : Ratings
-        Its ratings with their speeds.
-    predictors : sequence of str, optional
-        Of `PREDICTORS`, in the order of their claim: one that is a combination of
-        those before it, over these ratings, is dropped and named.
-    models : {"standard", "dummy", "all"}, optional
-        Which models.
-    session : str, optional
-        Which session; all unless given.
-    level : float, optional
-        Level of the intervals.
-
-    Returns
-    -------
-    GradeRegression
-        Odds ratios per standard deviation, errors clustered by rater.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such predictor, session or level.
-    RatingsError
-        If fewer than two grades, or ratings of two raters, are left.
-
-    Warns
-    -----
-    UndefinedStatisticWarning
-        If the predictors separate grades without a miss: the likelihood then has no
-        maximum, and no coefficient is a finite number.
-
-    Notes
-    -----
-    P(grade ≤ g) = 1/(1 + exp(x·β - τ_g)), by maximum likelihood (statsmodels,
-    `OrderedModel`). Whether a maximum exists is settled first, by a linear program:
-    it does not if some direction of β and τ makes no rating less likely [1]_. Models
-    on straight lines between others, as dummies are, do not help to tell L, H, Q and
-    D apart: they lie in the space of those at the ends.
-
-    References
-    ----------
-    .. [1] Albert, A., Anderson, J. A. (1984). On the existence of maximum likelihood
-       estimates in logistic regression models. Biometrika, 71(1), 1-10.
-       https://doi.org/10.1093/biomet/71.1.1
-    """
+    """Regress grades on L, H, Q, D and the stretching speed."""
+    # P(grade ≤ g) = 1/(1 + exp(x·β - τ_g)), by maximum likelihood (statsmodels,
+    # `OrderedModel`). Whether a maximum exists is settled first, by a linear program:
+    # it does not if some direction of β and τ makes no rating less likely [1]_. Models
+    # on straight lines between others, as dummies are, do not help to tell L, H, Q and
+    # D apart: they lie in the space of those at the ends.
+    # [1] Albert, A., Anderson, J. A. (1984). On the existence of maximum likelihood
+    # estimates in logistic regression models. Biometrika, 71(1), 1-10.
+    # https://doi.org/10.1093/biomet/71.1.1
     _check_options(predictors, level)
     table, n_missing = ratings_with(protocol, ratings, predictors, models, session)
     grades = tuple(g for g in ratings.scale.grades if (table["grade"] == g).any())

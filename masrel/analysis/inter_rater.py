@@ -13,29 +13,7 @@ __all__ = ["inter_rater"]
 def inter_rater(
     line: EstimatePlan, protocol: Protocol, ratings: Ratings
 ) -> PlannedEstimate:
-    """Estimate agreement between the raters of one session.
-
-    Parameters
-    ----------
-    line : EstimatePlan
-        A line of the plan of kind "inter-rater".
-    protocol : Protocol
-        The study's protocol.
-    ratings : Ratings
-        The ratings.
-
-    Returns
-    -------
-    PlannedEstimate
-        The estimate with its interval, or the reason why there is none.
-
-    Raises
-    ------
-    ParameterError
-        If the coefficient or the interval does not exist.
-    CountsError, RatingsError
-        If the ratings do not fit the coefficient.
-    """
+    """Estimate agreement between the raters of one session."""
     missing = absence(line, protocol, ratings)
     if missing is not None:
         return PlannedEstimate(line=line, reason=missing)

@@ -26,40 +26,7 @@ def planned_interval(
     n_resamples: int,
     seed: int,
 ) -> Interval | None:
-    """Compute the interval of one kind.
-
-    Parameters
-    ----------
-    kind : {"none", "auto", "analytic", "jackknife", "bootstrap", "posterior"}
-        Which one; "auto" chooses by target and size.
-    coefficient : str
-        Name of the coefficient.
-    ratings : nested sequence
-        What the coefficient takes; None is missing.
-    target : {"items", "raters", "both"}
-        What a new study would draw anew.
-    categories : sequence of str, int or float
-        The declared scale in order.
-    weights : str, optional
-        How much two categories agree.
-    level : float
-        Nominal level.
-    n_resamples : int
-        Resamples where a method draws them.
-    seed : int
-        Seed where a method draws.
-
-    Returns
-    -------
-    Interval or None
-        The interval; None for "none".
-
-    Raises
-    ------
-    ParameterError
-        If there is no such kind, or it does not exist for this coefficient or
-        target.
-    """
+    """Compute the interval of one kind."""
     if kind == "none":
         return None
     if kind not in _KINDS:
@@ -92,21 +59,7 @@ class _Asked(TypedDict):
 
 
 def stream_seed(root: int, purpose: str) -> int:
-    """Derive the seed of one purpose from a study's root seed.
-
-    Adding a line to a plan then moves no other line's numbers.
-
-    Parameters
-    ----------
-    root : int
-        The root seed.
-    purpose : str
-        What the stream is for.
-
-    Returns
-    -------
-    int
-        A seed of 63 bits.
-    """
+    """Derive the seed of one purpose from a study's root seed."""
+    # Adding a line to a plan then moves no other line's numbers.
     digest = hashlib.sha256(f"{root}/{purpose}".encode()).digest()
     return int.from_bytes(digest[:8], "big") >> 1

@@ -18,64 +18,32 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OrdinalData:
-    """Grades and what they are regressed on.
+    """Grades and what they are regressed on."""
 
-    Attributes
-    ----------
-    values : ndarray, shape (n_ratings, n_predictors)
-        Standardized predictors.
-    codes : ndarray of int, shape (n_ratings,)
-        Grades, 0 for the least that was given.
-    raters : ndarray of int, shape (n_ratings,)
-        Who gave them, from 0 on.
-    """
-
+    # (n_ratings, n_predictors): standardized predictors
     values: Floats = field(compare=False, repr=False)
+    # (n_ratings,): grades, 0 for the least that was given
     codes: NDArray[np.int64] = field(compare=False, repr=False)
+    # (n_ratings,): who gave them, from 0 on
     raters: NDArray[np.int64] = field(compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OrdinalFit:
-    """A regression of grades.
+    """A regression of grades."""
 
-    Attributes
-    ----------
-    coefficients : ndarray, shape (n_predictors,)
-        β.
-    covariance : ndarray, shape (n_predictors, n_predictors)
-        Of their errors, clustered by rater.
-    thresholds : ndarray, shape (n_grades - 1,)
-        τ.
-    log_likelihood : float
-        At the maximum.
-    """
-
-    coefficients: Floats = field(compare=False, repr=False)
+    coefficients: Floats = field(compare=False, repr=False)  # (n_predictors,): β
+    # (n_predictors, n_predictors): of their errors, clustered by rater
     covariance: Floats = field(compare=False, repr=False)
-    thresholds: Floats = field(compare=False, repr=False)
-    log_likelihood: float
+    thresholds: Floats = field(compare=False, repr=False)  # (n_grades - 1,): τ
+    log_likelihood: float  # at the maximum
 
 
 def is_separated(data: OrdinalData) -> bool:
-    """Say whether the likelihood has no maximum, by a linear program.
-
-    Parameters
-    ----------
-    data : OrdinalData
-        What was rated and how.
-
-    Returns
-    -------
-    bool
-        Whether some direction of β and τ makes no rating less likely and some more.
-
-    References
-    ----------
-    .. [1] Albert, A., Anderson, J. A. (1984). On the existence of maximum likelihood
-       estimates in logistic regression models. Biometrika, 71(1), 1-10.
-       https://doi.org/10.1093/biomet/71.1.1
-    """
+    """Say whether the likelihood has no maximum, by a linear program."""
+    # [1] Albert, A., Anderson, J. A. (1984). On the existence of maximum likelihood
+    # estimates in logistic regression models. Biometrika, 71(1), 1-10.
+    # https://doi.org/10.1093/biomet/71.1.1
     # A direction (β, τ) in which no rating's interval τ_(g-1) < x·β < τ_g shrinks at
     # either end, and some end moves away: then the likelihood grows for ever.
     n, p = data.values.shape
@@ -98,18 +66,7 @@ def is_separated(data: OrdinalData) -> bool:
 
 
 def fit_ordinal(data: OrdinalData) -> OrdinalFit:
-    """Fit the regression by maximum likelihood.
-
-    Parameters
-    ----------
-    data : OrdinalData
-        What was rated and how; not separated.
-
-    Returns
-    -------
-    OrdinalFit
-        Coefficients and thresholds.
-    """
+    """Fit the regression by maximum likelihood."""
     from statsmodels.miscmodels.ordinal_model import OrderedModel
 
     model = OrderedModel(data.codes, data.values, distr="logit")
@@ -132,23 +89,7 @@ def fit_ordinal(data: OrdinalData) -> OrdinalFit:
 
 
 def odds_ratio(coefficient: float) -> float:
-    """Turn a coefficient into what it multiplies the odds by.
-
-    Parameters
-    ----------
-    coefficient : float
-        Its logarithm.
-
-    Returns
-    -------
-    float
-        ``inf`` beyond the largest float64.
-
-    Examples
-    --------
-    >>> odds_ratio(0.0), odds_ratio(1e6)
-    (1.0, inf)
-    """
+    """Turn a coefficient into what it multiplies the odds by."""
     if coefficient > math.log(sys.float_info.max):
         return math.inf
     return math.exp(coefficient)

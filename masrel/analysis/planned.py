@@ -16,32 +16,7 @@ def with_interval(
     ratings: object,
     purpose: str,
 ) -> Estimate:
-    """Give an estimate the interval that its line of the plan asks for.
-
-    Parameters
-    ----------
-    estimate : Estimate
-        The estimate.
-    line : EstimatePlan
-        The line.
-    protocol : Protocol
-        Its protocol: scale, level, resamples and seed.
-    ratings : nested sequence
-        What the coefficient took.
-    purpose : str
-        What randomness is for, if any is needed.
-
-    Returns
-    -------
-    Estimate
-        The same with the interval; an intraclass correlation keeps its own where none
-        is asked for.
-
-    Raises
-    ------
-    ParameterError
-        If the interval does not exist for this coefficient or target.
-    """
+    """Give an estimate the interval that its line of the plan asks for."""
     interval = planned_interval(
         line.interval,
         line.coefficient,

@@ -29,31 +29,7 @@ def ratings_with(
     models: str,
     session: str | None,
 ) -> tuple[pd.DataFrame, int]:
-    """Put every predictor beside its grade.
-
-    Parameters
-    ----------
-    protocol : Protocol
-        The study, which has the models' parameters.
-    ratings : Ratings
-        Its ratings with their speeds.
-    predictors : sequence of str
-        Of `PREDICTORS`.
-    models : {"standard", "dummy", "all"}
-        Which models.
-    session : str or None
-        Which session; all if None.
-
-    Returns
-    -------
-    tuple of DataFrame and int
-        Ratings with a grade and every predictor, and how many have not.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such session.
-    """
+    """Put every predictor beside its grade."""
     table = ratings.table
     if session is not None:
         if session not in {s.id for s in protocol.sessions}:
@@ -78,25 +54,7 @@ def ratings_with(
 def independent(
     table: pd.DataFrame, predictors: Sequence[str]
 ) -> tuple[list[str], list[tuple[str, str]]]:
-    """Keep of the predictors those that are no combination of earlier ones.
-
-    Parameters
-    ----------
-    table : DataFrame
-        Ratings with a column each.
-    predictors : sequence of str
-        In the order of their claim.
-
-    Returns
-    -------
-    tuple of two list
-        Those that are kept, and the others, each with the reason.
-
-    Raises
-    ------
-    RatingsError
-        If none is left.
-    """
+    """Keep of the predictors those that are no combination of earlier ones."""
     kept: list[str] = []
     dropped: list[tuple[str, str]] = []
     basis = np.ones((len(table), 1)) / math.sqrt(len(table))

@@ -15,33 +15,10 @@ __all__ = ["retest_agreement"]
 def retest_agreement(
     line: EstimatePlan, protocol: Protocol, ratings: Ratings
 ) -> PlannedEstimate:
-    """Estimate agreement of every rater with him- or herself.
-
-    ``stratified_kappa`` gives one estimate over all raters, each a stratum, and
-    ``pooled_kappa`` one of all their pairs in one table, both with every rater's
-    Cohen's kappa beside it; any other coefficient is computed for every rater alone.
-
-    Parameters
-    ----------
-    line : EstimatePlan
-        A line of the plan of kind "test-retest".
-    protocol : Protocol
-        The study's protocol.
-    ratings : Ratings
-        The ratings.
-
-    Returns
-    -------
-    PlannedEstimate
-        The estimates, or the reason why there are none.
-
-    Raises
-    ------
-    ParameterError
-        If the coefficient or the interval does not exist.
-    CountsError, RatingsError
-        If the ratings do not fit the coefficient.
-    """
+    """Estimate agreement of every rater with him- or herself."""
+    # ``stratified_kappa`` gives one estimate over all raters, each a stratum, and
+    # ``pooled_kappa`` one of all their pairs in one table, both with every rater's
+    # Cohen's kappa beside it; any other coefficient is computed for every rater alone.
     missing = absence(line, protocol, ratings)
     if missing is not None:
         return PlannedEstimate(line=line, reason=missing)

@@ -10,22 +10,7 @@ __all__ = ["absence", "check_known", "rated_models"]
 def rated_models(
     line: EstimatePlan, protocol: Protocol, ratings: Ratings
 ) -> tuple[str, ...]:
-    """Return the models a line asks for that have a rating in each of its sessions.
-
-    Parameters
-    ----------
-    line : EstimatePlan
-        A line of the plan.
-    protocol : Protocol
-        The study's protocol.
-    ratings : Ratings
-        The ratings.
-
-    Returns
-    -------
-    tuple of str
-        Their ids, in the protocol's order.
-    """
+    """Return the models a line asks for that have a rating in each of its sessions."""
     table = ratings.table
     given = table[table["grade"].notna()]
     rated = [
@@ -37,22 +22,7 @@ def rated_models(
 
 
 def absence(line: EstimatePlan, protocol: Protocol, ratings: Ratings) -> str | None:
-    """Say why a line of the plan cannot be estimated from these data.
-
-    Parameters
-    ----------
-    line : EstimatePlan
-        A line of the plan.
-    protocol : Protocol
-        The study's protocol.
-    ratings : Ratings
-        The ratings.
-
-    Returns
-    -------
-    str or None
-        The reason; None when the data hold what the line asks for.
-    """
+    """Say why a line of the plan cannot be estimated from these data."""
     present = set(ratings.table["session"])
     lost = [session for session in line.sessions if session not in present]
     if lost:
@@ -72,20 +42,7 @@ def absence(line: EstimatePlan, protocol: Protocol, ratings: Ratings) -> str | N
 
 
 def check_known(protocol: Protocol, ratings: Ratings) -> None:
-    """Refuse ratings of sessions, raters or models the protocol does not have.
-
-    Parameters
-    ----------
-    protocol : Protocol
-        The study's protocol.
-    ratings : Ratings
-        The ratings.
-
-    Raises
-    ------
-    RatingsError
-        If there are any: one estimate would use them, and another section drop them.
-    """
+    """Refuse ratings of sessions, raters or models the protocol does not have."""
     known = {
         "session": [session.id for session in protocol.sessions],
         "rater": [rater.id for rater in protocol.raters],

@@ -12,21 +12,7 @@ __all__ = ["stretching_speeds"]
 
 
 def stretching_speeds(protocol: Protocol, ratings: Ratings) -> Speeds:
-    """Summarize the mean speeds of the stretches.
-
-    Parameters
-    ----------
-    protocol : Protocol
-        The study's protocol, which gives the order.
-    ratings : Ratings
-        The ratings with their speeds.
-
-    Returns
-    -------
-    Speeds
-        Every known speed in deg/s, and summaries per session and model and per
-        session and rater.
-    """
+    """Summarize the mean speeds of the stretches."""
     table = ratings.table
     known = table[table["mean_speed_deg_s"].notna()]
     values = tuple(

@@ -22,20 +22,7 @@ _POPULATION = {
 
 
 def check_figure(file: Path, target: Target | None) -> None:
-    """Check that a figure can be made, before anything is computed for it.
-
-    Parameters
-    ----------
-    file : Path
-        Where it is wanted.
-    target : {"items", "raters", "both"} or None
-        Of whom its intervals speak.
-
-    Raises
-    ------
-    ParameterError
-        If its name does not end as that of a figure, or there are no intervals.
-    """
+    """Check that a figure can be made, before anything is computed for it."""
     figure_form(file)
     if target is None:
         raise ParameterError(
@@ -46,26 +33,7 @@ def check_figure(file: Path, target: Target | None) -> None:
 def write_figure(
     rows: list[Row], ratings: "Ratings", by: str | None, target: Target, file: Path
 ) -> None:
-    """Draw the estimates with their intervals.
-
-    Parameters
-    ----------
-    rows : list of Row
-        The estimates.
-    ratings : Ratings
-        What they were made from.
-    by : str or None
-        The column that tells sessions apart, if there is more than one.
-    target : {"items", "raters", "both"}
-        Of whom intervals were asked to speak.
-    file : Path
-        Where to; its ending says in which form.
-
-    Raises
-    ------
-    OSError
-        If it cannot be written.
-    """
+    """Draw the estimates with their intervals."""
     # Imported here: a table loads nothing that draws.
     from masrel.report.figures import forest_file
 

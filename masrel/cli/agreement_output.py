@@ -28,20 +28,11 @@ NO_INTERVAL = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Output:
-    """What is written and printed.
+    """What is written and printed."""
 
-    Attributes
-    ----------
-    json_file : Path or None
-        Where JSON goes; "-" is the screen.
-    figure : Path or None
-        Where a figure goes.
-    csv, latex : bool
-        In which form the table is printed; as text when neither.
-    """
-
-    json_file: Path | None
-    figure: Path | None
+    json_file: Path | None  # where JSON goes; "-" is the screen
+    figure: Path | None  # where a figure goes
+    # csv, latex: in which form the table is printed; as text when neither
     csv: bool
     latex: bool
 
@@ -94,30 +85,7 @@ def put(
     by: str | None,
     about: tuple[str, ...],
 ) -> None:
-    """Write and print estimates.
-
-    Parameters
-    ----------
-    output : Output
-        Where to.
-    rows : list of Row
-        The estimates.
-    ratings : Ratings
-        What they were made from.
-    wanted : Wanted
-        What was asked for.
-    file : Path
-        Where the ratings came from.
-    by : str or None
-        The column that tells sessions apart, if there is more than one.
-    about : tuple of str
-        What to say of the ratings.
-
-    Raises
-    ------
-    OSError
-        If a file cannot be written.
-    """
+    """Write and print estimates."""
     if output.json_file is not None:
         _write_json(rows, by, output.json_file)
     if output.prints_json:

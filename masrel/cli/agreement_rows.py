@@ -24,34 +24,19 @@ _ANY_ORDER = ("all",)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Wanted:
-    """What is wanted of every session, as the command line has it.
+    """What is wanted of every session, as the command line has it."""
 
-    Attributes
-    ----------
-    coefficients : str or None
-        Names of the register, separated by commas, or ``"all"``; None for `USUAL`.
-    weights : str
-        Name of the weights, for coefficients that take any.
-    target : {"items", "raters", "both"} or None
-        What a new study would draw anew; no interval when None.
-    interval : str
-        Kind of interval; ``"auto"`` chooses one.
-    level : float
-        Its level.
-    n_resamples, seed : int
-        For intervals that draw.
-    words : str or None
-        Whose words for values.
-    """
-
+    # names of the register, separated by commas, or ``"all"``; None for `USUAL`
     coefficients: str | None
+    # name of the weights, for coefficients that take any
     weights: "WeightName"  # checked where the weights are made
-    target: Target | None
-    interval: str
-    level: float
+    target: Target | None  # what a new study would draw anew; no interval when None
+    interval: str  # kind of interval; ``"auto"`` chooses one
+    level: float  # its level
+    # n_resamples, seed: for intervals that draw
     n_resamples: int
     seed: int
-    words: str | None
+    words: str | None  # whose words for values
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -66,50 +51,18 @@ class Wanted:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Row:
-    """One estimate, and what to say of it that is not in it.
+    """One estimate, and what to say of it that is not in it."""
 
-    Attributes
-    ----------
-    session, title : str
-        Of what, and which coefficient.
-    estimate : Estimate
-        The estimate.
-    notes : tuple of str
-        What it lacks of what was asked for, and what was assumed.
-    """
-
+    # session, title: of what, and which coefficient
     session: str
     title: str
-    estimate: Estimate
+    estimate: Estimate  # the estimate
+    # what it lacks of what was asked for, and what was assumed
     notes: tuple[str, ...] = ()
 
 
 def estimate_session(ratings: "Ratings", session: str, wanted: Wanted) -> list[Row]:
-    """Estimate the coefficients of one session.
-
-    Parameters
-    ----------
-    ratings : Ratings
-        The ratings.
-    session : str
-        One of its sessions.
-    wanted : Wanted
-        What of it.
-
-    Returns
-    -------
-    list of Row
-        One per coefficient, in the order asked for.
-
-    Raises
-    ------
-    ParameterError
-        If a coefficient, weights or an interval does not exist or does not fit. Under
-        ``"all"`` what does not fit two raters, or has no such interval, is left out or
-        said instead; of coefficients that nobody named one at least must have it.
-    RatingsError
-        If the ratings do not fit a coefficient.
-    """
+    """Estimate the coefficients of one session."""
     from masrel.agreement import count_ratings
     from masrel.ratings import rating_matrix
 
@@ -145,25 +98,7 @@ def estimate_session(ratings: "Ratings", session: str, wanted: Wanted) -> list[R
 
 
 def scale_notes(ratings: "Ratings", weights: str) -> tuple[str, ...]:
-    """Say which scale was taken where none was declared.
-
-    Parameters
-    ----------
-    ratings : Ratings
-        The ratings of a file.
-    weights : str
-        Name of the weights asked for.
-
-    Returns
-    -------
-    tuple of str
-        Sentences for the reader of the table.
-
-    Raises
-    ------
-    ParameterError
-        If weights are asked for of text, whose order is not known.
-    """
+    """Say which scale was taken where none was declared."""
     scale, met = ratings.scale, ", ".join(ratings.scale.grades)
     if scale == MODIFIED_ASHWORTH:
         return (

@@ -21,28 +21,7 @@ def agreement_table(
     about: tuple[str, ...] = (),
     data: str = "foreign",
 ) -> "Table":
-    """Lay the estimates out as a table.
-
-    Parameters
-    ----------
-    rows : list of Row
-        The estimates.
-    file : Path
-        Where the ratings came from.
-    by : str or None
-        The column that tells sessions apart, if there is more than one.
-    wanted : Wanted
-        What was asked for.
-    about : tuple of str, optional
-        What to say of the ratings.
-    data : str, optional
-        Where they come from, in one word.
-
-    Returns
-    -------
-    Table
-        One row an estimate, with what to know of it in the notes.
-    """
+    """Lay the estimates out as a table."""
     from masrel.report.tables import Column, Table
 
     columns = [

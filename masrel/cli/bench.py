@@ -27,27 +27,14 @@ RANGE_END = math.radians(146.0)
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
 class Bench:
-    """A puck, and the screen or file that is told about it.
+    """A puck, and the screen or file that is told about it."""
 
-    Attributes
-    ----------
-    options : PuckOptions
-        Bus, node and how to treat it.
-    clock : Clock
-        Simulated for an emulated puck.
-    hand : SimulatedHand or None
-        What holds the arm of an emulated puck: a hand that has let go.
-    json_file : str or None
-        Where the JSON goes; "-" for the screen.
-    quiet : bool
-        Whether there are no progress bars.
-    """
-
-    options: PuckOptions
-    clock: Clock
+    options: PuckOptions  # bus, node and how to treat it
+    clock: Clock  # simulated for an emulated puck
+    # what holds the arm of an emulated puck: a hand that has let go
     hand: SimulatedHand | None
-    json_file: str | None
-    quiet: bool
+    json_file: str | None  # where the JSON goes; "-" for the screen
+    quiet: bool  # whether there are no progress bars
 
     @contextmanager
     def link(self, *, hears_all: bool = False) -> "Iterator[Link]":

@@ -18,75 +18,30 @@ __all__ = ["Between", "Source", "between", "read_source"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Source:
-    """A model that others are put next to.
+    """A model that others are put next to."""
 
-    Attributes
-    ----------
-    name : str
-        Name of a standard model, or that of a file without its ending.
-    said : str
-        The same for people, with the file and the start of its checksum.
-    joint : ElbowParameters
-        The model.
-    simulated : bool
-        Whether it comes from simulated recordings.
-    """
-
-    name: str
-    said: str
-    joint: ElbowParameters
-    simulated: bool
+    name: str  # name of a standard model, or that of a file without its ending
+    said: str  # the same for people, with the file and the start of its checksum
+    joint: ElbowParameters  # the model
+    simulated: bool  # whether it comes from simulated recordings
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Between:
-    """A model between two others.
+    """A model between two others."""
 
-    Attributes
-    ----------
-    name : str
-        ``D01`` and so on.
-    first, second : str
-        Its neighbours among the sources.
-    way : str
-        How far it is from the first to the second, as a fraction.
-    simulated : bool
-        Whether one of them is.
-    numbers : dict of str to float
-        L, H, Q and D by the key of a model file.
-    document : dict
-        Content of its model file.
-    """
-
-    name: str
+    name: str  # ``D01`` and so on
+    # first, second: its neighbours among the sources
     first: str
     second: str
-    way: str
-    simulated: bool
-    numbers: dict[str, float]
-    document: dict[str, object]
+    way: str  # how far it is from the first to the second, as a fraction
+    simulated: bool  # whether one of them is
+    numbers: dict[str, float]  # L, H, Q and D by the key of a model file
+    document: dict[str, object]  # content of its model file
 
 
 def read_source(model: str) -> Source:
-    """Find a model by name or read its file.
-
-    Parameters
-    ----------
-    model : str
-        ``HM1`` to ``HM4``, or a model file, which ends in ``.toml``.
-
-    Returns
-    -------
-    Source
-        The model.
-
-    Raises
-    ------
-    ParameterError
-        If it is neither.
-    ProtocolError
-        If the file is no usable model file.
-    """
+    """Find a model by name or read its file."""
     if not model.endswith(".toml"):
         if model not in STANDARD_MODELS:
             known = ", ".join(STANDARD_MODELS)
@@ -114,26 +69,7 @@ def read_source(model: str) -> Source:
 
 
 def between(sources: Sequence[Source], n_models: int) -> list[Between]:
-    """Put models at even steps between neighbours.
-
-    Parameters
-    ----------
-    sources : sequence of Source
-        Two or more, mildest first.
-    n_models : int
-        How many to make; the same number in every gap.
-
-    Returns
-    -------
-    list of Between
-        From the mildest to the most severe.
-
-    Raises
-    ------
-    ParameterError
-        If there are less than two, two have one name, the number does not divide
-        evenly among the gaps, or neighbours are read differently.
-    """
+    """Put models at even steps between neighbours."""
     joints = {source.name: source.joint for source in sources}
     if len(joints) < len(sources):
         names = [source.name for source in sources]

@@ -28,20 +28,7 @@ def command(study: Path) -> None:
 
 
 def check_study(study: StudyPaths) -> tuple[str, ...]:
-    """Gather the problems of a study from every checker.
-
-    Parameters
-    ----------
-    study : StudyPaths
-        Where the study is.
-
-    Returns
-    -------
-    tuple of str
-        Every problem with its file; empty when the study is usable. Without a
-        usable protocol there is nothing to hold the other files against, so its
-        problems are then all.
-    """
+    """Gather the problems of a study from every checker."""
     try:
         protocol = read_protocol(study.protocol)
     except ProtocolError as error:

@@ -16,20 +16,13 @@ __all__ = ["Columns", "column_options", "listed"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Columns:
-    """Columns of a file in long format, and its scale; None where nothing is said.
+    """Columns of a file in long format, and its scale; None where nothing is said."""
 
-    Attributes
-    ----------
-    item, rater, grade : str or None
-        Names of columns.
-    categories : str or None
-        Every grade of the scale in order, separated by commas.
-    """
-
+    # item, rater, grade: names of columns
     item: str | None
     rater: str | None
     grade: str | None
-    categories: str | None
+    categories: str | None  # every grade of the scale in order, separated by commas
 
     def read(self, file: Path) -> "Ratings":
         """Read the ratings of a file."""
@@ -58,21 +51,5 @@ column_options = grouped(
 
 
 def listed(text: str) -> list[str]:
-    """Split the parts of an option at its commas.
-
-    Parameters
-    ----------
-    text : str
-        What was given.
-
-    Returns
-    -------
-    list of str
-        The parts without spaces around them.
-
-    Examples
-    --------
-    >>> listed("0, 1, 1+")
-    ['0', '1', '1+']
-    """
+    """Split the parts of an option at its commas."""
     return [part.strip() for part in text.split(",")]

@@ -15,19 +15,7 @@ __all__ = ["fit_document"]
 
 
 def fit_document(fit: "ElbowFit | FrictionFit") -> dict[str, object]:
-    """Turn a fit into plain values, units in the keys.
-
-    Parameters
-    ----------
-    fit : ElbowFit or FrictionFit
-        The fit.
-
-    Returns
-    -------
-    dict
-        Estimates, correlation, steps, trials and remarks of a joint; estimates and
-        correlation of a device. ``nan`` is None, with its reason.
-    """
+    """Turn a fit into plain values, units in the keys."""
     if isinstance(fit, FrictionFit):
         return _device(fit)
     return {

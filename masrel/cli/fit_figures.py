@@ -13,15 +13,7 @@ __all__ = ["draw_friction_fit", "draw_joint_fit"]
 
 
 def draw_joint_fit(found: "ElbowFit", folder: Path) -> None:
-    """Draw an identified joint.
-
-    Parameters
-    ----------
-    found : ElbowFit
-        The fit.
-    folder : Path
-        Where the files go; it is made if there is none.
-    """
+    """Draw an identified joint."""
     from masrel.report.figures.fit_catch import draw_catches
     from masrel.report.figures.fit_residuals import draw_residuals
     from masrel.report.figures.fit_slow import draw_slow_trials
@@ -39,15 +31,7 @@ def draw_joint_fit(found: "ElbowFit", folder: Path) -> None:
 
 
 def draw_friction_fit(found: "FrictionFit", folder: Path) -> None:
-    """Draw the friction of a device.
-
-    Parameters
-    ----------
-    found : FrictionFit
-        The fit.
-    folder : Path
-        Where the files go; it is made if there is none.
-    """
+    """Draw the friction of a device."""
     from masrel.report.figures.fit_friction import draw_friction
 
     _write({"fit_friction": draw_friction(found, stamp=_stamp(found))}, folder)

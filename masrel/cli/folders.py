@@ -8,23 +8,7 @@ __all__ = ["check_folders"]
 
 
 def check_folders(**files: Path | str | None) -> None:
-    """Check that the folders of files to be written exist.
-
-    Parameters
-    ----------
-    **files : Path, str or None
-        Option, without its hyphens, to the file it names; None for none, and "-" for
-        the screen.
-
-    Raises
-    ------
-    ParameterError
-        If a folder does not exist; the message names the option.
-
-    Examples
-    --------
-    >>> check_folders(json="-", figure=None)
-    """
+    """Check that the folders of files to be written exist."""
     for option, name in files.items():
         if name is None or str(name) == "-":
             continue

@@ -23,21 +23,11 @@ __all__ = ["Output", "output_options", "put"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Output:
-    """What is written and printed.
+    """What is written and printed."""
 
-    Attributes
-    ----------
-    json_file : Path or None
-        Where JSON goes; "-" is the screen.
-    figure : Path or None
-        Where a figure goes.
-    csv : bool
-        Whether the table is printed as CSV.
-    """
-
-    json_file: Path | None
-    figure: Path | None
-    csv: bool
+    json_file: Path | None  # where JSON goes; "-" is the screen
+    figure: Path | None  # where a figure goes
+    csv: bool  # whether the table is printed as CSV
 
     def __post_init__(self) -> None:
         if self.csv and self.prints_json:
@@ -79,26 +69,7 @@ def put(
     file: Path,
     about: tuple[str, ...],
 ) -> None:
-    """Write and print a result.
-
-    Parameters
-    ----------
-    output : Output
-        Where to.
-    found : LatentTrait
-        The result.
-    ratings : Ratings
-        What it was made from.
-    file : Path
-        Where the ratings came from.
-    about : tuple of str
-        What to say of the ratings.
-
-    Raises
-    ------
-    OSError
-        If a file cannot be written.
-    """
+    """Write and print a result."""
     if output.json_file is not None:
         write_json(latent_document(found), output.json_file)
     if output.prints_json:

@@ -20,25 +20,7 @@ _UNLIKELY = 0.01
 def latent_table(
     found: "LatentTrait", file: Path, about: tuple[str, ...], data: str
 ) -> "Table":
-    """Lay a result out as a table.
-
-    Parameters
-    ----------
-    found : LatentTrait
-        The result.
-    file : Path
-        Where the ratings came from.
-    about : tuple of str
-        What to say of the ratings.
-    data : str
-        Where they come from, in one word.
-
-    Returns
-    -------
-    Table
-        Kappa, severities, thresholds, biases and noises, a row each, with what they
-        would be under another prior.
-    """
+    """Lay a result out as a table."""
     from masrel.report.tables import Column, Table
 
     columns = [
@@ -137,18 +119,7 @@ def _meanings(found: "LatentTrait") -> Iterator[str]:
 
 
 def unlikely(found: "LatentTrait") -> list[str]:
-    """Say what of the ratings the model would hardly make.
-
-    Parameters
-    ----------
-    found : LatentTrait
-        The result.
-
-    Returns
-    -------
-    list of str
-        Each property with what was seen and what was to be expected.
-    """
+    """Say what of the ratings the model would hardly make."""
     return [
         f"{check.name} {check.observed:.3g}, expected {check.low:.3g} to "
         f"{check.high:.3g}"
@@ -158,18 +129,7 @@ def unlikely(found: "LatentTrait") -> list[str]:
 
 
 def latent_document(found: "LatentTrait") -> dict[str, object]:
-    """Turn a result into plain values for JSON, every digit kept.
-
-    Parameters
-    ----------
-    found : LatentTrait
-        The result.
-
-    Returns
-    -------
-    dict
-        Field name to value; the other prior's result nested.
-    """
+    """Turn a result into plain values for JSON, every digit kept."""
     parts = {
         "items": found.items,
         "thresholds": found.thresholds,

@@ -15,49 +15,17 @@ __all__ = ["StudyMaterial", "read_material"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StudyMaterial:
-    """A study read from its folder.
+    """A study read from its folder."""
 
-    Attributes
-    ----------
-    paths : StudyPaths
-        Where its files are.
-    protocol : Protocol
-        Its protocol.
-    ratings : Ratings
-        The ratings asked for.
-    in_person : InPerson or None
-        Grades given in person; None for simulated ratings, to which they do not
-        belong.
-    """
-
-    paths: StudyPaths
-    protocol: Protocol
-    ratings: "Ratings"
+    paths: StudyPaths  # where its files are
+    protocol: Protocol  # its protocol
+    ratings: "Ratings"  # the ratings asked for
+    # grades given in person; None for simulated ratings, to which they do not belong
     in_person: "InPerson | None"
 
 
 def read_material(root: Path, ratings_file: Path | None) -> StudyMaterial:
-    """Read a study's protocol and ratings.
-
-    Parameters
-    ----------
-    root : Path
-        The study's folder.
-    ratings_file : Path or None
-        A file of ratings; None takes the study's own, or the published ones.
-
-    Returns
-    -------
-    StudyMaterial
-        What was read.
-
-    Raises
-    ------
-    ProtocolError
-        If the protocol is not usable.
-    RatingsError
-        If there are no ratings or they are not usable.
-    """
+    """Read a study's protocol and ratings."""
     from masrel.ratings import read_in_person, read_ratings
 
     paths = StudyPaths(root)

@@ -13,13 +13,7 @@ __all__ = ["notes"]
 
 @contextmanager
 def notes() -> Iterator[None]:
-    """Show warnings of masrel as notes, each once; leave all others as they are.
-
-    Yields
-    ------
-    None
-        The notes are shown when the block ends, also by an error.
-    """
+    """Show warnings of masrel as notes, each once; leave all others as they are."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:

@@ -12,22 +12,7 @@ Decorator = Callable[[Command], Command]
 
 
 def grouped(name: str, group: type, *options: Callable[..., Any]) -> Decorator:
-    """Give a command several options as one argument.
-
-    Parameters
-    ----------
-    name : str
-        Name of the argument.
-    group : type
-        A dataclass whose fields are the names of the options.
-    *options : callable
-        ``click.option`` of each.
-
-    Returns
-    -------
-    callable
-        A decorator of the command, in the place of the options.
-    """
+    """Give a command several options as one argument."""
     names = [field.name for field in fields(group)]
 
     def decorate(command: Command) -> Command:

@@ -18,27 +18,7 @@ _FORMS: dict[str, "Form"] = {".png": "png", ".svg": "svg", ".pdf": "pdf"}
 
 
 def write_json(document: dict[str, object], file: Path) -> None:
-    """Write a document, or print it.
-
-    Parameters
-    ----------
-    document : dict
-        Plain values, no ``nan`` among them.
-    file : Path
-        Where to; "-" is the screen.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
-
-    Examples
-    --------
-    >>> write_json({"symbol": "θ"}, Path("-"))
-    {
-     "symbol": "θ"
-    }
-    """
+    """Write a document, or print it."""
     text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
     if file == Path("-"):
         click.echo(text)
@@ -47,17 +27,7 @@ def write_json(document: dict[str, object], file: Path) -> None:
 
 
 def print_table(table: "Table", *, csv: bool, latex: bool = False) -> None:
-    """Print a table.
-
-    Parameters
-    ----------
-    table : Table
-        The table.
-    csv : bool
-        Whether as CSV, its notes on stderr: CSV has no place for them.
-    latex : bool, optional
-        Whether as LaTeX; as text when neither.
-    """
+    """Print a table."""
     from masrel.report.latex import as_latex
     from masrel.report.tables import as_csv, as_text
 
@@ -68,39 +38,12 @@ def print_table(table: "Table", *, csv: bool, latex: bool = False) -> None:
 
 
 def tell(notes: tuple[str, ...]) -> None:
-    """Say notes on stderr, one a line.
-
-    Parameters
-    ----------
-    notes : tuple of str
-        What to say; nothing if there is none.
-    """
+    """Say notes on stderr, one a line."""
     click.echo("".join(f"{note}\n" for note in notes), err=True, nl=False)
 
 
 def figure_form(file: Path) -> "Form":
-    """Return in which form a figure is wanted.
-
-    Parameters
-    ----------
-    file : Path
-        Where ``--figure`` wants it.
-
-    Returns
-    -------
-    {"png", "svg", "pdf"}
-        As its name ends.
-
-    Raises
-    ------
-    ParameterError
-        If it ends otherwise.
-
-    Examples
-    --------
-    >>> figure_form(Path("scale.PDF"))
-    'pdf'
-    """
+    """Return in which form a figure is wanted."""
     form = _FORMS.get(file.suffix.lower())
     if form is None:
         raise ParameterError(

@@ -51,18 +51,7 @@ _OPTIONS = (
 
 
 def for_a_puck(function: Callable[..., None]) -> Callable[..., None]:
-    """Give a command the options that say which puck it is for.
-
-    Parameters
-    ----------
-    function : callable
-        Takes a `Bench`, and the command's own options by name.
-
-    Returns
-    -------
-    callable
-        Takes the options that make a `Bench`, and the command's own.
-    """
+    """Give a command the options that say which puck it is for."""
 
     @functools.wraps(function)
     def called(

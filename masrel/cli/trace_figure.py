@@ -21,24 +21,7 @@ N_PIXELS = 800
 
 
 def check_figure(file: Path, view: str, scenes: Sequence[Scene]) -> None:
-    """Check that a figure can be made, before anything is computed for it.
-
-    Parameters
-    ----------
-    file : Path
-        Where it is wanted.
-    view : {"angle", "time", "catch", "schematic"}
-        What it shows.
-    scenes : sequence of Scene
-        The scenes.
-
-    Raises
-    ------
-    ParameterError
-        If its name does not end as that of a figure, there are more models than fit
-        beside each other or more lines than can be told apart, too few speeds, or
-        too many scenes for a schematic, or none with a catch.
-    """
+    """Check that a figure can be made, before anything is computed for it."""
     figure_form(file)
     models = _by_model(scenes)
     most = max(len(own) for own in models.values())
@@ -82,18 +65,7 @@ def _n_caught(scenes: Sequence[Scene]) -> int:
 
 
 def write_figure(scenes: Sequence[Scene], view: str, file: Path) -> None:
-    """Draw scenes.
-
-    Parameters
-    ----------
-    scenes : sequence of Scene
-        The scenes.
-    view : {"angle", "time", "catch", "schematic"}
-        Torque against angle, torque and angle against time, what catches depend on, or
-        one catch with its constants.
-    file : Path
-        Where the figure goes.
-    """
+    """Draw scenes."""
     from masrel.report import figures
 
     form = figure_form(file)

@@ -31,27 +31,13 @@ _N_AT_ONCE = 10_000  # rows between two signs of progress
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Files:
-    """Which files are asked for.
+    """Which files are asked for."""
 
-    Attributes
-    ----------
-    rate_hz : float or None
-        Samples a second of the CSV file; None for 1000.
-    csv_file : Path or None
-        Where samples go.
-    json_file : str or None
-        Where JSON goes; "-" is the screen.
-    figure : Path or None
-        Where a figure goes.
-    view : str or None
-        What it shows; None for "angle".
-    """
-
-    rate_hz: float | None
-    csv_file: Path | None
-    json_file: str | None
-    figure: Path | None
-    view: str | None
+    rate_hz: float | None  # samples a second of the CSV file; None for 1000
+    csv_file: Path | None  # where samples go
+    json_file: str | None  # where JSON goes; "-" is the screen
+    figure: Path | None  # where a figure goes
+    view: str | None  # what it shows; None for "angle"
 
     def __post_init__(self) -> None:
         if self.rate_hz is not None and self.csv_file is None:
@@ -66,18 +52,7 @@ class Files:
             raise ParameterError("--csv: needs the name of a file, got -")
 
     def check(self, scenes: Sequence[Scene]) -> None:
-        """Check that the files can be made, before anything is computed for them.
-
-        Parameters
-        ----------
-        scenes : sequence of Scene
-            The scenes.
-
-        Raises
-        ------
-        ParameterError
-            If a folder does not exist, or the figure cannot show these scenes.
-        """
+        """Check that the files can be made, before anything is computed for them."""
         check_folders(csv=self.csv_file, json=self.json_file, figure=self.figure)
         if self.figure is not None:
             check_figure(self.figure, self.view or VIEWS[0], scenes)
@@ -112,24 +87,7 @@ def write_files(
     *,
     quiet: bool,
 ) -> None:
-    """Write what was asked for; JSON for the screen is printed.
-
-    Parameters
-    ----------
-    files : Files
-        Which files.
-    scenes : sequence of Scene
-        The scenes.
-    documents : sequence of dict
-        What was computed of each.
-    quiet : bool
-        Whether no progress is shown.
-
-    Raises
-    ------
-    ParameterError
-        If there are more samples than a CSV file may have.
-    """
+    """Write what was asked for; JSON for the screen is printed."""
     if files.csv_file is not None:
         rate_hz = 1000.0 if files.rate_hz is None else files.rate_hz
         n_rows = _n_samples(documents, rate_hz)

@@ -19,27 +19,13 @@ __all__ = ["Law", "joints_of", "law_options"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Law:
-    """What the command line changes of every joint; None changes nothing.
+    """What the command line changes of every joint; None changes nothing."""
 
-    Attributes
-    ----------
-    rest : float or None
-        θ_rest, deg.
-    post_catch : str or None
-        Reading of (5).
-    reading : str or None
-        Reading of Q.
-    rise : float or None
-        How long torque takes to its peak, s.
-    inertia : float or None
-        m of (1) and (5), kg·m².
-    """
-
-    rest: float | None
-    post_catch: str | None
-    reading: str | None
-    rise: float | None
-    inertia: float | None
+    rest: float | None  # θ_rest, deg
+    post_catch: str | None  # reading of (5)
+    reading: str | None  # reading of Q
+    rise: float | None  # how long torque takes to its peak, s
+    inertia: float | None  # m of (1) and (5), kg·m²
 
     def of(self, joint: "ElbowParameters") -> "ElbowParameters":
         """Return a joint with these changes."""
@@ -77,30 +63,7 @@ law_options = grouped(
 def joints_of(
     models: Sequence[str], study: Path | None, law: Law
 ) -> dict[str, "ElbowParameters"]:
-    """Find models by name.
-
-    Parameters
-    ----------
-    models : sequence of str
-        Standard models, those of the study, or model files of ``masrel fit``.
-    study : Path or None
-        Folder of a study.
-    law : Law
-        What is changed of each.
-
-    Returns
-    -------
-    dict of str to ElbowParameters
-        Each model once; one from a file has that file's name without ending.
-
-    Raises
-    ------
-    ParameterError
-        If a model is unknown, two files have one name, or a change is outside its
-        range.
-    ProtocolError
-        If the study's protocol or a model file is not usable.
-    """
+    """Find models by name."""
     joints: dict[str, ElbowParameters] = {}
     for model in dict.fromkeys(models):
         is_file = model.endswith(".toml")

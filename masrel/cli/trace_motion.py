@@ -22,35 +22,19 @@ MOST_REPEATS = 1000  # which take a second to solve
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Asked:
-    """A motion as the command line has it; degrees and seconds.
+    """A motion as the command line has it; degrees and seconds."""
 
-    Attributes
-    ----------
-    kind : str
-        One of `KINDS`.
-    start, end : float or None
-        deg; None for the usual ones, or those of a recording.
-    acceleration : float or None
-        Of a trapezoid, deg/s².
-    recording : Path or None
-        The file of a recording.
-    interpolation : {"pchip", "linear"} or None
-        Of a recording.
-    stop, pause : float or None
-        When it is stopped and for how long, s.
-    repeats : int
-        How often it is made, with the way back in between.
-    """
-
-    kind: str
+    kind: str  # one of `KINDS`
+    # start, end: deg; None for the usual ones, or those of a recording
     start: float | None
     end: float | None
-    acceleration: float | None
-    recording: Path | None
-    interpolation: str | None
+    acceleration: float | None  # of a trapezoid, deg/s²
+    recording: Path | None  # the file of a recording
+    interpolation: str | None  # of a recording
+    # stop, pause: when it is stopped and for how long, s
     stop: float | None
     pause: float | None
-    repeats: int
+    repeats: int  # how often it is made, with the way back in between
 
     def __post_init__(self) -> None:
         if (self.kind == "recording") != (self.recording is not None):
@@ -129,27 +113,7 @@ motion_options = grouped(
 
 
 def motion_of(asked: Asked, speed_deg_s: float | None) -> "Motion":
-    """Make a motion.
-
-    Parameters
-    ----------
-    asked : Asked
-        What it is like.
-    speed_deg_s : float or None
-        Its speed: mean, or that of the level of a trapezoid; None of a recording.
-
-    Returns
-    -------
-    Motion
-        The motion.
-
-    Raises
-    ------
-    ParameterError
-        If a number is outside its range.
-    RecordingError
-        If the recording cannot be read.
-    """
+    """Make a motion."""
     from masrel.elbow import Joined, Reversed, interrupted
 
     once = _plain(asked, speed_deg_s)

@@ -25,31 +25,16 @@ OUTPUTS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scene:
-    """A model and a motion.
+    """A model and a motion."""
 
-    Attributes
-    ----------
-    model : str
-        Name of the model.
-    kind : str
-        Kind of the motion.
-    speed_deg_s : float or None
-        Its speed, if it is named after one.
-    start_deg, end_deg : float
-        Where it starts and ends.
-    parameters : ElbowParameters
-        The joint.
-    motion : Motion
-        The motion.
-    """
-
-    model: str
-    kind: str
-    speed_deg_s: float | None
+    model: str  # name of the model
+    kind: str  # kind of the motion
+    speed_deg_s: float | None  # its speed, if it is named after one
+    # start_deg, end_deg: where it starts and ends
     start_deg: float
     end_deg: float
-    parameters: "ElbowParameters"
-    motion: "Motion"
+    parameters: "ElbowParameters"  # the joint
+    motion: "Motion"  # the motion
 
     @property
     def title(self) -> str:
@@ -61,21 +46,11 @@ class Scene:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Wanted:
-    """What is asked of every scene beside events and peak.
+    """What is asked of every scene beside events and peak."""
 
-    Attributes
-    ----------
-    outputs : tuple of str
-        Of `OUTPUTS`.
-    times : tuple of float
-        Times at which the torque is asked for, s.
-    angles : tuple of float
-        Angles where it is asked for, deg.
-    """
-
-    outputs: tuple[str, ...]
-    times: tuple[float, ...]
-    angles: tuple[float, ...]
+    outputs: tuple[str, ...]  # of `OUTPUTS`
+    times: tuple[float, ...]  # times at which the torque is asked for, s
+    angles: tuple[float, ...]  # angles where it is asked for, deg
 
 
 output_options = grouped(
@@ -97,26 +72,7 @@ output_options = grouped(
 
 
 def document(scene: Scene, wanted: Wanted) -> dict[str, object]:
-    """Solve a scene.
-
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    wanted : Wanted
-        What is asked of it.
-
-    Returns
-    -------
-    dict
-        What goes into JSON.
-
-    Raises
-    ------
-    ParameterError
-        If a time or angle is none of the motion, or an output is larger than a float
-        can be.
-    """
+    """Solve a scene."""
     from masrel import elbow
 
     joint, motion = scene.parameters, scene.motion

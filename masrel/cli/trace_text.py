@@ -15,20 +15,7 @@ _LINES = {
 
 
 def summary(made: Document, title: str) -> str:
-    """Write the document of one scene for a person.
-
-    Parameters
-    ----------
-    made : dict
-        The document.
-    title : str
-        Name of the scene.
-
-    Returns
-    -------
-    str
-        Its phases and outputs.
-    """
+    """Write the document of one scene for a person."""
     lines = [title, _columns(["phase", "start s", "end s", "start deg", "end deg"])]
     for span in made["phases"]:
         times = [_number(span[key], 3) for key in ("start_s", "end_s")]
@@ -70,18 +57,7 @@ def _places(made: Document) -> list[tuple[str, float]]:
 
 
 def table(documents: Sequence[Document]) -> str:
-    """Write many scenes for a person, one a line.
-
-    Parameters
-    ----------
-    documents : sequence of dict
-        Their documents.
-
-    Returns
-    -------
-    str
-        Model, speed, catch angle, peak torque and what else was asked for.
-    """
+    """Write many scenes for a person, one a line."""
     keys = ["speed_deg_s", "catch_angle_deg", "mean_speed_deg_s", "peak_torque_nm"]
     keys += [key for key in _LINES if key in documents[0]]
     places = [f"torque_nm at {place}" for place, _ in _places(documents[0])]

@@ -11,26 +11,7 @@ __all__ = ["run_to_the_end"]
 
 
 def run_to_the_end(ticks: Ticks) -> tuple[str, Fault | None]:
-    """Run ticks until they end; whatever ends them, the torque is zero afterwards.
-
-    Parameters
-    ----------
-    ticks : Ticks
-        Those of one presentation, on an open device.
-
-    Returns
-    -------
-    str
-        "arrived", "max-duration" or "fault".
-    Fault or None
-        What stopped them; the device is then closed.
-
-    Raises
-    ------
-    BaseException
-        Whatever is no `DeviceError`, once the device has been closed, with a note
-        when that failed.
-    """
+    """Run ticks until they end; whatever ends them, the torque is zero afterwards."""
     try:
         return _run(ticks)
     except BaseException as error:

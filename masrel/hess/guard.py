@@ -15,28 +15,7 @@ _LONGEST_STOP_TICKS = 1.5
 
 
 class Guard:
-    """Check readings and torques against limits that look at more than one tick.
-
-    Parameters
-    ----------
-    limits : DeviceLimits
-        What may pass.
-    period_s : float
-        Time from tick to tick, s.
-
-    Attributes
-    ----------
-    replies : MissingReplies
-        Ticks without a new reading.
-
-    Examples
-    --------
-    >>> guard = Guard(DeviceLimits(), 0.001)
-    >>> guard.torque(0.0, 31.5)
-    Traceback (most recent call last):
-        ...
-    masrel.errors.LimitExceededError: torque: needs at most 20 N·m, got 31.500 N·m
-    """
+    """Check readings and torques against limits that look at more than one tick."""
 
     __slots__ = (
         "_angle",
@@ -68,22 +47,7 @@ class Guard:
         return time_s > self._time
 
     def reading(self, time_s: float, angle: float, age_s: float) -> None:
-        """Check a new reading alone and against the one before.
-
-        Parameters
-        ----------
-        time_s : float
-            When it was read, s since the presentation began.
-        angle : float
-            Elbow angle, rad; ``nan`` never passes.
-        age_s : float
-            How long ago that is, s.
-
-        Raises
-        ------
-        LimitExceededError
-            If it is stale, out of range, or cannot follow the one before.
-        """
+        """Check a new reading alone and against the one before."""
         limits = self._limits
         if not -self._period <= age_s <= limits.stale_time:
             raise LimitExceededError(
@@ -149,18 +113,7 @@ class Guard:
             )
 
     def speed(self, velocity: float) -> None:
-        """Check the estimated speed.
-
-        Parameters
-        ----------
-        velocity : float
-            rad/s; ``nan`` never passes.
-
-        Raises
-        ------
-        LimitExceededError
-            If the arm is too fast.
-        """
+        """Check the estimated speed."""
         limit = self._limits.speed
         if not -limit <= velocity <= limit:
             raise LimitExceededError(
@@ -170,21 +123,7 @@ class Guard:
             )
 
     def torque(self, time_s: float, torque: float) -> None:
-        """Check a torque before it is sent.
-
-        Parameters
-        ----------
-        time_s : float
-            When, s.
-        torque : float
-            What is to be sent, N·m; ``nan`` never passes.
-
-        Raises
-        ------
-        LimitExceededError
-            If it is too large, builds up too fast, or is more to begin with than an
-            arm at rest may bear.
-        """
+        """Check a torque before it is sent."""
         limits = self._limits
         if not -limits.torque <= torque <= limits.torque:
             raise LimitExceededError(

@@ -12,31 +12,7 @@ WINDOW_TICKS = 100
 
 
 class MissingReplies:
-    """Count ticks without a new reading, and say when there are too many.
-
-    Parameters
-    ----------
-    limits : DeviceLimits
-        How many may pass.
-    period_s : float
-        Time from tick to tick, s.
-
-    Attributes
-    ----------
-    n_missed : int
-        Ticks without a new reading so far.
-    n_in_a_row : int
-        Those since the last reading; whoever gets one sets it to 0.
-
-    Examples
-    --------
-    >>> missing = MissingReplies(DeviceLimits(missed_replies=0), 0.001)
-    >>> missing.another(0.25, "no answer")
-    Traceback (most recent call last):
-        ...
-    masrel.errors.LimitExceededError: missed replies: needs a new reading after at \
-most 0 ticks without, got 1 in a row (no answer)
-    """
+    """Count ticks without a new reading, and say when there are too many."""
 
     __slots__ = ("_limits", "_times", "_window_s", "n_in_a_row", "n_missed")
 
@@ -50,20 +26,7 @@ most 0 ticks without, got 1 in a row (no answer)
         self.n_in_a_row = 0
 
     def another(self, time_s: float, words: str) -> None:
-        """Count one more.
-
-        Parameters
-        ----------
-        time_s : float
-            When, s.
-        words : str
-            What came instead of a reading.
-
-        Raises
-        ------
-        LimitExceededError
-            If there are more in a row, or among the last 100 ticks, than may pass.
-        """
+        """Count one more."""
         limits = self._limits
         self.n_missed += 1
         self.n_in_a_row += 1

@@ -17,23 +17,7 @@ _CATCH = PHASES.index("catch")
 def movement_facts(
     columns: Columns, speed_threshold: float, stopped: bool
 ) -> dict[str, str | float | None]:
-    """Return what a recording's facts say of the movement.
-
-    Parameters
-    ----------
-    columns : dict of str to ndarray
-        Columns of a recording.
-    speed_threshold : float
-        Speed threshold ν_th, rad/s.
-    stopped : bool
-        Whether a fault stopped the presentation.
-
-    Returns
-    -------
-    dict
-        ``phases``, ``catch_angle_deg`` and ``mean_speed_deg_s``. After a fault before
-        the catch there is no mean speed: the last reading may be what was wrong.
-    """
+    """Return what a recording's facts say of the movement."""
     caught = catch_angle_deg(columns)
     whole = not stopped or caught is not None
     return {
@@ -46,18 +30,7 @@ def movement_facts(
 
 
 def phase_sequence(columns: Columns) -> tuple[str, ...]:
-    """Return the names of the phases in the order they came.
-
-    Parameters
-    ----------
-    columns : dict of str to ndarray
-        Columns of a recording.
-
-    Returns
-    -------
-    tuple of str
-        One name per change of phase; empty for no samples.
-    """
+    """Return the names of the phases in the order they came."""
     codes = columns["phase"].astype(np.int64)
     if codes.size == 0:
         return ()
@@ -66,39 +39,16 @@ def phase_sequence(columns: Columns) -> tuple[str, ...]:
 
 
 def catch_angle_deg(columns: Columns) -> float | None:
-    """Return the angle where the first catch began.
-
-    Parameters
-    ----------
-    columns : dict of str to ndarray
-        Columns of a recording.
-
-    Returns
-    -------
-    float or None
-        Angle, deg; None when there was no catch.
-    """
+    """Return the angle where the first catch began."""
     caught = np.flatnonzero(columns["phase"] == _CATCH)
     return float(columns["angle_deg"][caught[0]]) if caught.size else None
 
 
 def mean_speed_deg_s(columns: Columns, speed_threshold: float) -> float | None:
-    """Return the mean speed before the catch, as Table V reports it.
-
-    Parameters
-    ----------
-    columns : dict of str to ndarray
-        Columns of a recording.
-    speed_threshold : float
-        Speed threshold ν_th, rad/s: the movement begins when the speed reaches it.
-
-    Returns
-    -------
-    float or None
-        Angle travelled over time, deg/s, from the onset to the first catch: v̄ of (2).
-        An arm that was slower than ν_th in between has begun anew. Without a catch,
-        from the first to the last sample at ν_th or above; None without extension.
-    """
+    """Return the mean speed before the catch, as Table V reports it."""
+    # Angle travelled over time, deg/s, from the onset to the first catch: v̄ of (2). An
+    # arm that was slower than ν_th in between has begun anew. Without a catch, from the
+    # first to the last sample at ν_th or above; None without extension.
     moving = columns["velocity_deg_s"] >= math.degrees(speed_threshold)
     caught = np.flatnonzero(columns["phase"] == _CATCH)
     if caught.size:

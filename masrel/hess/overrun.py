@@ -7,30 +7,7 @@ __all__ = ["check_overrun"]
 
 
 def check_overrun(limits: DeviceLimits, n_missed: int, gap_s: float) -> None:
-    """Check how many ticks have been missed so far, and how many at once.
-
-    Parameters
-    ----------
-    limits : DeviceLimits
-        How many, and how long, may pass.
-    n_missed : int
-        Ticks missed since the presentation began.
-    gap_s : float
-        How long nothing has been sent, s.
-
-    Raises
-    ------
-    LimitExceededError
-        If there are too many, or the gap is as long as the watchdog waits.
-
-    Examples
-    --------
-    >>> check_overrun(DeviceLimits(missed_ticks=20), 21, 0.021)
-    Traceback (most recent call last):
-        ...
-    masrel.errors.LimitExceededError: missed ticks: needs at most 20 in a \
-presentation, the loop missed 21
-    """
+    """Check how many ticks have been missed so far, and how many at once."""
     if gap_s >= limits.watchdog_time:
         raise LimitExceededError(
             f"silence: needs a command every {limits.watchdog_time * 1e3:g} ms, "

@@ -15,49 +15,19 @@ _FINEST = 10  # halvings of a step in which something changes: 0.5 ms / 1024
 
 
 class Plant:
-    """The arm, integrated in fixed steps from the time of its first use.
+    """The arm, integrated in fixed steps from the time of its first use."""
 
-    The arm turns in a horizontal plane (no gravity)::
-
-        (I + I_arm) θ̈ = τ_hand - τ_motor - B θ̇ - β sgn(θ̇) - τ_stop
-
-    with I, B, β of (7). While the arm rests, Coulomb friction takes any value up to
-    β, so the arm truly sticks. The motor's torque follows the command, rounded to
-    its quantum, after a delay and through a first-order lag.
-
-    Between two changes (the arm sticks or breaks away, turns back, meets a stop, the
-    hand lets go) the equation is linear. A step solves it exactly for a torque of
-    the hand's intention that is linear within the step; a step in which something
-    changes is halved until the change lies within a 1024th of it.
-
-    Parameters
-    ----------
-    hand : Hand
-        What moves the arm; its time begins at `start_ns`.
-    parameters : PlantParameters
-        The arm.
-    start_ns : int
-        When it begins, ns.
-
-    Attributes
-    ----------
-    angle : float
-        rad, at `now_ns`.
-    velocity : float
-        rad/s.
-    now_ns : int
-        How far it has been integrated: `start_ns` and a whole number of steps.
-
-    Raises
-    ------
-    ParameterError
-        If the stretch does not start before the end of range.
-
-    References
-    ----------
-    .. [1] Park, H.-S., Kim, J., Damiano, D. L. (2012). IEEE TNSRE 20(3), 361-370,
-       Table II and equation (7). https://doi.org/10.1109/TNSRE.2012.2195330
-    """
+    # The arm turns in a horizontal plane (no gravity)::
+    # (I + I_arm) θ̈ = τ_hand - τ_motor - B θ̇ - β sgn(θ̇) - τ_stop
+    # with I, B, β of (7). While the arm rests, Coulomb friction takes any value up to
+    # β, so the arm truly sticks. The motor's torque follows the command, rounded to its
+    # quantum, after a delay and through a first-order lag.
+    # Between two changes (the arm sticks or breaks away, turns back, meets a stop, the
+    # hand lets go) the equation is linear. A step solves it exactly for a torque of the
+    # hand's intention that is linear within the step; a step in which something changes
+    # is halved until the change lies within a 1024th of it.
+    # [1] Park, H.-S., Kim, J., Damiano, D. L. (2012). IEEE TNSRE 20(3), 361-370, Table
+    # II and equation (7). https://doi.org/10.1109/TNSRE.2012.2195330
 
     __slots__ = (
         "_commanded",
@@ -137,44 +107,20 @@ class Plant:
         return spring + hand.damping * (velocity - self.velocity)
 
     def angle_at(self, now_ns: int) -> float:
-        """Return the angle at a time less than a step ahead.
-
-        Parameters
-        ----------
-        now_ns : int
-            The time, ns, not before the plant's own.
-
-        Returns
-        -------
-        float
-            rad, at the speed of now: within half a step at 100 rad/s² that is right
-            to 0.0007 deg, less than an encoder sees.
-        """
+        """Return the angle at a time less than a step ahead."""
+        # rad, at the speed of now: within half a step at 100 rad/s² that is right to
+        # 0.0007 deg, less than an encoder sees.
         return self.angle + self.velocity * (now_ns - self.now_ns) * 1e-9
 
     def command(self, torque_nm: float, now_ns: int) -> None:
-        """Command a torque, which the motor begins to follow after its delay.
-
-        Parameters
-        ----------
-        torque_nm : float
-            Torque at the elbow, N·m; positive resists extension.
-        now_ns : int
-            When it is commanded, ns.
-        """
+        """Command a torque, which the motor begins to follow after its delay."""
         step = self._torque_step
         if step > 0.0:
             torque_nm = math.floor(torque_nm / step + 0.5) * step
         self._pending.append((now_ns + self._delay_ns, torque_nm))
 
     def advance(self, now_ns: int) -> None:
-        """Integrate up to the last whole step that ends at or before a time.
-
-        Parameters
-        ----------
-        now_ns : int
-            The time, ns; nothing happens when it lies less than a step ahead.
-        """
+        """Integrate up to the last whole step that ends at or before a time."""
         step_ns = self._step_ns
         while self.now_ns + step_ns <= now_ns:
             pending = self._pending

@@ -80,19 +80,7 @@ def cut_off(spool: Path) -> Presented | None:
 
 
 def fault_facts(fault: Fault | None) -> dict[str, Fact]:
-    """Return what a recording's facts say of a fault.
-
-    Parameters
-    ----------
-    fault : Fault or None
-        What stopped the presentation.
-
-    Returns
-    -------
-    dict
-        ``fault``, ``fault_kind``, ``fault_time_s`` and ``fault_torque_nm``; all None
-        without a fault.
-    """
+    """Return what a recording's facts say of a fault."""
     if fault is None:
         return {
             "fault": None,

@@ -13,67 +13,33 @@ _LARGEST_NORM = 0.25  # 0.25^15 / 15! is below 1e-21: the series is exact in flo
 
 
 class Propagator(NamedTuple):
-    """What one step does to angle and speed; a named tuple, unpacked at every step.
+    """What one step does to angle and speed; a named tuple, unpacked at every step."""
 
-    Attributes
-    ----------
-    angle_angle, angle_speed, angle_lag, angle_force, angle_slope : float
-        New angle for a unit of angle, of speed, of what the actuator lags behind its
-        command, of the torque at the beginning of the step, and of its slope.
-    speed_angle, speed_speed, speed_lag, speed_force, speed_slope : float
-        The same for the new speed.
-    lag : float
-        Share of the actuator's lag that is left after the step.
-    """
-
+    # angle_angle, angle_speed, angle_lag, angle_force, angle_slope: new angle for a
+    # unit of angle, of speed, of what the actuator lags behind its command, of the
+    # torque at the beginning of the step, and of its slope
     angle_angle: float
     angle_speed: float
     angle_lag: float
     angle_force: float
     angle_slope: float
+    # speed_angle, speed_speed, speed_lag, speed_force, speed_slope: the same for the
+    # new speed
     speed_angle: float
     speed_speed: float
     speed_lag: float
     speed_force: float
     speed_slope: float
-    lag: float
+    lag: float  # share of the actuator's lag that is left after the step
 
 
 @functools.lru_cache(maxsize=512)
 def propagator(
     inertia: float, damping: float, stiffness: float, lag_time: float, step: float
 ) -> Propagator:
-    """Solve I·θ̈ + D·θ̇ + K·θ = f(t) - e(t) over one step.
-
-    f is linear within the step, and e, what the actuator's torque lags behind its
-    command, decays as exp(-t / `lag_time`). For such f the result is exact.
-
-    Parameters
-    ----------
-    inertia : float
-        I, kg·m².
-    damping : float
-        D, N·m·s/rad.
-    stiffness : float
-        K, N·m/rad.
-    lag_time : float
-        Time constant of the actuator, s; 0 for none.
-    step : float
-        Duration of the step, s.
-
-    Returns
-    -------
-    Propagator
-        The coefficients.
-
-    Examples
-    --------
-    A free mass of 2 kg·m² for 1 s: a torque of 1 N·m gives 0.25 rad and 0.5 rad/s.
-
-    >>> made = propagator(2.0, 0.0, 0.0, 0.0, 1.0)
-    >>> made.angle_force, made.speed_force, made.speed_slope
-    (0.25, 0.5, 0.25)
-    """
+    """Solve I·θ̈ + D·θ̇ + K·θ = f(t) - e(t) over one step."""
+    # f is linear within the step, and e, what the actuator's torque lags behind its
+    # command, decays as exp(-t / `lag_time`). For such f the result is exact.
     decay = 1.0 / lag_time if lag_time > 0.0 else 0.0
     system = np.zeros((5, 5))  # θ, θ̇, e, f, slope of f
     system[0, 1] = 1.0

@@ -18,18 +18,9 @@ _USUAL_SLACK_NS = 50_000
 
 @contextmanager
 def real_time() -> Iterator[str]:
-    """Ask for SCHED_FIFO, locked memory and prompt timers until the block ends.
-
-    Yields
-    ------
-    str
-        What was granted and, in the system's words, what was not.
-
-    Notes
-    -----
-    Only Linux has all three; elsewhere nothing is asked for. The process may ask for
-    SCHED_FIFO and locked memory as root, or within ``ulimit -r`` and ``ulimit -l``.
-    """
+    """Ask for SCHED_FIFO, locked memory and prompt timers until the block ends."""
+    # Only Linux has all three; elsewhere nothing is asked for. The process may ask for
+    # SCHED_FIFO and locked memory as root, or within ``ulimit -r`` and ``ulimit -l``.
     if sys.platform != "linux":
         yield f"ordinary scheduling: none better is known on {sys.platform}"
         return

@@ -23,32 +23,8 @@ _Path: TypeAlias = "tuple[float, _Path] | None"  # an angle, and those before it
 def recorded_angles(
     times_s: list[float], angles_deg: list[float], velocities_deg_s: list[float]
 ) -> tuple[list[float], bool]:
-    """Return the angles that were read, from what was recorded of them.
-
-    Parameters
-    ----------
-    times_s : list of float, shape (n_readings,)
-        Times, s.
-    angles_deg : list of float, shape (n_readings,)
-        Angles, deg.
-    velocities_deg_s : list of float, shape (n_readings,)
-        Speeds that the loop estimated, deg/s.
-
-    Returns
-    -------
-    list of float
-        Angles, rad.
-    bool
-        Whether speeds estimated from them are the recorded ones, bit for bit. If no
-        such angles are found, those in radians nearest to the recorded are given.
-
-    Examples
-    --------
-    >>> angles, is_exact = recorded_angles([0.0], [90.0], [0.0])
-    >>> angles[0] == math.pi / 2, is_exact
-    (True, True)
-    """
-    # Paths of angles so far, the last first, each with the estimate that has seen it.
+    """Return the angles that were read, from what was recorded of them."""
+    # Takes times_s (n_readings,), angles_deg (n_readings,), velocities_deg_s
     # One last bit of an angle is many of a speed over 1 ms, so few paths live long.
     paths: list[tuple[_Path, VelocityEstimate]] = [(None, VelocityEstimate())]
     for time_s, angle, velocity in zip(

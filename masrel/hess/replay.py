@@ -17,43 +17,18 @@ __all__ = ["ReplayDevice", "ReplayOptions", "build"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReplayOptions(BackendOptions):
-    """What is played back.
+    """What is played back."""
 
-    Attributes
-    ----------
-    recording : Recording
-        A recording of any device.
-    """
-
-    recording: Recording
+    recording: Recording  # A recording of any device
 
 
 class ReplayDevice(Device):
-    """Gives the readings of a recording one after the other, and takes any torque.
+    """Gives the readings of a recording one after the other, and takes any torque."""
 
-    Every reading puts a simulated clock forward to the time of the recorded one; on a
-    real clock it waits for it, and the time between reading and tick is what the
-    machine makes of it. Of a gap in the recording all ticks but one are missed again.
-    After a fault the recording holds no readings any more, and so it ends there.
-
-    Parameters
-    ----------
-    recording : Recording
-        What is played back.
-    clock : Clock
-        The clock of the loop.
-
-    Attributes
-    ----------
-    is_exact : bool
-        Whether the angles are those that were read to the last bit, rather than to
-        the two last that degrees leave open: for recordings of this package's loop.
-
-    Raises
-    ------
-    DeviceError
-        If the recording has no reading, or its times do not grow.
-    """
+    # Every reading puts a simulated clock forward to the time of the recorded one; on a
+    # real clock it waits for it, and the time between reading and tick is what the
+    # machine makes of it. Of a gap in the recording all ticks but one are missed again.
+    # After a fault the recording holds no readings any more, and so it ends there.
 
     name: ClassVar[str] = "replay"
     simulated: ClassVar[bool] = True
@@ -107,23 +82,7 @@ def _n_readings(recording: Recording) -> int:
 
 
 def build(setup: DeviceSetup) -> ReplayDevice:
-    """Make a device that plays a recording back.
-
-    Parameters
-    ----------
-    setup : DeviceSetup
-        With options that hold the recording; a hand has nothing to move.
-
-    Returns
-    -------
-    ReplayDevice
-        Not yet open.
-
-    Raises
-    ------
-    DeviceError
-        If there is no recording, or it has no readings.
-    """
+    """Make a device that plays a recording back."""
     options = setup.options
     if not isinstance(options, ReplayOptions):
         got = "none" if options is None else type(options).__name__

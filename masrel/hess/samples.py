@@ -15,35 +15,12 @@ Columns = dict[str, NDArray[np.float64]]
 
 
 def n_samples(n_ticks: int, rate_hz: int, limits: DeviceLimits) -> int:
-    """Return how many samples so many ticks can leave.
-
-    Parameters
-    ----------
-    n_ticks : int
-        Ticks after which the presentation ends.
-    rate_hz : int
-        Ticks a second.
-    limits : DeviceLimits
-        What the loop lets pass.
-
-    Returns
-    -------
-    int
-        One a tick, and the ramp of a fault, what it was, and zero at its end.
-    """
+    """Return how many samples so many ticks can leave."""
     return n_ticks + math.ceil(limits.ramp_time * rate_hz) + 3
 
 
 class Samples:
-    """Columns allocated before the presentation, filled by index during it.
-
-    Parameters
-    ----------
-    capacity : int
-        Samples that fit in.
-    spool : Spool or None, optional
-        A file that the samples go to; None keeps them in memory.
-    """
+    """Columns allocated before the presentation, filled by index during it."""
 
     __slots__ = (
         "_angle",
@@ -79,23 +56,7 @@ class Samples:
         command_torque: float,
         phase: int,
     ) -> None:
-        """Write one sample; the columns must not be full.
-
-        Parameters
-        ----------
-        time_s : float
-            Time since the presentation began, s.
-        angle : float
-            Elbow angle, rad.
-        velocity : float
-            Estimated speed, rad/s.
-        model_torque : float
-            What the joint model asks for, N·m.
-        command_torque : float
-            What was sent, N·m.
-        phase : int
-            Position in `masrel.recording.PHASES`.
-        """
+        """Write one sample; the columns must not be full."""
         n = self.n
         self._time[n] = time_s
         self._angle[n] = angle
@@ -106,13 +67,7 @@ class Samples:
         self.n = self._words[0] = n + 1  # last, so that what is counted is whole
 
     def replace_command(self, command_torque: float) -> None:
-        """Write another torque into the last sample; nothing when there is none.
-
-        Parameters
-        ----------
-        command_torque : float
-            What was sent after all, N·m.
-        """
+        """Write another torque into the last sample; nothing when there is none."""
         if self.n:
             self._command[self.n - 1] = command_torque
 
@@ -122,13 +77,8 @@ class Samples:
         return self._time[self.n - 1] if self.n else -math.inf
 
     def columns(self) -> Columns:
-        """Return copies of what was written, in the units of a recording.
-
-        Returns
-        -------
-        dict of str to ndarray, shape (n,)
-            One array per name of `masrel.recording.RECORDING_COLUMNS`.
-        """
+        """Return copies of what was written, in the units of a recording."""
+        # -> (n,)
         written = np.empty((N_COLUMNS, self.n))
         for row, part in zip(written, self._parts, strict=True):
             row[:] = part[: self.n]
@@ -141,18 +91,8 @@ class Samples:
 
 
 def recorded_columns(written: NDArray[np.float64]) -> Columns:
-    """Name what the loop wrote, in the units of a recording.
-
-    Parameters
-    ----------
-    written : ndarray, shape (6, n)
-        Time, angle, speed, model torque, command and phase, in SI units.
-
-    Returns
-    -------
-    dict of str to ndarray, shape (n,)
-        One array per name of `masrel.recording.RECORDING_COLUMNS`.
-    """
+    """Name what the loop wrote, in the units of a recording."""
+    # written (6, n) -> (n,)
     time_s, angle, velocity, model, command, phase = written
     return {
         "time_s": time_s.copy(),

@@ -15,32 +15,12 @@ __all__ = ["SimulatedDevice", "build"]
 
 
 class SimulatedDevice(Device):
-    """A device without hardware that obeys the same interface.
+    """A device without hardware that obeys the same interface."""
 
-    The arm is a `Plant`, brought up to the clock's now whenever the device is read
-    or commanded; the last command is held meanwhile, as an amplifier holds it.
-
-    Parameters
-    ----------
-    clock : Clock
-        Where "now" comes from.
-    hand : Hand
-        What moves the arm. Its time begins with the first reading.
-    parameters : PlantParameters or None, optional
-        The arm; None for the default.
-    resolution : float, optional
-        Step of the encoder at the elbow, rad (Table II: 0.005 deg).
-
-    Raises
-    ------
-    ParameterError
-        If a value is outside its range.
-
-    References
-    ----------
-    .. [1] Park, H.-S., Kim, J., Damiano, D. L. (2012). IEEE TNSRE 20(3), 361-370,
-       Table II. https://doi.org/10.1109/TNSRE.2012.2195330
-    """
+    # The arm is a `Plant`, brought up to the clock's now whenever the device is read or
+    # commanded; the last command is held meanwhile, as an amplifier holds it.
+    # [1] Park, H.-S., Kim, J., Damiano, D. L. (2012). IEEE TNSRE 20(3), 361-370, Table
+    # II. https://doi.org/10.1109/TNSRE.2012.2195330
 
     name: ClassVar[str] = "simulated"
     simulated: ClassVar[bool] = True
@@ -98,25 +78,7 @@ class SimulatedDevice(Device):
 
 
 def build(setup: DeviceSetup) -> SimulatedDevice:
-    """Make a simulated device.
-
-    Parameters
-    ----------
-    setup : DeviceSetup
-        Clock, hand and end of range.
-
-    Returns
-    -------
-    SimulatedDevice
-        Not yet open.
-
-    Raises
-    ------
-    DeviceError
-        If there is no hand, or there are options: it has none.
-    ParameterError
-        If the end of range does not fit the hand.
-    """
+    """Make a simulated device."""
     if setup.hand is None:
         raise DeviceError("simulated: needs a hand, there is nobody to move the arm")
     if setup.options is not None:

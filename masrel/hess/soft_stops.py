@@ -6,21 +6,7 @@ __all__ = ["SoftStops"]
 
 
 class SoftStops:
-    """A spring over the last bit of the range at each of its ends.
-
-    Parameters
-    ----------
-    limits : DeviceLimits
-        The range, how wide the springs are, and how strong.
-
-    Examples
-    --------
-    10 N·m over 5 deg; 3 deg into the upper one:
-
-    >>> import math
-    >>> round(SoftStops(DeviceLimits()).torque(math.radians(183.0)), 9)
-    6.0
-    """
+    """A spring over the last bit of the range at each of its ends."""
 
     __slots__ = ("_lower", "_slope", "_upper")
 
@@ -30,19 +16,9 @@ class SoftStops:
         self._lower = limits.lowest_angle + limits.soft_stop_width
 
     def torque(self, angle: float) -> float:
-        """Return what they push back with.
-
-        Parameters
-        ----------
-        angle : float
-            Elbow angle within the range, rad.
-
-        Returns
-        -------
-        float
-            Torque to add to the command, N·m: positive near the highest angle,
-            negative near the lowest, 0 between.
-        """
+        """Return what they push back with."""
+        # Torque to add to the command, N·m: positive near the highest angle, negative
+        # near the lowest, 0 between.
         if angle > self._upper:
             return self._slope * (angle - self._upper)
         return self._slope * (angle - self._lower) if angle < self._lower else 0.0

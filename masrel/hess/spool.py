@@ -24,27 +24,7 @@ _WORD = 8  # bytes of a float64
 
 
 class Spool:
-    """The file, open for the samples of one presentation.
-
-    Parameters
-    ----------
-    path : Path
-        The file; one that is there is replaced.
-    capacity : int
-        Samples that fit in.
-    facts : dict
-        What is known before the first sample.
-
-    Attributes
-    ----------
-    words : memoryview of float64, shape (1 + 6 * capacity,)
-        How many samples there are, then the columns one after another.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written; what there is of it is removed.
-    """
+    """The file, open for the samples of one presentation."""
 
     __slots__ = ("_map", "words")
 
@@ -72,38 +52,14 @@ class Spool:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spooled:
-    """What a presentation that never ended left.
+    """What a presentation that never ended left."""
 
-    Attributes
-    ----------
-    columns : ndarray, shape (6, n)
-        Its samples, as the loop wrote them.
-    facts : dict
-        What was known before the first.
-    """
-
-    columns: NDArray[np.float64]
-    facts: dict[str, Fact]
+    columns: NDArray[np.float64]  # (6, n): its samples, as the loop wrote them
+    facts: dict[str, Fact]  # what was known before the first
 
 
 def read_spool(path: Path) -> Spooled | None:
-    """Read what a process that died left.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Returns
-    -------
-    Spooled or None
-        None when it died before the first sample.
-
-    Raises
-    ------
-    RecordingError
-        If it is no such file.
-    """
+    """Read what a process that died left."""
     data = path.read_bytes()
     if len(data) < _HEADER + _WORD or not data[:_HEADER].strip():
         return None  # it died while it laid the file down

@@ -72,20 +72,8 @@ class EmergencyStop:
 
 @contextmanager
 def stop_on_signals(stop: EmergencyStop) -> Iterator[None]:
-    """Let signals that would end the process press the button instead.
-
-    Outside the main thread, where Python lets nobody handle signals, it does nothing.
-
-    Parameters
-    ----------
-    stop : EmergencyStop
-        The button.
-
-    Yields
-    ------
-    None
-        While the signals are caught: SIGINT (Ctrl-C), SIGTERM and SIGHUP.
-    """
+    """Let signals that would end the process press the button instead."""
+    # Outside the main thread, where Python lets nobody handle signals, it does nothing.
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -104,21 +92,7 @@ def stop_on_signals(stop: EmergencyStop) -> Iterator[None]:
 
 @contextmanager
 def stop_on_key(stop: EmergencyStop, keys: TextIO | None) -> Iterator[None]:
-    """Let any key of a terminal press the button.
-
-    Parameters
-    ----------
-    stop : EmergencyStop
-        The button.
-    keys : TextIO or None
-        Where the keys come from; None for nowhere. Anything but a terminal is left
-        alone, and so is every terminal on Windows.
-
-    Yields
-    ------
-    None
-        While keys are waited for, in a thread that sleeps until one comes.
-    """
+    """Let any key of a terminal press the button."""
     if sys.platform == "win32" or keys is None or not keys.isatty():
         yield
         return

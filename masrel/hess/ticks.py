@@ -28,44 +28,7 @@ _BEAT_EVERY_S = 0.005  # how often the watchdog is told that the loop is alive
 
 
 class Ticks:
-    """The loop proper, in plain numbers: a numpy scalar would cost more than a tick.
-
-    Parameters
-    ----------
-    device : Device
-        An open device.
-    controller : Controller
-        A controller that has not been stepped.
-    clock : Clock
-        The clock of the device.
-    limits : DeviceLimits
-        What the loop lets pass.
-    rate_hz : int
-        Ticks a second.
-    n_ticks : int
-        Ticks after which the presentation ends.
-    end_angle : float
-        Where the stretch is meant to end, rad.
-    samples : Samples
-        Where it writes to; `masrel.hess.samples.n_samples` fit in.
-    stop : EmergencyStop
-        The button it looks at.
-    watchdog : Watching
-        Told every 5 ms that the loop is alive.
-
-    Attributes
-    ----------
-    device, clock, watchdog, samples
-        As given.
-    period_ns, ramp_ns : int
-        From tick to tick, and how long a fault takes to bring the torque to zero, ns.
-    n_missed : int
-        Ticks that were skipped.
-    guard : Guard
-        What every reading and torque passed.
-    sent : float
-        The torque the device holds, N·m.
-    """
+    """The loop proper, in plain numbers: a numpy scalar would cost more than a tick."""
 
     __slots__ = (
         "_controller",
@@ -124,19 +87,7 @@ class Ticks:
         self.samples = samples
 
     def run(self) -> str:
-        """Run ticks until the end, however it comes.
-
-        Returns
-        -------
-        str
-            "arrived" or "max-duration".
-
-        Raises
-        ------
-        DeviceError
-            If the device fails, a limit is exceeded, the controller fails, or the
-            emergency stop is pressed.
-        """
+        """Run ticks until the end, however it comes."""
         self._start_ns = self._sent_ns = self.clock.now_ns()
         stop, device, beat = self._stop, self.device, self.watchdog.beat
         check_every = max(1, round(_CHECK_EVERY_S * 1e9 / self.period_ns))
@@ -219,27 +170,13 @@ class Ticks:
         return (self.clock.now_ns() - self._start_ns) * 1e-9
 
     def finish(self) -> None:
-        """Send zero torque, and let the watchdog rest.
-
-        Raises
-        ------
-        DeviceError
-            If the device does not take it, or the watchdog has ended.
-        """
+        """Send zero torque, and let the watchdog rest."""
         self.device.command(0.0)
         self.sent = 0.0
         self.watchdog.rest()
 
     def mark(self, now_ns: int, torque: float) -> None:
-        """Add a row without a reading, which holds the last one; none if none was.
-
-        Parameters
-        ----------
-        now_ns : int
-            The time, ns.
-        torque : float
-            What the device holds then, N·m.
-        """
+        """Add a row without a reading, which holds the last one; none if none was."""
         if self._latest is None:
             return
         read_s, angle, velocity = self._latest

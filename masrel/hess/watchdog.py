@@ -45,24 +45,11 @@ class NoWatchdog:
 
 
 class Watchdog:
-    """The process, as the control loop sees it: something to tell that it is alive.
+    """The process, as the control loop sees it: something to tell that it is alive."""
 
-    A context manager. The process idles the device when a `beat` is followed by
-    neither another nor `rest` for `timeout_s`, and when this process has ended,
-    however it ended.
-
-    Parameters
-    ----------
-    idle : IdleCommand
-        How the other process idles the device.
-    timeout_s : float
-        Longest silence, s.
-
-    Raises
-    ------
-    DeviceError
-        On entry, if the process does not take hold of the device.
-    """
+    # A context manager. The process idles the device when a `beat` is followed by
+    # neither another nor `rest` for `timeout_s`, and when this process has ended,
+    # however it ended.
 
     def __init__(self, idle: IdleCommand, timeout_s: float) -> None:
         self._idle = idle
@@ -113,23 +100,11 @@ class Watchdog:
             )
 
     def beat(self) -> None:
-        """Tell the process that this one is alive and will say so again in time.
-
-        Raises
-        ------
-        DeviceError
-            If the process has ended: nobody would idle the device.
-        """
+        """Tell the process that this one is alive and will say so again in time."""
         self._tell(b".")
 
     def rest(self) -> None:
-        """Tell the process that no beat follows for a while.
-
-        Raises
-        ------
-        DeviceError
-            If the process has ended.
-        """
+        """Tell the process that no beat follows for a while."""
         self._tell(b"p")
 
     def _tell(self, word: bytes) -> None:
@@ -167,19 +142,6 @@ class Watchdog:
 
 
 def watched(device: Device, timeout_s: float) -> Watchdog | None:
-    """Make a watchdog for a device, unless no other process can idle it.
-
-    Parameters
-    ----------
-    device : Device
-        An open device.
-    timeout_s : float
-        Longest silence, s.
-
-    Returns
-    -------
-    Watchdog or None
-        Not yet started; None for a device without an idle command.
-    """
+    """Make a watchdog for a device, unless no other process can idle it."""
     idle = device.idle_command()
     return None if idle is None else Watchdog(idle, timeout_s)

@@ -23,18 +23,7 @@ _PRIORITY = 81  # above that of the loop, which may be what hangs
 
 
 def main(arguments: list[str]) -> int:
-    """Take hold of the device, say so, and watch.
-
-    Parameters
-    ----------
-    arguments : list of str
-        Timeout in s, module, and what its ``prepare`` is called with.
-
-    Returns
-    -------
-    int
-        Exit code.
-    """
+    """Take hold of the device, say so, and watch."""
     # Whoever stops the loop must not stop this first; it ends when its input does.
     for name in ("SIGINT", "SIGTERM", "SIGHUP"):
         if hasattr(signal, name):
@@ -54,28 +43,7 @@ def main(arguments: list[str]) -> int:
 
 
 def watch(pipe: int, timeout_s: float, idle: Callable[[], None]) -> int:
-    """Wait for beats until they stop or all is well.
-
-    Parameters
-    ----------
-    pipe : int
-        Descriptor that beats come from: ``.`` is one, and another is expected; after
-        ``p`` none is; ``q`` is the last byte.
-    timeout_s : float
-        Longest silence, s.
-    idle : callable
-        Idles the device.
-
-    Returns
-    -------
-    int
-        0 when all was well, 3 when the device was idled.
-
-    Raises
-    ------
-    DeviceError
-        If the device cannot be idled after several tries.
-    """
+    """Wait for beats until they stop or all is well."""
     patience: float | None = None  # until the first beat
     while True:
         ready, _, _ = select.select([pipe], [], [], patience)

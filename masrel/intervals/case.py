@@ -27,39 +27,21 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
-    """A coefficient, its data as sums of features, and what was asked.
+    """A coefficient, its data as sums of features, and what was asked."""
 
-    Attributes
-    ----------
-    entry : Coefficient
-        The coefficient.
-    coded : CodedRatings
-        The ratings.
-    patterns : CodedRatings
-        The distinct rows of ratings, rater by rater, of items with any rating.
-    times : ndarray of int64, shape (n_patterns,)
-        How often each occurs.
-    rows : ndarray, shape (n_patterns, n_features)
-        Features of each.
-    v : ndarray, shape (n_categories, n_categories)
-        Disagreement of two categories.
-    value : float
-        The estimate; ``nan`` when undefined.
-    target : {"items", "raters", "both"}
-        The population asked for.
-    level : float
-        Nominal level.
-    """
-
-    entry: Coefficient
-    coded: CodedRatings
+    entry: Coefficient  # the coefficient
+    coded: CodedRatings  # the ratings
+    # the distinct rows of ratings, rater by rater, of items with any rating
     patterns: CodedRatings
+    # (n_patterns,): how often each occurs
     times: NDArray[np.int64] = field(compare=False, repr=False)
+    # (n_patterns, n_features): features of each
     rows: Floats = field(compare=False, repr=False)
+    # (n_categories, n_categories): disagreement of two categories
     v: Floats = field(compare=False, repr=False)
-    value: float
-    target: Target
-    level: float
+    value: float  # the estimate; ``nan`` when undefined
+    target: Target  # the population asked for
+    level: float  # nominal level
 
     @property
     def n_items(self) -> int:
@@ -83,10 +65,8 @@ class Case:
 
     @property
     def lowest(self) -> float:
-        """Where intervals are cut: -∞ for an estimate below the usual least value.
-
-        Weights, or items of a single rating, can bring a coefficient below -1.
-        """
+        """Where intervals are cut: -∞ for an estimate below the usual least value."""
+        # Weights, or items of a single rating, can bring a coefficient below -1.
         return self.entry.lowest if self.value >= self.entry.lowest else -math.inf
 
     @property
@@ -147,36 +127,7 @@ def open_case(
     weights: "WeightName | ArrayLike",
     level: float,
 ) -> Case:
-    """Check a question and prepare its data.
-
-    Parameters
-    ----------
-    statistic : str, callable or Coefficient
-        Name of a coefficient, or its public function.
-    ratings : nested sequence, array_like or DataFrame
-        What the coefficient takes.
-    target : {"items", "raters", "both"}
-        What a new study would draw anew.
-    categories : sequence or None
-        The declared scale.
-    weights : str or array_like
-        How much two categories agree.
-    level : float
-        Nominal level, within (0, 1).
-
-    Returns
-    -------
-    Case
-        The question.
-
-    Raises
-    ------
-    ParameterError
-        If the coefficient, target, weights or level is none, or the coefficient has no
-        such interval.
-    RatingsError
-        If the ratings do not fit.
-    """
+    """Check a question and prepare its data."""
     entry = find_entry(statistic)
     if target not in get_args(Target):
         raise ParameterError(

@@ -25,18 +25,10 @@ _ACCIDENT = 0.003  # of (1 - κ) / ratings: a variance below it is no informatio
 
 @dataclasses.dataclass(frozen=True)
 class Choice:
-    """A question whose interval is to be chosen.
+    """A question whose interval is to be chosen."""
 
-    Attributes
-    ----------
-    case : Case
-        The question.
-    modelled : bool
-        Whether the Dirichlet-multinomial model speaks of the coefficient.
-    """
-
-    case: Case
-    modelled: bool
+    case: Case  # the question
+    modelled: bool  # whether the Dirichlet-multinomial model speaks of the coefficient
 
     @property
     def small(self) -> bool:
@@ -63,11 +55,9 @@ class Choice:
 
     @property
     def least(self) -> float:
-        """The lower end of the scale on which an interval is symmetric.
-
-        That of an intraclass correlation of r raters is -1/(r - 1): its logit is
-        Fisher's transformation, ln[(1 + (r - 1) κ) / (1 - κ)].
-        """
+        """The lower end of the scale on which an interval is symmetric."""
+        # That of an intraclass correlation of r raters is -1/(r - 1): its logit is
+        # Fisher's transformation, ln[(1 + (r - 1) κ) / (1 - κ)].
         if self.modelled and self.per_item > 1.0:
             return -1.0 / (self.per_item - 1.0)
         return self.case.entry.lowest

@@ -21,18 +21,7 @@ __all__ = ["Choice", "choose"]
 
 
 def choose(choice: Choice) -> Interval:
-    """Compute the interval that covers best.
-
-    Parameters
-    ----------
-    choice : Choice
-        The question.
-
-    Returns
-    -------
-    Interval
-        Its first note says what was chosen and why.
-    """
+    """Compute the interval that covers best."""
     case = choice.case
     if case.entry.shape == "pairs":
         why = "items leave with the pairs of all their raters"

@@ -14,44 +14,14 @@ _BLOCK = 1 << 14  # items at once: what is made of them takes more room than the
 
 
 def blocks(n_items: int) -> Iterator[slice]:
-    """Cut items into blocks, so that what is made of them stays small.
-
-    Parameters
-    ----------
-    n_items : int
-        How many there are.
-
-    Yields
-    ------
-    slice
-        One block after the other.
-
-    Examples
-    --------
-    >>> list(blocks(20_000))
-    [slice(0, 16384, None), slice(16384, 20000, None)]
-    """
+    """Cut items into blocks, so that what is made of them stays small."""
     for start in range(0, n_items, _BLOCK):
         yield slice(start, min(start + _BLOCK, n_items))
 
 
 def features_of(kernel: Kernel, coded: CodedRatings, v: Floats) -> Floats:
-    """Return the features of items, made a block at a time.
-
-    Parameters
-    ----------
-    kernel : Kernel
-        A coefficient.
-    coded : CodedRatings
-        The ratings.
-    v : ndarray, shape (n_categories, n_categories)
-        Disagreement of two categories.
-
-    Returns
-    -------
-    ndarray, shape (n_items, n_features)
-        The features.
-    """
+    """Return the features of items, made a block at a time."""
+    # v (n_categories, n_categories) -> (n_items, n_features)
     n_items = len(coded.codes)
     if n_items <= _BLOCK:
         return kernel.features(coded, v)

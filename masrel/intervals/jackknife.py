@@ -98,20 +98,7 @@ def jackknife(
 
 
 def around_estimate(case: Case, found: Spread) -> Interval:
-    """Make the interval of a spread.
-
-    Parameters
-    ----------
-    case : Case
-        A question.
-    found : Spread
-        Its spread.
-
-    Returns
-    -------
-    Interval
-        Student's t around the estimate; ``nan`` with a reason when undefined.
-    """
+    """Make the interval of a spread."""
     target = case.target
     words = "two-way" if target == "both" else target.removesuffix("s")
     if found.reason is not None:

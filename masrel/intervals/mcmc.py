@@ -28,21 +28,12 @@ LEAST_ESS = 20_000.0  # endpoints within about 0.002 on Table V
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Draws:
-    """Draws of one quantity, converged.
+    """Draws of one quantity, converged."""
 
-    Attributes
-    ----------
-    values : ndarray, shape (n_chains, n_steps)
-        One chain a walker, after burn-in.
-    r_hat : float
-        Rank-normalized split R-hat over all walkers of all ensembles.
-    ess : float
-        Effective sample size of the tails.
-    """
-
+    # (n_chains, n_steps): one chain a walker, after burn-in
     values: Floats = field(compare=False, repr=False)
-    r_hat: float
-    ess: float
+    r_hat: float  # rank-normalized split R-hat over all walkers of all ensembles
+    ess: float  # effective sample size of the tails
 
     def quantile(self, share: float) -> float:
         """Return a quantile of all draws."""
@@ -62,47 +53,14 @@ def sample(
     n_steps: int,
     most_steps: int,
 ) -> Draws:
-    """Sample a density until one quantity of it has converged.
-
-    Parameters
-    ----------
-    log_density : callable
-        Positions of shape (n, n_dimensions) to log-densities of shape (n,).
-    n_dimensions : int
-        Dimensions of a position.
-    quantity : callable
-        Positions to values of shape (n,).
-    generator : Generator
-        Where randomness comes from.
-    n_steps : int
-        Steps of every walker at first; the first third is burn-in. Doubled until
-        converged.
-    most_steps : int
-        Where it gives up.
-
-    Returns
-    -------
-    Draws
-        R-hat below 1.01 and an effective size of at least 20 000 in the tails.
-
-    Raises
-    ------
-    ConvergenceError
-        If it has not converged after `most_steps`; says how many steps it needs.
-
-    Notes
-    -----
-    The ensembles start apart and do not see each other. The move is differential
-    evolution; the snooker variant of emcee 3.1.6 does not keep the density.
-
-    References
-    ----------
-    .. [1] Foreman-Mackey, D. et al. (2013). emcee: The MCMC Hammer. PASP, 125, 306.
-       https://doi.org/10.1086/670067
-    .. [2] Vehtari, A. et al. (2021). Rank-normalization, folding, and localization:
-       an improved R-hat. Bayesian Analysis, 16(2), 667-718.
-       https://doi.org/10.1214/20-BA1221
-    """
+    """Sample a density until one quantity of it has converged."""
+    # The ensembles start apart and do not see each other. The move is differential
+    # evolution; the snooker variant of emcee 3.1.6 does not keep the density.
+    # [1] Foreman-Mackey, D. et al. (2013). emcee: The MCMC Hammer. PASP, 125, 306.
+    # https://doi.org/10.1086/670067
+    # [2] Vehtari, A. et al. (2021). Rank-normalization, folding, and localization: an
+    # improved R-hat. Bayesian Analysis, 16(2), 667-718.
+    # https://doi.org/10.1214/20-BA1221
     ensembles = [
         _Ensemble(log_density, n_dimensions, generator) for _ in range(N_ENSEMBLES)
     ]
@@ -120,18 +78,8 @@ def sample(
 
 
 def diagnose(chains: Floats) -> tuple[float, float]:
-    """Return rank-normalized split R-hat and the effective sample size of the tails.
-
-    Parameters
-    ----------
-    chains : ndarray, shape (n_chains, n_steps)
-        Draws of one quantity.
-
-    Returns
-    -------
-    tuple of float
-        Both as in [2] of `sample`; the tails are beyond 2.5 % on either side.
-    """
+    """Return rank-normalized split R-hat and the effective sample size of the tails."""
+    # Takes chains (n_chains, n_steps)
     r_hat = array_stats.rhat(chains, chain_axis=0, draw_axis=1)
     ess = array_stats.ess(
         chains, chain_axis=0, draw_axis=1, method="tail", prob=(0.025, 0.975)
@@ -140,20 +88,8 @@ def diagnose(chains: Floats) -> tuple[float, float]:
 
 
 def quantile_error(chains: Floats, share: float) -> float:
-    """Return the Monte Carlo standard error of a quantile.
-
-    Parameters
-    ----------
-    chains : ndarray, shape (n_chains, n_steps)
-        Draws of one quantity.
-    share : float
-        Probability below the quantile.
-
-    Returns
-    -------
-    float
-        Its standard error.
-    """
+    """Return the Monte Carlo standard error of a quantile."""
+    # Takes chains (n_chains, n_steps)
     error = array_stats.mcse(
         chains, chain_axis=0, draw_axis=1, method="quantile", prob=share
     )
@@ -163,22 +99,7 @@ def quantile_error(chains: Floats, share: float) -> float:
 def not_converged(
     total: int, r_hat: float, ess: float, least_ess: float
 ) -> ConvergenceError:
-    """Say how many more steps a sampler needs.
-
-    Parameters
-    ----------
-    total : int
-        Steps made.
-    r_hat, ess : float
-        The largest and the smallest there are.
-    least_ess : float
-        What the effective size has to be.
-
-    Returns
-    -------
-    ConvergenceError
-        To be raised. R-hat - 1 falls as one over the steps.
-    """
+    """Say how many more steps a sampler needs."""
     needed = max((r_hat - 1.0) / (LARGEST_R_HAT - 1.0), least_ess / max(ess, 1.0))
     more = int(total * needed) - total if np.isfinite(needed) else total
     return ConvergenceError(
@@ -189,20 +110,9 @@ def not_converged(
 
 
 class Walkers:
-    """Chains that do not see each other, moved by one proposal.
+    """Chains that do not see each other, moved by one proposal."""
 
-    Parameters
-    ----------
-    log_density : callable
-        Positions of shape (n, n_dimensions) to log-densities of shape (n,).
-    proposal : callable
-        Positions and random state to new positions and the logarithms of what the
-        ratio of densities is multiplied by.
-    start : ndarray, shape (n_chains, n_dimensions)
-        Where the chains begin.
-    generator : Generator
-        Where randomness comes from.
-    """
+    # Takes start (n_chains, n_dimensions)
 
     def __init__(
         self,

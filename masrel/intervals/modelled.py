@@ -16,23 +16,9 @@ _DRAWS, _SEED = 4_000, 1  # of a table; always the same ones, so that it repeats
 
 
 def lifted(interval: Interval, above: float) -> Interval:
-    """Move an upper end halfway to a higher one of the posterior.
-
-    An estimate of few items is skewed: low where its error is low, too. The posterior
-    knows, but trusts many raters too much where κ is low; halfway covers with either.
-
-    Parameters
-    ----------
-    interval : Interval
-        A jackknife's.
-    above : float
-        The posterior's upper end.
-
-    Returns
-    -------
-    Interval
-        The interval, with a note if its end was moved.
-    """
+    """Move an upper end halfway to a higher one of the posterior."""
+    # An estimate of few items is skewed: low where its error is low, too. The posterior
+    # knows, but trusts many raters too much where κ is low; halfway covers with either.
     if not above > interval.high:
         return interval
     note = (
@@ -45,20 +31,7 @@ def lifted(interval: Interval, above: float) -> Interval:
 
 
 def of_any_raters(choice: Choice, excess: float) -> Interval:
-    """Compute the Dirichlet-multinomial posterior's interval, holding the estimate.
-
-    Parameters
-    ----------
-    choice : Choice
-        The question.
-    excess : float
-        Square of what raters add to a half width.
-
-    Returns
-    -------
-    Interval
-        The central interval; one-sided where the estimate is 1 or undefined.
-    """
+    """Compute the Dirichlet-multinomial posterior's interval, holding the estimate."""
     case, found = choice.case, choice.posterior
     if not case.value < 1.0:  # perfect, or undefined: one category
         return one_sided(choice)
@@ -84,18 +57,7 @@ def of_any_raters(choice: Choice, excess: float) -> Interval:
 
 
 def one_sided(choice: Choice) -> Interval:
-    """Compute all that is above a lower end of the Dirichlet-multinomial posterior.
-
-    Parameters
-    ----------
-    choice : Choice
-        The question.
-
-    Returns
-    -------
-    Interval
-        Up to 1; a note gives the end under another prior.
-    """
+    """Compute all that is above a lower end of the Dirichlet-multinomial posterior."""
     case, share = choice.case, 1.0 - choice.case.level
     low = float(expit(choice.posterior.logit.quantile(share)))
     others = [
@@ -121,18 +83,7 @@ def one_sided(choice: Choice) -> Interval:
 
 
 def of_two_raters(choice: Choice) -> Interval:
-    """Compute the interval of the posterior of two raters' table.
-
-    Parameters
-    ----------
-    choice : Choice
-        The question.
-
-    Returns
-    -------
-    Interval
-        One-sided where nothing disagrees, elsewhere holding the estimate.
-    """
+    """Compute the interval of the posterior of two raters' table."""
     case = choice.case
     perfect = not case.value < 1.0
     found = table_interval(case, None, n_draws=_DRAWS, rng=_SEED, one_sided=perfect)

@@ -4,38 +4,14 @@ __all__ = ["normal", "student_t"]
 
 
 def student_t(level: float, df: float) -> float:
-    """Return the two-sided quantile of Student's t.
-
-    Parameters
-    ----------
-    level : float
-        Probability between its negative and it.
-    df : float
-        Degrees of freedom.
-
-    Returns
-    -------
-    float
-        The quantile at (1 + level) / 2.
-    """
+    """Return the two-sided quantile of Student's t."""
     from scipy.special import stdtrit  # loaded only when an interval is asked for
 
     return float(stdtrit(df, 0.5 + 0.5 * level))
 
 
 def normal(level: float) -> float:
-    """Return the two-sided quantile of the standard normal.
-
-    Parameters
-    ----------
-    level : float
-        Probability between its negative and it.
-
-    Returns
-    -------
-    float
-        The quantile at (1 + level) / 2.
-    """
+    """Return the two-sided quantile of the standard normal."""
     from scipy.special import ndtri
 
     return float(ndtri(0.5 + 0.5 * level))

@@ -8,25 +8,7 @@ __all__ = ["warn_small"]
 
 
 def warn_small(count: int, least: int, what: str) -> tuple[str, ...]:
-    """Warn below a number of items or raters, and return the note of it.
-
-    Parameters
-    ----------
-    count, least : int
-        How many there are, and how many are enough.
-    what : str
-        Of what, such as ``"raters"``.
-
-    Returns
-    -------
-    tuple of str
-        One note for the result, or none.
-
-    Warns
-    -----
-    SmallSampleWarning
-        If there are too few.
-    """
+    """Warn below a number of items or raters, and return the note of it."""
     if count >= least:
         return ()
     note = f"{count} {what}: below {least} the interval may cover less than it says"

@@ -10,24 +10,7 @@ __all__ = ["check_rng", "recorded_generator"]
 def recorded_generator(
     rng: np.random.Generator | int | None,
 ) -> tuple[np.random.Generator, int | None]:
-    """Return a generator and the seed that repeats it.
-
-    Parameters
-    ----------
-    rng : Generator, int or None
-        A generator is taken as it is, and its seed is not known here; None draws a
-        fresh seed.
-
-    Returns
-    -------
-    tuple of Generator and int or None
-        The generator, and its seed where known.
-
-    Raises
-    ------
-    ParameterError
-        If it is neither.
-    """
+    """Return a generator and the seed that repeats it."""
     check_rng(rng)
     if isinstance(rng, np.random.Generator):
         return rng, None  # its owner knows where it began
@@ -37,18 +20,7 @@ def recorded_generator(
 
 
 def check_rng(rng: object) -> None:
-    """Check that random numbers can come from something.
-
-    Parameters
-    ----------
-    rng : object
-        What was given for `rng`.
-
-    Raises
-    ------
-    ParameterError
-        If it is neither a generator, nor a seed, nor None.
-    """
+    """Check that random numbers can come from something."""
     if rng is None or isinstance(rng, np.random.Generator):
         return
     if isinstance(rng, bool) or not isinstance(rng, int | np.integer) or rng < 0:

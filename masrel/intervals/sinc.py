@@ -23,30 +23,18 @@ _FIRST, _MOST = 32, 1 << 15  # steps
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SincDistribution:
-    """Probabilities at equally spaced points, and all in between.
+    """Probabilities at equally spaced points, and all in between."""
 
-    Attributes
-    ----------
-    points : ndarray, shape (n,)
-        Ascending, equally spaced.
-    masses : ndarray, shape (n,)
-        The density at each, times the step; they sum to 1.
-    log_total : float
-        Logarithm of the integral that the density was divided by.
+    # [1] Haber, S. (1993). Two formulas for numerical indefinite integration.
+    # Mathematics of Computation, 60(201), 279-296.
+    # https://doi.org/10.1090/S0025-5718-1993-1149292-9
+    # [2] Trefethen, L. N., Weideman, J. A. C. (2014). The exponentially convergent
+    # trapezoidal rule. SIAM Review, 56(3), 385-458. https://doi.org/10.1137/130932132
 
-    References
-    ----------
-    .. [1] Haber, S. (1993). Two formulas for numerical indefinite integration.
-       Mathematics of Computation, 60(201), 279-296.
-       https://doi.org/10.1090/S0025-5718-1993-1149292-9
-    .. [2] Trefethen, L. N., Weideman, J. A. C. (2014). The exponentially convergent
-       trapezoidal rule. SIAM Review, 56(3), 385-458.
-       https://doi.org/10.1137/130932132
-    """
-
-    points: Floats = field(compare=False, repr=False)
+    points: Floats = field(compare=False, repr=False)  # (n,): ascending, equally spaced
+    # (n,): the density at each, times the step; they sum to 1
     masses: Floats = field(compare=False, repr=False)
-    log_total: float = 0.0
+    log_total: float = 0.0  # logarithm of the integral that the density was divided by
 
     @classmethod
     def of_logs(cls, points: Floats, log: Floats) -> "SincDistribution":
@@ -75,20 +63,7 @@ class SincDistribution:
         return max(float(self.masses @ away) / self.step, 0.0)
 
     def quantile(self, share: float, start: float | None = None) -> float:
-        """Solve for the point below which a share lies.
-
-        Parameters
-        ----------
-        share : float
-            Probability, within (0, 1).
-        start : float, optional
-            Where it is expected.
-
-        Returns
-        -------
-        float
-            By Newton's method, and by halving where that leaves what is known.
-        """
+        """Solve for the point below which a share lies."""
         low, high = float(self.points[0]), float(self.points[-1])
         if start is None:
             below = int(np.searchsorted(self.masses.cumsum(), share))
@@ -113,28 +88,7 @@ def sinc_distribution(
     high: float,
     shares: Sequence[float],
 ) -> tuple[SincDistribution, list[float]]:
-    """Halve the step until the quantiles asked for no longer move.
-
-    Parameters
-    ----------
-    log_density : callable
-        Points of shape (n,) to log-densities of shape (n,), up to a constant.
-    low, high : float
-        Beyond them the density is negligible.
-    shares : sequence of float
-        Probabilities whose quantiles are wanted.
-
-    Returns
-    -------
-    tuple of SincDistribution and list of float
-        The distribution and the quantiles.
-
-    Raises
-    ------
-    ConvergenceError
-        If the quantiles still move at a step of 1/32768 of the range, or the density
-        is not negligible at an end.
-    """
+    """Halve the step until the quantiles asked for no longer move."""
     points = np.linspace(low, high, _FIRST + 1)
     log = log_density(points)
     before: list[float] = []

@@ -22,44 +22,16 @@ _UNITS = {"items": ("items",), "raters": ("raters",), "both": ("items", "raters"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spread:
-    """How much an estimate moves when units are left out.
+    """How much an estimate moves when units are left out."""
 
-    Attributes
-    ----------
-    variance : float
-        The jackknife's; ``nan`` when undefined.
-    df : float
-        Its degrees of freedom, Satterthwaite's for "both".
-    notes : tuple of str
-        What is small.
-    reason : str or None
-        Why it makes no interval, or None.
-    """
-
-    variance: float
-    df: float
-    notes: tuple[str, ...] = ()
-    reason: str | None = None
+    variance: float  # the jackknife's; ``nan`` when undefined
+    df: float  # its degrees of freedom, Satterthwaite's for "both"
+    notes: tuple[str, ...] = ()  # what is small
+    reason: str | None = None  # why it makes no interval, or None
 
 
 def spread(case: Case) -> Spread:
-    """Leave out items, raters, or both, as the target says.
-
-    Parameters
-    ----------
-    case : Case
-        A question.
-
-    Returns
-    -------
-    Spread
-        The variance, or why there is none.
-
-    Raises
-    ------
-    ParameterError
-        If there are too few raters to leave one out.
-    """
+    """Leave out items, raters, or both, as the target says."""
     if np.isnan(case.value):
         reason = "the estimate itself is undefined"
         return Spread(variance=np.nan, df=np.nan, reason=reason)
@@ -86,21 +58,8 @@ def spread(case: Case) -> Spread:
 
 
 def jackknife_variance(replicates: Floats, times: Integers) -> float:
-    """Return the jackknife's variance of an estimate.
-
-    Parameters
-    ----------
-    replicates : ndarray, shape (n_distinct,)
-        The estimate without a unit of each kind.
-    times : ndarray of int64, shape (n_distinct,)
-        Units of each kind.
-
-    Returns
-    -------
-    float
-        (n - 1)/n times the sum of squared deviations from their mean, (1.1) of [1] in
-        `jackknife`.
-    """
+    """Return the jackknife's variance of an estimate."""
+    # Takes replicates (n_distinct,), times (n_distinct,)
     n = int(times.sum())
     moved = replicates - replicates[0]  # so that no change at all is exactly 0
     deviations = moved - times @ moved / n
@@ -108,18 +67,7 @@ def jackknife_variance(replicates: Floats, times: Integers) -> float:
 
 
 def without_item(case: Case) -> tuple[Floats, Integers]:
-    """Return the estimate without an item of each pattern, and how many there are.
-
-    Parameters
-    ----------
-    case : Case
-        A question.
-
-    Returns
-    -------
-    tuple of ndarray
-        Values, ``nan`` of a single item, and items, both (n_patterns,).
-    """
+    """Return the estimate without an item of each pattern, and how many there are."""
     if case.n_items < 2:
         return np.full(1, np.nan), np.ones(1, dtype=np.int64)
     return _values_without(case, case.sums, case.rows), case.times
@@ -132,20 +80,10 @@ def _values_without(case: Case, sums: Floats, rows: Floats) -> Floats:
 
 
 def excess_of_raters(case: Case) -> float:
-    """Return what raters differ by beyond single ratings.
-
-    Parameters
-    ----------
-    case : Case
-        A question.
-
-    Returns
-    -------
-    float
-        max(0, V_R - V_C), with V_R the jackknife variance over raters and V_C that of
-        leaving out a rater on an item,
-        (n - 1)(r - 1)/(n r) Σ_ij (κ_-i-j - κ_-i - κ_-j + κ)². 0 where undefined.
-    """
+    """Return what raters differ by beyond single ratings."""
+    # max(0, V_R - V_C), with V_R the jackknife variance over raters and V_C that of
+    # leaving out a rater on an item, (n - 1)(r - 1)/(n r) Σ_ij (κ_-i-j - κ_-i - κ_-j +
+    # κ)². 0 where undefined.
     without, n = _values_without(case, case.sums, case.rows), case.n_items
     raters, cells = [], 0.0
     for rows in _rows_without_each_rater(case):

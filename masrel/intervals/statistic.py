@@ -13,23 +13,7 @@ Statistic = str | Callable[..., Estimate] | Coefficient
 
 
 def find_entry(statistic: Statistic) -> Coefficient:
-    """Find a coefficient in the register.
-
-    Parameters
-    ----------
-    statistic : str, callable or Coefficient
-        Name of a coefficient, or its public function.
-
-    Returns
-    -------
-    Coefficient
-        Its entry.
-
-    Raises
-    ------
-    ParameterError
-        If it is none.
-    """
+    """Find a coefficient in the register."""
     if isinstance(statistic, Coefficient):
         return statistic
     if isinstance(statistic, str):
@@ -38,23 +22,7 @@ def find_entry(statistic: Statistic) -> Coefficient:
 
 
 def kernel_of(entry: Coefficient) -> Kernel:
-    """Return a coefficient as a function of sums over items.
-
-    Parameters
-    ----------
-    entry : Coefficient
-        The coefficient.
-
-    Returns
-    -------
-    Kernel
-        Its kernel.
-
-    Raises
-    ------
-    ParameterError
-        If it is no such function: it has an interval of its own, or none.
-    """
+    """Return a coefficient as a function of sums over items."""
     if entry.kernel is None:
         raise ParameterError(
             f"coefficient: {entry.title} is no function of sums over items: there is "

@@ -12,26 +12,10 @@ Transform = Literal["none", "logit", "fisher"]
 def around(
     value: float, half: float, transform: Transform, lowest: float
 ) -> tuple[float, float]:
-    """Return the ends of an interval that is symmetric on some scale.
-
-    Parameters
-    ----------
-    value : float
-        The estimate.
-    half : float
-        Half the width on the scale of the estimate: a quantile times its error.
-    transform : {"none", "logit", "fisher"}
-        The estimate's own scale; the logit of its position between the ends of the
-        parameter space; or Fisher's z = artanh. On the latter two the error is
-        divided by the slope, and the ends are taken back, so that they stay inside.
-    lowest : float
-        Least value of the parameter space; 1 is its largest.
-
-    Returns
-    -------
-    tuple of float
-        Low and high; ``nan`` where the estimate is not strictly inside.
-    """
+    """Return the ends of an interval that is symmetric on some scale."""
+    # transform: The estimate's own scale; the logit of its position between the ends of
+    # the parameter space; or Fisher's z = artanh. On the latter two the error is
+    # divided by the slope, and the ends are taken back, so that they stay inside.
     if transform == "none":
         return value - half, value + half
     low = lowest if transform == "logit" else -1.0

@@ -18,40 +18,19 @@ Table = dict[str, typing.Any]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Decoded:
-    """What could be decoded of a table, and what could not.
+    """What could be decoded of a table, and what could not."""
 
-    Attributes
-    ----------
-    values : dict
-        The keys whose values are usable, defaults filled in; tables as dicts,
-        arrays as lists in which an unusable entry is None.
-    problems : list of str
-        Everything else, each ``key.path: needed ..., got ...``.
-    """
-
+    # the keys whose values are usable, defaults filled in; tables as dicts, arrays as
+    # lists in which an unusable entry is None
     values: Table = field(default_factory=dict)
+    # everything else, each ``key.path: needed ..., got ...``
     problems: list[str] = field(default_factory=list)
 
 
 def decode_table(
     raw: Mapping[str, object], struct: type[msgspec.Struct], at: str = ""
 ) -> Decoded:
-    """Decode a table into the fields of a struct, going on after each problem.
-
-    Parameters
-    ----------
-    raw : mapping
-        The table as ``tomllib`` gives it.
-    struct : type
-        The struct that says which keys there are.
-    at : str
-        Key path of the table, empty for the file itself.
-
-    Returns
-    -------
-    Decoded
-        Usable values and problems.
-    """
+    """Decode a table into the fields of a struct, going on after each problem."""
     decoded = Decoded()
     fields = {info.encode_name: info for info in msgspec.structs.fields(struct)}
     for key in raw:

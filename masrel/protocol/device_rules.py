@@ -9,18 +9,7 @@ Values = dict[str, Any]
 
 
 def device_rules(values: Values) -> Iterator[str]:
-    """Check the stretch against the range of motion and the device's limits.
-
-    Parameters
-    ----------
-    values : dict
-        The usable values of a protocol file; what is absent is not checked.
-
-    Yields
-    ------
-    str
-        Each broken rule as ``key.path: needed ..., got ...``.
-    """
+    """Check the stretch against the range of motion and the device's limits."""
     device, stretch = values.get("device") or {}, values.get("stretch") or {}
     yield from _stretch(stretch, values.get("elbow") or {})
     yield from _compensation(device)

@@ -12,18 +12,7 @@ Values = dict[str, Any]
 
 
 def joint_rules(values: Values) -> Iterator[str]:
-    """Check shared constants, and those of each model, against each other.
-
-    Parameters
-    ----------
-    values : dict
-        The usable values of a protocol file; what is absent is not checked.
-
-    Yields
-    ------
-    str
-        Each broken rule as ``key.path: needed ..., got ...``.
-    """
+    """Check shared constants, and those of each model, against each other."""
     elbow = values.get("elbow") or {}
     yield from _smallest_catch_angle(elbow)
     yield from _rise(elbow, elbow, "elbow")

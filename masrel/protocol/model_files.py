@@ -28,39 +28,18 @@ __all__ = ["Resolved", "read_model_file", "resolve_model_files"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Resolved:
-    """A protocol's content with the numbers of its model files in it.
+    """A protocol's content with the numbers of its model files in it."""
 
-    Attributes
-    ----------
-    raw : dict
-        The content.
-    problems : list of str
-        What is wrong with the files, each with the key that names one.
-    unread : list of int
-        Places of the models whose file could not be used: their keys are missing
-        for that reason alone.
-    """
-
-    raw: dict[str, object]
+    raw: dict[str, object]  # the content
+    # what is wrong with the files, each with the key that names one
     problems: list[str] = field(default_factory=list)
+    # places of the models whose file could not be used: their keys are missing for that
+    # reason alone
     unread: list[int] = field(default_factory=list)
 
 
 def resolve_model_files(raw: Mapping[str, object], folder: Path) -> Resolved:
-    """Read the model files that a protocol names.
-
-    Parameters
-    ----------
-    raw : mapping
-        The protocol as ``tomllib`` gives it.
-    folder : Path
-        Its folder: where a relative name of a file starts.
-
-    Returns
-    -------
-    Resolved
-        The content, in which every model has its numbers, as if they stood there.
-    """
+    """Read the model files that a protocol names."""
     resolved = Resolved(raw=dict(raw))
     models = raw.get("models")
     if not isinstance(models, list):
@@ -80,24 +59,7 @@ def resolve_model_files(raw: Mapping[str, object], folder: Path) -> Resolved:
 
 
 def read_model_file(path: Path) -> ElbowParameters:
-    """Read the joint in a model file, with the usual constants for all else.
-
-    Parameters
-    ----------
-    path : Path
-        A model file, as ``masrel fit`` writes it.
-
-    Returns
-    -------
-    ElbowParameters
-        The joint.
-
-    Raises
-    ------
-    ProtocolError
-        If there is no such file, or it is no model file, or any key is wrong. Its
-        `problems` are all there are.
-    """
+    """Read the joint in a model file, with the usual constants for all else."""
     read = _read(path)
     if isinstance(read, str):
         raise ProtocolError(read)

@@ -57,20 +57,7 @@ def elbow_parameters(protocol: Protocol, model_id: str) -> ElbowParameters:
 
 
 def joint_of(model: Model, shared: ElbowConstants) -> ElbowParameters:
-    """Return the joint of one model, in SI units.
-
-    Parameters
-    ----------
-    model : Model
-        The model; its angles are degrees.
-    shared : ElbowConstants
-        The constants for which it has none of its own.
-
-    Returns
-    -------
-    ElbowParameters
-        The joint; rad, rad/s, s.
-    """
+    """Return the joint of one model, in SI units."""
     own = {
         key: value
         for key in model.constants.__struct_fields__

@@ -13,18 +13,7 @@ SESSIONS_NEEDED = {"inter-rater": 1, "test-retest": 2}
 
 
 def plan_rules(values: Values) -> Iterator[str]:
-    """Check each line of the analysis plan against sessions, raters and models.
-
-    Parameters
-    ----------
-    values : dict
-        The usable values of a protocol file; what is absent is not checked.
-
-    Yields
-    ------
-    str
-        Each broken rule as ``key.path: needed ..., got ...``.
-    """
+    """Check each line of the analysis plan against sessions, raters and models."""
     plan = (values.get("analysis") or {}).get("estimates") or []
     for index, line in enumerate(plan):
         if line is not None:

@@ -20,18 +20,7 @@ MISSING_MARKS = ("NA",)
 
 
 def broken_rules(values: Values) -> tuple[str, ...]:
-    """Check the rules across keys.
-
-    Parameters
-    ----------
-    values : dict
-        The usable values of a protocol file; what is absent is not checked.
-
-    Returns
-    -------
-    tuple of str
-        Each broken rule as ``key.path: needed ..., got ...``.
-    """
+    """Check the rules across keys."""
     return tuple(problem for rule in _RULES for problem in rule(values))
 
 

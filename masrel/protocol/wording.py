@@ -15,24 +15,7 @@ _IDENTIFIER = (
 
 
 def needed(annotation: object) -> str:
-    """Say what a value of a field's type is.
-
-    Parameters
-    ----------
-    annotation : type
-        The type of a field of the protocol, or of an entry of an array field.
-
-    Returns
-    -------
-    str
-        A noun phrase with the range.
-
-    Examples
-    --------
-    >>> from masrel.protocol.definition import Angle
-    >>> needed(Angle)
-    'a number above 0 and at most 180'
-    """
+    """Say what a value of a field's type is."""
     return _phrase(inspect.type_info(annotation))
 
 
@@ -82,23 +65,7 @@ def _length(info: inspect.VarTupleType) -> str:
 
 
 def got(value: object) -> str:
-    """Show a decoded TOML value as its file would.
-
-    Parameters
-    ----------
-    value : object
-        A value as ``tomllib`` gives it.
-
-    Returns
-    -------
-    str
-        Short: a table and an array are named, not printed.
-
-    Examples
-    --------
-    >>> got("1+"), got(True), got({"a": 1})
-    ('"1+"', 'true', 'a table')
-    """
+    """Show a decoded TOML value as its file would."""
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False)
     if isinstance(value, bool):
@@ -113,21 +80,5 @@ def got(value: object) -> str:
 
 
 def with_id(entry: Mapping[str, object]) -> str:
-    """Name an entry of an array of tables at the end of a message.
-
-    Parameters
-    ----------
-    entry : mapping
-        The entry.
-
-    Returns
-    -------
-    str
-        Its id in parentheses; empty when it has none.
-
-    Examples
-    --------
-    >>> with_id({"id": "HM3"}), with_id({})
-    (' (id "HM3")', '')
-    """
+    """Name an entry of an array of tables at the end of a message."""
     return f" (id {got(entry['id'])})" if "id" in entry else ""

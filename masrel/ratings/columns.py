@@ -18,14 +18,9 @@ _NAMES = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Chosen:
-    """Columns the caller named; None is left to the names in the file.
+    """Columns the caller named; None is left to the names in the file."""
 
-    Attributes
-    ----------
-    item, rater, grade, session : str or None
-        Names of columns.
-    """
-
+    # item, rater, grade, session: names of columns
     item: str | None = None
     rater: str | None = None
     grade: str | None = None
@@ -34,67 +29,30 @@ class Chosen:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LongColumns:
-    """Columns of a long table: one row a rating.
+    """Columns of a long table: one row a rating."""
 
-    Attributes
-    ----------
-    item, rater, grade : int
-        Their positions.
-    session : int or None
-        Position of the session, if there is one.
-    """
-
+    # item, rater, grade: their positions
     item: int
     rater: int
     grade: int
-    session: int | None
+    session: int | None  # position of the session, if there is one
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WideColumns:
-    """Columns of a wide table: one row an item, one column a rater.
+    """Columns of a wide table: one row an item, one column a rater."""
 
-    Attributes
-    ----------
-    item : int
-        Position of the item.
-    raters : tuple of int
-        Positions of the raters.
-    session : int or None
-        Position of the session, if there is one.
-    """
-
-    item: int
-    raters: tuple[int, ...]
-    session: int | None
+    item: int  # position of the item
+    raters: tuple[int, ...]  # positions of the raters
+    session: int | None  # position of the session, if there is one
 
 
 def find_columns(rows: CsvRows, chosen: Chosen) -> LongColumns | WideColumns:
-    """Decide whether a table is long or wide, and which column is what.
-
-    A table with a column for the rater or for the grade, named by the caller or by
-    a name that is recognized, is long and needs item, rater and grade. Any other
-    table is wide: the item is the column the caller named, else one whose name is
-    recognized, else the first; every other column but the session is a rater.
-
-    Parameters
-    ----------
-    rows : CsvRows
-        The table.
-    chosen : Chosen
-        What the caller named; goes before any recognized name.
-
-    Returns
-    -------
-    LongColumns or WideColumns
-        Positions of the columns.
-
-    Raises
-    ------
-    RatingsError
-        If a named column is not there, two columns could be the same thing, or a
-        long table lacks one.
-    """
+    """Decide whether a table is long or wide, and which column is what."""
+    # A table with a column for the rater or for the grade, named by the caller or by a
+    # name that is recognized, is long and needs item, rater and grade. Any other table
+    # is wide: the item is the column the caller named, else one whose name is
+    # recognized, else the first; every other column but the session is a rater.
     found = {
         what: _find(rows, what, getattr(chosen, what), _taken(chosen, what))
         for what in _NAMES

@@ -18,78 +18,37 @@ _MOST_PROBLEMS = 20
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CsvRow:
-    """One record of a CSV file.
+    """One record of a CSV file."""
 
-    Attributes
-    ----------
-    line : int
-        Line of the file where it begins, from 1.
-    cells : tuple of str
-        Its cells without the blanks around them, as many as the header has.
-    """
-
-    line: int
+    line: int  # line of the file where it begins, from 1
+    # its cells without the blanks around them, as many as the header has
     cells: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CsvRows:
-    """A CSV file as text.
+    """A CSV file as text."""
 
-    Attributes
-    ----------
-    path : Path
-        The file.
-    header : tuple of str
-        Names of the columns, all different.
-    header_line : int
-        Line of the header.
-    rows : tuple of CsvRow
-        The records below it; blank lines are left out.
-    """
-
-    path: Path
-    header: tuple[str, ...]
-    header_line: int
-    rows: tuple[CsvRow, ...]
+    path: Path  # the file
+    header: tuple[str, ...]  # names of the columns, all different
+    header_line: int  # line of the header
+    rows: tuple[CsvRow, ...]  # the records below it; blank lines are left out
 
 
 class Problems:
-    """Problems of one file, collected to be raised together.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    """
+    """Problems of one file, collected to be raised together."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
         self._found: list[tuple[int, str]] = []
 
     def add(self, line: int, column: str | None, message: str) -> None:
-        """Note a problem.
-
-        Parameters
-        ----------
-        line : int
-            Line of the file.
-        column : str or None
-            Name of the column, None for the whole line.
-        message : str
-            What was needed and what came.
-        """
+        """Note a problem."""
         where = f"line {line}" + ("" if column is None else f", column {column!r}")
         self._found.append((line, f"{self._path}: {where}: {message}"))
 
     def raise_any(self) -> None:
-        """Raise what was noted, by line, at most 20 of them.
-
-        Raises
-        ------
-        RatingsError
-            If anything was.
-        """
+        """Raise what was noted, by line, at most 20 of them."""
         if not self._found:
             return
         texts = [text for _, text in sorted(self._found, key=lambda found: found[0])]
@@ -100,27 +59,9 @@ class Problems:
 
 
 def read_rows(path: Path) -> CsvRows:
-    """Read a CSV file as text, without guessing any type.
-
-    Lines at the head that begin with ``#`` are comments; a byte order mark, either
-    line ending, blank lines, and blanks around cells do not matter.
-
-    Parameters
-    ----------
-    path : Path
-        The file: UTF-8, separated by commas, with a header.
-
-    Returns
-    -------
-    CsvRows
-        Header and records.
-
-    Raises
-    ------
-    RatingsError
-        If the file is missing, not UTF-8, empty, not separated by commas, its
-        header has an empty or repeated name, or a row has more or fewer cells.
-    """
+    """Read a CSV file as text, without guessing any type."""
+    # Lines at the head that begin with ``#`` are comments; a byte order mark, either
+    # line ending, blank lines, and blanks around cells do not matter.
     text = _text(path)
     n_comments = _comment_lines(text)
     body = io.StringIO(text, newline="")

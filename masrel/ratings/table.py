@@ -118,22 +118,7 @@ def ratings_from_rows(
 def assemble(
     rows: Sequence[Mapping[str, object]], scale: Scale, source_path: Path | None
 ) -> Ratings:
-    """Put checked rows into a table.
-
-    Parameters
-    ----------
-    rows : sequence of mapping
-        Every column of `RATING_COLUMNS` in every row.
-    scale : Scale
-        The grades a rater may give.
-    source_path : Path or None
-        The file the rows are from.
-
-    Returns
-    -------
-    Ratings
-        The table.
-    """
+    """Put checked rows into a table."""
     types = dict.fromkeys(RATING_COLUMNS, "object")
     types.update({"repeat": "int64", "mean_speed_deg_s": "float64"})
     table = pd.DataFrame(

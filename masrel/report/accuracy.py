@@ -8,18 +8,7 @@ __all__ = ["in_person_section", "intended_section"]
 
 
 def intended_section(material: Material) -> Section:
-    """Show how many raters gave each standard model its intended grade.
-
-    Parameters
-    ----------
-    material : Material
-        What the report is made from.
-
-    Returns
-    -------
-    Section
-        The section.
-    """
+    """Show how many raters gave each standard model its intended grade."""
     found = material.analysis.intended
     title = "Agreement with the intended grade"
     if found is None or not found.models:
@@ -51,18 +40,7 @@ def intended_section(material: Material) -> Section:
 
 
 def in_person_section(material: Material) -> Section:
-    """Show grades given to patients beside those given to their models.
-
-    Parameters
-    ----------
-    material : Material
-        What the report is made from.
-
-    Returns
-    -------
-    Section
-        The section.
-    """
+    """Show grades given to patients beside those given to their models."""
     found = material.analysis.in_person
     title = "In-person and haptic grades"
     if found is None or found.n_pairs == 0:

@@ -22,36 +22,14 @@ _MARKS = (
 
 
 def agreement_section(material: Material) -> Section:
-    """Show the inter-rater estimates of the plan.
-
-    Parameters
-    ----------
-    material : Material
-        What the report is made from.
-
-    Returns
-    -------
-    Section
-        The section.
-    """
+    """Show the inter-rater estimates of the plan."""
     title = "Agreement between raters"
     blocks = _blocks(material, "inter-rater", "agreement", title)
     return Section(name="agreement", title=title, blocks=blocks)
 
 
 def retest_section(material: Material) -> Section:
-    """Show the test-retest estimates of the plan, and each rater's own.
-
-    Parameters
-    ----------
-    material : Material
-        What the report is made from.
-
-    Returns
-    -------
-    Section
-        The section.
-    """
+    """Show the test-retest estimates of the plan, and each rater's own."""
     caption = "Agreement of raters with themselves"
     blocks = _blocks(material, "test-retest", "test_retest", caption)
     return Section(name="test-retest", title="Test-retest agreement", blocks=blocks)

@@ -38,35 +38,13 @@ _SILENT = {"rest_angle_deg": None, "catch_rise_s": 0.0}
 
 
 def constants_tables(material: Material) -> tuple[Table, ...]:
-    """Show the constants of the joint models.
-
-    Parameters
-    ----------
-    material : Material
-        What the report is made from.
-
-    Returns
-    -------
-    tuple of Table
-        The shared ones and, where a model has some of its own, a table of these.
-    """
+    """Show the constants of the joint models."""
     own = _own_rows(material)
     return (_shared(material, others=bool(own)), *_own(material, own))
 
 
 def reading_of_q(material: Material) -> str:
-    """Say what Q is a share of.
-
-    Parameters
-    ----------
-    material : Material
-        What the report is made from.
-
-    Returns
-    -------
-    str
-        A noun phrase that holds for every model.
-    """
+    """Say what Q is a share of."""
     protocol = material.protocol
     shared = protocol.elbow.residual_reading
     own = {m.constants.residual_reading or shared for m in protocol.models}

@@ -25,16 +25,5 @@ SECTIONS: dict[str, Callable[[Material], Section]] = {
 
 
 def build_sections(material: Material) -> tuple[Section, ...]:
-    """Make the sections a protocol asks for, in its order.
-
-    Parameters
-    ----------
-    material : Material
-        What the report is made from.
-
-    Returns
-    -------
-    tuple of Section
-        The sections; their figures are not drawn yet.
-    """
+    """Make the sections a protocol asks for, in its order."""
     return tuple(SECTIONS[name](material) for name in material.protocol.report.sections)

@@ -17,18 +17,7 @@ _PARAMETERS = (
 
 
 def design_section(material: Material) -> Section:
-    """Describe the study: models with parameters, raters and sessions.
-
-    Parameters
-    ----------
-    material : Material
-        What the report is made from.
-
-    Returns
-    -------
-    Section
-        The section.
-    """
+    """Describe the study: models with parameters, raters and sessions."""
     protocol = material.protocol
     study = protocol.study
     n_standard = sum(1 for model in protocol.models if model.role == "standard")
@@ -137,18 +126,7 @@ def _session_row(material: Material, session: Session) -> tuple[Value, ...]:
 
 
 def grades_section(material: Material) -> Section:
-    """Show every grade of every session.
-
-    Parameters
-    ----------
-    material : Material
-        What the report is made from.
-
-    Returns
-    -------
-    Section
-        The section.
-    """
+    """Show every grade of every session."""
     blocks: list[Paragraph | Table | Drawing] = []
     for session in material.sessions:
         blocks.extend(grade_grid(material, session))

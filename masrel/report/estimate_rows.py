@@ -19,31 +19,16 @@ __all__ = ["EstimateRow", "estimate_rows", "meanings"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EstimateRow:
-    """One row: an estimate, or why there is none.
+    """One row: an estimate, or why there is none."""
 
-    Attributes
-    ----------
-    name : str
-        Id of the line of the plan, and the rater if it is one rater's.
-    coefficient : str
-        Name of the coefficient for a reader.
-    models, sessions : str
-        What it was estimated from.
-    estimate : Estimate or None
-        The estimate.
-    reason : str or None
-        Why there is none.
-    is_own : bool
-        Whether it is one rater's agreement with him- or herself.
-    """
-
-    name: str
-    coefficient: str
+    name: str  # id of the line of the plan, and the rater if it is one rater's
+    coefficient: str  # name of the coefficient for a reader
+    # models, sessions: what it was estimated from
     models: str
     sessions: str
-    estimate: Estimate | None
-    reason: str | None
-    is_own: bool = False
+    estimate: Estimate | None  # the estimate
+    reason: str | None  # why there is none
+    is_own: bool = False  # whether it is one rater's agreement with him- or herself
 
     @property
     def n_raters(self) -> int | None:
@@ -97,18 +82,7 @@ class EstimateRow:
 
 
 def estimate_rows(planned: Sequence[PlannedEstimate]) -> tuple[EstimateRow, ...]:
-    """Lay out planned estimates, each followed by those of its raters.
-
-    Parameters
-    ----------
-    planned : sequence of PlannedEstimate
-        Lines of the plan and what came of them.
-
-    Returns
-    -------
-    tuple of EstimateRow
-        The rows. A line with estimates per rater only has no row of its own.
-    """
+    """Lay out planned estimates, each followed by those of its raters."""
     return tuple(row for entry in planned for row in _rows(entry))
 
 
@@ -137,17 +111,6 @@ def _rows(entry: PlannedEstimate) -> Iterator[EstimateRow]:
 
 
 def meanings(rows: Sequence[EstimateRow]) -> tuple[str, ...]:
-    """Say in one plain sentence each what the intervals of some rows mean.
-
-    Parameters
-    ----------
-    rows : sequence of EstimateRow
-        The rows.
-
-    Returns
-    -------
-    tuple of str
-        One sentence per kind of interval, target and origin there is.
-    """
+    """Say in one plain sentence each what the intervals of some rows mean."""
     intervals = (row.interval for row in rows if row.interval is not None)
     return tuple(dict.fromkeys(meaning(interval, "model") for interval in intervals))

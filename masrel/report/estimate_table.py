@@ -48,25 +48,9 @@ _COLUMNS = (
 def estimate_table(
     rows: Sequence[EstimateRow], *, name: str, caption: str, data: str
 ) -> Table:
-    """Make a table of estimates.
-
-    On a page an interval is one column, marked with a letter; a note below says
-    what each letter means: level, method, and of whom the interval speaks.
-
-    Parameters
-    ----------
-    rows : sequence of EstimateRow
-        The estimates.
-    name, caption : str
-        Name of its file and what it shows.
-    data : str
-        Where the data come from.
-
-    Returns
-    -------
-    Table
-        One row per estimate.
-    """
+    """Make a table of estimates."""
+    # On a page an interval is one column, marked with a letter; a note below says what
+    # each letter means: level, method, and of whom the interval speaks.
     meant = (_meaning(row.interval) for row in rows if row.interval is not None)
     marks = {text: _mark(i) for i, text in enumerate(dict.fromkeys(meant))}
     notes = [f"{mark} {text}." for text, mark in marks.items()]

@@ -17,18 +17,8 @@ TARGETS = {
 
 
 def has_zero(coefficient: str | None) -> bool:
-    """Return whether 0 is what chance gives of a coefficient.
-
-    Parameters
-    ----------
-    coefficient : str or None
-        Its name in an estimate; of none there is no zero.
-
-    Returns
-    -------
-    bool
-        Not of a share, nor of a measure of order; of an ICC and a κ.
-    """
+    """Return whether 0 is what chance gives of a coefficient."""
+    # Not of a share, nor of a measure of order; of an ICC and a κ.
     if coefficient is None:
         return False
     entry = COEFFICIENTS.get(coefficient)  # the forms of ICC have entries of their own
@@ -36,18 +26,7 @@ def has_zero(coefficient: str | None) -> bool:
 
 
 def as_words(estimate: Estimate) -> str:
-    """Return a value with its interval, as shown.
-
-    Parameters
-    ----------
-    estimate : Estimate
-        The estimate.
-
-    Returns
-    -------
-    str
-        Such as ``"0.626 [0.320, 0.933]"``, or that it is undefined.
-    """
+    """Return a value with its interval, as shown."""
     if not math.isfinite(estimate.value):
         return UNDEFINED
     value, interval = number(estimate.value, 3), estimate.interval
@@ -57,25 +36,7 @@ def as_words(estimate: Estimate) -> str:
 
 
 def coefficient_name(coefficient: str, weights: str = "identity") -> str:
-    """Return a coefficient's name for a reader.
-
-    Parameters
-    ----------
-    coefficient : str
-        Its name in code.
-    weights : str, optional
-        Name of its weights.
-
-    Returns
-    -------
-    str
-        Its name in print.
-
-    Examples
-    --------
-    >>> coefficient_name("fleiss_kappa", "quadratic")
-    "Fleiss' κ, quadratic weights"
-    """
+    """Return a coefficient's name for a reader."""
     title = COEFFICIENTS[coefficient].title
     if weights != "identity":
         title = f"{title}, {weights} weights"
@@ -84,16 +45,5 @@ def coefficient_name(coefficient: str, weights: str = "identity") -> str:
 
 
 def interval_name(interval: Interval) -> str:
-    """Return level, kind and method of an interval.
-
-    Parameters
-    ----------
-    interval : Interval
-        The interval.
-
-    Returns
-    -------
-    str
-        Such as ``"95 % confidence, rater jackknife, t(7)"``.
-    """
+    """Return level, kind and method of an interval."""
     return f"{percent(interval.level)} % {interval.kind}, {interval.method}"

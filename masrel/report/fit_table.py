@@ -19,18 +19,7 @@ FRICTION = {
 
 
 def fit_table(fit: ElbowFit) -> Table:
-    """Make the table of an identified joint.
-
-    Parameters
-    ----------
-    fit : ElbowFit
-        The fit.
-
-    Returns
-    -------
-    Table
-        One row a parameter: from all trials together, and from the step alone.
-    """
+    """Make the table of an identified joint."""
     alone = {e.name: e for step in fit.steps for e in step.estimates}
     rows = tuple(_row(e, alone.get(e.name), QUANTITIES[e.name]) for e in fit.estimates)
     slow = sum(trial.pace == "slow" for trial in fit.trials)
@@ -47,18 +36,7 @@ def fit_table(fit: ElbowFit) -> Table:
 
 
 def friction_table(fit: FrictionFit) -> Table:
-    """Make the table of an identified device.
-
-    Parameters
-    ----------
-    fit : FrictionFit
-        The fit.
-
-    Returns
-    -------
-    Table
-        One row a parameter.
-    """
+    """Make the table of an identified device."""
     rows = tuple(_row(e, None, FRICTION[e.name]) for e in fit.estimates)
     notes = (
         f"{len(fit.strokes)} strokes; intervals are clustered by stroke.",

@@ -23,20 +23,7 @@ class _Grid:
 
 
 def grade_grid(material: Material, session: str) -> tuple[Table, Drawing]:
-    """Lay out the grades of a session.
-
-    Parameters
-    ----------
-    material : Material
-        What the report is made from.
-    session : str
-        The session.
-
-    Returns
-    -------
-    tuple of Table and Drawing
-        The same grades to read and to see.
-    """
+    """Lay out the grades of a session."""
     grid = _grid(material, session)
     return _table(material, session, grid), _drawing(material, session, grid)
 

@@ -24,26 +24,7 @@ _ESCAPES = {
 
 
 def as_latex(table: Table) -> str:
-    r"""Return a table as LaTeX that needs the package `booktabs` and no other.
-
-    Parameters
-    ----------
-    table : Table
-        The table.
-
-    Returns
-    -------
-    str
-        A `table` environment with caption, rules, rounded cells and notes.
-
-    Examples
-    --------
-    >>> from masrel.report.tables import Column
-    >>> print(as_latex(Table(
-    ...     name="x", caption="50 %", columns=(Column(key="a", heading="κ"),),
-    ...     rows=((0.5,),), data="foreign")).splitlines()[2])
-    \caption{50 \%}
-    """
+    r"""Return a table as LaTeX that needs the package `booktabs` and no other."""
     page = on_page(table)
     caption = f"SIMULATED DATA. {page.caption}" if page.simulated else page.caption
     letters = "".join(

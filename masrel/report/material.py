@@ -17,23 +17,12 @@ __all__ = ["Drawing", "Material", "Paragraph", "Section", "absent_section"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Material:
-    """Everything a report is made from.
+    """Everything a report is made from."""
 
-    Attributes
-    ----------
-    protocol : Protocol
-        The study's protocol.
-    ratings : Ratings
-        The ratings.
-    analysis : Analysis
-        What was computed from them.
-    in_person : InPerson or None
-        Grades given in person, whose notes are shown below their table.
-    """
-
-    protocol: Protocol
-    ratings: Ratings
-    analysis: Analysis
+    protocol: Protocol  # the study's protocol
+    ratings: Ratings  # the ratings
+    analysis: Analysis  # what was computed from them
+    # grades given in person, whose notes are shown below their table
     in_person: InPerson | None = None
 
     @property
@@ -82,76 +71,33 @@ class Material:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Paragraph:
-    """One paragraph of plain text.
+    """One paragraph of plain text."""
 
-    Attributes
-    ----------
-    text : str
-        The text.
-    absent : bool
-        Whether it says that something asked for is not in the data.
-    """
-
-    text: str
-    absent: bool = False
+    text: str  # the text
+    absent: bool = False  # whether it says that something asked for is not in the data
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drawing:
-    """A figure that is drawn when the document is written, and not before.
+    """A figure that is drawn when the document is written, and not before."""
 
-    Attributes
-    ----------
-    name : str
-        Name of its files, without extension.
-    caption : str
-        What it shows, understood alone.
-    alt : str
-        What a reader who cannot see it needs to know.
-    draw : callable
-        Draws it.
-    """
-
-    name: str
-    caption: str
-    alt: str
-    draw: "Callable[[], Drawn]"
+    name: str  # name of its files, without extension
+    caption: str  # what it shows, understood alone
+    alt: str  # what a reader who cannot see it needs to know
+    draw: "Callable[[], Drawn]"  # draws it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Section:
-    """One section of the report.
+    """One section of the report."""
 
-    Attributes
-    ----------
-    name : str
-        Its name in the protocol's ``report.sections``.
-    title : str
-        Its heading.
-    blocks : tuple of Paragraph, Table or Drawing
-        Its contents in order.
-    """
-
-    name: str
-    title: str
-    blocks: tuple[Paragraph | Table | Drawing, ...]
+    name: str  # its name in the protocol's ``report.sections``
+    title: str  # its heading
+    blocks: tuple[Paragraph | Table | Drawing, ...]  # its contents in order
 
 
 def absent_section(name: str, title: str, reason: str | None) -> Section:
-    """Make a section whose data are not there, and say why.
-
-    Parameters
-    ----------
-    name, title : str
-        Its name in the protocol's ``report.sections``, and its heading.
-    reason : str or None
-        Why, as a clause; None when it was not computed.
-
-    Returns
-    -------
-    Section
-        The section with one paragraph.
-    """
+    """Make a section whose data are not there, and say why."""
     why = "this was not computed" if reason is None else reason
     said = Paragraph(text=f"Not in these data: {why}.", absent=True)
     return Section(name=name, title=title, blocks=(said,))

@@ -21,50 +21,14 @@ _WIDER = "and the spread of raters"
 
 
 def meaning(interval: Interval, noun: Noun) -> str:
-    """Say what an interval promises, of whom, and what it was made from.
-
-    Parameters
-    ----------
-    interval : Interval
-        The interval.
-    noun : {"model", "item"}
-        What was rated.
-
-    Returns
-    -------
-    str
-        One sentence.
-
-    Examples
-    --------
-    >>> print(meaning(Interval(
-    ...     low=0.4, high=1.0, level=0.95, kind="credible", target="items",
-    ...     method="Dirichlet-multinomial posterior, one-sided",
-    ... ), "item"))
-    Credible bound: given these ratings and the prior, the value that would be found \
-if these raters graded other items like these, without end, lies above the lower end \
-with probability 95 %.
-    """
+    """Say what an interval promises, of whom, and what it was made from."""
     kind = "bound" if _is_bound(interval) else "interval"
     name = f"{interval.kind.capitalize()} {kind}"
     return f"{name}{origin(interval, noun)}: {promise(interval, noun)}."
 
 
 def promise(interval: Interval, noun: Noun) -> str:
-    """Say what an interval promises, and of whom.
-
-    Parameters
-    ----------
-    interval : Interval
-        The interval.
-    noun : {"model", "item"}
-        What was rated.
-
-    Returns
-    -------
-    str
-        The sentence without its beginning and full stop.
-    """
+    """Say what an interval promises, and of whom."""
     level = f"{percent(interval.level)} %"
     population = _POPULATIONS[interval.target].replace("{}", noun)
     if interval.kind == "confidence":
@@ -93,18 +57,7 @@ def _is_bound(interval: Interval) -> bool:
 
 
 def aside(interval: Interval) -> str:
-    """Say in few words how the ends differ from quantiles of the distribution.
-
-    Parameters
-    ----------
-    interval : Interval
-        The interval.
-
-    Returns
-    -------
-    str
-        Nothing where they do not.
-    """
+    """Say in few words how the ends differ from quantiles of the distribution."""
     if _is_bound(interval):
         return "one-sided"
     if interval.method.endswith(_WIDER):
@@ -113,21 +66,7 @@ def aside(interval: Interval) -> str:
 
 
 def origin(interval: Interval, noun: Noun) -> str:
-    """Say in brackets what the ends of an interval came from.
-
-    Parameters
-    ----------
-    interval : Interval
-        The interval.
-    noun : {"model", "item"}
-        What was rated.
-
-    Returns
-    -------
-    str
-        Such as ``" (from leaving out one item at a time)"``; nothing where nothing
-        was left out or drawn.
-    """
+    """Say in brackets what the ends of an interval came from."""
     units = {"items": f"{noun}s", "raters": "raters", "both": f"{noun}s and raters"}
     if interval.method.endswith(_WIDER):
         return " (a posterior, made wider by what raters differ by)"

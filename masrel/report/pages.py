@@ -21,60 +21,28 @@ _SYMBOL = re.compile(r"(?<!\w)(ΔT|k|ν|θ|p)_(peak|post|th|L|start|end|o|e)(?!\
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Placed:
-    """A block with its number.
+    """A block with its number."""
 
-    Attributes
-    ----------
-    kind : {"paragraph", "table", "figure"}
-        What it is.
-    number : int
-        Which of its kind, from 1.
-    content : Paragraph or Table or Drawing
-        The block.
-    uri : str
-        A figure's picture, to be held inside the page.
-    """
-
-    kind: Literal["paragraph", "table", "figure"]
-    number: int
-    content: Paragraph | Table | Drawing
-    uri: str = ""
+    kind: Literal["paragraph", "table", "figure"]  # what it is
+    number: int  # which of its kind, from 1
+    content: Paragraph | Table | Drawing  # the block
+    uri: str = ""  # A figure's picture, to be held inside the page
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlacedSection:
-    """A section with its numbered blocks.
+    """A section with its numbered blocks."""
 
-    Attributes
-    ----------
-    name, title : str
-        Its name in the protocol, and its heading.
-    blocks : tuple of Placed
-        Its contents in order.
-    """
-
+    # name, title: its name in the protocol, and its heading
     name: str
     title: str
-    blocks: tuple[Placed, ...]
+    blocks: tuple[Placed, ...]  # its contents in order
 
 
 def render_pages(
     material: Material, sections: tuple[PlacedSection, ...]
 ) -> dict[str, str]:
-    """Write out the pages.
-
-    Parameters
-    ----------
-    material : Material
-        What the report is made from.
-    sections : tuple of PlacedSection
-        Its sections, numbered.
-
-    Returns
-    -------
-    dict of str to str
-        Name of the file to its text.
-    """
+    """Write out the pages."""
     context = _context(material, sections)
     environment = _environment()
     names = ("report.html", "report.md")

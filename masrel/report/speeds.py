@@ -19,18 +19,7 @@ __all__ = ["speeds_section"]
 
 
 def speeds_section(material: Material) -> Section:
-    """Show the mean speeds per model and per rater.
-
-    Parameters
-    ----------
-    material : Material
-        What the report is made from.
-
-    Returns
-    -------
-    Section
-        The section.
-    """
+    """Show the mean speeds per model and per rater."""
     found = material.analysis.speeds
     if found is None or not found.values:
         why = None if found is None else found.reason

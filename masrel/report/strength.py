@@ -24,31 +24,9 @@ _STRENGTHS = (
 
 
 def strength(coefficient: str, value: float) -> str:
-    """Name the strength of agreement in Landis and Koch's words.
-
-    Parameters
-    ----------
-    coefficient : str
-        Name of the coefficient; only kappas have words.
-    value : float
-        Its value.
-
-    Returns
-    -------
-    str
-        The word, or a dash where there is none.
-
-    References
-    ----------
-    .. [1] Landis, J. R., Koch, G. G. (1977). The measurement of observer agreement
-       for categorical data. Biometrics, 33(1), 159-174.
-       https://doi.org/10.2307/2529310
-
-    Examples
-    --------
-    >>> strength("fleiss_kappa", 0.626), strength("percent_agreement", 0.9)
-    ('substantial', '–')
-    """
+    """Name the strength of agreement in Landis and Koch's words."""
+    # [1] Landis, J. R., Koch, G. G. (1977). The measurement of observer agreement for
+    # categorical data. Biometrics, 33(1), 159-174. https://doi.org/10.2307/2529310
     if not coefficient.endswith("kappa") or not math.isfinite(value):
         return ABSENT
     if value < 0.0:

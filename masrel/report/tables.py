@@ -52,56 +52,30 @@ Value = str | int | float | None
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Column:
-    """One column of a table.
+    """One column of a table."""
 
-    Attributes
-    ----------
-    key : str
-        Its name in the CSV, unit included.
-    heading : str
-        Its name for a reader, unit included.
-    digits : int or None
-        Decimals shown of a float; None for text, whole numbers, and numbers shown
-        with the digits they were given.
-    align : {"left", "right", "center"}
-        How it is set.
-    where : {"everywhere", "page", "csv"}
-        Whether a page (or screen) and the CSV have it. A page puts in one column
-        what a CSV keeps in several.
-    """
-
-    key: str
-    heading: str
+    key: str  # its name in the CSV, unit included
+    heading: str  # its name for a reader, unit included
+    # decimals shown of a float; None for text, whole numbers, and numbers shown with
+    # the digits they were given
     digits: int | None = None
-    align: Literal["left", "right", "center"] = "right"
+    align: Literal["left", "right", "center"] = "right"  # how it is set
+    # whether a page (or screen) and the CSV have it. A page puts in one column what a
+    # CSV keeps in several.
     where: Literal["everywhere", "page", "csv"] = "everywhere"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Table:
-    """A table whose first column names the rows.
+    """A table whose first column names the rows."""
 
-    Attributes
-    ----------
-    name : str
-        Name of its file, without extension.
-    caption : str
-        What it shows, understood alone.
-    columns : tuple of Column
-        The columns.
-    rows : tuple of tuple
-        Values as computed: text, numbers, ``nan`` for undefined, None for absent.
-    notes : tuple of str
-        What the reader must know, below the table.
-    data : str
-        Where the data come from: "simulated", "published", "recorded" or "foreign".
-    """
-
-    name: str
-    caption: str
-    columns: tuple[Column, ...]
+    name: str  # name of its file, without extension
+    caption: str  # what it shows, understood alone
+    columns: tuple[Column, ...]  # the columns
+    # values as computed: text, numbers, ``nan`` for undefined, None for absent
     rows: tuple[tuple[Value, ...], ...]
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  # what the reader must know, below the table
+    # where the data come from: "simulated", "published", "recorded" or "foreign"
     data: str
 
     @property
@@ -111,20 +85,7 @@ class Table:
 
 
 def shown(value: Value, column: Column) -> str:
-    """Return a value as it is shown in a column.
-
-    Parameters
-    ----------
-    value : str, int, float or None
-        The value as computed.
-    column : Column
-        Its column, whose `digits` round it.
-
-    Returns
-    -------
-    str
-        What is printed.
-    """
+    """Return a value as it is shown in a column."""
     if value is None:
         return ABSENT
     if not isinstance(value, float):
@@ -135,18 +96,7 @@ def shown(value: Value, column: Column) -> str:
 
 
 def on_page(table: Table) -> Table:
-    """Return a table with the columns a page or a screen has.
-
-    Parameters
-    ----------
-    table : Table
-        The table.
-
-    Returns
-    -------
-    Table
-        The same without the columns of the CSV alone.
-    """
+    """Return a table with the columns a page or a screen has."""
     return _without(table, "csv")
 
 
@@ -160,19 +110,7 @@ def _without(table: Table, where: str) -> Table:
 
 
 def as_csv(table: Table) -> str:
-    """Return a table as CSV, every digit kept, with its provenance in each row.
-
-    Parameters
-    ----------
-    table : Table
-        The table.
-
-    Returns
-    -------
-    str
-        CSV with a header line; the last column, ``data``, says where the row's
-        data come from. Undefined and absent values are empty.
-    """
+    """Return a table as CSV, every digit kept, with its provenance in each row."""
     kept = _without(table, "page")
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
@@ -189,18 +127,7 @@ def _plain(value: Value) -> str:
 
 
 def as_text(table: Table) -> str:
-    """Return a table for a screen of fixed-width letters.
-
-    Parameters
-    ----------
-    table : Table
-        The table.
-
-    Returns
-    -------
-    str
-        Caption, aligned columns and notes, one a line.
-    """
+    """Return a table for a screen of fixed-width letters."""
     page = on_page(table)
     head = [column.heading for column in page.columns]
     body = [

@@ -28,18 +28,7 @@ SLOWEST_DRAWN_DEG_S = 1.0
 
 
 def traces_section(material: Material) -> Section:
-    """Show the torque each model makes at each rater's mean speed.
-
-    Parameters
-    ----------
-    material : Material
-        What the report is made from.
-
-    Returns
-    -------
-    Section
-        The section.
-    """
+    """Show the torque each model makes at each rater's mean speed."""
     speeds = material.analysis.speeds
     title = "Torque traces"
     if speeds is None or not speeds.values:

@@ -95,25 +95,7 @@ def line_hash(line: bytes) -> str:
 
 
 def verify(path: Path, lines: list[bytes]) -> tuple[Event, ...]:
-    """Verify a chain from its first line on.
-
-    Parameters
-    ----------
-    path : Path
-        The log, for messages.
-    lines : list of bytes
-        Its lines without their newlines.
-
-    Returns
-    -------
-    tuple of Event
-        Every event in order.
-
-    Raises
-    ------
-    SessionLogError
-        If a line is not an event or does not carry the hash of the line before.
-    """
+    """Verify a chain from its first line on."""
     previous = FIRST_PREVIOUS
     events = []
     for number, line in enumerate(lines, start=1):
@@ -130,27 +112,7 @@ def verify(path: Path, lines: list[bytes]) -> tuple[Event, ...]:
 
 
 def parse_event(path: Path, number: int, line: bytes) -> Event:
-    """Read one line, without regard to the chain.
-
-    Parameters
-    ----------
-    path : Path
-        The log, for messages.
-    number : int
-        Number of the line, from 1.
-    line : bytes
-        The line without its newline.
-
-    Returns
-    -------
-    Event
-        The event.
-
-    Raises
-    ------
-    SessionLogError
-        If the line is not an event.
-    """
+    """Read one line, without regard to the chain."""
     try:
         document = json.loads(line.decode("utf-8"))
     except ValueError as error:

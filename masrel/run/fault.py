@@ -24,42 +24,18 @@ _FORMATS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FaultRecord:
-    """A fault as the log has it.
+    """A fault as the log has it."""
 
-    Attributes
-    ----------
-    kind : str
-        What kind of fault, in one word.
-    words : str
-        What was needed and what came.
-    time_s : float
-        When it was noticed, s since the presentation began.
-    torque_nm : float
-        The torque that the device held then, N·m.
-    last_200_ms : str
-        The recording from 200 ms before until the torque was zero, as CSV.
-    """
-
-    kind: str
-    words: str
-    time_s: float
-    torque_nm: float
+    kind: str  # what kind of fault, in one word
+    words: str  # what was needed and what came
+    time_s: float  # when it was noticed, s since the presentation began
+    torque_nm: float  # the torque that the device held then, N·m
+    # the recording from 200 ms before until the torque was zero, as CSV
     last_200_ms: str
 
 
 def fault_record(presented: Presented) -> FaultRecord | None:
-    """Return what the log keeps of a presentation's fault.
-
-    Parameters
-    ----------
-    presented : Presented
-        A presentation.
-
-    Returns
-    -------
-    FaultRecord or None
-        None when there was no fault.
-    """
+    """Return what the log keeps of a presentation's fault."""
     fault = presented.fault
     if fault is None:
         return None

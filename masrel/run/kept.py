@@ -17,69 +17,23 @@ __all__ = ["Shown", "keep", "recover", "spool_of"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shown:
-    """What a presentation left.
+    """What a presentation left."""
 
-    Attributes
-    ----------
-    sha256 : str
-        Checksum of the recording.
-    mean_speed_deg_s : float or None
-        Mean speed before the catch, deg/s; None when the arm never moved.
-    n_missed_ticks : int
-        Ticks the loop skipped.
-    fault : FaultRecord or None
-        What stopped it, or None.
-    simulated : bool
-        Whether no hardware moved.
-    """
-
-    sha256: str
+    sha256: str  # checksum of the recording
+    # mean speed before the catch, deg/s; None when the arm never moved
     mean_speed_deg_s: float | None
-    n_missed_ticks: int
-    fault: FaultRecord | None
-    simulated: bool
+    n_missed_ticks: int  # ticks the loop skipped
+    fault: FaultRecord | None  # what stopped it, or None
+    simulated: bool  # whether no hardware moved
 
 
 def spool_of(file: Path) -> Path:
-    """Return where samples are kept while the recording is made.
-
-    Parameters
-    ----------
-    file : Path
-        The recording's ``.npz`` file.
-
-    Returns
-    -------
-    Path
-        A file beside it.
-    """
+    """Return where samples are kept while the recording is made."""
     return file.with_suffix(".partial")
 
 
 def recover(protocol: Protocol, asked: Asked, *, file: Path) -> Shown | None:
-    """Make a recording of what a process left that died while presenting.
-
-    Parameters
-    ----------
-    protocol : Protocol
-        As for `present`.
-    asked : Asked
-        What was being presented.
-    file : Path
-        The recording's ``.npz`` file.
-
-    Returns
-    -------
-    Shown or None
-        What is to be logged; None when no process died here, or before it began.
-
-    Raises
-    ------
-    RecordingError
-        If what lies there is something else.
-    OSError
-        If the recording cannot be written.
-    """
+    """Make a recording of what a process left that died while presenting."""
     spool = spool_of(file)
     if not spool.exists():
         return None
@@ -91,29 +45,7 @@ def recover(protocol: Protocol, asked: Asked, *, file: Path) -> Shown | None:
 
 
 def keep(presented: Presented, protocol: Protocol, asked: Asked, file: Path) -> Shown:
-    """Write a recording, and remove what was kept while it was made.
-
-    Parameters
-    ----------
-    presented : Presented
-        The presentation, as it went.
-    protocol : Protocol
-        Of which study.
-    asked : Asked
-        What was presented to whom.
-    file : Path
-        The recording's ``.npz`` file.
-
-    Returns
-    -------
-    Shown
-        What is to be logged; the recording is on disk.
-
-    Raises
-    ------
-    OSError
-        If it cannot be written.
-    """
+    """Write a recording, and remove what was kept while it was made."""
     shown, recording = asked.presentation, presented.recording
     facts: dict[str, Fact] = {
         **recording.facts,

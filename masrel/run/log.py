@@ -31,13 +31,7 @@ __all__ = ["SessionLog", "utc_now"]
 
 
 def utc_now() -> datetime:
-    """Return the time of day in UTC.
-
-    Returns
-    -------
-    datetime
-        Aware, in UTC.
-    """
+    """Return the time of day in UTC."""
     return datetime.now(UTC)
 
 

@@ -37,37 +37,9 @@ LONGEST_STRETCH_S = 10.0
 def present(
     protocol: Protocol, asked: Asked, *, clock: Clock, file: Path, stop: EmergencyStop
 ) -> Shown:
-    """Present a model once on the protocol's device and write the recording.
-
-    Signals that would end the process, and with a real clock any key of the terminal,
-    press the emergency stop while the device is open.
-
-    Parameters
-    ----------
-    protocol : Protocol
-        Device, limits, stretch and models.
-    asked : Asked
-        What is presented to whom.
-    clock : Clock
-        The clock of the loop.
-    file : Path
-        The recording's ``.npz`` file.
-    stop : EmergencyStop
-        The button that stops the presentation.
-
-    Returns
-    -------
-    Shown
-        What is to be logged; the recording is on disk.
-
-    Raises
-    ------
-    DeviceError
-        If the device cannot be opened or closed. A fault while presenting is no
-        error: it is in the result.
-    OSError
-        If the recording cannot be written.
-    """
+    """Present a model once on the protocol's device and write the recording."""
+    # Signals that would end the process, and with a real clock any key of the terminal,
+    # press the emergency stop while the device is open.
     limits = device_limits(protocol.device)
     with contextlib.ExitStack() as held:
         held.enter_context(stop_on_signals(stop))

@@ -57,49 +57,20 @@ EVENTS: dict[str, tuple[str, ...]] = {
 
 @dataclass(slots=True, kw_only=True)
 class SessionState:
-    """Where a session stands.
+    """Where a session stands."""
 
-    Attributes
-    ----------
-    header : Mapping
-        Fields of the event ``session``; empty when there is none yet.
-    presented : dict of str to list of Event
-        Presentations of each code, in order.
-    given : dict of str to str
-        Grade of each graded code as the rater gave it.
-    grades : dict of str to str
-        The same with corrections.
-    is_complete : bool
-        Whether the session came to its end.
-    """
-
+    # fields of the event ``session``; empty when there is none yet
     header: Mapping[str, Fact] = field(default_factory=dict)
+    # presentations of each code, in order
     presented: dict[str, list[Event]] = field(default_factory=dict)
+    # grade of each graded code as the rater gave it
     given: dict[str, str] = field(default_factory=dict)
-    grades: dict[str, str] = field(default_factory=dict)
-    is_complete: bool = False
+    grades: dict[str, str] = field(default_factory=dict)  # the same with corrections
+    is_complete: bool = False  # whether the session came to its end
 
 
 def replay(path: Path, events: Sequence[Event]) -> SessionState:
-    """Find out where a session stands from its log.
-
-    Parameters
-    ----------
-    path : Path
-        The log, for messages.
-    events : sequence of Event
-        Its events.
-
-    Returns
-    -------
-    SessionState
-        Where the session stands.
-
-    Raises
-    ------
-    SessionLogError
-        If an event is unknown, lacks a field, or cannot come where it is.
-    """
+    """Find out where a session stands from its log."""
     state = SessionState()
     for event in events:
         fault = _misfit(state, event)

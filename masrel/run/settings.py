@@ -28,19 +28,7 @@ __all__ = [
 
 
 def check_backend(settings: DeviceSettings) -> None:
-    """Do nothing if a session can be run on the device of a protocol.
-
-    Parameters
-    ----------
-    settings : DeviceSettings
-        The table ``[device]``.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such device, nobody can move it, or an option of it is
-        outside its range.
-    """
+    """Do nothing if a session can be run on the device of a protocol."""
     names = [name for name in device_names() if name != "replay"]  # that has no hand
     if settings.backend not in names:
         raise ParameterError(
@@ -52,18 +40,7 @@ def check_backend(settings: DeviceSettings) -> None:
 
 
 def device_limits(settings: DeviceSettings) -> DeviceLimits:
-    """Return the limits that a protocol sets.
-
-    Parameters
-    ----------
-    settings : DeviceSettings
-        The table ``[device]``.
-
-    Returns
-    -------
-    DeviceLimits
-        The same in SI units.
-    """
+    """Return the limits that a protocol sets."""
     return DeviceLimits(
         torque=settings.torque_limit_nm,
         torque_rate=settings.torque_rate_limit_nm_s,
@@ -86,20 +63,7 @@ def device_limits(settings: DeviceSettings) -> DeviceLimits:
 
 
 def model_controller(protocol: Protocol, model: str) -> Controller:
-    """Return a new controller of one model.
-
-    Parameters
-    ----------
-    protocol : Protocol
-        The models, the stretch and the device.
-    model : str
-        Id of the model.
-
-    Returns
-    -------
-    Controller
-        For one presentation.
-    """
+    """Return a new controller of one model."""
     settings = protocol.device
     return Controller(
         elbow_parameters(protocol, model),
@@ -117,42 +81,14 @@ def model_controller(protocol: Protocol, model: str) -> Controller:
 
 
 def has_simulated_hand(settings: DeviceSettings) -> bool:
-    """Return whether a simulated hand moves the arm.
-
-    Parameters
-    ----------
-    settings : DeviceSettings
-        The table ``[device]``.
-
-    Returns
-    -------
-    bool
-        True for the simulated device, and for a puck on python-can's "virtual" bus:
-        nobody but an emulated one can be there, the bus ends with this process.
-    """
+    """Return whether a simulated hand moves the arm."""
     return settings.backend == "simulated" or (
         settings.backend == "puck" and settings.puck_interface == "virtual"
     )
 
 
 def moves_hardware(settings: DeviceSettings) -> bool:
-    """Return whether a motor may move.
-
-    Parameters
-    ----------
-    settings : DeviceSettings
-        The table ``[device]``.
-
-    Returns
-    -------
-    bool
-        False for a simulated device, and for a puck on a bus without hardware.
-
-    Raises
-    ------
-    ParameterError
-        If an option of the backend is outside its range.
-    """
+    """Return whether a motor may move."""
     if settings.backend != "puck":
         return settings.backend != "simulated"
     return _puck_options(settings).moves_hardware
@@ -161,26 +97,7 @@ def moves_hardware(settings: DeviceSettings) -> bool:
 def backend_options(
     settings: DeviceSettings, hand: Hand | None = None
 ) -> BackendOptions | None:
-    """Return what a protocol tells the backend alone.
-
-    Parameters
-    ----------
-    settings : DeviceSettings
-        The table ``[device]``.
-    hand : Hand or None, optional
-        The simulated hand, where there is one: a puck is then emulated, with the gear,
-        direction and properties that the protocol says it has.
-
-    Returns
-    -------
-    BackendOptions or None
-        None for a backend that needs to be told nothing.
-
-    Raises
-    ------
-    ParameterError
-        If an option of the backend is outside its range.
-    """
+    """Return what a protocol tells the backend alone."""
     if settings.backend != "puck":
         return None
     options = _puck_options(settings)

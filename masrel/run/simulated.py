@@ -107,37 +107,7 @@ class SimulatedGrades:
 
 
 def severity(protocol: Protocol, model: Model) -> float:
-    """Place a model on the scale, from facts of the protocol alone.
-
-    Parameters
-    ----------
-    protocol : Protocol
-        The protocol.
-    model : Model
-        One of its models.
-
-    Returns
-    -------
-    float
-        Rank of the intended grade; without one, interpolated linearly in H (the
-        height of the catch) between the models with an intended grade, and at most
-        the last of them at either end. Models of the same H count with their mean.
-
-    Raises
-    ------
-    ProtocolError
-        If no model has an intended grade.
-
-    Examples
-    --------
-    >>> from masrel.protocol import copy_template, read_protocol
-    >>> import pathlib, tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     copy_template("hess2012", pathlib.Path(folder) / "study")
-    ...     protocol = read_protocol(pathlib.Path(folder) / "study" / "protocol.toml")
-    >>> severity(protocol, protocol.models[0])  # HM1, grade "1", second of the scale
-    1.0
-    """
+    """Place a model on the scale, from facts of the protocol alone."""
     scale = scale_of(protocol)
     if model.intended_grade is not None:
         return float(scale.code(model.intended_grade))
@@ -157,22 +127,7 @@ def severity(protocol: Protocol, model: Model) -> float:
 def intended_speed(
     protocol: Protocol, rater: str, session: str, model: str, repeat: int
 ) -> float:
-    """Return the mean speed a simulated hand means to stretch with.
-
-    Parameters
-    ----------
-    protocol : Protocol
-        The protocol; its ``[simulated_raters]`` has mean and standard deviation.
-    rater, session, model : str
-        Whose hand, when and on what.
-    repeat : int
-        Which presentation of the model in the session, from 1.
-
-    Returns
-    -------
-    float
-        deg/s: normal, cut off at 3 standard deviations and at a fifth of the mean.
-    """
+    """Return the mean speed a simulated hand means to stretch with."""
     settings = protocol.simulated_raters
     mean, sd = settings.mean_speed_deg_s, settings.speed_sd_deg_s
     share = _uniform(settings.seed, "speed", rater, session, model, repeat)

@@ -70,28 +70,7 @@ class SessionSummary:
 
 
 class Walk:
-    """One run of one session; what it does is on disk before it goes on.
-
-    Parameters
-    ----------
-    study : StudyPaths
-        Where the study is.
-    protocol : Protocol
-        The study's protocol.
-    schedule : Schedule
-        What is presented, in order.
-    grades : GradeSource
-        Who is asked.
-    clock : {"real", "simulated"}
-        The clock of the control loop.
-    log : SessionLog
-        The session's log, open.
-
-    Raises
-    ------
-    SessionLogError
-        If the events of the log do not make a session.
-    """
+    """One run of one session; what it does is on disk before it goes on."""
 
     def __init__(
         self,
@@ -118,18 +97,7 @@ class Walk:
         return self._grades.simulated or not moves_hardware(self._protocol.device)
 
     def begin(self, schedule_sha256: str) -> None:
-        """Log what this is; or, when the log says it, that it is still the same.
-
-        Parameters
-        ----------
-        schedule_sha256 : str
-            SHA-256 of the schedule's file.
-
-        Raises
-        ------
-        SessionLogError
-            If the log was begun with something else.
-        """
+        """Log what this is; or, when the log says it, that it is still the same."""
         protocol, schedule = self._protocol, self._schedule
         same: dict[str, Fact] = {
             "format": _FORMAT,
@@ -165,27 +133,7 @@ class Walk:
     def to_the_end(
         self, progress: Callable[[Presentation], object] | None
     ) -> SessionSummary:
-        """Present and ask until every presentation has its grade.
-
-        Parameters
-        ----------
-        progress : callable or None
-            Called with each presentation that has its grade.
-
-        Returns
-        -------
-        SessionSummary
-            What came of it.
-
-        Raises
-        ------
-        DeviceError
-            If the device cannot be used, or a fault is not to be tried again.
-        ParameterError
-            If the source gives a grade that is not of the scale.
-        SessionStoppedError
-            If the person stops.
-        """
+        """Present and ask until every presentation has its grade."""
         schedule = self._schedule
         for shown in schedule.presentations:
             if shown.code not in self._state.given:

@@ -30,18 +30,7 @@ CODE = re.compile(r"[0-9A-Za-z]{1,16}")
 
 
 def schedule_text(schedule: Schedule) -> str:
-    """Write a schedule as the text of its file.
-
-    Parameters
-    ----------
-    schedule : Schedule
-        A schedule.
-
-    Returns
-    -------
-    str
-        ``# key: value`` lines, then CSV with a line of column names.
-    """
+    """Write a schedule as the text of its file."""
     head = [f"# {key}: {getattr(schedule, key)}" for key in HEAD]
     rows = [
         f"{shown.position},{shown.code},{shown.model},{shown.repeat}"
@@ -51,19 +40,7 @@ def schedule_text(schedule: Schedule) -> str:
 
 
 def sheet_text(schedule: Schedule) -> str:
-    """Write the blinded sheet on which a rater's grades are noted.
-
-    Parameters
-    ----------
-    schedule : Schedule
-        A schedule.
-
-    Returns
-    -------
-    str
-        CSV of positions and codes with empty grades; neither the models nor the
-        seed from which they could be drawn.
-    """
+    """Write the blinded sheet on which a rater's grades are noted."""
     rows = [f"{shown.position},{shown.code}," for shown in schedule.presentations]
     return "\n".join([",".join(SHEET_COLUMNS), *rows]) + "\n"
 

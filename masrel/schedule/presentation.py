@@ -117,21 +117,7 @@ def check_schedule(schedule: Schedule, protocol: Protocol) -> None:
 
 
 def require_place(protocol: Protocol, rater: str, session: str) -> None:
-    """Refuse a rater and session the protocol does not bring together.
-
-    Parameters
-    ----------
-    protocol : Protocol
-        The study's protocol.
-    rater, session : str
-        Their ids.
-
-    Raises
-    ------
-    ScheduleError
-        If there is no such session, or it has no such rater; the message names
-        those there are.
-    """
+    """Refuse a rater and session the protocol does not bring together."""
     raters = {each.id: each.raters for each in protocol.sessions}
     if session not in raters:
         raise ScheduleError(

@@ -20,24 +20,11 @@ WORD = 2**64
 
 
 class Stream:
-    """Random words for one purpose, whatever else is drawn from the same seed.
+    """Random words for one purpose, whatever else is drawn from the same seed."""
 
-    The SHA-256 of the JSON array ``["masrel", seed, *purpose]`` (UTF-8, no spaces,
-    non-ASCII escaped) is the whole state of the generator: its first 16 bytes, big
-    endian, are PCG64's state, the other 16 its increment, made odd.
-
-    Parameters
-    ----------
-    seed : int
-        Root seed of the study.
-    *purpose : str
-        What the stream is for.
-
-    Examples
-    --------
-    >>> Stream(1, "order").word() == Stream(1, "order").word()
-    True
-    """
+    # The SHA-256 of the JSON array ``["masrel", seed, *purpose]`` (UTF-8, no spaces,
+    # non-ASCII escaped) is the whole state of the generator: its first 16 bytes, big
+    # endian, are PCG64's state, the other 16 its increment, made odd.
 
     def __init__(self, seed: int, *purpose: str) -> None:
         name = json.dumps(["masrel", seed, *purpose], separators=(",", ":"))
@@ -58,22 +45,18 @@ class Stream:
         return int(self._generator.random_raw())
 
     def below(self, limit: int) -> int:
-        """Return a number uniform on 0 to `limit` - 1; `limit` from 1 to 2**64.
-
-        Words at and above the last multiple of `limit` are rejected, so that every
-        number has exactly the same chance.
-        """
+        """Return a number uniform on 0 to `limit` - 1; `limit` from 1 to 2**64."""
+        # Words at and above the last multiple of `limit` are rejected, so that every
+        # number has exactly the same chance.
         usable = WORD - WORD % limit
         while (word := self.word()) >= usable:
             pass
         return word % limit
 
     def shuffle(self, items: MutableSequence[T]) -> None:
-        """Put `items` into a random order in place, each order equally likely.
-
-        Fisher and Yates, from the last place down: place i takes the item of a
-        place drawn from 0 to i.
-        """
+        """Put `items` into a random order in place, each order equally likely."""
+        # Fisher and Yates, from the last place down: place i takes the item of a place
+        # drawn from 0 to i.
         for i in range(len(items) - 1, 0, -1):
             j = self.below(i + 1)
             items[i], items[j] = items[j], items[i]

@@ -12,53 +12,12 @@ _ERROR_FRAMES = 10  # on a bus of one joint there should be none
 
 
 def accepted_identifiers(puck: int) -> tuple[int, int]:
-    """Return the only identifiers that a driver of one puck listens to.
-
-    Parameters
-    ----------
-    puck : int
-        Node of the puck.
-
-    Returns
-    -------
-    tuple of int
-        Its positions and its other answers. The safety module's broadcasts, other
-        pucks and what other hosts ask are not among them.
-
-    Raises
-    ------
-    FrameError
-        If there is no such node.
-
-    Examples
-    --------
-    >>> [hex(identifier) for identifier in accepted_identifiers(1)]
-    ['0x423', '0x426']
-    """
+    """Return the only identifiers that a driver of one puck listens to."""
     return from_puck(puck, POSITION_GROUP), from_puck(puck, PROPERTY_GROUP)
 
 
 class Arrivals:
-    """Positions, answers, errors and frames of others, for the driver of one puck.
-
-    Parameters
-    ----------
-    puck : int
-        Node of the puck, 1 to 31.
-
-    Attributes
-    ----------
-    heard : dict of int to int
-        Answers that have come, the last by property number.
-    n_foreign, n_late, n_errors : int
-        Frames that were not for this driver, positions that came when nobody
-        waited for one any more, and error frames.
-
-    Raises
-    ------
-    FrameError
-        If there is no such node.
-    """
+    """Positions, answers, errors and frames of others, for the driver of one puck."""
 
     __slots__ = (
         "_positions",
@@ -79,25 +38,7 @@ class Arrivals:
         self.n_errors = 0
 
     def sort(self, frame: Frame) -> Position | None:
-        """Put a frame where it belongs.
-
-        Parameters
-        ----------
-        frame : Frame
-            What came.
-
-        Returns
-        -------
-        Position or None
-            The position, if it is one.
-
-        Raises
-        ------
-        BusError
-            If the bus is off, or has reported more than ten errors.
-        FrameError
-            If an answer of this puck is none.
-        """
+        """Put a frame where it belongs."""
         if frame.is_error:
             self._note_error(frame.identifier)
         elif frame.identifier == self._positions:

@@ -16,46 +16,13 @@ _channels = itertools.count(1)
 
 
 def emulated_options(hand: Hand) -> PuckOptions:
-    """Return options for an emulated puck on a bus of its own.
-
-    Parameters
-    ----------
-    hand : Hand
-        What moves the simulated arm; it says where the arm is when the puck wakes.
-
-    Returns
-    -------
-    PuckOptions
-        For `open_device`.
-    """
+    """Return options for an emulated puck on a bus of its own."""
     channel = f"masrel-{next(_channels)}"
     return PuckOptions(interface="virtual", channel=channel).emulated(hand.start)
 
 
 def build(setup: DeviceSetup) -> PuckDevice:
-    """Make the device of a puck: emulated when there is a hand, else on a real bus.
-
-    Parameters
-    ----------
-    setup : DeviceSetup
-        With a hand the puck is emulated, and there may be no options; without one
-        the options say where it is.
-
-    Returns
-    -------
-    PuckDevice
-        Not yet open.
-
-    Raises
-    ------
-    DeviceError
-        If options are missing, another backend's, or contradict the hand, or the
-        clock is simulated and the bus is not.
-    ParameterError
-        If the end of range does not fit the hand.
-    BusError
-        If the bus of an emulated puck cannot be opened.
-    """
+    """Make the device of a puck: emulated when there is a hand, else on a real bus."""
     options, hand = setup.options, setup.hand
     if options is None:
         if hand is None:

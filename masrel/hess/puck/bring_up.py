@@ -31,20 +31,8 @@ _SETTING_TIME_S = 0.001  # a setting takes 0.11 ms on the bus
 
 
 def wake(node: PuckNode) -> None:
-    """Wake a puck and wait, in silence, until it is back on the bus.
-
-    Talking to a puck that has left the bus may throw the host off it, too.
-
-    Parameters
-    ----------
-    node : PuckNode
-        A puck that is asleep.
-
-    Raises
-    ------
-    DeviceError
-        If it is not ready afterwards.
-    """
+    """Wake a puck and wait, in silence, until it is back on the bus."""
+    # Talking to a puck that has left the bus may throw the host off it, too.
     node.tell(STATUS, READY)
     node.wait(_OFF_BUS_S)
     status = node.ask(STATUS)
@@ -57,27 +45,7 @@ def wake(node: PuckNode) -> None:
 def configure(
     node: PuckNode, table: PropertyTable, options: PuckOptions
 ) -> Transmission:
-    """Idle a puck, set its groups and its torque limit, read what it counts in.
-
-    Parameters
-    ----------
-    node : PuckNode
-        A puck that is awake.
-    table : PropertyTable
-        Numbers of its properties.
-    options : PuckOptions
-        Groups follow from the node, the limit is `largest_torque`.
-
-    Returns
-    -------
-    Transmission
-        From CTS and IPNM as it reports them.
-
-    Raises
-    ------
-    DeviceError
-        If a setting does not read back, or what it reports makes no sense.
-    """
+    """Idle a puck, set its groups and its torque limit, read what it counts in."""
     # It may still hold the torque of a driver that was killed.
     _set(node, table, "T", 0)
     _set(node, table, "MODE", IDLE)
@@ -109,31 +77,7 @@ def configure(
 def set_position(
     node: PuckNode, table: PropertyTable, transmission: Transmission, angle: float
 ) -> int:
-    """Tell an idle puck where the arm is.
-
-    Parameters
-    ----------
-    node : PuckNode
-        The puck; idle, because its position jumps.
-    table : PropertyTable
-        Numbers of its properties.
-    transmission : Transmission
-        What it counts in.
-    angle : float
-        Where the arm is held, rad; 0 to pi.
-
-    Returns
-    -------
-    int
-        The count it reports afterwards.
-
-    Raises
-    ------
-    ParameterError
-        If no arm can be there.
-    DeviceError
-        If it is not idle, or its position does not read back.
-    """
+    """Tell an idle puck where the arm is."""
     if not 0.0 <= angle <= math.pi:
         raise ParameterError(f"angle: needs 0 to 180 degrees, got {angle} rad")
     mode = node.ask(table.number("MODE"))
@@ -154,20 +98,7 @@ def set_position(
 
 
 def activate(node: PuckNode, table: PropertyTable) -> None:
-    """Put a puck into torque mode, with zero torque.
-
-    Parameters
-    ----------
-    node : PuckNode
-        The puck.
-    table : PropertyTable
-        Numbers of its properties.
-
-    Raises
-    ------
-    DeviceError
-        If it does not go: on a whole arm its safety module decides.
-    """
+    """Put a puck into torque mode, with zero torque."""
     _set(node, table, "T", 0)
     node.tell(table.settable("MODE"), TORQUE)
     mode = node.ask(table.number("MODE"))
@@ -179,20 +110,7 @@ def activate(node: PuckNode, table: PropertyTable) -> None:
 
 
 def check_torque(node: PuckNode, table: PropertyTable) -> None:
-    """See whether a puck says what torque it was told, with one current unit.
-
-    Parameters
-    ----------
-    node : PuckNode
-        A puck in torque mode.
-    table : PropertyTable
-        Numbers of its properties.
-
-    Raises
-    ------
-    DeviceError
-        If it does not: then lost torques could not be noticed.
-    """
+    """See whether a puck says what torque it was told, with one current unit."""
     node.tell(table.settable("T"), 1)  # 0.007 N·m, less than friction holds
     found = node.ask(table.number("T"))
     _set(node, table, "T", 0)

@@ -49,21 +49,11 @@ _FILTERS_IN_KERNEL = frozenset({"socketcan"})
 
 
 class Frame(NamedTuple):
-    """One frame of the bus.
+    """One frame of the bus."""
 
-    Attributes
-    ----------
-    identifier : int
-        Identifier of 11 bits; for an error frame the class of error.
-    data : bytes
-        Up to eight bytes.
-    is_error : bool
-        Whether the controller reports an error with it.
-    """
-
-    identifier: int
-    data: bytes
-    is_error: bool = False
+    identifier: int  # identifier of 11 bits; for an error frame the class of error
+    data: bytes  # up to eight bytes
+    is_error: bool = False  # whether the controller reports an error with it
 
 
 class Neighbour(Protocol):
@@ -79,18 +69,7 @@ class Neighbour(Protocol):
 
 
 class Link:
-    """One end of a bus; a context manager that leaves it.
-
-    Parameters
-    ----------
-    bus : can.BusABC
-        An open bus.
-    clock : Clock
-        The clock of deadlines.
-    neighbour : Neighbour or None, optional
-        An emulator that lives in the same thread and is served whenever this end
-        sends or waits; so a bus works on a simulated clock, too.
-    """
+    """One end of a bus; a context manager that leaves it."""
 
     __slots__ = ("_bus", "_clock", "_neighbour")
 
@@ -117,23 +96,7 @@ class Link:
                 raise
 
     def send(self, frame: Frame) -> int:
-        """Send a frame.
-
-        Parameters
-        ----------
-        frame : Frame
-            What to send.
-
-        Returns
-        -------
-        int
-            When it was handed to the bus, ns.
-
-        Raises
-        ------
-        BusError
-            If the bus does not take it.
-        """
+        """Send a frame."""
         message = can.Message(
             arbitration_id=frame.identifier,
             data=frame.data,
@@ -150,23 +113,7 @@ class Link:
         return now_ns
 
     def receive(self, deadline_ns: int) -> Frame | None:
-        """Wait for a frame.
-
-        Parameters
-        ----------
-        deadline_ns : int
-            When to give up, ns; a time that has passed takes what is there already.
-
-        Returns
-        -------
-        Frame or None
-            The oldest that has not been received; None when none came.
-
-        Raises
-        ------
-        BusError
-            If the bus cannot be read.
-        """
+        """Wait for a frame."""
         if self._neighbour is None:
             left_ns = deadline_ns - self._clock.now_ns()
             return self._received(max(0.0, left_ns * 1e-9))
@@ -183,13 +130,7 @@ class Link:
             self._clock.sleep_until_ns(due_ns)
 
     def close(self) -> None:
-        """Leave the bus; doing it twice does nothing more.
-
-        Raises
-        ------
-        BusError
-            If the adapter does not let go.
-        """
+        """Leave the bus; doing it twice does nothing more."""
         try:
             self._bus.shutdown()
         except (can.CanError, OSError) as error:
@@ -218,33 +159,7 @@ def open_link(
     accepted: tuple[int, ...] | None = None,
     neighbour: Neighbour | None = None,
 ) -> Link:
-    """Open one end of a bus.
-
-    Parameters
-    ----------
-    interface : str
-        Name of a python-can interface, such as "socketcan" or "virtual".
-    channel : str
-        Its channel, such as "can0"; for "udp_multicast" a group, or an IPv4 group, a
-        colon and a port.
-    clock : Clock
-        The clock of deadlines.
-    accepted : tuple of int or None, optional
-        Identifiers to receive, None for all; a filter where the kernel has one.
-        Elsewhere whoever receives looks for himself, and error frames come through.
-    neighbour : Neighbour or None, optional
-        An emulator in the same thread.
-
-    Returns
-    -------
-    Link
-        Open; close it.
-
-    Raises
-    ------
-    BusError
-        If the bus cannot be opened.
-    """
+    """Open one end of a bus."""
     filters: list[can.typechecking.CanFilter] | None = None
     if accepted is not None and interface in _FILTERS_IN_KERNEL:
         filters = [

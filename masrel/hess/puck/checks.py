@@ -25,46 +25,17 @@ _SHARE_IN_TIME = 0.99
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Check:
-    """One thing that was looked at.
+    """One thing that was looked at."""
 
-    Attributes
-    ----------
-    name : str
-        What.
-    holds : bool
-        Whether it is as it must be.
-    found : str
-        What was found.
-    """
-
-    name: str
-    holds: bool
-    found: str
+    name: str  # what
+    holds: bool  # whether it is as it must be
+    found: str  # what was found
 
 
 def check(puck: Awake, options: PuckOptions) -> tuple[Check, ...]:
-    """Look at a puck that has been woken and configured.
-
-    The arm must be at rest. It is put into torque mode with zero torque, and with one
-    current unit (0.007 N·m) for a millisecond, and idled again.
-
-    Parameters
-    ----------
-    puck : Awake
-        The puck.
-    options : PuckOptions
-        What it was configured with.
-
-    Returns
-    -------
-    tuple of Check
-        What was looked at.
-
-    Raises
-    ------
-    DeviceError
-        If the bus fails, or the puck cannot be idled again.
-    """
+    """Look at a puck that has been woken and configured."""
+    # The arm must be at rest. It is put into torque mode with zero torque, and with one
+    # current unit (0.007 N·m) for a millisecond, and idled again.
     node, table, transmission = puck.node, puck.table, puck.transmission
     counts, took_s, n_lost = _requests(node, table, options.patience_s)
     units = f"CTS {transmission.counts_per_turn}, IPNM {transmission.units_per_nm}"

@@ -22,23 +22,12 @@ __all__ = ["Awake", "awake", "connected"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Awake:
-    """A puck that is awake, idle and configured.
+    """A puck that is awake, idle and configured."""
 
-    Attributes
-    ----------
-    node : PuckNode
-        The puck.
-    table : PropertyTable
-        Numbers of its properties.
-    transmission : Transmission
-        What it counts in.
-    was_asleep : bool
-        Whether it was woken just now, and so does not know where the arm is.
-    """
-
-    node: PuckNode
-    table: PropertyTable
-    transmission: Transmission
+    node: PuckNode  # the puck
+    table: PropertyTable  # numbers of its properties
+    transmission: Transmission  # what it counts in
+    # whether it was woken just now, and so does not know where the arm is
     was_asleep: bool
 
 
@@ -51,31 +40,7 @@ def connected(
     range_end: float,
     hears_all: bool = False,
 ) -> Iterator[Link]:
-    """Join a bus for a while, with an emulated puck on it where there is a hand.
-
-    Parameters
-    ----------
-    options : PuckOptions
-        Which bus.
-    clock : Clock
-        The clock of deadlines.
-    hand : Hand or None, optional
-        What moves the arm of an emulated puck.
-    range_end : float
-        Where that arm meets its end stop, rad.
-    hears_all : bool, optional
-        Whether to listen to all pucks rather than to one.
-
-    Yields
-    ------
-    Link
-        This end of the bus.
-
-    Raises
-    ------
-    DeviceError
-        If the bus cannot be opened, or left without an error before that.
-    """
+    """Join a bus for a while, with an emulated puck on it where there is a hand."""
     with ExitStack() as held:
         emulator = None
         if hand is not None:
@@ -101,27 +66,7 @@ def connected(
 
 
 def awake(link: Link, clock: Clock, options: PuckOptions) -> Awake:
-    """Wake a puck if it sleeps, idle it, and set what the driver needs set.
-
-    Parameters
-    ----------
-    link : Link
-        The bus.
-    clock : Clock
-        Its clock.
-    options : PuckOptions
-        Which puck.
-
-    Returns
-    -------
-    Awake
-        The puck, idle.
-
-    Raises
-    ------
-    DeviceError
-        If it does not answer, is not supported, or does not take a setting.
-    """
+    """Wake a puck if it sleeps, idle it, and set what the driver needs set."""
     node = PuckNode(link, clock, options.puck)
     identity = identify(node)
     table = table_of(identity, options.properties)

@@ -26,27 +26,12 @@ _IDLING_MODULE = "masrel.hess.puck.idling"
 
 
 class PuckDevice(Device):
-    """A motor puck on a CAN bus, in torque mode while the device is open.
+    """A motor puck on a CAN bus, in torque mode while the device is open."""
 
-    The torque is set by a frame to this puck alone, not by the packed frame that sets
-    four: that one would set the torques of its neighbours, and which of the four a
-    puck obeys hangs on two more of its properties. No setting is acknowledged: `Polls`
-    ask now and then whether it obeys.
-
-    Parameters
-    ----------
-    options : PuckOptions
-        Where the puck is and how to treat it.
-    clock : Clock
-        The clock of the loop.
-
-    Attributes
-    ----------
-    transmission : Transmission
-        What it counts in, once it is open.
-    identity : Identity
-        What it said of itself, once it is open.
-    """
+    # The torque is set by a frame to this puck alone, not by the packed frame that sets
+    # four: that one would set the torques of its neighbours, and which of the four a
+    # puck obeys hangs on two more of its properties. No setting is acknowledged:
+    # `Polls` ask now and then whether it obeys.
 
     name: ClassVar[str] = "puck"
     simulated: ClassVar[bool] = False
@@ -168,14 +153,7 @@ class PuckDevice(Device):
         )
 
     def idle_command(self) -> IdleCommand | None:
-        """Return how another process can idle the puck, once it is open.
-
-        Returns
-        -------
-        IdleCommand or None
-            None where two processes cannot share a bus: python-can's "virtual" is
-            inside this one, and most makers' adapters belong to whoever opened them.
-        """
+        """Return how another process can idle the puck, once it is open."""
         options = self._options
         if options.interface not in _SHARED_INTERFACES:
             return None

@@ -10,19 +10,7 @@ Act = Callable[[int], None]
 
 
 class DueActs:
-    """Acts that wait for their time; those of one time keep their order.
-
-    Examples
-    --------
-    >>> due = DueActs()
-    >>> due.at(20, lambda time_ns: print("second,", time_ns))
-    >>> due.at(10, lambda time_ns: print("first,", time_ns))
-    >>> due.next_ns()
-    10
-    >>> due.act(30)
-    first, 10
-    second, 20
-    """
+    """Acts that wait for their time; those of one time keep their order."""
 
     __slots__ = ("_acts", "_n_added")
 
@@ -31,36 +19,16 @@ class DueActs:
         self._n_added = 0
 
     def at(self, due_ns: int, act: Act) -> None:
-        """Add an act.
-
-        Parameters
-        ----------
-        due_ns : int
-            When it is due, ns.
-        act : callable
-            What is to be done then.
-        """
+        """Add an act."""
         self._n_added += 1  # what is due at the same time keeps its order
         heapq.heappush(self._acts, (due_ns, self._n_added, act))
 
     def next_ns(self) -> int | None:
-        """Return when the next act is due.
-
-        Returns
-        -------
-        int or None
-            Time, ns; None when there is none.
-        """
+        """Return when the next act is due."""
         return self._acts[0][0] if self._acts else None
 
     def act(self, now_ns: int) -> None:
-        """Do what is due by now, and what that makes due by now.
-
-        Parameters
-        ----------
-        now_ns : int
-            The time, ns.
-        """
+        """Do what is due by now, and what that makes due by now."""
         while self._acts and self._acts[0][0] <= now_ns:
             due_ns, _, act = heapq.heappop(self._acts)
             act(due_ns)

@@ -20,24 +20,7 @@ class UnwiredPuckDevice(PuckDevice):
 
 
 class EmulatedPuckDevice(PuckDevice):
-    """A puck that is emulated, on a bus inside this process.
-
-    Parameters
-    ----------
-    options : PuckOptions
-        With those of its emulator.
-    clock : Clock
-        The clock of the loop; it may be simulated.
-    hand : Hand
-        What moves the simulated arm.
-    range_end : float
-        Where the arm meets its end stop, rad.
-
-    Attributes
-    ----------
-    emulator : PuckEmulator
-        The other end of the bus, once it is open.
-    """
+    """A puck that is emulated, on a bus inside this process."""
 
     simulated: ClassVar[bool] = True
 

@@ -18,46 +18,15 @@ _REMEMBERED = 10_000
 
 
 class Setting(NamedTuple):
-    """What an emulated puck was told.
+    """What an emulated puck was told."""
 
-    Attributes
-    ----------
-    time_ns : int
-        When it took effect.
-    name : str
-        The property, or its number where the table has no name for it.
-    value : int
-        Its new value.
-    """
-
-    time_ns: int
-    name: str
-    value: int
+    time_ns: int  # when it took effect
+    name: str  # the property, or its number where the table has no name for it
+    value: int  # its new value
 
 
 class EmulatedSettings:
-    """Takes settings, switches the motor, and lets the faults of a puck happen.
-
-    Parameters
-    ----------
-    options : EmulatorOptions
-        What the puck is like.
-    registers : Registers
-        Its properties.
-    motor : EmulatedMotor
-        Arm and motor.
-    faults : ActiveFaults
-        What fails, from the moment the motor is first driven.
-    voice : EmulatedVoice
-        Reports the bus off.
-    due : DueActs
-        What waits for its time.
-
-    Attributes
-    ----------
-    told : deque of Setting
-        What it was told, by others too, the last 10 000.
-    """
+    """Takes settings, switches the motor, and lets the faults of a puck happen."""
 
     __slots__ = (
         "_due",
@@ -88,17 +57,7 @@ class EmulatedSettings:
         self.told: deque[Setting] = deque(maxlen=_REMEMBERED)
 
     def set(self, number: int, value: int, now_ns: int) -> None:
-        """Set a property.
-
-        Parameters
-        ----------
-        number : int
-            Number of the property.
-        value : int
-            Its new value.
-        now_ns : int
-            When it takes effect, ns.
-        """
+        """Set a property."""
         registers = self._registers
         name = registers.name(number)
         if name == "T" and self._faults.hit("dropped-torques", now_ns):
@@ -115,15 +74,7 @@ class EmulatedSettings:
             self._due.at(now_ns + wake_ns, lambda _due: registers.wake())
 
     def drive(self, units: int, now_ns: int) -> None:
-        """Take a torque, as the packed frame for four pucks sets it too.
-
-        Parameters
-        ----------
-        units : int
-            Current units.
-        now_ns : int
-            When it takes effect, ns.
-        """
+        """Take a torque, as the packed frame for four pucks sets it too."""
         registers = self._registers
         registers.torque = max(-registers.highest, min(registers.highest, units))
         if registers.mode == TORQUE:

@@ -30,37 +30,7 @@ _NAP_NS = 10_000_000  # of an emulator with a thread of its own
 
 
 class PuckEmulator:
-    """A puck, served by whoever shares its thread, or by a thread of its own.
-
-    Parameters
-    ----------
-    link : Link
-        Its end of the bus.
-    clock : Clock
-        The clock of the host.
-    hand : Hand
-        What moves the arm; its time begins when the puck first drives the motor.
-    range_end : float
-        Where the arm meets its end stop, rad.
-    options : EmulatorOptions
-        What it is like.
-    puck : int, optional
-        Its node.
-
-    Attributes
-    ----------
-    registers : Registers
-        Its properties.
-    motor : EmulatedMotor
-        Arm and motor.
-    faults : ActiveFaults
-        What fails.
-    settings : deque of Setting
-        What it was told, by others too, the last 10 000.
-    n_disturbances : int
-        Frames that came while it was off the bus to wake: a real host may be thrown
-        off the bus by one.
-    """
+    """A puck, served by whoever shares its thread, or by a thread of its own."""
 
     def __init__(
         self,
@@ -102,13 +72,7 @@ class PuckEmulator:
         self.n_disturbances = 0
 
     def next_due_ns(self) -> int | None:
-        """Return when it will act next.
-
-        Returns
-        -------
-        int or None
-            Time, ns; None when it waits for a frame.
-        """
+        """Return when it will act next."""
         return self._due.next_ns()
 
     def serve(self) -> None:
@@ -119,13 +83,7 @@ class PuckEmulator:
         self._act(self._clock.now_ns())
 
     def run(self, stop: threading.Event) -> None:
-        """Serve until told to stop; for a thread or process of its own.
-
-        Parameters
-        ----------
-        stop : threading.Event
-            Ends it within 10 ms.
-        """
+        """Serve until told to stop; for a thread or process of its own."""
         while not stop.is_set():
             nap_ns = self._clock.now_ns() + _NAP_NS
             due_ns = self.next_due_ns()

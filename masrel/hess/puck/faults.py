@@ -78,18 +78,7 @@ class InjectedFault:
 
 
 class ActiveFaults:
-    """The faults of one emulated puck, on its time.
-
-    Parameters
-    ----------
-    faults : tuple of InjectedFault
-        What fails, and when.
-
-    Attributes
-    ----------
-    started_ns : int or None
-        When their time began, ns; None while it has not.
-    """
+    """The faults of one emulated puck, on its time."""
 
     __slots__ = ("_faults", "_n_hit", "started_ns")
 
@@ -99,38 +88,14 @@ class ActiveFaults:
         self._n_hit: dict[FaultKind, int] = {}
 
     def start(self, now_ns: int) -> bool:
-        """Let their time begin.
-
-        Parameters
-        ----------
-        now_ns : int
-            The time, ns.
-
-        Returns
-        -------
-        bool
-            Whether it had not begun before.
-        """
+        """Let their time begin."""
         if self.started_ns is not None:
             return False
         self.started_ns = now_ns
         return True
 
     def active(self, kind: FaultKind, now_ns: int) -> InjectedFault | None:
-        """Return the fault of a kind that is on.
-
-        Parameters
-        ----------
-        kind : str
-            The kind.
-        now_ns : int
-            The time, ns.
-
-        Returns
-        -------
-        InjectedFault or None
-            The first that is on; None when none is.
-        """
+        """Return the fault of a kind that is on."""
         if self.started_ns is None or not self._faults:
             return None
         since_s = (now_ns - self.started_ns) * 1e-9
@@ -140,20 +105,7 @@ class ActiveFaults:
         return None
 
     def hit(self, kind: FaultKind, now_ns: int) -> InjectedFault | None:
-        """Count a frame, and return the fault that affects it.
-
-        Parameters
-        ----------
-        kind : str
-            The kind.
-        now_ns : int
-            The time, ns.
-
-        Returns
-        -------
-        InjectedFault or None
-            The fault; None when none is on, or it spares this frame.
-        """
+        """Count a frame, and return the fault that affects it."""
         fault = self.active(kind, now_ns)
         if fault is None:
             return None
@@ -161,19 +113,6 @@ class ActiveFaults:
         return fault if (n_hit - 1) % fault.every == 0 else None
 
     def amount(self, kind: FaultKind, now_ns: int) -> float:
-        """Count a frame, and return how much of a fault affects it.
-
-        Parameters
-        ----------
-        kind : str
-            The kind.
-        now_ns : int
-            The time, ns.
-
-        Returns
-        -------
-        float
-            How late, s, or how far, counts; 0 when none affects it.
-        """
+        """Count a frame, and return how much of a fault affects it."""
         fault = self.hit(kind, now_ns)
         return 0.0 if fault is None else fault.amount

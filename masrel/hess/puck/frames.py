@@ -16,53 +16,14 @@ PROPERTY_MASK = 0x7F
 
 
 def checked_property(property_id: int) -> int:
-    """Return the number of a property if there can be one.
-
-    Parameters
-    ----------
-    property_id : int
-        Number of the property.
-
-    Returns
-    -------
-    int
-        The same.
-
-    Raises
-    ------
-    FrameError
-        If it is not from 0 to 127.
-    """
+    """Return the number of a property if there can be one."""
     if not 0 <= property_id <= PROPERTY_MASK:
         raise FrameError(f"property: needs 0 to {PROPERTY_MASK}, got {property_id}")
     return property_id
 
 
 def little_endian(value: int, n_bytes: int) -> bytes:
-    """Return a value with its lowest byte first.
-
-    Parameters
-    ----------
-    value : int
-        Signed.
-    n_bytes : int
-        How many bytes it takes.
-
-    Returns
-    -------
-    bytes
-        Two's complement.
-
-    Raises
-    ------
-    FrameError
-        If it does not fit.
-
-    Examples
-    --------
-    >>> little_endian(-2, 4).hex(" ")
-    'fe ff ff ff'
-    """
+    """Return a value with its lowest byte first."""
     try:
         return value.to_bytes(n_bytes, "little", signed=True)
     except OverflowError as error:

@@ -12,78 +12,33 @@ __all__ = ["FrictionEstimate", "SteadyRun", "fit_friction"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SteadyRun:
-    """One turn of the arm at a steady speed.
+    """One turn of the arm at a steady speed."""
 
-    Attributes
-    ----------
-    speed : float
-        Mean speed of the steady part, rad/s; negative in flexion.
-    torque : float
-        Mean torque of the motor in it, N·m, positive in extension.
-    """
-
-    speed: float
-    torque: float
+    speed: float  # mean speed of the steady part, rad/s; negative in flexion
+    torque: float  # mean torque of the motor in it, N·m, positive in extension
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrictionEstimate:
-    """Friction of (7), fitted to steady runs.
+    """Friction of (7), fitted to steady runs."""
 
-    Attributes
-    ----------
-    viscous, viscous_error : float
-        B and its standard error, N·m·s/rad.
-    coulomb, coulomb_error : float
-        β and its standard error, N·m.
-    offset, offset_error : float
-        Torque that acts one way whatever the motion, N·m: gravity of an arm that is
-        not level, or a current sensor that is off.
-    runs : tuple of SteadyRun
-        What it was fitted to.
-    """
-
+    # viscous, viscous_error: B and its standard error, N·m·s/rad
     viscous: float
     viscous_error: float
+    # coulomb, coulomb_error: β and its standard error, N·m
     coulomb: float
     coulomb_error: float
+    # offset, offset_error: torque that acts one way whatever the motion, N·m: gravity
+    # of an arm that is not level, or a current sensor that is off
     offset: float
     offset_error: float
-    runs: tuple[SteadyRun, ...]
+    runs: tuple[SteadyRun, ...]  # what it was fitted to
 
 
 def fit_friction(runs: Sequence[SteadyRun]) -> FrictionEstimate:
-    """Fit B and β of (7) to steady runs by least squares.
-
-    Parameters
-    ----------
-    runs : sequence of SteadyRun
-        At two speeds or more, in both directions.
-
-    Returns
-    -------
-    FrictionEstimate
-        B, β and an offset, with standard errors from what the fit leaves.
-
-    Raises
-    ------
-    ParameterError
-        If there are fewer than four runs, or they cannot tell the three apart.
-
-    References
-    ----------
-    .. [1] Park, H.-S., Kim, J., Damiano, D. L. (2012). IEEE TNSRE 20(3), 361-370,
-       equation (7). https://doi.org/10.1109/TNSRE.2012.2195330
-
-    Examples
-    --------
-    >>> import math
-    >>> runs = [SteadyRun(speed=v, torque=0.2 * v + math.copysign(0.1, v))
-    ...         for v in (-2.0, -1.0, 1.0, 2.0)]
-    >>> found = fit_friction(runs)
-    >>> round(found.viscous, 6), round(found.coulomb, 6)
-    (0.2, 0.1)
-    """
+    """Fit B and β of (7) to steady runs by least squares."""
+    # [1] Park, H.-S., Kim, J., Damiano, D. L. (2012). IEEE TNSRE 20(3), 361-370,
+    # equation (7). https://doi.org/10.1109/TNSRE.2012.2195330
     speeds = np.array([run.speed for run in runs])
     torques = np.array([run.torque for run in runs])
     # (7) at a steady speed: τ = B θ̇ + β sgn(θ̇), and what acts one way

@@ -36,129 +36,33 @@ _HIGHEST_IDENTIFIER = 0x7FF
 
 
 class Address(NamedTuple):
-    """What an identifier says.
+    """What an identifier says."""
 
-    Attributes
-    ----------
-    sender : int
-        Node that sent the frame, 0 to 31.
-    receiver : int
-        Node or group it is for, 0 to 31.
-    is_group : bool
-        Whether the receiver is a group.
-    """
-
-    sender: int
-    receiver: int
-    is_group: bool
+    sender: int  # node that sent the frame, 0 to 31
+    receiver: int  # node or group it is for, 0 to 31
+    is_group: bool  # whether the receiver is a group
 
 
 def to_puck(puck: int) -> int:
-    """Return the identifier of a frame from the host to one puck.
-
-    Parameters
-    ----------
-    puck : int
-        Node of the puck, 1 to 31.
-
-    Returns
-    -------
-    int
-        Identifier.
-
-    Raises
-    ------
-    FrameError
-        If there is no such node.
-
-    Examples
-    --------
-    >>> hex(to_puck(1))
-    '0x1'
-    """
+    """Return the identifier of a frame from the host to one puck."""
     _check_node("puck", puck, lowest=1)
     return puck
 
 
 def to_group(group: int) -> int:
-    """Return the identifier of a frame from the host to a group.
-
-    Parameters
-    ----------
-    group : int
-        Group, 0 to 31.
-
-    Returns
-    -------
-    int
-        Identifier.
-
-    Raises
-    ------
-    FrameError
-        If there is no such group.
-
-    Examples
-    --------
-    >>> hex(to_group(TORQUE_GROUP))
-    '0x401'
-    """
+    """Return the identifier of a frame from the host to a group."""
     _check_node("group", group, lowest=0)
     return _GROUP_FLAG | group
 
 
 def from_puck(puck: int, group: int) -> int:
-    """Return the identifier of a frame from a puck to a group.
-
-    Parameters
-    ----------
-    puck : int
-        Node of the puck, 1 to 31.
-    group : int
-        Group, 0 to 31.
-
-    Returns
-    -------
-    int
-        Identifier.
-
-    Raises
-    ------
-    FrameError
-        If there is no such node or group.
-
-    Examples
-    --------
-    >>> hex(from_puck(1, PROPERTY_GROUP)), hex(from_puck(1, POSITION_GROUP))
-    ('0x426', '0x423')
-    """
+    """Return the identifier of a frame from a puck to a group."""
     _check_node("puck", puck, lowest=1)
     return to_group(group) | puck << 5
 
 
 def split_identifier(identifier: int) -> Address:
-    """Take an identifier apart.
-
-    Parameters
-    ----------
-    identifier : int
-        Any of 11 bits.
-
-    Returns
-    -------
-    Address
-        Sender and receiver.
-
-    Raises
-    ------
-    FrameError
-        If it has more than 11 bits: no puck sends such.
-
-    Examples
-    --------
-    >>> split_identifier(0x540)  # what the safety module broadcasts
-    Address(sender=10, receiver=0, is_group=True)
-    """
+    """Take an identifier apart."""
     if not 0 <= identifier <= _HIGHEST_IDENTIFIER:
         raise FrameError(f"identifier: needs 11 bits, got {identifier:#x}")
     return Address(

@@ -22,24 +22,12 @@ _MOTOR_ROLE = 0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Identity:
-    """What a puck says of itself before anything is set.
+    """What a puck says of itself before anything is set."""
 
-    Attributes
-    ----------
-    puck : int
-        Its node.
-    is_awake : bool
-        Whether it has left its monitor.
-    firmware : int
-        VERS.
-    role : int
-        ROLE.
-    """
-
-    puck: int
-    is_awake: bool
-    firmware: int
-    role: int
+    puck: int  # its node
+    is_awake: bool  # whether it has left its monitor
+    firmware: int  # VERS
+    role: int  # ROLE
 
     @property
     def is_motor(self) -> bool:
@@ -48,27 +36,7 @@ class Identity:
 
 
 def identify(node: PuckNode, *, patience_s: float = 0.05) -> Identity:
-    """Ask a puck who it is; nothing is set.
-
-    Parameters
-    ----------
-    node : PuckNode
-        The puck.
-    patience_s : float, optional
-        How long to wait for each answer, s.
-
-    Returns
-    -------
-    Identity
-        What it answers, asleep or awake.
-
-    Raises
-    ------
-    DeviceTimeoutError
-        If nobody answers at this node.
-    DeviceError
-        If it reports an error, or the bus fails.
-    """
+    """Ask a puck who it is; nothing is set."""
     status = node.ask(STATUS, patience_s=patience_s)
     if status not in (ASLEEP, READY):
         raise DeviceError(f"puck {node.puck}: needs STAT 0 or 2, it reports {status}")
@@ -81,25 +49,7 @@ def identify(node: PuckNode, *, patience_s: float = 0.05) -> Identity:
 
 
 def table_of(identity: Identity, given: PropertyTable | None) -> PropertyTable:
-    """Return the numbers of a motor puck's properties.
-
-    Parameters
-    ----------
-    identity : Identity
-        What it says of itself.
-    given : PropertyTable or None
-        A table of the user's own, which goes before.
-
-    Returns
-    -------
-    PropertyTable
-        Names and numbers.
-
-    Raises
-    ------
-    DeviceError
-        If it is no motor's, or its firmware is not known and no table was given.
-    """
+    """Return the numbers of a motor puck's properties."""
     if not identity.is_motor:
         raise DeviceError(
             f"puck {identity.puck}: needs a motor's puck, its ROLE is "

@@ -15,28 +15,7 @@ __all__ = ["prepare"]
 def prepare(
     interface: str, channel: str, puck: str, torque_number: str, mode_number: str
 ) -> Callable[[], None]:
-    """Join the bus and be ready to idle the puck.
-
-    Parameters
-    ----------
-    interface, channel : str
-        Of python-can.
-    puck : str
-        Node of the puck.
-    torque_number, mode_number : str
-        Numbers of T and MODE.
-
-    Returns
-    -------
-    callable
-        Zeroes the torque and idles the puck; raises `DeviceError` if it does not
-        confirm within 0.1 s.
-
-    Raises
-    ------
-    DeviceError
-        If the bus cannot be opened.
-    """
+    """Join the bus and be ready to idle the puck."""
     clock = RealClock()
     node_number = int(puck)
     link = open_link(

@@ -11,24 +11,7 @@ _BRAKING_STEP_NS = 500_000
 
 
 class EmulatedMotor:
-    """An arm that is driven by current units, or braked, and read in counts.
-
-    Parameters
-    ----------
-    hand : Hand
-        What moves the arm; its time begins when the motor is first driven.
-    range_end : float
-        Where the arm meets its end stop, rad.
-    transmission : Transmission
-        Gear, encoder and amplifier.
-    braking : float
-        Damping by the windings while idle, N·m·s/rad at the elbow.
-
-    Raises
-    ------
-    ParameterError
-        If the end of range does not fit the hand.
-    """
+    """An arm that is driven by current units, or braked, and read in counts."""
 
     __slots__ = ("_braking", "_hand", "_is_driven", "_parameters", "_plant", "_turns")
 
@@ -60,48 +43,18 @@ class EmulatedMotor:
         return 0.0 if self._plant is None else self._plant.velocity
 
     def angle(self, now_ns: int) -> float:
-        """Return where the arm is.
-
-        Parameters
-        ----------
-        now_ns : int
-            The time, ns; it never goes back.
-
-        Returns
-        -------
-        float
-            Elbow angle, rad.
-        """
+        """Return where the arm is."""
         if self._plant is None:
             return self._hand.start
         self.advance(now_ns)
         return self._plant.angle_at(now_ns)
 
     def counts(self, now_ns: int) -> int:
-        """Return what the encoder counts, from full flexion.
-
-        Parameters
-        ----------
-        now_ns : int
-            The time, ns.
-
-        Returns
-        -------
-        int
-            Counts.
-        """
+        """Return what the encoder counts, from full flexion."""
         return self._turns.counts(self.angle(now_ns))
 
     def drive(self, units: int, now_ns: int) -> None:
-        """Turn with a torque until told otherwise.
-
-        Parameters
-        ----------
-        units : int
-            Current units.
-        now_ns : int
-            The time, ns.
-        """
+        """Turn with a torque until told otherwise."""
         if self._plant is None:
             self._plant = Plant(self._hand, self._parameters, start_ns=now_ns)
         self.advance(now_ns)
@@ -109,24 +62,12 @@ class EmulatedMotor:
         self._plant.command(self._turns.torque(units), now_ns)
 
     def brake(self, now_ns: int) -> None:
-        """Short the windings: an idle motor damps the arm.
-
-        Parameters
-        ----------
-        now_ns : int
-            The time, ns.
-        """
+        """Short the windings: an idle motor damps the arm."""
         self.advance(now_ns)
         self._is_driven = False
 
     def advance(self, now_ns: int) -> None:
-        """Let the arm move up to a time; it does not before it is first driven.
-
-        Parameters
-        ----------
-        now_ns : int
-            The time, ns.
-        """
+        """Let the arm move up to a time; it does not before it is first driven."""
         plant = self._plant
         if plant is None:
             return

@@ -24,31 +24,7 @@ _MOST_OVERDUE = 30  # more than fit on the bus in 1 ms
 
 
 class PuckNode:
-    """A puck, spoken to frame by frame.
-
-    Parameters
-    ----------
-    link : Link
-        The bus.
-    clock : Clock
-        The clock of the link.
-    puck : int
-        Node of the puck, 1 to 31.
-
-    Attributes
-    ----------
-    puck : int
-        Node of the puck.
-    arrivals : Arrivals
-        What has come in.
-    heard : dict of int to int
-        Answers nobody was waiting for, the last by property number.
-
-    Raises
-    ------
-    FrameError
-        If there is no such node.
-    """
+    """A puck, spoken to frame by frame."""
 
     __slots__ = (
         "_clock",
@@ -74,66 +50,15 @@ class PuckNode:
         self.heard = self.arrivals.heard
 
     def tell(self, property_id: int, value: int) -> None:
-        """Set a property; a puck does not acknowledge it.
-
-        Parameters
-        ----------
-        property_id : int
-            Number of the property.
-        value : int
-            Its new value.
-
-        Raises
-        ------
-        BusError
-            If the bus does not take the frame.
-        FrameError
-            If the value does not fit.
-        """
+        """Set a property; a puck does not acknowledge it."""
         self._link.send(Frame(self._to, encode_set(property_id, value)))
 
     def inquire(self, property_id: int) -> int:
-        """Ask for a property and do not wait; the answer comes into `heard`.
-
-        Parameters
-        ----------
-        property_id : int
-            Number of the property.
-
-        Returns
-        -------
-        int
-            When it was asked for, ns.
-
-        Raises
-        ------
-        BusError
-            If the bus does not take the frame.
-        """
+        """Ask for a property and do not wait; the answer comes into `heard`."""
         return self._link.send(Frame(self._to, encode_get(property_id)))
 
     def ask(self, property_id: int, *, patience_s: float = 0.05) -> int:
-        """Ask for a property and wait for the answer.
-
-        Parameters
-        ----------
-        property_id : int
-            Number of the property.
-        patience_s : float, optional
-            How long to wait, s.
-
-        Returns
-        -------
-        int
-            Its value.
-
-        Raises
-        ------
-        DeviceTimeoutError
-            If no answer comes.
-        BusError, FrameError
-            If the bus fails or the answer is none.
-        """
+        """Ask for a property and wait for the answer."""
         self.listen()
         self.heard.pop(property_id, None)
         deadline_ns = self.inquire(property_id) + round(patience_s * 1e9)
@@ -149,34 +74,12 @@ class PuckNode:
         return self.heard.pop(property_id)
 
     def position(self, property_id: int, *, patience_s: float) -> tuple[int, int]:
-        """Ask for the position and wait for it.
-
-        An answer does not say which question it belongs to. So what waits is thrown
-        away first. After a question that stayed without an answer, which may only be
-        late, the next is followed by one for another property, each time another: a
-        puck answers in the order in which it is asked, so that the last position
-        before that answer is the one asked for.
-
-        Parameters
-        ----------
-        property_id : int
-            Number of P.
-        patience_s : float
-            How long to wait, s.
-
-        Returns
-        -------
-        tuple of int
-            When the encoder was sampled, ns: 75 µs after it was asked for, or when
-            the answer came if that was sooner; and its count, of 22 bits.
-
-        Raises
-        ------
-        DeviceTimeoutError
-            If no answer comes.
-        BusError, FrameError
-            If the bus fails or the answer is none.
-        """
+        """Ask for the position and wait for it."""
+        # An answer does not say which question it belongs to. So what waits is thrown
+        # away first. After a question that stayed without an answer, which may only be
+        # late, the next is followed by one for another property, each time another: a
+        # puck answers in the order in which it is asked, so that the last position
+        # before that answer is the one asked for.
         self.listen()
         asked_ns = self.inquire(property_id)
         marker = next(self._markers) if self._in_doubt else None
@@ -217,15 +120,7 @@ class PuckNode:
         return self._link.receive(deadline_ns)
 
     def listen(self) -> None:
-        """Take in what has come unasked: answers, errors, frames of others.
-
-        Raises
-        ------
-        BusError
-            If the bus is off, floods this end, or reports one error after another.
-        FrameError
-            If an answer of this puck is none.
-        """
+        """Take in what has come unasked: answers, errors, frames of others."""
         for _ in range(_MOST_WAITING):
             frame = self._link.receive(0)
             if frame is None:
@@ -235,21 +130,9 @@ class PuckNode:
         raise BusError(f"puck {self.puck}: the bus is flooded with frames", "flooded")
 
     def now_ns(self) -> int:
-        """Return the time.
-
-        Returns
-        -------
-        int
-            Time on the clock of the link, ns.
-        """
+        """Return the time."""
         return self._clock.now_ns()
 
     def wait(self, duration_s: float) -> None:
-        """Let time pass without a frame being sent.
-
-        Parameters
-        ----------
-        duration_s : float
-            How long, s.
-        """
+        """Let time pass without a frame being sent."""
         self._clock.sleep_until_ns(self._clock.now_ns() + round(duration_s * 1e9))

@@ -11,22 +11,10 @@ _LOST_TORQUES = 1  # the next comes after a tick
 
 
 class Polls:
-    """Ask for the mode and for the torque it holds, in turn, every few torques.
+    """Ask for the mode and for the torque it holds, in turn, every few torques."""
 
-    No setting is acknowledged. Nobody waits for the answers in the loop: they come
-    before the next position.
-
-    Parameters
-    ----------
-    node : PuckNode
-        The puck, in torque mode.
-    torque_number, mode_number : int
-        Numbers of T and MODE.
-    every : int
-        Torques after which one thing is asked.
-    checks_torque : bool
-        Whether it is asked for its torque.
-    """
+    # No setting is acknowledged. Nobody waits for the answers in the loop: they come
+    # before the next position.
 
     __slots__ = (
         "_asks_mode",
@@ -60,19 +48,7 @@ class Polls:
         self._n_lost = 0
 
     def sent(self, units: int) -> None:
-        """Count a torque, and ask when it is time.
-
-        Parameters
-        ----------
-        units : int
-            What the puck was told, current units.
-
-        Raises
-        ------
-        BusError
-            If the bus does not take the question. That no answer comes is complained
-            of by `hear`: a torque that is being taken back must not be kept from it.
-        """
+        """Count a torque, and ask when it is time."""
         self._left -= 1
         if self._left:
             return
@@ -86,17 +62,7 @@ class Polls:
         self._asks_mode = not self._asks_mode
 
     def hear(self) -> None:
-        """Look at the answers that have come.
-
-        Raises
-        ------
-        IdledError
-            If somebody else has changed its mode.
-        BusError
-            If twice in a row it does not hold the torque that it was told.
-        DeviceTimeoutError
-            If three in a row have stayed without an answer.
-        """
+        """Look at the answers that have come."""
         heard = self._node.heard
         if heard:
             if self._mode in heard:
@@ -108,22 +74,7 @@ class Polls:
             raise self._unanswered()
 
     def ask_mode(self, *, patience_s: float) -> None:
-        """Ask for its mode and wait for the answer.
-
-        Parameters
-        ----------
-        patience_s : float
-            How long to wait, s.
-
-        Raises
-        ------
-        IdledError
-            If somebody else has changed it.
-        DeviceTimeoutError
-            If three in a row have stayed without an answer.
-        BusError, FrameError
-            If the bus fails or the answer is none.
-        """
+        """Ask for its mode and wait for the answer."""
         try:
             found = self._node.ask(self._mode, patience_s=patience_s)
         except DeviceTimeoutError:

@@ -65,26 +65,9 @@ _MODERN = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PropertyTable:
-    """Names of properties and their numbers, for one motor puck's firmware.
+    """Names of properties and their numbers, for one motor puck's firmware."""
 
-    Attributes
-    ----------
-    numbers : mapping of str to int
-        Number of each property by its name, 8 to 127.
-
-    Raises
-    ------
-    ParameterError
-        If one of `NEEDED` is missing, a number is out of range, or one number
-        stands for two properties.
-
-    Examples
-    --------
-    >>> property_table(148).number("T")
-    42
-    """
-
-    numbers: Mapping[str, int]
+    numbers: Mapping[str, int]  # number of each property by its name, 8 to 127
 
     def __post_init__(self) -> None:
         missing = [name for name in NEEDED if name not in self.numbers]
@@ -106,23 +89,7 @@ class PropertyTable:
                 taken[used] = name
 
     def number(self, name: str) -> int:
-        """Return the number of a property.
-
-        Parameters
-        ----------
-        name : str
-            Name of the property.
-
-        Returns
-        -------
-        int
-            Its number.
-
-        Raises
-        ------
-        DeviceError
-            If this firmware's table does not have it.
-        """
+        """Return the number of a property."""
         try:
             return self.numbers[name]
         except KeyError:
@@ -131,24 +98,7 @@ class PropertyTable:
             ) from None
 
     def settable(self, name: str) -> int:
-        """Return the number of a property that is to be set.
-
-        Parameters
-        ----------
-        name : str
-            Name of the property.
-
-        Returns
-        -------
-        int
-            Its number.
-
-        Raises
-        ------
-        DeviceError
-            If the table does not have it, or setting it writes the puck's memory
-            (SAVE, LOAD, DEF, LOCK): this driver never does.
-        """
+        """Return the number of a property that is to be set."""
         if name in _NEVER_SET:
             raise DeviceError(
                 f"puck: {name} writes the puck's permanent memory and is never set"
@@ -157,30 +107,7 @@ class PropertyTable:
 
 
 def property_table(firmware: int) -> PropertyTable:
-    """Return the property numbers of a firmware.
-
-    Parameters
-    ----------
-    firmware : int
-        What the puck answers for VERS.
-
-    Returns
-    -------
-    PropertyTable
-        Names and numbers.
-
-    Raises
-    ------
-    DeviceError
-        If the numbers of this firmware are not known: 65 to 113 and from 119 on are.
-
-    Examples
-    --------
-    >>> property_table(116)
-    Traceback (most recent call last):
-        ...
-    masrel.errors.DeviceError: puck: needs firmware 65 to 113, or 119 or later, got 116
-    """
+    """Return the property numbers of a firmware."""
     if firmware < _OLDEST or _MOVED <= firmware < _UNMOVED:
         raise DeviceError(
             f"puck: needs firmware {_OLDEST} to {_MOVED - 1}, or {_UNMOVED} or later, "

@@ -10,25 +10,7 @@ __all__ = ["read_property_table"]
 
 
 def read_property_table(path: Path) -> PropertyTable:
-    """Read the property numbers of a firmware that the driver does not know.
-
-    Parameters
-    ----------
-    path : Path
-        A TOML file with one table, ``[properties]``: a number for every name.
-
-    Returns
-    -------
-    PropertyTable
-        Names and numbers.
-
-    Raises
-    ------
-    ParameterError
-        If the file is not such a table.
-    OSError
-        If it cannot be read.
-    """
+    """Read the property numbers of a firmware that the driver does not know."""
     try:
         document = tomllib.loads(path.read_text(encoding="utf-8"))
     except ValueError as error:

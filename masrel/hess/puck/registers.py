@@ -29,33 +29,7 @@ _MEASURED = {"TEMP": 31, "PTEMP": 33, "THERM": 30, "VBUS": 48}
 
 
 class Registers:
-    """What an emulated puck answers and remembers.
-
-    Parameters
-    ----------
-    options : EmulatorOptions
-        What it is like.
-    puck : int
-        Its node.
-
-    Attributes
-    ----------
-    table : PropertyTable
-        Numbers of its properties.
-    mode, torque : int
-        MODE, and T in current units.
-    offset : int
-        What P is more than the encoder's own count.
-    is_waking : bool
-        Whether it is off the bus.
-    n_memory_writes : int
-        How often it was told to write its permanent memory.
-
-    Raises
-    ------
-    DeviceError
-        If the firmware's numbers are not known and so cannot be emulated.
-    """
+    """What an emulated puck answers and remembers."""
 
     def __init__(self, options: EmulatorOptions, puck: int) -> None:
         self.table = options.properties or property_table(options.firmware)
@@ -103,18 +77,7 @@ class Registers:
         return self._values["MT"]
 
     def name(self, number: int) -> str:
-        """Return what a number means now.
-
-        Parameters
-        ----------
-        number : int
-            Number of a property.
-
-        Returns
-        -------
-        str
-            Its name; the number itself where it has none.
-        """
+        """Return what a number means now."""
         if number in self._universal:
             return self._universal[number]
         if not self._is_awake:
@@ -122,18 +85,7 @@ class Registers:
         return self._names.get(number, str(number))
 
     def value(self, number: int) -> int | None:
-        """Return what it answers.
-
-        Parameters
-        ----------
-        number : int
-            Number of a property.
-
-        Returns
-        -------
-        int or None
-            Its value; None where it does not answer.
-        """
+        """Return what it answers."""
         if number == STATUS and self._has_error:
             return BROKEN
         if number == STATUS:
@@ -146,20 +98,7 @@ class Registers:
         return self.torque if name == "T" else self._values.get(name)
 
     def set(self, number: int, value: int) -> bool:
-        """Set a property that neither moves nor brakes the motor.
-
-        Parameters
-        ----------
-        number : int
-            Number of the property.
-        value : int
-            Its new value.
-
-        Returns
-        -------
-        bool
-            Whether it now wakes.
-        """
+        """Set a property that neither moves nor brakes the motor."""
         name = self.name(number)
         if name in ("SAVE", "LOAD", "DEF", "LOCK"):
             self.n_memory_writes += 1

@@ -14,20 +14,7 @@ _PAUSE_S = 0.001  # between two tries
 
 
 def release(node: PuckNode, *, torque_number: int, mode_number: int) -> None:
-    """Zero the torque and idle a puck, again and again until it confirms.
-
-    Parameters
-    ----------
-    node : PuckNode
-        The puck.
-    torque_number, mode_number : int
-        Numbers of T and MODE.
-
-    Raises
-    ------
-    DeviceError
-        If it has not confirmed within 0.1 s.
-    """
+    """Zero the torque and idle a puck, again and again until it confirms."""
     begun_ns = node.now_ns()
     reason = "it does not go to idle"
     while (since_s := (node.now_ns() - begun_ns) * 1e-9) < _PATIENCE_S:

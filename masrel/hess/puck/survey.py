@@ -29,30 +29,14 @@ _KINDS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Found:
-    """A node that answers.
+    """A node that answers."""
 
-    Attributes
-    ----------
-    puck : int
-        Its node.
-    kind : str
-        What it is, from its ROLE, or that it is in error.
-    is_awake : bool
-        Whether it has left its monitor.
-    firmware : int or None
-        VERS; None where it is in error.
-    is_supported : bool
-        Whether this driver can drive it.
-    properties : dict of str to int
-        What else it says, while it is awake and supported.
-    """
-
-    puck: int
-    kind: str
-    is_awake: bool
-    firmware: int | None
-    is_supported: bool
-    properties: dict[str, int]
+    puck: int  # its node
+    kind: str  # what it is, from its ROLE, or that it is in error
+    is_awake: bool  # whether it has left its monitor
+    firmware: int | None  # VERS; None where it is in error
+    is_supported: bool  # whether this driver can drive it
+    properties: dict[str, int]  # what else it says, while it is awake and supported
 
 
 def probe(
@@ -62,29 +46,7 @@ def probe(
     properties: PropertyTable | None = None,
     progress: Callable[[], None] = lambda: None,
 ) -> tuple[Found, ...]:
-    """Ask every node who it is; nothing is set, and nobody is woken.
-
-    Parameters
-    ----------
-    link : Link
-        The bus.
-    clock : Clock
-        Its clock.
-    properties : PropertyTable or None, optional
-        Numbers of the properties, where a firmware is unknown to this driver.
-    progress : callable, optional
-        Called after each of the 31 nodes.
-
-    Returns
-    -------
-    tuple of Found
-        Those that answer, in the order of their nodes.
-
-    Raises
-    ------
-    DeviceError
-        If the bus fails.
-    """
+    """Ask every node who it is; nothing is set, and nobody is woken."""
     found = []
     for number in range(1, _HIGHEST_NODE + 1):
         one = _probed(PuckNode(link, clock, number), properties)

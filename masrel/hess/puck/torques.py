@@ -19,33 +19,9 @@ _N_PACKED = 4
 def encode_torques(
     first: int, second: int, third: int, fourth: int, *, property_id: int = 42
 ) -> bytes:
-    """Return the data that set the torques of four pucks at once.
-
-    The driver does not use it: on a bus with other pucks the frame sets the torque
-    of each of them, and which of the four a puck obeys hangs on its PIDX and groups.
-
-    Parameters
-    ----------
-    first, second, third, fourth : int
-        Torques, current units; -8192 to 8191.
-    property_id : int, optional
-        Number of the property T.
-
-    Returns
-    -------
-    bytes
-        Eight bytes: 80 + the number, then four times 14 bits, highest first.
-
-    Raises
-    ------
-    FrameError
-        If one does not fit, or there is no such number.
-
-    Examples
-    --------
-    >>> encode_torques(1, -1, 0, 0).hex(" ")
-    'aa 00 07 ff f0 00 00 00'
-    """
+    """Return the data that set the torques of four pucks at once."""
+    # The driver does not use it: on a bus with other pucks the frame sets the torque of
+    # each of them, and which of the four a puck obeys hangs on its PIDX and groups.
     packed = 0
     for torque in (first, second, third, fourth):
         if not LOWEST_TORQUE <= torque <= HIGHEST_TORQUE:
@@ -58,28 +34,7 @@ def encode_torques(
 
 
 def decode_torques(data: bytes) -> tuple[int, ...]:
-    """Read the torques of four pucks.
-
-    Parameters
-    ----------
-    data : bytes
-        Data of a frame to the group of packed torques.
-
-    Returns
-    -------
-    tuple of int
-        Four torques, current units.
-
-    Raises
-    ------
-    FrameError
-        If it is not eight bytes of which the first is 80 or above.
-
-    Examples
-    --------
-    >>> decode_torques(bytes.fromhex("aa0007fff0000000"))
-    (1, -1, 0, 0)
-    """
+    """Read the torques of four pucks."""
     if len(data) != 8 or not data[0] & _FLAG:
         raise FrameError(
             "torques: need 8 bytes, the first from 80 up, "

@@ -55,38 +55,9 @@ def steady_runs(
     stop: EmergencyStop | None = None,
     progress: Callable[[], None] = lambda: None,
 ) -> tuple[SteadyRun, ...]:
-    """Turn a free arm to and fro at steady speeds.
-
-    THE ARM MOVES BY ITSELF, between 40 and 115 deg, with 2 N·m at most. First it is
-    pushed with 0.5 N·m for 0.3 s to see whether it goes the right way.
-
-    Parameters
-    ----------
-    device : Device
-        An open device; nobody holds the arm.
-    clock : Clock
-        The clock of the device.
-    speeds : sequence of float, optional
-        Speeds above 0, rad/s.
-    watchdog : Watching or None, optional
-        Told at every tick that all is well.
-    stop : EmergencyStop or None, optional
-        A button that is looked at in every tick.
-    progress : callable, optional
-        Called after each run; there are two to a speed.
-
-    Returns
-    -------
-    tuple of SteadyRun
-        Two to a speed, one each way.
-
-    Raises
-    ------
-    DeviceError
-        If the device fails, the stop is pressed, one of `LIMITS` is passed, or the arm
-        goes the wrong way, is held or blocked, or is not between 30 and 125 deg to
-        begin with. Whoever opened the device closes it: then it is idle.
-    """
+    """Turn a free arm to and fro at steady speeds."""
+    # THE ARM MOVES BY ITSELF, between 40 and 115 deg, with 2 N·m at most. First it is
+    # pushed with 0.5 N·m for 0.3 s to see whether it goes the right way.
     watching = watchdog or NoWatchdog()
     turning = _Turning(device, clock, watching, stop or EmergencyStop())
     turning.check_direction()

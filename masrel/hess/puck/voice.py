@@ -26,25 +26,7 @@ _PROTOCOL_ERROR = 0x088  # class of an error frame: protocol violation, bus erro
 
 
 class EmulatedVoice:
-    """Answers questions of properties and of the position, with faults.
-
-    Parameters
-    ----------
-    link : Link
-        The puck's end of the bus.
-    puck : int
-        Its node.
-    options : EmulatorOptions
-        What it is like.
-    registers : Registers
-        Its properties.
-    motor : EmulatedMotor
-        Arm and motor.
-    faults : ActiveFaults
-        What fails.
-    due : DueActs
-        Where an answer waits for its time.
-    """
+    """Answers questions of properties and of the position, with faults."""
 
     __slots__ = (
         "_due",
@@ -80,51 +62,20 @@ class EmulatedVoice:
         self._frozen: int | None = None  # the count at which its encoder stands still
 
     def is_cut_off(self, now_ns: int) -> bool:
-        """Return whether no frame comes or goes.
-
-        Parameters
-        ----------
-        now_ns : int
-            The time, ns.
-
-        Returns
-        -------
-        bool
-            True while the cable is out or the bus is off.
-        """
+        """Return whether no frame comes or goes."""
         faults = self._faults
         return any(faults.active(kind, now_ns) for kind in ("unplugged", "bus-off"))
 
     def report(self, error_class: int) -> None:
-        """Send an error frame, as the host's adapter would.
-
-        Parameters
-        ----------
-        error_class : int
-            What its identifier says.
-        """
+        """Send an error frame, as the host's adapter would."""
         self._link.send(Frame(error_class, bytes(8), is_error=True))
 
     def answer(self, number: int, asked_ns: int) -> None:
-        """Answer for a property, with the value it has when the answer is sent.
-
-        Parameters
-        ----------
-        number : int
-            Number of the property.
-        asked_ns : int
-            When it was asked for, ns.
-        """
+        """Answer for a property, with the value it has when the answer is sent."""
         self._due.at(asked_ns + _ANSWER_NS, lambda due: self._value(number, due))
 
     def answer_position(self, asked_ns: int) -> None:
-        """Sample the encoder and answer, while others speak too.
-
-        Parameters
-        ----------
-        asked_ns : int
-            When the position was asked for, ns.
-        """
+        """Sample the encoder and answer, while others speak too."""
         self._due.at(asked_ns + _SAMPLING_NS, self._sample)
         self._interfere(asked_ns)
 

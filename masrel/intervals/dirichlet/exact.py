@@ -45,26 +45,13 @@ class _Tilted:
 
 
 class ExactDensity:
-    """The log-density of logit ρ, constants left out.
+    """The log-density of logit ρ, constants left out."""
 
-    Parameters
-    ----------
-    model : DirichletMultinomial
-        Data and priors.
-
-    Attributes
-    ----------
-    region : Region
-        Where the density is not negligible.
-
-    References
-    ----------
-    .. [1] Mosimann, J. E. (1962). On the compound multinomial distribution.
-       Biometrika, 49(1/2), 65-82. https://doi.org/10.2307/2333468
-    .. [2] Antoniak, C. E. (1974). Mixtures of Dirichlet processes with applications
-       to Bayesian nonparametric problems. Annals of Statistics, 2(6), 1152-1174.
-       https://doi.org/10.1214/aos/1176342871
-    """
+    # [1] Mosimann, J. E. (1962). On the compound multinomial distribution. Biometrika,
+    # 49(1/2), 65-82. https://doi.org/10.2307/2333468
+    # [2] Antoniak, C. E. (1974). Mixtures of Dirichlet processes with applications to
+    # Bayesian nonparametric problems. Annals of Statistics, 2(6), 1152-1174.
+    # https://doi.org/10.1214/aos/1176342871
 
     def __init__(self, model: DirichletMultinomial) -> None:
         self._factors = Factors.of(model)

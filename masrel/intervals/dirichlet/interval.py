@@ -25,31 +25,7 @@ def rho_interval(
     most_steps: int,
     rng: np.random.Generator | int | None,
 ) -> Interval:
-    """Compute the central credible interval of ρ.
-
-    Parameters
-    ----------
-    case : Case
-        The question, of a coefficient whose value in the population is ρ.
-    prior : Prior
-        What is believed of ρ and π.
-    sampled : bool
-        Whether emcee draws it, to check the quadrature.
-    n_steps, most_steps : int
-        Steps of every walker at first, and where the sampler gives up.
-    rng : Generator, int or None
-        Where its randomness comes from.
-
-    Returns
-    -------
-    Interval
-        The interval; ``nan`` with a reason when the prior alone would speak.
-
-    Raises
-    ------
-    ConvergenceError
-        If the sampler has not converged after `most_steps`.
-    """
+    """Compute the central credible interval of ρ."""
     method = f"Dirichlet-multinomial posterior, {'emcee' if sampled else 'exact'}"
     counts = item_counts(case.coded)
     reason = _nothing_to_learn(counts)

@@ -17,34 +17,23 @@ __all__ = ["DirichletMultinomial"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DirichletMultinomial:
-    """The posterior of ρ and π given counts, on an unbounded scale.
+    """The posterior of ρ and π given counts, on an unbounded scale."""
 
-    Attributes
-    ----------
-    prior : ndarray, shape (n_parts,)
-        Parameters of the Dirichlet prior of π. Categories nobody used enter the
-        likelihood nowhere, so they are one part, the last, whose parameter is the
-        sum of theirs (the Dirichlet's aggregation property).
-    shape : float
-        The prior of ρ is Beta(shape, shape): 1 is uniform.
-    above, depth : ndarray of int64, shape (n_above,)
-        Part k and depth j of every factor A π_k + j there is.
-    times : ndarray, shape (n_above,)
-        N_kj: items with more than j ratings in category k, the factor's power.
-    times_below : ndarray, shape (largest number of ratings of an item,)
-        n_j: items with more than j ratings, the power of A + j.
+    # [1] Mosimann, J. E. (1962). On the compound multinomial distribution. Biometrika,
+    # 49(1/2), 65-82. https://doi.org/10.2307/2333468
 
-    References
-    ----------
-    .. [1] Mosimann, J. E. (1962). On the compound multinomial distribution.
-       Biometrika, 49(1/2), 65-82. https://doi.org/10.2307/2333468
-    """
-
+    # (n_parts,): parameters of the Dirichlet prior of π. Categories nobody used enter
+    # the likelihood nowhere, so they are one part, the last, whose parameter is the sum
+    # of theirs (the Dirichlet's aggregation property).
     prior: Floats = field(compare=False, repr=False)
-    shape: float
+    shape: float  # the prior of ρ is Beta(shape, shape): 1 is uniform
+    # above, depth: (n_above,): part k and depth j of every factor A π_k + j there is
     above: NDArray[np.int64] = field(compare=False, repr=False)
     depth: NDArray[np.int64] = field(compare=False, repr=False)
+    # (n_above,): n_kj: items with more than j ratings in category k, the factor's power
     times: Floats = field(compare=False, repr=False)
+    # (largest number of ratings of an item,): n_j: items with more than j ratings, the
+    # power of A + j
     times_below: Floats = field(compare=False, repr=False)
 
     @classmethod
@@ -55,22 +44,8 @@ class DirichletMultinomial:
         concentration: float = 1.0,
         shape: float = 1.0,
     ) -> "DirichletMultinomial":
-        """Compress counts to all that matters.
-
-        Parameters
-        ----------
-        counts : ndarray of int64, shape (n_items, n_categories)
-            Raters per item and category, at least two categories and one rating.
-        concentration : float, optional
-            The prior of π is Dirichlet(concentration, ...) over all categories.
-        shape : float, optional
-            The prior of ρ is Beta(shape, shape).
-
-        Returns
-        -------
-        DirichletMultinomial
-            The model.
-        """
+        """Compress counts to all that matters."""
+        # Takes counts (n_items, n_categories)
         used = counts.any(axis=0)
         prior = np.full(int(used.sum()), concentration)
         if not used.all():
@@ -94,61 +69,28 @@ class DirichletMultinomial:
         return int(self.prior.size)
 
     def parts(self, position: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return ρ, 1 - ρ and π at unbounded positions.
-
-        Parameters
-        ----------
-        position : ndarray, shape (n, n_dimensions)
-            logit ρ, then log(π_k / π_last).
-
-        Returns
-        -------
-        tuple of ndarray
-            ρ and 1 - ρ, both (n,), and π, (n, n_parts).
-        """
+        """Return ρ, 1 - ρ and π at unbounded positions."""
+        # Takes position (n, n_dimensions)
+        # ρ and 1 - ρ, both (n,), and π, (n, n_parts).
         rho, rest = expit(position[:, 0]), expit(-position[:, 0])
         ratios = np.column_stack([position[:, 1:], np.zeros(len(position))])
         ratios = np.exp(ratios - ratios.max(axis=1, keepdims=True))
         return rho, rest, ratios / ratios.sum(axis=1, keepdims=True)
 
     def log_likelihood(self, rho: Floats, rest: Floats, pi: Floats) -> Floats:
-        """Return the log-likelihood, constants left out.
-
-        With A = (1 - ρ)/ρ every factor A π_k + j and A + j of [1] times ρ is
-        (1 - ρ) π_k + j ρ and 1 - ρ + j ρ; there are as many above as below.
-
-        Parameters
-        ----------
-        rho, rest : ndarray, shape (n,)
-            ρ and 1 - ρ.
-        pi : ndarray, shape (n, n_parts)
-            Shares of the categories.
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            Its logarithm.
-        """
+        """Return the log-likelihood, constants left out."""
+        # With A = (1 - ρ)/ρ every factor A π_k + j and A + j of [1] times ρ is (1 - ρ)
+        # π_k + j ρ and 1 - ρ + j ρ; there are as many above as below.
+        # rho, rest (n,), pi (n, n_parts) -> (n,)
         above = rest[:, None] * pi[:, self.above] + rho[:, None] * self.depth
         below = rest[:, None] + rho[:, None] * np.arange(self.times_below.size)
         return np.asarray(np.log(above) @ self.times - np.log(below) @ self.times_below)
 
     def log_density(self, position: Floats) -> Floats:
-        """Return the log posterior density of unbounded positions.
-
-        Prior ρ ~ Beta(`shape`, `shape`) and π ~ Dirichlet(`prior`); the Jacobian is
-        ρ (1 - ρ) of the logit and Π π_k of the log-ratios.
-
-        Parameters
-        ----------
-        position : ndarray, shape (n, n_dimensions)
-            As in `parts`.
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            The logarithm, up to a constant; -inf where it is 0 in floating point.
-        """
+        """Return the log posterior density of unbounded positions."""
+        # Prior ρ ~ Beta(`shape`, `shape`) and π ~ Dirichlet(`prior`); the Jacobian is ρ
+        # (1 - ρ) of the logit and Π π_k of the log-ratios.
+        # position (n, n_dimensions) -> (n,)
         rho, rest, pi = self.parts(position)
         with np.errstate(divide="ignore", invalid="ignore"):  # far out a part is 0
             # Beta density (ρ (1 - ρ))^(shape - 1), times the Jacobian ρ (1 - ρ)

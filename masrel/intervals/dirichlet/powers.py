@@ -24,21 +24,11 @@ _MOST_FACTORS = 20_000  # of a polynomial multiplied out in logarithms: some sec
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Powers:
-    """Coefficients of consecutive powers, as value times exp(scale).
+    """Coefficients of consecutive powers, as value times exp(scale)."""
 
-    Attributes
-    ----------
-    first : int
-        The lowest power.
-    values : ndarray, shape (n_powers,)
-        Positive.
-    scale : float
-        Logarithm of what all are to be multiplied by.
-    """
-
-    first: int
-    values: Floats = field(compare=False, repr=False)
-    scale: float = 0.0
+    first: int  # the lowest power
+    values: Floats = field(compare=False, repr=False)  # (n_powers,): positive
+    scale: float = 0.0  # logarithm of what all are to be multiplied by
 
     @property
     def exponents(self) -> Floats:
@@ -66,40 +56,16 @@ class Powers:
 
 
 class Category:
-    """One category's coefficients times the moments Γ(a + t) / Γ(a) of its share.
+    """One category's coefficients times the moments Γ(a + t) / Γ(a) of its share."""
 
-    Parameters
-    ----------
-    powers : ndarray, shape (n_depths,)
-        N_j: items with more than j ratings in the category.
-    a : float
-        Its Dirichlet parameter.
-    """
+    # Takes powers (n_depths,)
 
     def __init__(self, powers: Floats, a: float) -> None:
         self._powers = powers
         self._a = a
 
     def tilted(self, x: float, log_tilt: float) -> Powers:
-        """Return the coefficients of λ^t, the constant Γ(a) left out.
-
-        Parameters
-        ----------
-        x : float
-            About where the polynomial matters.
-        log_tilt : float
-            The logarithm of λ.
-
-        Returns
-        -------
-        Powers
-            All that is above `TRIMMED`.
-
-        Raises
-        ------
-        ConvergenceError
-            If items have so many ratings that it would take minutes.
-        """
+        """Return the coefficients of λ^t, the constant Γ(a) left out."""
         law = self._law(x)
         log = np.log(law.values) - law.exponents * np.log(x)
         found = self._with_moments(law.first, law.scale + log, log_tilt)

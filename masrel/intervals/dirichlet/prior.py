@@ -17,40 +17,15 @@ _WORDS = {"uniform": "ρ ~ U(0, 1)", "jeffreys": "ρ ~ Beta(1/2, 1/2)"}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Prior:
-    """What is believed before the data.
+    """What is believed before the data."""
 
-    Attributes
-    ----------
-    name : {"uniform", "jeffreys"}
-        That of ρ.
-    concentration : float
-        π ~ Dirichlet(concentration, ...) over the declared categories.
-    """
-
-    name: PriorName
+    name: PriorName  # that of ρ
+    # π ~ Dirichlet(concentration, ...) over the declared categories
     concentration: float
 
     @classmethod
     def of(cls, name: PriorName, concentration: float) -> "Prior":
-        """Check a prior.
-
-        Parameters
-        ----------
-        name : {"uniform", "jeffreys"}
-            That of ρ.
-        concentration : float
-            Parameter of the Dirichlet prior of every category.
-
-        Returns
-        -------
-        Prior
-            The prior.
-
-        Raises
-        ------
-        ParameterError
-            If there is none of that name, or the concentration is not positive.
-        """
+        """Check a prior."""
         if name not in _SHAPES:
             raise ParameterError(
                 f"prior: needs one of {', '.join(get_args(PriorName))}, got {name!r}"
@@ -72,19 +47,9 @@ class Prior:
         return f"{_WORDS[self.name]}, π ~ Dirichlet({self.concentration:.3g}, ...)"
 
     def others(self, n_categories: int) -> "tuple[Prior, Prior]":
-        """Return what might as well have been believed: of ρ, and of π.
-
-        Parameters
-        ----------
-        n_categories : int
-            Declared categories.
-
-        Returns
-        -------
-        tuple of Prior
-            With the other prior of ρ; and with a Dirichlet as strong as one rating,
-            Dirichlet(1/K, ...), or for that Dirichlet(1, ...).
-        """
+        """Return what might as well have been believed: of ρ, and of π."""
+        # With the other prior of ρ; and with a Dirichlet as strong as one rating,
+        # Dirichlet(1/K, ...), or for that Dirichlet(1, ...).
         of_rho: PriorName = "jeffreys" if self.name == "uniform" else "uniform"
         as_one = 1.0 / n_categories
         of_pi = 1.0 if math.isclose(self.concentration, as_one) else as_one

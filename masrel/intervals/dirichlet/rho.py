@@ -20,43 +20,22 @@ _FEW_ITEMS = 10
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExactPosterior:
-    """The posterior of ρ = 1 / (1 + A), and the ends of its central interval.
+    """The posterior of ρ = 1 / (1 + A), and the ends of its central interval."""
 
-    Attributes
-    ----------
-    low, high : float
-        Ends.
-    logit : SincDistribution
-        The distribution of logit ρ.
-    log_density : ExactDensity
-        What it was integrated from.
-    """
-
+    # low, high: ends
     low: float
     high: float
+    # the distribution of logit ρ
     logit: SincDistribution = field(compare=False, repr=False)
+    # what it was integrated from
     log_density: ExactDensity = field(compare=False, repr=False)
 
     @classmethod
     def of(
         cls, counts: NDArray[np.int64], prior: Prior, level: float
     ) -> "ExactPosterior":
-        """Integrate the posterior.
-
-        Parameters
-        ----------
-        counts : ndarray of int64, shape (n_items, n_categories)
-            Raters per item and category, at least two categories and one rating.
-        prior : Prior
-            What is believed of ρ and π.
-        level : float
-            Level of the central interval.
-
-        Returns
-        -------
-        ExactPosterior
-            Its distribution and ends.
-        """
+        """Integrate the posterior."""
+        # Takes counts (n_items, n_categories)
         density = ExactDensity(
             DirichletMultinomial.of_counts(
                 counts, concentration=prior.concentration, shape=prior.shape
@@ -69,19 +48,9 @@ class ExactPosterior:
         return cls(low=low, high=high, logit=logit, log_density=density)
 
     def distribution(self, words: str) -> Distribution:
-        """Return the density of ρ at points between its outermost quantiles.
-
-        Parameters
-        ----------
-        words : str
-            What it is.
-
-        Returns
-        -------
-        Distribution
-            Continuous; the points are equally spaced in logit ρ, from about the
-            quantile at 1e-6 to that at 1 - 1e-6.
-        """
+        """Return the density of ρ at points between its outermost quantiles."""
+        # Continuous; the points are equally spaced in logit ρ, from about the quantile
+        # at 1e-6 to that at 1 - 1e-6.
         below = self.logit.masses.cumsum()
         ends = np.searchsorted(below, (1e-6, 1.0 - 1e-6)) + np.array([-1, 1])
         low, high = self.logit.points[ends.clip(0, below.size - 1)]
@@ -96,25 +65,8 @@ class ExactPosterior:
 def prior_notes(
     counts: NDArray[np.int64], prior: Prior, level: float, low: float, high: float
 ) -> tuple[str, ...]:
-    """Say where the prior weighs, with the interval under the other that moves it most.
-
-    Parameters
-    ----------
-    counts : ndarray of int64, shape (n_items, n_categories)
-        Raters per item and category.
-    prior : Prior
-        What was believed.
-    level : float
-        Level of the interval.
-    low, high : float
-        Its ends.
-
-    Returns
-    -------
-    tuple of str
-        One note, or none: with all ratings in one category, perfect agreement, or
-        fewer than 10 items with ratings of two raters.
-    """
+    """Say where the prior weighs, by the interval under the one that moves it most."""
+    # Takes counts (n_items, n_categories)
     n_items = int((counts.sum(axis=1) >= 2).sum())
     if (counts.sum(axis=0) > 0).sum() == 1:
         what = "all ratings are in one category"

@@ -24,27 +24,15 @@ _CLOSE = 1e-9  # so that after a step as small as that, of x, the next changes n
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Factors:
-    """The likelihood Π_k Π_j (A π_k + j)^N_kj / Π_j (A + j)^n_j and its priors.
+    """The likelihood Π_k Π_j (A π_k + j)^N_kj / Π_j (A + j)^n_j and its priors."""
 
-    Attributes
-    ----------
-    powers : ndarray, shape (n_used, n_depths)
-        N_kj of the categories that were used.
-    below : ndarray, shape (n_depths,)
-        n_j.
-    a : ndarray, shape (n_used,)
-        Dirichlet parameters of the used categories.
-    a_total : float
-        The sum of all, unused ones included.
-    shape : float
-        The prior of ρ is Beta(shape, shape).
-    """
-
+    # (n_used, n_depths): n_kj of the categories that were used
     powers: Floats = field(compare=False, repr=False)
-    below: Floats = field(compare=False, repr=False)
+    below: Floats = field(compare=False, repr=False)  # (n_depths,): n_j
+    # (n_used,): dirichlet parameters of the used categories
     a: Floats = field(compare=False, repr=False)
-    a_total: float
-    shape: float
+    a_total: float  # the sum of all, unused ones included
+    shape: float  # the prior of ρ is Beta(shape, shape)
 
     @classmethod
     def of(cls, model: DirichletMultinomial) -> "Factors":
@@ -61,19 +49,10 @@ class Factors:
         )
 
     def outside(self, logit: Floats) -> Floats:
-        """Return what multiplies the polynomial in A = exp(-logit ρ), as logarithm.
-
-        Parameters
-        ----------
-        logit : ndarray, shape (n,)
-            Logits of ρ.
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            -Σ n_j log(A + j), with the prior (ρ (1 - ρ))^(shape - 1) and the
-            Jacobian ρ (1 - ρ) of the logit.
-        """
+        """Return what multiplies the polynomial in A = exp(-logit ρ), as logarithm."""
+        # logit (n,) -> (n,)
+        # -Σ n_j log(A + j), with the prior (ρ (1 - ρ))^(shape - 1) and the Jacobian ρ
+        # (1 - ρ) of the logit.
         depth = np.arange(self.below.size)
         with np.errstate(divide="ignore"):  # j = 0 is the logit itself
             log = np.logaddexp(-logit[:, None], np.log(depth))
@@ -81,22 +60,11 @@ class Factors:
         return np.asarray(-log @ self.below - self.shape * spread)
 
     def saddle(self, tilt: Floats) -> tuple[Floats, Floats]:
-        """Find where each category's tilted polynomial is largest.
-
-        With t(x) = Σ_j N_kj x / (x + j), the mean power of Π_j (x + j)^N_kj at x,
-        it is at x = λ (a_k + t(x)). Newton's method from the right, where
-        x - λ (a_k + t(x)) is convex and rises.
-
-        Parameters
-        ----------
-        tilt : ndarray, shape (n,)
-            λ, by which the power t is tilted as λ^t.
-
-        Returns
-        -------
-        tuple of ndarray
-            x and t, both (n, n_used).
-        """
+        """Find where each category's tilted polynomial is largest."""
+        # With t(x) = Σ_j N_kj x / (x + j), the mean power of Π_j (x + j)^N_kj at x, it
+        # is at x = λ (a_k + t(x)). Newton's method from the right, where x - λ (a_k +
+        # t(x)) is convex and rises.
+        # Takes tilt (n,)
         depth = np.arange(self.below.size)
         tilt = tilt[:, None]
         x = tilt * (self.a + self.powers.sum(axis=1))
@@ -112,18 +80,9 @@ class Factors:
         return x, x * (self.powers * share).sum(axis=-1)
 
     def profile(self, tilt: Floats) -> tuple[Floats, Floats]:
-        """Return the largest term of the density at the logits that tilts belong to.
-
-        Parameters
-        ----------
-        tilt : ndarray, shape (n,)
-            λ.
-
-        Returns
-        -------
-        tuple of ndarray
-            Logits of ρ and the logarithm of the term, both (n,).
-        """
+        """Return the largest term of the density at the logits that tilts belong to."""
+        # Takes tilt (n,)
+        # Logits of ρ and the logarithm of the term, both (n,).
         x, t = self.saddle(tilt)
         total = t.sum(axis=1)
         logit = -np.log(tilt) - np.log(self.a_total + total)
@@ -136,19 +95,12 @@ class Factors:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Region:
-    """Where the posterior is not negligible, and the tilts there.
+    """Where the posterior is not negligible, and the tilts there."""
 
-    Attributes
-    ----------
-    logits, log_tilts : ndarray, shape (n,)
-        Logits of ρ, ascending, and the logarithm of λ at each.
-    mode : float
-        About the logit of the highest density.
-    """
-
+    # logits, log_tilts: (n,): logits of ρ, ascending, and the logarithm of λ at each
     logits: Floats = field(compare=False, repr=False)
     log_tilts: Floats = field(compare=False, repr=False)
-    mode: float
+    mode: float  # about the logit of the highest density
 
     @classmethod
     def of(cls, factors: Factors) -> "Region":

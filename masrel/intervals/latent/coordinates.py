@@ -24,30 +24,21 @@ _PLAIN = 5.0  # variance of items' means over its error, where ratings place ite
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Coordinates:
-    """What a position holds.
+    """What a position holds."""
 
-    In this order: one coordinate an item; b_r / ω and w_r (n_raters each); logit ρ,
-    logit f, log η; α; and the logarithms of the distances between neighbouring T_k,
-    from the lowest pair up.
+    # In this order: one coordinate an item; b_r / ω and w_r (n_raters each); logit ρ,
+    # logit f, log η; α; and the logarithms of the distances between neighbouring T_k,
+    # from the lowest pair up.
 
-    Attributes
-    ----------
-    n_items, n_raters, n_categories : int
-        Sizes.
-    middle : int
-        The threshold that is α: the one that halves the ratings best.
-    placed : ndarray of bool, shape (n_items,)
-        Items whose coordinate is v_i = u_i - Σ_k W_ik T_k; of the others it is
-        z_i = θ_i / √ρ.
-    between : ndarray, shape (n_items, n_categories - 1)
-        W: weights of the thresholds between an item's grades.
-    """
-
+    # n_items, n_raters, n_categories: sizes
     n_items: int
     n_raters: int
     n_categories: int
-    middle: int
+    middle: int  # the threshold that is α: the one that halves the ratings best
+    # (n_items,): items whose coordinate is v_i = u_i - Σ_k W_ik T_k; of the others it
+    # is z_i = θ_i / √ρ
     placed: NDArray[np.bool_] = field(compare=False, repr=False)
+    # (n_items, n_categories - 1): w: weights of the thresholds between an item's grades
     between: Floats = field(compare=False, repr=False)
 
     @classmethod
@@ -82,19 +73,7 @@ class Coordinates:
         return self.n_items + 2 * self.n_raters
 
     def middle_of_prior(self, noise_spread: float) -> Floats:
-        """Return a position, (n_dimensions,), where the density is not far from high.
-
-        Parameters
-        ----------
-        noise_spread : float
-            η there. Biases and noises are in the middle, the grades equally frequent,
-            and items where their ratings place them.
-
-        Returns
-        -------
-        ndarray, shape (n_dimensions,)
-            The position.
-        """
+        """Return a position, (n_dimensions,), where the density is near its peak."""
         position = np.zeros(self.n_dimensions)
         at = self.shares
         position[at] = 1.0
@@ -141,30 +120,16 @@ class Coordinates:
         return np.hstack([below, np.zeros((len(gap), 1)), above])
 
     def log_jacobian(self, place: Place) -> Floats:
-        """Return log |∂(θ, τ) / ∂(their coordinates)|, (n,), without items' √ρ.
-
-        z_i is a unit normal by its prior, whose density needs no Jacobian.
-        """
+        """Return log |∂(θ, τ) / ∂(their coordinates)|, (n,), without items' √ρ."""
+        # z_i is a unit normal by its prior, whose density needs no Jacobian.
         n_scaled = int(self.placed.sum()) + self.n_categories - 2
         return np.asarray(
             n_scaled * np.log(place.root[:, 0]) + np.log(place.gap).sum(axis=1)
         )
 
     def by_threshold(self, slope: Floats, place: Place) -> Floats:
-        """Turn slopes by T_k into slopes by the logarithms of their distances.
-
-        Parameters
-        ----------
-        slope : ndarray, shape (n, n_categories - 1)
-            Slopes by T_k.
-        place : Place
-            Where.
-
-        Returns
-        -------
-        ndarray, shape (n, n_categories - 2)
-            Slopes.
-        """
+        """Turn slopes by T_k into slopes by the logarithms of their distances."""
+        # slope (n, n_categories - 1) -> (n, n_categories - 2)
         # a distance below the middle moves all thresholds below it down
         down = -slope.cumsum(axis=1)[:, : self.middle]
         up = _from_right(slope)[:, self.middle + 1 :]

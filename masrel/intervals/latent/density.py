@@ -21,21 +21,11 @@ __all__ = ["LatentDensity"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LatentDensity:
-    """The posterior of the model on unbounded coordinates.
+    """The posterior of the model on unbounded coordinates."""
 
-    Attributes
-    ----------
-    coordinates : Coordinates
-        What a position holds.
-    cells : Cells
-        The ratings.
-    prior : LatentPrior
-        What is believed before.
-    """
-
-    coordinates: Coordinates
-    cells: Cells
-    prior: LatentPrior
+    coordinates: Coordinates  # what a position holds
+    cells: Cells  # the ratings
+    prior: LatentPrior  # what is believed before
 
     @classmethod
     def of(cls, codes: Codes, n_categories: int, prior: LatentPrior) -> "LatentDensity":
@@ -53,23 +43,15 @@ class LatentDensity:
 
     @property
     def counterweight(self) -> Floats:
-        """Slopes, (n_dimensions,), that take a spike off the density.
-
-        Where ρ goes to 0, all severities can go to one point, and the joint density
-        to infinity, on next to no volume. With these slopes added it has a mode.
-        """
+        """Slopes, (n_dimensions,), that take a spike off the density."""
+        # Where ρ goes to 0, all severities can go to one point, and the joint density
+        # to infinity, on next to no volume. With these slopes added it has a mode.
         slopes = np.zeros(self.n_dimensions)
         slopes[self.coordinates.shares] = 0.5 * self.coordinates.placed.sum()
         return slopes
 
     def middle_of_prior(self) -> Floats:
-        """Return a position, (n_dimensions,), where the density is not far from high.
-
-        Returns
-        -------
-        ndarray, shape (n_dimensions,)
-            As `Coordinates.middle_of_prior`.
-        """
+        """Return a position, (n_dimensions,), where the density is near its peak."""
         return self.coordinates.middle_of_prior(self.prior.noise_spread)
 
     def traits(self, position: Floats) -> Traits:
@@ -77,18 +59,8 @@ class LatentDensity:
         return self.coordinates.place(position).traits
 
     def log_density(self, position: Floats) -> Floats:
-        """Return the log posterior density of unbounded positions.
-
-        Parameters
-        ----------
-        position : ndarray, shape (n, n_dimensions)
-            Coordinates.
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            The logarithm, up to a constant; -inf where it is 0 in floating point.
-        """
+        """Return the log posterior density of unbounded positions."""
+        # position (n, n_dimensions) -> (n,)
         with np.errstate(all="ignore"):  # far out a cell has probability 0
             place = self.coordinates.place(position)
             density = self.cells.log_likelihood(place)
@@ -122,18 +94,8 @@ class LatentDensity:
         return np.asarray(density)
 
     def gradient(self, position: Floats) -> Floats:
-        """Return the gradient of `log_density`.
-
-        Parameters
-        ----------
-        position : ndarray, shape (n, n_dimensions)
-            Coordinates.
-
-        Returns
-        -------
-        ndarray, shape (n, n_dimensions)
-            Slopes; 0 where the density is 0 in floating point.
-        """
+        """Return the gradient of `log_density`."""
+        # position (n, n_dimensions) -> (n, n_dimensions)
         with np.errstate(all="ignore"):
             place = self.coordinates.place(position)
             slope = self._slopes(place, self.cells.slopes(place))

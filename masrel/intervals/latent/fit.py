@@ -28,24 +28,15 @@ _MOST_KAPPAS = 8_192  # positions where an integral over new items is computed
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LatentFit:
-    """The model after the data.
+    """The model after the data."""
 
-    Attributes
-    ----------
-    density : LatentDensity
-        What was sampled.
-    chains : Chains
-        Draws of kappa and of all in `parts`, in that order.
-    parts : dict of str to slice
-        Where "kappa", "severity", "bias", "noise", "thresholds", "shares" (of the
-        items, the biases and the noises) and "noise_spread" are among the quantities.
-    agreement : Agreement
-        Of two new raters, at the positions where kappa was computed.
-    """
-
-    density: LatentDensity
+    density: LatentDensity  # what was sampled
+    # draws of kappa and of all in `parts`, in that order
     chains: Chains = field(repr=False)
+    # where "kappa", "severity", "bias", "noise", "thresholds", "shares" (of the items,
+    # the biases and the noises) and "noise_spread" are among the quantities
     parts: dict[str, slice]
+    # of two new raters, at the positions where kappa was computed
     agreement: Agreement = field(repr=False)
 
     def draws(self, most: int) -> Traits:
@@ -62,31 +53,7 @@ def fit_latent(
     most_steps: int,
     progress: Callable[[int], object] | None,
 ) -> LatentFit:
-    """Sample the model until every reported quantity has converged.
-
-    Parameters
-    ----------
-    density : LatentDensity
-        The model with its data.
-    items : {"fixed", "random"}
-        Which kappa.
-    generator : Generator
-        Where randomness comes from.
-    n_steps, most_steps : int
-        Steps of every chain at first, and where it gives up.
-    progress : callable or None
-        Called with the number of steps just made.
-
-    Returns
-    -------
-    LatentFit
-        The chains.
-
-    Raises
-    ------
-    ConvergenceError
-        If it has not converged after `most_steps`.
-    """
+    """Sample the model until every reported quantity has converged."""
     agreement: list[Agreement] = []
 
     def quantities(positions: Floats) -> list[Floats]:

@@ -17,33 +17,15 @@ Proposal = Callable[[Floats, np.random.RandomState], tuple[Floats, Floats]]
 def hamiltonian_proposal(
     gradient: Callable[[Floats], Floats], root: Floats, step: float
 ) -> Proposal:
-    """Make a proposal for a Metropolis step of many walkers at once.
-
-    Each walker gets a momentum p ~ N(0, I) and a step length of its own, and moves by
-    leapfrog steps in coordinates whose covariance is about I.
-
-    Parameters
-    ----------
-    gradient : callable
-        Positions of shape (n, n_dimensions) to slopes of the log-density.
-    root : ndarray, shape (n_dimensions, n_dimensions)
-        A root R of the metric: R Rᵀ is about the covariance of the density.
-    step : float
-        Length of a leapfrog step. Each walker's is between 0.14 and 1.4 times that,
-        so that some steps are short enough wherever the density is sharp.
-
-    Returns
-    -------
-    callable
-        Positions and random state to new positions and the logarithms of what the
-        ratio of densities is multiplied by: exp(|p|²/2 - |p'|²/2). A leapfrog keeps
-        volume and is its own inverse but for the sign of p, so that this is all.
-
-    References
-    ----------
-    .. [1] Neal, R. M. (2011). MCMC using Hamiltonian dynamics. Handbook of Markov
-       Chain Monte Carlo, ch. 5, eqs. 5.18-5.20. https://arxiv.org/abs/1206.1901
-    """
+    """Make a proposal for a Metropolis step of many walkers at once."""
+    # Each walker gets a momentum p ~ N(0, I) and a step length of its own, and moves by
+    # leapfrog steps in coordinates whose covariance is about I.
+    # Takes root (n_dimensions, n_dimensions)
+    # Positions and random state to new positions and the logarithms of what the ratio
+    # of densities is multiplied by: exp(|p|²/2 - |p'|²/2). A leapfrog keeps volume and
+    # is its own inverse but for the sign of p, so that this is all.
+    # [1] Neal, R. M. (2011). MCMC using Hamiltonian dynamics. Handbook of Markov Chain
+    # Monte Carlo, ch. 5, eqs. 5.18-5.20. https://arxiv.org/abs/1206.1901
     leaps = int(np.ceil(JOURNEY / step))
 
     def propose(

@@ -32,18 +32,12 @@ _CHUNK = 400  # positions at a time
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Agreement:
-    """Agreement of two raters drawn anew, at n positions.
+    """Agreement of two raters drawn anew, at n positions."""
 
-    Attributes
-    ----------
-    observed, chance : ndarray, shape (n,)
-        P_o and P_e.
-    kappa : ndarray, shape (n,)
-        Fleiss' kappa; 0 where all ratings are in one category.
-    """
-
+    # observed, chance: (n,): p_o and P_e
     observed: Floats = field(compare=False, repr=False)
     chance: Floats = field(compare=False, repr=False)
+    # (n,): fleiss' kappa; 0 where all ratings are in one category
     kappa: Floats = field(compare=False, repr=False)
 
     @classmethod
@@ -59,18 +53,8 @@ class Agreement:
 
 
 def grade_probabilities(traits: Traits) -> Floats:
-    """Return how likely a new rater gives each grade to each of the items.
-
-    Parameters
-    ----------
-    traits : Traits
-        Unknowns at n positions.
-
-    Returns
-    -------
-    ndarray, shape (n, n_items, n_categories)
-        p_ik, by a trapezoid sum over w: within 1e-6 for η < 1.5.
-    """
+    """Return how likely a new rater gives each grade to each of the items."""
+    # -> (n, n_items, n_categories)
     total: Floats = np.zeros(0)
     for deviation, weight in _perceived(traits):
         away = traits.thresholds[:, None, :] - traits.severity[:, :, None]
@@ -80,50 +64,22 @@ def grade_probabilities(traits: Traits) -> Floats:
 
 
 def agreement_on_items(traits: Traits) -> Agreement:
-    """Return the agreement of two new raters on these items.
-
-    Parameters
-    ----------
-    traits : Traits
-        Unknowns at n positions.
-
-    Returns
-    -------
-    Agreement
-        At each of them.
-    """
+    """Return the agreement of two new raters on these items."""
     p = grade_probabilities(traits)
     shares = p.mean(axis=1)
     return Agreement.of(shares, ((p - shares[:, None]) ** 2).sum(axis=2).mean(axis=1))
 
 
 def agreement_on_new_items(traits: Traits) -> Agreement:
-    """Return the agreement of two new raters on new items.
-
-    Parameters
-    ----------
-    traits : Traits
-        Unknowns at n positions.
-
-    Returns
-    -------
-    Agreement
-        At each of them; the variance is an integral over θ ~ N(0, ρ), and in π_k θ
-        integrates out.
-
-    Notes
-    -----
-    p_k(θ) changes within s of each threshold, however small s is. The tanh-sinh
-    rule between neighbouring thresholds has points so close to both ends that it
-    follows [1]_: κ is within 1e-6 for η < 1 and ρ < 0.99, and within 1e-4
-    everywhere.
-
-    References
-    ----------
-    .. [1] Takahasi, H., Mori, M. (1974). Double exponential formulas for numerical
-       integration. Publ. RIMS, Kyoto University, 9(3), 721-741.
-       https://doi.org/10.2977/prims/1195192451
-    """
+    """Return the agreement of two new raters on new items."""
+    # At each of them; the variance is an integral over θ ~ N(0, ρ), and in π_k θ
+    # integrates out.
+    # p_k(θ) changes within s of each threshold, however small s is. The tanh-sinh rule
+    # between neighbouring thresholds has points so close to both ends that it follows
+    # [1]_: κ is within 1e-6 for η < 1 and ρ < 0.99, and within 1e-4 everywhere.
+    # [1] Takahasi, H., Mori, M. (1974). Double exponential formulas for numerical
+    # integration. Publ. RIMS, Kyoto University, 9(3), 721-741.
+    # https://doi.org/10.2977/prims/1195192451
     below = np.zeros(traits.thresholds.shape)
     for deviation, weight in _perceived(traits):
         whole = np.sqrt(traits.item_share + deviation**2)

@@ -19,42 +19,27 @@ __all__ = ["CellSlopes", "Cells"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CellSlopes:
-    """Slopes of the log-likelihood at n positions.
+    """Slopes of the log-likelihood at n positions."""
 
-    Attributes
-    ----------
-    item : ndarray, shape (n, n_items)
-        By u_i.
-    bias, log_noise : ndarray, shape (n, n_raters)
-        By b_r and log σ_r.
-    threshold : ndarray, shape (n, n_categories - 1)
-        By T_k.
-    """
-
-    item: Floats = field(compare=False, repr=False)
+    item: Floats = field(compare=False, repr=False)  # (n, n_items): by u_i
+    # bias, log_noise: (n, n_raters): by b_r and log σ_r
     bias: Floats = field(compare=False, repr=False)
     log_noise: Floats = field(compare=False, repr=False)
+    # (n, n_categories - 1): by T_k
     threshold: Floats = field(compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cells:
-    """Between which thresholds each rating fell.
+    """Between which thresholds each rating fell."""
 
-    Attributes
-    ----------
-    shape : tuple of int
-        Items and raters.
-    lower, upper : ndarray of int, shape (n_items * n_raters,)
-        Thresholds below and above, counting -∞ as 0 and ∞ as n_categories; a missing
-        rating fell between those two.
-    at_lower, at_upper : ndarray, shape (n_items * n_raters, n_categories - 1)
-        1 where a threshold is the lower, the upper end.
-    """
-
-    shape: tuple[int, int]
+    shape: tuple[int, int]  # items and raters
+    # lower, upper: (n_items * n_raters,): thresholds below and above, counting -∞ as 0
+    # and ∞ as n_categories; a missing rating fell between those two
     lower: NDArray[np.intp] = field(compare=False, repr=False)
     upper: NDArray[np.intp] = field(compare=False, repr=False)
+    # at_lower, at_upper: (n_items * n_raters, n_categories - 1): 1 where a threshold is
+    # the lower, the upper end
     at_lower: Floats = field(compare=False, repr=False)
     at_upper: Floats = field(compare=False, repr=False)
 

@@ -12,45 +12,30 @@ __all__ = ["Place"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Place:
-    """Positions taken apart, in units of c.
+    """Positions taken apart, in units of c."""
 
-    Attributes
-    ----------
-    item : ndarray, shape (n, n_items)
-        u_i = (θ_i - α) / c.
-    bias, noise : ndarray, shape (n, n_raters)
-        b_r / c and σ_r / c.
-    threshold : ndarray, shape (n, n_categories - 1)
-        T_k = (τ_k - α) / c.
-    own : ndarray, shape (n, n_items)
-        The items' coordinates.
-    b, w : ndarray, shape (n, n_raters)
-        b_r / ω and w_r.
-    logit_share, logit_fraction, log_spread : ndarray, shape (n, 1)
-        logit ρ, logit f, log η.
-    share, root, fraction, spread : ndarray, shape (n, 1)
-        ρ, c, f and η.
-    anchor : ndarray, shape (n, 1)
-        α.
-    gap : ndarray, shape (n, n_categories - 2)
-        Distances of neighbouring T_k.
-    """
-
-    item: Floats = field(compare=False, repr=False)
+    item: Floats = field(compare=False, repr=False)  # (n, n_items): u_i = (θ_i - α) / c
+    # bias, noise: (n, n_raters): b_r / c and σ_r / c
     bias: Floats = field(compare=False, repr=False)
     noise: Floats = field(compare=False, repr=False)
+    # (n, n_categories - 1): t_k = (τ_k - α) / c
     threshold: Floats = field(compare=False, repr=False)
+    # (n, n_items): the items' coordinates
     own: Floats = field(compare=False, repr=False)
+    # b, w: (n, n_raters): b_r / ω and w_r
     b: Floats = field(compare=False, repr=False)
     w: Floats = field(compare=False, repr=False)
+    # logit_share, logit_fraction, log_spread: (n, 1): logit ρ, logit f, log η
     logit_share: Floats = field(compare=False, repr=False)
     logit_fraction: Floats = field(compare=False, repr=False)
     log_spread: Floats = field(compare=False, repr=False)
+    # share, root, fraction, spread: (n, 1): ρ, c, f and η
     share: Floats = field(compare=False, repr=False)
     root: Floats = field(compare=False, repr=False)
     fraction: Floats = field(compare=False, repr=False)
     spread: Floats = field(compare=False, repr=False)
-    anchor: Floats = field(compare=False, repr=False)
+    anchor: Floats = field(compare=False, repr=False)  # (n, 1): α
+    # (n, n_categories - 2): distances of neighbouring T_k
     gap: Floats = field(compare=False, repr=False)
 
     @property

@@ -15,25 +15,15 @@ __all__ = ["PredictiveCheck", "predictive_checks", "replicate"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PredictiveCheck:
-    """One property of the ratings beside what the model would have made of it.
+    """One property of the ratings beside what the model would have made of it."""
 
-    Attributes
-    ----------
-    name : str
-        What it is.
-    observed : float
-        In the ratings.
-    low, high : float
-        Central 95 % of ratings made anew by the same raters on the same items.
-    p_value : float
-        Share of those that are larger, with half of those that are equal. Near 0 or 1
-        the model does not make ratings such as these.
-    """
-
-    name: str
-    observed: float
+    name: str  # what it is
+    observed: float  # in the ratings
+    # low, high: central 95 % of ratings made anew by the same raters on the same items
     low: float
     high: float
+    # share of those that are larger, with half of those that are equal. Near 0 or 1 the
+    # model does not make ratings such as these.
     p_value: float
 
 
@@ -43,27 +33,8 @@ def predictive_checks(
     categories: Sequence[object],
     generator: np.random.Generator,
 ) -> tuple[PredictiveCheck, ...]:
-    """Compare ratings with ratings made anew from the posterior.
-
-    Parameters
-    ----------
-    codes : ndarray of int, shape (n_items, n_raters)
-        The ratings, -1 where missing; they are missing in the new ones, too.
-    traits : Traits
-        Unknowns at n draws, each of which makes the ratings once.
-    categories : sequence
-        The scale.
-    generator : Generator
-        Where randomness comes from.
-
-    Returns
-    -------
-    tuple of PredictiveCheck
-        Share of agreeing pairs of raters on an item, ratings in each category,
-        standard deviations of raters' and of items' mean grades, the item on whose
-        grade raters differ most, and the rater who differs most from the items' means
-        (both as standard deviations of places in the scale).
-    """
+    """Compare ratings with ratings made anew from the posterior."""
+    # Takes codes (n_items, n_raters)
     made = np.where(codes >= 0, replicate(traits, generator), -1)
     n = len(categories)
     names = [
@@ -88,20 +59,8 @@ def predictive_checks(
 
 
 def replicate(traits: Traits, generator: np.random.Generator) -> NDArray[np.int64]:
-    """Let the same raters rate the same items anew.
-
-    Parameters
-    ----------
-    traits : Traits
-        Unknowns at n draws.
-    generator : Generator
-        Where randomness comes from.
-
-    Returns
-    -------
-    ndarray of int64, shape (n, n_items, n_raters)
-        Codes.
-    """
+    """Let the same raters rate the same items anew."""
+    # -> (n, n_items, n_raters)
     perceived = traits.severity[:, :, None] + traits.bias[:, None, :]
     noise = generator.standard_normal(perceived.shape)
     perceived = perceived + traits.noise[:, None, :] * noise

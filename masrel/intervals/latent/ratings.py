@@ -18,47 +18,20 @@ Items = Literal["fixed", "random"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LatentRatings:
-    """Checked ratings, without items or raters that have none.
+    """Checked ratings, without items or raters that have none."""
 
-    Attributes
-    ----------
-    codes : ndarray of int, shape (n_items, n_raters)
-        Positions in the scale, -1 where missing.
-    categories : tuple of str, int or float
-        The declared scale.
-    items, raters : tuple of str
-        Names: of the index and the columns of a DataFrame, or numbers from 1.
-    """
-
+    # (n_items, n_raters): positions in the scale, -1 where missing
     codes: Codes = field(compare=False, repr=False)
-    categories: tuple[Label, ...]
+    categories: tuple[Label, ...]  # the declared scale
+    # items, raters: names: of the index and the columns of a DataFrame, or numbers from
+    # 1
     items: tuple[str, ...]
     raters: tuple[str, ...]
 
     @classmethod
     def of(cls, ratings: object, categories: Sequence[Label] | None) -> "LatentRatings":
-        """Check ratings.
-
-        Parameters
-        ----------
-        ratings : nested sequence, array_like or DataFrame, shape (n_items, n_raters)
-            Labels or numbers; None and ``nan`` are missing.
-        categories : sequence of str, int or float, or None
-            The declared scale in order.
-
-        Returns
-        -------
-        LatentRatings
-            The ratings.
-
-        Raises
-        ------
-        ParameterError
-            If the order of the labels is not known, or there is one category.
-        RatingsError
-            If the ratings do not fit, have fewer than two items, no item rated by two
-            raters, or no disagreement.
-        """
+        """Check ratings."""
+        # Takes ratings (n_items, n_raters)
         coded = code_ratings(ratings, categories)
         if not coded.declared and isinstance(coded.categories[0], str):
             raise ParameterError(

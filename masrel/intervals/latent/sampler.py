@@ -31,28 +31,18 @@ class SmoothDensity(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Chains:
-    """Draws of several quantities, converged.
+    """Draws of several quantities, converged."""
 
-    Attributes
-    ----------
-    positions : ndarray, shape (n_chains, n_kept, n_dimensions)
-        Where the chains were after warm-up.
-    values : list of ndarray, shape (n_chains, at most n_kept)
-        The quantities there, or at some of them.
-    r_hat, ess : ndarray, shape (n_quantities,)
-        Rank-normalized split R-hat; effective size of the tails.
-    n_steps : int
-        Steps of every chain after warm-up, kept or not.
-    acceptance : float
-        Share of the proposals that were taken.
-    """
-
+    # (n_chains, n_kept, n_dimensions): where the chains were after warm-up
     positions: Floats = field(compare=False, repr=False)
+    # (n_chains, at most n_kept): the quantities there, or at some of them
     values: list[Floats] = field(compare=False, repr=False)
+    # r_hat, ess: (n_quantities,): rank-normalized split R-hat; effective size of the
+    # tails
     r_hat: Floats = field(compare=False, repr=False)
     ess: Floats = field(compare=False, repr=False)
-    n_steps: int
-    acceptance: float
+    n_steps: int  # steps of every chain after warm-up, kept or not
+    acceptance: float  # share of the proposals that were taken
 
 
 def sample_smooth(
@@ -66,45 +56,10 @@ def sample_smooth(
     most_steps: int,
     progress: Callable[[int], object] | None = None,
 ) -> Chains:
-    """Sample a density by Hamiltonian proposals until its quantities have converged.
-
-    Parameters
-    ----------
-    density : SmoothDensity
-        What is sampled.
-    quantities : callable
-        Positions of shape (n_chains, n_kept, n_dimensions) to values of each quantity,
-        (n_chains, at most n_kept), those of a chain in order and equally spaced.
-    start : ndarray, shape (n_chains, n_dimensions)
-        Where the chains begin.
-    covariance : ndarray, shape (n_dimensions, n_dimensions)
-        A first guess at that of the density.
-    generator : Generator
-        Where randomness comes from.
-    n_steps : int
-        Steps of every chain at first, after a warm-up of 300 that is thrown away.
-        Doubled until converged.
-    most_steps : int
-        Where it gives up.
-    progress : callable, optional
-        Called with the number of steps just made, warm-up included.
-
-    Returns
-    -------
-    Chains
-        R-hat below 1.01 and an effective size of at least 4 000 in the tails of
-        every quantity.
-
-    Raises
-    ------
-    ConvergenceError
-        If it has not converged after `most_steps`; says how many steps it needs.
-
-    Notes
-    -----
-    Metric and step length are fitted in warm-up and then stay: a chain that goes on
-    adapting has no law to converge to.
-    """
+    """Sample a density by Hamiltonian proposals until its quantities have converged."""
+    # Takes start (n_chains, n_dimensions), covariance (n_dimensions, n_dimensions)
+    # Metric and step length are fitted in warm-up and then stay: a chain that goes on
+    # adapting has no law to converge to.
     tell = progress or _silent
     walkers = _warm_up(density, start, covariance, generator, tell)
     kept = np.empty((len(start), 0, start.shape[1]))

@@ -26,65 +26,25 @@ _SHOWN = 2_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Question:
-    """What was asked of the model, checked.
+    """What was asked of the model, checked."""
 
-    Attributes
-    ----------
-    ratings : LatentRatings
-        The data.
-    items : {"fixed", "random"}
-        Which kappa.
-    target : {"raters", "both"}
-        The population it speaks of.
-    level : float
-        Level of the intervals.
-    n_steps, most_steps : int
-        Steps of every chain at first, and where it gives up.
-    keep_chains : bool
-        Whether the result holds the draws.
-    progress : callable or None
-        Called with the number of steps just made.
-    seed : int or None
-        The seed to be recorded.
-    """
-
-    ratings: LatentRatings
-    items: Items
-    target: Target
-    level: float
+    ratings: LatentRatings  # the data
+    items: Items  # which kappa
+    target: Target  # the population it speaks of
+    level: float  # level of the intervals
+    # n_steps, most_steps: steps of every chain at first, and where it gives up
     n_steps: int
     most_steps: int
-    keep_chains: bool
+    keep_chains: bool  # whether the result holds the draws
+    # called with the number of steps just made
     progress: Callable[[int], object] | None = field(compare=False, repr=False)
-    seed: int | None
+    seed: int | None  # the seed to be recorded
 
 
 def summarize(
     question: Question, prior: LatentPrior, seed: int, other: LatentTrait | None
 ) -> LatentTrait:
-    """Sample the model and put its result together.
-
-    Parameters
-    ----------
-    question : Question
-        What was asked.
-    prior : LatentPrior
-        What is believed before the data.
-    seed : int
-        Where this prior's randomness comes from.
-    other : LatentTrait or None
-        The result under another prior.
-
-    Returns
-    -------
-    LatentTrait
-        The result.
-
-    Raises
-    ------
-    ConvergenceError
-        If the sampler has not converged.
-    """
+    """Sample the model and put its result together."""
     known, generator = question.ratings, np.random.default_rng(seed)
     fit = fit_latent(
         LatentDensity.of(known.codes, len(known.categories), prior),

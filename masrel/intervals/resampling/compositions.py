@@ -11,45 +11,13 @@ __all__ = ["compositions", "n_compositions"]
 
 
 def n_compositions(n: int, n_members: int) -> int:
-    """Count the distinct resamples of n draws.
-
-    Parameters
-    ----------
-    n : int
-        How many are drawn.
-    n_members : int
-        From how many distinct ones.
-
-    Returns
-    -------
-    int
-        C(n + m - 1, m - 1).
-
-    Examples
-    --------
-    >>> n_compositions(4, 4), n_compositions(8, 8)
-    (35, 6435)
-    """
+    """Count the distinct resamples of n draws."""
     return math.comb(n + n_members - 1, n_members - 1)
 
 
 def compositions(n: int, shares: Floats) -> tuple[NDArray[np.int32], Floats]:
-    """Enumerate the distinct resamples of n draws.
-
-    Parameters
-    ----------
-    n : int
-        How many are drawn.
-    shares : ndarray, shape (n_members,)
-        Probability of each member at a draw, above 0.
-
-    Returns
-    -------
-    counts : ndarray of int32, shape (n_resamples, n_members)
-        How often each member is drawn, every possibility once.
-    probabilities : ndarray, shape (n_resamples,)
-        Its multinomial probability.
-    """
+    """Enumerate the distinct resamples of n draws."""
+    # shares (n_members,) -> (n_resamples, n_members), (n_resamples,)
     # In logs, so that no n over- or underflows: Σ t log share - log t!.
     steps = np.log(np.maximum(np.arange(n + 1), 1))
     factorials = np.cumsum(steps, dtype=np.longdouble).astype(np.float64)

@@ -17,17 +17,10 @@ _SPAN = 1 << 18  # integers that the sums span at most
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Control:
-    """The sum of integer scores of what is drawn.
+    """The sum of integer scores of what is drawn."""
 
-    Attributes
-    ----------
-    least : int
-        The least sum of the table.
-    upto : ndarray, shape (n_sums,)
-        The probability of a sum at most as large, for one after the other.
-    """
-
-    least: int
+    least: int  # the least sum of the table
+    # (n_sums,): the probability of a sum at most as large, for one after the other
     upto: Floats = field(compare=False, repr=False)
 
     def cut(self, position: float) -> tuple[int, float]:
@@ -39,44 +32,16 @@ class Control:
 
 
 def control_of(scores: Integers, shares: Floats, n: int) -> Control:
-    """Return the distribution of a sum of scores.
-
-    Parameters
-    ----------
-    scores : ndarray of int64, shape (n_members,)
-        Score of each member.
-    shares : ndarray, shape (n_members,)
-        Probability of each at a draw.
-    n : int
-        How many are drawn.
-
-    Returns
-    -------
-    Control
-        Probabilities within 1e-12.
-    """
+    """Return the distribution of a sum of scores."""
+    # Takes scores (n_members,), shares (n_members,)
     lowest = int(scores.min())
     least, found = line_of_sums(scores - lowest, shares, n)
     return Control(least=least + n * lowest, upto=np.cumsum(found))
 
 
 def whole_scores(slopes: Floats, spread: float, n: int) -> Integers:
-    """Round slopes to integers that are fine enough, and few enough.
-
-    Parameters
-    ----------
-    slopes : ndarray, shape (n,)
-        How fast an estimate moves.
-    spread : float
-        The standard deviation of its linear part over one draw, above 0.
-    n : int
-        How many are drawn.
-
-    Returns
-    -------
-    ndarray of int64, shape (n,)
-        The slopes on a scale that fits a table of their sums.
-    """
+    """Round slopes to integers that are fine enough, and few enough."""
+    # slopes (n,) -> (n,)
     # Fine enough is a part of the spread; the sums span 17 of their deviations.
     scale = min(_FINE, _SPAN / (17.0 * math.sqrt(n))) / spread
     return np.asarray(np.rint(slopes * scale), dtype=np.int64)

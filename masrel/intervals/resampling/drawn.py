@@ -15,35 +15,23 @@ __all__ = ["Drawn"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drawn:
-    """Values that were drawn, with a control whose distribution is known.
+    """Values that were drawn, with a control whose distribution is known."""
 
-    Attributes
-    ----------
-    values : ndarray, shape (n_values,)
-        As they were drawn, none undefined.
-    ordered : ndarray, shape (n_values,)
-        The same, ascending.
-    control : Control or None
-        A linear function of the resample that goes with the values.
-    scores : ndarray of int64, shape (n_values,), or None
-        Its values on the same resamples.
+    # Let the values be at most x in a share F of the resamples, and the control at most
+    # c in a share H. Of H the expected share is known, and so how far this sample is
+    # off: F less β times that is a better share, with β the slope of the one indicator
+    # on the other [1]_. The quantile at p is then the quantile of the sample at p + β
+    # (H - E H).
+    # [1] Davison, A. C., Hinkley, D. V. (1997). Bootstrap Methods and their
+    # Application, section 9.3 (control methods).
 
-    Notes
-    -----
-    Let the values be at most x in a share F of the resamples, and the control at most c
-    in a share H. Of H the expected share is known, and so how far this sample is off:
-    F less β times that is a better share, with β the slope of the one indicator on the
-    other [1]_. The quantile at p is then the quantile of the sample at p + β (H - E H).
-
-    References
-    ----------
-    .. [1] Davison, A. C., Hinkley, D. V. (1997). Bootstrap Methods and their
-       Application, section 9.3 (control methods).
-    """
-
+    # (n_values,): as they were drawn, none undefined
     values: Floats = field(compare=False, repr=False)
+    # (n_values,): the same, ascending
     ordered: Floats = field(compare=False, repr=False)
+    # A linear function of the resample that goes with the values
     control: Control | None = field(default=None, compare=False, repr=False)
+    # (n_values,): its values on the same resamples
     scores: Integers | None = field(default=None, compare=False, repr=False)
 
     @property
@@ -63,22 +51,7 @@ class Drawn:
         return share - self._missed(below, share)[0]
 
     def error(self, position: float, pull: float, value: float) -> float:
-        """Return the Monte Carlo error of a quantile.
-
-        Parameters
-        ----------
-        position : float
-            Its position.
-        pull : float
-            How fast the position moves with the share of resamples below `value`.
-        value : float
-            The estimate.
-
-        Returns
-        -------
-        float
-            The standard error of the position times the slope of the quantile there.
-        """
+        """Return the Monte Carlo error of a quantile."""
         miss, rest = self._miss(position)
         if pull:
             below = self._indicator(value)

@@ -18,21 +18,12 @@ __all__ = ["Effort", "draw_resamples"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Effort:
-    """How many resamples are drawn.
+    """How many resamples are drawn."""
 
-    Attributes
-    ----------
-    n_resamples : int
-        How many at least.
-    tolerance : float or None
-        The largest Monte Carlo error of an end; None for any.
-    most_resamples : int
-        How many at most.
-    """
-
-    n_resamples: int
+    n_resamples: int  # how many at least
+    # the largest Monte Carlo error of an end; None for any
     tolerance: float | None = None
-    most_resamples: int
+    most_resamples: int  # how many at most
 
     def check(self) -> None:
         """Raise ParameterError if a number is out of its range."""
@@ -71,29 +62,7 @@ def draw_resamples(
     effort: Effort,
     generator: np.random.Generator,
 ) -> Resamples:
-    """Draw resamples, more of them while an end is less certain than asked for.
-
-    Parameters
-    ----------
-    sampler : Sampler
-        How they are drawn.
-    rule : Rule
-        What is asked of them.
-    effort : Effort
-        How many are drawn.
-    generator : Generator
-        Where randomness comes from.
-
-    Returns
-    -------
-    Resamples
-        As many values, less the undefined ones.
-
-    Raises
-    ------
-    ConvergenceError
-        If the tolerance takes more; the message says how many.
-    """
+    """Draw resamples, more of them while an end is less certain than asked for."""
     values, scores = sampler.batches(effort.n_resamples, generator)
     while True:
         found = _resamples(sampler, values, scores)

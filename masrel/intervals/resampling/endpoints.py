@@ -16,64 +16,31 @@ Kind = Literal["percentile", "basic", "bca", "studentized"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ends:
-    """The ends of an interval.
+    """The ends of an interval."""
 
-    Attributes
-    ----------
-    low, high : float
-        Where it begins and ends.
-    errors : tuple of float or None
-        Monte Carlo errors of both; None if nothing was drawn.
-    """
-
+    # low, high: where it begins and ends
     low: float
     high: float
+    # monte Carlo errors of both; None if nothing was drawn
     errors: tuple[float, float] | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rule:
-    """How the ends come from resamples.
+    """How the ends come from resamples."""
 
-    Attributes
-    ----------
-    kind : {"percentile", "basic", "bca", "studentized"}
-        Which way.
-    level : float
-        Nominal level.
-    value : float
-        The estimate.
-    error : float
-        Its standard error, where it is studentized.
-    skew : float
-        The acceleration of BCa.
+    # [1] Efron, B., Tibshirani, R. J. (1993). An Introduction to the Bootstrap.
+    # [2] Davison, A. C., Hinkley, D. V. (1997). Bootstrap Methods and their
+    # Application.
 
-    References
-    ----------
-    .. [1] Efron, B., Tibshirani, R. J. (1993). An Introduction to the Bootstrap.
-    .. [2] Davison, A. C., Hinkley, D. V. (1997). Bootstrap Methods and their
-       Application.
-    """
-
-    kind: Kind
-    level: float
-    value: float
-    error: float = math.nan
-    skew: float = 0.0
+    kind: Kind  # which way
+    level: float  # nominal level
+    value: float  # the estimate
+    error: float = math.nan  # its standard error, where it is studentized
+    skew: float = 0.0  # the acceleration of BCa
 
     def ends(self, source: Enumerated | Drawn) -> Ends | None:
-        """Return the ends.
-
-        Parameters
-        ----------
-        source : Enumerated or Drawn
-            Values of resamples; how many standard errors each is off for "studentized".
-
-        Returns
-        -------
-        Ends or None
-            None if BCa has no bias to go by: all resamples lie on one side.
-        """
+        """Return the ends."""
         tail = 0.5 * (1.0 - self.level)
         levels, pulls = (tail, 1.0 - tail), (0.0, 0.0)
         if self.kind == "bca":
@@ -120,32 +87,8 @@ class Rule:
 
 
 def bca_levels(level: float, share: float, skew: float) -> tuple[float, float]:
-    """Return which quantiles of the resamples are the ends of a BCa interval.
-
-    Parameters
-    ----------
-    level : float
-        Nominal level.
-    share : float
-        Probability of a resample below the estimate, ties half, within (0, 1).
-    skew : float
-        The acceleration.
-
-    Returns
-    -------
-    tuple of float
-        Positions of the low and the high end.
-
-    References
-    ----------
-    .. [1] Efron, B., Tibshirani, R. J. (1993). An Introduction to the Bootstrap,
-       ch. 14.
-
-    Examples
-    --------
-    >>> [round(at, 6) for at in bca_levels(0.95, 0.5, 0.0)]
-    [0.025, 0.975]
-    """
+    """Return which quantiles of the resamples are the ends of a BCa interval."""
+    # [1] Efron, B., Tibshirani, R. J. (1993). An Introduction to the Bootstrap, ch. 14.
     normal = NormalDist()
     bias = normal.inv_cdf(share)  # z0, (14.14) of [1]
     tail = 0.5 * (1.0 - level)

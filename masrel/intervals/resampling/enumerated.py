@@ -13,36 +13,19 @@ _ROUNDING = 1e-12  # values and probabilities nearer than this are the same
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Enumerated:
-    """All values there are, with their probabilities.
+    """All values there are, with their probabilities."""
 
-    Attributes
-    ----------
-    values : ndarray, shape (n_values,)
-        Ascending and distinct.
-    weights : ndarray, shape (n_values,)
-        Their probabilities, which sum to 1.
-    upto : ndarray, shape (n_values,)
-        The probability of a value at most as large.
-    """
-
+    # (n_values,): ascending and distinct
     values: Floats = field(compare=False, repr=False)
+    # (n_values,): their probabilities, which sum to 1
     weights: Floats = field(compare=False, repr=False)
+    # (n_values,): the probability of a value at most as large
     upto: Floats = field(compare=False, repr=False)
 
     @classmethod
     def of(cls, values: Floats, weights: Floats) -> "Enumerated":
-        """Sort values and put equal ones together.
-
-        Parameters
-        ----------
-        values, weights : ndarray, shape (n_resamples,)
-            Values, none undefined, and weights of any sum.
-
-        Returns
-        -------
-        Enumerated
-            Distinct values.
-        """
+        """Sort values and put equal ones together."""
+        # Takes values, weights (n_resamples,)
         order = np.argsort(values)
         values, weights = values[order], weights[order] / weights.sum()
         if values.size:
@@ -67,32 +50,11 @@ class Enumerated:
 
 
 def quantile_of(values: Floats, upto: Floats, position: float) -> float:
-    """Return the least value whose probability adds up to a position.
-
-    Where it adds up to just that, any value up to the next would do: it is the middle
-    of the two, so that mirrored values have mirrored quantiles. This is definition 2 of
-    Hyndman and Fan (1996), https://doi.org/10.2307/2684934.
-
-    Parameters
-    ----------
-    values : ndarray, shape (n_values,)
-        Ascending.
-    upto : ndarray, shape (n_values,)
-        The probability of a value at most as large.
-    position : float
-        A probability.
-
-    Returns
-    -------
-    float
-        The quantile.
-
-    Examples
-    --------
-    >>> values, upto = np.array([1.0, 2.0, 4.0]), np.array([0.25, 0.75, 1.0])
-    >>> [quantile_of(values, upto, at) for at in (0.2, 0.25, 0.3, 0.75)]
-    [1.0, 1.5, 2.0, 3.0]
-    """
+    """Return the least value whose probability adds up to a position."""
+    # Where it adds up to just that, any value up to the next would do: it is the middle
+    # of the two, so that mirrored values have mirrored quantiles. This is definition 2
+    # of Hyndman and Fan (1996), https://doi.org/10.2307/2684934.
+    # Takes values (n_values,), upto (n_values,)
     last = values.size - 1
     at = min(int(np.searchsorted(upto, position - _ROUNDING)), last)
     value = float(values[at])
@@ -102,17 +64,6 @@ def quantile_of(values: Floats, upto: Floats, position: float) -> float:
 
 
 def near(value: float) -> tuple[float, float]:
-    """Return between which numbers only rounding sets a value apart.
-
-    Parameters
-    ----------
-    value : float
-        Any value.
-
-    Returns
-    -------
-    tuple of float
-        A little less and a little more.
-    """
+    """Return between which numbers only rounding sets a value apart."""
     off = _ROUNDING * max(1.0, abs(value))
     return value - off, value + off

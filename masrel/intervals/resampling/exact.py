@@ -27,28 +27,7 @@ _BLOCK = 1 << 14  # numbers held at once while values are computed
 def enumerate_resamples(
     pool: Pool, statistic: Callable[[Floats], Floats] | None, *, insist: bool
 ) -> Resamples | None:
-    """Take every distinct resample once, with its probability.
-
-    Parameters
-    ----------
-    pool : Pool
-        What is resampled.
-    statistic : callable or None
-        How often each member is drawn, (n_resamples, n_members), to values
-        (n_resamples,); None for the coefficient, a function of sums of features.
-    insist : bool
-        Whether to say why not, rather than None, if there are too many.
-
-    Returns
-    -------
-    Resamples or None
-        Nothing of it is random.
-
-    Raises
-    ------
-    ParameterError
-        If there are too many, and it was insisted on.
-    """
+    """Take every distinct resample once, with its probability."""
     n_distinct = n_compositions(pool.n, pool.times.size)
     if n_distinct > _FEW and statistic is None:
         found = _merged(pool, n_distinct, insist)

@@ -21,34 +21,7 @@ __all__ = ["pool_of", "rule_of"]
 def pool_of(
     case: Case, clusters: Sequence[object] | NDArray[Any] | None
 ) -> tuple[Pool, tuple[str, ...], str]:
-    """Find out what is resampled.
-
-    Parameters
-    ----------
-    case : Case
-        The question.
-    clusters : sequence or None
-        Label of the cluster each item belongs to.
-
-    Returns
-    -------
-    Pool
-        The units that are drawn.
-    tuple of str
-        What to say of them.
-    str
-        Their name where it is not that of the target; empty elsewhere.
-
-    Raises
-    ------
-    ParameterError
-        If these units cannot be resampled.
-
-    Warns
-    -----
-    SmallSampleWarning
-        Below 16 items or clusters, or 5 raters.
-    """
+    """Find out what is resampled."""
     if case.target == "both":
         raise ParameterError(
             'target: the bootstrap resamples "items" or "raters"; for both use the '
@@ -67,22 +40,7 @@ def pool_of(
 
 
 def rule_of(case: Case, pool: Pool, kind: Kind) -> Rule:
-    """Prepare how ends come from resamples.
-
-    Parameters
-    ----------
-    case : Case
-        The question.
-    pool : Pool
-        What is resampled.
-    kind : {"percentile", "basic", "bca", "studentized"}
-        The kind of ends.
-
-    Returns
-    -------
-    Rule
-        With the skew of BCa, or the error of the estimate to studentize by.
-    """
+    """Prepare how ends come from resamples."""
     rule = Rule(kind=kind, level=case.level, value=case.value)
     if math.isnan(case.value):
         return rule

@@ -16,40 +16,20 @@ _TURNS = 50
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lattice:
-    """Rows as integer steps: a sum of n rows is n · origin + steps @ basis, exactly.
+    """Rows as integer steps: a sum of n rows is n · origin + steps @ basis, exactly."""
 
-    Attributes
-    ----------
-    steps : ndarray of int64, shape (n_rows, n_dimensions)
-        Where each row is; the least of every coordinate is 0.
-    origin : ndarray of int64, shape (n_features,)
-        Numerators of the features at 0.
-    basis : ndarray of int64, shape (n_dimensions, n_features)
-        What a step adds to the numerators.
-    denominators : ndarray, shape (n_features,)
-        What the numerators are divided by.
-    """
-
+    # (n_rows, n_dimensions): where each row is; the least of every coordinate is 0
     steps: Integers = field(compare=False, repr=False)
+    # (n_features,): numerators of the features at 0
     origin: Integers = field(compare=False, repr=False)
+    # (n_dimensions, n_features): what a step adds to the numerators
     basis: Integers = field(compare=False, repr=False)
+    # (n_features,): what the numerators are divided by
     denominators: Floats = field(compare=False, repr=False)
 
     def sums(self, steps: Integers | Floats, n: int) -> Floats:
-        """Return sums of features.
-
-        Parameters
-        ----------
-        steps : ndarray of integers, shape (..., n_dimensions)
-            Sums of steps.
-        n : int
-            Over how many rows.
-
-        Returns
-        -------
-        ndarray, shape (..., n_features)
-            The sums, each rounded once.
-        """
+        """Return sums of features."""
+        # steps (..., n_dimensions) -> (..., n_features)
         whole: Floats = steps.astype(np.float64) @ self.basis.astype(np.float64)
         whole += n * self.origin
         whole /= self.denominators
@@ -57,21 +37,8 @@ class Lattice:
 
 
 def grid_of(rows: Floats, n: int) -> Lattice | None:
-    """Take the numerators of the features themselves as steps.
-
-    Parameters
-    ----------
-    rows : ndarray, shape (n_rows, n_features)
-        Rows of rational numbers.
-    n : int
-        How many rows are added at most.
-
-    Returns
-    -------
-    Lattice or None
-        One dimension for each feature that is not the same in all rows: more than
-        `lattice_of` finds, but found at once. None as there.
-    """
+    """Take the numerators of the features themselves as steps."""
+    # Takes rows (n_rows, n_features)
     found = numerators_of(rows, n)
     if found is None:
         return None
@@ -87,23 +54,8 @@ def grid_of(rows: Floats, n: int) -> Lattice | None:
 
 
 def lattice_of(rows: Floats, shares: Floats, n: int) -> Lattice | None:
-    """Find the lattice of distinct rows, with short steps.
-
-    Parameters
-    ----------
-    rows : ndarray, shape (n_rows, n_features)
-        Rows of rational numbers.
-    shares : ndarray, shape (n_rows,)
-        How often each occurs, in parts of 1.
-    n : int
-        How many rows are added at most.
-
-    Returns
-    -------
-    Lattice or None
-        None if some features are not rational, their numerators are too large, or
-        the rows are too many or span too many dimensions.
-    """
+    """Find the lattice of distinct rows, with short steps."""
+    # Takes rows (n_rows, n_features), shares (n_rows,)
     if len(rows) > _ROWS:
         return None
     found = numerators_of(rows, n)

@@ -17,28 +17,8 @@ _WHOLE = 1e-13  # of a number: as near to an integer as that it is one, but for 
 
 
 def numerators_of(rows: Floats, n: int) -> tuple[Integers, Floats] | None:
-    """Write rational numbers as integers over one denominator a column.
-
-    Parameters
-    ----------
-    rows : ndarray, shape (n_rows, n_features)
-        Numbers that are rational but for rounding.
-    n : int
-        How many rows are added at most.
-
-    Returns
-    -------
-    tuple of ndarray, or None
-        Numerators, of the same shape, and denominators, (n_features,); None if some
-        are not rational, or if sums of the numerators are no integers in floats.
-
-    Examples
-    --------
-    >>> rows = np.array([[0.5, 1.0], [1 / 3, 0.0]])
-    >>> numerators, denominators = numerators_of(rows, 9)
-    >>> numerators.tolist(), denominators.tolist()
-    ([[3, 1], [2, 0]], [6.0, 1.0])
-    """
+    """Write rational numbers as integers over one denominator a column."""
+    # Takes rows (n_rows, n_features)
     denominators = _denominators(rows)
     if denominators is None:
         return None

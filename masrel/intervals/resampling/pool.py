@@ -22,23 +22,16 @@ _FEW = 2_000  # rows that are sorted column by column
 
 @dataclass(frozen=True, kw_only=True)
 class Pool:
-    """Distinct members, of which as many are drawn as there are.
+    """Distinct members, of which as many are drawn as there are."""
 
-    Attributes
-    ----------
-    times : ndarray of int64, shape (n_members,)
-        How often each is there.
-    rows : ndarray, shape (n_members, n_features), or None
-        Features of each, where a resample is a sum of them; None for raters.
-    sums : callable
-        How often each is drawn, (..., n_members), to sums (..., n_features).
-    values : callable
-        Sums (..., n_features) to the coefficient (...), ``nan`` where undefined.
-    """
-
+    # (n_members,): how often each is there
     times: Integers = field(compare=False, repr=False)
+    # (n_members, n_features): features of each, where a resample is a sum of them; None
+    # for raters
     rows: Floats | None = field(compare=False, repr=False)
+    # how often each is drawn, (..., n_members), to sums (..., n_features)
     sums: Callable[[Floats], Floats]
+    # sums (..., n_features) to the coefficient (...), ``nan`` where undefined
     values: Callable[[Floats], Floats]
 
     @cached_property
@@ -55,10 +48,8 @@ class Pool:
 
     @cached_property
     def directions(self) -> tuple[Floats, Floats]:
-        """An orthogonal basis of the rows less their mean, and the rows in it.
-
-        Shapes (n_directions, n_features) and (n_directions, n_members).
-        """
+        """An orthogonal basis of the rows less their mean, and the rows in it."""
+        # Shapes (n_directions, n_features) and (n_directions, n_members).
         if self.rows is None:
             raise TypeError("raters have no features")
         centred = self.rows - self.shares @ self.rows
@@ -74,18 +65,8 @@ class Pool:
         return np.asarray(self.times / self.n)
 
     def of_counts(self, counts: Floats) -> Floats:
-        """Return the coefficient of resamples.
-
-        Parameters
-        ----------
-        counts : ndarray, shape (n_resamples, n_members)
-            How often each member is drawn.
-
-        Returns
-        -------
-        ndarray, shape (n_resamples,)
-            Values, ``nan`` where undefined.
-        """
+        """Return the coefficient of resamples."""
+        # counts (n_resamples, n_members) -> (n_resamples,)
         return self.values(self.sums(counts))
 
     def without(self) -> Floats:
@@ -96,41 +77,13 @@ class Pool:
 
 
 def item_pool(case: Case) -> Pool:
-    """Return the items, those with equal features together.
-
-    Parameters
-    ----------
-    case : Case
-        A question.
-
-    Returns
-    -------
-    Pool
-        Distinct rows of features.
-    """
+    """Return the items, those with equal features together."""
     return _pool(case, case.rows, case.times)
 
 
 def cluster_pool(case: Case, clusters: Sequence[object] | NDArray[Any]) -> Pool:
-    """Return clusters of items, those with equal sums of features together.
-
-    Parameters
-    ----------
-    case : Case
-        A question.
-    clusters : sequence, shape (n_items,)
-        To which cluster each row of the ratings belongs.
-
-    Returns
-    -------
-    Pool
-        Distinct sums of the features of a cluster's items.
-
-    Raises
-    ------
-    ParameterError
-        If there is not one label for each row of the ratings.
-    """
+    """Return clusters of items, those with equal sums of features together."""
+    # Takes clusters (n_items,)
     of, n_clusters = _numbered(case, clusters)
     codes = case.coded.codes
     sums = np.zeros((n_clusters, case.rows.shape[1]))
@@ -170,23 +123,7 @@ def _numbered(
 
 
 def rater_pool(case: Case) -> Pool:
-    """Return the raters, of whom none is paired with a copy of itself.
-
-    Parameters
-    ----------
-    case : Case
-        A question about a coefficient whose raters can be resampled.
-
-    Returns
-    -------
-    Pool
-        Every rater once: two who always agree are still two.
-
-    Raises
-    ------
-    ParameterError
-        If raters of the coefficient cannot be resampled.
-    """
+    """Return the raters, of whom none is paired with a copy of itself."""
     fewest, most = case.entry.n_raters
     if case.kernel.rater_sums is None or most == fewest:
         raise ParameterError(

@@ -12,27 +12,13 @@ __all__ = ["Resamples"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Resamples:
-    """Values of a statistic over resamples.
+    """Values of a statistic over resamples."""
 
-    Attributes
-    ----------
-    source : Enumerated or Drawn
-        The defined values.
-    n_resamples : int or None
-        How many were drawn; None if these are all.
-    n_undefined : int
-        How many are undefined, of those drawn or of the distinct ones.
-    words : str
-        What they are.
-    notes : tuple of str
-        What the reader must know of them.
-    """
-
-    source: Enumerated | Drawn = field(compare=False, repr=False)
-    n_resamples: int | None
-    n_undefined: int
-    words: str
-    notes: tuple[str, ...] = ()
+    source: Enumerated | Drawn = field(compare=False, repr=False)  # the defined values
+    n_resamples: int | None  # how many were drawn; None if these are all
+    n_undefined: int  # how many are undefined, of those drawn or of the distinct ones
+    words: str  # what they are
+    notes: tuple[str, ...] = ()  # what the reader must know of them
 
     @property
     def ascending(self) -> Floats:

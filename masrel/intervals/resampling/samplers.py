@@ -27,22 +27,14 @@ Batch = tuple[Floats, Integers | None]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sampler:
-    """How resamples of one pool are drawn.
+    """How resamples of one pool are drawn."""
 
-    Attributes
-    ----------
-    draw : callable
-        A number of resamples and a generator to a batch. What is drawn does not depend
-        on how it is cut into batches.
-    control : Control or None
-        The distribution of the scores; None where there are none.
-    width : int
-        Numbers a resample takes while it is drawn.
-    """
-
+    # A number of resamples and a generator to a batch. What is drawn does not depend on
+    # how it is cut into batches.
     draw: Callable[[int, np.random.Generator], Batch]
+    # the distribution of the scores; None where there are none
     control: Control | None = field(default=None, repr=False)
-    width: int
+    width: int  # numbers a resample takes while it is drawn
 
     def batches(self, n_resamples: int, generator: np.random.Generator) -> Batch:
         """Draw resamples, a few at a time."""
@@ -57,20 +49,7 @@ class Sampler:
 
 
 def sampler_of(pool: Pool, statistic: Callable[[Floats], Floats] | None) -> Sampler:
-    """Choose how resamples of a pool are drawn.
-
-    Parameters
-    ----------
-    pool : Pool
-        What is resampled.
-    statistic : callable or None
-        As of `enumerate_resamples`.
-
-    Returns
-    -------
-    Sampler
-        The faster of two, which draw different resamples from the same distribution.
-    """
+    """Choose how resamples of a pool are drawn."""
     slopes = _slopes(pool)
     n, n_members = pool.n, pool.times.size
     at_once = max(1, int(math.log(_TABLE, max(n, 2)) + 1e-9))

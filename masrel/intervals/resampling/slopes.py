@@ -16,33 +16,15 @@ _NO_SPREAD = 1e-9  # of the standard error of the estimate: rounding, not spread
 
 
 def influence(pool: Pool, counts: Floats) -> Floats:
-    """Return how fast the coefficient moves with one more of each member.
-
-    Parameters
-    ----------
-    pool : Pool
-        What is resampled.
-    counts : ndarray, shape (n_resamples, n_members)
-        How often each member is drawn.
-
-    Returns
-    -------
-    ndarray, shape (n_resamples, n_members)
-        Derivatives of the coefficient, less the same for every member.
-
-    Notes
-    -----
-    The derivative of an analytic f at x is the imaginary part of f(x + ih) / h, to
-    the last digits, because nothing is subtracted [1]_. Items are moved along an
-    orthogonal basis of their features, which has few directions; raters one by one. Of
-    a member that is not drawn it may be ``nan``, or no derivative at all.
-
-    References
-    ----------
-    .. [1] Squire, W., Trapp, G. (1998). Using complex variables to estimate derivatives
-       of real functions. SIAM Review, 40(1), 110-112.
-       https://doi.org/10.1137/S003614459631241X
-    """
+    """Return how fast the coefficient moves with one more of each member."""
+    # counts (n_resamples, n_members) -> (n_resamples, n_members)
+    # The derivative of an analytic f at x is the imaginary part of f(x + ih) / h, to
+    # the last digits, because nothing is subtracted [1]_. Items are moved along an
+    # orthogonal basis of their features, which has few directions; raters one by one.
+    # Of a member that is not drawn it may be ``nan``, or no derivative at all.
+    # [1] Squire, W., Trapp, G. (1998). Using complex variables to estimate derivatives
+    # of real functions. SIAM Review, 40(1), 110-112.
+    # https://doi.org/10.1137/S003614459631241X
     if pool.rows is None:
         return _slopes(lambda at: pool.values(pool.sums(at)), counts, np.eye(pool.n))
     directions, along = pool.directions
@@ -72,18 +54,8 @@ def _slopes(
 
 
 def standard_errors(pool: Pool, counts: Floats) -> Floats:
-    """Return the delta-method standard error of the coefficient on each resample.
-
-    Parameters
-    ----------
-    pool, counts
-        As of `influence`.
-
-    Returns
-    -------
-    ndarray, shape (n_resamples,)
-        The infinitesimal jackknife's: the root of the sum of squared influences.
-    """
+    """Return the delta-method standard error of the coefficient on each resample."""
+    # -> (n_resamples,)
     moved = influence(pool, counts)
     moved = np.where(counts > 0.0, moved, 0.0)  # nobody asks after those not drawn
     mean = (counts * moved).sum(axis=-1, keepdims=True) / pool.n
@@ -91,21 +63,8 @@ def standard_errors(pool: Pool, counts: Floats) -> Floats:
 
 
 def studentized(pool: Pool, counts: Floats, value: float, error: float) -> Floats:
-    """Return how many of its own standard errors each resample is off.
-
-    Parameters
-    ----------
-    pool, counts
-        As of `influence`.
-    value, error : float
-        The estimate and its standard error.
-
-    Returns
-    -------
-    ndarray, shape (n_resamples,)
-        Equation (12.20) of Efron and Tibshirani (1993). Infinite for a resample that
-        is off without any spread; ``nan`` where undefined.
-    """
+    """Return how many of its own standard errors each resample is off."""
+    # -> (n_resamples,)
     off = pool.values(pool.sums(counts)) - value
     errors = standard_errors(pool, counts)
     flat = errors <= _NO_SPREAD * error
@@ -116,19 +75,7 @@ def studentized(pool: Pool, counts: Floats, value: float, error: float) -> Float
 
 
 def acceleration(pool: Pool) -> float:
-    """Return how the spread of an estimate changes with its size.
-
-    Parameters
-    ----------
-    pool : Pool
-        What is resampled.
-
-    Returns
-    -------
-    float
-        A sixth of the skewness of the values with one member left out, equation
-        (14.15) of Efron and Tibshirani (1993); those undefined are passed over.
-    """
+    """Return how the spread of an estimate changes with its size."""
     left = pool.without()
     known = ~np.isnan(left)
     left, times = left[known], pool.times[known]

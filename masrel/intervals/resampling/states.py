@@ -23,28 +23,11 @@ _LEFT_OUT = 1e-12  # probability that may be lost at the far ends, or in roundin
 
 
 def box(steps: Integers, shares: Floats, n: int) -> Integers:
-    """Return the sides of a box that holds the sums but for a probability of 1e-12.
-
-    Parameters
-    ----------
-    steps : ndarray of int64, shape (n_rows, n_dimensions)
-        The rows, of at least 0.
-    shares : ndarray, shape (n_rows,)
-        Probability of each row at a draw.
-    n : int
-        How many are drawn.
-
-    Returns
-    -------
-    ndarray of int64, shape (n_dimensions,)
-        How many integers each coordinate needs.
-
-    Notes
-    -----
-    By Bernstein's inequality a sum of n steps, each at most b from its mean and of
-    variance s², is t away from its own with probability at most
-    2 exp(-t² / (2 (n s² + b t / 3))). Sums that far away are few where n is large.
-    """
+    """Return the sides of a box that holds the sums but for a probability of 1e-12."""
+    # steps (n_rows, n_dimensions), shares (n_rows,) -> (n_dimensions,)
+    # By Bernstein's inequality a sum of n steps, each at most b from its mean and of
+    # variance s², is t away from its own with probability at most 2 exp(-t² / (2 (n s²
+    # + b t / 3))). Sums that far away are few where n is large.
     apart = steps - shares @ steps
     variance = n * (shares @ apart**2)
     most = np.abs(apart).max(axis=0)
@@ -57,27 +40,10 @@ def box(steps: Integers, shares: Floats, n: int) -> Integers:
 def transformed_states(
     lattice: Lattice, shares: Floats, n: int
 ) -> tuple[Integers, Floats]:
-    """Return all sums by Fourier's transform, whatever n.
-
-    Parameters
-    ----------
-    lattice : Lattice
-        The rows.
-    shares, n
-        As of `box`.
-
-    Returns
-    -------
-    steps : ndarray of int64, shape (n_states, n_dimensions)
-        Sums of steps.
-    probabilities : ndarray, shape (n_states,)
-        Their probabilities, within 1e-12 in all.
-
-    Notes
-    -----
-    Sums beyond the box come round to its other side; the box is so large that they do
-    not matter, and a residue stands for the sum that is nearest to the mean.
-    """
+    """Return all sums by Fourier's transform, whatever n."""
+    # -> (n_states, n_dimensions), (n_states,)
+    # Sums beyond the box come round to its other side; the box is so large that they do
+    # not matter, and a residue stands for the sum that is nearest to the mean.
     if not lattice.steps.shape[1]:  # all rows are alike
         return np.zeros((1, 0), dtype=np.int64), np.ones(1)
     sides = [_smooth(int(side)) for side in box(lattice.steps, shares, n)]
@@ -94,22 +60,8 @@ def transformed_states(
 
 
 def line_of_sums(scores: Integers, shares: Floats, n: int) -> tuple[int, Floats]:
-    """Return the probabilities of sums of integers, one after the other.
-
-    Parameters
-    ----------
-    scores : ndarray of int64, shape (n_rows,)
-        One of each row, at least 0.
-    shares, n
-        As of `box`.
-
-    Returns
-    -------
-    least : int
-        The first sum.
-    probabilities : ndarray, shape (n_sums,)
-        Of it and those after it, within 1e-12 in all.
-    """
+    """Return the probabilities of sums of integers, one after the other."""
+    # scores (n_rows,) -> (n_sums,)
     side = _smooth(int(box(scores[:, None], shares, n)[0]))
     spectrum = _power(np.fft.rfft(np.bincount(scores, weights=shares), side), n)
     found = np.fft.irfft(spectrum, side)
@@ -127,27 +79,10 @@ def _least(steps: Integers, shares: Floats, n: int, sides: Integers) -> Integers
 def merged_states(
     lattice: Lattice, shares: Floats, n: int, most: int
 ) -> tuple[Integers, Floats] | None:
-    """Return all sums by adding one draw at a time, equal sums together.
-
-    Parameters
-    ----------
-    lattice, shares, n
-        As of `transformed_states`.
-    most : int
-        How many sums are kept at most.
-
-    Returns
-    -------
-    tuple of ndarray, or None
-        As of `transformed_states`, each probability to full relative precision; None
-        if there are too many, or their coordinates do not fit into one integer.
-
-    Notes
-    -----
-    The number of sums of k rows in d dimensions is Σ_i h_i C(k + d - i, d), with h at
-    least 0 as a rule. So the number for n is no less than that for k times C(n + d, d)
-    / C(k + d, d), which tells early that there will be too many.
-    """
+    """Return all sums by adding one draw at a time, equal sums together."""
+    # The number of sums of k rows in d dimensions is Σ_i h_i C(k + d - i, d), with h at
+    # least 0 as a rule. So the number for n is no less than that for k times C(n + d,
+    # d) / C(k + d, d), which tells early that there will be too many.
     sides = n * lattice.steps.max(axis=0) + 1
     if math.prod(map(int, sides)) >= 2**62:
         return None

@@ -22,17 +22,13 @@ GRID = np.linspace(-20.0, 20.0, 65)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Risen:
-    """Moments E[κ^p (1 - κ)^q] of the Beta of mean m and spread g, as factors.
+    """Moments E[κ^p (1 - κ)^q] of the Beta of mean m and spread g, as factors."""
 
-    Times g in every factor they are
-    Π_{i<p}(m (1 - g) + i g) Π_{i<q}((1 - m)(1 - g) + i g) / Π_{i<p+q}(1 - g + i g).
+    # Times g in every factor they are Π_{i<p}(m (1 - g) + i g) Π_{i<q}((1 - m)(1 - g) +
+    # i g) / Π_{i<p+q}(1 - g + i g).
 
-    Attributes
-    ----------
-    up, down, below : ndarray, shape (n, largest p + q + 1)
-        Logarithms of the three products, by their number of factors.
-    """
-
+    # up, down, below: (n, largest p + q + 1): logarithms of the three products, by
+    # their number of factors
     up: Floats = field(compare=False, repr=False)
     down: Floats = field(compare=False, repr=False)
     below: Floats = field(compare=False, repr=False)
@@ -52,38 +48,21 @@ class Risen:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RaterPairs:
-    """The pairs of one rater, as all that the likelihood of κ needs.
+    """The pairs of one rater, as all that the likelihood of κ needs."""
 
-    L(κ) = Σ_j weight_j κ^(agree - j) (1 - κ)^(differ + j), all weights positive.
+    # L(κ) = Σ_j weight_j κ^(agree - j) (1 - κ)^(differ + j), all weights positive.
 
-    Attributes
-    ----------
-    agree, differ : int
-        Pairs of equal and of unequal grades.
-    log_weights : ndarray, shape (agree + 1,)
-        Logarithms of the weights.
-    """
-
+    # agree, differ: pairs of equal and of unequal grades
     agree: int
     differ: int
+    # (agree + 1,): logarithms of the weights
     log_weights: Floats = field(compare=False, repr=False)
 
     @classmethod
     def of(cls, table: NDArray[np.int64], concentration: float) -> "RaterPairs":
-        """Integrate the shares of the categories out.
-
-        Parameters
-        ----------
-        table : ndarray of int64, shape (n_categories, n_categories)
-            Items per grade of the first and of the second session.
-        concentration : float
-            π ~ Dirichlet(concentration, ...).
-
-        Returns
-        -------
-        RaterPairs
-            The likelihood of κ.
-        """
+        """Integrate the shares of the categories out."""
+        # Takes table (n_categories, n_categories)
+        # The likelihood of κ.
         equal = np.diagonal(table)
         agree = int(equal.sum())
         return cls(
@@ -93,18 +72,9 @@ class RaterPairs:
         )
 
     def log_terms(self, risen: Risen) -> Floats:
-        """Return the terms of the likelihood of (m, g), κ integrated out.
-
-        Parameters
-        ----------
-        risen : Risen
-            Moments at n points.
-
-        Returns
-        -------
-        ndarray, shape (n, agree + 1)
-            Logarithms; in term j κ has the powers agree - j and differ + j.
-        """
+        """Return the terms of the likelihood of (m, g), κ integrated out."""
+        # -> (n, agree + 1)
+        # Logarithms; in term j κ has the powers agree - j and differ + j.
         n = self.agree + self.differ
         return np.asarray(
             self.log_weights
@@ -122,24 +92,12 @@ def _log_products(factors: Floats) -> Floats:
 
 
 def log_weights(table: NDArray[np.int64], concentration: float) -> Floats:
-    """Expand the likelihood of κ in powers, with π integrated out.
-
-    With d_k pairs of k and k, and o_k unequal grades of k, it is (1 - κ)^differ times
-    the mean of Π_k π_k^(d_k + o_k) (κ + (1 - κ) π_k)^d_k over the Dirichlet, whose
-    moments are Π_k Γ(a + t_k) / Γ(a) · Γ(K a) / Γ(K a + Σ t_k).
-
-    Parameters
-    ----------
-    table : ndarray of int64, shape (n_categories, n_categories)
-        Items per grade of the first and of the second session.
-    concentration : float
-        The Dirichlet's parameter a of every category.
-
-    Returns
-    -------
-    ndarray, shape (agree + 1,)
-        Logarithm of the weight of κ^(agree - j) (1 - κ)^(differ + j).
-    """
+    """Expand the likelihood of κ in powers, with π integrated out."""
+    # With d_k pairs of k and k, and o_k unequal grades of k, it is (1 - κ)^differ times
+    # the mean of Π_k π_k^(d_k + o_k) (κ + (1 - κ) π_k)^d_k over the Dirichlet, whose
+    # moments are Π_k Γ(a + t_k) / Γ(a) · Γ(K a) / Γ(K a + Σ t_k).
+    # table (n_categories, n_categories) -> (agree + 1,)
+    # Logarithm of the weight of κ^(agree - j) (1 - κ)^(differ + j).
     equal = np.diagonal(table)
     graded = table.sum(axis=0) + table.sum(axis=1) - equal  # d_k + o_k
     total = np.zeros(1)

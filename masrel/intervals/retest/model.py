@@ -27,33 +27,16 @@ _METHOD = "hierarchical kappa model, exact"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RetestModel:
-    """Agreement of a population of raters with themselves.
+    """Agreement of a population of raters with themselves."""
 
-    Attributes
-    ----------
-    kappa : Quantity
-        Mean of raters' kappas over their population.
-    spread : Quantity
-        Standard deviation of raters' kappas over their population.
-    raters : tuple of Quantity
-        Kappa of every rater with a pair, pulled towards the others.
-    n_pairs : tuple of int
-        Items that each of them graded in both sessions.
-    prior : str
-        What was believed before the data.
-    other_kappa : Quantity
-        The mean under the other prior that moves its interval most.
-    other_prior : str
-        That prior.
-    """
-
-    kappa: Quantity
-    spread: Quantity
+    kappa: Quantity  # mean of raters' kappas over their population
+    spread: Quantity  # standard deviation of raters' kappas over their population
+    # kappa of every rater with a pair, pulled towards the others
     raters: tuple[Quantity, ...]
-    n_pairs: tuple[int, ...]
-    prior: str
-    other_kappa: Quantity
-    other_prior: str
+    n_pairs: tuple[int, ...]  # items that each of them graded in both sessions
+    prior: str  # what was believed before the data
+    other_kappa: Quantity  # the mean under the other prior that moves its interval most
+    other_prior: str  # that prior
 
 
 def retest_model(

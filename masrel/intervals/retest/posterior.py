@@ -21,26 +21,14 @@ _LEFT_OUT = 1e-6  # probability of the smallest terms of a rater's mixture, toge
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RetestPosterior:
-    """The joint posterior of the mean m and the spread g of raters' kappas.
+    """The joint posterior of the mean m and the spread g of raters' kappas."""
 
-    Attributes
-    ----------
-    raters : tuple of RaterPairs
-        The data.
-    shape : float
-        m ~ Beta(shape, shape); g ~ U(0, 1/3).
-    mean : SincDistribution
-        The distribution of logit m.
-    quantiles : tuple of float
-        Quantiles of m, as asked for.
-    masses : ndarray, shape (n_means, n_spreads)
-        Probabilities of the points (`mean.points`, `GRID`).
-    """
-
-    raters: tuple[RaterPairs, ...] = field(compare=False, repr=False)
-    shape: float
+    raters: tuple[RaterPairs, ...] = field(compare=False, repr=False)  # the data
+    shape: float  # m ~ Beta(shape, shape); g ~ U(0, 1/3)
+    # the distribution of logit m
     mean: SincDistribution = field(compare=False, repr=False)
-    quantiles: tuple[float, ...]
+    quantiles: tuple[float, ...]  # quantiles of m, as asked for
+    # (n_means, n_spreads): probabilities of the points (`mean.points`, `GRID`)
     masses: Floats = field(compare=False, repr=False)
 
     @classmethod
@@ -52,23 +40,8 @@ class RetestPosterior:
         shape: float,
         concentration: float,
     ) -> "RetestPosterior":
-        """Integrate the posterior.
-
-        Parameters
-        ----------
-        tables : sequence of ndarray of int64, shape (n_categories, n_categories)
-            Per rater, items per grade of the first and of the second session.
-        shares : sequence of float
-            Probabilities whose quantiles of m are wanted.
-        shape, concentration : float
-            m ~ Beta(shape, shape); a rater's category shares ~
-            Dirichlet(concentration, ...).
-
-        Returns
-        -------
-        RetestPosterior
-            Its distribution.
-        """
+        """Integrate the posterior."""
+        # Takes tables (n_categories, n_categories)
         raters = tuple(RaterPairs.of(table, concentration) for table in tables)
         known: dict[float, Floats] = {}  # log-density over GRID, by logit m
 
@@ -90,22 +63,8 @@ class RetestPosterior:
         )
 
     def rater_quantiles(self, rater: int, shares: Sequence[float]) -> list[float]:
-        """Return quantiles of one rater's kappa.
-
-        Given m and g it is a mixture of Betas, one a term of the likelihood.
-
-        Parameters
-        ----------
-        rater : int
-            Position among the raters.
-        shares : sequence of float
-            Probabilities.
-
-        Returns
-        -------
-        list of float
-            Quantiles, to about 1e-4.
-        """
+        """Return quantiles of one rater's kappa."""
+        # Given m and g it is a mixture of Betas, one a term of the likelihood.
         pairs = self.raters[rater]
         mass, up, down = self._mixture(pairs)
 
@@ -134,18 +93,8 @@ class RetestPosterior:
         return weight / weight.sum(), up, down
 
     def spread_quantiles(self, shares: Sequence[float]) -> list[float]:
-        """Return quantiles of the standard deviation of kappa over raters.
-
-        Parameters
-        ----------
-        shares : sequence of float
-            Probabilities.
-
-        Returns
-        -------
-        list of float
-            Quantiles of √(m (1 - m) g), to about 1e-9.
-        """
+        """Return quantiles of the standard deviation of kappa over raters."""
+        # Quantiles of √(m (1 - m) g), to about 1e-9.
         variance = expit(self.mean.points) * expit(-self.mean.points)
         step = GRID[1] - GRID[0]
 

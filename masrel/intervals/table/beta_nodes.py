@@ -19,35 +19,13 @@ _WIDEST = 2.0  # spread: one end can fall off within a few units of the logit
 def beta_nodes(
     a: float, b: float, step: float, least: float = 0.0
 ) -> tuple[Floats, Floats]:
-    """Return the trapezoid nodes of a Beta(a, b) on a line where it dies off fast.
-
-    Parameters
-    ----------
-    a, b : float
-        Its parameters.
-    step : float
-        The distance of two nodes; halving it about doubles the digits.
-    least : float, optional
-        Only from here to 1 - `least`, which is below 1/2.
-
-    Returns
-    -------
-    tuple of ndarray
-        Shares x and 1 - x, (n, 2), and weights (n,), which sum to the probability of
-        the range.
-
-    Notes
-    -----
-    The logit of the place in the range is its mode plus a spread times sinh w, with w
-    equally spaced: a power of the distance to an end, as small parameters give, is
-    smooth in w [1]_.
-
-    References
-    ----------
-    .. [1] Takahasi, H., Mori, M. (1974). Double exponential formulas for numerical
-       integration. Publications of the RIMS, 9(3), 721-741.
-       https://doi.org/10.2977/prims/1195192451
-    """
+    """Return the trapezoid nodes of a Beta(a, b) on a line where it dies off fast."""
+    # The logit of the place in the range is its mode plus a spread times sinh w, with w
+    # equally spaced: a power of the distance to an end, as small parameters give, is
+    # smooth in w [1]_.
+    # [1] Takahasi, H., Mori, M. (1974). Double exponential formulas for numerical
+    # integration. Publications of the RIMS, 9(3), 721-741.
+    # https://doi.org/10.2977/prims/1195192451
 
     def at(logit: Floats) -> tuple[Floats, Floats]:
         place = np.column_stack([expit(logit), expit(-logit)])

@@ -35,26 +35,17 @@ CHANCE: dict[str, Chance] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Nodes:
-    """Values of x and y with what the coefficient needs of them.
+    """Values of x and y with what the coefficient needs of them."""
 
-    The disagreement is t d, and by chance (1 - t)² e_0 + t (1 - t) e_1 + t² e_2. What
-    is kept are differences from d, which for two categories lose no digits.
+    # The disagreement is t d, and by chance (1 - t)² e_0 + t (1 - t) e_1 + t² e_2. What
+    # is kept are differences from d, which for two categories lose no digits.
 
-    Attributes
-    ----------
-    weights : ndarray, shape (n,)
-        Probabilities of the values; they sum to 1.
-    apart : ndarray, shape (n,)
-        d, of pairs that are apart.
-    agreed : ndarray, shape (n,)
-        e_0, as if all pairs agreed.
-    less_mixed, less_apart : ndarray, shape (n,)
-        d - e_1, and d - e_2.
-    """
-
+    # (n,): probabilities of the values; they sum to 1
     weights: Floats = field(compare=False, repr=False)
-    apart: Floats = field(compare=False, repr=False)
+    apart: Floats = field(compare=False, repr=False)  # (n,): d, of pairs that are apart
+    # (n,): e_0, as if all pairs agreed
     agreed: Floats = field(compare=False, repr=False)
+    # less_mixed, less_apart: (n,): d - e_1, and d - e_2
     less_mixed: Floats = field(compare=False, repr=False)
     less_apart: Floats = field(compare=False, repr=False)
 
@@ -62,26 +53,9 @@ class Nodes:
     def of(
         cls, chance: Chance, v: Floats, weights: Floats, x: Floats, y: Floats
     ) -> "Nodes":
-        """Compute what the coefficient needs.
-
-        Parameters
-        ----------
-        chance : str
-            What disagreement by chance is made of.
-        v : ndarray, shape (n_categories, n_categories)
-            Disagreement of two categories.
-        weights : ndarray, shape (n,)
-            Probabilities of the values.
-        x : ndarray, shape (n, n_categories)
-            Shares of the categories among pairs that agree.
-        y : ndarray, shape (n, n_categories (n_categories - 1))
-            Shares of the other cells, row by row.
-
-        Returns
-        -------
-        Nodes
-            One of each value.
-        """
+        """Compute what the coefficient needs."""
+        # Takes v (n_categories, n_categories), weights (n,), x (n, n_categories), y (n,
+        # n_categories (n_categories - 1))
         q = len(v)
         first, second = np.nonzero(~np.eye(q, dtype=bool))
         rows, columns = y @ np.eye(q)[first], y @ np.eye(q)[second]
@@ -131,20 +105,8 @@ def _products(v: Floats, one: Floats, two: Floats) -> Floats:
 
 
 def single(chance: Chance, v: Floats) -> Nodes:
-    """Return one value, where neither x nor y matters.
-
-    Parameters
-    ----------
-    chance : {"none", "uniform"}
-        What disagreement by chance is made of.
-    v : ndarray, shape (n_categories, n_categories)
-        Disagreement of two categories, the same of any two.
-
-    Returns
-    -------
-    Nodes
-        The value.
-    """
+    """Return one value, where neither x nor y matters."""
+    # Takes v (n_categories, n_categories)
     q = len(v)
     cells = q * (q - 1)
     x, y = np.full((1, q), 1.0 / q), np.full((1, cells), 1.0 / cells)
@@ -152,32 +114,11 @@ def single(chance: Chance, v: Floats) -> Nodes:
 
 
 def grid(chance: Chance, v: Floats, prior: Floats, step: float, value: float) -> Nodes:
-    """Return the quadrature nodes of two categories.
-
-    Parameters
-    ----------
-    chance : str
-        What disagreement by chance is made of.
-    v : ndarray, shape (2, 2)
-        Disagreement of two categories.
-    prior : ndarray, shape (2, 2)
-        Parameters of the Dirichlet of θ.
-    step : float
-        As in `beta_nodes`, of x, and of y where it matters.
-    value : float
-        What the coefficient is compared with, at least -1.
-
-    Returns
-    -------
-    Nodes
-        All pairs; y only as far as the coefficient can be at most `value`.
-
-    Notes
-    -----
-    With margins and r = 1 - `value` the coefficient can be at most a negative value
-    only where r 2 y (1 - y) is at least -`value`; what is beyond is 0, and a grid over
-    all y would not see where it begins.
-    """
+    """Return the quadrature nodes of two categories."""
+    # Takes v (2, 2), prior (2, 2)
+    # With margins and r = 1 - `value` the coefficient can be at most a negative value
+    # only where r 2 y (1 - y) is at least -`value`; what is beyond is 0, and a grid
+    # over all y would not see where it begins.
     x, of_x = beta_nodes(float(prior[0, 0]), float(prior[1, 1]), step)
     y, of_y = np.full((1, 2), 0.5), np.ones(1)
     if chance == "margins":  # else y matters nowhere
@@ -197,26 +138,8 @@ def drawn(
     generator: np.random.Generator,
     n_draws: int,
 ) -> Nodes:
-    """Draw values of x and y.
-
-    Parameters
-    ----------
-    chance : str
-        What disagreement by chance is made of.
-    v : ndarray, shape (n_categories, n_categories)
-        Disagreement of two categories.
-    prior : ndarray, shape (n_categories, n_categories)
-        Parameters of the Dirichlet of θ.
-    generator : Generator
-        Where randomness comes from.
-    n_draws : int
-        How many.
-
-    Returns
-    -------
-    Nodes
-        All of one weight.
-    """
+    """Draw values of x and y."""
+    # Takes v (n_categories, n_categories), prior (n_categories, n_categories)
     agreed = np.eye(len(v), dtype=bool)
     x = generator.dirichlet(prior[agreed], size=n_draws)
     y = generator.dirichlet(prior[~agreed], size=n_draws)

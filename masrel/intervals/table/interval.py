@@ -24,19 +24,7 @@ _NOTED_DRAWS = 2_000  # for the interval under another prior: a note has three d
 
 
 def speaks_of(case: Case) -> bool:
-    """Return whether a table of two raters has something to say.
-
-    Parameters
-    ----------
-    case : Case
-        The question.
-
-    Returns
-    -------
-    bool
-        False for a coefficient or a number of raters it does not know, or where the
-        prior alone would speak.
-    """
+    """Return whether a table of two raters has something to say."""
     if case.entry.name not in CHANCE or case.coded.codes.shape[1] != 2:
         return False
     table, _ = _table(case.coded.codes, case.coded.n_categories)
@@ -51,33 +39,7 @@ def table_interval(
     rng: np.random.Generator | int | None,
     one_sided: bool = False,
 ) -> Interval:
-    """Compute the credible interval of a coefficient of two raters.
-
-    Parameters
-    ----------
-    case : Case
-        The question.
-    concentration : float or None
-        Parameter of every cell of the table in its Dirichlet prior; None for the
-        default, see `TablePrior`.
-    n_draws : int
-        How often to draw where there are more than two categories.
-    rng : Generator, int or None
-        Where randomness comes from, if any is needed.
-    one_sided : bool, optional
-        All above a lower end, instead of the central interval.
-
-    Returns
-    -------
-    Interval
-        The interval; ``nan`` with a reason when the prior alone would speak.
-
-    Raises
-    ------
-    ParameterError
-        If there are not exactly two raters, the coefficient is none of theirs, or
-        there are too few draws.
-    """
+    """Compute the credible interval of a coefficient of two raters."""
     _check(case, n_draws)
     table, n_single = _table(case.coded.codes, case.coded.n_categories)
     reason = _nothing_to_learn(case, table)

@@ -22,26 +22,17 @@ _SHOWN = 101  # points of a distribution
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TablePosterior:
-    """The distribution of a coefficient.
+    """The distribution of a coefficient."""
 
-    Attributes
-    ----------
-    nodes : callable
-        A value to what agreeing and other pairs may be, with weights, for the
-        coefficient to be at most that value.
-    shown : callable
-        The same of fewer nodes, as many as a density that is looked at needs.
-    apart, agreed : float
-        The share of pairs that are apart is Beta(apart, agreed).
-    n_draws : int or None
-        How many nodes were drawn; None if none were.
-    """
-
+    # A value to what agreeing and other pairs may be, with weights, for the coefficient
+    # to be at most that value
     nodes: Callable[[float], Nodes]
+    # the same of fewer nodes, as many as a density that is looked at needs
     shown: Callable[[float], Nodes]
+    # apart, agreed: the share of pairs that are apart is Beta(apart, agreed)
     apart: float
     agreed: float
-    n_draws: int | None = None
+    n_draws: int | None = None  # how many nodes were drawn; None if none were
 
     def probability(self, value: float) -> float:
         """Return the probability that the coefficient is at most a value."""
@@ -54,20 +45,7 @@ class TablePosterior:
         return float(nodes.weights @ self._densities(nodes, value))
 
     def quantile(self, share: float, start: float) -> float:
-        """Solve for a quantile.
-
-        Parameters
-        ----------
-        share : float
-            Probability, within (0, 1).
-        start : float
-            Where it is expected, below 1.
-
-        Returns
-        -------
-        float
-            By Newton's method, and by halving where that leaves what is known.
-        """
+        """Solve for a quantile."""
         low, high = -1.0, 1.0
         while self.probability(low) > share:
             low = 2.0 * low - 1.0  # weighted it can be below -1
@@ -90,20 +68,7 @@ class TablePosterior:
         return float(given.std() / np.sqrt(given.size)) / self.density(at)
 
     def distribution(self, low: float, high: float, words: str) -> Distribution:
-        """Return the density between two values.
-
-        Parameters
-        ----------
-        low, high : float
-            Where it begins and ends.
-        words : str
-            What it is.
-
-        Returns
-        -------
-        Distribution
-            Continuous, at equally spaced points.
-        """
+        """Return the density between two values."""
         values = np.linspace(low, high, _SHOWN + 2)[1:-1]
         density = np.zeros(_SHOWN)
         for i, at in enumerate(values.tolist()):

@@ -33,35 +33,8 @@ def table_quantiles(
     generator: Callable[[], np.random.Generator],
     n_draws: int,
 ) -> tuple[TablePosterior, tuple[float, float]]:
-    """Integrate, or draw, the posterior of a coefficient of two raters.
-
-    Parameters
-    ----------
-    chance : str
-        What disagreement by chance is made of; see `CHANCE`.
-    v : ndarray, shape (n_categories, n_categories)
-        Disagreement of two categories, at least two.
-    prior : ndarray, shape (n_categories, n_categories)
-        Parameters of the posterior Dirichlet: items and prior of each pair.
-    shares : tuple of float
-        Probabilities whose quantiles are wanted.
-    start : float
-        Where they are about.
-    generator : callable
-        Gives a generator, if one is needed.
-    n_draws : int
-        How often to draw, if needed.
-
-    Returns
-    -------
-    tuple of TablePosterior and tuple of float
-        The posterior and the quantiles.
-
-    Raises
-    ------
-    ConvergenceError
-        If the quadrature of two categories does not settle.
-    """
+    """Integrate, or draw, the posterior of a coefficient of two raters."""
+    # Takes v (n_categories, n_categories), prior (n_categories, n_categories)
     q = len(v)
     agreed = float(prior.trace())
     of_nodes = partial(TablePosterior, apart=float(prior.sum()) - agreed, agreed=agreed)

@@ -19,20 +19,7 @@ __all__ = ["draw_friction"]
 
 
 def draw_friction(fit: FrictionFit, *, stamp: str) -> Drawn:
-    """Draw torque against time and against speed.
-
-    Parameters
-    ----------
-    fit : FrictionFit
-        A fit; of several recordings, the first is drawn against time.
-    stamp : str
-        The line that says where the data come from.
-
-    Returns
-    -------
-    Drawn
-        The figure's files.
-    """
+    """Draw torque against time and against speed."""
     with house_style():
         figure = Figure(figsize=(6.7, 2.9))
         left, right = figure.subplots(1, 2, width_ratios=(1.3, 1.0), sharey=True)

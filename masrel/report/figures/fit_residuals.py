@@ -21,21 +21,7 @@ BINS = 40
 
 
 def draw_residuals(fit: ElbowFit, *, stamp: str) -> Drawn:
-    """Draw residual torque against angle and time, and residual catch angles.
-
-    Parameters
-    ----------
-    fit : ElbowFit
-        A fit.
-    stamp : str
-        The line that says where the data come from.
-
-    Returns
-    -------
-    Drawn
-        The figure's files. A law that holds leaves bands around 0 without a trend;
-        the line is the mean of narrow bands.
-    """
+    """Draw residual torque against angle and time, and residual catch angles."""
     has_line = not math.isnan(fit["catch_slope"].value)
     n_panels = 1 + any(t.after is not None for t in fit.trials) + has_line
     with house_style():

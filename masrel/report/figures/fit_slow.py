@@ -20,21 +20,7 @@ MOST_COLUMNS = 4
 
 
 def draw_slow_trials(fit: ElbowFit, *, stamp: str) -> Drawn:
-    """Draw measured torque and (1) against time, one column a slow trial.
-
-    Parameters
-    ----------
-    fit : ElbowFit
-        The fit; of more than four slow trials the four with the most samples are
-        drawn.
-    stamp : str
-        The line that says where the data come from.
-
-    Returns
-    -------
-    Drawn
-        The figure's files.
-    """
+    """Draw measured torque and (1) against time, one column a slow trial."""
     slow = [i for i, trial in enumerate(fit.trials) if trial.pace == "slow"]
     sizes = {i: fit.trials[i].pre_catch.time.size for i in slow}
     shown = sorted(sorted(slow, key=lambda i: -sizes[i])[:MOST_COLUMNS])

@@ -29,20 +29,7 @@ MOST_COLUMNS = 3
 
 
 def draw_fast_trials(fit: ElbowFit, *, stamp: str) -> Drawn:
-    """Draw torque, angle and speed of fast trials: slowest, middle and fastest.
-
-    Parameters
-    ----------
-    fit : ElbowFit
-        A fit with at least one catch whose torque is used.
-    stamp : str
-        The line that says where the data come from.
-
-    Returns
-    -------
-    Drawn
-        The figure's files.
-    """
+    """Draw torque, angle and speed of fast trials: slowest, middle and fastest."""
     fast = [
         (trial.catch.mean_speed, i)
         for i, trial in enumerate(fit.trials)

@@ -37,15 +37,7 @@ _PARTS: dict[Part, str] = {
 
 
 def put_legend(figure: Figure, handles: Sequence[Artist]) -> None:
-    """Put a legend below the axes.
-
-    Parameters
-    ----------
-    figure : Figure
-        The figure.
-    handles : sequence of Artist
-        Of `handles_of`.
-    """
+    """Put a legend below the axes."""
     dots = [
         handle
         for handle in handles
@@ -62,18 +54,7 @@ def put_legend(figure: Figure, handles: Sequence[Artist]) -> None:
 
 
 def handles_of(rows: Sequence[ForestRow]) -> list[Artist]:
-    """Return what the legend of some rows explains, each mark once.
-
-    Parameters
-    ----------
-    rows : sequence of ForestRow
-        The rows.
-
-    Returns
-    -------
-    list of Artist
-        Marks with their words.
-    """
+    """Return what the legend of some rows explains, each mark once."""
     handles: dict[str, Artist] = {}
     if any(row.is_known for row in rows):
         handles["estimate"] = Line2D([], [], linestyle="none", **DOT)

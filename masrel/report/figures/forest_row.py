@@ -71,19 +71,7 @@ Placed = tuple[ForestRow, float, float | None]
 
 
 def placed(rows: Sequence[ForestRow]) -> Iterator[Placed]:
-    """Give every row its place, from the top down.
-
-    Parameters
-    ----------
-    rows : sequence of ForestRow
-        The rows.
-
-    Yields
-    ------
-    tuple
-        The row, the height of its interval's line and that of its heading, if it has
-        one; inches below the top.
-    """
+    """Give every row its place, from the top down."""
     top, group = 0.0, ""
     for row in rows:
         heading = None
@@ -101,18 +89,7 @@ def below(row: ForestRow) -> float:
 
 
 def zeros(places: Sequence[Placed]) -> list[tuple[float, float]]:
-    """Return where rows next to each other have a zero: one line for all of them.
-
-    Parameters
-    ----------
-    places : sequence of tuple
-        What `placed` gives.
-
-    Returns
-    -------
-    list of tuple of float
-        Where each line begins and ends, inches below the top.
-    """
+    """Return where rows next to each other have a zero: one line for all of them."""
     lines: list[tuple[float, float]] = []
     above = 0.0
     for row, y, _ in places:
@@ -126,18 +103,7 @@ def zeros(places: Sequence[Placed]) -> list[tuple[float, float]]:
 
 
 def least(rows: Sequence[ForestRow]) -> float:
-    """Return the least of 0 and all that rows show.
-
-    Parameters
-    ----------
-    rows : sequence of ForestRow
-        The rows.
-
-    Returns
-    -------
-    float
-        The least number.
-    """
+    """Return the least of 0 and all that rows show."""
     numbers = [0.0]
     for row in rows:
         if row.value is not None and row.is_known:

@@ -44,17 +44,7 @@ _SAME = 1e-9  # values as near as this are one value, computed in another order
 def draw_ridge(
     axes: Axes, distribution: Distribution, *, base: float, top: float
 ) -> None:
-    """Draw a distribution between two heights; its own greatest height is the top.
-
-    Parameters
-    ----------
-    axes : Axes
-        Where.
-    distribution : Distribution
-        What.
-    base, top : float
-        Where nothing is, and where the most is, in the units of the axis.
-    """
+    """Draw a distribution between two heights; its own greatest height is the top."""
     if distribution.continuous:
         colour, most = RIDGE_COLOURS["density"], distribution.weights.max()
         heights = base + (top - base) * distribution.weights / most
@@ -76,18 +66,7 @@ def draw_ridge(
 
 
 def parts(distribution: Distribution) -> tuple[Part, ...]:
-    """Return what the ridge of a distribution is made of.
-
-    Parameters
-    ----------
-    distribution : Distribution
-        What it shows.
-
-    Returns
-    -------
-    tuple of {"density", "stems", "bars"}
-        Each once.
-    """
+    """Return what the ridge of a distribution is made of."""
     if distribution.continuous:
         return ("density",)
     single = _is_single(_distinct(distribution)[1])
@@ -96,18 +75,7 @@ def parts(distribution: Distribution) -> tuple[Part, ...]:
 
 
 def least_shown(distribution: Distribution) -> float:
-    """Return where a ridge begins to be seen.
-
-    Parameters
-    ----------
-    distribution : Distribution
-        What it shows.
-
-    Returns
-    -------
-    float
-        The least value that is not faint.
-    """
+    """Return where a ridge begins to be seen."""
     values, heights = distribution.values, distribution.weights
     if not distribution.continuous:
         values, heights = _distinct(distribution)

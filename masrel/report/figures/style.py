@@ -86,13 +86,7 @@ class Drawn:
 
 @contextmanager
 def house_style() -> Iterator[None]:
-    """Draw in the house style alone: a reader's own matplotlibrc changes nothing.
-
-    Yields
-    ------
-    None
-        The settings from before are back when the block ends.
-    """
+    """Draw in the house style alone: a reader's own matplotlibrc changes nothing."""
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(STYLE)
@@ -100,34 +94,13 @@ def house_style() -> Iterator[None]:
 
 
 def finish(figure: Figure, stamp: str) -> Drawn:
-    """Put the stamp on a figure and make its files.
-
-    Parameters
-    ----------
-    figure : Figure
-        The figure.
-    stamp : str
-        The line that says where the data come from.
-
-    Returns
-    -------
-    Drawn
-        Its files, without any time of day.
-    """
+    """Put the stamp on a figure and make its files."""
     put_stamp(figure, stamp)
     return Drawn(png=as_bytes(figure, "png"), svg=as_bytes(figure, "svg"))
 
 
 def put_stamp(figure: Figure, stamp: str) -> None:
-    """Say at the top of a figure where its data come from.
-
-    Parameters
-    ----------
-    figure : Figure
-        The figure.
-    stamp : str
-        The line; one in capitals is a warning, and set as one. None if empty.
-    """
+    """Say at the top of a figure where its data come from."""
     if not stamp:
         return
     loud = stamp.isupper()
@@ -144,20 +117,7 @@ def put_stamp(figure: Figure, stamp: str) -> None:
 
 
 def as_bytes(figure: Figure, form: Form) -> bytes:
-    """Make one file of a figure.
-
-    Parameters
-    ----------
-    figure : Figure
-        The figure.
-    form : {"png", "svg", "pdf"}
-        What file.
-
-    Returns
-    -------
-    bytes
-        The file, without any time of day.
-    """
+    """Make one file of a figure."""
     file = io.BytesIO()
     if form == "png":
         metadata = {"Software": None}
