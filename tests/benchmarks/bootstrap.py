@@ -1,7 +1,7 @@
 """Bootstrap intervals beside other packages: time, error for the time, memory.
 
-Part of ``python -m tests.benchmarks.intervals``. Peers that are not installed are left
-out.
+Part of ``python -m docs.make.benchmarks.intervals``. Peers that are not
+installed are left out.
 """
 
 import importlib

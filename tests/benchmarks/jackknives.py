@@ -1,6 +1,6 @@
 """The jackknife of Fleiss' kappa beside two loops over statsmodels.
 
-Part of ``python -m tests.benchmarks.intervals``.
+Part of ``python -m docs.make.benchmarks.intervals``.
 """
 
 import time

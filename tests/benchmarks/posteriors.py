@@ -1,6 +1,6 @@
 """The posterior of ρ: quadrature, emcee at several lengths, importance sampling.
 
-Part of ``python -m tests.benchmarks.intervals``. The truth is another integral, by
+Part of ``python -m docs.make.benchmarks.intervals``. The truth is another integral, by
 panels of Gauss-Legendre.
 """
 

@@ -9,12 +9,10 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from masrel.estimates import Interval
-from masrel.intervals import estimate
-from tests.coverage.bounds import Bounds
-from tests.coverage.case import Case
-from tests.coverage.methods import DEFAULT, METHODS
-from tests.coverage.simulate import (
+from docs.make.coverage.bounds import Bounds
+from docs.make.coverage.case import Case
+from docs.make.coverage.methods import DEFAULT, METHODS
+from docs.make.coverage.simulate import (
     DESIGNS,
     KAPPAS,
     MODELS,
@@ -23,7 +21,9 @@ from tests.coverage.simulate import (
     draw_case,
     simulate,
 )
-from tests.coverage.studies import Design, Target
+from docs.make.coverage.studies import Design, Target
+from masrel.estimates import Interval
+from masrel.intervals import estimate
 
 pytestmark = pytest.mark.filterwarnings("ignore::masrel.errors.MasrelWarning")
 FALSE_ALARMS = 5e-7

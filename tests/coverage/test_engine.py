@@ -5,17 +5,17 @@ import warnings
 import numpy as np
 import pytest
 
+from docs.make.coverage import peers
+from docs.make.coverage.bounds import Bounds, around
+from docs.make.coverage.case import Case
+from docs.make.coverage.latent import LatentTrait
+from docs.make.coverage.methods import delta, of_items, of_raters, two_way
+from docs.make.coverage.multinomial import DirichletMultinomial
+from docs.make.coverage.simulate import TARGETS
+from docs.make.coverage.studies import Design, Model, Target
 from masrel.agreement import fleiss_kappa, fleiss_null
 from masrel.intervals import analytic, jackknife, posterior
 from masrel.intervals.analytic import Distribution
-from tests.coverage import peers
-from tests.coverage.bounds import Bounds, around
-from tests.coverage.case import Case
-from tests.coverage.latent import LatentTrait
-from tests.coverage.methods import delta, of_items, of_raters, two_way
-from tests.coverage.multinomial import DirichletMultinomial
-from tests.coverage.simulate import TARGETS
-from tests.coverage.studies import Design, Model, Target
 
 pytestmark = pytest.mark.filterwarnings("ignore::masrel.errors.MasrelWarning")
 SIZE = 40

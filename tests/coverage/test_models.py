@@ -7,10 +7,10 @@ generator is fixed.
 import numpy as np
 import pytest
 
-from tests.coverage.latent import STEP, LatentTrait, fixed
-from tests.coverage.multinomial import DirichletMultinomial, urn
-from tests.coverage.spread import spread_of
-from tests.coverage.studies import Design, Floats, drawn, kappa_of_items
+from docs.make.coverage.latent import STEP, LatentTrait, fixed
+from docs.make.coverage.multinomial import DirichletMultinomial, urn
+from docs.make.coverage.spread import spread_of
+from docs.make.coverage.studies import Design, Floats, drawn, kappa_of_items
 
 MODELS = (DirichletMultinomial, LatentTrait)
 KAPPAS = (0.2, 0.6, 0.9)

@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from tests.coverage.figure import draw
-from tests.coverage.methods import DEFAULT, METHODS
-from tests.coverage.page import is_within, page
-from tests.coverage.simulate import (
+from docs.make.coverage.figure import draw
+from docs.make.coverage.methods import DEFAULT, METHODS
+from docs.make.coverage.page import is_within, page
+from docs.make.coverage.simulate import (
     DESIGNS,
     OTHERS,
     Cell,

@@ -5,11 +5,17 @@ import itertools
 import numpy as np
 import pytest
 
+from docs.make.coverage.simulate import KAPPAS
+from docs.make.coverage.tables import COEFFICIENTS, MODELS, Tables, cohen
+from docs.make.coverage.two_raters import (
+    Question,
+    all_questions,
+    count,
+    draw,
+    intervals,
+)
 from masrel.agreement import COEFFICIENTS as REGISTER
 from masrel.intervals import estimate
-from tests.coverage.simulate import KAPPAS
-from tests.coverage.tables import COEFFICIENTS, MODELS, Tables, cohen
-from tests.coverage.two_raters import Question, all_questions, count, draw, intervals
 
 pytestmark = pytest.mark.filterwarnings("ignore::masrel.errors.MasrelWarning")
 

@@ -1,0 +1,1 @@
+"""Programs that measure, and write the pages and figures of measurements."""

@@ -1,0 +1,1 @@
+"""The page of accuracy: masrel and other packages beside exact fractions."""

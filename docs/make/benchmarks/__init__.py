@@ -1,0 +1,1 @@
+"""Benchmarks that write pages; what only measures is in ``tests/benchmarks``."""

@@ -1,0 +1,80 @@
+"""The figures of docs/elbow.md about run time and sampling."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from masrel.report.figures.style import (
+    BLACK,
+    BLUE,
+    DASHES,
+    GREY,
+    ORANGE,
+    VERMILLION,
+    as_bytes,
+    house_style,
+)
+
+if TYPE_CHECKING:
+    from docs.make.benchmarks.elbow import Point
+
+FIGURES = Path(__file__).parents[2] / "figures"
+
+_WAYS = {
+    "exact": ("exact: events and peak", BLUE, "*", 11),
+    "sampled": ("sampled, whole columns", VERMILLION, "o", 5),
+    "stepped": ("sampled, step by step", ORANGE, "s", 5),
+    "solve_ivp": ("solve_ivp, RK45 with events", GREY, "^", 5),
+}
+
+
+def draw_work(points: Sequence["Point"]) -> None:
+    """Error of the events against the time that finding them takes."""
+    with house_style():
+        figure = Figure(figsize=(5.6, 3.6))
+        axes = figure.subplots()
+        for way, (label, colour, marker, size) in _WAYS.items():
+            own = [point for point in points if point.way == way]
+            x = [1e3 * point.seconds for point in own]
+            y = [max(point.error_s, 1e-17) for point in own]
+            axes.loglog(x, y, marker=marker, color=colour, markersize=size, lw=0.8,
+                        label=label)  # fmt: skip
+            if way in ("stepped", "solve_ivp"):
+                for point, at, height in zip(own, x, y, strict=True):
+                    axes.annotate(
+                        point.setting, (at, height), xytext=(6, 4), fontsize=6.5,
+                        textcoords="offset points", color=colour,
+                        bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.3},
+                    )  # fmt: skip
+        axes.set_xlabel("processor time of one stretch (ms)")
+        axes.set_ylabel("largest error of catch\nand catch end (s)")
+        axes.grid(which="major")
+        axes.set_xlim(right=axes.get_xlim()[1] * 4)
+        axes.legend(fontsize=7.5, loc="center left", bbox_to_anchor=(0.0, 0.42))
+        (FIGURES / "elbow_work.png").write_bytes(as_bytes(figure, "png"))
+
+
+def draw_approach(rates: Sequence[float], late: dict[str, np.ndarray]) -> None:
+    """How late a sampled law sees the events, speed by speed, against the rate."""
+    with house_style():
+        figure = Figure(figsize=(6.2, 2.9))
+        panels = figure.subplots(1, 2, sharex=True, sharey=True)
+        periods = 1e3 / np.array(rates)
+        for axes, (name, rows), most in zip(panels, late.items(), (1, 2), strict=True):
+            axes.fill_between(
+                rates, 0.0, most * periods, color="#DDDDDD", lw=0,
+                label=f"0 to {most} period" + "s" * (most > 1),
+            )  # fmt: skip
+            for row in rows:
+                axes.plot(rates, 1e3 * row, ".", color=BLUE, markersize=2.5)
+            axes.axvline(1000.0, color=BLACK, lw=0.7, linestyle=DASHES)
+            axes.set_title(name)
+            axes.set_xscale("log")
+            axes.set_yscale("symlog", linthresh=0.01)
+            axes.set_xlabel("samples a second (Hz)")
+            axes.legend(fontsize=7.5, loc="upper right")
+        panels[0].set_ylabel("sampled − exact (ms)")
+        (FIGURES / "elbow_sampled.png").write_bytes(as_bytes(figure, "png"))

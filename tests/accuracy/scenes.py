@@ -1,0 +1,57 @@
+"""masrel's estimate and the exact one of a case, side by side."""
+
+import warnings
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from masrel import agreement as offered
+from masrel.agreement import count_ratings, count_table
+from masrel.errors import UndefinedStatisticWarning
+from masrel.estimates import Estimate
+from tests.accuracy import reference
+from tests.accuracy.cases import METRICS, Case
+
+
+@dataclass(frozen=True)
+class Exact:
+    """A coefficient in fractions; None where it is 0/0, and the error of one item."""
+
+    value: Fraction | None
+    standard_error: Any  # mpmath.mpf or None
+
+
+def exact(case: Case, name: str, weights: str, *, error: bool = True) -> Exact:
+    """Compute a coefficient by its textbook formula."""
+    if weights in METRICS:
+        w: Any = reference.agreement_of_metric(METRICS[weights], case.scale, case.items)
+    else:
+        w = reference.agreement(weights, case.scale)
+    q = len(case.scale)
+    value = reference.value(name, case.items, w, q)
+    if value is None or not error:
+        return Exact(value, None)
+    return Exact(value, reference.standard_error(name, case.items, w, q))
+
+
+def prepared(case: Case) -> Any:
+    """Ratings as masrel takes them, coded once for all coefficients."""
+    if case.table:
+        return count_table(case.table, categories=case.scale)
+    if case.counts:
+        return case.counts
+    return count_ratings(case.labels(), categories=case.scale)
+
+
+def estimate(case: Case, name: str, weights: str, ratings: Any) -> Estimate:
+    """Ask masrel for a coefficient of prepared ratings."""
+    how = {"metric": METRICS[weights]} if weights in METRICS else {"weights": weights}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UndefinedStatisticWarning)
+        if case.table and name in ("cohen_kappa", "scott_pi"):
+            function = getattr(offered, f"{name}_from_table")
+            return function(case.table, categories=case.scale, **how)
+        if case.counts:
+            function = getattr(offered, f"{name}_from_counts")
+            return function(ratings, categories=case.scale, **how)
+        return getattr(offered, name)(ratings, **how)
