@@ -34,15 +34,11 @@ def side_by_side(
     works: Mapping[str, Work],
     *,
     turns: int,
-    least_s: float = 0.02,
+    min_s: float = 0.02,
     clock: Callable[[], float] = time.perf_counter,
 ) -> dict[str, Timing]:
-    """Time every function in turn, each call repeated until it takes `least_s`."""
-    repeats = {}
-    for name, work in works.items():
-        start = clock()
-        work()
-        repeats[name] = max(1, int(least_s / max(clock() - start, 1e-9)))
+    """Time every function in turn, warm, each call repeated until it takes `min_s`."""
+    repeats = {name: warm_repeats(work, min_s, clock) for name, work in works.items()}
     seconds: dict[str, list[float]] = {name: [] for name in works}
     gc.collect()
     gc.disable()
@@ -55,7 +51,24 @@ def side_by_side(
                 seconds[name].append((clock() - start) / repeats[name])
     finally:
         gc.enable()
-    return {name: Timing(seconds=tuple(found)) for name, found in seconds.items()}
+    return {name: Timing(seconds=tuple(each)) for name, each in seconds.items()}
+
+
+def warm_repeats(work: Work, min_s: float, clock: Callable[[], float]) -> int:
+    """How many calls take `min_s` once everything is loaded."""
+    # A first call may import: to take the number of repeats from it would time a peer
+    # that loads itself one cold call a turn.
+    work()
+    repeats = 1
+    while True:
+        start = clock()
+        for _ in range(repeats):
+            work()
+        seconds = clock() - start
+        if seconds >= min_s:
+            return repeats
+        growth = 1.2 * min_s / seconds if seconds > 0.1 * min_s else 10.0
+        repeats = int(repeats * growth) + 1
 
 
 def peak_megabytes(work: Work) -> float:
