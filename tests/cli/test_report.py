@@ -1,21 +1,19 @@
 """masrel report: writes pages, says where, and one sentence when it cannot."""
 
-import shutil
 from pathlib import Path
 
 import pytest
 
+from masrel.protocol import copy_template
 from tests.architecture.test_imports import loaded_after
 from tests.cli.process import Caller
-
-STUDY = Path(__file__).parents[2] / "studies/hess2012"
 
 
 @pytest.fixture
 def study(tmp_path: Path) -> Path:
     """The published study: no estimates, one section with a figure and one without."""
     root = tmp_path / "study"
-    shutil.copytree(STUDY, root)
+    copy_template("hess2012", root)  # nothing that somebody left in the clone
     protocol = root / "protocol.toml"
     text = protocol.read_text(encoding="utf-8")
     head = text.partition("[[analysis.estimates]]")[0]
