@@ -1,0 +1,18 @@
+"""Every golden case, by group, and the tenth of them that every test run compares."""
+
+import zlib
+
+from tests.golden import scenes, studies, tables
+from tests.golden.call import Case
+
+__all__ = ["GROUPS", "is_quick"]
+
+GROUPS: dict[str, list[Case]] = {}
+for _case in [*tables.cases(), *studies.cases(), *scenes.cases()]:
+    GROUPS.setdefault(_case.group, []).append(_case)
+
+
+def is_quick(case: Case) -> bool:
+    """Whether it is of the tenth: drawn once from the names, or alone in its kind."""
+    drawn = zlib.crc32(f"{case.group} {case.name}".encode()) % 10 == 0
+    return not case.slow and (drawn or case.name in ("published", "HM3"))
