@@ -8,7 +8,7 @@ from masrel.cli.agreement_rows import Row, Wanted
 from masrel.estimates import Interval
 
 if TYPE_CHECKING:
-    from masrel.report.tables import Table, Value
+    from masrel.report._tables import Table, Value
 
 __all__ = ["agreement_table"]
 
@@ -22,7 +22,7 @@ def agreement_table(
     data: str = "foreign",
 ) -> "Table":
     """Lay the estimates out as a table."""
-    from masrel.report.tables import Column, Table
+    from masrel.report._tables import Column, Table
 
     columns = [
         Column(key="coefficient", heading="Coefficient", align="left"),
@@ -116,8 +116,8 @@ def _of_row(row: Row) -> list[str]:
 
 
 def _about(interval: Interval) -> str:
+    from masrel.report._tables import percent
     from masrel.report.meaning import origin, promise
-    from masrel.report.tables import percent
 
     name = f"{percent(interval.level)} % {interval.kind} interval, {interval.method}"
     speaks = f"it speaks of other {_OTHERS[interval.target]}"

@@ -59,9 +59,9 @@ def command(
 
 
 def _show(material: StudyMaterial, analysis: "Analysis", *, as_csv_text: bool) -> None:
+    from masrel.report._tables import Table, as_csv, as_text
     from masrel.report.contents import SECTIONS
     from masrel.report.material import Material, Paragraph
-    from masrel.report.tables import Table, as_csv, as_text
 
     shown = Material(
         protocol=material.protocol,

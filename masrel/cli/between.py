@@ -112,7 +112,7 @@ def _document(made: "list[Between]", files: list[Path]) -> dict[str, object]:
 def _table(made: "list[Between]") -> str:
     from masrel.elbow.identification.model_file import MODEL_KEYS
     from masrel.elbow.identification.quantities import QUANTITIES
-    from masrel.report.tables import Column, Table, as_text
+    from masrel.report._tables import Column, Table, as_text
 
     shown = [q for q in QUANTITIES.values() if q.key in MODEL_KEYS]
     table = Table(

@@ -225,8 +225,8 @@ def _say(found: "ElbowFit | FrictionFit", json_file: Path | None) -> None:
     if json_file == Path("-"):
         return
     from masrel.elbow.identification import ElbowFit
+    from masrel.report._tables import as_text
     from masrel.report.fit_table import fit_table, friction_table
-    from masrel.report.tables import as_text
 
     table = fit_table(found) if isinstance(found, ElbowFit) else friction_table(found)
     click.echo(as_text(table))

@@ -96,7 +96,7 @@ def _document(found: "GradeRegression") -> dict[str, object]:
 
 
 def _table(found: "GradeRegression") -> str:
-    from masrel.report.tables import Column, Table, as_text
+    from masrel.report._tables import Column, Table, as_text
 
     table = Table(
         name="grading",
@@ -120,13 +120,13 @@ def _table(found: "GradeRegression") -> str:
 
 
 def _row(effect: "Effect") -> tuple[str, str, float, str]:
-    from masrel.report.tables import interval_words, number
+    from masrel.report._tables import interval_text, number
 
     return (
         effect.predictor,
         f"{number(effect.per, 3)} {_unit(effect.predictor)}".strip(),
         effect.odds_ratio,
-        interval_words(effect.low, effect.high, 2),
+        interval_text(effect.low, effect.high, 2),
     )
 
 

@@ -9,7 +9,7 @@ from masrel.estimates import as_document
 if TYPE_CHECKING:
     from masrel.intervals.latent.result import LatentTrait
     from masrel.intervals.quantity import Quantity
-    from masrel.report.tables import Table, Value
+    from masrel.report._tables import Table, Value
 
 __all__ = ["latent_document", "latent_table", "unlikely"]
 
@@ -21,7 +21,7 @@ def latent_table(
     found: "LatentTrait", file: Path, about: tuple[str, ...], data: str
 ) -> "Table":
     """Lay a result out as a table."""
-    from masrel.report.tables import Column, Table
+    from masrel.report._tables import Column, Table
 
     columns = [
         Column(key="what", heading="What", align="left"),
@@ -94,7 +94,7 @@ def _notes(found: "LatentTrait") -> Iterator[str]:
 
 def _meanings(found: "LatentTrait") -> Iterator[str]:
     # what the numbers speak of, and their unit
-    from masrel.report.rounding import number, percent
+    from masrel.report._tables import number, percent
 
     interval = found.kappa.interval
     if interval is not None:

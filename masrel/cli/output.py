@@ -9,8 +9,8 @@ import click
 from masrel.errors import ParameterError
 
 if TYPE_CHECKING:
+    from masrel.report._tables import Table
     from masrel.report.figures import Form
-    from masrel.report.tables import Table
 
 __all__ = ["figure_form", "print_table", "tell", "write_json"]
 
@@ -28,8 +28,7 @@ def write_json(document: dict[str, object], file: Path) -> None:
 
 def print_table(table: "Table", *, csv: bool, latex: bool = False) -> None:
     """Print a table."""
-    from masrel.report.latex import as_latex
-    from masrel.report.tables import as_csv, as_text
+    from masrel.report._tables import as_csv, as_latex, as_text
 
     form = as_csv if csv else as_latex if latex else as_text
     click.echo(form(table).rstrip("\n"))

@@ -1,8 +1,8 @@
 """Sections `intended` and `in-person`: grades against what they should equal."""
 
 from masrel.analysis import InPersonAgreement
+from masrel.report._tables import Column, Table, counted, number
 from masrel.report.material import Material, Paragraph, Section, absent_section
-from masrel.report.tables import Column, Table, counted, number
 
 __all__ = ["in_person_section", "intended_section"]
 

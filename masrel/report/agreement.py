@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from masrel.analysis import PlannedEstimate
+from masrel.report._tables import Table
 from masrel.report.estimate_rows import EstimateRow, estimate_rows, meanings
 from masrel.report.estimate_table import estimate_table
 from masrel.report.material import Drawing, Material, Paragraph, Section
-from masrel.report.tables import Table
 
 if TYPE_CHECKING:
     from masrel.report.figures import Drawn

@@ -1,7 +1,7 @@
 """Tables of the joint's constants: those all models share, and those of one model."""
 
+from masrel.report._tables import Column, Table, Value
 from masrel.report.material import Material
-from masrel.report.tables import Column, Table, Value
 
 __all__ = ["constants_tables", "reading_of_q"]
 

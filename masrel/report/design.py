@@ -1,10 +1,17 @@
 """Sections `design` and `grades`: what was presented to whom, and what they said."""
 
 from masrel.protocol import Protocol, Session
+from masrel.report._tables import (
+    Column,
+    Table,
+    Value,
+    as_entered,
+    counted,
+    entered_decimals,
+)
 from masrel.report.constants import constants_tables, reading_of_q
 from masrel.report.grid import grade_grid
 from masrel.report.material import Drawing, Material, Paragraph, Section
-from masrel.report.tables import Column, Table, Value, as_given, counted, decimals_given
 
 __all__ = ["design_section", "grades_section"]
 
@@ -47,7 +54,10 @@ def design_section(material: Material) -> Section:
 
 def _simulation(protocol: Protocol) -> str:
     settings = protocol.simulated_raters
-    accuracy, again = as_given(settings.accuracy), as_given(settings.retest_agreement)
+    accuracy, again = (
+        as_entered(settings.accuracy),
+        as_entered(settings.retest_agreement),
+    )
     return (
         "The grades are simulated: every simulated rater gives the intended grade with "
         f"probability {accuracy} and repeats a grade at a retest with probability "
@@ -61,7 +71,7 @@ def _models_table(material: Material) -> Table:
     parameters = [
         tuple(float(getattr(model, key)) for key, _ in _PARAMETERS) for model in models
     ]
-    digits = [decimals_given(values) for values in zip(*parameters, strict=True)]
+    digits = [entered_decimals(values) for values in zip(*parameters, strict=True)]
     notes = [
         "L: catch angle constant; H: catch torque per stretching speed; Q: "
         f"{reading_of_q(material)}; D: angle travelled during the catch."

@@ -15,10 +15,10 @@ from typing import Literal
 from masrel.analysis import Analysis
 from masrel.protocol import Protocol
 from masrel.ratings import InPerson, Ratings
+from masrel.report._tables import Table, as_csv, page_cells
 from masrel.report.contents import build_sections
 from masrel.report.material import Drawing, Material, Paragraph, Section
 from masrel.report.pages import Placed, PlacedSection, render_pages
-from masrel.report.tables import Table, as_csv, on_page
 
 __all__ = ["ReportFiles", "write_report"]
 
@@ -160,8 +160,15 @@ def _placed(
         kind = _kind(block)
         numbers[kind] += 1
         uri = pictures[block.name].uri if isinstance(block, Drawing) else ""
-        content = on_page(block) if isinstance(block, Table) else block
-        return Placed(kind=kind, number=numbers[kind], content=content, uri=uri)
+        columns, rows = page_cells(block) if isinstance(block, Table) else ([], [])
+        return Placed(
+            kind=kind,
+            number=numbers[kind],
+            content=block,
+            columns=columns,
+            rows=rows,
+            uri=uri,
+        )
 
     return tuple(
         PlacedSection(

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from masrel.analysis import PlannedEstimate
 from masrel.estimates import Estimate, Interval
+from masrel.report._tables import counted
 from masrel.report.estimate_words import (
     TARGETS,
     as_words,
@@ -12,7 +13,6 @@ from masrel.report.estimate_words import (
     has_zero,
 )
 from masrel.report.meaning import aside, meaning
-from masrel.report.tables import counted
 
 __all__ = ["EstimateRow", "estimate_rows", "meanings"]
 

@@ -3,17 +3,16 @@
 from collections.abc import Sequence
 
 from masrel.estimates import Interval
-from masrel.report.estimate_rows import EstimateRow
-from masrel.report.estimate_words import TARGETS, interval_name
-from masrel.report.tables import (
+from masrel.report._tables import (
     ABSENT,
-    LANDIS_KOCH,
     Column,
     Table,
     Value,
-    interval_words,
-    strength,
+    interval_text,
 )
+from masrel.report.estimate_rows import EstimateRow
+from masrel.report.estimate_words import TARGETS, interval_name
+from masrel.report.strength import LANDIS_KOCH, strength
 
 __all__ = ["estimate_table"]
 
@@ -116,7 +115,7 @@ def _interval_cells(
     if interval is None:
         return (None,) * 5
     return (
-        f"{interval_words(interval.low, interval.high)} {marks[_meaning(interval)]}",
+        f"{interval_text(interval.low, interval.high)} {marks[_meaning(interval)]}",
         interval.low,
         interval.high,
         interval_name(interval),

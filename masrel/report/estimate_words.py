@@ -4,7 +4,7 @@ import math
 
 from masrel.agreement import COEFFICIENTS
 from masrel.estimates import Estimate, Interval
-from masrel.report.tables import UNDEFINED, interval_words, number, percent
+from masrel.report._tables import UNDEFINED, interval_text, number, percent
 
 __all__ = ["TARGETS", "as_words", "coefficient_name", "has_zero", "interval_name"]
 
@@ -32,7 +32,7 @@ def as_words(estimate: Estimate) -> str:
     value, interval = number(estimate.value, 3), estimate.interval
     if interval is None:
         return value
-    return f"{value} {interval_words(interval.low, interval.high)}"
+    return f"{value} {interval_text(interval.low, interval.high)}"
 
 
 def coefficient_name(coefficient: str, weights: str = "identity") -> str:

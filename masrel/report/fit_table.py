@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from masrel.elbow.identification.friction import FrictionFit
 from masrel.elbow.identification.quantities import QUANTITIES, Quantity
 from masrel.elbow.identification.results import ElbowFit, FittedParameter
-from masrel.report.rounding import ABSENT, interval_words, number, percent
-from masrel.report.tables import Column, Table
+from masrel.report._tables import ABSENT, Column, Table, interval_text, number, percent
 
 __all__ = ["fit_table", "friction_table"]
 
@@ -55,7 +54,7 @@ def _row(
     interval, step = ABSENT, ABSENT
     if not math.isnan(error):
         low, high = estimate.low * factor, estimate.high * factor
-        interval = interval_words(low, high, digits)
+        interval = interval_text(low, high, digits)
     if alone is not None and not math.isnan(alone.value):
         step = number(alone.value * factor, digits)
     return (

@@ -4,8 +4,8 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from masrel.report._tables import Column, Table, counted
 from masrel.report.material import Drawing, Material
-from masrel.report.tables import Column, Table, counted
 
 if TYPE_CHECKING:
     from masrel.report.figures import Drawn

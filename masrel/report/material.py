@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from masrel.analysis import Analysis
 from masrel.protocol import Protocol
 from masrel.ratings import InPerson, Ratings
-from masrel.report.tables import Table
+from masrel.report._tables import Table
 
 if TYPE_CHECKING:
     from masrel.report.figures import Drawn

@@ -3,7 +3,7 @@
 from typing import Literal
 
 from masrel.estimates import Interval
-from masrel.report.rounding import percent
+from masrel.report._tables import percent
 
 __all__ = ["Noun", "aside", "meaning", "origin", "promise"]
 

@@ -8,8 +8,8 @@ from typing import Literal
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 
+from masrel.report._tables import Column, Table
 from masrel.report.material import Drawing, Material, Paragraph
-from masrel.report.tables import Table, shown
 
 __all__ = ["Placed", "PlacedSection", "render_pages"]
 
@@ -26,6 +26,9 @@ class Placed:
     kind: Literal["paragraph", "table", "figure"]  # what it is
     number: int  # which of its kind, from 1
     content: Paragraph | Table | Drawing  # the block
+    # columns, rows: of a table, as they are shown
+    columns: list[Column]
+    rows: list[list[str]]
     uri: str = ""  # A figure's picture, to be held inside the page
 
 
@@ -88,7 +91,6 @@ def _environment() -> Environment:
         undefined=StrictUndefined,
         keep_trailing_newline=True,
     )
-    environment.filters["shown"] = shown
     environment.filters["md"] = _markdown
     environment.filters["symbols"] = _symbols
     return environment

@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING
 
 from masrel.analysis import Speeds, SpeedSummary
+from masrel.report._tables import Column, Table, number, whole_or_tenths
 from masrel.report.material import (
     Drawing,
     Material,
@@ -10,7 +11,6 @@ from masrel.report.material import (
     Section,
     absent_section,
 )
-from masrel.report.tables import Column, Table, number, whole_or_tenths
 
 if TYPE_CHECKING:
     from masrel.report.figures import Drawn, SpeedColumn

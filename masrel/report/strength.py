@@ -2,7 +2,7 @@
 
 import math
 
-from masrel.report.rounding import ABSENT
+from masrel.report._tables import ABSENT
 
 __all__ = ["LANDIS_KOCH", "strength"]
 

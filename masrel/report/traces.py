@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from masrel.analysis import Speed
 from masrel.elbow import ConstantSpeed, ElbowParameters, peak_torque, trace
 from masrel.protocol import elbow_parameters
+from masrel.report._tables import Column, Table, as_entered, number, whole_or_tenths
 from masrel.report.material import (
     Drawing,
     Material,
@@ -14,7 +15,6 @@ from masrel.report.material import (
     Section,
     absent_section,
 )
-from masrel.report.tables import Column, Table, as_given, number, whole_or_tenths
 
 if TYPE_CHECKING:
     from masrel.report.figures import Drawn, TracePanel
@@ -60,7 +60,7 @@ def traces_section(material: Material) -> Section:
     )
 
 
-_TOO_SLOW = f"below {as_given(SLOWEST_DRAWN_DEG_S)} deg/s"
+_TOO_SLOW = f"below {as_entered(SLOWEST_DRAWN_DEG_S)} deg/s"
 
 
 def _about(material: Material, session: str, n_still: int) -> str:
@@ -68,14 +68,14 @@ def _about(material: Material, session: str, n_still: int) -> str:
         "published": "published mean speeds",
         "simulated": "mean speeds of the simulated hands",
     }.get(material.data, "recorded mean speeds")
-    start = as_given(material.protocol.stretch.start_deg)
-    end, rate_hz = as_given(_end_deg(material)), material.protocol.device.rate_hz
+    start = as_entered(material.protocol.stretch.start_deg)
+    end, rate_hz = as_entered(_end_deg(material)), material.protocol.device.rate_hz
     about = (
         "These traces are reconstructions, not measurements: each model is stretched "
         f"at constant speed from {start}° to {end}°, at the {kind} of session "
         f"{session}, one line a rater. Torque resists extension; the arm's own inertia "
         "is not in it. Torque and phases are what the control law sends at "
-        f"{as_given(rate_hz)} Hz."
+        f"{as_entered(rate_hz)} Hz."
     )
     if n_still:
         about += f" Speeds {_TOO_SLOW}, which are not drawn: {n_still}."

@@ -9,10 +9,10 @@ import pytest
 
 from masrel.analysis import PlannedEstimate, RaterEstimate
 from masrel.estimates import Estimate, Interval
+from masrel.report._tables import Table, as_csv, as_text, page_cells
 from masrel.report.estimate_rows import estimate_rows, meanings
 from masrel.report.estimate_table import estimate_table
 from masrel.report.estimate_words import coefficient_name, interval_name
-from masrel.report.tables import Table, as_csv, as_text, on_page
 from tests.analysis.studies import plan
 
 
@@ -69,8 +69,8 @@ def test_the_csv_has_every_number_and_no_mark() -> None:
 
 
 def test_the_page_has_the_interval_in_one_column_explained_below() -> None:
-    table = on_page(made(one(interval=interval())))
-    assert [column.heading for column in table.columns] == [
+    table = made(one(interval=interval()))
+    assert [column.heading for column in page_cells(table)[0]] == [
         "Estimate",
         "Coefficient",
         "Models",
@@ -95,15 +95,14 @@ def test_intervals_made_alike_share_a_mark() -> None:
         one(interval=other),
         one(),
     )
-    shown = [row[7] for row in on_page(table).rows]
-    shown = [row[6] for row in on_page(table).rows]
-    assert shown == ["[0.320, 0.933] ᵃ", "[0.100, 0.933] ᵃ", "[0.320, 0.933] ᵇ", None]
+    shown = [row[6] for row in page_cells(table)[1]]
+    assert shown == ["[0.320, 0.933] ᵃ", "[0.100, 0.933] ᵃ", "[0.320, 0.933] ᵇ", "–"]
     assert sum(note.startswith(("ᵃ", "ᵇ")) for note in table.notes) == 2
 
 
 def test_more_intervals_than_letters_still_have_marks_of_their_own() -> None:
     lines = [one(interval=interval(method=f"way {i}")) for i in range(60)]
-    marks = {str(row[6]).split()[-1] for row in on_page(made(*lines)).rows}
+    marks = {row[6].split()[-1] for row in page_cells(made(*lines))[1]}
     assert len(marks) == 60
 
 

@@ -5,13 +5,13 @@ import pytest
 
 from masrel.elbow import STANDARD_MODELS, fit, fit_friction
 from masrel.elbow.identification import ElbowFit
+from masrel.report._tables import as_text
 from masrel.report.figures.fit_catch import draw_catches
 from masrel.report.figures.fit_friction import draw_friction
 from masrel.report.figures.fit_residuals import draw_residuals
 from masrel.report.figures.fit_slow import draw_slow_trials
 from masrel.report.figures.fit_trial import draw_fast_trials
 from masrel.report.fit_table import fit_table, friction_table
-from masrel.report.tables import as_text
 from tests.elbow.identification.synthesis import Scatter, study
 from tests.elbow.identification.test_friction import backdriven
 

@@ -15,7 +15,7 @@ TABLES = """
 from masrel.analysis import analyze
 from masrel.report.contents import SECTIONS, build_sections
 from masrel.report.material import Material
-from masrel.report.tables import Table, as_csv, as_text
+from masrel.report._tables import Table, as_csv, as_text
 from tests.analysis.studies import plan, protocol_with, table_v
 protocol, ratings = protocol_with(plan(), sections=tuple(SECTIONS)), table_v()
 analysis = analyze(protocol, ratings)
@@ -62,4 +62,4 @@ def test_the_detector_sees_rounding() -> None:
 @pytest.mark.parametrize("module", MODULES, ids=str)
 def test_one_module_rounds(module: Path) -> None:
     tree = ast.parse((REPORT / module).read_text(encoding="utf-8"))
-    assert bool(rounds(tree)) == (module == Path("rounding.py"))
+    assert bool(rounds(tree)) == (module == Path("_tables.py"))

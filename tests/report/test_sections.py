@@ -15,10 +15,10 @@ from masrel.elbow import ConstantSpeed, peak_torque
 from masrel.protocol import elbow_parameters
 from masrel.ratings import Ratings
 from masrel.report import ReportFiles, write_report
+from masrel.report._tables import Table, as_text
 from masrel.report.contents import SECTIONS, build_sections
 from masrel.report.figures.style import STYLE
 from masrel.report.material import Drawing, Material, Paragraph
-from masrel.report.tables import Table, as_text
 from tests.analysis.studies import (
     hess2012,
     of_session,

@@ -8,22 +8,23 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from masrel.report.tables import (
+from masrel.report._tables import (
     Column,
     Table,
     as_csv,
-    as_given,
+    as_entered,
+    as_latex,
     as_text,
+    cell_text,
     counted,
-    decimals_given,
-    interval_words,
+    entered_decimals,
+    interval_text,
     number,
-    on_page,
+    page_cells,
     percent,
-    shown,
-    strength,
     whole_or_tenths,
 )
+from masrel.report.strength import strength
 
 
 def example(data: str = "published") -> Table:
@@ -51,11 +52,10 @@ def test_a_negative_number_has_a_true_minus_and_zero_has_none() -> None:
 
 
 def test_undefined_and_absent_are_told_apart() -> None:
-    column = Column(key="x", heading="x", digits=1)
-    assert shown(math.nan, column) == "undefined"
-    assert shown(None, column) == "–"
-    assert interval_words(math.nan, 0.5) == "[undefined]"
-    assert interval_words(-math.inf, 0.5) == "[−∞, 0.500]"  # an end without a bound
+    assert cell_text(math.nan, 1) == "undefined"
+    assert cell_text(None, 1) == "–"
+    assert interval_text(math.nan, 0.5) == "[undefined]"
+    assert interval_text(-math.inf, 0.5) == "[−∞, 0.500]"  # an end without a bound
 
 
 # Landis and Koch (1977), p. 165: .00-.20 slight, .21-.40 fair, .41-.60 moderate,
@@ -129,16 +129,16 @@ def test_a_csv_gives_every_digit_back(value: float) -> None:
 
 
 def test_a_number_somebody_chose_keeps_its_digits() -> None:
-    assert [as_given(x) for x in (146.0, 0.35, -2.5, 1e-7, 0.1 + 0.2)] == [
+    assert [as_entered(x) for x in (146.0, 0.35, -2.5, 1e-7, 0.1 + 0.2)] == [
         "146",
         "0.35",
         "−2.5",
         "0.0000001",
         "0.30000000000000004",
     ]
-    assert as_given(math.nan) == "undefined"
-    assert shown(146.0, Column(key="x", heading="x")) == "146"
-    assert decimals_given([130.0, 125.5, 0.125]) == 3
+    assert as_entered(math.nan) == "undefined"
+    assert cell_text(146.0, None) == "146"
+    assert entered_decimals([130.0, 125.5, 0.125]) == 3
 
 
 def test_a_level_is_not_rounded_to_certainty() -> None:
@@ -168,5 +168,11 @@ def test_a_column_may_be_of_the_page_or_of_the_csv_alone() -> None:
         data="foreign",
     )
     assert as_csv(table) == "id,low,data\na,0.123,foreign\n"
-    assert on_page(table).rows == (("a", "[0.1, 0.2]"),)
+    assert page_cells(table)[1] == [["a", "[0.1, 0.2]"]]
     assert "0.123" not in as_text(table)
+
+
+def test_letters_that_latex_reads_as_its_own_are_escaped() -> None:
+    text = as_latex(example("simulated"))
+    assert r"\caption{SIMULATED DATA. Values by model}" in text
+    assert "HM3 & -- \\\\" in text

@@ -12,6 +12,7 @@ from masrel.elbow.identification.law import PreCatchLaw
 from masrel.elbow.identification.levels import CatchLevels, catch_levels
 from masrel.elbow.identification.quantities import QUANTITIES
 from masrel.elbow.identification.results import ElbowFit
+from masrel.report._tables import interval_text, number
 from masrel.report.figures.style import (
     BLACK,
     BLUE,
@@ -20,7 +21,6 @@ from masrel.report.figures.style import (
     finish,
     house_style,
 )
-from masrel.report.rounding import interval_words, number
 
 __all__ = ["draw_catches"]
 
@@ -103,7 +103,7 @@ def _said(fit: ElbowFit, name: str, digits: int) -> str:
     said += unit
     if not math.isnan(estimate.standard_error):
         ends = estimate.low * quantity.factor, estimate.high * quantity.factor
-        said += f" {interval_words(*ends, digits)}"
+        said += f" {interval_text(*ends, digits)}"
     return said
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from masrel.elbow.identification.friction import FrictionFit
+from masrel.report._tables import number
 from masrel.report.figures.style import (
     BLACK,
     GREY,
@@ -13,7 +14,6 @@ from masrel.report.figures.style import (
     finish,
     house_style,
 )
-from masrel.report.rounding import number
 
 __all__ = ["draw_friction"]
 

@@ -5,6 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from masrel.elbow.identification.results import ElbowFit
+from masrel.report._tables import number
 from masrel.report.figures.style import (
     BLACK,
     GREY,
@@ -12,7 +13,6 @@ from masrel.report.figures.style import (
     finish,
     house_style,
 )
-from masrel.report.rounding import number
 
 __all__ = ["draw_slow_trials"]
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from masrel.elbow.identification.catch import Catch
 from masrel.elbow.identification.results import ElbowFit
 from masrel.elbow.identification.trials import Trial
+from masrel.report._tables import number
 from masrel.report.figures.style import (
     BLACK,
     BLUE,
@@ -21,7 +22,6 @@ from masrel.report.figures.style import (
     finish,
     house_style,
 )
-from masrel.report.rounding import number
 
 __all__ = ["draw_fast_trials"]
 

@@ -9,10 +9,10 @@ from matplotlib.legend_handler import HandlerLine2D
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from masrel.report._tables import percent
 from masrel.report.figures.forest_row import ForestRow
 from masrel.report.figures.ridge import RIDGE_ALPHA, RIDGE_COLOURS, Part, parts
 from masrel.report.figures.style import BLACK, BLUE, DASHES, GREY, ORANGE
-from masrel.report.rounding import percent
 
 __all__ = ["DOT", "LOOKS", "ZERO", "handles_of", "put_legend"]
 

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from masrel.report._tables import percent
 from masrel.report.figures.style import (
     BLACK,
     BLUE,
@@ -23,7 +24,6 @@ from masrel.report.figures.style import (
     house_style,
     put_stamp,
 )
-from masrel.report.rounding import percent
 
 __all__ = ["LatentScale", "ScaleRow", "latent_file"]
 

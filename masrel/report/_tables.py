@@ -1,0 +1,237 @@
+"""Tables in every form they are read in, and the rules by which numbers are rounded.
+
+A table holds its values as they were computed. This is the only module of the report
+that rounds, and it does so when a table is shown (screen, LaTeX, HTML, Markdown); the
+CSV keeps every digit.
+"""
+
+import csv
+import io
+import math
+import unicodedata
+from collections.abc import Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from typing import Literal
+
+ABSENT = "–"
+"""What is shown where there is nothing."""
+
+UNDEFINED = "undefined"
+"""What is shown for ``nan``."""
+
+SIMULATED = "SIMULATED DATA"
+"""What tables and figures of simulated data carry."""
+
+Value = str | int | float | None
+"""What a cell holds: text, a number, or nothing."""
+
+Align = Literal["left", "right", "center"]
+"""How a column is set."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Column:
+    """One column of a table."""
+
+    key: str  # its name in the CSV, unit included
+    heading: str  # its name for a reader, unit included
+    # decimals shown of a float; None for text, whole numbers, and numbers shown with
+    # the digits they were entered with
+    digits: int | None = None
+    align: Align = "right"
+    # whether a page (or screen) and the CSV have it: a page puts in one column what a
+    # CSV keeps in several
+    where: Literal["everywhere", "page", "csv"] = "everywhere"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Table:
+    """A table whose first column names the rows."""
+
+    name: str  # name of its file, without extension
+    caption: str  # what it shows, understood alone
+    columns: tuple[Column, ...]
+    # values as computed: text, numbers, ``nan`` for undefined, None for absent
+    rows: tuple[tuple[Value, ...], ...]
+    notes: tuple[str, ...] = ()  # what the reader must know, below the table
+    # where the data come from: "simulated", "published", "recorded" or "foreign"
+    data: str
+
+    @property
+    def simulated(self) -> bool:
+        """Whether any of its data are simulated."""
+        return "simulated" in self.data
+
+
+def number(value: float | None, digits: int) -> str:
+    """Return a number as shown: rounded, with a true minus sign."""
+    if value is None:
+        return ABSENT
+    if math.isinf(value):
+        return "∞" if value > 0.0 else "−∞"
+    if math.isnan(value):
+        return UNDEFINED
+    text = f"{value:.{digits}f}"
+    if float(text) == 0.0:
+        text = text.removeprefix("-")  # no "-0.000"
+    return text.replace("-", "−")
+
+
+def as_entered(value: float) -> str:
+    """Return a number that somebody chose with the digits it was entered with."""
+    if not math.isfinite(value):
+        return UNDEFINED
+    text = f"{Decimal(repr(float(value))):f}"  # no exponent
+    return text.removesuffix(".0").replace("-", "−")
+
+
+def percent(share: float) -> str:
+    """Return a share that somebody chose in percent, with the digits it has."""
+    return f"{(Decimal(repr(float(share))) * 100).normalize():f}"
+
+
+def entered_decimals(values: Sequence[float]) -> int:
+    """Return the decimals with which a column of chosen numbers loses nothing."""
+    written = (as_entered(value).partition(".")[2] for value in values)
+    return max(map(len, written), default=0)
+
+
+def whole_or_tenths(values: Sequence[float]) -> int:
+    """Return the decimals a column of measurements needs: 0 if all are whole."""
+    known = [value for value in values if math.isfinite(value)]
+    return 0 if all(float(value).is_integer() for value in known) else 1
+
+
+def interval_text(low: float, high: float, digits: int = 3) -> str:
+    """Return the ends of an interval in brackets."""
+    if math.isnan(low) or math.isnan(high):
+        return f"[{UNDEFINED}]"
+    return f"[{number(low, digits)}, {number(high, digits)}]"
+
+
+def counted(count: int, noun: str) -> str:
+    """Return a count with its noun, in the plural unless there is one."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def cell_text(value: Value, digits: int | None) -> str:
+    """Return a value as it is shown in a cell."""
+    if value is None:
+        return ABSENT
+    if not isinstance(value, float):
+        return str(value)
+    return as_entered(value) if digits is None else number(value, digits)
+
+
+def page_cells(table: Table) -> tuple[list[Column], list[list[str]]]:
+    """Return the columns of a page or a screen, and every row as shown in them."""
+    places = [(i, c) for i, c in enumerate(table.columns) if c.where != "csv"]
+    rows = [[cell_text(row[i], c.digits) for i, c in places] for row in table.rows]
+    return [column for _, column in places], rows
+
+
+def as_csv(table: Table) -> str:
+    """Return a table as CSV, every digit kept, with its provenance in each row."""
+    places = [(i, c) for i, c in enumerate(table.columns) if c.where != "page"]
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow([*(column.key for _, column in places), "data"])
+    for row in table.rows:
+        writer.writerow([*(_csv_cell(row[i]) for i, _ in places), table.data])
+    return out.getvalue()
+
+
+def _csv_cell(value: Value) -> str:
+    if value is None or (isinstance(value, float) and not math.isfinite(value)):
+        return ""
+    return repr(value) if isinstance(value, float) else str(value)
+
+
+def as_text(table: Table) -> str:
+    """Return a table for a screen of fixed-width letters."""
+    columns, body = page_cells(table)
+    head = [column.heading for column in columns]
+    lines = aligned([head, *body], [column.align for column in columns], rule=True)
+    return "\n".join([_caption(table), *lines, *table.notes])
+
+
+def aligned(
+    rows: Sequence[Sequence[str]], aligns: Sequence[Align], *, rule: bool = False
+) -> list[str]:
+    """Return rows of cells as lines that line up, with a rule below the first."""
+    widths = [max(map(_width, cells)) for cells in zip(*rows, strict=True)]
+    if rule:
+        rows = [rows[0], ["-" * width for width in widths], *rows[1:]]
+    lines = []
+    for cells in rows:
+        spaces = [
+            " " * (width - _width(cell))
+            for cell, width in zip(cells, widths, strict=True)
+        ]
+        padded = [
+            space + cell if align == "right" else cell + space
+            for cell, space, align in zip(cells, spaces, aligns, strict=True)
+        ]
+        lines.append("  ".join(padded).rstrip())
+    return lines
+
+
+def _width(text: str) -> int:
+    # combining marks take no column of the screen
+    return sum(1 for letter in text if not unicodedata.combining(letter))
+
+
+def _caption(table: Table) -> str:
+    return f"{SIMULATED}. {table.caption}" if table.simulated else table.caption
+
+
+def as_latex(table: Table) -> str:
+    r"""Return a table as LaTeX that needs the package `booktabs` and no other."""
+    columns, body = page_cells(table)
+    letters = "".join({"left": "l", "center": "c"}.get(c.align, "r") for c in columns)
+    lines = [
+        r"\begin{table}",
+        r"\centering",
+        rf"\caption{{{_latex_text(_caption(table))}}}",
+        rf"\begin{{tabular}}{{{letters}}}",
+        r"\toprule",
+        _latex_line([column.heading for column in columns]),
+        r"\midrule",
+        *map(_latex_line, body),
+        r"\bottomrule",
+        r"\end{tabular}",
+    ]
+    if table.notes:
+        notes = r" \\ ".join(map(_latex_text, table.notes))
+        lines.append(rf"\par\smallskip\footnotesize\raggedright {notes}")
+    return "\n".join([*lines, r"\end{table}"]) + "\n"
+
+
+_LATEX_ESCAPES = str.maketrans(
+    {
+        "\\": r"\textbackslash{}",
+        "&": r"\&",
+        "%": r"\%",
+        "$": r"\$",
+        "#": r"\#",
+        "_": r"\_",
+        "{": r"\{",
+        "}": r"\}",
+        "~": r"\textasciitilde{}",
+        "^": r"\textasciicircum{}",
+        "−": "$-$",
+        "–": "--",
+        "κ": r"$\kappa$",
+        "π": r"$\pi$",
+        "α": r"$\alpha$",
+    }
+)
+
+
+def _latex_line(cells: list[str]) -> str:
+    return " & ".join(map(_latex_text, cells)) + r" \\"
+
+
+def _latex_text(text: str) -> str:
+    return text.translate(_LATEX_ESCAPES)
