@@ -13,6 +13,7 @@ from mpmath import mp, mpf
 
 from masrel.elbow import (
     STANDARD_MODELS,
+    ConstantSpeed,
     ElbowParameters,
     Events,
     MinimumJerk,
@@ -350,6 +351,25 @@ def test_a_stretch_ends_at_its_end_or_at_the_limit(
 ) -> None:
     last = events(joint, motion).phases[-1].end_angle
     assert last == pytest.approx(min(motion.end, joint.range_end), abs=4e-15)
+
+
+def test_at_the_speed_of_the_smallest_angle_the_line_of_slower_speeds_holds() -> None:
+    # (6) with ν_L above ν_H = (L - θ_L) / α = (1.90625 - 1.25) / 0.375 = 1.75 rad/s:
+    # up to ν_H the catch is at L - α ν_L = 0.78125 rad, beyond it at θ_L = 1.25 rad.
+    joint = ElbowParameters(
+        catch_angle_constant=1.90625,
+        catch_torque_constant=2.0,
+        residual_ratio=0.4,
+        catch_travel=0.25,
+        catch_slope=0.375,
+        slowest_mean_speed=3.0,
+        smallest_catch_angle=1.25,
+    )
+    for start in (0.1, 0.3, 0.5):  # the mean speed is a quotient, rounded either way
+        at = events(joint, ConstantSpeed(start=start, end=2.5, speed=1.75))
+        assert at.catch_angle == pytest.approx(0.78125, abs=1e-15)
+    beyond = events(joint, ConstantSpeed(start=0.5, end=2.5, speed=nextafter(1.75, 2)))
+    assert beyond.catch_angle == pytest.approx(1.25, abs=1e-15)
 
 
 @given(joint=joints(), motion=motions())
