@@ -66,7 +66,7 @@ class Bench:
     def emergency_stop(self) -> "Iterator[EmergencyStop]":
         """Give a button that signals press, and any key of the terminal."""
         from masrel.hess import EmergencyStop
-        from masrel.hess.stop import stop_on_key, stop_on_signals
+        from masrel.hess._stop import stop_on_key, stop_on_signals
 
         stop = EmergencyStop()
         keys = None if self.hand is not None else sys.stdin  # an emulator is quick

@@ -110,9 +110,9 @@ def friction_command(bench: Bench, arm_is_free: bool) -> None:
     The arm moves by itself, between 40 and 115 deg, at up to 80 deg/s, with at most
     2 N·m, for about 20 s.
     """
+    from masrel.hess._watchdog import watched
     from masrel.hess.puck.friction import fit_friction
     from masrel.hess.puck.turning import LIMITS, SPEEDS, steady_runs
-    from masrel.hess.watchdog import watched
 
     if not arm_is_free:
         raise click.UsageError(

@@ -1,19 +1,22 @@
 """The driver of the simulator: devices, the controller of Fig. 7, the 1 kHz loop."""
 
+from masrel.hess._presented import Fault, Presented, cut_off
+from masrel.hess._replay import ReplayOptions
+from masrel.hess._stop import EmergencyStop
 from masrel.hess.clock import Clock, RealClock, SimulatedClock
 from masrel.hess.controller import Controller
-from masrel.hess.device import Device, IdleCommand, Reading
-from masrel.hess.fault import Fault
+from masrel.hess.device import (
+    BackendOptions,
+    Device,
+    DeviceSetup,
+    IdleCommand,
+    Reading,
+)
 from masrel.hess.friction import Friction, FrictionCompensation
-from masrel.hess.hand import Hand
+from masrel.hess.hand import Hand, SimulatedHand, YieldingHand
 from masrel.hess.limits import DeviceLimits
 from masrel.hess.loop import run_presentation
-from masrel.hess.presented import Presented, cut_off
 from masrel.hess.registry import device_names, open_device
-from masrel.hess.setup import BackendOptions, DeviceSetup
-from masrel.hess.simulated_hand import SimulatedHand
-from masrel.hess.stop import EmergencyStop
-from masrel.hess.yielding_hand import YieldingHand
 
 __all__ = [
     "BackendOptions",
@@ -31,6 +34,7 @@ __all__ = [
     "Presented",
     "Reading",
     "RealClock",
+    "ReplayOptions",
     "SimulatedClock",
     "SimulatedHand",
     "YieldingHand",

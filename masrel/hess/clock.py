@@ -5,8 +5,6 @@ from typing import Protocol
 
 from masrel.errors import ParameterError
 
-__all__ = ["Clock", "RealClock", "SimulatedClock"]
-
 
 class Clock(Protocol):
     """What the loop and the simulated device ask of a clock."""

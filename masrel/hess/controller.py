@@ -12,8 +12,6 @@ from masrel.errors import ParameterError
 from masrel.hess.friction import Friction, FrictionCompensation
 from masrel.recording import PHASES
 
-__all__ = ["Controller"]
-
 _PRE_CATCH = PHASES.index("pre-catch")
 _SLIP_WINDOW_S = 0.010  # twice the delay of the estimated speed
 _RANGE_END_MARGIN = math.radians(3.0)  # what the loop takes for arrived, too

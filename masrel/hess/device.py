@@ -1,14 +1,15 @@
-"""What a device is to the control loop, whichever hardware or simulation it is."""
+"""What a device is to the control loop, and what one is made from."""
 
 import math
 import warnings
 from abc import ABC, abstractmethod
+from dataclasses import dataclass
 from types import TracebackType
 from typing import ClassVar, Literal, NamedTuple, Self
 
 from masrel.errors import DeviceError
-
-__all__ = ["Device", "IdleCommand", "Reading"]
+from masrel.hess.clock import Clock
+from masrel.hess.hand import Hand
 
 State = Literal["new", "open", "closed"]
 
@@ -213,3 +214,30 @@ class Device(ABC):
 
     def _check(self) -> None:  # noqa: B027 - a device without a state has nothing to say
         """Ask an open device for its state; raise `DeviceError` when it is wrong."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BackendOptions:
+    """What one backend can be told beyond `DeviceSetup`; each has a subclass."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DeviceSetup:
+    """What a backend's `build` makes a device from.
+
+    Attributes
+    ----------
+    clock : Clock
+        The clock of the loop that will use it.
+    hand : Hand or None
+        The hand that moves a simulated arm.
+    range_end : float
+        Where the arm meets its end stop, rad.
+    options : BackendOptions or None
+        The backend's own options; None for its defaults.
+    """
+
+    clock: Clock
+    hand: Hand | None = None
+    range_end: float = math.radians(146.0)
+    options: BackendOptions | None = None

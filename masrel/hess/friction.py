@@ -9,8 +9,6 @@ from dataclasses import dataclass
 
 from masrel.errors import ParameterError
 
-__all__ = ["Friction", "FrictionCompensation"]
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Friction:

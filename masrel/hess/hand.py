@@ -1,8 +1,9 @@
-"""What a simulated arm feels of whoever moves it."""
+"""Hands that move a simulated arm: a spring and a damper to an intention."""
 
-from typing import Protocol
+import math
+from typing import ClassVar, Protocol
 
-__all__ = ["Hand"]
+from masrel.errors import ParameterError
 
 
 class Hand(Protocol):
@@ -59,3 +60,260 @@ class Hand(Protocol):
             Torque of the hand on the arm, N·m.
         """
         ...
+
+
+class SimulatedHand:
+    """A hand that stretches the arm once at an intended speed, and then holds.
+
+    The intention is a trapezoid: rest for `delay`, a short ramp up, constant speed, a
+    ramp down. So the mean speed before the catch, which the catch angle depends on,
+    falls at most 2 % short of the intended one. Spring and damper are stiffer than a
+    human arm: the damper keeps the speed within 12 deg/s of the intention when the
+    catch adds 7 N·m at once, and the spring lags by about 1 deg. This hand executes
+    an intention; it is no model of how a person reacts.
+
+    Parameters
+    ----------
+    start : float
+        Where the stretch starts, rad.
+    end : float
+        Where it is meant to end, rad: the end of the range of motion.
+    mean_speed : float
+        Speed between the ramps, rad/s.
+    slip_time : float or None, optional
+        Time after the first reading at which the hand lets go, s; None for never.
+    stiffness : float, optional
+        N·m/rad.
+    damping : float, optional
+        N·m·s/rad.
+    delay : float, optional
+        Rest before the stretch, s.
+    ramp_up, ramp_down : float, optional
+        Duration of the ramps, s.
+    follow_through : float, optional
+        How far beyond `end` the hand intends to go, rad: it meets the joint's own
+        end and presses against it, whatever the torque there.
+
+    Raises
+    ------
+    ParameterError
+        If a value is outside its range or the ramps take more than the stretch.
+
+    Examples
+    --------
+    >>> hand = SimulatedHand(start=0.5, end=2.5, mean_speed=1.5)
+    >>> hand.intended(0.0)
+    (0.5, 0.0)
+    >>> hand.intended(1.0)[1]
+    1.5
+    """
+
+    __slots__ = (
+        "_brake_time",
+        "_cruise_angle",
+        "_cruise_time",
+        "_delay",
+        "_final_angle",
+        "_final_time",
+        "_ramp_down",
+        "_ramp_up",
+        "damping",
+        "end",
+        "mean_speed",
+        "slip_time",
+        "start",
+        "stiffness",
+    )
+
+    yields: ClassVar[bool] = False
+
+    def __init__(
+        self,
+        *,
+        start: float,
+        end: float,
+        mean_speed: float,
+        slip_time: float | None = None,
+        stiffness: float = 600.0,
+        damping: float = 40.0,
+        delay: float = 0.05,
+        ramp_up: float = 0.02,
+        ramp_down: float = 0.1,
+        follow_through: float = math.radians(2.5),
+    ) -> None:
+        self.start = start
+        self.end = end
+        self.mean_speed = mean_speed
+        self.slip_time = math.inf if slip_time is None else slip_time
+        self.stiffness = stiffness
+        self.damping = damping
+        self._delay = delay
+        self._ramp_up = ramp_up
+        self._ramp_down = ramp_down
+        self._check(follow_through)
+        self._final_angle = end + follow_through
+        ramps = 0.5 * mean_speed * (ramp_up + ramp_down)
+        cruise = self._final_angle - start - ramps
+        if cruise <= 0.0:
+            raise ParameterError(
+                f"mean_speed: needs ramps shorter than the stretch, at {mean_speed} "
+                f"rad/s they take {ramps:.3g} of {self._final_angle - start:.3g} rad"
+            )
+        self._cruise_time = delay + ramp_up
+        self._cruise_angle = start + 0.5 * mean_speed * ramp_up
+        self._brake_time = self._cruise_time + cruise / mean_speed
+        self._final_time = self._brake_time + ramp_down
+
+    def _check(self, follow_through: float) -> None:
+        positive = {
+            "mean_speed": self.mean_speed,
+            "stiffness": self.stiffness,
+            "damping": self.damping,
+            "ramp_up": self._ramp_up,
+            "ramp_down": self._ramp_down,
+        }
+        for name, value in positive.items():
+            if not 0.0 < value < math.inf:
+                raise ParameterError(f"{name}: needs more than 0, got {value}")
+        for name, value in (("delay", self._delay), ("follow_through", follow_through)):
+            if not 0.0 <= value < math.inf:
+                raise ParameterError(f"{name}: needs 0 or more, got {value}")
+        if not self.slip_time >= 0.0:
+            raise ParameterError(f"slip_time: needs 0 or more, got {self.slip_time}")
+        if not 0.0 <= self.start < self.end <= math.pi:
+            raise ParameterError(
+                "start, end: need 0 <= start < end <= 180 degrees, "
+                f"got {self.start} and {self.end} rad"
+            )
+
+    def intended(self, time_s: float) -> tuple[float, float]:
+        """Return where the hand means to be.
+
+        Parameters
+        ----------
+        time_s : float
+            Time after the first reading, s.
+
+        Returns
+        -------
+        tuple of float
+            Intended angle, rad, and speed, rad/s.
+        """
+        speed = self.mean_speed
+        if self._cruise_time <= time_s < self._brake_time:
+            return self._cruise_angle + speed * (time_s - self._cruise_time), speed
+        if time_s <= self._delay:
+            return self.start, 0.0
+        if time_s < self._cruise_time:
+            since = time_s - self._delay
+            rise = speed / self._ramp_up
+            return self.start + 0.5 * rise * since * since, rise * since
+        left = self._final_time - time_s
+        if left <= 0.0:
+            return self._final_angle, 0.0
+        fall = speed / self._ramp_down
+        return self._final_angle - 0.5 * fall * left * left, fall * left
+
+    def feel(self, time_s: float, torque: float) -> None:
+        """Feel nothing: this hand goes on whatever the torque."""
+
+
+class YieldingHand(SimulatedHand):
+    """A hand that slows down where the arm resists, and speeds up where it gives.
+
+    The intention of a `SimulatedHand` is gone through at a rate r between 0 and 1
+    that follows 1 / (1 + `yielding`·|τ|) of the torque τ it feels, with a first-order
+    lag of `reaction_time`. So the hand brakes after a catch, as a person's does who
+    meets a resistance. It is still no model of a person.
+
+    Parameters
+    ----------
+    start : float
+        Where the stretch starts, rad.
+    end : float
+        Where it is meant to end, rad.
+    mean_speed : float
+        Speed between the ramps where nothing resists, rad/s.
+    slip_time : float or None, optional
+        Time after the first reading at which the hand lets go, s; None for never.
+    yielding : float, optional
+        1/(N·m); the default halves the speed at 10 N·m.
+    reaction_time : float, optional
+        s; the default is a long-latency reflex rather than a decision.
+
+    Raises
+    ------
+    ParameterError
+        If a value is outside its range or the ramps take more than the stretch.
+
+    Examples
+    --------
+    >>> hand = YieldingHand(start=0.5, end=2.5, mean_speed=1.5)
+    >>> for tick in range(1000):
+    ...     hand.feel(tick * 1e-3, 10.0)
+    >>> round(hand.intended(1.0)[1], 2)
+    0.75
+    """
+
+    __slots__ = ("_felt_at", "_intended_at", "_rate", "_reaction_time", "_yielding")
+
+    yields: ClassVar[bool] = True
+
+    def __init__(
+        self,
+        *,
+        start: float,
+        end: float,
+        mean_speed: float,
+        slip_time: float | None = None,
+        yielding: float = 0.1,
+        reaction_time: float = 0.08,
+    ) -> None:
+        super().__init__(
+            start=start, end=end, mean_speed=mean_speed, slip_time=slip_time
+        )
+        if not 0.0 <= yielding < math.inf:
+            raise ParameterError(f"yielding: needs 0 or more, got {yielding}")
+        if not 0.0 < reaction_time < math.inf:
+            raise ParameterError(
+                f"reaction_time: needs more than 0, got {reaction_time}"
+            )
+        self._yielding = yielding
+        self._reaction_time = reaction_time
+        self._rate = 1.0
+        self._felt_at = 0.0  # s
+        self._intended_at = 0.0  # how far it has gone through its intention, s
+
+    def intended(self, time_s: float) -> tuple[float, float]:
+        """Return where the hand means to be, as far as it has felt.
+
+        Parameters
+        ----------
+        time_s : float
+            Time after the first reading, s.
+
+        Returns
+        -------
+        tuple of float
+            Intended angle, rad, and speed, rad/s.
+        """
+        since = time_s - self._felt_at
+        angle, speed = super().intended(self._intended_at + self._rate * since)
+        return angle, self._rate * speed
+
+    def feel(self, time_s: float, torque: float) -> None:
+        """Adapt the rate to a torque.
+
+        Parameters
+        ----------
+        time_s : float
+            Time after the first reading, s; never earlier than the one before.
+        torque : float
+            Torque of the hand on the arm, N·m.
+        """
+        since = time_s - self._felt_at
+        self._intended_at += self._rate * since
+        self._felt_at = time_s
+        target = 1.0 / (1.0 + self._yielding * abs(torque))
+        share = -math.expm1(-since / self._reaction_time)
+        self._rate += share * (target - self._rate)

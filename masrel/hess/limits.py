@@ -5,13 +5,10 @@ from dataclasses import dataclass
 
 from masrel.errors import ParameterError
 
-__all__ = ["HIGHEST_ANGLE", "LONGEST_RAMP_S", "LOWEST_ANGLE", "DeviceLimits"]
+# No elbow is outside, rad; 5 deg because an end stop gives way a little.
+_LOWEST_ANGLE, _HIGHEST_ANGLE = math.radians(-5.0), math.radians(185.0)
 
-LOWEST_ANGLE, HIGHEST_ANGLE = math.radians(-5.0), math.radians(185.0)
-"""No elbow is outside, rad; 5 deg because an end stop gives way a little."""
-
-LONGEST_RAMP_S = 0.1
-"""A fault's torque is zero after this at the latest, s."""
+_LONGEST_RAMP_S = 0.1  # a fault's torque is zero after this at the latest
 
 _POSITIVE = (
     "torque",
@@ -91,8 +88,8 @@ class DeviceLimits:
     torque: float = 20.0
     torque_rate: float = 12_000.0
     speed: float = math.radians(400.0)
-    lowest_angle: float = LOWEST_ANGLE
-    highest_angle: float = HIGHEST_ANGLE
+    lowest_angle: float = _LOWEST_ANGLE
+    highest_angle: float = _HIGHEST_ANGLE
     soft_stop_width: float = math.radians(5.0)
     soft_stop_torque: float = 10.0
     missed_ticks: int = 20
@@ -115,9 +112,9 @@ class DeviceLimits:
             value = getattr(self, name)
             if not 0 <= value < math.inf:
                 raise ParameterError(f"{name}: needs 0 or more, got {value}")
-        if not 0.0 <= self.ramp_time <= LONGEST_RAMP_S:
+        if not 0.0 <= self.ramp_time <= _LONGEST_RAMP_S:
             raise ParameterError(
-                f"ramp_time: needs 0 to {LONGEST_RAMP_S:g} s, got {self.ramp_time}"
+                f"ramp_time: needs 0 to {_LONGEST_RAMP_S:g} s, got {self.ramp_time}"
             )
         if not -math.inf < self.lowest_angle < self.highest_angle < math.inf:
             raise ParameterError(

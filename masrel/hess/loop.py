@@ -1,6 +1,5 @@
 """The control loop: one presentation at a fixed rate, recorded tick by tick."""
 
-import gc
 import math
 import warnings
 from collections.abc import Iterator
@@ -8,23 +7,18 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from masrel.errors import DeviceError, OverrunWarning, ParameterError
-from masrel.hess.clock import Clock, RealClock
+from masrel.hess._presented import Presented, as_presented
+from masrel.hess._realtime import collector_off, scheduled
+from masrel.hess._shutdown import run_to_the_end
+from masrel.hess._spool import Samples, Spool, n_samples
+from masrel.hess._stop import EmergencyStop
+from masrel.hess._ticks import Ticks
+from masrel.hess._watchdog import NoWatchdog, Watching
+from masrel.hess.clock import Clock
 from masrel.hess.controller import Controller
 from masrel.hess.device import Device
-from masrel.hess.ending import run_to_the_end
-from masrel.hess.fault import Fault
 from masrel.hess.limits import DeviceLimits
-from masrel.hess.movement import Columns, movement_facts
-from masrel.hess.presented import Presented, fault_facts
-from masrel.hess.realtime import real_time
-from masrel.hess.samples import Samples, n_samples
-from masrel.hess.spool import Spool
-from masrel.hess.stop import EmergencyStop
-from masrel.hess.ticks import Ticks
-from masrel.hess.watchdog import NoWatchdog, Watching
-from masrel.recording import Fact, Recording
-
-__all__ = ["run_presentation"]
+from masrel.recording import Fact
 
 
 def run_presentation(
@@ -126,15 +120,22 @@ def run_presentation(
             stop or EmergencyStop(),
             watchdog or NoWatchdog(),
         )
-        with _scheduled(clock) as known["scheduling"], _collector_off():
+        with scheduled(clock) as known["scheduling"], collector_off():
             ended, fault = run_to_the_end(ticks)
         columns = samples.columns()
     if ticks.n_missed:
-        words = f"the control loop missed {ticks.n_missed} ticks; they were skipped"
-        warnings.warn(words, OverrunWarning, stacklevel=2)
-    facts = {**known, **_facts(ticks, controller, columns, ended, fault)}
-    recording = Recording(columns=columns, facts=facts)
-    return Presented(recording=recording, fault=fault, n_missed_ticks=ticks.n_missed)
+        message = f"the control loop missed {ticks.n_missed} ticks; they were skipped"
+        warnings.warn(message, OverrunWarning, stacklevel=2)
+    return as_presented(
+        columns,
+        known,
+        speed_threshold=controller.speed_threshold,
+        ended=ended,
+        fault=fault,
+        grip_lost=controller.grip_lost,
+        n_missed_ticks=ticks.n_missed,
+        n_missed_replies=ticks.guard.dropouts.n_missed,
+    )
 
 
 def _check(
@@ -167,24 +168,6 @@ def _check(
         raise DeviceError(f"{device.name}: needs an open device to present on")
 
 
-def _facts(
-    ticks: Ticks,
-    controller: Controller,
-    columns: Columns,
-    ended: str,
-    fault: Fault | None,
-) -> dict[str, Fact]:
-    # What is known of a presentation once it is over
-    return {
-        "n_missed_ticks": ticks.n_missed,
-        "n_missed_replies": ticks.guard.replies.n_missed,
-        **fault_facts(fault),
-        "ended": ended,
-        "grip_lost": controller.grip_lost,
-        **movement_facts(columns, controller.speed_threshold, fault is not None),
-    }
-
-
 @contextmanager
 def _samples(
     spool: Path | None, capacity: int, known: dict[str, Fact], threshold: float
@@ -200,25 +183,3 @@ def _samples(
         samples.close()
         if file is not None:
             file.close()
-
-
-@contextmanager
-def _scheduled(clock: Clock) -> Iterator[str | None]:
-    # Only where a tick comes at a time of the day does it matter how late it comes
-    if not isinstance(clock, RealClock):
-        yield None
-        return
-    with real_time() as granted:
-        yield granted
-
-
-@contextmanager
-def _collector_off() -> Iterator[None]:
-    # A collection could take longer than a tick
-    collecting = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if collecting:
-            gc.enable()

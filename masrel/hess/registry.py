@@ -6,16 +6,13 @@ from typing import Protocol, cast
 
 from masrel.errors import DeviceError
 from masrel.hess.clock import Clock
-from masrel.hess.device import Device
+from masrel.hess.device import BackendOptions, Device, DeviceSetup
 from masrel.hess.hand import Hand
-from masrel.hess.setup import BackendOptions, DeviceSetup
-
-__all__ = ["device_names", "open_device"]
 
 _BACKENDS = {
     "puck": "masrel.hess.puck.backend",
-    "replay": "masrel.hess.replay",
-    "simulated": "masrel.hess.simulated",
+    "replay": "masrel.hess._replay",
+    "simulated": "masrel.hess._simulated",
 }
 """Name to the module whose `build` makes the device; imported when it is chosen."""
 

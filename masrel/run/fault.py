@@ -27,7 +27,7 @@ class FaultRecord:
     """A fault as the log has it."""
 
     kind: str  # what kind of fault, in one word
-    words: str  # what was needed and what came
+    message: str  # what was needed and what came
     time_s: float  # when it was noticed, s since the presentation began
     torque_nm: float  # the torque that the device held then, N·m
     # the recording from 200 ms before until the torque was zero, as CSV
@@ -41,7 +41,7 @@ def fault_record(presented: Presented) -> FaultRecord | None:
         return None
     return FaultRecord(
         kind=fault.kind,
-        words=fault.words,
+        message=fault.message,
         time_s=fault.time_s,
         torque_nm=fault.torque_nm,
         last_200_ms=_last(presented.recording, fault.time_s - LAST_S),

@@ -15,8 +15,8 @@ from masrel.hess import (
     open_device,
     run_presentation,
 )
-from masrel.hess.stop import stop_on_key, stop_on_signals
-from masrel.hess.watchdog import watched
+from masrel.hess._stop import stop_on_key, stop_on_signals
+from masrel.hess._watchdog import watched
 from masrel.protocol import Protocol, elbow_parameters
 from masrel.run.grades import Asked
 from masrel.run.kept import Shown, keep, spool_of

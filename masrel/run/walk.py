@@ -178,11 +178,11 @@ class Walk:
             asked = self._asked(presentation, attempt, n_faults)
             if fault is None:
                 grade = self._checked(asked, self._grades.grade(asked))
-            elif not self._grades.present_again(asked, fault.words):
+            elif not self._grades.present_again(asked, fault.message):
                 raise DeviceError(
                     f"session {asked.session} of {asked.rater}: presentation "
                     f"{presentation.position}, code {presentation.code}, was stopped "
-                    f"by a fault: {fault.words}"
+                    f"by a fault: {fault.message}"
                 )
         return grade
 
@@ -239,7 +239,7 @@ class Walk:
                 "sha256": left.sha256,
                 "mean_speed_deg_s": left.mean_speed_deg_s,
                 "n_missed_ticks": left.n_missed_ticks,
-                "fault": None if left.fault is None else left.fault.words,
+                "fault": None if left.fault is None else left.fault.message,
                 "simulated": left.simulated,
             },
         )
@@ -255,7 +255,7 @@ class Walk:
                 "position": shown.position,
                 "attempt": asked.attempt,
                 "kind": fault.kind,
-                "words": fault.words,
+                "words": fault.message,
                 "time_s": fault.time_s,
                 "torque_nm": fault.torque_nm,
                 "last_200_ms": fault.last_200_ms,

@@ -25,8 +25,7 @@ from masrel.hess import (
     open_device,
     run_presentation,
 )
-from masrel.hess.plant import Plant
-from masrel.hess.plant_parameters import PlantParameters
+from masrel.hess._plant import Plant, PlantParameters
 
 START, END = radians(30.0), radians(146.0)
 ARM = PlantParameters()

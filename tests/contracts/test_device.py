@@ -23,6 +23,7 @@ from masrel.hess import (
     DeviceLimits,
     Hand,
     Reading,
+    ReplayOptions,
     SimulatedClock,
     SimulatedHand,
     device_names,
@@ -30,7 +31,6 @@ from masrel.hess import (
     registry,
     run_presentation,
 )
-from masrel.hess.replay import ReplayOptions
 from masrel.recording import Recording
 from tests.hess.rig import ScriptedDevice
 

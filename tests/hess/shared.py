@@ -23,7 +23,7 @@ from masrel.hess import (
     RealClock,
     run_presentation,
 )
-from masrel.hess.watchdog import watched
+from masrel.hess._watchdog import watched
 
 FORMAT = "=dqq"  # torque N·m; when it was sent or idled, ns; mode: 1 torque, 0 idle
 SIZE = struct.calcsize(FORMAT)

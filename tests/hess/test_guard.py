@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from masrel.elbow import STANDARD_MODELS, MinimumJerk, trace
 from masrel.errors import LimitExceededError
 from masrel.hess import DeviceLimits
-from masrel.hess.guard import Guard
-from masrel.hess.missing import MissingReplies
+from masrel.hess._guard import Dropouts, Guard
 
 PERIOD = 0.001
 STEP = radians(0.005)  # of the encoder
@@ -117,7 +116,7 @@ def test_the_law_itself_passes_the_defaults(model: str, speed: float) -> None:
         watching.reading(time_s, round(angle / STEP) * STEP, 0.0)
         watching.speed(velocity)
         watching.torque(time_s, torque)
-    assert watching.replies.n_missed == 0
+    assert watching.dropouts.n_missed == 0
 
 
 # Angle and speed
@@ -144,7 +143,7 @@ def test_what_lies_on_the_limits_passes() -> None:
     made.torque(PERIOD, -20.0)
     made.reading(0.0, radians(-5.0), 0.005)
     guard().reading(0.0, radians(185.0), -0.001)
-    assert made.replies.n_missed == 0
+    assert made.dropouts.n_missed == 0
 
 
 # The encoder
@@ -232,14 +231,14 @@ def test_an_arm_that_trembles_by_one_step_may_be_held_for_long() -> None:
 def test_replies_may_be_missed_twice_in_a_row() -> None:
     made = guard()
     for tick in range(0, 9, 3):
-        made.replies.another(tick * PERIOD, "no answer")
-        made.replies.another((tick + 1) * PERIOD, "no answer")
+        made.dropouts.count(tick * PERIOD, "no answer")
+        made.dropouts.count((tick + 1) * PERIOD, "no answer")
         made.reading((tick + 2) * PERIOD, 1.0, 0.0)
-    assert made.replies.n_missed == 6
-    made.replies.another(0.009, "no answer")
-    made.replies.another(0.010, "no answer")
+    assert made.dropouts.n_missed == 6
+    made.dropouts.count(0.009, "no answer")
+    made.dropouts.count(0.010, "no answer")
     with raises_limit("missed-replies", r"at most 2 ticks .* 3 in a row \(no answer\)"):
-        made.replies.another(0.011, "no answer")
+        made.dropouts.count(0.011, "no answer")
 
 
 def missing(made: Guard, lost: Callable[[int], bool], n_ticks: int) -> int | None:
@@ -249,7 +248,7 @@ def missing(made: Guard, lost: Callable[[int], bool], n_ticks: int) -> int | Non
             made.reading(tick * PERIOD, 1.0, 0.0)
             continue
         try:
-            made.replies.another(tick * PERIOD, "no answer")
+            made.dropouts.count(tick * PERIOD, "no answer")
         except LimitExceededError as error:
             return tick if error.kind == "missed-replies" else None
     return None
@@ -277,16 +276,16 @@ def test_the_share_is_that_of_any_hundred_ticks(
         return len([one for one in lost if tick - 99 <= one <= tick]) > limit
 
     limits = DeviceLimits(missed_replies=1000, missed_replies_per_100=limit)
-    replies = MissingReplies(limits, period)
+    dropouts = Dropouts(limits, period)
     for tick in sorted(lost):
         if too_many(tick):
             with raises_limit(
                 "missed-replies", rf"at most {limit} of 100 ticks without"
             ):
-                replies.another(tick * period, "no answer")
+                dropouts.count(tick * period, "no answer")
             return
-        replies.another(tick * period, "no answer")
-    assert replies.n_missed == len(lost)
+        dropouts.count(tick * period, "no answer")
+    assert dropouts.n_missed == len(lost)
 
 
 def test_every_refusal_says_degrees_where_it_speaks_of_angles() -> None:

@@ -149,7 +149,7 @@ def test_too_fast_an_arm_is_a_fault_that_is_named_and_latched() -> None:
         device, controller, clock=clock, limits=limits_with(speed=radians(100.0))
     )
     assert presented.fault is not None
-    assert presented.fault.words.startswith(
+    assert presented.fault.message.startswith(
         "speed: needs at most 100 deg/s, the arm moves"
     )
     assert not device.is_open
@@ -164,7 +164,7 @@ def test_too_fast_an_arm_is_a_fault_that_is_named_and_latched() -> None:
 def test_a_fault_leaves_the_recording_up_to_its_moment() -> None:
     presented = present("HM3", 130.0, limits=limits_with(speed=radians(100.0)))
     columns, facts = presented.recording.columns, presented.recording.facts
-    assert facts["fault"] == presented.fault.words
+    assert facts["fault"] == presented.fault.message
     assert facts["fault_kind"] == "speed"
     assert facts["ended"] == "fault"
     before = columns["time_s"] < presented.fault.time_s
@@ -234,7 +234,7 @@ def test_a_watchdog_that_ends_does_not_make_the_torque_fall_at_once() -> None:
         watchdog=Ending(),
     )
     assert presented.fault is not None
-    assert presented.fault.words == (
+    assert presented.fault.message == (
         "watchdog: has ended; ramping down: watchdog: has ended"
     )
     ramp = [torque for time_ns, torque in device.commands if time_ns > 200 * PERIOD_NS]
@@ -246,7 +246,7 @@ def test_at_a_fault_zero_is_the_last_torque_and_the_device_is_let_go() -> None:
     device, presented = rest(
         clock, angle=lambda t: START if t < 0.0095 else radians(-8.0)
     )
-    assert presented.fault.words == (
+    assert presented.fault.message == (
         "range: needs -5.0 to 185.0 deg, the arm is at -8.0 deg"
     )
     assert device.commands[-1] == (10 * PERIOD_NS, 0.0)  # at rest: nothing to ramp
@@ -258,7 +258,7 @@ def test_more_missed_ticks_than_allowed_are_a_fault() -> None:
     clock = LateClock({5 * PERIOD_NS: 3_400_000})
     with pytest.warns(OverrunWarning, match="missed 3 ticks"):
         device, presented = rest(clock, limits=limits_with(missed_ticks=2))
-    assert presented.fault.words == (
+    assert presented.fault.message == (
         "missed ticks: needs at most 2 in a presentation, the loop missed 3"
     )
     assert device.commands[-1] == (8_400_000, 0.0)
@@ -270,7 +270,7 @@ def test_a_torque_above_the_limit_is_never_sent_and_stops_the_presentation() -> 
     presented = present("HM4", 110.0, limits=limits_with(torque=5.0))
     columns = presented.recording.columns
     assert presented.fault is not None
-    assert presented.fault.words.startswith("torque: needs at most 5 N·m, got 1")
+    assert presented.fault.message.startswith("torque: needs at most 5 N·m, got 1")
     assert presented.recording.facts["ended"] == "fault"
     assert np.max(np.abs(columns["command_torque_nm"])) <= 5.0
     # The last samples keep what the model asked for, in the first tick of the catch.
@@ -287,7 +287,7 @@ def test_a_torque_that_is_no_number_is_a_fault() -> None:
     controller = Controller(STANDARD_MODELS["HM3"], start_angle=math.nan)
     with device:
         presented = run_presentation(device, controller, clock=clock, limits=LIMITS)
-    assert presented.fault.words == "torque: needs at most 20 N·m, got nan N·m"
+    assert presented.fault.message == "torque: needs at most 20 N·m, got nan N·m"
     assert [torque for _, torque in device.commands] == [0.0, 0.0]  # end, closing
 
 
@@ -300,7 +300,7 @@ def test_a_device_that_fails_is_a_fault_with_its_own_words(attribute: str) -> No
     controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
     presented = run_presentation(device, controller, clock=clock, limits=LIMITS)
     assert presented.fault is not None
-    assert "scripted: " in presented.fault.words
+    assert "scripted: " in presented.fault.message
     assert not device.is_open
     assert device.stopped  # also when it does not take the zero
     # Two ticks without a reading are let pass, a command that is not taken is not.
@@ -317,7 +317,7 @@ def test_what_goes_wrong_while_closing_is_added_to_the_fault() -> None:
     device.open()
     controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
     presented = run_presentation(device, controller, clock=clock, limits=LIMITS)
-    assert presented.fault.words == (
+    assert presented.fault.message == (
         "missed replies: needs a new reading after at most 2 ticks without, got 3 in a "
         "row (scripted: no answer); ramping down: scripted: does not listen; "
         "closing it: scripted: does not listen"
@@ -356,7 +356,7 @@ def test_readings_that_are_not_newer_than_the_last_one_are_a_fault() -> None:
     presented = run_presentation(device, controller, clock=clock, limits=LIMITS)
     assert presented.fault is not None
     assert presented.fault.kind == "missed-replies"
-    assert presented.fault.words.endswith("(one of 0.005000 s again)")
+    assert presented.fault.message.endswith("(one of 0.005000 s again)")
     assert not device.is_open
 
 
@@ -367,7 +367,7 @@ def test_a_device_that_never_answers_leaves_an_empty_recording(tmp_path) -> None
     device.open()
     controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
     presented = run_presentation(device, controller, clock=clock, limits=LIMITS)
-    assert presented.fault.words.endswith("(scripted: no answer)")
+    assert presented.fault.message.endswith("(scripted: no answer)")
     assert presented.recording.n_samples == 0
     assert presented.recording.facts["phases"] == ""
     write_recording(presented.recording, tmp_path / "empty.npz")
@@ -382,10 +382,10 @@ def test_a_fault_of_the_encoder_leaves_a_recording_that_can_be_written(
         SimulatedClock(), angle=lambda t: START + t if t < 0.0175 else angle
     )
     assert presented.fault is not None
-    assert presented.fault.words.startswith("range: ")
+    assert presented.fault.message.startswith("range: ")
     write_recording(presented.recording, tmp_path / "fault.npz")
     facts = json.loads((tmp_path / "fault.json").read_text())
-    assert facts["fault"] == presented.fault.words
+    assert facts["fault"] == presented.fault.message
     assert facts["mean_speed_deg_s"] is None  # no catch, and the last angle is wrong
 
 
@@ -412,7 +412,7 @@ def test_an_arm_that_is_not_at_its_start_is_a_fault_before_any_torque() -> None:
     fault = presented.fault
     assert fault is not None
     assert fault.kind == "start"
-    assert "at 145.0 deg asks for 6.322 N·m; bring it to where" in fault.words
+    assert "at 145.0 deg asks for 6.322 N·m; bring it to where" in fault.message
     assert fault.torque_nm == 0.0
     assert [torque for _, torque in device.commands] == [0.0] * len(device.commands)
 

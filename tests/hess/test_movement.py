@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from masrel.elbow import STANDARD_MODELS, SampledJoint
-from masrel.hess.movement import (
+from masrel.hess._presented import (
     Columns,
     catch_angle_deg,
     mean_speed_deg_s,

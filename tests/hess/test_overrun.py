@@ -4,7 +4,7 @@ import pytest
 
 from masrel.errors import LimitExceededError
 from masrel.hess import DeviceLimits
-from masrel.hess.overrun import check_overrun
+from masrel.hess._guard import check_overrun
 
 
 def test_one_missed_tick_too_many_is_named() -> None:

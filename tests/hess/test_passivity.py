@@ -14,8 +14,8 @@ import pytest
 
 from masrel.elbow import STANDARD_MODELS
 from masrel.hess import Controller, Friction, SimulatedClock, SimulatedHand
-from masrel.hess.simulated import SimulatedDevice
-from masrel.hess.velocity import VelocityEstimate
+from masrel.hess._simulated import SimulatedDevice
+from masrel.hess._velocity import VelocityEstimate
 
 PAGE = (Path(__file__).parents[2] / "docs" / "driver.md").read_text(encoding="utf-8")
 PERIOD = 0.001

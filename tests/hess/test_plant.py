@@ -20,10 +20,8 @@ from masrel.hess import (
     YieldingHand,
     run_presentation,
 )
-from masrel.hess.plant import Plant
-from masrel.hess.plant_parameters import PlantParameters
-from masrel.hess.propagation import propagator
-from masrel.hess.simulated import SimulatedDevice
+from masrel.hess._plant import Plant, PlantParameters, propagator
+from masrel.hess._simulated import SimulatedDevice
 from tests.benchmarks.driver_integrators import by_solve_ivp, chosen, commands
 
 from .rig import END, START

@@ -229,7 +229,7 @@ class Faults(RuleBasedStateMachine):
         assert set(columns) == set(RECORDING_COLUMNS)
         assert np.all(np.diff(columns["time_s"]) > 0.0)
         if presented.fault is not None:
-            assert facts["fault"] == presented.fault.words
+            assert facts["fault"] == presented.fault.message
             assert facts["fault_kind"] == presented.fault.kind
             if columns["time_s"].size:
                 assert columns["command_torque_nm"][-1] == 0.0

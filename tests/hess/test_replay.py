@@ -17,7 +17,7 @@ from masrel.hess import (
     open_device,
     run_presentation,
 )
-from masrel.hess.replay import ReplayDevice, ReplayOptions
+from masrel.hess._replay import ReplayDevice, ReplayOptions
 from masrel.recording import (
     RECORDING_COLUMNS,
     Recording,

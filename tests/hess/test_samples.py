@@ -4,7 +4,7 @@ from math import degrees
 
 import numpy as np
 
-from masrel.hess.samples import Samples
+from masrel.hess._spool import Samples
 from masrel.recording import RECORDING_COLUMNS
 
 

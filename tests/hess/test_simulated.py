@@ -5,8 +5,8 @@ import pytest
 
 from masrel.errors import DeviceError, ParameterError
 from masrel.hess import Friction, SimulatedClock, SimulatedHand
-from masrel.hess.plant_parameters import PlantParameters
-from masrel.hess.simulated import SimulatedDevice
+from masrel.hess._plant import PlantParameters
+from masrel.hess._simulated import SimulatedDevice
 
 # An amplifier that gives any torque at once
 INSTANT = {"torque_step": 0.0, "lag_time": 0.0, "delay": 0.0}

@@ -5,7 +5,7 @@ from math import radians
 import pytest
 
 from masrel.hess import DeviceLimits
-from masrel.hess.soft_stops import SoftStops
+from masrel.hess._guard import SoftStops
 
 
 def test_they_push_back_from_five_degrees_before_the_ends() -> None:

@@ -20,8 +20,7 @@ from masrel.hess import (
     open_device,
     run_presentation,
 )
-from masrel.hess.samples import Samples
-from masrel.hess.spool import Spool, read_spool
+from masrel.hess._spool import Samples, Spool, read_spool
 from masrel.recording import RECORDING_COLUMNS
 
 from .rig import END, START

@@ -25,7 +25,7 @@ from masrel.hess import (
     open_device,
     run_presentation,
 )
-from masrel.hess.stop import stop_on_key, stop_on_signals
+from masrel.hess._stop import stop_on_key, stop_on_signals
 from masrel.run import read_log
 
 from .injected import small_study

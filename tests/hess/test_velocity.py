@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from masrel.errors import ParameterError
-from masrel.hess.velocity import VelocityEstimate
+from masrel.hess._velocity import VelocityEstimate
 
 
 def test_a_step_of_speed_is_followed_as_a_first_order_system() -> None:

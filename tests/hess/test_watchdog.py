@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from masrel.errors import DeviceError
-from masrel.hess import IdleCommand, watchdog
-from masrel.hess.watchdog import Watchdog, watched
-from masrel.hess.watchdog_process import watch
+from masrel.hess import IdleCommand, _watchdog
+from masrel.hess._watchdog import Watchdog, watched
+from masrel.hess._watchdog_process import watch
 
 from .killed import LEAST_NM, torque_stood_ms
 from .rig import ScriptedDevice, SimulatedClock
@@ -137,7 +137,7 @@ def prepare() -> None:
 
 
 def test_a_watchdog_that_is_never_ready_is_refused(monkeypatch) -> None:
-    monkeypatch.setattr(watchdog, "_READY_AFTER_S", 0.2)
+    monkeypatch.setattr(_watchdog, "_READY_AFTER_S", 0.2)
     begun = time.monotonic()
     with (
         pytest.raises(DeviceError, match="watchdog: needs a process that is ready"),
@@ -154,12 +154,12 @@ def test_a_watchdog_that_does_not_end_is_ended(tmp_path: Path, monkeypatch) -> N
         process = dog._process
         assert process is not None
         process.send_signal(signal.SIGSTOP)
-        monkeypatch.setattr(watchdog, "_READY_AFTER_S", 0.2)
+        monkeypatch.setattr(_watchdog, "_READY_AFTER_S", 0.2)
     assert process.returncode == -signal.SIGKILL
 
 
 def test_the_process_says_in_one_line_why_it_cannot() -> None:
-    command = (sys.executable, "-m", "masrel.hess.watchdog_process", "0.05")
+    command = (sys.executable, "-m", "masrel.hess._watchdog_process", "0.05")
     done = subprocess.run(
         (*command, "masrel.hess.puck.idling", "none", "x", "1", "42", "8"),
         stdin=subprocess.DEVNULL,
@@ -184,7 +184,7 @@ def test_only_a_device_that_another_process_can_reach_is_watched(tmp_path) -> No
 def test_it_outlives_the_signals_that_end_its_parent(tmp_path: Path) -> None:
     path = tmp_path / "device"
     file = made(path)
-    command = (sys.executable, "-m", "masrel.hess.watchdog_process", "5.0")
+    command = (sys.executable, "-m", "masrel.hess._watchdog_process", "5.0")
     process = subprocess.Popen(
         (*command, "tests.hess.shared", str(path)),
         stdin=subprocess.PIPE,

@@ -8,8 +8,7 @@ from click.testing import CliRunner
 
 from masrel.cli import cli
 from masrel.errors import ParameterError
-from masrel.hess import SimulatedClock, open_device, run_presentation
-from masrel.hess.replay import ReplayOptions
+from masrel.hess import ReplayOptions, SimulatedClock, open_device, run_presentation
 from masrel.protocol import Protocol, StudyPaths
 from masrel.recording import read_recording
 from masrel.run import SimulatedGrades, read_log, run_session

@@ -32,7 +32,7 @@ from masrel.hess import (
     open_device,
     run_presentation,
 )
-from masrel.hess.realtime import real_time
+from masrel.hess._realtime import real_time
 from tests.benchmarks import driver_integrators
 
 START, END = radians(30.0), radians(146.0)
@@ -104,7 +104,7 @@ def presented(clock: SimulatedClock, hand: SimulatedHand | None) -> int:
     with device:
         done = run_presentation(device, controller, clock=clock, limits=DeviceLimits())
     if done.fault is not None:
-        raise SystemExit(done.fault.words)
+        raise SystemExit(done.fault.message)
     return done.recording.n_samples
 
 
@@ -181,7 +181,7 @@ def loop(seconds: float) -> tuple[list[int], int]:
             end_angle=10.0,
         )
     if done.fault is not None:
-        raise SystemExit(done.fault.words)
+        raise SystemExit(done.fault.message)
     return list(clock.late[: clock.n]), done.n_missed_ticks
 
 

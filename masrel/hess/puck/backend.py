@@ -4,11 +4,11 @@ import itertools
 
 from masrel.errors import DeviceError
 from masrel.hess.clock import SimulatedClock
+from masrel.hess.device import DeviceSetup
 from masrel.hess.hand import Hand
 from masrel.hess.puck.device import PuckDevice
 from masrel.hess.puck.emulated import EmulatedPuckDevice, UnwiredPuckDevice
 from masrel.hess.puck.options import PuckOptions
-from masrel.hess.setup import DeviceSetup
 
 __all__ = ["build", "emulated_options"]
 

@@ -5,7 +5,7 @@ import statistics
 from dataclasses import dataclass
 
 from masrel.errors import DeviceError, DeviceTimeoutError
-from masrel.hess.limits import HIGHEST_ANGLE, LOWEST_ANGLE
+from masrel.hess.limits import DeviceLimits
 from masrel.hess.puck.bring_up import activate, check_torque
 from masrel.hess.puck.connection import Awake
 from masrel.hess.puck.node import PuckNode
@@ -95,10 +95,11 @@ def _position(counts: list[int], puck: Awake) -> list[Check]:
     angle = puck.transmission.angle(counts[-1])
     look = "not zeroed yet" if puck.was_asleep else "look whether the arm is there"
     spread = max(counts) - min(counts)
+    limits = DeviceLimits()
     return [
         Check(
             name="position",
-            holds=LOWEST_ANGLE <= angle <= HIGHEST_ANGLE,
+            holds=limits.lowest_angle <= angle <= limits.highest_angle,
             found=f"{math.degrees(angle):.2f} deg; {look}",
         ),
         Check(

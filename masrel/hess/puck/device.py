@@ -7,7 +7,7 @@ from typing import ClassVar
 from masrel.errors import BusError, DeviceError, LimitExceededError
 from masrel.hess.clock import Clock
 from masrel.hess.device import Device, IdleCommand, Reading
-from masrel.hess.limits import HIGHEST_ANGLE, LOWEST_ANGLE
+from masrel.hess.limits import DeviceLimits
 from masrel.hess.puck import bring_up
 from masrel.hess.puck.arrivals import accepted_identifiers
 from masrel.hess.puck.bus import open_link
@@ -101,7 +101,8 @@ class PuckDevice(Device):
         self._position_number = number = self._table.number("P")
         _, counts = self._node.position(number, patience_s=0.05)
         angle = self.transmission.angle(counts)
-        if not LOWEST_ANGLE <= angle <= HIGHEST_ANGLE:
+        limits = DeviceLimits()
+        if not limits.lowest_angle <= angle <= limits.highest_angle:
             raise DeviceError(
                 f"puck {self._node.puck}: needs an arm between -5 and 185 deg, it "
                 f"reports {math.degrees(angle):.1f}; run masrel device zero"

@@ -1,8 +1,7 @@
 """The motor of an emulated puck: the simulated arm in counts and current units."""
 
+from masrel.hess._plant import Plant, PlantParameters
 from masrel.hess.hand import Hand
-from masrel.hess.plant import Plant
-from masrel.hess.plant_parameters import PlantParameters
 from masrel.hess.puck.transmission import Transmission
 
 __all__ = ["EmulatedMotor"]

@@ -5,10 +5,10 @@ from dataclasses import dataclass, field, replace
 from typing import Literal, Self
 
 from masrel.errors import ParameterError
+from masrel.hess.device import BackendOptions
 from masrel.hess.puck.emulator_options import EmulatorOptions
 from masrel.hess.puck.properties import PropertyTable
 from masrel.hess.puck.transmission import GEAR_RATIO
-from masrel.hess.setup import BackendOptions
 
 __all__ = ["PuckOptions"]
 

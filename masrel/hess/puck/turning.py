@@ -6,15 +6,14 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from masrel.errors import DeviceError, DeviceTimeoutError
+from masrel.hess._guard import Guard, check_overrun
+from masrel.hess._stop import EmergencyStop
+from masrel.hess._velocity import VelocityEstimate
+from masrel.hess._watchdog import NoWatchdog, Watching
 from masrel.hess.clock import Clock
 from masrel.hess.device import Device
-from masrel.hess.guard import Guard
 from masrel.hess.limits import DeviceLimits
-from masrel.hess.overrun import check_overrun
 from masrel.hess.puck.friction import SteadyRun
-from masrel.hess.stop import EmergencyStop
-from masrel.hess.velocity import VelocityEstimate
-from masrel.hess.watchdog import NoWatchdog, Watching
 
 __all__ = ["LIMITS", "SPEEDS", "steady_runs"]
 
@@ -143,11 +142,11 @@ class _Turning:
         try:
             time_ns, angle = self._device.read()
         except DeviceTimeoutError as error:
-            guard.replies.another(self._since_start_s(now_ns), str(error))
+            guard.dropouts.count(self._since_start_s(now_ns), str(error))
             return  # the device holds its torque
         time_s = self._since_start_s(time_ns)
         if not guard.is_new(time_s):
-            guard.replies.another(
+            guard.dropouts.count(
                 self._since_start_s(now_ns), f"one of {time_s:.6f} s again"
             )
             return

@@ -23,6 +23,7 @@ from masrel.hess import (
     SimulatedClock,
     open_device,
 )
+from masrel.hess.device import DeviceSetup
 from masrel.hess.puck.backend import build
 from masrel.hess.puck.device import PuckDevice
 from masrel.hess.puck.emulated import EmulatedPuckDevice, UnwiredPuckDevice
@@ -33,7 +34,6 @@ from masrel.hess.puck.positions import decode_position, encode_position
 from masrel.hess.puck.properties import property_table
 from masrel.hess.puck.requests import decode_request, encode_set
 from masrel.hess.puck.transmission import Transmission
-from masrel.hess.setup import DeviceSetup
 from tests.hess.puck.rig import (
     END,
     START,

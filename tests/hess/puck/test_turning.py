@@ -12,9 +12,9 @@ from masrel.errors import (
     LimitExceededError,
 )
 from masrel.hess import EmergencyStop, SimulatedClock, SimulatedHand, open_device
+from masrel.hess._simulated import SimulatedDevice
 from masrel.hess.puck.friction import fit_friction
 from masrel.hess.puck.turning import steady_runs
-from masrel.hess.simulated import SimulatedDevice
 from tests.hess.puck.rig import END, fault, loose, opened, puck_options
 from tests.hess.rig import ScriptedDevice
 

@@ -1,8 +1,8 @@
 """The process of a watchdog: waits for beats, idles the device when they stop.
 
-``python -m masrel.hess.watchdog_process TIMEOUT_S MODULE ARGUMENT...`` reads beats from
-its standard input. It ends with 0 when it is told that all is well, with 3 after it
-has idled the device, and with 1 and a sentence when it cannot.
+``python -m masrel.hess._watchdog_process TIMEOUT_S MODULE ARGUMENT...`` reads beats
+from its standard input. It ends with 0 when it is told that all is well, with 3 after
+it has idled the device, and with 1 and a sentence when it cannot.
 """
 
 import contextlib
@@ -14,8 +14,6 @@ import sys
 from collections.abc import Callable
 
 from masrel.errors import DeviceError
-
-__all__ = ["main", "watch"]
 
 _FAILED, _IDLED = 1, 3
 _TRIES = 5  # a bus that fails once may work a moment later

@@ -3,19 +3,15 @@
 import math
 
 from masrel.errors import ControllerError, DeviceTimeoutError
+from masrel.hess._guard import Guard, SoftStops, check_overrun
+from masrel.hess._spool import Samples
+from masrel.hess._stop import EmergencyStop
+from masrel.hess._velocity import VelocityEstimate
+from masrel.hess._watchdog import Watching
 from masrel.hess.clock import Clock
 from masrel.hess.controller import Controller
 from masrel.hess.device import Device
-from masrel.hess.guard import Guard
 from masrel.hess.limits import DeviceLimits
-from masrel.hess.overrun import check_overrun
-from masrel.hess.samples import Samples
-from masrel.hess.soft_stops import SoftStops
-from masrel.hess.stop import EmergencyStop
-from masrel.hess.velocity import VelocityEstimate
-from masrel.hess.watchdog import Watching
-
-__all__ = ["Ticks"]
 
 # A hand that presses against the end stop rests within a few tenths of a degree of
 # it; one encoder step makes 0.8 deg/s; 0.1 s is shorter than a person's reaction.
@@ -129,11 +125,11 @@ class Ticks:
         try:
             time_ns, angle = self.device.read()
         except DeviceTimeoutError as error:
-            guard.replies.another(self.time_s(), str(error))
+            guard.dropouts.count(self.time_s(), str(error))
             return False  # the device holds its torque
         time_s = (time_ns - self._start_ns) * 1e-9
         if not guard.is_new(time_s):
-            guard.replies.another(self.time_s(), f"one of {time_s:.6f} s again")
+            guard.dropouts.count(self.time_s(), f"one of {time_s:.6f} s again")
             return False
         now_ns = self.clock.now_ns()
         self._latest = (time_s, angle, 0.0)

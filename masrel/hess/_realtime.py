@@ -1,13 +1,14 @@
-"""Real-time scheduling and locked memory, where the system permits them."""
+"""What makes a loop prompt: its scheduling, locked memory, timers, no collector."""
 
 import contextlib
 import ctypes
+import gc
 import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-__all__ = ["real_time"]
+from masrel.hess.clock import Clock, RealClock
 
 _PRIORITY = 80  # of 1 to 99: above all ordinary work, below the kernel's own threads
 _LOCK_CURRENT, _LOCK_FUTURE = 1, 2  # MCL_CURRENT, MCL_FUTURE of sys/mman.h
@@ -17,21 +18,45 @@ _USUAL_SLACK_NS = 50_000
 
 
 @contextmanager
+def scheduled(clock: Clock) -> Iterator[str | None]:
+    """Ask for real-time scheduling on a real clock -> what was granted, or None."""
+    # Only where a tick comes at a time of the day does it matter how late it comes
+    if not isinstance(clock, RealClock):
+        yield None
+        return
+    with real_time() as granted:
+        yield granted
+
+
+@contextmanager
+def collector_off() -> Iterator[None]:
+    """Keep the garbage collector off until the block ends."""
+    # A collection could take longer than a tick
+    collecting = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collecting:
+            gc.enable()
+
+
+@contextmanager
 def real_time() -> Iterator[str]:
     """Ask for SCHED_FIFO, locked memory and prompt timers until the block ends."""
-    # Only Linux has all three; elsewhere nothing is asked for. The process may ask for
+    # Only Linux has all three; elsewhere nothing is requested. The process may ask for
     # SCHED_FIFO and locked memory as root, or within ``ulimit -r`` and ``ulimit -l``.
     if sys.platform != "linux":
         yield f"ordinary scheduling: none better is known on {sys.platform}"
         return
     library = ctypes.CDLL(None, use_errno=True)
     with contextlib.ExitStack() as granted:
-        words = (
+        outcomes = (
             _fifo(granted),
             _locked(granted, library),
             _prompt(granted, library),
         )
-        yield ", ".join(words)
+        yield ", ".join(outcomes)
 
 
 def _fifo(granted: contextlib.ExitStack) -> str:

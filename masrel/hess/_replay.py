@@ -1,25 +1,34 @@
 """A device that plays a recording back: the same readings, for any controller."""
 
+import copy
+import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, TypeAlias
 
 import numpy as np
 
 from masrel.errors import DeviceError
+from masrel.hess._velocity import VelocityEstimate
 from masrel.hess.clock import Clock
-from masrel.hess.device import Device, Reading
-from masrel.hess.recorded_angles import recorded_angles
-from masrel.hess.setup import BackendOptions, DeviceSetup
+from masrel.hess.device import BackendOptions, Device, DeviceSetup, Reading
 from masrel.recording import Recording
 
-__all__ = ["ReplayDevice", "ReplayOptions", "build"]
+_MAX_PATHS = 64
+
+_Path: TypeAlias = "tuple[float, _Path] | None"  # an angle, and those before it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReplayOptions(BackendOptions):
-    """What is played back."""
+    """What `open_device` needs to play a recording back.
 
-    recording: Recording  # A recording of any device
+    Attributes
+    ----------
+    recording : Recording
+        A recording of any device.
+    """
+
+    recording: Recording
 
 
 class ReplayDevice(Device):
@@ -88,3 +97,48 @@ def build(setup: DeviceSetup) -> ReplayDevice:
         got = "none" if options is None else type(options).__name__
         raise DeviceError(f"replay: needs options of type ReplayOptions, got {got}")
     return ReplayDevice(options.recording, clock=setup.clock)
+
+
+def recorded_angles(
+    times_s: list[float], angles_deg: list[float], velocities_deg_s: list[float]
+) -> tuple[list[float], bool]:
+    """Return the angles that were read, and whether they are so to the last bit."""
+    # A recording keeps angles in degrees, and from radians to degrees and back a float
+    # may end one last bit aside. The speed that was estimated from the angles is
+    # recorded too and tells such neighbours apart. One last bit of an angle is many of
+    # a speed over 1 ms, so few paths live long.
+    paths: list[tuple[_Path, VelocityEstimate]] = [(None, VelocityEstimate())]
+    for time_s, angle, velocity in zip(
+        times_s, angles_deg, velocities_deg_s, strict=True
+    ):
+        candidates = _radians_of(angle)
+        longer: list[tuple[_Path, VelocityEstimate]] = []
+        for path, estimate in paths:
+            for candidate in candidates:
+                updated = copy.copy(estimate)
+                if _degrees(updated.update(time_s, candidate)) == velocity:
+                    longer.append(((candidate, path), updated))
+        if not longer:
+            return [math.radians(angle) for angle in angles_deg], False
+        paths = longer[:_MAX_PATHS]
+    return _angles_of(paths[0][0]), True
+
+
+def _angles_of(path: _Path) -> list[float]:
+    angles = []
+    while path is not None:
+        angle, path = path
+        angles.append(angle)
+    return angles[::-1]
+
+
+def _radians_of(angle_deg: float) -> list[float]:
+    # Every float whose degrees are these, the nearest first: a degree is 57 of a
+    # radian, so that up to two neighbours may share them.
+    near = math.radians(angle_deg)
+    lower, upper = math.nextafter(near, -math.inf), math.nextafter(near, math.inf)
+    return [angle for angle in (near, lower, upper) if _degrees(angle) == angle_deg]
+
+
+def _degrees(angle: float) -> float:
+    return float(np.degrees(angle))  # as the recording was made

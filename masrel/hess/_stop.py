@@ -16,8 +16,6 @@ if sys.platform != "win32":
     import termios
     import tty
 
-__all__ = ["EmergencyStop", "stop_on_key", "stop_on_signals"]
-
 _SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
 
 

@@ -3,11 +3,9 @@
 from contextlib import suppress
 
 from masrel.errors import DeviceError
+from masrel.hess._presented import Fault
+from masrel.hess._ticks import Ticks
 from masrel.hess.device import Device
-from masrel.hess.fault import Fault
-from masrel.hess.ticks import Ticks
-
-__all__ = ["run_to_the_end"]
 
 
 def run_to_the_end(ticks: Ticks) -> tuple[str, Fault | None]:
@@ -27,17 +25,20 @@ def _run(ticks: Ticks) -> tuple[str, Fault | None]:
         ticks.finish()
     except DeviceError as error:
         time_s, torque = ticks.time_s(), ticks.sent
-        words = [str(error), *_ramped_and_closed(ticks)]
+        messages = [str(error), *_ramp_down_and_close(ticks)]
         ticks.mark(ticks.clock.now_ns(), 0.0)
         fault = Fault(
-            kind=error.kind, words="; ".join(words), time_s=time_s, torque_nm=torque
+            kind=error.kind,
+            message="; ".join(messages),
+            time_s=time_s,
+            torque_nm=torque,
         )
         return "fault", fault
     return ended, None
 
 
-def _ramped_and_closed(ticks: Ticks) -> list[str]:
-    # -> what went wrong with that, in words
+def _ramp_down_and_close(ticks: Ticks) -> list[str]:
+    # -> what went wrong with that, in sentences
     wrong = []
     try:
         _ramp_down(ticks)
@@ -55,8 +56,8 @@ def _ramp_down(ticks: Ticks) -> None:
     begun_ns = now_ns = clock.now_ns()
     ticks.mark(begun_ns, torque)
     while torque != 0.0 and ramp_ns:
-        n_over = (now_ns - begun_ns) // ticks.period_ns  # late ones are skipped
-        next_ns = min((n_over + 1) * ticks.period_ns, ramp_ns)
+        n_elapsed = (now_ns - begun_ns) // ticks.period_ns  # late ones are skipped
+        next_ns = min((n_elapsed + 1) * ticks.period_ns, ramp_ns)
         clock.sleep_until_ns(begun_ns + next_ns)
         now_ns = clock.now_ns()
         left = 1.0 - (now_ns - begun_ns) / ramp_ns

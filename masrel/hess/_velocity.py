@@ -4,8 +4,6 @@ import math
 
 from masrel.errors import ParameterError
 
-__all__ = ["VelocityEstimate"]
-
 
 class VelocityEstimate:
     """Differentiate the encoder and pass it through a first-order low-pass."""

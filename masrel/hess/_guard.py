@@ -1,17 +1,22 @@
-"""The guard of one presentation: every reading and every torque passes it."""
+"""What every reading, every torque and every tick of the loop has to pass.
+
+In: `DeviceLimits`, readings, torques, ticks that were missed. Out: nothing, or a
+`LimitExceededError` that names the limit.
+"""
 
 import math
+from collections import deque
 
 from masrel.errors import LimitExceededError
 from masrel.hess.limits import DeviceLimits
-from masrel.hess.missing import MissingReplies
-
-__all__ = ["Guard"]
 
 # An arm that was faster than this cannot stop within a tick without 20 N·m on its
 # 0.06 kg·m²; slower ones may come to rest between two steps of the encoder.
 _MOVING_SPEED = math.radians(20.0)
 _LONGEST_STOP_TICKS = 1.5
+
+# Of so many ticks `DeviceLimits.missed_replies_per_100` may be without a reading.
+_WINDOW_TICKS = 100
 
 
 class Guard:
@@ -27,7 +32,7 @@ class Guard:
         "_sent_at",
         "_stopped_dead",
         "_time",
-        "replies",
+        "dropouts",
     )
 
     def __init__(self, limits: DeviceLimits, period_s: float) -> None:
@@ -40,7 +45,7 @@ class Guard:
         self._stopped_dead = False  # whether it moved fast one tick before that
         self._sent = 0.0  # the last torque, N·m
         self._sent_at = math.inf  # nothing yet: the device holds zero
-        self.replies = MissingReplies(limits, period_s)
+        self.dropouts = Dropouts(limits, period_s)
 
     def is_new(self, time_s: float) -> bool:
         """Return whether a reading is newer than the last one."""
@@ -62,7 +67,7 @@ class Guard:
                 f"{math.degrees(angle):.1f} deg",
                 "range",
             )
-        self.replies.n_in_a_row = 0
+        self.dropouts.n_in_a_row = 0
         if self._time == -math.inf:
             self._moved_at = time_s
         else:
@@ -156,3 +161,74 @@ class Guard:
                 "it to where the stretch starts",
                 "start",
             )
+
+
+class Dropouts:
+    """Count ticks without a new reading, and say when there are too many."""
+
+    __slots__ = ("_limits", "_times", "_window_s", "n_in_a_row", "n_missed")
+
+    def __init__(self, limits: DeviceLimits, period_s: float) -> None:
+        self._limits = limits
+        # The first and the last of 100 ticks are 99 periods apart; half of one more
+        # is for a loop that comes late.
+        self._window_s = (_WINDOW_TICKS - 0.5) * period_s
+        self._times: deque[float] = deque(maxlen=limits.missed_replies_per_100 + 1)
+        self.n_missed = 0
+        self.n_in_a_row = 0
+
+    def count(self, time_s: float, reason: str) -> None:
+        """Count one tick without a new reading."""
+        limits = self._limits
+        self.n_missed += 1
+        self.n_in_a_row += 1
+        if self.n_in_a_row > limits.missed_replies:
+            raise LimitExceededError(
+                f"missed replies: needs a new reading after at most "
+                f"{limits.missed_replies} ticks without, got {self.n_in_a_row} "
+                f"in a row ({reason})",
+                "missed-replies",
+            )
+        times = self._times
+        times.append(time_s)
+        if len(times) == times.maxlen and time_s - times[0] < self._window_s:
+            raise LimitExceededError(
+                f"missed replies: needs at most {limits.missed_replies_per_100} of "
+                f"{_WINDOW_TICKS} ticks without a new reading, got {len(times)} "
+                f"within {(time_s - times[0]) * 1e3:.1f} ms ({reason})",
+                "missed-replies",
+            )
+
+
+def check_overrun(limits: DeviceLimits, n_missed: int, gap_s: float) -> None:
+    """Check how many ticks have been missed so far, and how many at once."""
+    if gap_s >= limits.watchdog_time:
+        raise LimitExceededError(
+            f"silence: needs a command every {limits.watchdog_time * 1e3:g} ms, "
+            f"the loop sent none for {gap_s * 1e3:.1f} ms",
+            "overrun",
+        )
+    if n_missed > limits.missed_ticks:
+        raise LimitExceededError(
+            f"missed ticks: needs at most {limits.missed_ticks} in a presentation, "
+            f"the loop missed {n_missed}",
+            "overrun",
+        )
+
+
+class SoftStops:
+    """A spring over the last bit of the range at each of its ends."""
+
+    __slots__ = ("_lower", "_slope", "_upper")
+
+    def __init__(self, limits: DeviceLimits) -> None:
+        self._slope = limits.soft_stop_torque / limits.soft_stop_width
+        self._upper = limits.highest_angle - limits.soft_stop_width
+        self._lower = limits.lowest_angle + limits.soft_stop_width
+
+    def torque(self, angle: float) -> float:
+        """Return the torque to add to the command, N·m."""
+        # positive near the highest angle, negative near the lowest, 0 between
+        if angle > self._upper:
+            return self._slope * (angle - self._upper)
+        return self._slope * (angle - self._lower) if angle < self._lower else 0.0

@@ -1,17 +1,119 @@
 """The arm that a simulated device moves: inertia, friction that sticks, end stops."""
 
+import functools
 import math
 from collections import deque
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from masrel.errors import ParameterError
+from masrel.hess.friction import Friction
 from masrel.hess.hand import Hand
-from masrel.hess.plant_parameters import PlantParameters
-from masrel.hess.propagation import Propagator, propagator
-
-__all__ = ["Plant"]
 
 _LOWER, _FREE, _UPPER = -1, 0, 1  # which end stop the arm touches
 _FINEST = 10  # halvings of a step in which something changes: 0.5 ms / 1024
+_TAYLOR_TERMS = 14
+_LARGEST_NORM = 0.25  # 0.25^15 / 15! is below 1e-21: the series is exact in floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlantParameters:
+    """What the simulated arm, motor and amplifier are like, in SI units."""
+
+    # inertia of the motor and friction, (7)
+    friction: Friction = field(default_factory=Friction)
+    # inertia of the mannequin's forearm and hand, kg·m². Not printed in the source: a
+    # rod of 0.8 kg and 0.25 m and a hand of 0.3 kg at 0.33 m give 0.05.
+    arm_inertia: float = 0.05
+    # where the arm meets its end stop, rad; the other one is at 0
+    range_end: float = math.radians(146.0)
+    # stop_stiffness, stop_damping: of both end stops, N·m/rad and N·m·s/rad: 10 N·m
+    # move one by 0.03 deg, and the arm does not bounce
+    stop_stiffness: float = 20_000.0
+    stop_damping: float = 50.0
+    # quantum of the commanded torque, N·m; 0 for none. One unit of an amplifier with
+    # 2700 units to the N·m behind a gear of 18.8:1.
+    torque_step: float = 18.8 / 2700.0
+    # time constant of the current loop, s; 0 for none. Not printed; chosen.
+    lag_time: float = 0.0005
+    # from the command until the current begins to follow, s. Not printed; chosen.
+    delay: float = 0.0005
+    step_ns: int = 500_000  # step of the integration, ns
+
+    def __post_init__(self) -> None:
+        zero_or_more = ("arm_inertia", "torque_step", "lag_time", "delay")
+        for name in (*zero_or_more, "stop_stiffness", "stop_damping"):
+            if not 0.0 <= getattr(self, name) < math.inf:
+                raise ParameterError(
+                    f"{name}: needs 0 or more, got {getattr(self, name)}"
+                )
+        if not 0.0 < self.range_end <= math.pi:
+            raise ParameterError(
+                "range_end: needs more than 0 and at most 180 degrees, "
+                f"got {self.range_end} rad"
+            )
+        if self.step_ns < 1:
+            raise ParameterError(f"step_ns: needs 1 or more, got {self.step_ns}")
+
+
+class Propagator(NamedTuple):
+    """What one step does to angle and speed; a named tuple, unpacked at every step."""
+
+    # angle_angle, angle_speed, angle_lag, angle_force, angle_slope: new angle for a
+    # unit of angle, of speed, of what the actuator lags behind its command, of the
+    # torque at the beginning of the step, and of its slope
+    angle_angle: float
+    angle_speed: float
+    angle_lag: float
+    angle_force: float
+    angle_slope: float
+    # speed_angle, speed_speed, speed_lag, speed_force, speed_slope: the same for the
+    # new speed
+    speed_angle: float
+    speed_speed: float
+    speed_lag: float
+    speed_force: float
+    speed_slope: float
+    lag: float  # share of the actuator's lag that is left after the step
+
+
+@functools.lru_cache(maxsize=512)
+def propagator(
+    inertia: float, damping: float, stiffness: float, lag_time: float, step: float
+) -> Propagator:
+    """Solve I·θ̈ + D·θ̇ + K·θ = f(t) - e(t) over one step."""
+    # f is linear within the step, and e, what the actuator's torque lags behind its
+    # command, decays as exp(-t / `lag_time`). For such f the result is exact.
+    decay = 1.0 / lag_time if lag_time > 0.0 else 0.0
+    system = np.zeros((5, 5))  # θ, θ̇, e, f, slope of f
+    system[0, 1] = 1.0
+    system[1, :4] = np.array([-stiffness, -damping, -1.0, 1.0]) / inertia
+    system[2, 2] = -decay
+    system[3, 4] = 1.0
+    exponential = _exponential(system * step)
+    angle_row, speed_row = exponential[0].tolist(), exponential[1].tolist()
+    lag_left = float(exponential[2, 2]) if lag_time > 0.0 else 0.0
+    return Propagator._make([*angle_row, *speed_row, lag_left])
+
+
+def _exponential(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    # (n, n) -> (n, n), by a Taylor series of the scaled matrix, squared back
+    norm = float(np.abs(matrix).sum(axis=1).max())
+    squarings = 0
+    while norm > _LARGEST_NORM:
+        norm *= 0.5
+        squarings += 1
+    scaled = matrix * 0.5**squarings
+    identity = np.eye(matrix.shape[0])
+    result = identity
+    for term in range(_TAYLOR_TERMS, 0, -1):  # Horner
+        result = identity + scaled @ result / term
+    for _ in range(squarings):
+        result = result @ result
+    return result
 
 
 class Plant:
@@ -125,9 +227,9 @@ class Plant:
         while self.now_ns + step_ns <= now_ns:
             pending = self._pending
             if pending and pending[0][0] <= self.now_ns:
-                self._take(pending.popleft()[1])
+                self._follow(pending.popleft()[1])
                 continue
-            if not self._stepped(0):
+            if not self._try_step(0):
                 self._step_in_parts()
             self.now_ns += step_ns
             # From integers, so that rounding does not add up.
@@ -136,7 +238,7 @@ class Plant:
                 self._hand.feel(self._time, self.hand_torque)
                 self._force = self._force_at(self._time)
 
-    def _take(self, torque_nm: float) -> None:
+    def _follow(self, torque_nm: float) -> None:
         # The motor's torque goes on from where it is.
         self._lag = self._lag + self._commanded - torque_nm if self._lag_time else 0.0
         self._commanded = torque_nm
@@ -145,13 +247,13 @@ class Plant:
     def _step_in_parts(self) -> None:
         # Something changes within this step: parts of a half, a quarter, ... of it,
         # each as long as the place reached allows.
-        done, whole = 0, 1 << _FINEST
-        while done < whole:
-            size = done & -done or whole >> 1
+        done, total = 0, 1 << _FINEST
+        while done < total:
+            size = done & -done or total >> 1
             level = _FINEST + 1 - size.bit_length()
-            while not self._stepped(level):
+            while not self._try_step(level):
                 level += 1
-            done += whole >> level
+            done += total >> level
 
     def _force_at(self, time_s: float) -> float:
         # Torque on the arm that depends on neither its angle nor its speed, N·m
@@ -168,17 +270,17 @@ class Plant:
         stiffness = self._hand.stiffness if self._holds else 0.0
         return stiffness + (self._stop_stiffness if self._contact else 0.0)
 
-    def _stepped(self, level: int) -> bool:
+    def _try_step(self, level: int) -> bool:
         # One part of a step, half as long per level -> whether it was taken. It is
         # not when something changes within it, unless the part is the shortest.
         step = self._step_ns * 1e-9 / (1 << level)
         end = self._time + step
         force, new_force = self._force, self._force_at(end)
-        made = self._propagators.get((self._holds, self._contact, level))
-        if made is None:
-            made = self._propagator(step, level)
+        factors = self._propagators.get((self._holds, self._contact, level))
+        if factors is None:
+            factors = self._propagator(step, level)
         slide, angle, velocity, lag = self._slide, self.angle, self.velocity, self._lag
-        aa, as_, al, af, ag, sa, ss, sl, sf, sg, lag_left = made
+        aa, as_, al, af, ag, sa, ss, sl, sf, sg, lag_left = factors
         new_lag = lag_left * lag
         if slide:
             slope = (new_force - force) / step
@@ -206,11 +308,11 @@ class Plant:
     def _propagator(self, step: float, level: int) -> Propagator:
         damping = self._viscous + (self._hand.damping if self._holds else 0.0)
         damping += self._stop_damping if self._contact else 0.0
-        made = propagator(
+        factors = propagator(
             self._inertia, damping, self._stiffness(), self._lag_time, step
         )
-        self._propagators[self._holds, self._contact, level] = made
-        return made
+        self._propagators[self._holds, self._contact, level] = factors
+        return factors
 
     def _change(self, contact: int, holds: bool, turned: bool) -> None:
         self._contact, self._holds = contact, holds

@@ -4,14 +4,10 @@ import math
 from typing import ClassVar
 
 from masrel.errors import DeviceError, ParameterError
+from masrel.hess._plant import Plant, PlantParameters
 from masrel.hess.clock import Clock
-from masrel.hess.device import Device, Reading
+from masrel.hess.device import Device, DeviceSetup, Reading
 from masrel.hess.hand import Hand
-from masrel.hess.plant import Plant
-from masrel.hess.plant_parameters import PlantParameters
-from masrel.hess.setup import DeviceSetup
-
-__all__ = ["SimulatedDevice", "build"]
 
 
 class SimulatedDevice(Device):

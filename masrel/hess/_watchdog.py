@@ -15,8 +15,6 @@ from typing import IO, Protocol, Self
 from masrel.errors import DeviceError
 from masrel.hess.device import Device, IdleCommand
 
-__all__ = ["NoWatchdog", "Watchdog", "Watching", "watched"]
-
 _READY_AFTER_S = 20.0  # a Python that starts, or ends, on a busy machine
 
 
@@ -61,7 +59,7 @@ class Watchdog:
         command = (
             sys.executable,
             "-m",
-            "masrel.hess.watchdog_process",
+            "masrel.hess._watchdog_process",
             repr(self._timeout_s),
             self._idle.module,
             *self._idle.arguments,
@@ -81,10 +79,10 @@ class Watchdog:
         return self
 
     def _wait_until_ready(
-        self, process: subprocess.Popen[bytes], said: IO[bytes]
+        self, process: subprocess.Popen[bytes], output: IO[bytes]
     ) -> None:
         name = " ".join((self._idle.module, *self._idle.arguments))
-        ready, _, _ = select.select([said], [], [], _READY_AFTER_S)
+        ready, _, _ = select.select([output], [], [], _READY_AFTER_S)
         if not ready:
             process.kill()
             self._end()
@@ -92,7 +90,7 @@ class Watchdog:
                 f"watchdog: needs a process that is ready within {_READY_AFTER_S:g} s, "
                 f"{name} is not"
             )
-        if said.readline() != b"ready\n":
+        if output.readline() != b"ready\n":
             self._end()
             raise DeviceError(
                 f"watchdog: needs a process that can idle the device, {name} "
@@ -101,15 +99,15 @@ class Watchdog:
 
     def beat(self) -> None:
         """Tell the process that this one is alive and will say so again in time."""
-        self._tell(b".")
+        self._send(b".")
 
     def rest(self) -> None:
         """Tell the process that no beat follows for a while."""
-        self._tell(b"p")
+        self._send(b"p")
 
-    def _tell(self, word: bytes) -> None:
+    def _send(self, message: bytes) -> None:
         try:
-            os.write(self._pipe, word)
+            os.write(self._pipe, message)
         except BlockingIOError:
             return  # full of beats that it has not read: it is slow, not silent
         except OSError as error:

@@ -1,0 +1,190 @@
+"""The samples of a presentation, in memory or in a file that outlives the process.
+
+What the loop writes into a mapped file is in the system's hands at once, so that a
+process that is killed in the middle of a presentation leaves every sample up to that
+moment. The whole file is allocated before the first tick: a full disk is noticed before
+anything moves.
+"""
+
+import json
+import math
+import mmap
+from array import array
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from masrel.errors import RecordingError
+from masrel.hess.limits import DeviceLimits
+from masrel.recording import Fact
+
+Columns = dict[str, NDArray[np.float64]]
+
+_N_COLUMNS = 6
+_HEADER = 4096  # bytes for the facts, a page
+_WORD = 8  # bytes of a float64
+
+
+def n_samples(n_ticks: int, rate_hz: int, limits: DeviceLimits) -> int:
+    """Return how many samples so many ticks can leave."""
+    return n_ticks + math.ceil(limits.ramp_time * rate_hz) + 3
+
+
+class Spool:
+    """The file, open for the samples of one presentation."""
+
+    __slots__ = ("_map", "values")
+
+    def __init__(self, path: Path, capacity: int, facts: dict[str, Fact]) -> None:
+        header = json.dumps({**facts, "capacity": capacity}).encode()
+        n_bytes = _HEADER + _WORD * (1 + _N_COLUMNS * capacity)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            with path.open("w+b") as file:
+                file.write(header.ljust(_HEADER))
+                file.write(bytes(n_bytes - _HEADER))  # not sparse: the space is taken
+                file.flush()
+                self._map = mmap.mmap(file.fileno(), n_bytes)
+        except OSError as error:
+            path.unlink(missing_ok=True)  # nothing was sampled
+            error.filename = str(path)  # a full disk does not say which file it was
+            raise
+        self.values = memoryview(self._map)[_HEADER:].cast("d")
+
+    def close(self) -> None:
+        """Let go of the file; it stays where it is."""
+        self.values.release()
+        self._map.close()
+
+
+class Samples:
+    """Columns allocated before the presentation, filled by index during it."""
+
+    __slots__ = (
+        "_angle",
+        "_columns",
+        "_command",
+        "_model",
+        "_phase",
+        "_time",
+        "_values",
+        "_velocity",
+        "n",
+    )
+
+    def __init__(self, capacity: int, spool: Spool | None = None) -> None:
+        # How many samples there are, and after it column by column
+        n_values = 1 + _N_COLUMNS * capacity
+        if spool is None:
+            values: memoryview[float] = memoryview(array("d", bytes(8 * n_values)))
+        else:
+            values = spool.values
+        self._values = values
+        starts = range(1, n_values, max(capacity, 1))
+        self._columns = [values[start : start + capacity] for start in starts]
+        self._time, self._angle, self._velocity = self._columns[:3]
+        self._model, self._command, self._phase = self._columns[3:]
+        self.n = 0
+
+    def add(
+        self,
+        time_s: float,
+        angle: float,
+        velocity: float,
+        model_torque: float,
+        command_torque: float,
+        phase: int,
+    ) -> None:
+        """Write one sample; the columns must not be full."""
+        n = self.n
+        self._time[n] = time_s
+        self._angle[n] = angle
+        self._velocity[n] = velocity
+        self._model[n] = model_torque
+        self._command[n] = command_torque
+        self._phase[n] = phase
+        self.n = self._values[0] = n + 1  # last, so that what is counted is complete
+
+    def replace_command(self, command_torque: float) -> None:
+        """Write another torque into the last sample; nothing when there is none."""
+        if self.n:
+            self._command[self.n - 1] = command_torque
+
+    @property
+    def last_time_s(self) -> float:
+        """Time of the last sample, s; minus infinity when there is none."""
+        return self._time[self.n - 1] if self.n else -math.inf
+
+    def columns(self) -> Columns:
+        """Return copies of what was written, in the units of a recording."""
+        # -> (n,)
+        written = np.empty((_N_COLUMNS, self.n))
+        for row, column in zip(written, self._columns, strict=True):
+            row[:] = column[: self.n]
+        return recorded_columns(written)
+
+    def close(self) -> None:
+        """Let go of a spool's memory, so that it can be closed; nothing is left."""
+        for column in self._columns:
+            column.release()
+
+
+def recorded_columns(written: NDArray[np.float64]) -> Columns:
+    """Name what the loop wrote, in the units of a recording."""
+    # written (6, n) -> (n,)
+    time_s, angle, velocity, model, command, phase = written
+    return {
+        "time_s": time_s.copy(),
+        "angle_deg": np.degrees(angle),
+        "velocity_deg_s": np.degrees(velocity),
+        "model_torque_nm": model.copy(),
+        "command_torque_nm": command.copy(),
+        "phase": phase.copy(),
+    }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Spooled:
+    """What a presentation that never ended left."""
+
+    columns: NDArray[np.float64]  # (6, n): its samples, as the loop wrote them
+    facts: dict[str, Fact]  # what was known before the first
+
+
+def read_spool(path: Path) -> Spooled | None:
+    """Read what a process that died left; None when it left no sample."""
+    data = path.read_bytes()
+    if len(data) < _HEADER + _WORD or not data[:_HEADER].strip():
+        return None  # it died while it allocated the file
+    try:
+        return _spooled(json.loads(data[:_HEADER]), data)
+    except (ValueError, KeyError, TypeError) as error:
+        raise RecordingError(
+            f"{path}: needs the samples of a presentation that was cut off, got "
+            f"something else ({error}); move it away to go on"
+        ) from error
+
+
+def _spooled(facts: dict[str, Fact], data: bytes) -> Spooled | None:
+    # Raises ValueError, KeyError or TypeError where it is no such file.
+    if not isinstance(facts, dict):
+        raise TypeError(f"no facts but {facts}")
+    capacity, rate_hz = facts.pop("capacity"), facts["rate_hz"]
+    threshold = facts["speed_threshold"]
+    if not isinstance(capacity, int) or capacity < 1:
+        raise ValueError(f"a capacity of {capacity}")
+    for fact in (rate_hz, threshold):
+        if not isinstance(fact, int | float):
+            raise TypeError(f"{fact!r} where a number should be")
+    n = float(np.frombuffer(data, np.float64, count=1, offset=_HEADER)[0])
+    if n == 0.0:
+        return None  # not one sample, whether the file is complete or not
+    if not (n.is_integer() and 0.0 < n <= capacity):
+        raise ValueError(f"{n:g} samples where {capacity} fit in")
+    values = np.frombuffer(
+        data, np.float64, count=_N_COLUMNS * capacity, offset=_HEADER + _WORD
+    )
+    columns = values.reshape(_N_COLUMNS, capacity)[:, : int(n)]
+    return Spooled(columns=columns.copy(), facts=facts)
