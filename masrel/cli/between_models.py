@@ -11,7 +11,7 @@ from masrel.elbow import STANDARD_MODELS, ElbowParameters, intermediate_models
 from masrel.elbow.identification import model_document
 from masrel.elbow.identification.model_file import MODEL_KEYS
 from masrel.errors import ParameterError
-from masrel.protocol.model_files import read_model_file
+from masrel.protocol import read_model_file
 
 __all__ = ["Between", "Source", "between", "read_source"]
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from masrel.protocol.templates import copy_template
+from masrel.protocol import copy_template
 
 __all__ = ["command"]
 

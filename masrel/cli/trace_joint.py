@@ -77,7 +77,7 @@ def joints_of(
 
 
 def _file(model: str, study: Path | None) -> "ElbowParameters":
-    from masrel.protocol.model_files import read_model_file
+    from masrel.protocol import read_model_file
 
     if study is not None:
         raise ParameterError(

@@ -4,6 +4,12 @@ Goes in: ``protocol.toml``. Comes out: a :class:`Protocol`, and from it the scal
 the joint parameters of each model in SI units, and two hashes.
 """
 
+from masrel.protocol.content import (
+    elbow_parameters,
+    presented_hash,
+    protocol_hash,
+    scale_of,
+)
 from masrel.protocol.definition import (
     Analysis,
     DeviceSettings,
@@ -21,11 +27,8 @@ from masrel.protocol.definition import (
     Stretch,
     Study,
 )
-from masrel.protocol.fingerprint import presented_hash, protocol_hash
-from masrel.protocol.models import elbow_parameters, scale_of
-from masrel.protocol.read import read_protocol
-from masrel.protocol.study import StudyPaths
-from masrel.protocol.templates import copy_template, template_names
+from masrel.protocol.read import read_model_file, read_protocol
+from masrel.protocol.study import StudyPaths, copy_template, template_names
 
 __all__ = [
     "Analysis",
@@ -48,6 +51,7 @@ __all__ = [
     "elbow_parameters",
     "presented_hash",
     "protocol_hash",
+    "read_model_file",
     "read_protocol",
     "scale_of",
     "template_names",

@@ -12,116 +12,98 @@ from msgspec import Meta
 from masrel.elbow.parameters import PostCatch, ResidualReading
 from masrel.estimates import Target
 
-__all__ = [
-    "Analysis",
-    "DeviceSettings",
-    "ElbowConstants",
-    "EstimatePlan",
-    "Model",
-    "ModelConstants",
-    "Protocol",
-    "Rater",
-    "Report",
-    "ScaleDefinition",
-    "ScheduleScheme",
-    "Session",
-    "SimulatedRaters",
-    "Stretch",
-    "Study",
-]
-
-Identifier = Annotated[str, Meta(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,31}\Z")]
-Text = Annotated[str, Meta(min_length=1)]
-Angle = Annotated[float, Meta(gt=0, le=180)]
-RestAngle = Annotated[float, Meta(ge=0, le=180)]
-Positive = Annotated[float, Meta(gt=0)]
-NonNegative = Annotated[float, Meta(ge=0)]
+_Identifier = Annotated[str, Meta(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,31}\Z")]
+_Text = Annotated[str, Meta(min_length=1)]
+_Angle = Annotated[float, Meta(gt=0, le=180)]
+_RestAngle = Annotated[float, Meta(ge=0, le=180)]
+_Positive = Annotated[float, Meta(gt=0)]
+_NonNegative = Annotated[float, Meta(ge=0)]
 
 
-class Table(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class _Table(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A table of the protocol file; unknown keys are errors."""
 
 
-class Study(Table, frozen=True, kw_only=True):
+class Study(_Table, frozen=True, kw_only=True):
     """``[study]``: what the study is."""
 
-    id: Identifier
-    title: Text
+    id: _Identifier
+    title: _Text
     source: str = ""
     notes: str = ""
 
 
-class ScaleDefinition(Table, frozen=True, kw_only=True):
+class ScaleDefinition(_Table, frozen=True, kw_only=True):
     """``[scale]``: the grades a rater may give, least first."""
 
-    name: Text
-    grades: Annotated[tuple[Text, ...], Meta(min_length=2)]
+    name: _Text
+    grades: Annotated[tuple[_Text, ...], Meta(min_length=2)]
 
 
-class ElbowConstants(Table, frozen=True, kw_only=True):
+class ElbowConstants(_Table, frozen=True, kw_only=True):
     """``[elbow]``: the constants all models share (Table III's last column)."""
 
-    inertia_kg_m2: NonNegative = 0.0
-    damping_nms_rad: NonNegative = 1.26
-    stiffness_nm_rad: NonNegative = 3.15
-    catch_slope_s: Positive = 0.35
-    peak_duration_s: Positive = 0.1
-    post_catch_stiffness_nm_rad: NonNegative = 5.8
-    speed_threshold_deg_s: Positive = 20.0
-    slowest_mean_speed_deg_s: NonNegative = 60.0
-    smallest_catch_angle_deg: Angle = 60.0
-    range_end_deg: Angle = 146.0
-    rest_angle_deg: RestAngle | None = None
+    inertia_kg_m2: _NonNegative = 0.0
+    damping_nms_rad: _NonNegative = 1.26
+    stiffness_nm_rad: _NonNegative = 3.15
+    catch_slope_s: _Positive = 0.35
+    peak_duration_s: _Positive = 0.1
+    post_catch_stiffness_nm_rad: _NonNegative = 5.8
+    speed_threshold_deg_s: _Positive = 20.0
+    slowest_mean_speed_deg_s: _NonNegative = 60.0
+    smallest_catch_angle_deg: _Angle = 60.0
+    range_end_deg: _Angle = 146.0
+    rest_angle_deg: _RestAngle | None = None
     post_catch: PostCatch = "continuous"
     residual_reading: ResidualReading = "residual"
-    catch_rise_s: NonNegative = 0.0
+    catch_rise_s: _NonNegative = 0.0
 
 
-class ModelConstants(Table, frozen=True, kw_only=True):
+class ModelConstants(_Table, frozen=True, kw_only=True):
     """``[models.constants]``: what a model does not share with the others."""
 
-    inertia_kg_m2: NonNegative | None = None
-    damping_nms_rad: NonNegative | None = None
-    stiffness_nm_rad: NonNegative | None = None
-    catch_slope_s: Positive | None = None
-    post_catch_stiffness_nm_rad: NonNegative | None = None
-    rest_angle_deg: RestAngle | None = None
+    inertia_kg_m2: _NonNegative | None = None
+    damping_nms_rad: _NonNegative | None = None
+    stiffness_nm_rad: _NonNegative | None = None
+    catch_slope_s: _Positive | None = None
+    post_catch_stiffness_nm_rad: _NonNegative | None = None
+    rest_angle_deg: _RestAngle | None = None
     post_catch: PostCatch | None = None
     residual_reading: ResidualReading | None = None
-    catch_rise_s: NonNegative | None = None
+    catch_rise_s: _NonNegative | None = None
 
 
-class Model(Table, frozen=True, kw_only=True):
+class Model(_Table, frozen=True, kw_only=True):
     """``[[models]]``: one haptic model."""
 
-    id: Identifier
+    id: _Identifier
     role: Literal["standard", "dummy"] = "standard"
     intended_grade: str | None = None
-    catch_angle_constant_deg: Angle  # L
-    catch_torque_nms_rad: NonNegative  # H
+    catch_angle_constant_deg: _Angle  # L
+    catch_torque_nms_rad: _NonNegative  # H
     residual_ratio: Annotated[float, Meta(ge=0, lt=1)]  # Q
-    catch_travel_deg: Angle  # D
-    file: Text | None = None
+    catch_travel_deg: _Angle  # D
+    file: _Text | None = None
     simulated: bool = False
     constants: ModelConstants = ModelConstants()
 
 
-class Rater(Table, frozen=True, kw_only=True):
+class Rater(_Table, frozen=True, kw_only=True):
     """``[[raters]]``: one rater."""
 
-    id: Identifier
+    id: _Identifier
     note: str = ""
 
 
-class Session(Table, frozen=True, kw_only=True):
+class Session(_Table, frozen=True, kw_only=True):
     """``[[sessions]]``: one occasion on which raters meet every model."""
 
-    id: Identifier
+    id: _Identifier
     raters: Annotated[tuple[str, ...], Meta(min_length=1)]
     note: str = ""
 
 
-class ScheduleScheme(Table, frozen=True, kw_only=True):
+class ScheduleScheme(_Table, frozen=True, kw_only=True):
     """``[schedule]``: how the order of presentations is drawn."""
 
     seed: Annotated[int, Meta(ge=0, le=2**63 - 1)]
@@ -129,20 +111,20 @@ class ScheduleScheme(Table, frozen=True, kw_only=True):
     repeats: Annotated[int, Meta(ge=1, le=20)] = 1
 
 
-class Stretch(Table, frozen=True, kw_only=True):
+class Stretch(_Table, frozen=True, kw_only=True):
     """``[stretch]``: the movement a rater is asked to make."""
 
     start_deg: Annotated[float, Meta(ge=0, lt=180)] = 30.0
-    end_deg: Angle = 146.0
+    end_deg: _Angle = 146.0
 
 
-class DeviceSettings(Table, frozen=True, kw_only=True):
+class DeviceSettings(_Table, frozen=True, kw_only=True):
     """``[device]``: which device, and the limits around it."""
 
-    backend: Identifier = "simulated"
+    backend: _Identifier = "simulated"
     rate_hz: Annotated[int, Meta(ge=100, le=4000)] = 1000
     torque_limit_nm: Annotated[float, Meta(gt=0, le=28)] = 20.0
-    torque_rate_limit_nm_s: Positive = 12_000.0
+    torque_rate_limit_nm_s: _Positive = 12_000.0
     speed_limit_deg_s: Annotated[float, Meta(gt=0, le=600)] = 400.0
     lowest_angle_deg: Annotated[float, Meta(ge=-30, lt=180)] = -5.0
     highest_angle_deg: Annotated[float, Meta(gt=0, le=210)] = 185.0
@@ -159,36 +141,36 @@ class DeviceSettings(Table, frozen=True, kw_only=True):
     watchdog_ms: Annotated[float, Meta(gt=0, le=100)] = 50.0
     ramp_ms: Annotated[float, Meta(ge=0, le=100)] = 50.0
     friction_compensation: Annotated[float, Meta(ge=0, le=1)] = 0.9
-    friction_viscous_nms_rad: NonNegative = 0.168
-    friction_coulomb_nm: NonNegative = 0.189
-    dead_zone_deg_s: NonNegative = 0.1
-    full_speed_deg_s: Positive = 2.0
-    slip_speed_drop_deg_s: Positive = 40.0
-    puck_interface: Text = "socketcan"
-    puck_channel: Text = "can0"
+    friction_viscous_nms_rad: _NonNegative = 0.168
+    friction_coulomb_nm: _NonNegative = 0.189
+    dead_zone_deg_s: _NonNegative = 0.1
+    full_speed_deg_s: _Positive = 2.0
+    slip_speed_drop_deg_s: _Positive = 40.0
+    puck_interface: _Text = "socketcan"
+    puck_channel: _Text = "can0"
     puck_node: Annotated[int, Meta(ge=1, le=7)] = 1
     puck_direction: Literal[1, -1] = 1
-    puck_gear_ratio: Positive = 18.8
+    puck_gear_ratio: _Positive = 18.8
     puck_checks_torque: bool = True
     puck_properties: dict[str, int] | None = None
 
 
-class SimulatedRaters(Table, frozen=True, kw_only=True):
+class SimulatedRaters(_Table, frozen=True, kw_only=True):
     """``[simulated_raters]``: the raters of ``--grades simulated``."""
 
     seed: Annotated[int, Meta(ge=0, le=2**63 - 1)] = 0
     accuracy: Annotated[float, Meta(ge=0, le=1)] = 0.84
     retest_agreement: Annotated[float, Meta(ge=0, le=1)] = 0.85
-    mean_speed_deg_s: Positive = 85.0
-    speed_sd_deg_s: NonNegative = 15.0
+    mean_speed_deg_s: _Positive = 85.0
+    speed_sd_deg_s: _NonNegative = 15.0
 
 
-class EstimatePlan(Table, frozen=True, kw_only=True):
+class EstimatePlan(_Table, frozen=True, kw_only=True):
     """``[[analysis.estimates]]``: one line of the analysis plan."""
 
-    id: Identifier
+    id: _Identifier
     kind: Literal["inter-rater", "test-retest"]
-    coefficient: Text
+    coefficient: _Text
     weights: Literal[
         "identity",
         "linear",
@@ -207,7 +189,7 @@ class EstimatePlan(Table, frozen=True, kw_only=True):
     ] = "none"
 
 
-class Analysis(Table, frozen=True, kw_only=True):
+class Analysis(_Table, frozen=True, kw_only=True):
     """``[analysis]``: the plan, written before the data."""
 
     level: Annotated[float, Meta(gt=0.5, lt=1)] = 0.95
@@ -216,7 +198,7 @@ class Analysis(Table, frozen=True, kw_only=True):
     estimates: tuple[EstimatePlan, ...] = ()
 
 
-class Report(Table, frozen=True, kw_only=True):
+class Report(_Table, frozen=True, kw_only=True):
     """``[report]``: which sections the report has, in order."""
 
     title: str = ""
@@ -235,7 +217,7 @@ class Report(Table, frozen=True, kw_only=True):
     ] = ("design", "grades", "agreement", "intended", "test-retest", "speeds", "traces")
 
 
-class Protocol(Table, frozen=True, kw_only=True):
+class Protocol(_Table, frozen=True, kw_only=True):
     """A whole protocol file."""
 
     study: Study

@@ -10,7 +10,7 @@ import pytest
 
 from masrel.elbow import STANDARD_MODELS, MinimumJerk, trace
 from masrel.hess import DeviceLimits, Friction, device_names
-from masrel.protocol.definition import DeviceSettings
+from masrel.protocol import DeviceSettings
 
 from .rig import END, START
 from .test_backdrive import felt

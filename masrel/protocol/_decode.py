@@ -1,5 +1,7 @@
 """Decode a TOML table into a struct key by key, collecting every problem."""
 
+import datetime
+import json
 import math
 import typing
 from collections.abc import Mapping
@@ -7,11 +9,8 @@ from dataclasses import dataclass, field
 from difflib import get_close_matches
 
 import msgspec
+from msgspec import inspect
 from msgspec.structs import FieldInfo
-
-from masrel.protocol.wording import got, needed
-
-__all__ = ["Decoded", "decode_table"]
 
 Table = dict[str, typing.Any]
 
@@ -78,16 +77,16 @@ def _decode_array(
     if not isinstance(value, list):
         into.problems.append(f"{where}: needed {words}, got {got(value)}")
         return
-    found = Decoded()
+    entries = Decoded()
     for index, item in enumerate(value):
-        before = len(found.problems)
-        _decode_value(item, entry, f"{where}[{index}]", str(index), found)
-        _name_entry(item, found.problems, before)
-    into.problems.extend(found.problems)
-    into.values[key] = [found.values.get(str(i)) for i in range(len(value))]
-    # The array's own limits, which its entries cannot show.
-    info = msgspec.inspect.type_info(annotation)
-    if isinstance(info, msgspec.inspect.VarTupleType) and not (
+        before = len(entries.problems)
+        _decode_value(item, entry, f"{where}[{index}]", str(index), entries)
+        _name_entry(item, entries.problems, before)
+    into.problems.extend(entries.problems)
+    into.values[key] = [entries.values.get(str(i)) for i in range(len(value))]
+    # limits on the length of the array, which no entry shows
+    info = inspect.type_info(annotation)
+    if isinstance(info, inspect.VarTupleType) and not (
         (info.min_length or 0) <= len(value) <= (info.max_length or math.inf)
     ):
         into.problems.append(f"{where}: needed {needed(annotation)}, got {got(value)}")
@@ -107,8 +106,8 @@ def _leaf_problem(value: object, annotation: object, where: str) -> str | None:
     try:
         msgspec.convert(value, annotation)
     except msgspec.ValidationError:
-        info = msgspec.inspect.type_info(annotation)
-        options = info.values if isinstance(info, msgspec.inspect.LiteralType) else ()
+        info = inspect.type_info(annotation)
+        options = info.values if isinstance(info, inspect.LiteralType) else ()
         return problem + _closest(value, [str(option) for option in options])
     return None
 
@@ -149,3 +148,78 @@ def _entry_type(annotation: object) -> object | None:
 
 def _join(at: str, key: str) -> str:
     return f"{at}.{key}" if at else key
+
+
+_IDENTIFIER = (
+    "a name of 1 to 32 letters, digits, '.', '_' or '-', "
+    "the first a letter or digit (in quotes)"
+)
+
+
+def needed(annotation: object) -> str:
+    """Say what a value of a field's type is."""
+    return _phrase(inspect.type_info(annotation))
+
+
+def _phrase(info: inspect.Type) -> str:
+    if isinstance(info, inspect.UnionType):
+        kinds = [t for t in info.types if not isinstance(t, inspect.NoneType)]
+        return " or ".join(_phrase(kind) for kind in kinds)
+    if isinstance(info, inspect.BoolType):
+        return "true or false"
+    if isinstance(info, inspect.DictType):
+        return f"a table in which each value is {_phrase(info.value_type)}"
+    if isinstance(info, inspect.FloatType):
+        return "a number" + _range(info)
+    if isinstance(info, inspect.IntType):
+        return "a whole number" + _range(info)
+    if isinstance(info, inspect.LiteralType):
+        return "one of " + ", ".join(got(value) for value in info.values)
+    if isinstance(info, inspect.VarTupleType):
+        return "an array" + _length(info)
+    if isinstance(info, inspect.StrType) and info.pattern is not None:
+        return _IDENTIFIER
+    if isinstance(info, inspect.StrType) and info.min_length:
+        return "text that is not empty (in quotes)"
+    return "text (in quotes)"
+
+
+def _range(info: inspect.FloatType | inspect.IntType) -> str:
+    limits = (
+        ("above", info.gt),
+        ("at least", info.ge),
+        ("below", info.lt),
+        ("at most", info.le),
+    )
+    form = "d" if isinstance(info, inspect.IntType) else "g"  # exact: up to 2**63
+    phrases = [f"{word} {limit:{form}}" for word, limit in limits if limit is not None]
+    return " " + " and ".join(phrases) if phrases else ""
+
+
+def _length(info: inspect.VarTupleType) -> str:
+    if info.min_length and info.max_length:
+        return f" of {info.min_length} to {info.max_length} entries"
+    if info.min_length:
+        few = "entry" if info.min_length == 1 else "entries"
+        return f" of at least {info.min_length} {few}"
+    return ""
+
+
+def got(value: object) -> str:
+    """Show a decoded TOML value as its file would."""
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, Mapping):
+        return "a table"
+    if isinstance(value, list | tuple):
+        return f"an array of {len(value)}"
+    if isinstance(value, datetime.date | datetime.time):
+        return value.isoformat()
+    return str(value)
+
+
+def with_id(entry: Mapping[str, object]) -> str:
+    """Name an entry of an array of tables at the end of a message."""
+    return f" (id {got(entry['id'])})" if "id" in entry else ""

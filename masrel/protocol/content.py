@@ -1,0 +1,169 @@
+"""What a protocol says to others: its scale, its joints in SI units, its hashes."""
+
+import hashlib
+import math
+from typing import Any
+
+import msgspec
+
+from masrel.elbow.parameters import ElbowParameters
+from masrel.errors import ParameterError
+from masrel.protocol.definition import ElbowConstants, Model, Protocol
+from masrel.scales import Scale
+
+
+def scale_of(protocol: Protocol) -> Scale:
+    """Return the rating scale of a protocol.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        A protocol.
+
+    Returns
+    -------
+    Scale
+        Name and grades, least first.
+    """
+    return Scale(name=protocol.scale.name, grades=protocol.scale.grades)
+
+
+def elbow_parameters(protocol: Protocol, model_id: str) -> ElbowParameters:
+    """Return the joint parameters of one haptic model, in SI units.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        A protocol; its angles are degrees.
+    model_id : str
+        Id of one of its models.
+
+    Returns
+    -------
+    ElbowParameters
+        The model's L, H, Q and D and constants, with those of ``[elbow]``
+        for the rest; rad, rad/s, s.
+
+    Raises
+    ------
+    ParameterError
+        If the protocol has no such model; the message names those there are.
+    """
+    models = {model.id: model for model in protocol.models}
+    if model_id not in models:
+        known = ", ".join(models)
+        raise ParameterError(f"model: needed one of {known}, got {model_id!r}")
+    return _joint_of(models[model_id], protocol.elbow)
+
+
+def _joint_of(model: Model, shared: ElbowConstants) -> ElbowParameters:
+    """Return the joint of one model, in SI units."""
+    overrides = {
+        key: value
+        for key in model.constants.__struct_fields__
+        if (value := getattr(model.constants, key)) is not None
+    }
+    elbow = msgspec.structs.replace(shared, **overrides)
+    rest = elbow.rest_angle_deg
+    return ElbowParameters(
+        catch_angle_constant=math.radians(model.catch_angle_constant_deg),
+        catch_torque_constant=model.catch_torque_nms_rad,
+        residual_ratio=model.residual_ratio,
+        catch_travel=math.radians(model.catch_travel_deg),
+        inertia=elbow.inertia_kg_m2,
+        damping=elbow.damping_nms_rad,
+        stiffness=elbow.stiffness_nm_rad,
+        catch_slope=elbow.catch_slope_s,
+        peak_duration=elbow.peak_duration_s,
+        post_catch_stiffness=elbow.post_catch_stiffness_nm_rad,
+        speed_threshold=math.radians(elbow.speed_threshold_deg_s),
+        slowest_mean_speed=math.radians(elbow.slowest_mean_speed_deg_s),
+        smallest_catch_angle=math.radians(elbow.smallest_catch_angle_deg),
+        range_end=math.radians(elbow.range_end_deg),
+        rest_angle=None if rest is None else math.radians(rest),
+        post_catch=elbow.post_catch,
+        residual_reading=elbow.residual_reading,
+        catch_rise=elbow.catch_rise_s,
+    )
+
+
+_PRESENTED = ("scale", "elbow", "models", "schedule", "stretch", "device")
+"""The tables that decide what a rater meets, besides the study's id."""
+
+_LATER: dict[str, object] = {
+    "catch_rise_s": 0.0,
+    "residual_reading": "residual",
+    "rest_angle_deg": None,
+}
+"""Constants that protocols had no key for, with the defaults they then had: these do
+not enter, so that no schedule drawn before turns stale."""
+
+
+def protocol_hash(protocol: Protocol) -> str:
+    """Hash the whole content of a protocol.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        A protocol; keys left out of the file count with their defaults.
+
+    Returns
+    -------
+    str
+        SHA-256, 64 hexadecimal digits. Comments, order of keys and layout of the
+        file do not enter. Of a model file its numbers enter, its name, and whether
+        it comes from simulated recordings.
+    """
+    return _digest(_plain(protocol))
+
+
+def presented_hash(protocol: Protocol) -> str:
+    """Hash the part of a protocol that decides what a rater meets.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        A protocol.
+
+    Returns
+    -------
+    str
+        SHA-256, 64 hexadecimal digits, of the study's id and the tables
+        ``scale``, ``elbow``, ``models``, ``schedule``, ``stretch`` and ``device``.
+
+    Notes
+    -----
+    Raters, sessions, texts, the analysis plan and the report do not enter: adding
+    a rater or wording a title better makes nobody's drawn schedule stale.
+    """
+    tables = {name: getattr(protocol, name) for name in _PRESENTED}
+    content = _plain({"study": protocol.study.id, **tables})
+    for model in content["models"]:
+        for key in ("file", "simulated"):  # the numbers are what is felt
+            model.pop(key, None)
+    return _digest(content)
+
+
+def _plain(content: object) -> dict[str, Any]:
+    plain: dict[str, Any] = msgspec.to_builtins(content)
+    elbow = plain["elbow"]
+    for model in plain["models"]:
+        constants = {k: v for k, v in model.pop("constants").items() if v is not None}
+        # what a model repeats of the shared constants does not enter twice
+        for key in ("post_catch", *_LATER):
+            if key in constants and constants[key] == elbow[key]:
+                del constants[key]
+        if constants:
+            model["constants"] = constants
+        for key, absent in (("file", None), ("simulated", False)):
+            if model[key] is absent:
+                del model[key]
+    for key, default in _LATER.items():
+        if elbow[key] == default:
+            del elbow[key]
+    return plain
+
+
+def _digest(content: object) -> str:
+    canonical = msgspec.json.encode(content, order="sorted")
+    return hashlib.sha256(canonical).hexdigest()
