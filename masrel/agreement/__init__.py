@@ -4,37 +4,43 @@ In: item × rater labels (or counts, or a contingency table). Out: an `Estimate`
 `Significance` from a test.
 """
 
-from masrel.agreement.bands import Band, BandScale, bands, benchmark
+from masrel.agreement._counts import CountedRatings, count_ratings, count_table
+from masrel.agreement._data import CodedRatings, code_long, code_ratings
+from masrel.agreement._labels import Label
+from masrel.agreement.benchmarks import Band, BandScale, bands, benchmark, strength
 from masrel.agreement.brennan_prediger import (
     brennan_prediger,
     brennan_prediger_from_counts,
 )
 from masrel.agreement.category import category_kappa, fleiss_null
-from masrel.agreement.coding import CodedRatings, code_ratings
 from masrel.agreement.cohen import cohen_kappa, cohen_kappa_from_table
 from masrel.agreement.conger import conger_kappa
-from masrel.agreement.counting import CountedRatings, count_ratings, count_table
+from masrel.agreement.contingency import (
+    bhapkar,
+    bias_index,
+    bowker,
+    contingency_table,
+    kappa_max,
+    mcnemar,
+    prevalence_index,
+    stuart_maxwell,
+)
 from masrel.agreement.fleiss import fleiss_kappa, fleiss_kappa_from_counts
 from masrel.agreement.gwet import gwet_ac, gwet_ac_from_counts
 from masrel.agreement.icc import icc, icc_f_test
-from masrel.agreement.indices import bias_index, kappa_max, prevalence_index
 from masrel.agreement.kendall import kendall_w, kendall_w_test
 from masrel.agreement.krippendorff import (
     krippendorff_alpha,
     krippendorff_alpha_from_counts,
 )
 from masrel.agreement.light import light_kappa
-from masrel.agreement.long import code_long
-from masrel.agreement.margins import bhapkar, stuart_maxwell
 from masrel.agreement.percent import percent_agreement, percent_agreement_from_counts
-from masrel.agreement.pooled_pairs import pooled_kappa
 from masrel.agreement.registry import COEFFICIENTS, Coefficient, coefficient
+from masrel.agreement.retest import pooled_kappa, stratified_kappa
 from masrel.agreement.robinson import robinson_a
 from masrel.agreement.scott import scott_pi, scott_pi_from_table
 from masrel.agreement.significance import Significance, p_value
-from masrel.agreement.stratified import stratified_kappa
-from masrel.agreement.symmetry import bowker, contingency_table, mcnemar
-from masrel.agreement.weights import Weights, declared_weights
+from masrel.agreement.weights import WeightName, Weights, declared_weights
 
 __all__ = [
     "COEFFICIENTS",
@@ -43,7 +49,9 @@ __all__ = [
     "CodedRatings",
     "Coefficient",
     "CountedRatings",
+    "Label",
     "Significance",
+    "WeightName",
     "Weights",
     "bands",
     "benchmark",
@@ -86,5 +94,6 @@ __all__ = [
     "scott_pi",
     "scott_pi_from_table",
     "stratified_kappa",
+    "strength",
     "stuart_maxwell",
 ]

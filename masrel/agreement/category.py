@@ -7,11 +7,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement.coding import Label, code_ratings
-from masrel.agreement.counting import item_counts
+from masrel.agreement._counts import item_counts
+from masrel.agreement._data import code_ratings
+from masrel.agreement._kernel import undefined
+from masrel.agreement._labels import Label
 from masrel.agreement.fleiss import fleiss_kappa_from_counts
 from masrel.agreement.significance import Significance
-from masrel.agreement.undefined import undefined
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate
 

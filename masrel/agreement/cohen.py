@@ -6,11 +6,17 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from masrel.agreement.coding import CodedRatings, Label, code_ratings
-from masrel.agreement.counts import check_table, column_categories
-from masrel.agreement.kernel import Floats, Kernel, divide
-from masrel.agreement.pair_sums import PairSums, Table, kappa_of_sums, pair_table
-from masrel.agreement.standard_error import check_population, standard_error
+from masrel.agreement._counts import check_table, column_categories
+from masrel.agreement._data import CodedRatings, code_ratings
+from masrel.agreement._kernel import (
+    Floats,
+    Kernel,
+    check_population,
+    divide,
+    standard_error,
+)
+from masrel.agreement._labels import Label
+from masrel.agreement._pairs import PairSums, Table, kappa_of_sums, pair_table
 from masrel.agreement.weights import WeightName, Weights, declared_weights
 from masrel.errors import RatingsError
 from masrel.estimates import Estimate

@@ -7,18 +7,24 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from masrel.agreement.coding import CodedRatings, Label, code_ratings
-from masrel.agreement.conger_influence import Margins, influence_squares
-from masrel.agreement.counting import coded_items, item_counts
-from masrel.agreement.kernel import Floats, Kernel, divide, weighted_disagreement
-from masrel.agreement.standard_error import (
+from masrel.agreement._counts import coded_items, item_counts
+from masrel.agreement._data import CodedRatings, code_ratings
+from masrel.agreement._kernel import (
+    NO_CHANCE,
+    NO_PAIR,
+    Floats,
+    Kernel,
     Variance,
     check_population,
     check_variance,
+    divide,
     standard_error,
+    undefined,
+    weighted_disagreement,
 )
+from masrel.agreement._labels import Label
+from masrel.agreement.conger_influence import Margins, influence_squares
 from masrel.agreement.tally import Observed
-from masrel.agreement.undefined import NO_CHANCE, NO_PAIR, undefined
 from masrel.agreement.weights import WeightName, Weights, declared_weights
 from masrel.estimates import Estimate
 

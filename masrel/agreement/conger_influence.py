@@ -7,11 +7,10 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement.coding import CodedRatings
-from masrel.agreement.counting import item_counts
+from masrel.agreement._counts import distinct_rows, item_counts
+from masrel.agreement._data import CodedRatings
+from masrel.agreement._kernel import Floats, weighted_disagreement
 from masrel.agreement.float_sums import cancelled
-from masrel.agreement.kernel import Floats, weighted_disagreement
-from masrel.agreement.patterns import distinct_patterns
 from masrel.agreement.tally import Observed
 from masrel.agreement.weights import Weights
 
@@ -95,7 +94,7 @@ def influence_squares(
     """Return Σ_i u_i² of Conger's kappa, u_i being n times what item i moves it by."""
     # With d_i an item's disagreement and s_i = 1 if it has a pair, D_e u_i = (D_o/D_e)
     # Σ_g moves_g - (n/n') (d_i - D_o s_i). In fractions where floats would cancel.
-    rows, times = distinct_patterns(coded.codes, coded.n_categories)
+    rows, times = distinct_rows(coded.codes, coded.n_categories)
     rated = (rows >= 0).any(axis=1)
     rows, times, n = rows[rated], times[rated], coded.n_items
     d_o = Fraction(observed.numerator, observed.denominator)

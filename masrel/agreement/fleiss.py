@@ -6,18 +6,16 @@ from operator import mul
 import numpy as np
 from numpy.typing import ArrayLike
 
-from masrel.agreement.coding import Label
-from masrel.agreement.kernel import Floats, pooled_kernel
-from masrel.agreement.pooled import (
-    Expected,
+from masrel.agreement._kernel import Floats, Variance, pooled_kernel
+from masrel.agreement._labels import Label
+from masrel.agreement._pooled import (
     Options,
     PooledCoefficient,
-    Shares,
-    Slopes,
-    Variance,
     estimate_counts,
     estimate_ratings,
 )
+from masrel.agreement.influence import Expected, Slopes
+from masrel.agreement.tally import Shares
 from masrel.agreement.weights import WeightName, Weights
 from masrel.estimates import Estimate
 

@@ -8,10 +8,10 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement.coding import Label
+from masrel.agreement._data import complete_values
+from masrel.agreement._kernel import undefined
+from masrel.agreement._labels import Label
 from masrel.agreement.significance import Significance
-from masrel.agreement.undefined import undefined
-from masrel.agreement.values import complete_values
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Interval
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement.coding import Label
+from masrel.agreement._data import complete_values
+from masrel.agreement._kernel import undefined
+from masrel.agreement._labels import Label
 from masrel.agreement.significance import Significance
-from masrel.agreement.undefined import undefined
-from masrel.agreement.values import complete_values
 from masrel.estimates import Estimate
 
 __all__ = ["kendall_w", "kendall_w_test"]

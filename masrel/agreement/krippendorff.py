@@ -9,20 +9,29 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from masrel.agreement.coding import CodedRatings, Label
-from masrel.agreement.counting import (
+from masrel.agreement._counts import (
     CountedRatings,
+    ItemTable,
     count_ratings,
     item_counts,
     take_counts,
 )
+from masrel.agreement._data import CodedRatings
+from masrel.agreement._kernel import (
+    NO_CHANCE,
+    NO_PAIR,
+    Floats,
+    Kernel,
+    check_population,
+    divide,
+    standard_error,
+    undefined,
+    weighted_disagreement,
+)
+from masrel.agreement._labels import Label
 from masrel.agreement.influence import Linear
-from masrel.agreement.items import ItemTable
-from masrel.agreement.kernel import Floats, Kernel, divide, weighted_disagreement
 from masrel.agreement.metrics import Metric, metric_weights
-from masrel.agreement.standard_error import check_population, standard_error
 from masrel.agreement.tally import SizeGroup
-from masrel.agreement.undefined import NO_CHANCE, NO_PAIR, undefined
 from masrel.agreement.weights import (
     WeightName,
     Weights,

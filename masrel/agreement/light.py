@@ -10,14 +10,19 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from masrel.agreement.coding import CodedRatings, Label, code_ratings, complete
+from masrel.agreement._counts import distinct_rows
+from masrel.agreement._data import CodedRatings, code_ratings, complete
+from masrel.agreement._kernel import (
+    Floats,
+    Kernel,
+    check_population,
+    standard_error,
+    undefined,
+)
+from masrel.agreement._labels import Label
+from masrel.agreement._pairs import PairSums, pair_table
 from masrel.agreement.cohen import COHEN_KERNEL
 from masrel.agreement.float_sums import cancelled
-from masrel.agreement.kernel import Floats, Kernel
-from masrel.agreement.pair_sums import PairSums, pair_table
-from masrel.agreement.patterns import distinct_patterns
-from masrel.agreement.standard_error import check_population, standard_error
-from masrel.agreement.undefined import undefined
 from masrel.agreement.weights import WeightName, Weights, declared_weights
 from masrel.errors import ParameterError, RatingsError
 from masrel.estimates import Estimate
@@ -159,7 +164,7 @@ def _error(
     population: int | None,
 ) -> float:
     n = coded.n_items
-    rows, times = distinct_patterns(coded.codes, coded.n_categories)
+    rows, times = distinct_rows(coded.codes, coded.n_categories)
     every = [_moves(found, n, len(pairs), v) for found in sums]
     parts = []
     for (g, h), cells in zip(pairs, every, strict=True):

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import Literal, get_args
 
-from masrel.agreement.counting import CountedRatings
+from masrel.agreement._counts import CountedRatings
 from masrel.agreement.weights import (
     Weights,
     category_values,

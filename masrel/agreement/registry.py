@@ -8,23 +8,27 @@ from typing import Literal, get_args
 
 from numpy.typing import ArrayLike
 
+from masrel.agreement._data import CodedRatings, code_pairs, code_ratings
+from masrel.agreement._kernel import Kernel
+from masrel.agreement._labels import Label
 from masrel.agreement.brennan_prediger import BRENNAN_PREDIGER_KERNEL, brennan_prediger
-from masrel.agreement.coding import CodedRatings, Label, code_ratings
 from masrel.agreement.cohen import COHEN_KERNEL, cohen_kappa
 from masrel.agreement.conger import CONGER_KERNEL, conger_kappa
 from masrel.agreement.fleiss import FLEISS_KERNEL, fleiss_kappa
 from masrel.agreement.gwet import GWET_KERNEL, gwet_ac
 from masrel.agreement.icc import IccForm, icc
 from masrel.agreement.kendall import kendall_w
-from masrel.agreement.kernel import Kernel
 from masrel.agreement.krippendorff import KRIPPENDORFF_KERNEL, krippendorff_alpha
 from masrel.agreement.light import LIGHT_KERNEL, light_kappa
-from masrel.agreement.pairs import code_strata
 from masrel.agreement.percent import PERCENT_KERNEL, percent_agreement
-from masrel.agreement.pooled_pairs import POOLED_PAIRS_KERNEL, pooled_kappa
+from masrel.agreement.retest import (
+    POOLED_PAIRS_KERNEL,
+    STRATIFIED_KERNEL,
+    pooled_kappa,
+    stratified_kappa,
+)
 from masrel.agreement.robinson import robinson_a
 from masrel.agreement.scott import SCOTT_KERNEL, scott_pi
-from masrel.agreement.stratified import STRATIFIED_KERNEL, stratified_kappa
 from masrel.agreement.weights import WeightName
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate
@@ -77,7 +81,7 @@ class Coefficient:
         Whether 0 is what chance gives.
     weighted : bool
         Whether it takes weights.
-    own_interval : bool
+    has_interval : bool
         Whether it comes with an interval, and takes its level.
     code : callable
         Ratings and categories to the codes its kernel takes.
@@ -94,7 +98,7 @@ class Coefficient:
     highest: float = 1.0
     chance_corrected: bool = True
     weighted: bool = True
-    own_interval: bool = False
+    has_interval: bool = False
     code: Callable[..., CodedRatings] = code_ratings
 
     def __call__(
@@ -111,7 +115,7 @@ class Coefficient:
             return self.function(ratings, categories=categories, weights=weights)
         if not (isinstance(weights, str) and weights == "identity"):
             raise ParameterError(f"weights: {self.title} takes none, got {weights!r}")
-        if self.own_interval:
+        if self.has_interval:
             return self.function(ratings, categories=categories, level=level)
         return self.function(ratings, categories=categories)
 
@@ -186,7 +190,7 @@ _ALL = (
         name="stratified_kappa",
         title="Stratified κ",
         function=stratified_kappa,
-        code=code_strata,
+        code=code_pairs,
         kernel=STRATIFIED_KERNEL,
         shape="pairs",
         n_raters=(1, None),
@@ -195,7 +199,7 @@ _ALL = (
         name="pooled_kappa",
         title="Pooled κ",
         function=pooled_kappa,
-        code=code_strata,
+        code=code_pairs,
         kernel=POOLED_PAIRS_KERNEL,
         shape="pairs",
         n_raters=(1, None),
@@ -230,7 +234,7 @@ _ALL = (
             lowest=-math.inf,
             highest=math.inf if form == "ICC(A,k)" else 1.0,
             weighted=False,
-            own_interval=True,
+            has_interval=True,
         )
         for name, form in zip(
             ("icc_1", "icc_1k", "icc_c1", "icc_ck", "icc_a1", "icc_ak"),

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from masrel.agreement.coding import Label
-from masrel.agreement.undefined import undefined
-from masrel.agreement.values import complete_values
+from masrel.agreement._data import complete_values
+from masrel.agreement._kernel import undefined
+from masrel.agreement._labels import Label
 from masrel.estimates import Estimate
 
 __all__ = ["robinson_a"]

@@ -4,16 +4,17 @@ from collections.abc import Sequence
 
 from numpy.typing import ArrayLike
 
-from masrel.agreement.coding import CodedRatings, Label, code_ratings, complete
+from masrel.agreement._counts import coded_items, count_table
+from masrel.agreement._data import CodedRatings, code_ratings, complete
+from masrel.agreement._kernel import Floats, Kernel
+from masrel.agreement._labels import Label
+from masrel.agreement._pooled import Options, PooledCoefficient, pooled_estimate
 from masrel.agreement.cohen import two_raters
-from masrel.agreement.counting import coded_items, count_table
 from masrel.agreement.fleiss import (
     FLEISS_KERNEL,
     expected_disagreement,
     expected_slopes,
 )
-from masrel.agreement.kernel import Floats, Kernel
-from masrel.agreement.pooled import Options, PooledCoefficient, pooled_estimate
 from masrel.agreement.weights import WeightName, declared_weights
 from masrel.estimates import Estimate
 

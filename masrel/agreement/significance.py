@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from masrel.agreement.undefined import undefined
+from masrel.agreement._kernel import undefined
 from masrel.estimates import Estimate
 
 __all__ = ["Significance", "chi_squared", "p_value"]

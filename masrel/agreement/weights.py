@@ -14,7 +14,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from masrel.agreement.coding import Label
+from masrel.agreement._labels import Label
 from masrel.agreement.irrational import sine_squared, square_root
 from masrel.errors import ParameterError
 

@@ -4,8 +4,7 @@ import hashlib
 from collections.abc import Sequence
 from typing import TypedDict
 
-from masrel.agreement.coding import Label
-from masrel.agreement.weights import WeightName
+from masrel.agreement import Label, WeightName
 from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target
 

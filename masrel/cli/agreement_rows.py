@@ -10,8 +10,7 @@ from masrel.estimates import Estimate, Interval, Target
 from masrel.scales import MODIFIED_ASHWORTH
 
 if TYPE_CHECKING:
-    from masrel.agreement import Coefficient
-    from masrel.agreement.weights import WeightName
+    from masrel.agreement import Coefficient, WeightName
     from masrel.ratings import RatingMatrix, Ratings
 
 __all__ = ["USUAL", "Row", "Wanted", "estimate_session", "scale_notes"]
@@ -151,7 +150,7 @@ def _interval(
 ) -> Interval | None:
     from masrel.analysis.interval import planned_interval
 
-    comes_with_one = entry.own_interval and (
+    comes_with_one = entry.has_interval and (
         wanted.interval == "auto" or wanted.names == _ANY_ORDER
     )
     if wanted.target is None or comes_with_one:

@@ -7,8 +7,7 @@ from typing import Literal, get_args
 
 from numpy.typing import ArrayLike
 
-from masrel.agreement.coding import Label
-from masrel.agreement.weights import WeightName
+from masrel.agreement import Label, WeightName
 from masrel.errors import ParameterError, UndefinedStatisticWarning
 from masrel.estimates import Estimate, Interval, Target
 from masrel.intervals.case import Case, open_case

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from masrel.agreement.coding import Label
-from masrel.agreement.registry import Coefficient
+from masrel.agreement import Coefficient, Label
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Interval, Target
 from masrel.intervals.analytic import analytic
@@ -18,7 +17,7 @@ from masrel.intervals.posterior import SPOKEN_OF
 from masrel.intervals.statistic import Statistic, find_entry
 
 if TYPE_CHECKING:
-    from masrel.agreement.weights import WeightName
+    from masrel.agreement import WeightName
 
 __all__ = ["Method", "estimate"]
 
@@ -91,7 +90,7 @@ def estimate(
         )
     entry = find_entry(coefficient)
     found = entry(ratings, categories=categories, weights=weights, level=level)
-    if method == "auto" and entry.own_interval:
+    if method == "auto" and entry.has_interval:
         return found
     asked = _Asked(entry, ratings, target, categories, weights, level)
     interval = _chosen(asked) if method == "auto" else _by(method, asked, rng)

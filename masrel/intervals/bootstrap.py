@@ -9,8 +9,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from masrel.agreement.coding import Label
-from masrel.agreement.weights import WeightName
+from masrel.agreement import Label, WeightName
 from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target
 from masrel.intervals.case import open_case

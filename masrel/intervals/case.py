@@ -9,11 +9,15 @@ from typing import get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from masrel.agreement.coding import CodedRatings, Label
-from masrel.agreement.kernel import Floats, Kernel
-from masrel.agreement.patterns import distinct_patterns
-from masrel.agreement.registry import Coefficient
-from masrel.agreement.weights import WeightName, declared_weights
+from masrel.agreement import (
+    CodedRatings,
+    Coefficient,
+    Label,
+    WeightName,
+    declared_weights,
+)
+from masrel.agreement._counts import distinct_rows
+from masrel.agreement._kernel import Floats, Kernel
 from masrel.errors import ParameterError, UndefinedStatisticWarning
 from masrel.estimates import Interval, Target, Unit
 from masrel.intervals.features import features_of
@@ -139,7 +143,7 @@ def open_case(
     _check_raters(entry, coded)
     kernel = kernel_of(entry)
     v = declared_weights(weights, coded.categories, declared=coded.declared).as_floats()
-    codes, times = distinct_patterns(coded.codes, coded.n_categories)
+    codes, times = distinct_rows(coded.codes, coded.n_categories)
     if (codes[0] < 0).all():  # the first of them, if any, has no rating
         codes, times = codes[1:], times[1:]
     patterns = replace(coded, codes=codes)

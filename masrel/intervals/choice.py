@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement.counting import item_counts
+from masrel.agreement._counts import item_counts
 from masrel.intervals.case import Case
 from masrel.intervals.dirichlet.prior import Prior
 from masrel.intervals.dirichlet.rho import ExactPosterior

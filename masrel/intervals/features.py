@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from masrel.agreement.coding import CodedRatings
-from masrel.agreement.kernel import Floats, Kernel
+from masrel.agreement import CodedRatings
+from masrel.agreement._kernel import Floats, Kernel
 
 __all__ = ["blocks", "features_of"]
 

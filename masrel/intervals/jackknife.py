@@ -5,8 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from masrel.agreement.coding import Label
-from masrel.agreement.weights import WeightName
+from masrel.agreement import Label, WeightName
 from masrel.estimates import Interval, Target
 from masrel.intervals.case import Case, open_case
 from masrel.intervals.quantiles import student_t

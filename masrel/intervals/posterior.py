@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from masrel.agreement.coding import Label
+from masrel.agreement import Label
 from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target
 from masrel.intervals.case import Case, open_case
@@ -14,7 +14,7 @@ from masrel.intervals.dirichlet.prior import Prior, PriorName
 from masrel.intervals.statistic import Statistic
 
 if TYPE_CHECKING:
-    from masrel.agreement.weights import WeightName
+    from masrel.agreement import WeightName
 
 __all__ = ["SPOKEN_OF", "posterior"]
 

@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 
-from masrel.agreement.kernel import Kernel
-from masrel.agreement.registry import Coefficient, coefficient
+from masrel.agreement import Coefficient, coefficient
+from masrel.agreement._kernel import Kernel
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate
 

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from numpy.typing import NDArray
 
-from masrel.agreement.coding import code_ratings
-from masrel.agreement.labels import code_type, is_missing
+from masrel.agreement import code_ratings
+from masrel.agreement._labels import code_type, is_missing
 from masrel.errors import RatingsError
 
 INTEGERS = ["i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8"]

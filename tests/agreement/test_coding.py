@@ -4,8 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from masrel.agreement import fleiss_kappa
-from masrel.agreement.coding import code_ratings
+from masrel.agreement import code_ratings, fleiss_kappa
 from masrel.errors import RatingsError
 
 GRADES = ["0", "1", "1+", "2", "3", "4"]

@@ -11,21 +11,30 @@ from numpy.typing import NDArray
 
 from masrel.agreement import (
     COEFFICIENTS,
+    CodedRatings,
+    _counts,
     code_ratings,
     count_ratings,
     declared_weights,
     fleiss_kappa,
     fleiss_kappa_from_counts,
-    items,
     krippendorff_alpha_from_counts,
     percent_agreement_from_counts,
 )
-from masrel.agreement.coding import CodedRatings
-from masrel.agreement.counting import coded_items, item_counts, take_counts
-from masrel.agreement.counts import check_counts, check_table, column_categories
+from masrel.agreement._counts import (
+    FewItems,
+    ItemTable,
+    ManyItems,
+    check_counts,
+    check_table,
+    coded_items,
+    column_categories,
+    distinct_rows,
+    item_counts,
+    item_table,
+    take_counts,
+)
 from masrel.agreement.influence import Linear
-from masrel.agreement.items import FewItems, ItemTable, ManyItems, item_table
-from masrel.agreement.patterns import distinct_patterns
 from masrel.errors import CountsError, ParameterError
 
 Codes = NDArray[np.int8]
@@ -112,7 +121,7 @@ def test_distinct_patterns_are_those_of_a_plain_count(
     shape: tuple[int, int, int],
 ) -> None:
     codes = random_codes(*shape)
-    rows, times = distinct_patterns(codes, shape[2])
+    rows, times = distinct_rows(codes, shape[2])
     assert rows.dtype == times.dtype == np.int64
     pairs = zip(map(tuple, rows.tolist()), times.tolist(), strict=True)
     assert dict(pairs) == Counter(map(tuple, codes.tolist()))
@@ -120,7 +129,7 @@ def test_distinct_patterns_are_those_of_a_plain_count(
 
 def test_a_pattern_of_missing_ratings_and_of_the_last_category_come_back() -> None:
     codes = np.array([[-1, -1, -1], [3, 3, 3], [-1, 3, -1], [3, 3, 3]], dtype=np.int8)
-    rows, times = distinct_patterns(codes, 4)
+    rows, times = distinct_rows(codes, 4)
     assert sorted(zip(rows.tolist(), times.tolist(), strict=True)) == [
         ([-1, -1, -1], 1),
         ([-1, 3, -1], 1),
@@ -181,7 +190,7 @@ def test_coefficients_of_huge_counts_are_exact() -> None:
 
 
 def test_the_table_is_chosen_by_its_size() -> None:
-    counts = np.ones((items._FEW // 2, 2), dtype=np.int64)
+    counts = np.ones((_counts._FEW_COUNTS // 2, 2), dtype=np.int64)
     assert isinstance(item_table(counts), FewItems)
     assert isinstance(item_table(np.vstack([counts, counts])), ManyItems)
 
@@ -202,7 +211,7 @@ def test_items_in_arrays_and_in_integers_give_the_same(
         both = []
         for few, kind in ((0, ManyItems), (10**9, FewItems)):
             with monkeypatch.context() as patched:
-                patched.setattr(items, "_FEW", few)
+                patched.setattr(_counts, "_FEW_COUNTS", few)
                 assert isinstance(coded_items(rows), kind)
                 both.append(COEFFICIENTS[name](rows, weights=weights))  # type: ignore[arg-type]
         in_arrays, exact = both

@@ -5,7 +5,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from masrel.agreement.patterns import distinct_patterns
+from masrel.agreement._counts import distinct_rows
 
 
 @pytest.mark.parametrize(
@@ -25,7 +25,7 @@ def test_every_row_is_counted(n_items: int, n_raters: int, n_categories: int) ->
     codes = rng.integers(-1, n_categories, (n_items, n_raters), dtype=np.int8)
     codes[: n_items // 3] = codes[:1]
     codes[n_items // 2 : n_items // 2 + 2] = -1
-    rows, times = distinct_patterns(codes, n_categories)
+    rows, times = distinct_rows(codes, n_categories)
     assert (rows.dtype, times.dtype) == (np.int64, np.int64)
     found = dict(zip(map(tuple, rows.tolist()), times.tolist(), strict=True))
     assert found == Counter(map(tuple, codes.tolist()))

@@ -10,14 +10,14 @@ import pytest
 
 from masrel.agreement import (
     COEFFICIENTS,
-    arrays,
+    _counts,
+    _labels,
+    _pooled,
     count_ratings,
-    distinct,
     few_items,
     fleiss_kappa,
     gwet_ac,
     krippendorff_alpha,
-    pooled,
     weights,
 )
 
@@ -61,8 +61,8 @@ def test_identity_weights_make_no_matrix(meter: Meter) -> None:
 def test_several_coefficients_of_counted_ratings_look_at_the_ratings_once(
     meter: Meter,
 ) -> None:
-    meter.watch(arrays, "_codes")
-    meter.watch(distinct, "_keys")
+    meter.watch(_labels, "_codes")
+    meter.watch(_counts, "_keys")
     counted = count_ratings(RATINGS)
     once = meter.calls.copy()
     assert once["_codes"] == 1
@@ -81,7 +81,7 @@ def test_work_after_counting_grows_with_distinct_items_only(meter: Meter) -> Non
 
 
 def test_a_standard_error_is_computed_once_and_when_it_is_read(meter: Meter) -> None:
-    meter.watch(pooled, "pooled_influence")
+    meter.watch(_pooled, "pooled_influence")
     found = fleiss_kappa(RATINGS)
     assert meter.calls == {}
     assert found.standard_error == found.standard_error > 0

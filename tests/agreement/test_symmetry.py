@@ -18,7 +18,7 @@ from masrel.agreement import (
     mcnemar,
     stuart_maxwell,
 )
-from masrel.agreement.symmetry import McnemarKind
+from masrel.agreement.contingency import McnemarKind
 from masrel.errors import (
     CountsError,
     ParameterError,

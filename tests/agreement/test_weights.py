@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from masrel.agreement import (
     COEFFICIENTS,
+    WeightName,
     cohen_kappa,
     count_ratings,
     declared_weights,
@@ -18,7 +19,6 @@ from masrel.agreement import (
     krippendorff_alpha,
     percent_agreement,
 )
-from masrel.agreement.weights import WeightName
 from masrel.errors import ParameterError, UndefinedStatisticWarning
 
 NAMES = get_args(WeightName)

@@ -10,8 +10,7 @@ from typing import Any, get_args
 
 import pytest
 
-from masrel.agreement import COEFFICIENTS, BandScale
-from masrel.agreement.weights import WeightName
+from masrel.agreement import COEFFICIENTS, BandScale, WeightName
 from masrel.estimates import Estimate, Interval
 from tests.cli.process import Caller, Done
 

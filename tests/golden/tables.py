@@ -114,7 +114,7 @@ def _applicable(table: Drawn, method: str, *, every: bool) -> list[str]:
         if every
         or (
             (two or entry.n_raters != (2, 2))
-            and (entry.kernel or (method == "estimate" and entry.own_interval))
+            and (entry.kernel or (method == "estimate" and entry.has_interval))
             and (method != "posterior" or two or name in OF_POSTERIOR)
             and (method != "posterior" or entry.shape == "ratings")
         )

@@ -13,9 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import masrel.agreement
-from masrel.agreement import COEFFICIENTS, Coefficient, declared_weights
+from masrel.agreement import COEFFICIENTS, Coefficient, WeightName, declared_weights
 from masrel.agreement.registry import Property
-from masrel.agreement.weights import WeightName
 from masrel.errors import UndefinedStatisticWarning
 from masrel.estimates import Estimate
 from tests.strategies import LABELS, Table, tables

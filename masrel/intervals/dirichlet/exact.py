@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaln
 
-from masrel.agreement.kernel import Floats
+from masrel.agreement._kernel import Floats
 from masrel.errors import ConvergenceError
 from masrel.intervals.dirichlet.model import DirichletMultinomial
 from masrel.intervals.dirichlet.powers import TRIMMED, Category, Powers

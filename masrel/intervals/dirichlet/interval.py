@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement.counting import item_counts
+from masrel.agreement._counts import item_counts
 from masrel.estimates import Interval
 from masrel.intervals.case import Case
 from masrel.intervals.dirichlet.model import DirichletMultinomial

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from scipy.special import gammaln, xlogy
 
-from masrel.agreement.kernel import Floats
+from masrel.agreement._kernel import Floats
 from masrel.errors import ConvergenceError
 
 __all__ = ["TRIMMED", "Category", "Powers"]

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit, ndtri
 
-from masrel.agreement.coding import Codes
-from masrel.agreement.kernel import Floats
+from masrel.agreement._kernel import Floats
+from masrel.agreement._labels import Codes
 from masrel.intervals.latent.place import Place
 
 __all__ = ["Coordinates"]

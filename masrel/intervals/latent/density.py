@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from masrel.agreement.coding import Codes
-from masrel.agreement.kernel import Floats
+from masrel.agreement._kernel import Floats
+from masrel.agreement._labels import Codes
 from masrel.intervals.latent.coordinates import Coordinates
 from masrel.intervals.latent.likelihood import Cells, CellSlopes
 from masrel.intervals.latent.place import Place

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.optimize import minimize
 
-from masrel.agreement.kernel import Floats
+from masrel.agreement._kernel import Floats
 from masrel.intervals.latent.density import LatentDensity
 from masrel.intervals.latent.kappa import (
     Agreement,

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from masrel.agreement.kernel import Floats
+from masrel.agreement._kernel import Floats
 
 __all__ = ["JOURNEY", "hamiltonian_proposal"]
 

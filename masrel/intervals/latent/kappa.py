@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.special import ndtr
 
-from masrel.agreement.kernel import Floats
+from masrel.agreement._kernel import Floats
 from masrel.intervals.latent.traits import Traits
 
 __all__ = [

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement.coding import Codes
-from masrel.agreement.kernel import Floats
+from masrel.agreement._kernel import Floats
+from masrel.agreement._labels import Codes
 from masrel.intervals.latent.place import Place
 from masrel.intervals.latent.traits import between, normal
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 from scipy.special import expit
 
-from masrel.agreement.kernel import Floats
+from masrel.agreement._kernel import Floats
 from masrel.intervals.latent.traits import Traits
 
 __all__ = ["Place"]

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement.coding import Codes
-from masrel.agreement.kernel import Floats
+from masrel.agreement._kernel import Floats
+from masrel.agreement._labels import Codes
 from masrel.intervals.latent.traits import Traits
 
 __all__ = ["PredictiveCheck", "predictive_checks", "replicate"]

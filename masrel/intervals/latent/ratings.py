@@ -7,7 +7,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement.coding import Codes, Label, code_ratings
+from masrel.agreement import Label, code_ratings
+from masrel.agreement._labels import Codes
 from masrel.errors import ParameterError, RatingsError
 
 __all__ = ["Items", "LatentRatings"]

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from masrel.agreement.kernel import Floats
+from masrel.agreement._kernel import Floats
 from masrel.estimates import Estimate
 from masrel.intervals.latent.predictive import PredictiveCheck
 from masrel.intervals.latent.prior import LatentPrior

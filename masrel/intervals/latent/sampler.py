@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from masrel.agreement.kernel import Floats
+from masrel.agreement._kernel import Floats
 from masrel.intervals.latent.hamiltonian import hamiltonian_proposal
 from masrel.intervals.mcmc import LARGEST_R_HAT, Walkers, diagnose, not_converged
 

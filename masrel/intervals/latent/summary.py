@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from masrel.agreement.kernel import Floats
+from masrel.agreement._kernel import Floats
 from masrel.estimates import Distribution, Estimate, Interval, Target
 from masrel.intervals.latent.density import LatentDensity
 from masrel.intervals.latent.fit import LatentFit, fit_latent

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from masrel.agreement.coding import Label
+from masrel.agreement import Label
 from masrel.errors import ParameterError
 from masrel.estimates import Target
 from masrel.intervals.latent.prior import LatentPrior

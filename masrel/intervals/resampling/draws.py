@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from masrel.agreement.kernel import Floats
+from masrel.agreement._kernel import Floats
 from masrel.errors import ConvergenceError, ParameterError
 from masrel.intervals.resampling.drawn import Drawn
 from masrel.intervals.resampling.endpoints import Rule

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from masrel.agreement.kernel import Floats
+from masrel.agreement._kernel import Floats
 
 __all__ = ["Enumerated", "near", "quantile_of"]
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from masrel.agreement.kernel import Floats
+from masrel.agreement._kernel import Floats
 from masrel.intervals.resampling.numerators import Integers, numerators_of
 
 __all__ = ["Lattice", "grid_of", "lattice_of"]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement.kernel import Floats
+from masrel.agreement._kernel import Floats
 from masrel.errors import ParameterError
 from masrel.intervals.case import Case
 from masrel.intervals.features import blocks

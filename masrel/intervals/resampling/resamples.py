@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from masrel.agreement.kernel import Floats
+from masrel.agreement._kernel import Floats
 from masrel.estimates import Distribution
 from masrel.intervals.resampling.drawn import Drawn
 from masrel.intervals.resampling.enumerated import Enumerated

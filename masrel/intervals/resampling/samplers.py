@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from masrel.agreement.kernel import Floats
+from masrel.agreement._kernel import Floats
 from masrel.intervals.resampling.control import Control, control_of, whole_scores
 from masrel.intervals.resampling.lattice import Lattice, grid_of
 from masrel.intervals.resampling.numerators import Integers

@@ -5,7 +5,7 @@ from typing import cast
 
 import numpy as np
 
-from masrel.agreement.kernel import Floats
+from masrel.agreement._kernel import Floats
 from masrel.intervals.resampling.pool import Pool
 
 __all__ = ["acceleration", "influence", "standard_errors", "studentized"]

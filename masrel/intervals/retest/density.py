@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit, gammaln
 
-from masrel.agreement.kernel import Floats
+from masrel.agreement._kernel import Floats
 
 __all__ = ["GRID", "RaterPairs", "Risen", "log_weights"]
 

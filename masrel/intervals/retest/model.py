@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement.coding import Label
-from masrel.agreement.pair_sums import pair_table
-from masrel.agreement.pairs import code_strata, strata_of
+from masrel.agreement import Label
+from masrel.agreement._data import code_pairs, pairs_of_raters
+from masrel.agreement._pairs import pair_table
 from masrel.errors import ParameterError, UndefinedStatisticWarning
 from masrel.estimates import Interval, Target
 from masrel.intervals.dirichlet.prior import Prior, PriorName
@@ -107,8 +107,8 @@ def retest_model(
     if not 0.0 < level < 1.0:
         raise ParameterError(f"level: needs (0, 1), got {level}")
     believed = Prior.of(prior, concentration)
-    coded = code_strata(pairs, categories)
-    every = [pair_table(codes, coded.n_categories) for codes in strata_of(coded)]
+    coded = code_pairs(pairs, categories)
+    every = [pair_table(codes, coded.n_categories) for codes in pairs_of_raters(coded)]
     tables = {rater: table for rater, table in enumerate(every) if table.any()}
     if not tables:
         return _undefined("no rater has a pair of grades", believed, level)

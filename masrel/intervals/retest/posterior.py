@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import betainc, expit, logit, sici
 
-from masrel.agreement.kernel import Floats
+from masrel.agreement._kernel import Floats
 from masrel.intervals.retest.density import GRID, RaterPairs, Risen
 from masrel.intervals.sinc import SincDistribution, sinc_distribution
 

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.special import betainc, expit
 
-from masrel.agreement.kernel import Floats
+from masrel.agreement._kernel import Floats
 
 __all__ = ["LEAST", "beta_nodes"]
 

@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from masrel.agreement.kernel import Floats
+from masrel.agreement._kernel import Floats
 from masrel.intervals.table.beta_nodes import LEAST, beta_nodes
 
 __all__ = ["CHANCE", "Chance", "Nodes", "drawn", "grid", "single"]

@@ -6,7 +6,7 @@ from typing import Self
 
 import numpy as np
 
-from masrel.agreement.kernel import Floats
+from masrel.agreement._kernel import Floats
 
 __all__ = ["TablePrior"]
 

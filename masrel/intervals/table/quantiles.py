@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from masrel.agreement.kernel import Floats
+from masrel.agreement._kernel import Floats
 from masrel.errors import ConvergenceError
 from masrel.intervals.table.chances import Chance, Nodes, drawn, grid, single
 from masrel.intervals.table.posterior import TablePosterior

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from masrel.agreement.coding import code_ratings
-from masrel.agreement.counting import item_counts
+from masrel.agreement import code_ratings
+from masrel.agreement._counts import item_counts
 from masrel.errors import ConvergenceError, ParameterError, UndefinedStatisticWarning
 from masrel.estimates import Interval
 from masrel.intervals import posterior

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from masrel.agreement.registry import COEFFICIENTS
+from masrel.agreement import COEFFICIENTS
 from masrel.intervals.case import Case, open_case
 from masrel.intervals.resampling.pool import Pool, item_pool, rater_pool
 from masrel.intervals.resampling.slopes import (

@@ -2,12 +2,10 @@
 
 import math
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal
 
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate
-
-__all__ = ["Band", "BandScale", "bands", "benchmark"]
 
 BandScale = Literal["landis_koch", "altman", "fleiss", "cicchetti"]
 """Whose words."""
@@ -114,13 +112,10 @@ def bands(estimate: Estimate, *, scale: BandScale = "landis_koch") -> tuple[Band
     >>> [(band.word, round(band.cumulative, 2)) for band in found[:3]]
     [('almost perfect', 0.0), ('substantial', 0.06), ('moderate', 0.5)]
     """
-    if scale not in get_args(BandScale):
-        raise ParameterError(
-            f"scale: needs one of {', '.join(get_args(BandScale))}, got {scale!r}"
-        )
+    steps = _steps(scale)
     found: list[Band] = []
     high, better = 1.0, 0.0
-    for low, closed, word in _SCALES[scale]:
+    for low, closed, word in steps:
         end = -math.inf if low == -1.0 > estimate.value else low
         inside, cumulative = _probabilities(estimate, end, high, closed, better)
         band = Band(
@@ -129,6 +124,46 @@ def bands(estimate: Estimate, *, scale: BandScale = "landis_koch") -> tuple[Band
         found.append(band)
         high, better = low, cumulative
     return tuple(found)
+
+
+def strength(value: float, *, scale: BandScale = "landis_koch") -> str:
+    """Return the word of a scale for a value, whatever its standard error.
+
+    Parameters
+    ----------
+    value : float
+        A coefficient.
+    scale : {"landis_koch", "altman", "fleiss", "cicchetti"}, optional
+        Whose words.
+
+    Returns
+    -------
+    str
+        The word; ``"undefined"`` for ``nan``.
+
+    Raises
+    ------
+    ParameterError
+        If the scale is invalid.
+
+    Examples
+    --------
+    >>> strength(0.4), strength(0.41)
+    ('fair', 'moderate')
+    """
+    steps = _steps(scale)
+    if math.isnan(value):
+        return "undefined"
+    reached = (
+        word for low, closed, word in steps if value > low or (closed and value == low)
+    )
+    return next(reached, steps[-1][2])
+
+
+def _steps(scale: str) -> tuple[tuple[float, bool, str], ...]:
+    if scale not in _SCALES:
+        raise ParameterError(f"scale: needs one of {', '.join(_SCALES)}, got {scale!r}")
+    return _SCALES[scale]
 
 
 def benchmark(

@@ -7,12 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement.coding import Codes
-from masrel.agreement.undefined import NO_CHANCE, NO_PAIR, undefined
+from masrel.agreement._kernel import NO_CHANCE, NO_PAIR, undefined
+from masrel.agreement._labels import Codes
 from masrel.agreement.weights import Weights
 from masrel.estimates import Estimate
-
-__all__ = ["PairSums", "Table", "kappa_of_sums", "pair_table"]
 
 Table = NDArray[np.int64]
 

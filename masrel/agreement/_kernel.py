@@ -1,20 +1,23 @@
-"""How a coefficient is computed from sums over items, many resamples at once.
+"""A coefficient as a function of sums over items, many resamples at once.
 
 Every coefficient here is a function of sums over items of a few features of each
 item. A resample of items, or leaving one out, only changes the sums; so intervals
 need no call per resample.
 """
 
+import math
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement.coding import CodedRatings, Codes
-from masrel.agreement.counting import item_counts
-
-__all__ = ["Floats", "Kernel", "divide", "pooled_kernel", "weighted_disagreement"]
+from masrel.agreement._counts import item_counts
+from masrel.agreement._data import CodedRatings
+from masrel.agreement._labels import Codes
+from masrel.errors import ParameterError, UndefinedStatisticWarning
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -131,3 +134,55 @@ def _over(numerator: Floats, denominator: Floats) -> Floats:
     # 0 where there is nothing to divide by
     empty = denominator == 0
     return np.where(empty, 0.0, numerator) / np.where(empty, 1.0, denominator)
+
+
+Variance = Literal["delta", "irrcac"]
+"""Which standard error: the delta method's, or the one irrCAC prints."""
+
+_VARIANCES = get_args(Variance)
+
+
+def standard_error(
+    squares: float, over: float, n_items: int, population: int | None
+) -> float:
+    """Return the standard error of an estimate from how much each item moves it."""
+    # squares, over: Σ_i u_i² is `squares` / `over`, u_i being n times what the estimate
+    # changes by when item i counts a little more.
+    # √[(1 - n/N) Σ_i u_i² / (n (n - 1))]; ``nan`` of a single item.
+    if n_items < 2:
+        return math.nan
+    variance = squares / (over * n_items * (n_items - 1))
+    if population is not None:
+        variance *= (population - n_items) / population
+    return math.sqrt(variance)
+
+
+def check_variance(variance: str) -> None:
+    """Check the name of a standard error."""
+    if variance not in _VARIANCES:
+        raise ParameterError(
+            f"variance: needs one of {', '.join(_VARIANCES)}, got {variance!r}"
+        )
+
+
+def check_population(population: int | None, n_items: int) -> None:
+    """Check the size of a finite population."""
+    if population is None:
+        return
+    if not isinstance(population, int | np.integer) or population < max(n_items, 1):
+        raise ParameterError(
+            f"population: needs a whole number of at least the {n_items} items rated, "
+            f"got {population!r}"
+        )
+
+
+NO_PAIR = "no item has ratings of two raters"
+NO_CHANCE = "0/0: chance agreement is 1, all ratings are in one category"
+
+
+def undefined(title: str, reason: str) -> str:
+    """Warn that a statistic is undefined, and return why."""
+    warnings.warn(
+        f"{title} is undefined: {reason}", UndefinedStatisticWarning, stacklevel=4
+    )
+    return reason

@@ -1,23 +1,108 @@
-"""Arrays of labels to codes, a block at a time."""
+"""Labels of ratings to codes, from lists, arrays and frames."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement.labels import Label, code_type, is_missing, labels_met, lookup
 from masrel.errors import RatingsError
 
-__all__ = ["array_codes"]
+Label = str | int | float
+"""What a grade is called: text or a number."""
 
 Codes = NDArray[np.signedinteger[Any]]
+"""Codes in the smallest integers that hold them."""
+
+
+def is_missing(label: object) -> bool:
+    """Return whether a label is None, ``nan``, or pandas' NA or NaT."""
+    if label is None:
+        return True
+    if isinstance(label, str):
+        return False
+    same = label == label
+    if isinstance(same, bool | np.bool_):
+        return not same
+    return same is label  # pandas' NA, which does not know whether it is itself
+
+
+def check_categories(categories: Sequence[Label]) -> tuple[Label, ...]:
+    """Check a declared scale."""
+    if isinstance(categories, str) or not isinstance(categories, Iterable):
+        raise RatingsError(
+            f"categories: needs a sequence of at least one label, got {categories!r}"
+        )
+    declared = tuple(
+        label.item() if isinstance(label, np.generic) else label for label in categories
+    )
+    if not declared:
+        raise RatingsError("categories: needs a sequence of at least one label, got ()")
+    if any(is_missing(label) for label in declared):
+        raise RatingsError("categories: a missing value cannot be a category")
+    _one_kind(declared, "categories")
+    if len(set(declared)) < len(declared):
+        repeated = [label for i, label in enumerate(declared) if label in declared[:i]]
+        raise RatingsError(f"categories: each label once, repeated: {repeated}")
+    return declared
+
+
+def labels_met(labels: Iterable[object]) -> tuple[Label, ...]:
+    """Return the distinct labels in order: numbers by value, text by alphabet."""
+    try:
+        met: set[Any] = set(labels)
+    except TypeError as error:
+        raise RatingsError(
+            f"ratings: labels need to be text or numbers ({error})"
+        ) from error
+    if set(map(type, met)) != {str}:  # text alone needs no more care
+        met = {label for label in met if not is_missing(label)}
+        _one_kind(met, "ratings")
+    return tuple(sorted(met))
+
+
+def _one_kind(labels: Iterable[Any], where: str) -> None:
+    kinds = {isinstance(label, str): label for label in labels}
+    if len(kinds) > 1:
+        raise RatingsError(
+            f"{where}: text and numbers cannot be mixed, got {kinds[True]!r} "
+            f"and {kinds[False]!r}"
+        )
+    if kinds and not isinstance(label := next(iter(kinds.values())), str | int | float):
+        if not isinstance(label, np.number):
+            raise RatingsError(
+                f"{where}: labels need to be text or numbers, got {label!r}"
+            )
+
+
+def code_type(n_categories: int) -> type[np.signedinteger[Any]]:
+    """Return the smallest integers that hold the codes of some categories."""
+    if n_categories <= 127:
+        return np.int8
+    return np.int16 if n_categories <= 32_767 else np.int32
+
+
+def lookup(
+    label: object, position: dict[object, int], row: int, column: int | str
+) -> int:
+    """Return the code of one label."""
+    if is_missing(label):
+        return -1
+    try:
+        return position[label]
+    except (KeyError, TypeError) as error:
+        known = ", ".join(repr(k) for k in position if k is not None)
+        raise RatingsError(
+            f"ratings: row {row}, column {column!r}: needs one of {known} or a missing "
+            f"value, got {label!r}"
+        ) from error
+
+
 Array = NDArray[Any]
 _Coder = Callable[[Array], Array]
 
 _BLOCK = 1 << 16  # labels coded at once, so that they stay in the cache
 _WIDEST = 1 << 16  # span of whole numbers for which a table of codes is made
-_MISSING, _UNKNOWN = -1, -2
 
 
 def array_codes(
@@ -206,3 +291,58 @@ def _object_codes(
             for i, label in enumerate(flat)
         ]
     return np.array(codes, dtype=code_type(len(known))).reshape(labels.shape), known
+
+
+_MISSING, _UNKNOWN = -1, -2
+
+
+def frame_codes(
+    frame: Any, declared: tuple[Label, ...] | None
+) -> tuple[Codes, tuple[Label, ...], bool]:
+    """Turn a DataFrame of labels into codes, without importing pandas."""
+    # Takes frame (n_items, n_raters)
+    if len(frame.shape) != 2:
+        raise RatingsError(
+            "ratings: needs two dimensions (items, raters), got shape "
+            f"{' × '.join(map(str, frame.shape))}"
+        )
+    if 0 in frame.shape:
+        raise RatingsError(
+            "ratings: needs at least one item and one rater, got shape "
+            f"{frame.shape[0]} × {frame.shape[1]}"
+        )
+    if not hasattr(frame, "iloc"):  # not pandas, whose own types are told apart here
+        codes, known = array_codes(np.asarray(frame.to_numpy()), declared)
+        return codes, known, declared is not None
+    if all(hasattr(dtype, "categories") for dtype in frame.dtypes):
+        return _categorical_codes(frame, declared)
+    plain = all(isinstance(d, np.dtype) and d.kind in "iuf" for d in frame.dtypes)
+    codes, known = array_codes(frame.to_numpy(None if plain else object), declared)
+    return codes, known, declared is not None
+
+
+def _categorical_codes(
+    frame: Any, declared: tuple[Label, ...] | None
+) -> tuple[Codes, tuple[Label, ...], bool]:
+    columns = [frame.iloc[:, j].array for j in range(frame.shape[1])]
+    of_columns = [column.categories.tolist() for column in columns]
+    ordered = all(column.ordered for column in columns)
+    if declared is None and ordered and all(c == of_columns[0] for c in of_columns):
+        declared = check_categories(of_columns[0])
+    known = declared
+    if known is None:
+        # categories nobody was given are not labels met
+        known = labels_met(
+            labels[code]
+            for column, labels in zip(columns, of_columns, strict=True)
+            for code in np.unique(column.codes[column.codes >= 0]).tolist()
+        )
+    position: dict[object, int] = {label: code for code, label in enumerate(known)}
+    codes = np.empty(frame.shape, dtype=code_type(len(known)))
+    for j, (column, labels) in enumerate(zip(columns, of_columns, strict=True)):
+        table = [position.get(label, _UNKNOWN) for label in labels] + [_MISSING]
+        codes[:, j] = np.array(table)[column.codes]
+        if codes[:, j].min() == _UNKNOWN:
+            i = int(np.argmin(codes[:, j]))
+            lookup(labels[int(column.codes[i])], position, i, j)
+    return codes, known, declared is not None

@@ -11,8 +11,17 @@ from typing import NamedTuple
 
 from numpy.typing import ArrayLike
 
-from masrel.agreement.coding import Label
-from masrel.agreement.counting import count_ratings, take_counts
+from masrel.agreement._counts import ItemTable, count_ratings, take_counts
+from masrel.agreement._kernel import (
+    NO_CHANCE,
+    NO_PAIR,
+    Variance,
+    check_population,
+    check_variance,
+    standard_error,
+    undefined,
+)
+from masrel.agreement._labels import Label
 from masrel.agreement.influence import (
     Expected,
     Slopes,
@@ -20,30 +29,9 @@ from masrel.agreement.influence import (
     pooled_influence,
     rounded_influence,
 )
-from masrel.agreement.items import ItemTable
-from masrel.agreement.standard_error import (
-    Variance,
-    check_population,
-    check_variance,
-    standard_error,
-)
 from masrel.agreement.tally import Observed, Shares, Tally
-from masrel.agreement.undefined import NO_CHANCE, NO_PAIR, undefined
 from masrel.agreement.weights import WeightName, Weights, declared_weights
 from masrel.estimates import Estimate
-
-__all__ = [
-    "Expected",
-    "Options",
-    "PooledCoefficient",
-    "Shares",
-    "Slopes",
-    "Variance",
-    "estimate_counts",
-    "estimate_ratings",
-    "pooled_estimate",
-]
-
 
 _LONG = 500  # bits of a multiple of all numbers of ratings that integers are slow with
 
