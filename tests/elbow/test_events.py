@@ -7,7 +7,7 @@ from math import degrees, nextafter, radians
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from mpmath import mp, mpf
 
@@ -377,13 +377,14 @@ def test_the_catch_is_the_first_time_beyond_the_catch_angle(
     joint: ElbowParameters, motion: Motion
 ) -> None:
     found = events(joint, motion)
-    if found.onset is None:
+    if found.onset is None:  # never faster than ν_th
+        speeds = motion.velocity(np.linspace(0.0, found.end, 301))
+        assert (speeds <= joint.speed_threshold * (1 + 1e-12)).all()
         return
     slow = min(slowed(joint, motion), found.end)
     stop = slow if found.catch is None else found.catch
     times = np.linspace(found.onset, stop, 302)[1:-1]
-    if stop - found.onset < 1e-6:
-        return  # caught at once: no time before
+    assume(stop - found.onset >= 1e-6)  # not caught at once: some time before
     travel = motion.angle(times) - motion.angle(found.onset)
     catch_angles = [joint.catch_angle(v) for v in travel / (times - found.onset)]
     # rounding of the mean speed, α · 1e-15 rad / 1e-9 s at worst, is below 1e-6
@@ -396,6 +397,8 @@ def test_catch_angle_and_travel_obey_equations_2_and_4(
 ) -> None:
     found = events(joint, motion)
     if found.catch is None:
+        assert set(names(found)) == {"pre-catch"}
+        assert (found.catch_angle, found.mean_speed, found.catch_end) == (None,) * 3
         return
     if found.catch > found.onset:
         asked = joint.catch_angle(found.mean_speed)

@@ -194,6 +194,8 @@ def test_torque_jumps_at_catch_and_end_of_peak_as_the_law_says(
 ) -> None:
     found = events(joint, motion)
     if found.catch is None:
+        assert {span.name for span in found.phases} == {"pre-catch"}
+        assert found.peak_end is None
         return
     rise = joint.catch_torque_constant * found.catch_speed  # H·v_c
     fall = -(1.0 - joint.residual_ratio) * rise

@@ -5,7 +5,7 @@ import math
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy import stats
 from scipy.special import stdtrit
@@ -119,8 +119,7 @@ def test_the_ends_of_the_interval_are_where_the_profile_has_fallen_enough() -> N
 def test_shifting_and_scaling_travels_does_the_same_to_the_answer(
     seen: list[float], limits: list[float], shift: float, scale: float
 ) -> None:
-    if np.std(seen) < 1e-3:
-        return
+    assume(np.std(seen) >= 1e-3)
     one = fitted(seen, limits, 0.01)
     two = fitted(
         [shift + scale * y for y in seen],
