@@ -10,16 +10,22 @@ from numpy.typing import ArrayLike
 from masrel.agreement import Label, WeightName
 from masrel.errors import ParameterError, UndefinedStatisticWarning
 from masrel.estimates import Estimate, Interval, Target
-from masrel.intervals.case import Case, open_case
-from masrel.intervals.quantiles import normal, student_t
-from masrel.intervals.samples import warn_small
-from masrel.intervals.statistic import Statistic
-from masrel.intervals.transforms import Transform, around
-
-__all__ = ["Distribution", "analytic"]
+from masrel.intervals._problem import (
+    IntervalProblem,
+    Statistic,
+    pose_problem,
+    warn_small,
+)
 
 Distribution = Literal["t", "normal", "logit", "fisher"]
 """What an interval is taken from, and on which scale."""
+
+_METHODS: dict[Distribution, str] = {
+    "t": "delta method, t(n-1)",
+    "normal": "delta method, normal",
+    "logit": "delta method, t(n-1) on the logit",
+    "fisher": "delta method, t(n-1) on Fisher's z",
+}
 
 
 def analytic(
@@ -60,7 +66,7 @@ def analytic(
     Raises
     ------
     ParameterError
-        If an option is none, or `target` is not "items".
+        If an option is invalid, or `target` is not "items".
     RatingsError
         If the ratings do not fit the coefficient.
 
@@ -78,8 +84,8 @@ def analytic(
     Examples
     --------
     >>> ratings = [["a", "a"], ["a", "b"], ["b", "b"], ["b", "b"]] * 5
-    >>> found = analytic("cohen_kappa", ratings, target="items")
-    >>> round(found.low, 3), round(found.high, 3)
+    >>> interval = analytic("cohen_kappa", ratings, target="items")
+    >>> round(interval.low, 3), round(interval.high, 3)
     (0.14, 0.86)
     """
     if distribution not in get_args(Distribution):
@@ -87,7 +93,7 @@ def analytic(
             f"distribution: needs one of {', '.join(get_args(Distribution))}, "
             f"got {distribution!r}"
         )
-    case = open_case(
+    problem = pose_problem(
         coefficient,
         ratings,
         target=target,
@@ -95,38 +101,34 @@ def analytic(
         weights=weights,
         level=level,
     )
-    _check_target(case)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UndefinedStatisticWarning)  # said below
-        estimate = case.entry(ratings, categories=categories, weights=weights)
-    method = f"delta method, {_WORDS[distribution]}"
-    reason = _undefined(estimate)
-    if reason is not None:
-        return case.undefined(reason, method=method, unit=None)
-    return _closed(case, estimate, distribution, method)
-
-
-def _closed(
-    case: Case, estimate: Estimate, distribution: Distribution, method: str
-) -> Interval:
-    notes = warn_small(estimate.n_items, 10, "items")
-    low, high = _ends(case, estimate, distribution)
-    if math.isnan(low):
-        reason = "the estimate is not inside the ends of the parameter space"
-        return case.undefined(reason, method=method, unit=None)
-    return case.closed(low, high, method=method, unit=None, notes=notes)
-
-
-def _check_target(case: Case) -> None:
-    if case.target != "items":
+    if target != "items":
         raise ParameterError(
             'target: the delta method speaks of other items only, so "items"; for '
-            f'other raters use the jackknife; got "{case.target}"'
+            f'other raters use the jackknife; got "{target}"'
         )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UndefinedStatisticWarning)  # given below
+        estimate = problem.entry(ratings, categories=categories, weights=weights)
+    return _interval_around_estimate(problem, estimate, distribution)
 
 
-def _undefined(estimate: Estimate) -> str | None:
-    # why there is no interval, if there is none
+def _interval_around_estimate(
+    problem: IntervalProblem, estimate: Estimate, distribution: Distribution
+) -> Interval:
+    method = _METHODS[distribution]
+    reason = _why_undefined(estimate)
+    if reason is not None:
+        return problem.undefined(reason, method=method, unit=None)
+    notes = warn_small(estimate.n_items, 10, "items")
+    low, high = _ends(problem, estimate, distribution)
+    if math.isnan(low):
+        reason = "the estimate is not inside the ends of the parameter space"
+        return problem.undefined(reason, method=method, unit=None)
+    return problem.confidence(low, high, method=method, unit=None, notes=notes)
+
+
+def _why_undefined(estimate: Estimate) -> str | None:
+    """Return why there is no interval, if there is none."""
     if estimate.reason is not None or estimate.standard_error > 0.0:
         return estimate.reason
     if math.isnan(estimate.standard_error):
@@ -138,20 +140,41 @@ def _undefined(estimate: Estimate) -> str | None:
 
 
 def _ends(
-    case: Case, estimate: Estimate, distribution: Distribution
+    problem: IntervalProblem, estimate: Estimate, distribution: Distribution
 ) -> tuple[float, float]:
     if distribution == "normal":
-        half = normal(case.level) * estimate.standard_error
+        from scipy.special import ndtri  # loaded only when an interval needs it
+
+        quantile = float(ndtri(0.5 + 0.5 * problem.level))
     else:
-        half = student_t(case.level, estimate.n_items - 1) * estimate.standard_error
-    transform = _TRANSFORMS.get(distribution, "none")
-    return around(estimate.value, half, transform, case.entry.lowest)
+        quantile = problem.student_t(estimate.n_items - 1)
+    value, half = estimate.value, quantile * estimate.standard_error
+    if distribution == "logit":
+        return _on_logit(value, half, problem.entry.lowest)
+    if distribution == "fisher":
+        # artanh x is half the logit of (x + 1)/2, so that both give the same ends
+        return _on_logit(value, half, -1.0)
+    return value - half, value + half
 
 
-_WORDS = {
-    "t": "t(n-1)",
-    "normal": "normal",
-    "logit": "t(n-1) on the logit",
-    "fisher": "t(n-1) on Fisher's z",
-}
-_TRANSFORMS: dict[Distribution, Transform] = {"logit": "logit", "fisher": "fisher"}
+def _on_logit(value: float, half: float, lowest: float) -> tuple[float, float]:
+    """Return ends that are symmetric on the logit of the place between lowest and 1."""
+    # The error is divided by the slope of the logit, and the ends are taken back, so
+    # that they stay inside.
+    if not lowest < value < 1.0:
+        return math.nan, math.nan
+    width = 1.0 - lowest
+    share = (value - lowest) / width
+    half /= width * share * (1.0 - share)
+    middle = math.log(share / (1.0 - share))
+    return (
+        lowest + width * _inverse_logit(middle - half),
+        lowest + width * _inverse_logit(middle + half),
+    )
+
+
+def _inverse_logit(x: float) -> float:
+    # from the side on which the exponential is small
+    if x >= 0.0:
+        return 1.0 / (1.0 + math.exp(-x))
+    return math.exp(x) / (1.0 + math.exp(x))

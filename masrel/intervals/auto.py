@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
+from typing import TYPE_CHECKING, Literal, TypedDict, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,16 +10,14 @@ from numpy.typing import ArrayLike
 from masrel.agreement import Coefficient, Label
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Interval, Target
+from masrel.intervals._problem import Statistic, find_entry, pose_problem
 from masrel.intervals.analytic import analytic
-from masrel.intervals.case import open_case
+from masrel.intervals.bootstrap import bootstrap
 from masrel.intervals.jackknife import jackknife
-from masrel.intervals.posterior import SPOKEN_OF
-from masrel.intervals.statistic import Statistic, find_entry
+from masrel.intervals.posterior import SPOKEN_OF, posterior
 
 if TYPE_CHECKING:
     from masrel.agreement import WeightName
-
-__all__ = ["Method", "estimate"]
 
 Method = Literal["auto", "analytic", "jackknife", "bootstrap", "posterior"]
 """Kinds of intervals; "auto" chooses one by target and size."""
@@ -66,7 +64,7 @@ def estimate(
     Raises
     ------
     ParameterError
-        If an option is none, or the coefficient has no such interval.
+        If an option is invalid, or the coefficient has no such interval.
     RatingsError
         If the ratings do not fit the coefficient.
 
@@ -80,8 +78,8 @@ def estimate(
     Examples
     --------
     >>> ratings = [["a", "a", "a"], ["a", "b", "a"], ["b", "b", "b"]] * 4
-    >>> found = estimate("fleiss_kappa", ratings, target="items")
-    >>> found.interval.method
+    >>> result = estimate("fleiss_kappa", ratings, target="items")
+    >>> result.interval.method
     'item jackknife, t(11) on the logit'
     """
     if method not in get_args(Method):
@@ -89,63 +87,36 @@ def estimate(
             f"method: needs one of {', '.join(get_args(Method))}, got {method!r}"
         )
     entry = find_entry(coefficient)
-    found = entry(ratings, categories=categories, weights=weights, level=level)
+    result = entry(ratings, categories=categories, weights=weights, level=level)
     if method == "auto" and entry.has_interval:
-        return found
-    asked = _Asked(entry, ratings, target, categories, weights, level)
-    interval = _chosen(asked) if method == "auto" else _by(method, asked, rng)
-    return dataclasses.replace(found, interval=interval)
+        return result
+    options = _Options(
+        target=target, categories=categories, weights=weights, level=level
+    )
+    if method == "auto":
+        interval = _chosen(entry, ratings, options)
+    elif method in ("analytic", "jackknife"):
+        without_draws = analytic if method == "analytic" else jackknife
+        interval = without_draws(entry, ratings, **options)
+    else:
+        draws = bootstrap if method == "bootstrap" else posterior
+        interval = draws(entry, ratings, rng=rng, **options)
+    return dataclasses.replace(result, interval=interval)
 
 
-class _Asked(NamedTuple):
+class _Options(TypedDict):
     # what every method takes
-    coefficient: Coefficient
-    ratings: object
     target: Target
     categories: Sequence[Label] | None
     weights: "WeightName | ArrayLike"
     level: float
 
 
-def _by(method: str, asked: _Asked, rng: np.random.Generator | int | None) -> Interval:
-    entry, ratings, target, categories, weights, level = asked
-    if method in ("analytic", "jackknife"):
-        exact = analytic if method == "analytic" else jackknife
-        return exact(
-            entry,
-            ratings,
-            target=target,
-            categories=categories,
-            weights=weights,
-            level=level,
-        )
-    # Imported here: asking for the others loads no scipy.
-    from masrel.intervals.bootstrap import bootstrap
-    from masrel.intervals.posterior import posterior
-
-    return (bootstrap if method == "bootstrap" else posterior)(
-        entry,
-        ratings,
-        target=target,
-        categories=categories,
-        weights=weights,
-        level=level,
-        rng=rng,
-    )
-
-
-def _chosen(asked: _Asked) -> Interval:
-    entry, ratings, target, categories, weights, level = asked
-    case = open_case(
-        entry,
-        ratings,
-        target=target,
-        categories=categories,
-        weights=weights,
-        level=level,
-    )
+def _chosen(entry: Coefficient, ratings: object, options: _Options) -> Interval:
+    problem = pose_problem(entry, ratings, **options)
+    weights = options["weights"]
     identity = isinstance(weights, str) and weights == "identity"
     # Imported here: the other methods load no scipy.
-    from masrel.intervals.defaults import Choice, choose
+    from masrel.intervals._choice import choose_interval
 
-    return choose(Choice(case, entry.name in SPOKEN_OF and identity))
+    return choose_interval(problem, modelled=identity and entry.name in SPOKEN_OF)

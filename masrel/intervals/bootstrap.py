@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from masrel.agreement import Label, WeightName
 from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target
-from masrel.intervals.case import open_case
+from masrel.intervals._problem import Statistic, pose_problem
+from masrel.intervals._seeds import check_rng, recorded_generator
 from masrel.intervals.resampling.draws import Effort, draw_resamples
 from masrel.intervals.resampling.endpoints import Ends, Kind, Rule
 from masrel.intervals.resampling.exact import enumerate_resamples
@@ -21,8 +22,6 @@ from masrel.intervals.resampling.pool import Pool
 from masrel.intervals.resampling.resamples import Resamples
 from masrel.intervals.resampling.samplers import sampler_of
 from masrel.intervals.resampling.slopes import studentized
-from masrel.intervals.seeds import check_rng, recorded_generator
-from masrel.intervals.statistic import Statistic
 
 __all__ = ["Exact", "Kind", "bootstrap"]
 
@@ -154,7 +153,7 @@ def bootstrap(
         n_resamples=n_resamples, tolerance=tolerance, most_resamples=most_resamples
     )
     _check(kind, exact, effort, rng)
-    case = open_case(
+    problem = pose_problem(
         coefficient,
         ratings,
         target=target,
@@ -162,19 +161,19 @@ def bootstrap(
         weights=weights,
         level=level,
     )
-    pool, notes, what = pool_of(case, clusters)
-    rule = rule_of(case, pool, kind)
+    pool, notes, what = pool_of(problem, clusters)
+    rule = rule_of(problem, pool, kind)
     method = f"{kind} bootstrap{what}"
     reason = _no_ground(rule)
     if reason is not None:
-        return case.undefined(reason, method=method, unit=target)
+        return problem.undefined(reason, method=method, unit=target)
     found, seed = _resamples(pool, rule, exact, effort, rng)
     if found.n_resamples is None:
         method += ", exact"
     ends = rule.ends(found.source) if found.has_spread else None
     if ends is None:
-        return case.undefined(_no_ends(found), method=method, unit=target)
-    closed = case.closed(
+        return problem.undefined(_no_ends(found), method=method, unit=target)
+    closed = problem.confidence(
         ends.low,
         ends.high,
         method=method,

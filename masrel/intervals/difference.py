@@ -10,13 +10,13 @@ from numpy.typing import ArrayLike
 from masrel.agreement import Label, WeightName
 from masrel.errors import ParameterError, RatingsError
 from masrel.estimates import Estimate, Interval
-from masrel.intervals.case import Case, open_case
-from masrel.intervals.quantiles import student_t
-from masrel.intervals.samples import warn_small
-from masrel.intervals.spread import jackknife_variance, without_item
-from masrel.intervals.statistic import Statistic
-
-__all__ = ["Design", "difference"]
+from masrel.intervals._problem import (
+    IntervalProblem,
+    Statistic,
+    pose_problem,
+    warn_small,
+)
+from masrel.intervals.jackknife import _variance_of, _without_item
 
 Design = Literal["dependent", "independent"]
 """Whether both sets of ratings are of the same items, row by row."""
@@ -61,7 +61,7 @@ def difference(
     Raises
     ------
     ParameterError
-        If an option is none, or the coefficient has no such interval.
+        If an option is invalid, or the coefficient has no such interval.
     RatingsError
         If the ratings do not fit the coefficient, or not each other.
 
@@ -89,16 +89,16 @@ def difference(
     --------
     >>> before = [["a", "b"], ["b", "b"], ["a", "a"], ["b", "a"]] * 5
     >>> after = [["a", "a"], ["b", "b"], ["a", "a"], ["b", "a"]] * 5
-    >>> found = difference("fleiss_kappa", after, before, design="dependent")
-    >>> round(found.value, 3), round(found.interval.low, 3)
+    >>> estimate = difference("fleiss_kappa", after, before, design="dependent")
+    >>> round(estimate.value, 3), round(estimate.interval.low, 3)
     (0.467, 0.08)
     """
     if design not in get_args(Design):
         raise ParameterError(
             f"design: needs one of {', '.join(get_args(Design))}, got {design!r}"
         )
-    cases = [
-        open_case(
+    problems = [
+        pose_problem(
             coefficient,
             ratings,
             target="items",
@@ -108,38 +108,32 @@ def difference(
         )
         for ratings in (first, second)
     ]
-    one, other = cases
-    variance, df = (_dependent if design == "dependent" else _independent)(one, other)
-    estimates = [
-        case.entry(ratings, categories=categories, weights=weights)
-        for case, ratings in zip(cases, (first, second), strict=True)
-    ]
-    interval = _interval(cases, estimates, variance, df)
-    return _estimate(estimates, interval, variance)
-
-
-def _estimate(
-    estimates: list[Estimate], interval: Interval, variance: float
-) -> Estimate:
-    before, after = estimates
+    variance_of = _dependent if design == "dependent" else _independent
+    variance, df = variance_of(*problems)
+    one, other = (
+        problem.entry(ratings, categories=categories, weights=weights)
+        for problem, ratings in zip(problems, (first, second), strict=True)
+    )
+    value, reason = one.value - other.value, one.reason or other.reason
     return Estimate(
-        coefficient=f"difference of {before.coefficient}",
-        weights=before.weights,
-        value=before.value - after.value,
+        coefficient=f"difference of {one.coefficient}",
+        weights=one.weights,
+        value=value,
         standard_error=math.sqrt(variance),
-        interval=interval,
-        observed=before.observed - after.observed,
-        chance=before.chance - after.chance,
-        n_items=min(before.n_items, after.n_items),
-        n_raters=min(before.n_raters, after.n_raters),
-        n_categories=before.n_categories,
-        reason=before.reason or after.reason,
+        interval=_interval(problems, value, reason, variance, df),
+        observed=one.observed - other.observed,
+        chance=one.chance - other.chance,
+        n_items=min(one.n_items, other.n_items),
+        n_raters=min(one.n_raters, other.n_raters),
+        n_categories=one.n_categories,
+        reason=reason,
     )
 
 
-def _dependent(one: Case, other: Case) -> tuple[float, float]:
-    # items without any rating are left out of a case: they must be the same ones
-    rated = [np.max(case.coded.codes, axis=1) >= 0 for case in (one, other)]
+def _dependent(one: IntervalProblem, other: IntervalProblem) -> tuple[float, float]:
+    """Return the jackknife variance of the difference and its degrees of freedom."""
+    # items without any rating are left out of a problem: they must be the same ones
+    rated = [np.max(problem.coded.codes, axis=1) >= 0 for problem in (one, other)]
     if len(rated[0]) != len(rated[1]):
         raise RatingsError(
             "design: dependent ratings need the same items, got "
@@ -154,15 +148,19 @@ def _dependent(one: Case, other: Case) -> tuple[float, float]:
     n = one.n_items
     if n < 2:
         return math.nan, 0.0
-    # the coefficients without item i, from the sums less its features
-    first, second = (case.values(case.sums - case.features) for case in (one, other))
-    return jackknife_variance(first - second, np.ones(n, dtype=np.int64)), float(n - 1)
+    # both coefficients without item i, from the sums less its features
+    first, second = (
+        problem.values(problem.sums - problem.item_features())
+        for problem in (one, other)
+    )
+    return _variance_of(first - second, np.ones(n, dtype=np.int64)), float(n - 1)
 
 
-def _independent(one: Case, other: Case) -> tuple[float, float]:
+def _independent(one: IntervalProblem, other: IntervalProblem) -> tuple[float, float]:
+    """Return the sum of both jackknife variances and Satterthwaite's degrees [2]_."""
     parts = [
-        (jackknife_variance(*without_item(case)), case.n_items - 1)
-        for case in (one, other)
+        (_variance_of(*_without_item(problem)), problem.n_items - 1)
+        for problem in (one, other)
     ]
     variance = sum(part for part, _ in parts)
     if not variance > 0.0:
@@ -171,27 +169,29 @@ def _independent(one: Case, other: Case) -> tuple[float, float]:
 
 
 def _interval(
-    cases: list[Case], estimates: list[Estimate], variance: float, df: float
+    problems: list[IntervalProblem],
+    value: float,
+    reason: str | None,
+    variance: float,
+    df: float,
 ) -> Interval:
-    before, after = estimates
-    value, reason = before.value - after.value, before.reason or after.reason
     method = "item jackknife of the difference, t"
-    fewest = min(cases, key=lambda case: case.n_items)
+    smaller = min(problems, key=lambda problem: problem.n_items)
     if reason is None and math.isnan(variance):
         reason = "with one item left out an estimate is undefined"
     elif reason is None and variance == 0.0:
         reason = "leaving out any item leaves the difference as it is"
     if reason is not None:
-        return fewest.undefined(reason, method=method, unit="items")
-    half = student_t(fewest.level, df) * math.sqrt(variance)
-    notes = warn_small(fewest.n_items, 10, "items")
-    width = 1.0 - min(case.lowest for case in cases)  # that of the parameter space
+        return smaller.undefined(reason, method=method, unit="items")
+    half = smaller.student_t(df) * math.sqrt(variance)
+    notes = warn_small(smaller.n_items, 10, "items")
+    width = 1.0 - min(problem.min_value for problem in problems)  # of its space
     if value - half < -width or value + half > width:
         notes += (f"cut at the ends of the parameter space [{-width:g}, {width:g}]",)
     return Interval(
         low=max(value - half, -width),
         high=min(value + half, width),
-        level=fewest.level,
+        level=smaller.level,
         kind="confidence",
         method=method,
         target="items",

@@ -1,18 +1,26 @@
 """Jackknife intervals: leave out items, raters, or both, one at a time."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from masrel.agreement import Label, WeightName
+from masrel.agreement._kernel import Floats
+from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target
-from masrel.intervals.case import Case, open_case
-from masrel.intervals.quantiles import student_t
-from masrel.intervals.spread import Spread, spread
-from masrel.intervals.statistic import Statistic
+from masrel.intervals._problem import (
+    IntervalProblem,
+    Statistic,
+    pose_problem,
+    warn_small,
+)
 
-__all__ = ["around_estimate", "jackknife"]
+Integers = NDArray[np.int64]
+
+_UNITS = {"items": ("items",), "raters": ("raters",), "both": ("items", "raters")}
 
 
 def jackknife(
@@ -51,7 +59,7 @@ def jackknife(
     Raises
     ------
     ParameterError
-        If an option is none, or `target` is not "items" with two raters: leaving
+        If an option is invalid, or `target` is not "items" with two raters: leaving
         one out leaves no pair.
     RatingsError
         If the ratings do not fit the coefficient.
@@ -81,11 +89,11 @@ def jackknife(
     Examples
     --------
     >>> ratings = [["a", "a"], ["a", "b"], ["b", "b"], ["b", "b"]] * 5
-    >>> found = jackknife("cohen_kappa", ratings, target="items")
-    >>> round(found.low, 3), round(found.high, 3)
+    >>> interval = jackknife("cohen_kappa", ratings, target="items")
+    >>> round(interval.low, 3), round(interval.high, 3)
     (0.122, 0.878)
     """
-    case = open_case(
+    problem = pose_problem(
         coefficient,
         ratings,
         target=target,
@@ -93,21 +101,124 @@ def jackknife(
         weights=weights,
         level=level,
     )
-    return around_estimate(case, spread(case))
+    return _interval_around_estimate(problem, _jackknife_variance(problem))
 
 
-def around_estimate(case: Case, found: Spread) -> Interval:
-    """Make the interval of a spread."""
-    target = case.target
-    words = "two-way" if target == "both" else target.removesuffix("s")
-    if found.reason is not None:
-        return case.undefined(found.reason, method=f"{words} jackknife", unit=target)
-    half = student_t(case.level, found.df) * float(np.sqrt(found.variance))
-    t = "t" if target == "both" else f"t({found.df:g})"
-    return case.closed(
-        case.value - half,
-        case.value + half,
-        method=f"{words} jackknife, {t}",
+def _interval_around_estimate(
+    problem: IntervalProblem, jackknifed: "_JackknifeVariance"
+) -> Interval:
+    target = problem.target
+    unit = "two-way" if target == "both" else target.removesuffix("s")
+    if jackknifed.reason is not None:
+        return problem.undefined(
+            jackknifed.reason, method=f"{unit} jackknife", unit=target
+        )
+    half = problem.student_t(jackknifed.df) * math.sqrt(jackknifed.variance)
+    t = "t" if target == "both" else f"t({jackknifed.df:g})"
+    return problem.confidence(
+        problem.value - half,
+        problem.value + half,
+        method=f"{unit} jackknife, {t}",
         unit=target,
-        notes=found.notes,
+        notes=jackknifed.notes,
     )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _JackknifeVariance:
+    """How much an estimate moves when units are left out one at a time."""
+
+    variance: float  # ``nan`` when undefined
+    df: float  # its degrees of freedom, Satterthwaite's for "both"
+    notes: tuple[str, ...] = ()  # what is small
+    reason: str | None = None  # why it makes no interval, or None
+
+
+def _jackknife_variance(problem: IntervalProblem) -> _JackknifeVariance:
+    """Leave out items, raters, or both, as the target says."""
+    if math.isnan(problem.value):
+        reason = "the estimate itself is undefined"
+        return _JackknifeVariance(variance=math.nan, df=math.nan, reason=reason)
+    parts: list[tuple[float, int]] = []
+    notes: tuple[str, ...] = ()
+    units = _UNITS[problem.target]
+    for unit in units:
+        if unit == "items":
+            replicates, freq = _without_item(problem)
+        else:
+            replicates, freq = _without_rater(problem)
+        if np.isnan(replicates).any():
+            reason = f"with one of the {unit} left out the estimate is undefined"
+            return _JackknifeVariance(variance=math.nan, df=math.nan, reason=reason)
+        n = int(freq.sum())
+        parts.append((_variance_of(replicates, freq), n - 1))
+        notes += warn_small(n, 10 if unit == "items" else 5, unit)
+    variance = sum(part for part, _ in parts)
+    if not variance > 0.0:
+        reason = (
+            f"leaving out any of the {' or '.join(units)} leaves the estimate as it "
+            "is, so the jackknife cannot say how uncertain it is"
+        )
+        return _JackknifeVariance(variance=0.0, df=math.nan, notes=notes, reason=reason)
+    df = variance**2 / sum(part**2 / n for part, n in parts)  # Satterthwaite [2]
+    return _JackknifeVariance(variance=variance, df=df, notes=notes)
+
+
+def _variance_of(replicates: Floats, freq: Integers) -> float:
+    """Return (n - 1)/n Σ (θ_i - mean)² of estimates with one left out [1]_."""
+    # Takes replicates (n_distinct,), freq (n_distinct,)
+    n = int(freq.sum())
+    moved = replicates - replicates[0]  # so that no change at all is exactly 0
+    deviations = moved - freq @ moved / n
+    return float((n - 1) / n * (freq @ deviations**2))
+
+
+def _without_item(problem: IntervalProblem) -> tuple[Floats, Integers]:
+    """Return the estimate without an item of each pattern, and how many there are."""
+    if problem.n_items < 2:
+        return np.full(1, np.nan), np.ones(1, dtype=np.int64)
+    return problem.values_without(problem.sums, problem.rows), problem.freq
+
+
+def _without_rater(problem: IntervalProblem) -> tuple[Floats, Integers]:
+    """Return the estimate without each rater, and a 1 for each."""
+    values = [
+        problem.values(problem.freq @ rows) for rows in _rows_without_rater(problem)
+    ]
+    return np.array(values, dtype=np.float64), np.ones(len(values), dtype=np.int64)
+
+
+def _rows_without_rater(problem: IntervalProblem) -> Iterator[Floats]:
+    """Return the features of the patterns without one rater after the other."""
+    # They are made anew, because pairs of raters go; each (n_patterns, n_features).
+    width = 2 if problem.entry.shape == "pairs" else 1  # columns of a rater
+    codes = problem.patterns.codes
+    n_raters = codes.shape[1] // width
+    fewest = 2 if width == 2 else 3
+    if n_raters < fewest:
+        raise ParameterError(
+            f'target: "{problem.target}" needs at least {fewest} raters, because one '
+            f"is left out; got {n_raters}"
+        )
+    for rater in range(n_raters):
+        rest = np.delete(codes, np.s_[rater * width : (rater + 1) * width], axis=1)
+        yield problem.features(replace(problem.patterns, codes=rest))
+
+
+def _excess_of_raters(problem: IntervalProblem) -> float:
+    """Return the variance by which raters differ beyond single ratings, or 0."""
+    # max(0, V_R - V_C), with V_R the jackknife variance over raters and V_C that of
+    # leaving out a rater on an item,
+    # (n - 1)(r - 1)/(n r) Σ_ij (κ_-i-j - κ_-i - κ_-j + κ)².
+    without_item = problem.values_without(problem.sums, problem.rows)
+    without_rater, cells = [], 0.0
+    for rows in _rows_without_rater(problem):
+        sums = problem.freq @ rows
+        without_rater.append(float(problem.values(sums)))
+        without_both = problem.values_without(sums, rows)
+        cell = without_both - without_item - without_rater[-1] + problem.value
+        cells += float(problem.freq @ cell**2)
+    n, r = problem.n_items, len(without_rater)
+    of_raters = _variance_of(np.array(without_rater), np.ones(r, dtype=np.int64))
+    excess = of_raters - (n - 1) * (r - 1) / (n * r) * cells
+    return max(0.0, excess) if math.isfinite(excess) else 0.0

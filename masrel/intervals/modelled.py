@@ -2,15 +2,21 @@
 
 import dataclasses
 import math
+from typing import TYPE_CHECKING
 
 from scipy.special import expit
 
 from masrel.estimates import Distribution, Interval
-from masrel.intervals.choice import PRIOR, Choice
+from masrel.intervals.dirichlet.prior import Prior
 from masrel.intervals.dirichlet.rho import ExactPosterior, prior_notes
 from masrel.intervals.table.interval import table_interval
 
 __all__ = ["lifted", "of_any_raters", "of_two_raters", "one_sided"]
+
+if TYPE_CHECKING:
+    from masrel.intervals._choice import Choice
+
+PRIOR = Prior.of("uniform", 1.0)  # of the Dirichlet-multinomial model
 
 _DRAWS, _SEED = 4_000, 1  # of a table; always the same ones, so that it repeats
 
@@ -30,10 +36,10 @@ def lifted(interval: Interval, above: float) -> Interval:
     return dataclasses.replace(interval, high=high, notes=(*interval.notes, note))
 
 
-def of_any_raters(choice: Choice, excess: float) -> Interval:
+def of_any_raters(choice: "Choice", excess: float) -> Interval:
     """Compute the Dirichlet-multinomial posterior's interval, holding the estimate."""
-    case, found = choice.case, choice.posterior
-    if not case.value < 1.0:  # perfect, or undefined: one category
+    problem, found = choice.problem, choice.posterior
+    if not problem.value < 1.0:  # perfect, or undefined: one category
         return one_sided(choice)
     low, high = found.low, found.high
     method = "Dirichlet-multinomial posterior, exact"
@@ -42,11 +48,11 @@ def of_any_raters(choice: Choice, excess: float) -> Interval:
         middle = float(expit(found.logit.quantile(0.5)))
         low = middle - math.hypot(middle - low, math.sqrt(excess))
         high = middle + math.hypot(high - middle, math.sqrt(excess))
-    notes = prior_notes(choice.counts, PRIOR, case.level, found.low, found.high)
-    if not low <= case.value <= high:
+    notes = prior_notes(choice.counts, PRIOR, problem.level, found.low, found.high)
+    if not low <= problem.value <= high:
         notes += ("widened to the estimate, which lies outside the posterior's",)
-    interval = case.closed(
-        min(low, case.value), max(high, case.value), method=method, unit=None
+    interval = problem.confidence(
+        min(low, problem.value), max(high, problem.value), method=method, unit=None
     )
     return dataclasses.replace(
         interval,
@@ -56,14 +62,14 @@ def of_any_raters(choice: Choice, excess: float) -> Interval:
     )
 
 
-def one_sided(choice: Choice) -> Interval:
+def one_sided(choice: "Choice") -> Interval:
     """Compute all that is above a lower end of the Dirichlet-multinomial posterior."""
-    case, share = choice.case, 1.0 - choice.case.level
+    problem, share = choice.problem, 1.0 - choice.problem.level
     low = float(expit(choice.posterior.logit.quantile(share)))
     others = [
         (float(expit(other.logit.quantile(share))), prior.words)
         for prior in PRIOR.others(choice.counts.shape[1])
-        for other in [ExactPosterior.of(choice.counts, prior, case.level)]
+        for other in [ExactPosterior.of(choice.counts, prior, problem.level)]
     ]
     there, words = max(others, key=lambda found: abs(found[0] - low))
     note = (
@@ -73,27 +79,27 @@ def one_sided(choice: Choice) -> Interval:
     return Interval(
         low=low,
         high=1.0,
-        level=case.level,
+        level=problem.level,
         kind="credible",
         method="Dirichlet-multinomial posterior, one-sided",
-        target=case.target,
+        target=problem.target,
         notes=(note,),
         distribution=_distribution(choice.posterior),
     )
 
 
-def of_two_raters(choice: Choice) -> Interval:
+def of_two_raters(choice: "Choice") -> Interval:
     """Compute the interval of the posterior of two raters' table."""
-    case = choice.case
-    perfect = not case.value < 1.0
-    found = table_interval(case, None, n_draws=_DRAWS, rng=_SEED, one_sided=perfect)
-    if perfect or found.low <= case.value <= found.high:
+    problem = choice.problem
+    perfect = not problem.value < 1.0
+    found = table_interval(problem, None, n_draws=_DRAWS, rng=_SEED, one_sided=perfect)
+    if perfect or found.low <= problem.value <= found.high:
         return found
     note = "widened to the estimate, which lies outside the posterior's"
     return dataclasses.replace(
         found,
-        low=min(found.low, case.value),
-        high=max(found.high, case.value),
+        low=min(found.low, problem.value),
+        high=max(found.high, problem.value),
         notes=(*found.notes, note),
     )
 

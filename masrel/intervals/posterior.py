@@ -9,9 +9,8 @@ from numpy.typing import ArrayLike
 from masrel.agreement import Label
 from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target
-from masrel.intervals.case import Case, open_case
+from masrel.intervals._problem import IntervalProblem, Statistic, pose_problem
 from masrel.intervals.dirichlet.prior import Prior, PriorName
-from masrel.intervals.statistic import Statistic
 
 if TYPE_CHECKING:
     from masrel.agreement import WeightName
@@ -126,7 +125,7 @@ def posterior(
     >>> found.kind, round(found.low, 3), round(found.high, 3)
     ('credible', 0.188, 0.815)
     """
-    case = open_case(
+    problem = pose_problem(
         coefficient,
         ratings,
         target=target,
@@ -135,21 +134,21 @@ def posterior(
         level=level,
     )
     believed = Prior.of(prior, 1.0 if concentration is None else concentration)
-    _check_options(case, model, method)
+    _check_options(problem, model, method)
     identity = isinstance(weights, str) and weights == "identity"
-    spoken_of = case.entry.name in SPOKEN_OF and identity
-    asked = case.entry.name if identity else f"weighted {case.entry.name}"
+    spoken_of = problem.entry.name in SPOKEN_OF and identity
+    asked = problem.entry.name if identity else f"weighted {problem.entry.name}"
     # Imported here: the other intervals load neither scipy nor emcee.
     if model == "table" or (model == "auto" and not spoken_of):
-        _check_table(case, asked, model, method, believed)
+        _check_table(problem, asked, model, method, believed)
         from masrel.intervals.table.interval import table_interval
 
-        return table_interval(case, concentration, n_draws=n_draws, rng=rng)
+        return table_interval(problem, concentration, n_draws=n_draws, rng=rng)
     _check_dirichlet(spoken_of, asked)
     from masrel.intervals.dirichlet.interval import rho_interval
 
     return rho_interval(
-        case,
+        problem,
         believed,
         sampled=method == "emcee",
         n_steps=n_steps,
@@ -158,15 +157,15 @@ def posterior(
     )
 
 
-def _check_options(case: Case, model: Model, method: Method) -> None:
+def _check_options(problem: IntervalProblem, model: Model, method: Method) -> None:
     for name, given, options in (("model", model, Model), ("method", method, Method)):
         if given not in get_args(options):
             known = ", ".join(get_args(options))
             raise ParameterError(f"{name}: needs one of {known}, got {given!r}")
-    if case.target != "items":
+    if problem.target != "items":
         raise ParameterError(
             "target: a posterior speaks of other items, so "
-            f'"items"; for other raters use the jackknife; got "{case.target}"'
+            f'"items"; for other raters use the jackknife; got "{problem.target}"'
         )
 
 
@@ -180,9 +179,9 @@ def _check_dirichlet(spoken_of: bool, asked: str) -> None:
 
 
 def _check_table(
-    case: Case, asked: str, model: Model, method: Method, prior: Prior
+    problem: IntervalProblem, asked: str, model: Model, method: Method, prior: Prior
 ) -> None:
-    n_raters = case.coded.codes.shape[1]
+    n_raters = problem.coded.codes.shape[1]
     if model == "auto" and n_raters != 2:
         raise ParameterError(
             "coefficient: a posterior speaks of unweighted fleiss_kappa, scott_pi and "

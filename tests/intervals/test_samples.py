@@ -6,7 +6,7 @@ import pytest
 
 from masrel.errors import SmallSampleWarning
 from masrel.intervals import analytic, bootstrap, difference, jackknife
-from masrel.intervals.samples import warn_small
+from masrel.intervals._problem import warn_small
 
 TABLE = [["a", "a"], ["a", "b"], ["b", "b"], ["b", "b"], ["a", "a"]]
 OTHER = [["a", "b"], ["a", "b"], ["b", "b"], ["b", "a"], ["a", "a"], ["b", "b"]]

@@ -7,17 +7,17 @@ from numpy.typing import NDArray
 
 from masrel.agreement._counts import item_counts
 from masrel.estimates import Interval
-from masrel.intervals.case import Case
+from masrel.intervals._problem import IntervalProblem
+from masrel.intervals._seeds import recorded_generator
 from masrel.intervals.dirichlet.model import DirichletMultinomial
 from masrel.intervals.dirichlet.prior import Prior
 from masrel.intervals.dirichlet.rho import ExactPosterior, prior_notes
-from masrel.intervals.seeds import recorded_generator
 
 __all__ = ["rho_interval"]
 
 
 def rho_interval(
-    case: Case,
+    problem: IntervalProblem,
     prior: Prior,
     *,
     sampled: bool,
@@ -27,16 +27,16 @@ def rho_interval(
 ) -> Interval:
     """Compute the central credible interval of ρ."""
     method = f"Dirichlet-multinomial posterior, {'emcee' if sampled else 'exact'}"
-    counts = item_counts(case.coded)
+    counts = item_counts(problem.coded)
     reason = _nothing_to_learn(counts)
     if reason is not None:
-        undefined = case.undefined(reason, method=method, unit=None)
+        undefined = problem.undefined(reason, method=method, unit=None)
         return dataclasses.replace(undefined, kind="credible")
     if sampled:
-        found = _sampled(case, counts, prior, method, n_steps, most_steps, rng)
+        found = _sampled(problem, counts, prior, method, n_steps, most_steps, rng)
     else:
-        found = _integrated(case, counts, prior, method)
-    notes = prior_notes(counts, prior, case.level, found.low, found.high)
+        found = _integrated(problem, counts, prior, method)
+    notes = prior_notes(counts, prior, problem.level, found.low, found.high)
     return dataclasses.replace(found, notes=notes)
 
 
@@ -50,22 +50,22 @@ def _nothing_to_learn(counts: NDArray[np.int64]) -> str | None:
 
 
 def _integrated(
-    case: Case, counts: NDArray[np.int64], prior: Prior, method: str
+    problem: IntervalProblem, counts: NDArray[np.int64], prior: Prior, method: str
 ) -> Interval:
-    found = ExactPosterior.of(counts, prior, case.level)
+    found = ExactPosterior.of(counts, prior, problem.level)
     return Interval(
         low=found.low,
         high=found.high,
-        level=case.level,
+        level=problem.level,
         kind="credible",
         method=method,
-        target=case.target,
+        target=problem.target,
         distribution=found.distribution(f"posterior of ρ, prior {prior.words}"),
     )
 
 
 def _sampled(
-    case: Case,
+    problem: IntervalProblem,
     counts: NDArray[np.int64],
     prior: Prior,
     method: str,
@@ -88,14 +88,14 @@ def _sampled(
         n_steps=n_steps,
         most_steps=most_steps,
     )
-    tail = 0.5 * (1.0 - case.level)
+    tail = 0.5 * (1.0 - problem.level)
     return Interval(
         low=draws.quantile(tail),
         high=draws.quantile(1.0 - tail),
-        level=case.level,
+        level=problem.level,
         kind="credible",
         method=method,
-        target=case.target,
+        target=problem.target,
         n_resamples=int(draws.values.size),
         monte_carlo_error=(
             draws.quantile_error(tail),

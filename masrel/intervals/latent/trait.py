@@ -8,9 +8,9 @@ import numpy as np
 from masrel.agreement import Label
 from masrel.errors import ParameterError
 from masrel.estimates import Target
+from masrel.intervals._seeds import recorded_generator
 from masrel.intervals.latent.prior import LatentPrior
 from masrel.intervals.latent.ratings import Items, LatentRatings
-from masrel.intervals.seeds import recorded_generator
 
 if TYPE_CHECKING:
     from masrel.intervals.latent.result import LatentTrait

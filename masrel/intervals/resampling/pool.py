@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from masrel.agreement._kernel import Floats
 from masrel.errors import ParameterError
-from masrel.intervals.case import Case
-from masrel.intervals.features import blocks
+from masrel.intervals._problem import IntervalProblem, blocks
 from masrel.intervals.resampling.lattice import Lattice, lattice_of
 from masrel.intervals.resampling.numerators import Integers
 
@@ -76,35 +75,37 @@ class Pool:
         return self.of_counts(self.times - np.eye(self.times.size))
 
 
-def item_pool(case: Case) -> Pool:
+def item_pool(problem: IntervalProblem) -> Pool:
     """Return the items, those with equal features together."""
-    return _pool(case, case.rows, case.times)
+    return _pool(problem, problem.rows, problem.freq)
 
 
-def cluster_pool(case: Case, clusters: Sequence[object] | NDArray[Any]) -> Pool:
+def cluster_pool(
+    problem: IntervalProblem, clusters: Sequence[object] | NDArray[Any]
+) -> Pool:
     """Return clusters of items, those with equal sums of features together."""
     # Takes clusters (n_items,)
-    of, n_clusters = _numbered(case, clusters)
-    codes = case.coded.codes
-    sums = np.zeros((n_clusters, case.rows.shape[1]))
+    of, n_clusters = _numbered(problem, clusters)
+    codes = problem.coded.codes
+    sums = np.zeros((n_clusters, problem.rows.shape[1]))
     for items in blocks(len(codes)):
         rated = np.any(codes[items] >= 0, axis=1)
-        block = replace(case.coded, codes=codes[items][rated])
-        np.add.at(sums, of[items][rated], case.kernel.features(block, case.v))
-    return _pool(case, sums, np.ones(n_clusters, dtype=np.int64))
+        block = replace(problem.coded, codes=codes[items][rated])
+        np.add.at(sums, of[items][rated], problem.kernel.features(block, problem.v))
+    return _pool(problem, sums, np.ones(n_clusters, dtype=np.int64))
 
 
 def _numbered(
-    case: Case, clusters: Sequence[object] | NDArray[Any]
+    problem: IntervalProblem, clusters: Sequence[object] | NDArray[Any]
 ) -> tuple[Integers, int]:
     # number of each item's cluster, -1 without ratings, (n_items,); how many there are
     labels = list(clusters)
-    n_items = case.coded.codes.shape[0]
+    n_items = problem.coded.codes.shape[0]
     if len(labels) != n_items:
         raise ParameterError(
             f"clusters: needs one label for each of {n_items} items, got {len(labels)}"
         )
-    rated = np.any(case.coded.codes >= 0, axis=1).tolist()
+    rated = np.any(problem.coded.codes >= 0, axis=1).tolist()
     number: dict[object, int] = {}
     try:
         of = np.fromiter(
@@ -122,29 +123,29 @@ def _numbered(
     return of, len(number)
 
 
-def rater_pool(case: Case) -> Pool:
+def rater_pool(problem: IntervalProblem) -> Pool:
     """Return the raters, of whom none is paired with a copy of itself."""
-    fewest, most = case.entry.n_raters
-    if case.kernel.rater_sums is None or most == fewest:
+    fewest, most = problem.entry.n_raters
+    if problem.kernel.rater_sums is None or most == fewest:
         raise ParameterError(
-            f"target: raters of {case.entry.title} cannot be resampled without "
+            f"target: raters of {problem.entry.title} cannot be resampled without "
             "pairing a rater with a copy of itself"
         )
     return Pool(
-        times=np.ones(case.patterns.codes.shape[1], dtype=np.int64),
+        times=np.ones(problem.patterns.codes.shape[1], dtype=np.int64),
         rows=None,
-        sums=case.kernel.rater_sums(case.patterns, case.times, case.v),
-        values=case.values,
+        sums=problem.kernel.rater_sums(problem.patterns, problem.freq, problem.v),
+        values=problem.values,
     )
 
 
-def _pool(case: Case, rows: Floats, times: Integers) -> Pool:
+def _pool(problem: IntervalProblem, rows: Floats, times: Integers) -> Pool:
     rows, kind = _distinct(rows)
     return Pool(
         times=np.bincount(kind, weights=times).astype(np.int64),
         rows=rows,
         sums=lambda taken: taken @ rows,
-        values=case.values,
+        values=problem.values,
     )
 
 

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from masrel.agreement._kernel import Floats
 from masrel.errors import ParameterError
 from masrel.estimates import Interval
-from masrel.intervals.case import Case
-from masrel.intervals.seeds import recorded_generator
+from masrel.intervals._problem import IntervalProblem
+from masrel.intervals._seeds import recorded_generator
 from masrel.intervals.table.chances import CHANCE
 from masrel.intervals.table.posterior import TablePosterior
 from masrel.intervals.table.prior import TablePrior
@@ -23,16 +23,16 @@ _LEAST_DRAWS = 100
 _NOTED_DRAWS = 2_000  # for the interval under another prior: a note has three digits
 
 
-def speaks_of(case: Case) -> bool:
+def speaks_of(problem: IntervalProblem) -> bool:
     """Return whether a table of two raters has something to say."""
-    if case.entry.name not in CHANCE or case.coded.codes.shape[1] != 2:
+    if problem.entry.name not in CHANCE or problem.coded.codes.shape[1] != 2:
         return False
-    table, _ = _table(case.coded.codes, case.coded.n_categories)
-    return _nothing_to_learn(case, table) is None
+    table, _ = _table(problem.coded.codes, problem.coded.n_categories)
+    return _nothing_to_learn(problem, table) is None
 
 
 def table_interval(
-    case: Case,
+    problem: IntervalProblem,
     concentration: float | None,
     *,
     n_draws: int,
@@ -40,11 +40,11 @@ def table_interval(
     one_sided: bool = False,
 ) -> Interval:
     """Compute the credible interval of a coefficient of two raters."""
-    _check(case, n_draws)
-    table, n_single = _table(case.coded.codes, case.coded.n_categories)
-    reason = _nothing_to_learn(case, table)
+    _check(problem, n_draws)
+    table, n_single = _table(problem.coded.codes, problem.coded.n_categories)
+    reason = _nothing_to_learn(problem, table)
     if reason is not None:
-        undefined = case.undefined(reason, method="table posterior", unit=None)
+        undefined = problem.undefined(reason, method="table posterior", unit=None)
         return dataclasses.replace(undefined, kind="credible")
     q = len(table)
     prior = (
@@ -52,7 +52,7 @@ def table_interval(
         if concentration is None
         else TablePrior.of(concentration, q)
     )
-    asked = _Asked(case, rng, one_sided)
+    asked = _Asked(problem, rng, one_sided)
     found, ends = asked.posterior(table + prior.cells, n_draws)
     said = (f"left out, items of a single rating: {n_single}",) if n_single else ()
     notes = (*said, *_prior_notes(asked, table, prior, ends))
@@ -66,7 +66,7 @@ def _interval(
     prior: TablePrior,
     notes: tuple[str, ...],
 ) -> Interval:
-    case, (low, high) = asked.case, ends
+    problem, (low, high) = asked.problem, ends
     method = "Dirichlet posterior of the table of two raters, exact"
     errors = None
     if found.n_draws is not None:
@@ -76,26 +76,26 @@ def _interval(
     return Interval(
         low=low,
         high=high,
-        level=case.level,
+        level=problem.level,
         kind="credible",
         method=f"{method}, one-sided" if asked.one_sided else method,
-        target=case.target,
+        target=problem.target,
         n_resamples=found.n_draws,
         monte_carlo_error=errors,
         seed=asked.seed,
         notes=notes,
         distribution=found.distribution(
-            *_reach(case, low, high),
-            f"posterior of {case.entry.title}, prior {prior.words}",
+            *_reach(problem, low, high),
+            f"posterior of {problem.entry.title}, prior {prior.words}",
         ),
     )
 
 
-def _check(case: Case, n_draws: int) -> None:
-    if case.entry.name not in CHANCE or case.coded.codes.shape[1] != 2:
+def _check(problem: IntervalProblem, n_draws: int) -> None:
+    if problem.entry.name not in CHANCE or problem.coded.codes.shape[1] != 2:
         raise ParameterError(
             f'model: "table" speaks of {", ".join(CHANCE)} of exactly two raters; got '
-            f"{case.entry.name} of {case.coded.codes.shape[1]}"
+            f"{problem.entry.name} of {problem.coded.codes.shape[1]}"
         )
     if n_draws < _LEAST_DRAWS:
         raise ParameterError(f"n_draws: needs at least {_LEAST_DRAWS}, got {n_draws}")
@@ -105,9 +105,12 @@ class _Asked:
     """One question for several priors; a generator is made when first needed."""
 
     def __init__(
-        self, case: Case, rng: np.random.Generator | int | None, one_sided: bool
+        self,
+        problem: IntervalProblem,
+        rng: np.random.Generator | int | None,
+        one_sided: bool,
     ) -> None:
-        self.case = case
+        self.problem = problem
         self.one_sided = one_sided
         self.seed: int | None = None
         self._rng = rng
@@ -117,14 +120,14 @@ class _Asked:
         self, prior: Floats, n_draws: int
     ) -> tuple[TablePosterior, tuple[float, float]]:
         """Return the posterior of one Dirichlet and its ends."""
-        tail = 1.0 - self.case.level
+        tail = 1.0 - self.problem.level
         tail = tail if self.one_sided else 0.5 * tail
         found, (low, high) = table_quantiles(
-            CHANCE[self.case.entry.name],
-            self.case.v,
+            CHANCE[self.problem.entry.name],
+            self.problem.v,
             prior,
             (tail, 1.0 - tail),
-            start=0.5 if math.isnan(self.case.value) else self.case.value,
+            start=0.5 if math.isnan(self.problem.value) else self.problem.value,
             generator=self._made,
             n_draws=n_draws,
         )
@@ -145,22 +148,22 @@ def _table(codes: NDArray[np.signedinteger], n_categories: int) -> tuple[Floats,
     return cells.reshape(shape).astype(np.float64), int((given == 1).sum())
 
 
-def _nothing_to_learn(case: Case, table: Floats) -> str | None:
+def _nothing_to_learn(problem: IntervalProblem, table: Floats) -> str | None:
     if not table.any():
         return "no item has ratings of two raters"
     if len(table) < 2:
         return "one category is declared"
-    if np.isnan(case.v).any():
+    if np.isnan(problem.v).any():
         return "the scale has no such weights"
-    if not case.v.any():
+    if not problem.v.any():
         return "the weights know no disagreement"
     return None
 
 
-def _reach(case: Case, low: float, high: float) -> tuple[float, float]:
+def _reach(problem: IntervalProblem, low: float, high: float) -> tuple[float, float]:
     # beyond the ends as far as the interval is wide
     wide = high - low
-    return max(low - wide, min(case.entry.lowest, low)), min(high + wide, 1.0)
+    return max(low - wide, min(problem.entry.lowest, low)), min(high + wide, 1.0)
 
 
 def _prior_notes(

@@ -10,7 +10,7 @@ import pytest
 
 from masrel.errors import ConvergenceError, ParameterError
 from masrel.intervals import bootstrap
-from masrel.intervals.case import open_case
+from masrel.intervals._problem import pose_problem
 from masrel.intervals.resampling.control import control_of, whole_scores
 from masrel.intervals.resampling.drawn import Drawn
 from masrel.intervals.resampling.draws import Effort, draw_resamples
@@ -32,7 +32,7 @@ def made(n: int, r: int, categories: int = 3) -> list[list[int]]:
 def pool_of(
     table: list[list[int]], coefficient: str = "fleiss_kappa", weights: str = "identity"
 ) -> Pool:
-    case = open_case(
+    case = pose_problem(
         coefficient,
         table,
         target="items",
@@ -88,7 +88,7 @@ def test_irrational_weights_are_drawn_in_counts() -> None:
 
 @few
 def test_raters_are_drawn_with_the_exact_distribution() -> None:
-    case = open_case(
+    case = pose_problem(
         "fleiss_kappa",
         made(12, 6),
         target="raters",

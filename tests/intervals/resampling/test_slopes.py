@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from masrel.agreement import COEFFICIENTS
-from masrel.intervals.case import Case, open_case
+from masrel.intervals._problem import IntervalProblem, pose_problem
 from masrel.intervals.resampling.pool import Pool, item_pool, rater_pool
 from masrel.intervals.resampling.slopes import (
     acceleration,
@@ -32,8 +32,8 @@ def ratings_of(name: str, n: int) -> list[list[object]]:
     return [list(row) for row in table]
 
 
-def case_of(name: str, n: int = 25, weights: str = "identity") -> Case:
-    return open_case(
+def case_of(name: str, n: int = 25, weights: str = "identity") -> IntervalProblem:
+    return pose_problem(
         name,
         ratings_of(name, n),
         target="items",
@@ -129,7 +129,7 @@ def test_errors_of_resamples_are_those_of_a_double_loop() -> None:
 def test_a_resample_without_spread_is_infinitely_far_off() -> None:
     table = [[0, 0, 0]] * 3 + [[1, 1, 1]] * 3 + [[0, 1, 1], [0, 0, 1]]
     pool = item_pool(
-        open_case(
+        pose_problem(
             "fleiss_kappa",
             table,
             target="items",
@@ -160,7 +160,7 @@ def test_a_rater_without_a_pair_leaves_the_slopes_of_the_others_alone() -> None:
     first = [["a", "a"], ["b", "b"], ["a", "b"], ["b", "b"], ["b", "a"]]
     second = [["a", "b"], ["b", "b"], [None, None], [None, None], [None, None]]
     pool = item_pool(
-        open_case(
+        pose_problem(
             "stratified_kappa",
             [first, second],
             target="items",
@@ -188,7 +188,7 @@ def test_raters_who_are_not_drawn_are_not_asked_after() -> None:
     # The last item is rated by the third rater alone: were he drawn, it would count.
     table = [[0, 0, 0], [1, 1, 0], [2, 2, 2], [0, 1, 0], [None, None, 2]]
     pool = rater_pool(
-        open_case(
+        pose_problem(
             "fleiss_kappa",
             table,
             target="raters",
@@ -209,7 +209,7 @@ def test_raters_who_are_not_drawn_are_not_asked_after() -> None:
 
 def test_acceleration_is_a_sixth_of_the_skewness_of_values_left_out() -> None:
     case = case_of("gwet_ac", n=14)
-    features = case.features
+    features = case.item_features()
     left = case.values(features.sum(axis=0) - features)
     deviation = left.mean() - left
     expected = (deviation**3).sum() / (6 * (deviation**2).sum() ** 1.5)
@@ -218,7 +218,7 @@ def test_acceleration_is_a_sixth_of_the_skewness_of_values_left_out() -> None:
 
 def test_acceleration_of_raters_leaves_out_raters() -> None:
     table = np.array(dirichlet_multinomial(np.random.default_rng(5), 20, 5, 0.5))
-    case = open_case(
+    case = pose_problem(
         "fleiss_kappa",
         table,
         target="raters",

@@ -10,7 +10,7 @@ import scipy.stats
 from hypothesis import given
 from hypothesis import strategies as st
 
-from masrel.intervals.case import open_case
+from masrel.intervals._problem import pose_problem
 from masrel.intervals.resampling.compositions import compositions, n_compositions
 from masrel.intervals.resampling.lattice import lattice_of
 from masrel.intervals.resampling.pool import Pool, item_pool
@@ -28,7 +28,7 @@ def pool_of(
 ) -> Pool:
     table = dirichlet_multinomial(np.random.default_rng(n), n, r, 0.4)
     return item_pool(
-        open_case(
+        pose_problem(
             coefficient,
             table,
             target="items",
@@ -152,7 +152,7 @@ def test_a_box_around_the_mean_loses_less_than_it_says(n: int, share: float) -> 
 def test_a_large_study_fits_into_a_small_box() -> None:
     # two categories, three raters: 0, 1, 2 or 3 of them, and whether they all agree
     table = np.random.default_rng(2).integers(0, 2, (1000, 3)).tolist()
-    case = open_case(
+    case = pose_problem(
         "fleiss_kappa",
         table,
         target="items",

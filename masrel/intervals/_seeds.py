@@ -4,8 +4,6 @@ import numpy as np
 
 from masrel.errors import ParameterError
 
-__all__ = ["check_rng", "recorded_generator"]
-
 
 def recorded_generator(
     rng: np.random.Generator | int | None,

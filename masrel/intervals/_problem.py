@@ -1,0 +1,226 @@
+"""One question about a coefficient, checked once, as every interval method takes it."""
+
+import math
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from masrel.agreement import (
+    CodedRatings,
+    Coefficient,
+    Label,
+    WeightName,
+    coefficient,
+    declared_weights,
+)
+from masrel.agreement._counts import distinct_rows
+from masrel.agreement._kernel import Floats, Kernel
+from masrel.errors import (
+    ParameterError,
+    SmallSampleWarning,
+    UndefinedStatisticWarning,
+)
+from masrel.estimates import Estimate, Interval, Target, Unit
+
+Integers = NDArray[np.int64]
+
+Statistic = str | Callable[..., Estimate] | Coefficient
+"""A coefficient: its name, its public function, or its entry in the register."""
+
+_BLOCK = 1 << 14  # items at once: what is made of them takes more room than they do
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class IntervalProblem:
+    """A coefficient, its data as sums of features, and the question about it."""
+
+    # A coefficient is a function of sums over items of a few features of each, so that
+    # a resample, or leaving an item out, changes the sums and nothing else.
+    entry: Coefficient
+    kernel: Kernel
+    coded: CodedRatings  # all ratings, item by item
+    patterns: CodedRatings  # the distinct rows of ratings that are not empty
+    freq: Integers = field(compare=False, repr=False)  # (n_patterns,)
+    rows: Floats = field(compare=False, repr=False)  # (n_patterns, n_features)
+    sums: Floats = field(compare=False, repr=False)  # over all items, (n_features,)
+    v: Floats = field(compare=False, repr=False)  # disagreement of two categories
+    n_items: int  # items with a rating
+    value: float  # the estimate; ``nan`` when undefined
+    target: Target
+    level: float
+
+    def values(self, sums: Floats) -> Floats:
+        """Return the coefficient for sums of shape (..., n_features)."""
+        return self.kernel.value(sums, self.v)
+
+    def values_without(self, sums: Floats, rows: Floats) -> Floats:
+        """Return the coefficient for sums less each row of features, (n_rows,)."""
+        parts = [self.values(sums - rows[block]) for block in blocks(len(rows))]
+        return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+    def features(self, coded: CodedRatings) -> Floats:
+        """Return the features of items, (n_items, n_features)."""
+        return _features(self.kernel, coded, self.v)
+
+    def item_features(self) -> Floats:
+        """Return the features of every item with a rating, in order."""
+        rated = (self.coded.codes >= 0).any(axis=1)
+        return self.features(self.coded)[rated]
+
+    @property
+    def min_value(self) -> float:
+        """Where intervals are cut: -∞ for an estimate below the usual least value."""
+        # Weights, or items of a single rating, can bring a coefficient below -1.
+        return self.entry.lowest if self.value >= self.entry.lowest else -math.inf
+
+    def student_t(self, df: float) -> float:
+        """Return the two-sided quantile of Student's t at the level."""
+        from scipy.special import stdtrit  # loaded only when an interval needs it
+
+        return float(stdtrit(df, 0.5 + 0.5 * self.level))
+
+    def confidence(
+        self,
+        low: float,
+        high: float,
+        *,
+        method: str,
+        unit: Unit | None,
+        notes: Sequence[str] = (),
+    ) -> Interval:
+        """Return a confidence interval, cut at the ends of the parameter space."""
+        min_value = self.min_value
+        if low < min_value or high > 1.0:
+            notes = (
+                *notes,
+                f"cut at the end of the parameter space [{min_value:g}, 1]",
+            )
+        return Interval(
+            low=max(low, min_value),
+            high=min(high, 1.0),
+            level=self.level,
+            kind="confidence",
+            method=method,
+            target=self.target,
+            unit=unit,
+            notes=tuple(notes),
+        )
+
+    def undefined(self, reason: str, *, method: str, unit: Unit | None) -> Interval:
+        """Return an interval of ``nan`` that says why, with a warning."""
+        warnings.warn(
+            f"{method} interval of {self.entry.title} is undefined: {reason}",
+            UndefinedStatisticWarning,
+            stacklevel=3,
+        )
+        return Interval(
+            low=math.nan,
+            high=math.nan,
+            level=self.level,
+            kind="confidence",
+            method=method,
+            target=self.target,
+            unit=unit,
+            reason=reason,
+        )
+
+
+def pose_problem(
+    statistic: Statistic,
+    ratings: object,
+    *,
+    target: Target,
+    categories: Sequence[Label] | None,
+    weights: "WeightName | ArrayLike",
+    level: float,
+) -> IntervalProblem:
+    """Check a question and prepare its data."""
+    entry = find_entry(statistic)
+    if target not in get_args(Target):
+        raise ParameterError(
+            f"target: needs one of {', '.join(get_args(Target))}, got {target!r}"
+        )
+    if not 0.0 < level < 1.0:
+        raise ParameterError(f"level: needs (0, 1), got {level}")
+    coded = entry.code(ratings, categories)
+    _check_raters(entry, coded)
+    kernel = entry.kernel
+    if kernel is None:
+        raise ParameterError(
+            f"coefficient: {entry.title} is no function of sums over items: there is "
+            "no such interval of it"
+        )
+    v = declared_weights(weights, coded.categories, declared=coded.declared).as_floats()
+    codes, freq = distinct_rows(coded.codes, coded.n_categories)
+    if (codes[0] < 0).all():  # the first of them, if any, has no rating
+        codes, freq = codes[1:], freq[1:]
+    patterns = replace(coded, codes=codes)
+    rows = _features(kernel, patterns, v)
+    sums = np.asarray(freq @ rows)
+    return IntervalProblem(
+        entry=entry,
+        kernel=kernel,
+        coded=coded,
+        patterns=patterns,
+        freq=freq,
+        rows=rows,
+        sums=sums,
+        v=v,
+        n_items=int(freq.sum()),
+        value=float(kernel.value(sums, v)),
+        target=target,
+        level=level,
+    )
+
+
+def find_entry(statistic: Statistic) -> Coefficient:
+    """Return the entry of a coefficient in the register."""
+    if isinstance(statistic, Coefficient):
+        return statistic
+    if isinstance(statistic, str):
+        return coefficient(statistic)
+    return coefficient(getattr(statistic, "__name__", repr(statistic)))
+
+
+def _check_raters(entry: Coefficient, coded: CodedRatings) -> None:
+    fewest, most = entry.n_raters
+    n_raters = coded.codes.shape[1]
+    if entry.shape == "ratings" and (
+        n_raters < fewest or (most is not None and n_raters > most)
+    ):
+        needed = f"{fewest}" if most == fewest else f"at least {fewest}"
+        raise ParameterError(f"{entry.title} needs {needed} raters, got {n_raters}")
+
+
+def _features(kernel: Kernel, coded: CodedRatings, v: Floats) -> Floats:
+    # (n_items, n_features), made a block at a time
+    n_items = len(coded.codes)
+    if n_items <= _BLOCK:
+        return kernel.features(coded, v)
+    features = None
+    for block in blocks(n_items):
+        part = kernel.features(replace(coded, codes=coded.codes[block]), v)
+        if features is None:
+            features = np.empty((n_items, part.shape[1]))
+        features[block] = part
+    return np.asarray(features)
+
+
+def blocks(n_items: int) -> Iterator[slice]:
+    """Cut items into blocks, so that what is made of them stays small."""
+    for start in range(0, n_items, _BLOCK):
+        yield slice(start, min(start + _BLOCK, n_items))
+
+
+def warn_small(count: int, minimum: int, what: str) -> tuple[str, ...]:
+    """Warn below a number of items or raters, and return the note of it."""
+    if count >= minimum:
+        return ()
+    note = f"{count} {what}: below {minimum} the interval may cover less than it says"
+    # called by what a method calls: the warning points to who called the method
+    warnings.warn(note, SmallSampleWarning, stacklevel=4)
+    return (note,)
