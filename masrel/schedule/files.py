@@ -1,16 +1,21 @@
-"""The text of a schedule file and of a rater's sheet, and reading a schedule back."""
+"""The files of schedules and raters' sheets: read, drawn once, kept, found stale."""
 
 import csv
 import re
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from masrel.errors import ScheduleError
-from masrel.schedule.presentation import Presentation, Schedule
+from masrel.protocol import Protocol, StudyPaths
+from masrel.schedule.presentation import (
+    Presentation,
+    Schedule,
+    check_schedule,
+    draw_schedule,
+)
 
-__all__ = ["read_schedule", "schedule_text", "sheet_text"]
-
-HEAD = {
+_HEAD = {
     "study": r"\S+",
     "rater": r"\S+",
     "session": r"\S+",
@@ -22,27 +27,22 @@ HEAD = {
 }
 """Keys of the ``# key: value`` lines, in order, and what their values look like."""
 
-COLUMNS = ["position", "code", "model", "repeat"]
-SHEET_COLUMNS = ["position", "code", "grade"]
+_COLUMNS = ["position", "code", "model", "repeat"]
+_SHEET_COLUMNS = ["position", "code", "grade"]
 
 # A code names a recording's file, so it is letters and digits only.
-CODE = re.compile(r"[0-9A-Za-z]{1,16}")
+_CODE = re.compile(r"[0-9A-Za-z]{1,16}")
 
 
-def schedule_text(schedule: Schedule) -> str:
-    """Write a schedule as the text of its file."""
-    head = [f"# {key}: {getattr(schedule, key)}" for key in HEAD]
-    rows = [
-        f"{shown.position},{shown.code},{shown.model},{shown.repeat}"
-        for shown in schedule.presentations
-    ]
-    return "\n".join([*head, ",".join(COLUMNS), *rows]) + "\n"
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Place:
+    """One rater in one session, and the files that belong to the two."""
 
-
-def sheet_text(schedule: Schedule) -> str:
-    """Write the blinded sheet on which a rater's grades are noted."""
-    rows = [f"{shown.position},{shown.code}," for shown in schedule.presentations]
-    return "\n".join([",".join(SHEET_COLUMNS), *rows]) + "\n"
+    rater: str
+    session: str
+    schedule: Path
+    sheet: Path
+    log: Path
 
 
 def read_schedule(path: Path) -> Schedule:
@@ -100,19 +100,19 @@ def _read_head(lines: list[str], path: Path, problems: list[str]) -> dict[str, s
     for number, line in enumerate(lines, start=1):
         key, _, value = line.removeprefix("#").partition(":")
         key, value = key.strip(), value.strip()
-        if key not in HEAD or key in head:
+        if key not in _HEAD or key in head:
             problems.append(
                 f"{path}: line {number}: needed '# key: value' with each of "
-                f"{', '.join(HEAD)} once, got {line!r}"
+                f"{', '.join(_HEAD)} once, got {line!r}"
             )
-        elif not re.fullmatch(HEAD[key], value):
+        elif not re.fullmatch(_HEAD[key], value):
             problems.append(
-                f"{path}: line {number}: needed {key} as {HEAD[key]}, got {value!r}"
+                f"{path}: line {number}: needed {key} as {_HEAD[key]}, got {value!r}"
             )
             head[key] = ""
         else:
             head[key] = value
-    missing = [key for key in HEAD if key not in head]
+    missing = [key for key in _HEAD if key not in head]
     if missing:
         problems.append(f"{path}: needed a line '# {missing[0]}: ...', got none")
     return head
@@ -122,10 +122,11 @@ def _read_rows(
     lines: list[str], n_head: int, path: Path, problems: list[str]
 ) -> Iterator[Presentation]:
     table = list(csv.reader(lines[n_head:]))
-    if not table or table[0] != COLUMNS:
-        came = ",".join(table[0]) if table else "nothing"
+    if not table or table[0] != _COLUMNS:
+        header = ",".join(table[0]) if table else "nothing"
         problems.append(
-            f"{path}: line {n_head + 1}: needed columns {','.join(COLUMNS)}, got {came}"
+            f"{path}: line {n_head + 1}: needed columns {','.join(_COLUMNS)}, "
+            f"got {header}"
         )
         return iter(())
     if len(table) == 1:
@@ -143,12 +144,12 @@ def _read_rows(
 
 
 def _row_problem(row: Sequence[str], place: int, seen: set[str]) -> str | None:
-    if len(row) != len(COLUMNS):
-        return f"needed {len(COLUMNS)} cells, got {len(row)}"
+    if len(row) != len(_COLUMNS):
+        return f"needed {len(_COLUMNS)} cells, got {len(row)}"
     position, code, model, repeat = row
     if position != str(place):
         return f"needed position {place}, got {position!r}"
-    if not CODE.fullmatch(code):
+    if not _CODE.fullmatch(code):
         return f"needed a code of letters and digits, got {code!r}"
     if code in seen:
         return f"needed codes that differ, got {code!r} again"
@@ -157,3 +158,178 @@ def _row_problem(row: Sequence[str], place: int, seen: set[str]) -> str | None:
     if not re.fullmatch(r"[1-9][0-9]{0,3}", repeat):
         return f"needed repeat as a whole number from 1, got {repeat!r}"
     return None
+
+
+def write_schedules(
+    protocol: Protocol, study: StudyPaths, *, redraw: bool = False
+) -> tuple[Path, ...]:
+    """Draw every schedule that is not there yet, with its blinded sheet.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        The study's protocol.
+    study : StudyPaths
+        Where the study is; its schedules folder is made when needed.
+    redraw : bool
+        Draw stale or damaged schedules anew. Schedules that still fit stay as they
+        are, byte for byte, with or without it.
+
+    Returns
+    -------
+    tuple of Path
+        The files written; empty when all were there.
+
+    Raises
+    ------
+    ScheduleError
+        If a schedule is stale or damaged and `redraw` is false; or a schedule that
+        has to be drawn belongs to a session that has begun (it has a log, or
+        grades on its sheet). Nothing is written then.
+    OSError
+        If the system refuses a folder or file.
+    """
+    places = _places(protocol, study)
+    problems: list[str] = []
+    texts: dict[Path, str] = {}
+    for place in places:
+        fault = _fault(place, protocol)
+        if fault is None:
+            schedule = read_schedule(place.schedule)
+            if not place.sheet.exists():
+                texts[place.sheet] = _sheet_text(schedule)
+            continue
+        problem = _refusal(place, fault, redraw=redraw)
+        if problem is not None:
+            problems.append(problem)
+        drawn = draw_schedule(protocol, place.rater, place.session)
+        texts[place.schedule] = _schedule_text(drawn)
+        texts[place.sheet] = _sheet_text(drawn)
+    if problems:
+        raise ScheduleError("\n".join(problems))
+    study.schedules.mkdir(parents=True, exist_ok=True)
+    for path, text in texts.items():
+        path.write_bytes(text.encode("utf-8"))  # the same bytes on every system
+    return tuple(texts)
+
+
+def schedule_problems(protocol: Protocol, study: StudyPaths) -> tuple[str, ...]:
+    """Find what is wrong with the schedules of a study that are there.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        The study's protocol.
+    study : StudyPaths
+        Where the study is.
+
+    Returns
+    -------
+    tuple of str
+        Each problem with its file: damaged, stale, a sheet with other codes, or a
+        file that belongs to no rater and session. A schedule not drawn yet is none.
+    """
+    places = _places(protocol, study)
+    problems: list[str] = []
+    for place in places:
+        if place.schedule.exists():
+            fault = _fault(place, protocol)
+            fault = fault or _sheet_fault(place, read_schedule(place.schedule))
+            problems.extend([fault] if fault else [])
+    expected = {path for place in places for path in (place.schedule, place.sheet)}
+    for path in sorted(study.schedules.glob("*.csv")):
+        if path not in expected:
+            problems.append(
+                f"{path}: needed schedules of the protocol's raters and sessions only, "
+                "got a file of neither"
+            )
+    return tuple(problems)
+
+
+def _places(protocol: Protocol, study: StudyPaths) -> list[_Place]:
+    return [
+        _Place(
+            rater=rater,
+            session=session.id,
+            schedule=study.schedule_file(rater, session.id),
+            sheet=study.sheet_file(rater, session.id),
+            log=study.log_file(rater, session.id),
+        )
+        for session in protocol.sessions
+        for rater in session.raters
+    ]
+
+
+def _fault(place: _Place, protocol: Protocol) -> str | None:
+    # Why the schedule's file cannot be used as it is, or None.
+    if not place.schedule.exists():
+        return f"{place.schedule}: needed a schedule file, got none"
+    try:
+        schedule = read_schedule(place.schedule)
+    except ScheduleError as error:
+        return str(error)
+    if (schedule.rater, schedule.session) != (place.rater, place.session):
+        return (
+            f"{place.schedule}: needed the schedule of rater {place.rater} in session "
+            f"{place.session}, got that of {schedule.rater} in {schedule.session}"
+        )
+    try:
+        check_schedule(schedule, protocol)
+    except ScheduleError as error:
+        return f"{place.schedule}: {error}"
+    return None
+
+
+def _refusal(place: _Place, fault: str, *, redraw: bool) -> str | None:
+    # Why a schedule with this fault may not be drawn, or None.
+    if place.log.exists():
+        return (
+            f"{fault}. It was not drawn, because the session has begun: {place.log} "
+            "was recorded by the schedule there was. Bring back that schedule and its "
+            "protocol, or move the log out of the study"
+        )
+    if place.sheet.exists() and _is_filled_in(place.sheet):
+        return (
+            f"{fault}. It was not drawn, because {place.sheet} has grades on it. Move "
+            "the sheet out of the study first"
+        )
+    if place.schedule.exists() and not redraw:
+        return f"{fault}. It was kept; --redraw draws it anew"
+    return None
+
+
+def _is_filled_in(sheet: Path) -> bool:
+    # A blank sheet's rows, and none but they, end at the comma before the grade.
+    rows = sheet.read_text(encoding="utf-8", errors="replace").splitlines()[1:]
+    return any(not row.endswith(",") for row in rows if row)
+
+
+def _sheet_fault(place: _Place, schedule: Schedule) -> str | None:
+    # The sheet may be missing or have grades, but its codes are the schedule's.
+    if not place.sheet.exists():
+        return None
+    text = place.sheet.read_text(encoding="utf-8", errors="replace").splitlines()[1:]
+    rows = [tuple(row.split(",")[:2]) for row in text if row]
+    expected = [(str(s.position), s.code) for s in schedule.presentations]
+    if rows == expected:
+        return None
+    return (
+        f"{place.sheet}: needed the positions and codes of {place.schedule.name}, "
+        "got others"
+    )
+
+
+def _schedule_text(schedule: Schedule) -> str:
+    """Write a schedule as the text of its file."""
+    head = [f"# {key}: {getattr(schedule, key)}" for key in _HEAD]
+    rows = [
+        f"{shown.position},{shown.code},{shown.model},{shown.repeat}"
+        for shown in schedule.presentations
+    ]
+    return "\n".join([*head, ",".join(_COLUMNS), *rows]) + "\n"
+
+
+def _sheet_text(schedule: Schedule) -> str:
+    """Write the blinded sheet on which a rater's grades are noted."""
+    rows = [f"{shown.position},{shown.code}," for shown in schedule.presentations]
+    return "\n".join([",".join(_SHEET_COLUMNS), *rows]) + "\n"

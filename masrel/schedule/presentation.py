@@ -1,12 +1,25 @@
-"""One presentation, the schedule of one rater in one session, and its checks."""
+"""The schedule of one rater in one session: what it is, drawing it, checking it."""
 
+import hashlib
+import json
 from collections import Counter
+from collections.abc import MutableSequence
 from dataclasses import dataclass
+from typing import TypeVar
 
+from numpy.random import PCG64
+
+import masrel
 from masrel.errors import ScheduleError
-from masrel.protocol import Protocol, presented_hash
+from masrel.protocol import Protocol, presented_hash, protocol_hash
 
-__all__ = ["Presentation", "Schedule", "check_schedule", "require_place"]
+# No letter that reads as a digit (I, O, Q, S, Z), that makes a number of the code
+# (E), or that says left or right (L, R).
+_CODE_LETTERS = "ABCDFGHJKMNPTUVWXY"
+
+_T = TypeVar("_T")
+
+_N_WORDS = 2**64
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,6 +78,78 @@ class Schedule:
     presentations: tuple[Presentation, ...]
 
 
+def draw_schedule(protocol: Protocol, rater: str, session: str) -> Schedule:
+    """Draw the order and the blinded codes of one rater in one session.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        The study's protocol; its seed, models and repeats decide the draw.
+    rater, session : str
+        Their ids.
+
+    Returns
+    -------
+    Schedule
+        Every model as often as the protocol repeats it, in random order.
+
+    Raises
+    ------
+    ScheduleError
+        If the session is not the protocol's or does not have the rater.
+
+    Notes
+    -----
+    Order and codes come from two streams for each session and rater alone, so
+    adding a rater, a session or a repeat of another study moves nobody else's
+    schedule, and a code says nothing about the place or the model it stands for.
+    """
+    _require_place(protocol, rater, session)
+    seed, repeats = protocol.schedule.seed, protocol.schedule.repeats
+    shown = [
+        (model.id, repeat)
+        for repeat in range(1, repeats + 1)
+        for model in protocol.models
+    ]
+    _Stream(seed, "schedule", session, rater).shuffle(shown)
+    codes = _draw_codes(protocol, len(shown), rater, session)
+    return Schedule(
+        study=protocol.study.id,
+        rater=rater,
+        session=session,
+        seed=seed,
+        scheme=protocol.schedule.scheme,
+        protocol_sha256=protocol_hash(protocol),
+        presented_sha256=presented_hash(protocol),
+        masrel_version=masrel.__version__,
+        presentations=tuple(
+            Presentation(position=place, code=code, model=model, repeat=repeat)
+            for place, (code, (model, repeat)) in enumerate(
+                zip(codes, shown, strict=True), start=1
+            )
+        ),
+    )
+
+
+def _draw_codes(
+    protocol: Protocol, n_codes: int, rater: str, session: str
+) -> list[str]:
+    # Two digits and a letter, such as 47K: 1800 codes, of which at most 500 are
+    # needed and 500 are some model's id, so that the draw always ends.
+    taken = {model.id.upper() for model in protocol.models}
+    stream = _Stream(protocol.schedule.seed, "codes", session, rater)
+    codes: list[str] = []
+    while len(codes) < n_codes:
+        number, letter = divmod(
+            stream.below(100 * len(_CODE_LETTERS)), len(_CODE_LETTERS)
+        )
+        code = f"{number:02d}{_CODE_LETTERS[letter]}"
+        if code not in taken:
+            taken.add(code)
+            codes.append(code)
+    return codes
+
+
 def check_schedule(schedule: Schedule, protocol: Protocol) -> None:
     """Refuse a schedule that was not drawn from what the protocol presents now.
 
@@ -79,7 +164,8 @@ def check_schedule(schedule: Schedule, protocol: Protocol) -> None:
     ------
     ScheduleError
         If study, rater or session are not the protocol's, what is presented has
-        changed since the draw, or the rows are not every model as often as asked.
+        changed since the draw, or the rows do not hold every model as often as the
+        protocol repeats it.
 
     Notes
     -----
@@ -92,7 +178,7 @@ def check_schedule(schedule: Schedule, protocol: Protocol) -> None:
         raise ScheduleError(
             f"{where}: needed study {protocol.study.id}, got {schedule.study}"
         )
-    require_place(protocol, schedule.rater, schedule.session)
+    _require_place(protocol, schedule.rater, schedule.session)
     now = presented_hash(protocol)
     if schedule.presented_sha256 != now:
         raise ScheduleError(
@@ -101,14 +187,14 @@ def check_schedule(schedule: Schedule, protocol: Protocol) -> None:
             f"or device (presented_sha256 {now[:12]} and "
             f"{schedule.presented_sha256[:12]})"
         )
-    asked = Counter(
+    expected = Counter(
         (model.id, repeat)
         for model in protocol.models
         for repeat in range(1, protocol.schedule.repeats + 1)
     )
-    found = Counter((shown.model, shown.repeat) for shown in schedule.presentations)
-    if asked != found:
-        wrong = sorted((asked - found) + (found - asked))
+    scheduled = Counter((shown.model, shown.repeat) for shown in schedule.presentations)
+    if expected != scheduled:
+        wrong = sorted((expected - scheduled) + (scheduled - expected))
         named = ", ".join(f"{model} repeat {repeat}" for model, repeat in wrong)
         raise ScheduleError(
             f"{where}: needed every model of the protocol once per repeat, "
@@ -116,7 +202,7 @@ def check_schedule(schedule: Schedule, protocol: Protocol) -> None:
         )
 
 
-def require_place(protocol: Protocol, rater: str, session: str) -> None:
+def _require_place(protocol: Protocol, rater: str, session: str) -> None:
     """Refuse a rater and session the protocol does not bring together."""
     raters = {each.id: each.raters for each in protocol.sessions}
     if session not in raters:
@@ -128,3 +214,49 @@ def require_place(protocol: Protocol, rater: str, session: str) -> None:
             f"rater: needed one of {', '.join(raters[session])} for session "
             f"{session}, got {rater!r}"
         )
+
+
+class _Stream:
+    """Random words for one purpose, whatever else is drawn from the same seed."""
+
+    # NumPy keeps the raw words of a bit generator the same for ever, but not what its
+    # Generator methods make of them: words are taken raw, and numbers made here.
+    #
+    # The SHA-256 of the JSON array ``["masrel", seed, *purpose]`` (UTF-8, no spaces,
+    # non-ASCII escaped) is the whole state of the generator: its first 16 bytes, big
+    # endian, are PCG64's state, the other 16 its increment, made odd.
+
+    def __init__(self, seed: int, *purpose: str) -> None:
+        name = json.dumps(["masrel", seed, *purpose], separators=(",", ":"))
+        digest = hashlib.sha256(name.encode("ascii")).digest()
+        self._generator = PCG64(0)
+        self._generator.state = {
+            "bit_generator": "PCG64",
+            "state": {
+                "state": int.from_bytes(digest[:16], "big"),
+                "inc": int.from_bytes(digest[16:], "big") | 1,
+            },
+            "has_uint32": 0,
+            "uinteger": 0,
+        }
+
+    def word(self) -> int:
+        """Return the next word, uniform on 0 to 2**64 - 1."""
+        return int(self._generator.random_raw())
+
+    def below(self, limit: int) -> int:
+        """Return a number uniform on 0 to `limit` - 1; `limit` from 1 to 2**64."""
+        # Words at and above the last multiple of `limit` are rejected, so that every
+        # number has exactly the same chance.
+        usable = _N_WORDS - _N_WORDS % limit
+        while (word := self.word()) >= usable:
+            pass
+        return word % limit
+
+    def shuffle(self, items: MutableSequence[_T]) -> None:
+        """Put `items` into a random order in place, each order equally likely."""
+        # Fisher and Yates, from the last place down: place i takes the item of a place
+        # drawn from 0 to i.
+        for i in range(len(items) - 1, 0, -1):
+            j = self.below(i + 1)
+            items[i], items[j] = items[j], items[i]

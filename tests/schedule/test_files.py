@@ -1,16 +1,28 @@
 """A schedule file is read back as written, and anything else is refused by line."""
 
+import tempfile
 from pathlib import Path
 
 import pytest
 
 from masrel.errors import ScheduleError
-from masrel.schedule import draw_schedule, read_schedule
-from masrel.schedule.files import schedule_text
+from masrel.protocol import StudyPaths
+from masrel.schedule import draw_schedule, read_schedule, write_schedules
 from tests.schedule.studies import protocol_of
 
-SCHEDULE = draw_schedule(protocol_of(models=("A", "B")), "R1", "test")
-LINES = schedule_text(SCHEDULE).splitlines()
+PROTOCOL = protocol_of(models=("A", "B"))
+SCHEDULE = draw_schedule(PROTOCOL, "R1", "test")
+
+
+def written() -> list[str]:
+    """The lines of the file of `SCHEDULE`."""
+    with tempfile.TemporaryDirectory() as folder:
+        study = StudyPaths(Path(folder))
+        write_schedules(PROTOCOL, study)
+        return study.schedule_file("R1", "test").read_text("utf-8").splitlines()
+
+
+LINES = written()
 
 
 def test_the_file_is_provenance_then_rows() -> None:

@@ -13,8 +13,8 @@ import masrel
 from masrel.errors import ScheduleError
 from masrel.protocol import presented_hash, protocol_hash, read_protocol
 from masrel.schedule import Schedule, check_schedule, draw_schedule
+from tests.internal.schedule.test_stream import words_of
 from tests.schedule.studies import protocol_of
-from tests.schedule.test_stream import words_of
 
 PUBLISHED = Path(__file__).parents[2] / "studies" / "hess2012" / "protocol.toml"
 
