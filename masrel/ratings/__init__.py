@@ -8,23 +8,26 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from masrel.ratings.files import read_ratings
-    from masrel.ratings.in_person import InPerson, InPersonRow, read_in_person
-    from masrel.ratings.logs import ratings_from_logs
-    from masrel.ratings.matrices import (
-        RatingMatrix,
-        RetestPairs,
-        rating_matrix,
-        retest_pairs,
+    from masrel.ratings.files import (
+        InPerson,
+        InPersonRow,
+        ratings_hash,
+        read_in_person,
+        read_ratings,
+        write_ratings,
     )
+    from masrel.ratings.logs import ratings_from_logs
     from masrel.ratings.table import (
         DEFAULT_SESSION,
         RATING_COLUMNS,
         SOURCES,
+        RatingMatrix,
         Ratings,
+        RetestPairs,
+        rating_matrix,
         ratings_from_rows,
+        retest_pairs,
     )
-    from masrel.ratings.writing import ratings_hash, write_ratings
 
 __all__ = [
     "DEFAULT_SESSION",
@@ -46,23 +49,23 @@ __all__ = [
 ]
 
 _HOMES = {
-    "files": ("read_ratings",),
-    "in_person": ("InPerson", "InPersonRow", "read_in_person"),
-    "logs": ("ratings_from_logs",),
-    "matrices": ("RatingMatrix", "RetestPairs", "rating_matrix", "retest_pairs"),
-    "table": (
-        "DEFAULT_SESSION",
-        "RATING_COLUMNS",
-        "SOURCES",
-        "Ratings",
-        "ratings_from_rows",
+    "files": (
+        "InPerson",
+        "InPersonRow",
+        "ratings_hash",
+        "read_in_person",
+        "read_ratings",
+        "write_ratings",
     ),
-    "writing": ("ratings_hash", "write_ratings"),
+    "logs": ("ratings_from_logs",),
 }
+"""Module to the names in it; all other names are of `table`."""
 
 
 def __getattr__(name: str) -> object:
-    for module, names in _HOMES.items():
-        if name in names:
-            return getattr(importlib.import_module(f"masrel.ratings.{module}"), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    home = next((home for home, names in _HOMES.items() if name in names), "table")
+    value = getattr(importlib.import_module(f"masrel.ratings.{home}"), name)
+    globals()[name] = value  # the next use finds it without coming here
+    return value

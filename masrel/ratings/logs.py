@@ -12,8 +12,6 @@ from masrel.run.chain import Event, read_log
 from masrel.run.replay import SessionState, replay
 from masrel.schedule import Schedule, check_schedule, read_schedule
 
-__all__ = ["ratings_from_logs"]
-
 
 def ratings_from_logs(study: StudyPaths, protocol: Protocol) -> Ratings:
     """Collect the ratings of a study from its session logs.

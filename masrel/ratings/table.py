@@ -1,22 +1,15 @@
-"""What makes a data frame a table of ratings."""
+"""What makes a data frame a table of ratings, and how statistics take its ratings."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
 from masrel.errors import RatingsError
 from masrel.scales import Scale
-
-__all__ = [
-    "DEFAULT_SESSION",
-    "RATING_COLUMNS",
-    "SOURCES",
-    "Ratings",
-    "ratings_from_rows",
-]
 
 RATING_COLUMNS = (
     "session",  # text
@@ -112,26 +105,24 @@ def ratings_from_rows(
             problems.append(f"row {number}: {key} is in row {seen[key]} already")
     if problems:
         raise RatingsError("\n".join(problems))
-    return assemble(complete, scale, source_path)
+    columns = {name: [row[name] for row in complete] for name in RATING_COLUMNS}
+    return _assemble(columns, scale, source_path)
 
 
-def assemble(
-    rows: Sequence[Mapping[str, object]], scale: Scale, source_path: Path | None
+def _assemble(
+    columns: Mapping[str, list[Any]], scale: Scale, source_path: Path | None
 ) -> Ratings:
-    """Put checked rows into a table."""
+    """Return the table of columns that have been checked."""
     types = dict.fromkeys(RATING_COLUMNS, "object")
     types.update({"repeat": "int64", "mean_speed_deg_s": "float64"})
     table = pd.DataFrame(
-        {
-            name: pd.Series([row[name] for row in rows], dtype=types[name])
-            for name in RATING_COLUMNS
-        }
+        {name: pd.Series(columns[name], dtype=types[name]) for name in RATING_COLUMNS}
     )
     return Ratings(
         table=table,
         scale=scale,
         source_path=source_path,
-        simulated=any(row["source"] == "simulated" for row in rows),
+        simulated="simulated" in columns["source"],
     )
 
 
@@ -167,3 +158,182 @@ def _problems(row: Mapping[str, object], scale: Scale) -> list[str]:
     if unknown:
         problems.append(f"unknown columns {', '.join(unknown)}")
     return problems
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RatingMatrix:
+    """Grades of one session, item by rater.
+
+    Attributes
+    ----------
+    items : tuple of str
+        The haptic models; a second presentation of one is an item ``"HM1#2"``.
+    raters : tuple of str
+        The raters.
+    grades : list of list of (str or None), shape (n_items, n_raters)
+        None is missing.
+    n_missing : int
+        How many are None.
+    """
+
+    items: tuple[str, ...]
+    raters: tuple[str, ...]
+    grades: list[list[str | None]] = field(hash=False)
+    n_missing: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RetestPairs:
+    """Grades the same raters gave the same items in two sessions.
+
+    Attributes
+    ----------
+    raters : tuple of str
+        Raters with rows in both sessions.
+    items : tuple of str
+        The haptic models; a second presentation of one is an item ``"HM1#2"``.
+    pairs : list, shape (n_raters, n_items, 2)
+        First and second grade; None is missing.
+    n_missing : int
+        Pairs of which a side is missing.
+    """
+
+    raters: tuple[str, ...]
+    items: tuple[str, ...]
+    pairs: list[list[list[str | None]]] = field(hash=False)
+    n_missing: int
+
+
+_Key = tuple[str, str, int]  # rater, model, repeat
+
+
+def rating_matrix(
+    ratings: Ratings, *, session: str, models: Sequence[str] | None = None
+) -> RatingMatrix:
+    """Arrange the grades of one session item by rater.
+
+    Parameters
+    ----------
+    ratings : Ratings
+        The table.
+    session : str
+        The session.
+    models : sequence of str, optional
+        The models, in this order; one that nobody rated is a row of None. Every
+        model of the session, as they come, unless given.
+
+    Returns
+    -------
+    RatingMatrix
+        Raters as they come in the session, all of them.
+
+    Raises
+    ------
+    RatingsError
+        If the session has no ratings.
+
+    Examples
+    --------
+    >>> from masrel.ratings import ratings_from_rows
+    >>> from masrel.scales import MODIFIED_ASHWORTH
+    >>> rows = [
+    ...     {"rater": "R1", "model": "HM1", "grade": "1"},
+    ...     {"rater": "R2", "model": "HM1", "grade": "1+"},
+    ... ]
+    >>> ratings = ratings_from_rows(rows, MODIFIED_ASHWORTH)
+    >>> rating_matrix(ratings, session="test").grades
+    [['1', '1+']]
+    """
+    grades = _of_session(ratings, session)
+    raters = tuple(dict.fromkeys(rater for rater, _, _ in grades))
+    keys, items = _items([grades], models)
+    matrix = [
+        [grades.get((rater, model, repeat)) for rater in raters]
+        for model, repeat in keys
+    ]
+    return RatingMatrix(
+        items=items,
+        raters=raters,
+        grades=matrix,
+        n_missing=sum(row.count(None) for row in matrix),
+    )
+
+
+def retest_pairs(
+    ratings: Ratings,
+    *,
+    first: str,
+    second: str,
+    models: Sequence[str] | None = None,
+) -> RetestPairs:
+    """Pair the grades raters gave in two sessions.
+
+    Parameters
+    ----------
+    ratings : Ratings
+        The table.
+    first, second : str
+        The sessions.
+    models : sequence of str, optional
+        The models, in this order. Every model of either session unless given.
+
+    Returns
+    -------
+    RetestPairs
+        Raters of both sessions, as they come in the first; none is no error.
+
+    Raises
+    ------
+    RatingsError
+        If a session has no ratings, or both are the same.
+    """
+    if first == second:
+        raise RatingsError(f"needed two different sessions, got {first!r} twice")
+    before, after = _of_session(ratings, first), _of_session(ratings, second)
+    again = {rater for rater, _, _ in after}
+    raters = tuple(dict.fromkeys(r for r, _, _ in before if r in again))
+    keys, items = _items([before, after], models)
+    pairs = [
+        [[before.get((r, *key)), after.get((r, *key))] for key in keys] for r in raters
+    ]
+    return RetestPairs(
+        raters=raters,
+        items=items,
+        pairs=pairs,
+        n_missing=sum(None in pair for of_rater in pairs for pair in of_rater),
+    )
+
+
+def _of_session(ratings: Ratings, session: str) -> dict[_Key, str | None]:
+    table = ratings.table[ratings.table["session"] == session]
+    if table.empty:
+        known = ", ".join(dict.fromkeys(ratings.table["session"])) or "none"
+        raise RatingsError(f"needed ratings of session {session!r}, there are {known}")
+    return {
+        (rater, model, repeat): grade if isinstance(grade, str) else None
+        for rater, model, repeat, grade in zip(
+            table["rater"],
+            table["model"],
+            table["repeat"].tolist(),
+            table["grade"],
+            strict=True,
+        )
+    }
+
+
+def _items(
+    sessions: Sequence[Mapping[_Key, str | None]], models: Sequence[str] | None
+) -> tuple[list[tuple[str, int]], tuple[str, ...]]:
+    # -> (model, repeat) in the order of models, a model without ratings once; names
+    n_repeats: dict[str, int] = {}
+    for grades in sessions:
+        for _, model, repeat in grades:
+            n_repeats[model] = max(n_repeats.get(model, 1), repeat)
+    keys = [
+        (model, repeat)
+        for model in (n_repeats if models is None else models)
+        for repeat in range(1, n_repeats.get(model, 1) + 1)
+    ]
+    return keys, tuple(
+        model if repeat == 1 else f"{model}#{repeat}" for model, repeat in keys
+    )
