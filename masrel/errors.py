@@ -62,10 +62,15 @@ class MasrelError(Exception):
 class ProtocolError(MasrelError, ValueError):
     """A study's protocol is not usable.
 
+    Parameters
+    ----------
+    *problems : str
+        Every problem, each with file and key.
+
     Attributes
     ----------
     problems : tuple of str
-        Every problem found, each with file and key.
+        The same.
     """
 
     def __init__(self, *problems: str) -> None:

@@ -107,8 +107,8 @@ def fleiss_null(
     Returns
     -------
     Significance
-        z with its two-sided p-value from the normal. The standard error under the
-        hypothesis belongs to this test: it makes no interval.
+        The statistic z with its two-sided p-value from the normal. The standard error
+        under the hypothesis belongs to this test: it makes no interval.
 
     Raises
     ------

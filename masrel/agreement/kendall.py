@@ -99,7 +99,8 @@ def kendall_w_test(
     Returns
     -------
     Significance
-        m (n - 1) W with n - 1 degrees of freedom; approximate below some 8 items.
+        Friedman's m (n - 1) W with n - 1 degrees of freedom; approximate below some
+        8 items.
 
     Raises
     ------

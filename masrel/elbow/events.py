@@ -84,6 +84,8 @@ class Events:
         The motion ends, at its own end or at the end of range, s.
     phases : tuple of PhaseSpan
         The phases in order.
+    course : Course
+        The same in 50 digits; torque, work and impulse are computed from it.
 
     Notes
     -----

@@ -239,7 +239,7 @@ class YieldingHand(SimulatedHand):
     yielding : float, optional
         1/(N·m); the default halves the speed at 10 N·m.
     reaction_time : float, optional
-        s; the default is a long-latency reflex rather than a decision.
+        In s; the default is a long-latency reflex rather than a decision.
 
     Raises
     ------
