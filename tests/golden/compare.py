@@ -85,8 +85,7 @@ class _Place:
 
 def _walk(place: _Place, stored: object, new: object) -> Iterator[Change]:
     if isinstance(stored, dict) and isinstance(new, dict):
-        if list(stored) != list(new):
-            yield Change(place.path + "/keys", "text", list(stored), list(new))
+        yield from _keys(place, list(stored), list(new))
         for key in [key for key in stored if key in new]:
             yield from _walk(place.at(key, stored), stored[key], new[key])
     elif isinstance(stored, list) and isinstance(new, list):
@@ -100,6 +99,16 @@ def _walk(place: _Place, stored: object, new: object) -> Iterator[Change]:
         yield Change(place.path, place.kind, stored, new)
     elif repr(stored) != repr(new):  # of floats, every bit; nan is nan
         yield Change(place.path, place.kind, stored, new, _within(place, stored, new))
+
+
+def _keys(place: _Place, stored: list[str], new: list[str]) -> Iterator[Change]:
+    # those of one alone; or all, where only their order differs
+    gone = [key for key in stored if key not in new]
+    come = [key for key in new if key not in stored]
+    if gone or come:
+        yield Change(place.path + "/keys", "text", gone, come)
+    elif stored != new:
+        yield Change(place.path + "/keys", "text", stored, new)
 
 
 def _texts(place: _Place, stored: str, new: str) -> Iterator[Change]:

@@ -5,7 +5,7 @@ from functools import partial
 
 from masrel import agreement, intervals
 from masrel.agreement import COEFFICIENTS
-from tests.golden.call import Case, outcome
+from tests.golden.call import Case, Stream, outcome
 from tests.golden.drawn import N_TABLES, Drawn, drawn
 
 WEIGHTS = ("identity", "linear", "quadratic")
@@ -33,16 +33,28 @@ METHODS: tuple[tuple[str, dict[str, object]], ...] = (
 )
 """Function of `masrel.intervals` and its options."""
 
+OF_COUNTED = (
+    "percent_agreement",
+    "fleiss_kappa",
+    "brennan_prediger",
+    "gwet_ac",
+    "krippendorff_alpha",
+)
+
 OF_POSTERIOR = ("fleiss_kappa", "scott_pi", "krippendorff_alpha")
 
 
 def cases() -> list[Case]:
     """One case a table and group."""
     groups = {"agreement": _coefficients, "intervals": _intervals, "tests": _tests}
-    return [
+    made = [
         Case(group, f"table-{seed:03}", partial(make, seed))
         for group, make in groups.items()
         for seed in range(0, N_TABLES, 2 if group == "tests" else 1)
+    ]
+    return made + [
+        Case("agreement", f"cells-{seed:02}", partial(_large, seed))
+        for seed in range(40)
     ]
 
 
@@ -62,6 +74,25 @@ def _coefficients(seed: int) -> dict:
     for name, entry in COEFFICIENTS.items():
         options = {"categories": table.categories, "weights": _weights(name, seed)}
         made[name] = outcome(entry, _shaped(table, name), **options)
+    return made
+
+
+def _large(seed: int) -> dict:
+    # counts up to 10¹⁰; where one cell outweighs all others, chance is next to 1
+    stream, q = Stream(f"cells {seed}"), 2 + seed % 3
+    most = 2 if seed % 2 else 10
+    cells = [
+        [stream.below(10 ** (1 + stream.below(most))) for _ in range(q)]
+        for _ in range(q)
+    ]
+    cells[0][0] = 10 ** (4 + stream.below(7))
+    counted, weights = agreement.count_table(cells), WEIGHTS[seed % 3]
+    made: dict = {"cells": cells}
+    for function in (agreement.cohen_kappa_from_table, agreement.scott_pi_from_table):
+        made[function.__name__] = outcome(function, cells, weights=weights)
+    for name in OF_COUNTED:
+        function = getattr(agreement, name)
+        made[name] = outcome(function, counted, weights=weights)
     return made
 
 
