@@ -50,7 +50,7 @@ def _plan_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
 
 
 def _device_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
-    from masrel.run.settings import check_backend  # loads numpy
+    from masrel.run._settings import check_backend  # loads numpy
 
     try:
         check_backend(protocol.device)

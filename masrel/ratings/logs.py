@@ -8,8 +8,8 @@ from pathlib import Path
 from masrel.errors import RatingsError
 from masrel.protocol import Protocol, StudyPaths, scale_of
 from masrel.ratings.table import Ratings, ratings_from_rows
-from masrel.run.chain import Event, read_log
-from masrel.run.replay import SessionState, replay
+from masrel.run._log import Event, read_log
+from masrel.run._state import SessionState, replay
 from masrel.schedule import Schedule, check_schedule, read_schedule
 
 

@@ -8,38 +8,37 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from masrel.run.chain import Event, read_log
+    from masrel.run._grades import GradeRequest, GradeSource, ScriptGrades
+    from masrel.run._log import Event, SessionLog, read_log
+    from masrel.run._runner import SessionSummary
+    from masrel.run._settings import model_controller
+    from masrel.run._simulated_raters import SimulatedGrades
     from masrel.run.console import ConsoleGrades
-    from masrel.run.correction import record_correction
-    from masrel.run.grades import Asked, GradeSource, ScriptGrades
-    from masrel.run.log import SessionLog
-    from masrel.run.session import run_session
-    from masrel.run.simulated import SimulatedGrades
-    from masrel.run.walk import SessionSummary
+    from masrel.run.session import record_correction, run_session
 
 __all__ = [
-    "Asked",
     "ConsoleGrades",
     "Event",
+    "GradeRequest",
     "GradeSource",
     "ScriptGrades",
     "SessionLog",
     "SessionSummary",
     "SimulatedGrades",
+    "model_controller",
     "read_log",
     "record_correction",
     "run_session",
 ]
 
 _HOMES = {
-    "chain": ("Event", "read_log"),
+    "_grades": ("GradeRequest", "GradeSource", "ScriptGrades"),
+    "_log": ("Event", "SessionLog", "read_log"),
+    "_runner": ("SessionSummary",),
+    "_settings": ("model_controller",),
+    "_simulated_raters": ("SimulatedGrades",),
     "console": ("ConsoleGrades",),
-    "correction": ("record_correction",),
-    "grades": ("Asked", "GradeSource", "ScriptGrades"),
-    "log": ("SessionLog",),
-    "session": ("run_session",),
-    "simulated": ("SimulatedGrades",),
-    "walk": ("SessionSummary",),
+    "session": ("record_correction", "run_session"),
 }
 
 

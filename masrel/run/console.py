@@ -4,10 +4,8 @@ import sys
 from typing import ClassVar, TextIO
 
 from masrel.errors import SessionStoppedError
-from masrel.run.grades import Asked
+from masrel.run._grades import GradeRequest
 from masrel.scales import Scale
-
-__all__ = ["ConsoleGrades"]
 
 
 class ConsoleGrades:
@@ -40,12 +38,12 @@ class ConsoleGrades:
         self._answers = sys.stdin if answers is None else answers
         self._questions = sys.stdout if questions is None else questions
 
-    def make_ready(self, asked: Asked) -> None:
+    def make_ready(self, request: GradeRequest) -> None:
         """Wait until the rater is ready.
 
         Parameters
         ----------
-        asked : Asked
+        request : GradeRequest
             What comes next.
 
         Raises
@@ -53,23 +51,23 @@ class ConsoleGrades:
         SessionStoppedError
             If the person stops, or the input ends.
         """
-        again = "" if asked.attempt == 1 else " again"
-        shown = asked.presentation
+        again = "" if request.attempt == 1 else " again"
+        presentation = request.presentation
         answer = self._ask(
-            asked,
-            f"Presentation {shown.position} of {asked.n_presentations}, code "
-            f"{shown.code}{again}. Enter to begin (then any key is an emergency "
+            request,
+            f"Presentation {presentation.position} of {request.n_presentations}, code "
+            f"{presentation.code}{again}. Enter to begin (then any key is an emergency "
             "stop), stop to stop: ",
         )
         if answer == "stop":
-            raise _stopped(asked, "on request")
+            raise _stopped(request, "on request")
 
-    def grade(self, asked: Asked) -> str | None:
+    def grade(self, request: GradeRequest) -> str | None:
         """Ask for the grade until it is one of the scale.
 
         Parameters
         ----------
-        asked : Asked
+        request : GradeRequest
             What was presented.
 
         Returns
@@ -85,22 +83,23 @@ class ConsoleGrades:
         grades = ", ".join(self._scale.grades)
         while True:
             answer = self._ask(
-                asked, f"Grade of {asked.presentation.code} ({grades}; again; stop): "
+                request,
+                f"Grade of {request.presentation.code} ({grades}; again; stop): ",
             )
             if answer in self._scale.grades:
                 return answer
             if answer == "again":
                 return None
             if answer == "stop":
-                raise _stopped(asked, "on request")
+                raise _stopped(request, "on request")
             self._say(f"{answer!r} is not a grade: needed one of {grades}.\n")
 
-    def present_again(self, asked: Asked, fault: str) -> bool:
+    def present_again(self, request: GradeRequest, fault: str) -> bool:
         """Ask whether to present the model again after a fault.
 
         Parameters
         ----------
-        asked : Asked
+        request : GradeRequest
             What was presented.
         fault : str
             What went wrong.
@@ -117,18 +116,18 @@ class ConsoleGrades:
         """
         self._say(f"The presentation was stopped: {fault}.\n")
         while True:
-            answer = self._ask(asked, "Present it again? (yes, no): ").casefold()
+            answer = self._ask(request, "Present it again? (yes, no): ").casefold()
             if answer in ("yes", "y", "no", "n"):
                 return answer.startswith("y")
 
-    def _ask(self, asked: Asked, question: str) -> str:
+    def _ask(self, request: GradeRequest, question: str) -> str:
         self._say(question)
         try:
             answer = self._answers.readline()
         except KeyboardInterrupt as error:
-            raise _stopped(asked, "by an interrupt") from error
+            raise _stopped(request, "by an interrupt") from error
         if not answer:
-            raise _stopped(asked, "by the end of its input")
+            raise _stopped(request, "by the end of its input")
         return answer.strip()
 
     def _say(self, text: str) -> None:
@@ -136,9 +135,9 @@ class ConsoleGrades:
         self._questions.flush()
 
 
-def _stopped(asked: Asked, why: str) -> SessionStoppedError:
+def _stopped(request: GradeRequest, why: str) -> SessionStoppedError:
     return SessionStoppedError(
-        f"session {asked.session} of {asked.rater} was stopped {why} at presentation "
-        f"{asked.presentation.position} of {asked.n_presentations}; the same command "
-        "goes on there"
+        f"session {request.session} of {request.rater} was stopped {why} at "
+        f"presentation {request.presentation.position} of {request.n_presentations}; "
+        "the same command goes on there"
     )

@@ -1,4 +1,4 @@
-"""Walk one schedule: present each model, ask for its grade, log both at once.
+"""Run one session, from its schedule to the last grade, and correct a grade in it.
 
 Started again, a session goes on where its log ends: what has a grade keeps it, and
 what was presented but not graded is presented again and logged as another attempt.
@@ -8,15 +8,14 @@ import hashlib
 from collections.abc import Callable
 from datetime import datetime
 
-from masrel.errors import ParameterError, ScheduleError
+from masrel.errors import ParameterError, ScheduleError, SessionLogError
 from masrel.protocol import Protocol, StudyPaths
-from masrel.run.grades import GradeSource
-from masrel.run.log import SessionLog, utc_now
-from masrel.run.settings import check_backend, has_simulated_hand
-from masrel.run.walk import CLOCKS, ClockName, SessionSummary, Walk
+from masrel.run._grades import GradeSource
+from masrel.run._log import SessionLog, utc_now
+from masrel.run._runner import CLOCKS, ClockName, SessionRunner, SessionSummary
+from masrel.run._settings import check_backend, has_simulated_hand
+from masrel.run._state import replay
 from masrel.schedule import Presentation, check_schedule, read_schedule
-
-__all__ = ["run_session"]
 
 
 def run_session(
@@ -89,9 +88,9 @@ def run_session(
         )
     checksum = hashlib.sha256(path.read_bytes()).hexdigest()
     with SessionLog.open(study.log_file(rater, session), now=now) as log:
-        walk = Walk(study, protocol, schedule, grades, clock, log)
-        walk.begin(checksum)
-        return walk.to_the_end(progress)
+        runner = SessionRunner(study, protocol, schedule, grades, clock, log)
+        runner.begin(checksum)
+        return runner.run(progress)
 
 
 def _check_device(clock: str, protocol: Protocol) -> None:
@@ -102,4 +101,67 @@ def _check_device(clock: str, protocol: Protocol) -> None:
     if clock == "simulated" and not has_simulated_hand(device):
         raise ParameterError(
             f"clock: needed the real one for device {device.backend!r}, got 'simulated'"
+        )
+
+
+def record_correction(
+    study: StudyPaths,
+    protocol: Protocol,
+    rater: str,
+    session: str,
+    *,
+    code: str,
+    grade: str,
+    who: str,
+    why: str,
+    now: Callable[[], datetime] = utc_now,
+) -> None:
+    """Append a correction to a session's log; the first grade stays in it.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is.
+    protocol : Protocol
+        The study's protocol.
+    rater, session : str
+        Whose session.
+    code : str
+        The blinded code of a presentation that has a grade.
+    grade : str
+        What the grade should have been.
+    who, why : str
+        Who corrects it, and for what reason.
+    now : callable, optional
+        Gives the time of day for the log, aware.
+
+    Raises
+    ------
+    ParameterError
+        If the grade is not of the scale, or `who` or `why` is blank.
+    SessionLogError
+        If there is no such log, it is damaged, or the code has no grade.
+    OSError
+        If the log cannot be written.
+    """
+    if grade not in protocol.scale.grades:
+        raise ParameterError(
+            f"grade: needed one of {', '.join(protocol.scale.grades)}, got {grade!r}"
+        )
+    for name, text in (("who", who), ("why", why)):
+        if not text.strip():
+            raise ParameterError(f"{name}: needed text, got none")
+    path = study.log_file(rater, session)
+    if not path.is_file():
+        raise SessionLogError(f"{path}: no such session log")
+    with SessionLog.open(path, now=now) as log:
+        state = replay(path, log.events)
+        if code not in state.first_grades:
+            known = ", ".join(state.first_grades) or "none"
+            raise SessionLogError(
+                f"{path}: needed a code that has a grade ({known}), got {code!r}"
+            )
+        log.append(
+            "correction",
+            {"code": code, "grade": grade, "who": who.strip(), "why": why.strip()},
         )

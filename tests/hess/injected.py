@@ -22,10 +22,9 @@ from masrel.errors import OverrunWarning
 from masrel.hess import Controller, Device, SimulatedClock, SimulatedHand, open_device
 from masrel.protocol import Protocol, StudyPaths, read_protocol
 from masrel.recording import read_recording
-from masrel.run import SimulatedGrades, kept, read_log, run_session
-from masrel.run import present as presenting
-from masrel.run.settings import model_controller
-from masrel.run.walk import CLOCKS
+from masrel.run import SimulatedGrades, model_controller, read_log, run_session
+from masrel.run import _present as presenting
+from masrel.run._runner import CLOCKS
 from masrel.schedule import write_schedules
 
 from . import faults as f
@@ -426,7 +425,7 @@ def _injected(
         slips = is_first("hand") and injection.slip
         return SimulatedHand(**options, slip_time=injection.at_s if slips else None)
 
-    written = kept.write_recording
+    written = presenting.write_recording
     disk_is_full = [injection.full_disk]
 
     def write(recording, path):
@@ -438,7 +437,7 @@ def _injected(
         mock.patch.object(presenting, "open_device", open_faulty),
         mock.patch.object(presenting, "model_controller", controller),
         mock.patch.object(presenting, "SimulatedHand", hand),
-        mock.patch.object(kept, "write_recording", write),
+        mock.patch.object(presenting, "write_recording", write),
         mock.patch.dict(CLOCKS, {"simulated": clock}),
     ):
         yield

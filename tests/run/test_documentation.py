@@ -5,7 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from masrel.run.log import SessionLog
+from masrel.run import SessionLog
 
 PAGE = Path(__file__).parents[2] / "docs" / "session_log.md"
 

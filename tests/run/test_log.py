@@ -11,8 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from masrel.errors import SessionLogError
-from masrel.run.chain import read_log
-from masrel.run.log import SessionLog
+from masrel.run import SessionLog, read_log
 
 
 def noon() -> datetime:

@@ -12,7 +12,7 @@ from masrel.hess import ReplayOptions, SimulatedClock, open_device, run_presenta
 from masrel.protocol import Protocol, StudyPaths
 from masrel.recording import read_recording
 from masrel.run import SimulatedGrades, read_log, run_session
-from masrel.run.settings import device_limits, model_controller
+from masrel.run._settings import device_limits, model_controller
 
 NewStudy = Callable[..., tuple[StudyPaths, Protocol]]
 

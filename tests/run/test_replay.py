@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from masrel.errors import SessionLogError
-from masrel.run.chain import Event
-from masrel.run.replay import EVENTS, SessionState, replay
+from masrel.run import Event
+from masrel.run._state import EVENTS, SessionState, replay
 
 Step = tuple[str, dict[str, str | int | float | bool | None]]
 
@@ -36,7 +36,7 @@ def test_a_log_says_where_its_session_stands() -> None:
         *(RECOVERED, BEGUN, FAULT, step("stopped"), step("resumed"), A_SHOWN),
         *(A_GRADED, CORRECTED, B_SHOWN),
     )
-    assert state.given == {"A": "1"}
+    assert state.first_grades == {"A": "1"}
     assert state.grades == {"A": "3"}
     assert [len(state.presented[code]) for code in "AB"] == [2, 1]
     assert not state.is_complete

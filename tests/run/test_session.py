@@ -26,8 +26,8 @@ from masrel.protocol import DeviceSettings, Protocol, StudyPaths
 from masrel.ratings import ratings_from_logs
 from masrel.recording import RECORDING_COLUMNS, read_recording
 from masrel.run import (
-    Asked,
     ConsoleGrades,
+    GradeRequest,
     GradeSource,
     ScriptGrades,
     SessionSummary,
@@ -36,7 +36,7 @@ from masrel.run import (
     record_correction,
     run_session,
 )
-from masrel.run.walk import CLOCKS
+from masrel.run._runner import CLOCKS
 from masrel.scales import MODIFIED_ASHWORTH
 from masrel.schedule import Presentation, read_schedule
 
@@ -339,8 +339,8 @@ def test_a_crash_while_presenting_leaves_only_what_was_done(
     small: Small, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     class Broken(ScriptGrades):
-        def make_ready(self, asked: Asked) -> None:
-            if asked.presentation.position == 2:
+        def make_ready(self, request: GradeRequest) -> None:
+            if request.presentation.position == 2:
                 raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
@@ -416,9 +416,9 @@ def test_a_correction_needs_a_code_a_grade_a_person_and_a_reason(
     run(small, ScriptGrades(["1", "1+", "3"]))
     before = study.log_file("R1", "test").read_bytes()
     code = read_schedule(study.schedule_file("R1", "test")).presentations[0].code
-    asked = {"code": code, "grade": "2", "who": "Kim", "why": "misheard", **change}
+    request = {"code": code, "grade": "2", "who": "Kim", "why": "misheard", **change}
     with pytest.raises((ParameterError, SessionLogError), match=message):
-        record_correction(study, protocol, "R1", "test", **asked)
+        record_correction(study, protocol, "R1", "test", **request)
     assert study.log_file("R1", "test").read_bytes() == before
 
 
@@ -450,10 +450,10 @@ def test_a_recording_is_on_disk_before_the_log_names_it(
 
 def test_a_script_by_code_and_by_position() -> None:
     shown = Presentation(position=2, code="K7", model="HM1", repeat=1)
-    asked = Asked(
+    request = GradeRequest(
         rater="R1", session="test", presentation=shown, n_presentations=3, attempt=1
     )
-    assert ScriptGrades({"K7": "1+"}).grade(asked) == "1+"
-    assert ScriptGrades(["1", "2"]).grade(asked) == "2"
+    assert ScriptGrades({"K7": "1+"}).grade(request) == "1+"
+    assert ScriptGrades(["1", "2"]).grade(request) == "2"
     with pytest.raises(ParameterError, match="position 2, code K7"):
-        ScriptGrades({"A": "1"}).grade(asked)
+        ScriptGrades({"A": "1"}).grade(request)

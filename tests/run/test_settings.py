@@ -12,7 +12,7 @@ from masrel.hess.puck.emulator_options import EmulatorOptions
 from masrel.hess.puck.options import PuckOptions
 from masrel.hess.puck.properties import property_table
 from masrel.protocol import DeviceSettings
-from masrel.run.settings import (
+from masrel.run._settings import (
     backend_options,
     check_backend,
     device_limits,

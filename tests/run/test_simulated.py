@@ -10,8 +10,8 @@ import pytest
 
 from masrel.errors import ParameterError, ProtocolError
 from masrel.protocol import Model, Protocol, SimulatedRaters, StudyPaths
-from masrel.run import Asked, SimulatedGrades
-from masrel.run.simulated import intended_speed, severity
+from masrel.run import GradeRequest, SimulatedGrades
+from masrel.run._simulated_raters import intended_speed, severity
 from masrel.schedule import Presentation
 
 Made = Callable[..., tuple[StudyPaths, Protocol]]
@@ -26,8 +26,8 @@ def with_settings(protocol: Protocol, **settings: float) -> Protocol:
 
 def asked(
     model: str, *, rater: str = "R1", session: str = "test", repeat: int = 1
-) -> Asked:
-    return Asked(
+) -> GradeRequest:
+    return GradeRequest(
         rater=rater,
         session=session,
         presentation=Presentation(position=1, code="X", model=model, repeat=repeat),

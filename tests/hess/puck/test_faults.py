@@ -22,7 +22,7 @@ from masrel.hess.puck.faults import FaultKind, InjectedFault
 from masrel.hess.puck.transmission import Transmission
 from masrel.recording import read_recording
 from masrel.run import SimulatedGrades, read_log, run_session
-from masrel.run import present as presenting
+from masrel.run import _present as presenting
 from tests.hess.injected import small_study
 from tests.hess.puck.rig import fault, presented, puck_options
 

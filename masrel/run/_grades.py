@@ -7,14 +7,11 @@ from typing import ClassVar, Protocol
 from masrel.errors import ParameterError
 from masrel.schedule import Presentation
 
-__all__ = ["MOST_FAULTS", "Asked", "GradeSource", "ScriptGrades"]
-
-MOST_FAULTS = 3
-"""Faults in a row of one presentation after which nobody is asked any more."""
+MAX_FAULTS = 3  # in a row of one presentation; after that nobody is asked any more
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Asked:
+class GradeRequest:
     """What a grade is asked for.
 
     Attributes
@@ -52,15 +49,15 @@ class GradeSource(Protocol):
         """Whether its grades are no person's."""
         ...
 
-    def make_ready(self, asked: Asked) -> None:
+    def make_ready(self, request: GradeRequest) -> None:
         """Return when the rater is ready for the presentation."""
         ...
 
-    def grade(self, asked: Asked) -> str | None:
+    def grade(self, request: GradeRequest) -> str | None:
         """Return the grade, or None to have it presented again first."""
         ...
 
-    def present_again(self, asked: Asked, fault: str) -> bool:
+    def present_again(self, request: GradeRequest, fault: str) -> bool:
         """Return whether to go on after a fault by presenting it again."""
         ...
 
@@ -80,15 +77,15 @@ class ScriptGrades:
     def __init__(self, grades: Mapping[str, str] | Sequence[str]) -> None:
         self._grades = grades
 
-    def make_ready(self, asked: Asked) -> None:
+    def make_ready(self, request: GradeRequest) -> None:
         """Return at once."""
 
-    def grade(self, asked: Asked) -> str | None:
+    def grade(self, request: GradeRequest) -> str | None:
         """Return the grade of the script.
 
         Parameters
         ----------
-        asked : Asked
+        request : GradeRequest
             What was presented.
 
         Returns
@@ -101,16 +98,17 @@ class ScriptGrades:
         ParameterError
             If the script has none for it.
         """
-        shown, grades = asked.presentation, self._grades
+        presentation, grades = request.presentation, self._grades
         if isinstance(grades, Mapping):
-            if shown.code in grades:
-                return grades[shown.code]
-        elif shown.position <= len(grades):
-            return grades[shown.position - 1]
+            if presentation.code in grades:
+                return grades[presentation.code]
+        elif presentation.position <= len(grades):
+            return grades[presentation.position - 1]
         raise ParameterError(
-            f"script: needed a grade of position {shown.position}, code {shown.code}"
+            f"script: needed a grade of position {presentation.position}, "
+            f"code {presentation.code}"
         )
 
-    def present_again(self, asked: Asked, fault: str) -> bool:  # noqa: ARG002 - the interface's
-        """Return whether there were fewer faults in a row than `MOST_FAULTS`."""
-        return asked.n_faults < MOST_FAULTS
+    def present_again(self, request: GradeRequest, fault: str) -> bool:  # noqa: ARG002 - the interface's
+        """Return whether there were fewer faults in a row than `MAX_FAULTS`."""
+        return request.n_faults < MAX_FAULTS

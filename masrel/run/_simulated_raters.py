@@ -12,9 +12,7 @@ from typing import ClassVar, Literal
 
 from masrel.errors import ParameterError, ProtocolError
 from masrel.protocol import Model, Protocol, scale_of
-from masrel.run.grades import MOST_FAULTS, Asked
-
-__all__ = ["SimulatedGrades", "intended_speed", "severity"]
+from masrel.run._grades import MAX_FAULTS, GradeRequest
 
 _Purpose = Literal["accuracy", "neighbour", "severity", "retest", "speed"]
 
@@ -55,15 +53,15 @@ class SimulatedGrades:
             for rater in session.raters:
                 self._first_session.setdefault(rater, session.id)
 
-    def make_ready(self, asked: Asked) -> None:
+    def make_ready(self, request: GradeRequest) -> None:
         """Return at once."""
 
-    def grade(self, asked: Asked) -> str | None:
+    def grade(self, request: GradeRequest) -> str | None:
         """Return the grade the simulated rater gives.
 
         Parameters
         ----------
-        asked : Asked
+        request : GradeRequest
             What was presented.
 
         Returns
@@ -76,22 +74,25 @@ class SimulatedGrades:
         ParameterError
             If the protocol has no such model.
         """
-        shown = asked.presentation
-        if shown.model not in self._severity:
+        presentation = request.presentation
+        if presentation.model not in self._severity:
             raise ParameterError(
-                f"model: needed one of {', '.join(self._severity)}, got {shown.model!r}"
+                f"model: needed one of {', '.join(self._severity)}, "
+                f"got {presentation.model!r}"
             )
-        session = asked.session
-        first = self._first_session.get(asked.rater, session)
-        key = (asked.rater, session, shown.model, shown.repeat)
+        session = request.session
+        first = self._first_session.get(request.rater, session)
+        key = (request.rater, session, presentation.model, presentation.repeat)
         repeats = _uniform(self._settings.seed, "retest", *key)
         if session != first and repeats < self._settings.retest_agreement:
             session = first
-        return self._fresh(asked.rater, session, shown.model, shown.repeat)
+        return self._fresh(
+            request.rater, session, presentation.model, presentation.repeat
+        )
 
-    def present_again(self, asked: Asked, fault: str) -> bool:  # noqa: ARG002 - the interface's
-        """Return whether there were fewer faults in a row than `MOST_FAULTS`."""
-        return asked.n_faults < MOST_FAULTS
+    def present_again(self, request: GradeRequest, fault: str) -> bool:  # noqa: ARG002 - the interface's
+        """Return whether there were fewer faults in a row than `MAX_FAULTS`."""
+        return request.n_faults < MAX_FAULTS
 
     def _fresh(self, rater: str, session: str, model: str, repeat: int) -> str:
         seed, key = self._settings.seed, (rater, session, model, repeat)
@@ -139,9 +140,9 @@ def _interpolated(height: float, known: list[tuple[float, float]]) -> float:
     # known: (height, rank), by height
     if height <= known[0][0]:
         return known[0][1]
-    for (low, below), (high, above) in itertools.pairwise(known):
+    for (low, low_rank), (high, high_rank) in itertools.pairwise(known):
         if height <= high:
-            return below + (above - below) * (height - low) / (high - low)
+            return low_rank + (high_rank - low_rank) * (height - low) / (high - low)
     return known[-1][1]
 
 

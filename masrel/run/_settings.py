@@ -17,15 +17,6 @@ from masrel.protocol import DeviceSettings, Protocol, elbow_parameters
 if TYPE_CHECKING:
     from masrel.hess.puck.options import PuckOptions
 
-__all__ = [
-    "backend_options",
-    "check_backend",
-    "device_limits",
-    "has_simulated_hand",
-    "model_controller",
-    "moves_hardware",
-]
-
 
 def check_backend(settings: DeviceSettings) -> None:
     """Do nothing if a session can be run on the device of a protocol."""
@@ -63,7 +54,25 @@ def device_limits(settings: DeviceSettings) -> DeviceLimits:
 
 
 def model_controller(protocol: Protocol, model: str) -> Controller:
-    """Return a new controller of one model."""
+    """Return a new controller of one model.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        The models, the stretch and the device.
+    model : str
+        Id of the model.
+
+    Returns
+    -------
+    Controller
+        For one presentation.
+
+    Raises
+    ------
+    ProtocolError
+        If the protocol has no such model.
+    """
     settings = protocol.device
     return Controller(
         elbow_parameters(protocol, model),

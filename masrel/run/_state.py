@@ -3,11 +3,13 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from masrel.errors import SessionLogError
-from masrel.run.chain import Event, Fact
+from masrel.run._log import Event
 
-__all__ = ["EVENTS", "SessionState", "replay"]
+if TYPE_CHECKING:
+    from masrel.recording import Fact  # loads numpy
 
 EVENTS: dict[str, tuple[str, ...]] = {
     "session": (
@@ -60,11 +62,11 @@ class SessionState:
     """Where a session stands."""
 
     # fields of the event ``session``; empty when there is none yet
-    header: Mapping[str, Fact] = field(default_factory=dict)
+    header: "Mapping[str, Fact]" = field(default_factory=dict)
     # presentations of each code, in order
     presented: dict[str, list[Event]] = field(default_factory=dict)
     # grade of each graded code as the rater gave it
-    given: dict[str, str] = field(default_factory=dict)
+    first_grades: dict[str, str] = field(default_factory=dict)
     grades: dict[str, str] = field(default_factory=dict)  # the same with corrections
     is_complete: bool = False  # whether the session came to its end
 
@@ -73,14 +75,14 @@ def replay(path: Path, events: Sequence[Event]) -> SessionState:
     """Find out where a session stands from its log."""
     state = SessionState()
     for event in events:
-        fault = _misfit(state, event)
+        fault = _contradiction(state, event)
         if fault is not None:
             raise SessionLogError(f"{path}: line {event.line}: {event.kind}: {fault}")
-        _take(state, event)
+        _apply(state, event)
     return state
 
 
-def _misfit(state: SessionState, event: Event) -> str | None:
+def _contradiction(state: SessionState, event: Event) -> str | None:
     # -> why the event cannot follow, or None
     if event.kind not in EVENTS:
         return f"needed an event of {', '.join(EVENTS)}"
@@ -95,36 +97,36 @@ def _misfit(state: SessionState, event: Event) -> str | None:
         return "needed the event session once, before all others"
     if state.is_complete and event.kind != "correction":
         return "needed no event but a correction after complete"
-    return _misfit_of_code(state, event)
+    return _contradiction_of_code(state, event)
 
 
-def _misfit_of_code(state: SessionState, event: Event) -> str | None:
+def _contradiction_of_code(state: SessionState, event: Event) -> str | None:
     code = event.fields.get("code")
-    if event.kind == "presented" and code in state.given:
+    if event.kind == "presented" and code in state.first_grades:
         return f"needed a code that is not graded yet, got {code}"
     if event.kind == "fault":
         before = state.presented.get(str(code), [])
         if not before or before[-1].fields["fault"] is None:
             return f"needed a presentation of {code} that a fault stopped before it"
     if event.kind == "grade":
-        if code in state.given:
+        if code in state.first_grades:
             return f"needed one grade of {code}, got another"
         before = state.presented.get(str(code), [])
         if not before or before[-1].fields["fault"] is not None:
             return f"needed a presentation of {code} without fault before its grade"
-    if event.kind == "correction" and code not in state.given:
+    if event.kind == "correction" and code not in state.first_grades:
         return f"needed a code that is graded, got {code}"
     return None
 
 
-def _take(state: SessionState, event: Event) -> None:
+def _apply(state: SessionState, event: Event) -> None:
     code, grade = str(event.fields.get("code")), str(event.fields.get("grade"))
     if event.kind == "session":
         state.header = event.fields
     elif event.kind == "presented":
         state.presented.setdefault(code, []).append(event)
     elif event.kind == "grade":
-        state.given[code] = state.grades[code] = grade
+        state.first_grades[code] = state.grades[code] = grade
     elif event.kind == "correction":
         state.grades[code] = grade
     elif event.kind == "complete":

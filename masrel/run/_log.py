@@ -1,33 +1,146 @@
-"""The session log, open for appending: an event is on disk before anything follows.
+"""The session log: a chain of events, each on disk before anything follows.
 
-``docs/session_log.md`` says what happens after a crash.
+Every line carries the hash of the line before. ``docs/session_log.md`` has the format,
+how to verify it without masrel, and what happens after a crash.
 """
 
+import hashlib
 import json
 import math
 import os
 import sys
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
-from types import TracebackType
-from typing import Self
+from types import MappingProxyType, TracebackType
+from typing import TYPE_CHECKING, Self
 
 from masrel.errors import SessionLogError
-from masrel.run.chain import (
-    FIRST_PREVIOUS,
-    Event,
-    Fact,
-    line_hash,
-    parse_event,
-    split_lines,
-    verify,
-)
+
+if TYPE_CHECKING:
+    from masrel.recording import Fact  # loads numpy
 
 if sys.platform != "win32":
     import fcntl
 
-__all__ = ["SessionLog", "utc_now"]
+# What the first line carries in place of the hash of a line before it
+_FIRST_PREVIOUS = "0" * 64
+
+_KEYS = ("event", "time_utc", "previous", "fields")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Event:
+    """One line of a session log.
+
+    Attributes
+    ----------
+    line : int
+        Its number in the file, from 1.
+    kind : str
+        What happened: ``"session"``, ``"presented"``, ``"grade"`` and others.
+    time_utc : str
+        When, ISO 8601 in UTC.
+    fields : mapping of str to str, int, float, bool or None
+        The facts of the event.
+    """
+
+    line: int
+    kind: str
+    time_utc: str
+    fields: "Mapping[str, Fact]" = field(hash=False)
+
+
+def read_log(path: Path) -> tuple[Event, ...]:
+    """Read a session log and verify its whole chain.
+
+    Parameters
+    ----------
+    path : Path
+        The log.
+
+    Returns
+    -------
+    tuple of Event
+        Every event in order; empty when the file is.
+
+    Raises
+    ------
+    SessionLogError
+        If the file is missing, a line is not an event, a line does not carry the
+        hash of the line before, or the last line is torn.
+    """
+    if not path.is_file():
+        raise SessionLogError(f"{path}: no such session log")
+    lines, torn = _split_lines(path.read_bytes())
+    if torn:
+        raise SessionLogError(
+            f"{path}: line {len(lines) + 1}: ends without a newline, its writing was "
+            "interrupted; masrel run for this rater and session recovers the log"
+        )
+    return _verify(path, lines)
+
+
+def _split_lines(data: bytes) -> tuple[list[bytes], bytes]:
+    """Return the lines without their newlines, and what follows the last newline."""
+    *lines, torn = data.split(b"\n")
+    return lines, torn
+
+
+def _line_hash(line: bytes) -> str:
+    """Return the SHA-256 of a line without its newline, in hexadecimal."""
+    return hashlib.sha256(line).hexdigest()
+
+
+def _verify(path: Path, lines: list[bytes]) -> tuple[Event, ...]:
+    """Verify a chain from its first line on."""
+    previous = _FIRST_PREVIOUS
+    events = []
+    for number, line in enumerate(lines, start=1):
+        events.append(_parse_event(path, number, line))
+        carried = json.loads(line)["previous"]
+        if carried != previous:
+            raise SessionLogError(
+                f"{path}: line {number}: needed previous = {previous}"
+                + (f" (the hash of line {number - 1})" if number > 1 else "")
+                + f", got {carried}: a line before was changed, removed or added"
+            )
+        previous = _line_hash(line)
+    return tuple(events)
+
+
+def _parse_event(path: Path, number: int, line: bytes) -> Event:
+    """Read one line, without regard to the chain."""
+    try:
+        document = json.loads(line.decode("utf-8"))
+    except ValueError as error:
+        raise SessionLogError(
+            f"{path}: line {number}: needed one JSON object, got {line[:40]!r} "
+            f"({error})"
+        ) from error
+    if not isinstance(document, dict) or tuple(document) != _KEYS:
+        raise SessionLogError(
+            f"{path}: line {number}: needed an object with the keys "
+            f"{', '.join(_KEYS)}, got {line[:40]!r}"
+        )
+    kind, time_utc, fields = document["event"], document["time_utc"], document["fields"]
+    if not (
+        isinstance(kind, str) and isinstance(time_utc, str) and isinstance(fields, dict)
+    ):
+        raise SessionLogError(
+            f"{path}: line {number}: needed text in event and time_utc and an object "
+            "in fields"
+        )
+    for name, fact in fields.items():
+        if isinstance(fact, dict | list):
+            raise SessionLogError(
+                f"{path}: line {number}: {name} needs text, a number, true, false or "
+                f"null, got {fact!r}"
+            )
+    return Event(
+        line=number, kind=kind, time_utc=time_utc, fields=MappingProxyType(fields)
+    )
 
 
 def utc_now() -> datetime:
@@ -102,9 +215,9 @@ class SessionLog:
     @classmethod
     def _recover(cls, path: Path, descriptor: int, now: Callable[[], datetime]) -> Self:
         data = path.read_bytes()
-        lines, torn = split_lines(data)
-        events = list(verify(path, lines))
-        previous = line_hash(lines[-1]) if lines else FIRST_PREVIOUS
+        lines, torn = _split_lines(data)
+        events = list(_verify(path, lines))
+        previous = _line_hash(lines[-1]) if lines else _FIRST_PREVIOUS
         log = cls(path, descriptor, events, previous, now)
         os.lseek(descriptor, len(data) - len(torn), os.SEEK_SET)
         if torn:
@@ -115,7 +228,7 @@ class SessionLog:
         facts: dict[str, Fact] = {
             "line": line,
             "n_bytes": len(torn),
-            "sha256": line_hash(torn),
+            "sha256": _line_hash(torn),
         }
         # A line's closing brace is its last byte: what parses is a whole event.
         if _is_event(self.path, line, torn, self._previous):
@@ -140,7 +253,7 @@ class SessionLog:
         """Whether events can be appended."""
         return self._descriptor is not None
 
-    def append(self, kind: str, fields: Mapping[str, Fact]) -> Event:
+    def append(self, kind: str, fields: "Mapping[str, Fact]") -> Event:
         """Append one event and wait until it is on disk.
 
         Parameters
@@ -191,8 +304,8 @@ class SessionLog:
             # After a failed or interrupted write nothing may follow on this line.
             if not is_written:
                 os.close(descriptor)
-        self._events.append(parse_event(self.path, len(self._events) + 1, line))
-        self._previous = line_hash(line)
+        self._events.append(_parse_event(self.path, len(self._events) + 1, line))
+        self._previous = _line_hash(line)
         self._descriptor = descriptor
 
     def close(self) -> None:
@@ -215,13 +328,13 @@ class SessionLog:
 
 def _is_event(path: Path, number: int, line: bytes, previous: str) -> bool:
     try:
-        parse_event(path, number, line)
+        _parse_event(path, number, line)
     except SessionLogError:
         return False
     return bool(json.loads(line)["previous"] == previous)
 
 
-def _check_fact(path: Path, kind: str, name: str, fact: Fact) -> None:
+def _check_fact(path: Path, kind: str, name: str, fact: "Fact") -> None:
     if fact is not None and not isinstance(fact, str | int | float):
         raise SessionLogError(
             f"{path}: event {kind!r}: {name} needs text, a number, true, false or "

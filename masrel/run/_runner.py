@@ -1,4 +1,4 @@
-"""One walk along a schedule: present, ask, and log both at once."""
+"""The runner of one session: present, ask for the grade, and log both at once."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,17 +14,13 @@ from masrel.errors import (
 )
 from masrel.hess import Clock, EmergencyStop, RealClock, SimulatedClock
 from masrel.protocol import Protocol, StudyPaths, presented_hash, protocol_hash
-from masrel.run.chain import Fact
-from masrel.run.fault import FaultRecord
-from masrel.run.grades import Asked, GradeSource
-from masrel.run.kept import Shown, recover
-from masrel.run.log import SessionLog
-from masrel.run.present import present
-from masrel.run.replay import SessionState, replay
-from masrel.run.settings import moves_hardware
+from masrel.recording import Fact
+from masrel.run._grades import GradeRequest, GradeSource
+from masrel.run._log import SessionLog
+from masrel.run._present import Outcome, present, recover
+from masrel.run._settings import moves_hardware
+from masrel.run._state import SessionState, replay
 from masrel.schedule import Presentation, Schedule
-
-__all__ = ["CLOCKS", "ClockName", "SessionSummary", "Walk"]
 
 ClockName = Literal["real", "simulated"]
 
@@ -36,8 +32,8 @@ CLOCKS: dict[str, Callable[[], Clock]] = {
 
 _FORMAT = 1
 
-_ENDING = ("signal SIGTERM", "signal SIGHUP")
-"""Emergency stops by somebody who wants the process to end; Ctrl-C may be a rater's."""
+# Emergency stops by somebody who wants the process to end; Ctrl-C may be a rater's.
+_TERMINATING = ("signal SIGTERM", "signal SIGHUP")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,7 +65,7 @@ class SessionSummary:
     simulated: bool
 
 
-class Walk:
+class SessionRunner:
     """One run of one session; what it does is on disk before it goes on."""
 
     def __init__(
@@ -88,7 +84,7 @@ class Walk:
         self._clock = clock
         self._log = log
         self._state: SessionState = replay(log.path, log.events)
-        self._n_graded_before = len(self._state.given)
+        self._n_graded_before = len(self._state.first_grades)
         self._n_again = 0
         self._n_faults = 0
 
@@ -130,16 +126,14 @@ class Walk:
                 "resumed", {**provenance, "n_graded": self._n_graded_before}
             )
 
-    def to_the_end(
-        self, progress: Callable[[Presentation], object] | None
-    ) -> SessionSummary:
+    def run(self, progress: Callable[[Presentation], object] | None) -> SessionSummary:
         """Present and ask until every presentation has its grade."""
         schedule = self._schedule
-        for shown in schedule.presentations:
-            if shown.code not in self._state.given:
-                self._rate(shown)
+        for presentation in schedule.presentations:
+            if presentation.code not in self._state.first_grades:
+                self._rate(presentation)
             if progress is not None:
-                progress(shown)
+                progress(presentation)
         if not self._state.is_complete:
             n_presentations = len(schedule.presentations)
             self._log.append("complete", {"n_presentations": n_presentations})
@@ -154,40 +148,42 @@ class Walk:
         )
 
     def _rate(self, presentation: Presentation) -> None:
-        shown: dict[str, Fact] = {
+        fields: dict[str, Fact] = {
             "code": presentation.code,
             "position": presentation.position,
         }
         try:
             grade = self._until_graded(presentation)
         except SessionStoppedError as error:
-            self._log.append("stopped", {**shown, "why": str(error)})
+            self._log.append("stopped", {**fields, "why": str(error)})
             raise
-        self._log.append("grade", {**shown, "grade": grade})
+        self._log.append("grade", {**fields, "grade": grade})
 
     def _until_graded(self, presentation: Presentation) -> str:
         attempt = len(self._state.presented.get(presentation.code, []))
         n_faults, grade = 0, None
-        attempt += self._recovered(self._asked(presentation, attempt + 1, 0))
+        attempt += self._recovered(self._request(presentation, attempt + 1, 0))
         while grade is None:
             attempt += 1
-            asked = self._asked(presentation, attempt, n_faults)
-            self._grades.make_ready(asked)
-            fault = self._present(asked).fault
+            request = self._request(presentation, attempt, n_faults)
+            self._grades.make_ready(request)
+            fault = self._present(request).fault
             n_faults = 0 if fault is None else n_faults + 1
-            asked = self._asked(presentation, attempt, n_faults)
+            request = self._request(presentation, attempt, n_faults)
             if fault is None:
-                grade = self._checked(asked, self._grades.grade(asked))
-            elif not self._grades.present_again(asked, fault.message):
+                grade = self._checked(request, self._grades.grade(request))
+            elif not self._grades.present_again(request, fault.message):
                 raise DeviceError(
-                    f"session {asked.session} of {asked.rater}: presentation "
+                    f"session {request.session} of {request.rater}: presentation "
                     f"{presentation.position}, code {presentation.code}, was stopped "
                     f"by a fault: {fault.message}"
                 )
         return grade
 
-    def _asked(self, presentation: Presentation, attempt: int, n_faults: int) -> Asked:
-        return Asked(
+    def _request(
+        self, presentation: Presentation, attempt: int, n_faults: int
+    ) -> GradeRequest:
+        return GradeRequest(
             rater=self._schedule.rater,
             session=self._schedule.session,
             presentation=presentation,
@@ -196,77 +192,76 @@ class Walk:
             n_faults=n_faults,
         )
 
-    def _file(self, asked: Asked) -> Path:
-        code = asked.presentation.code
-        file = self._study.recording_file(asked.rater, asked.session, code)
-        return (
-            file.with_name(f"{code}-{asked.attempt}.npz") if asked.attempt > 1 else file
-        )
+    def _file(self, request: GradeRequest) -> Path:
+        code = request.presentation.code
+        file = self._study.recording_file(request.rater, request.session, code)
+        if request.attempt > 1:
+            return file.with_name(f"{code}-{request.attempt}.npz")
+        return file
 
-    def _recovered(self, asked: Asked) -> bool:
+    def _recovered(self, request: GradeRequest) -> bool:
         # Whether a process died while it presented this, and its data are now logged
-        file = self._file(asked)
-        left = recover(self._protocol, asked, file=file)
-        if left is not None:
-            self._log_shown(asked, left, file)
-        return left is not None
+        file = self._file(request)
+        outcome = recover(self._protocol, request, file=file)
+        if outcome is not None:
+            self._log_presented(request, outcome, file)
+        return outcome is not None
 
-    def _present(self, asked: Asked) -> Shown:
-        shown, file = asked.presentation, self._file(asked)
+    def _present(self, request: GradeRequest) -> Outcome:
+        file = self._file(request)
         # A new one each time, so that the simulated clock starts at zero.
         clock, stop = CLOCKS[self._clock](), EmergencyStop()
-        left = present(self._protocol, asked, clock=clock, file=file, stop=stop)
-        self._n_again += asked.attempt > 1
-        self._log_shown(asked, left, file)
-        if stop.reason in _ENDING:
+        outcome = present(self._protocol, request, clock=clock, file=file, stop=stop)
+        self._n_again += request.attempt > 1
+        self._log_presented(request, outcome, file)
+        if stop.reason in _TERMINATING:
             raise SessionStoppedError(
-                f"session {asked.session} of {asked.rater} was stopped by "
-                f"{stop.reason} at presentation {shown.position}; the same command "
-                "goes on there"
+                f"session {request.session} of {request.rater} was stopped by "
+                f"{stop.reason} at presentation {request.presentation.position}; "
+                "the same command goes on there"
             )
-        return left
+        return outcome
 
-    def _log_shown(self, asked: Asked, left: Shown, file: Path) -> None:
-        shown = asked.presentation
-        self._n_faults += left.fault is not None
+    def _log_presented(
+        self, request: GradeRequest, outcome: Outcome, file: Path
+    ) -> None:
+        fault = outcome.fault
+        self._n_faults += fault is not None
+        fields: dict[str, Fact] = {
+            "code": request.presentation.code,
+            "position": request.presentation.position,
+            "attempt": request.attempt,
+        }
         self._log.append(
             "presented",
             {
-                "code": shown.code,
-                "position": shown.position,
-                "attempt": asked.attempt,
+                **fields,
                 "recording": file.relative_to(self._study.sessions).as_posix(),
-                "sha256": left.sha256,
-                "mean_speed_deg_s": left.mean_speed_deg_s,
-                "n_missed_ticks": left.n_missed_ticks,
-                "fault": None if left.fault is None else left.fault.message,
-                "simulated": left.simulated,
+                "sha256": outcome.sha256,
+                "mean_speed_deg_s": outcome.mean_speed_deg_s,
+                "n_missed_ticks": outcome.n_missed_ticks,
+                "fault": None if fault is None else fault.message,
+                "simulated": outcome.simulated,
             },
         )
-        if left.fault is not None:
-            self._log_fault(asked, left.fault)
+        if fault is not None:
+            self._log.append(
+                "fault",
+                {
+                    **fields,
+                    "kind": fault.kind,
+                    "words": fault.message,
+                    "time_s": fault.time_s,
+                    "torque_nm": fault.torque_nm,
+                    "last_200_ms": outcome.last_200_ms,
+                },
+            )
 
-    def _log_fault(self, asked: Asked, fault: FaultRecord) -> None:
-        shown = asked.presentation
-        self._log.append(
-            "fault",
-            {
-                "code": shown.code,
-                "position": shown.position,
-                "attempt": asked.attempt,
-                "kind": fault.kind,
-                "words": fault.message,
-                "time_s": fault.time_s,
-                "torque_nm": fault.torque_nm,
-                "last_200_ms": fault.last_200_ms,
-            },
-        )
-
-    def _checked(self, asked: Asked, grade: str | None) -> str | None:
+    def _checked(self, request: GradeRequest, grade: str | None) -> str | None:
         grades = self._protocol.scale.grades
         if grade is not None and grade not in grades:
             raise ParameterError(
-                f"grade of {asked.presentation.code}: needed one of "
+                f"grade of {request.presentation.code}: needed one of "
                 f"{', '.join(grades)}, got {grade!r}"
             )
         return grade

@@ -1,0 +1,225 @@
+"""One presentation of one model: on the device of its study, and on disk."""
+
+import contextlib
+import dataclasses
+import math
+import os
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from masrel.hess import (
+    Clock,
+    DeviceLimits,
+    EmergencyStop,
+    Fault,
+    Presented,
+    RealClock,
+    SimulatedHand,
+    cut_off,
+    open_device,
+    run_presentation,
+)
+from masrel.hess._stop import stop_on_key, stop_on_signals
+from masrel.hess._watchdog import watched
+from masrel.protocol import Protocol, elbow_parameters
+from masrel.recording import RECORDING_COLUMNS, Fact, Recording, write_recording
+from masrel.run._grades import GradeRequest
+from masrel.run._settings import (
+    backend_options,
+    device_limits,
+    has_simulated_hand,
+    model_controller,
+)
+from masrel.run._simulated_raters import intended_speed
+
+# After this a presentation ends, wherever the arm is.
+_LONGEST_STRETCH_S = 10.0
+
+# How much of the recording before a fault goes into the log
+_BEFORE_FAULT_S = 0.2
+
+_FORMATS = {
+    "time_s": "{:.6f}",
+    "angle_deg": "{:.4f}",
+    "velocity_deg_s": "{:.2f}",
+    "model_torque_nm": "{:.4f}",
+    "command_torque_nm": "{:.4f}",
+    "phase": "{:.0f}",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """What a presentation left."""
+
+    sha256: str  # checksum of the recording
+    # mean speed before the catch, deg/s; None when the arm never moved
+    mean_speed_deg_s: float | None
+    n_missed_ticks: int  # ticks the loop skipped
+    fault: Fault | None  # what stopped it, or None
+    # the recording from 200 ms before the fault until the torque was zero, as CSV
+    last_200_ms: str | None
+    simulated: bool  # whether no hardware moved
+
+
+def present(
+    protocol: Protocol,
+    request: GradeRequest,
+    *,
+    clock: Clock,
+    file: Path,
+    stop: EmergencyStop,
+) -> Outcome:
+    """Present a model once on the protocol's device and write the recording."""
+    # Signals that would end the process, and with a real clock any key of the terminal,
+    # press the emergency stop while the device is open.
+    limits = device_limits(protocol.device)
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(stop_on_signals(stop))
+        if isinstance(clock, RealClock):
+            stack.enter_context(stop_on_key(stop, sys.stdin))
+        spool = _spool_of(file)
+        presented = _on_device(protocol, request, clock, limits, stop, spool)
+    return _keep(presented, protocol, request, file)
+
+
+def recover(protocol: Protocol, request: GradeRequest, *, file: Path) -> Outcome | None:
+    """Make a recording of what a process left that died while presenting."""
+    spool = _spool_of(file)
+    if not spool.exists():
+        return None
+    presented = cut_off(spool)
+    if presented is None:
+        spool.unlink()
+        return None
+    return _keep(presented, protocol, request, file)
+
+
+def _on_device(
+    protocol: Protocol,
+    request: GradeRequest,
+    clock: Clock,
+    limits: DeviceLimits,
+    stop: EmergencyStop,
+    spool: Path,
+) -> Presented:
+    settings, stretch = protocol.device, protocol.stretch
+    start, end = math.radians(stretch.start_deg), math.radians(stretch.end_deg)
+    speed = _hand_speed(protocol, request)
+    hand = (
+        None if speed is None else SimulatedHand(start=start, end=end, mean_speed=speed)
+    )
+    model = request.presentation.model
+    with contextlib.ExitStack() as stack:
+        device = stack.enter_context(
+            open_device(
+                settings.backend,
+                clock=clock,
+                hand=hand,
+                range_end=elbow_parameters(protocol, model).range_end,
+                options=backend_options(settings, hand),
+            )
+        )
+        watchdog = watched(device, limits.watchdog_time)
+        if watchdog is not None:
+            stack.enter_context(watchdog)
+        return run_presentation(
+            device,
+            model_controller(protocol, model),
+            clock=clock,
+            limits=limits,
+            rate_hz=settings.rate_hz,
+            max_duration_s=_max_duration_s(end - start, speed),
+            end_angle=end,
+            stop=stop,
+            watchdog=watchdog,
+            spool=spool,
+        )
+
+
+def _hand_speed(protocol: Protocol, request: GradeRequest) -> float | None:
+    # rad/s of the simulated hand; None when a person moves the arm
+    if not has_simulated_hand(protocol.device):
+        return None
+    presentation = request.presentation
+    return math.radians(
+        intended_speed(
+            protocol,
+            request.rater,
+            request.session,
+            presentation.model,
+            presentation.repeat,
+        )
+    )
+
+
+def _max_duration_s(travel: float, speed: float | None) -> float:
+    if speed is None:
+        return _LONGEST_STRETCH_S
+    # A simulated hand that means to be slow gets the time it needs.
+    return max(_LONGEST_STRETCH_S, 2.0 * travel / speed)
+
+
+def _spool_of(file: Path) -> Path:
+    # Where samples are kept while the recording is made
+    return file.with_suffix(".partial")
+
+
+def _keep(
+    presented: Presented, protocol: Protocol, request: GradeRequest, file: Path
+) -> Outcome:
+    # Writes the recording, and removes what was kept while it was made
+    presentation, recording = request.presentation, presented.recording
+    facts: dict[str, Fact] = {
+        **recording.facts,
+        "study": protocol.study.id,
+        "rater": request.rater,
+        "session": request.session,
+        "code": presentation.code,
+        "model": presentation.model,
+        "repeat": presentation.repeat,
+        "position": presentation.position,
+        "attempt": request.attempt,
+    }
+    try:
+        checksum = write_recording(dataclasses.replace(recording, facts=facts), file)
+    except OSError as error:
+        error.filename = str(file)  # a full disk does not say which file it was
+        raise
+    for written in (file, file.with_suffix(".json")):
+        _sync(written)  # before the log says that they are there
+    _spool_of(file).unlink(missing_ok=True)  # only now is it of no use
+    speed, fault = facts["mean_speed_deg_s"], presented.fault
+    return Outcome(
+        sha256=checksum,
+        mean_speed_deg_s=None if speed is None else float(speed),
+        n_missed_ticks=presented.n_missed_ticks,
+        fault=fault,
+        last_200_ms=None if fault is None else _before(fault, recording),
+        simulated=bool(facts["simulated"]),
+    )
+
+
+def _sync(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDWR)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _before(fault: Fault, recording: Recording) -> str:
+    # The rows from shortly before a fault to the end, as CSV
+    columns = recording.columns
+    first = int(np.searchsorted(columns["time_s"], fault.time_s - _BEFORE_FAULT_S))
+    lines = [",".join(RECORDING_COLUMNS)]
+    for row in range(first, recording.n_samples):
+        cells = (
+            _FORMATS[name].format(float(columns[name][row]))
+            for name in RECORDING_COLUMNS
+        )
+        lines.append(",".join(cells))
+    return "\n".join(lines) + "\n"
