@@ -27,6 +27,7 @@ __all__ = [
 ]
 
 Phase = Literal["pre-catch", "catch", "post-catch"]
+"""Part of a stretch that a joint is in."""
 
 PHASES: tuple[Phase, ...] = ("pre-catch", "catch", "post-catch")
 """Names of the phases; their positions are the codes in the column `phase`."""

@@ -1,6 +1,5 @@
 """Every exported name is on the page of the interface, with what it is."""
 
-import importlib
 import pkgutil
 
 import masrel
@@ -21,6 +20,6 @@ def test_no_package_that_exports_is_left_out() -> None:
     packages = [
         info.name
         for info in pkgutil.walk_packages(masrel.__path__, "masrel.")
-        if info.ispkg and hasattr(importlib.import_module(info.name), "__all__")
+        if info.ispkg and info.name.count(".") == 1
     ]
     assert set(packages) - {"masrel.cli"} <= set(MODULES)
