@@ -1,8 +1,8 @@
 """What docs/identification.md shows: its figures, its table of coverage, its time.
 
-python -m tests.elbow.identification.page figures
-python -m tests.elbow.identification.page coverage [STUDIES]
-python -m tests.elbow.identification.page time
+python -m docs.make.identification figures
+python -m docs.make.identification coverage [STUDIES]
+python -m docs.make.identification time
 """
 
 import math
@@ -24,7 +24,7 @@ from masrel.report.figures.fit_trial import draw_fast_trials
 from tests.elbow.identification.synthesis import Scatter, recording, study
 from tests.elbow.identification.test_friction import backdriven
 
-FIGURES = Path(__file__).parents[3] / "docs" / "figures"
+FIGURES = Path(__file__).parents[1] / "figures"
 SCATTER = Scatter(
     catch_angle=math.radians(2.0), catch_torque=0.1, catch_travel=math.radians(2.0)
 )
