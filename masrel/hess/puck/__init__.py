@@ -1,10 +1,75 @@
-"""The Barrett Puck, a motor amplifier on a CAN bus: codec, device, emulator.
+"""The Barrett Puck, a motor amplifier on a CAN bus: bring it up, or emulate it.
 
-The names here need no python-can: what speaks on a bus is imported when it is used.
+`open_device("puck", ...)` of `masrel.hess` drives it. In: where the puck is, as
+`PuckOptions`. The names that speak on a bus load python-can on first use (PEP 562).
 """
 
-from masrel.hess.puck.emulator_options import EmulatorOptions
-from masrel.hess.puck.faults import InjectedFault
-from masrel.hess.puck.options import PuckOptions
+import importlib
+from typing import TYPE_CHECKING
 
-__all__ = ["EmulatorOptions", "InjectedFault", "PuckOptions"]
+from masrel.hess.puck._options import EmulatorOptions, InjectedFault, PuckOptions
+from masrel.hess.puck._properties import (
+    PropertyTable,
+    property_table,
+    read_property_table,
+)
+
+if TYPE_CHECKING:
+    from masrel.hess.puck._bus import Frame, Link
+    from masrel.hess.puck._commissioning import (
+        Check,
+        NodeReport,
+        check,
+        connected,
+        probe,
+        zero,
+    )
+    from masrel.hess.puck._steady_rotation import (
+        FrictionEstimate,
+        SteadyRun,
+        fit_friction,
+        steady_runs,
+    )
+
+__all__ = [
+    "Check",
+    "EmulatorOptions",
+    "Frame",
+    "FrictionEstimate",
+    "InjectedFault",
+    "Link",
+    "NodeReport",
+    "PropertyTable",
+    "PuckOptions",
+    "SteadyRun",
+    "check",
+    "connected",
+    "fit_friction",
+    "probe",
+    "property_table",
+    "read_property_table",
+    "steady_runs",
+    "zero",
+]
+
+_LOADED_ON_USE = {
+    "_bus": ("Frame", "Link"),
+    "_commissioning": ("Check", "NodeReport", "check", "connected", "probe", "zero"),
+    "_steady_rotation": (
+        "FrictionEstimate",
+        "SteadyRun",
+        "fit_friction",
+        "steady_runs",
+    ),
+}
+
+
+def __getattr__(name: str) -> object:
+    for module, names in _LOADED_ON_USE.items():
+        if name in names:
+            return getattr(importlib.import_module(f"{__name__}.{module}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

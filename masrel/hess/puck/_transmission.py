@@ -6,8 +6,6 @@ from typing import Literal
 
 from masrel.errors import ParameterError
 
-__all__ = ["GEAR_RATIO", "Transmission"]
-
 GEAR_RATIO = 18.8
 """Turns of the motor for one of the elbow (Park, Kim and Damiano 2012, Table II)."""
 

@@ -1,7 +1,7 @@
 """The CAN bus, by python-can: the only module that imports it.
 
-A frame that a bus reports is a `Frame`, an error that python-can raises a
-`DeviceError`, a wait ends at a time on the loop's clock.
+Each frame on the bus becomes a `Frame`, each error of python-can a `BusError`, and
+every wait ends at a time on the loop's clock.
 """
 
 from types import TracebackType
@@ -17,24 +17,14 @@ except ImportError as error:
         "puck: needs python-can; install it with: pip install 'masrel[can]'"
     ) from error
 
-__all__ = [
-    "BUS_OFF",
-    "BUS_RESTARTED",
-    "CONTROLLER_ERROR",
-    "Frame",
-    "Link",
-    "Neighbour",
-    "open_link",
-]
-
 BITRATE = 1_000_000
 """Bits a second on a Puck's bus."""
 
 # Classes of error in the identifier of SocketCAN's error frames (linux/can/error.h)
-CONTROLLER_ERROR, BUS_OFF, BUS_RESTARTED = 0x004, 0x040, 0x100
+BUS_OFF, BUS_RESTARTED = 0x040, 0x100
 
-# What python-can raises where it knows no such interface, and its interfaces where an
-# adapter or its maker's library is missing or they have to be told more than a channel
+# What python-can raises for an interface that it does not know, and what its interfaces
+# raise when an adapter or its maker's library is missing, or a channel is not enough
 _NOT_OPENED = (
     can.CanError,
     ImportError,
@@ -49,15 +39,25 @@ _FILTERS_IN_KERNEL = frozenset({"socketcan"})
 
 
 class Frame(NamedTuple):
-    """One frame of the bus."""
+    """One frame of the bus.
 
-    identifier: int  # identifier of 11 bits; for an error frame the class of error
-    data: bytes  # up to eight bytes
-    is_error: bool = False  # whether the controller reports an error with it
+    Attributes
+    ----------
+    identifier : int
+        Identifier of 11 bits; for an error frame the class of error.
+    data : bytes
+        Up to eight bytes.
+    is_error : bool
+        Whether the controller reports an error with it.
+    """
+
+    identifier: int
+    data: bytes
+    is_error: bool = False
 
 
-class Neighbour(Protocol):
-    """Somebody else on an in-process bus, who acts when the host sends or waits."""
+class InProcessPeer(Protocol):
+    """Another node on a bus inside this process, served whenever the host waits."""
 
     def next_due_ns(self) -> int | None:
         """Return when it will act next, ns; None when it waits for a frame."""
@@ -69,16 +69,27 @@ class Neighbour(Protocol):
 
 
 class Link:
-    """One end of a bus; a context manager that leaves it."""
+    """One end of a bus, as `connected` opens it; a context manager that leaves it.
 
-    __slots__ = ("_bus", "_clock", "_neighbour")
+    Parameters
+    ----------
+    bus : can.BusABC
+        An open bus.
+    clock : Clock
+        The clock of deadlines.
+    peer : InProcessPeer or None, optional
+        An emulator in the same thread, which is served whenever this end sends or
+        waits, so that a bus works on a simulated clock too.
+    """
+
+    __slots__ = ("_bus", "_clock", "_peer")
 
     def __init__(
-        self, bus: can.BusABC, clock: Clock, *, neighbour: Neighbour | None = None
+        self, bus: can.BusABC, clock: Clock, *, peer: InProcessPeer | None = None
     ) -> None:
         self._bus = bus
         self._clock = clock
-        self._neighbour = neighbour
+        self._peer = peer
 
     def __enter__(self) -> Self:
         return self
@@ -92,11 +103,27 @@ class Link:
         try:
             self.close()
         except BusError:
-            if error is None:  # else that one matters more
+            if error is None:  # an error inside the block matters more
                 raise
 
     def send(self, frame: Frame) -> int:
-        """Send a frame."""
+        """Send a frame to the bus.
+
+        Parameters
+        ----------
+        frame : Frame
+            What to send.
+
+        Returns
+        -------
+        int
+            When it was handed to the bus, ns.
+
+        Raises
+        ------
+        BusError
+            If the bus does not take it.
+        """
         message = can.Message(
             arbitration_id=frame.identifier,
             data=frame.data,
@@ -108,35 +135,57 @@ class Link:
             self._bus.send(message)
         except (can.CanError, OSError) as error:
             raise BusError(f"puck: the bus takes no frame ({error})") from error
-        if self._neighbour is not None:
-            self._neighbour.serve()
+        if self._peer is not None:
+            self._peer.serve()
         return now_ns
 
     def receive(self, deadline_ns: int) -> Frame | None:
-        """Wait for a frame."""
-        if self._neighbour is None:
+        """Wait for a frame.
+
+        Parameters
+        ----------
+        deadline_ns : int
+            When to give up, ns; a time that has passed takes what is there already.
+
+        Returns
+        -------
+        Frame or None
+            The oldest that has not been received yet; None when none came.
+
+        Raises
+        ------
+        BusError
+            If the bus cannot be read.
+        """
+        if self._peer is None:
             left_ns = deadline_ns - self._clock.now_ns()
-            return self._received(max(0.0, left_ns * 1e-9))
+            return self._next_frame(max(0.0, left_ns * 1e-9))
         while True:
-            self._neighbour.serve()
-            frame = self._received(0.0)
+            self._peer.serve()
+            frame = self._next_frame(0.0)
             if frame is not None:
                 return frame
-            due_ns = self._neighbour.next_due_ns()
+            due_ns = self._peer.next_due_ns()
             if due_ns is None or due_ns > deadline_ns:
                 self._clock.sleep_until_ns(deadline_ns)
-                self._neighbour.serve()
+                self._peer.serve()
                 return None
             self._clock.sleep_until_ns(due_ns)
 
     def close(self) -> None:
-        """Leave the bus; doing it twice does nothing more."""
+        """Leave the bus; doing it twice does nothing more.
+
+        Raises
+        ------
+        BusError
+            If the adapter does not let go.
+        """
         try:
             self._bus.shutdown()
         except (can.CanError, OSError) as error:
             raise BusError(f"puck: the bus cannot be left ({error})") from error
 
-    def _received(self, timeout_s: float) -> Frame | None:
+    def _next_frame(self, timeout_s: float) -> Frame | None:
         # A timeout of 0 does not wait.
         try:
             message = self._bus.recv(timeout_s)
@@ -157,9 +206,11 @@ def open_link(
     *,
     clock: Clock,
     accepted: tuple[int, ...] | None = None,
-    neighbour: Neighbour | None = None,
+    peer: InProcessPeer | None = None,
 ) -> Link:
-    """Open one end of a bus."""
+    """Open one end of a bus; `accepted` identifiers are filtered in the kernel."""
+    # Where no kernel filters, whoever receives looks at the identifiers: filters of
+    # python-can would drop error frames too.
     filters: list[can.typechecking.CanFilter] | None = None
     if accepted is not None and interface in _FILTERS_IN_KERNEL:
         filters = [
@@ -170,23 +221,24 @@ def open_link(
         bus = can.Bus(
             interface=interface,
             can_filters=filters,
-            ignore_config=True,  # what is opened is what was asked for
-            **_settings(interface, channel),
+            ignore_config=True,  # no file of python-can's changes what is opened
+            **_bus_arguments(interface, channel),
         )
     except _NOT_OPENED as error:
         raise BusError(
             f"puck: cannot open channel {channel!r} of interface {interface!r} "
             f"({error})"
         ) from error
-    return Link(bus, clock, neighbour=neighbour)
+    return Link(bus, clock, peer=peer)
 
 
-def _settings(interface: str, channel: str) -> dict[str, Any]:
+def _bus_arguments(interface: str, channel: str) -> dict[str, Any]:
     if interface != "udp_multicast":
         return {"channel": channel, "bitrate": BITRATE}
-    # A bus between the processes of one machine does not leave it.
-    settings: dict[str, Any] = {"channel": channel, "hop_limit": 0}
+    # The bus is for processes of one machine: its packets do not leave it. The channel
+    # is a group, or an IPv4 group, a colon and a port.
+    arguments: dict[str, Any] = {"channel": channel, "hop_limit": 0}
     group, colon, port = channel.partition(":")
     if colon and port.isdecimal():
-        settings.update(channel=group, port=int(port))
-    return settings
+        arguments.update(channel=group, port=int(port))
+    return arguments
