@@ -8,14 +8,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from masrel.cli.bench import Bench
-from masrel.cli.puck import for_a_puck
+from masrel.cli._puck_session import PuckSession, puck_command
 
 if TYPE_CHECKING:
-    from masrel.hess.puck.friction import FrictionEstimate
-    from masrel.hess.puck.survey import Found
-
-__all__ = ["command"]
+    from masrel.hess.puck import FrictionEstimate, NodeReport
 
 _N_NODES = 31
 
@@ -31,43 +27,51 @@ def command() -> None:
 
 
 @command.command("probe")
-@for_a_puck
-def probe_command(bench: Bench) -> None:
+@puck_command
+def probe_command(session: PuckSession) -> None:
     """Ask every node who it is; nothing is set and nobody is woken."""
-    from masrel.hess.puck.survey import probe
+    from masrel.hess.puck import probe
 
-    with bench.link(hears_all=True) as link, bench.progress(_N_NODES) as progress:
-        found = probe(
-            link, bench.clock, properties=bench.options.properties, progress=progress
+    with session.link(all_nodes=True) as link, session.progress(_N_NODES) as progress:
+        reports = probe(
+            link,
+            session.clock,
+            properties=session.options.properties,
+            progress=progress,
         )
-    bench.say(
-        [_described(one) for one in found] or ["nobody answers"],
-        {"found": [dataclasses.asdict(one) for one in found]},
+    session.write_output(
+        [_report_line(report) for report in reports] or ["nobody answers"],
+        {"found": [dataclasses.asdict(report) for report in reports]},
     )
-    if not found:
+    if not reports:
         sys.exit(1)
 
 
 @command.command("check")
-@for_a_puck
-def check_command(bench: Bench) -> None:
+@puck_command
+def check_command(session: PuckSession) -> None:
     """Wake a puck and see whether it can be driven. The arm must be at rest.
 
     It is told its groups and torque limit, goes into torque mode for some
     milliseconds with no more than 0.007 N·m, and is idle afterwards.
     """
-    from masrel.hess.puck.checks import check
-    from masrel.hess.puck.connection import awake
+    from masrel.hess.puck import check
 
-    with bench.link() as link:
-        checks = check(awake(link, bench.clock, bench.options), bench.options)
+    with session.link() as link:
+        checks = check(link, session.clock, session.options)
     holds = all(one.holds for one in checks)
-    bench.say(
+    session.write_output(
         [
-            f"{'ok  ' if one.holds else 'NOT '} {one.name}: {one.found}"
+            f"{'ok  ' if one.holds else 'NOT '} {one.name}: {one.result}"
             for one in checks
         ],
-        {"holds": holds, "checks": [dataclasses.asdict(one) for one in checks]},
+        {
+            "holds": holds,
+            "checks": [
+                {"name": one.name, "holds": one.holds, "found": one.result}
+                for one in checks
+            ],
+        },
     )
     if not holds:
         sys.exit(1)
@@ -80,18 +84,16 @@ def check_command(bench: Bench) -> None:
     required=True,
     help="Where the arm is held now, 0 at full flexion.",
 )
-@for_a_puck
-def zero_command(bench: Bench, angle_deg: float) -> None:
+@puck_command
+def zero_command(session: PuckSession, angle_deg: float) -> None:
     """Tell a puck where the arm is; it forgets when its supply is switched off."""
-    from masrel.hess.puck.bring_up import set_position
-    from masrel.hess.puck.connection import awake
+    from masrel.hess.puck import zero
 
-    with bench.link() as link:
-        puck = awake(link, bench.clock, bench.options)
-        counts = set_position(
-            puck.node, puck.table, puck.transmission, math.radians(angle_deg)
+    with session.link() as link:
+        counts = zero(
+            link, session.clock, session.options, angle=math.radians(angle_deg)
         )
-    bench.say(
+    session.write_output(
         [f"the arm is at {angle_deg:g} deg: {counts} counts"],
         {"angle_deg": angle_deg, "counts": counts},
     )
@@ -103,42 +105,43 @@ def zero_command(bench: Bench, angle_deg: float) -> None:
     is_flag=True,
     help="Say that nobody holds the arm and nothing is in its way: IT MOVES.",
 )
-@for_a_puck
-def friction_command(bench: Bench, arm_is_free: bool) -> None:
+@puck_command
+def friction_command(session: PuckSession, arm_is_free: bool) -> None:
     """Turn the free arm at steady speeds and fit B and β of equation (7).
 
     The arm moves by itself, between 40 and 115 deg, at up to 80 deg/s, with at most
     2 N·m, for about 20 s.
     """
     from masrel.hess._watchdog import watched
-    from masrel.hess.puck.friction import fit_friction
-    from masrel.hess.puck.turning import LIMITS, SPEEDS, steady_runs
+    from masrel.hess.puck import fit_friction, steady_runs
+    from masrel.hess.puck._steady_rotation import LIMITS, SPEEDS
 
     if not arm_is_free:
         raise click.UsageError(
             "the arm will move by itself; when it is free, say --arm-is-free"
         )
     with (
-        bench.emergency_stop() as stop,
-        bench.device() as device,
+        session.emergency_stop() as stop,
+        session.device() as device,
         watched(device, LIMITS.watchdog_time) or nullcontext() as watchdog,
-        bench.progress(2 * len(SPEEDS)) as progress,
+        session.progress(2 * len(SPEEDS)) as progress,
     ):
         runs = steady_runs(
-            device, bench.clock, watchdog=watchdog, stop=stop, progress=progress
+            device, session.clock, watchdog=watchdog, stop=stop, progress=progress
         )
         estimate = fit_friction(runs)
-    bench.say(_friction_lines(estimate), dataclasses.asdict(estimate))
+    session.write_output(_friction_lines(estimate), dataclasses.asdict(estimate))
 
 
-def _described(one: "Found") -> str:
-    if one.firmware is None:
-        return f"puck {one.puck}: {one.kind}"
-    state = "awake" if one.is_awake else "asleep"
-    support = "" if one.is_supported else ", NOT SUPPORTED"
-    said = "".join(f", {name} {value}" for name, value in one.properties.items())
+def _report_line(report: "NodeReport") -> str:
+    if report.firmware is None:
+        return f"puck {report.puck}: {report.kind}"
+    state = "awake" if report.is_awake else "asleep"
+    support = "" if report.is_supported else ", NOT SUPPORTED"
+    values = "".join(f", {name} {value}" for name, value in report.properties.items())
     return (
-        f"puck {one.puck}: {one.kind}, firmware {one.firmware}, {state}{support}{said}"
+        f"puck {report.puck}: {report.kind}, firmware {report.firmware}, "
+        f"{state}{support}{values}"
     )
 
 

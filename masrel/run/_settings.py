@@ -15,7 +15,7 @@ from masrel.hess import (
 from masrel.protocol import DeviceSettings, Protocol, elbow_parameters
 
 if TYPE_CHECKING:
-    from masrel.hess.puck.options import PuckOptions
+    from masrel.hess.puck import PuckOptions
 
 
 def check_backend(settings: DeviceSettings) -> None:
@@ -114,8 +114,7 @@ def backend_options(
 
 
 def _puck_options(settings: DeviceSettings) -> "PuckOptions":
-    from masrel.hess.puck.options import PuckOptions  # only when chosen
-    from masrel.hess.puck.properties import PropertyTable
+    from masrel.hess.puck import PropertyTable, PuckOptions  # only when chosen
 
     numbers = settings.puck_properties
     try:

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from masrel.hess.puck import turning
-from masrel.hess.puck.turning import steady_runs
+from masrel.hess import puck
+from masrel.hess.puck import steady_runs
 
 from .process import Caller
 
@@ -83,7 +83,7 @@ def test_a_signal_is_an_emergency_stop_while_the_arm_turns(
         signal.raise_signal(signal.Signals[name])
         return steady_runs(*arguments, **options)
 
-    monkeypatch.setattr(turning, "steady_runs", signalled)
+    monkeypatch.setattr(puck, "steady_runs", signalled)
     done = masrel("device", "friction", "--arm-is-free", *EMULATED)
     assert done.code == 1
     assert f"emergency stop: signal {name}" in done.err

@@ -8,9 +8,7 @@ import pytest
 
 from masrel.errors import ParameterError
 from masrel.hess import DeviceLimits, SimulatedHand
-from masrel.hess.puck.emulator_options import EmulatorOptions
-from masrel.hess.puck.options import PuckOptions
-from masrel.hess.puck.properties import property_table
+from masrel.hess.puck import EmulatorOptions, PuckOptions, property_table
 from masrel.protocol import DeviceSettings
 from masrel.run._settings import (
     backend_options,

@@ -42,7 +42,7 @@ class Identity:
 
     @property
     def kind(self) -> int:
-        """What kind of puck it is: on other kinds the same numbers mean other things."""
+        """Its kind: on other kinds the same numbers mean other things."""
         return self.role & _ROLE_MASK
 
 

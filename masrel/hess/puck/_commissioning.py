@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from masrel.errors import DeviceError, DeviceTimeoutError
 from masrel.hess.clock import Clock
 from masrel.hess.hand import Hand
-from masrel.hess.limits import HIGHEST_ANGLE, LOWEST_ANGLE
+from masrel.hess.limits import DeviceLimits
 from masrel.hess.puck._bring_up import (
     AwakePuck,
     activate,
@@ -164,9 +164,7 @@ def probe(
     return tuple(reports)
 
 
-def _node_report(
-    node: PuckNode, properties: PropertyTable | None
-) -> NodeReport | None:
+def _node_report(node: PuckNode, properties: PropertyTable | None) -> NodeReport | None:
     try:
         status = node.get(STATUS, patience_s=_PROBE_PATIENCE_S)
         if status not in (ASLEEP, READY):
@@ -351,13 +349,13 @@ def _check_replies(took_s: list[float], n_lost: int) -> Check:
 
 
 def _check_position(counts: list[int], puck: AwakePuck) -> list[Check]:
-    angle = puck.transmission.angle(counts[-1])
+    angle, limits = puck.transmission.angle(counts[-1]), DeviceLimits()
     advice = "not zeroed yet" if puck.was_asleep else "look whether the arm is there"
     spread = max(counts) - min(counts)
     return [
         Check(
             name="position",
-            holds=LOWEST_ANGLE <= angle <= HIGHEST_ANGLE,
+            holds=limits.lowest_angle <= angle <= limits.highest_angle,
             result=f"{math.degrees(angle):.2f} deg; {advice}",
         ),
         Check(
@@ -375,9 +373,7 @@ def _check_torque_mode(puck: AwakePuck, options: PuckOptions) -> Check:
     except DeviceError as error:
         return Check(name="torque mode", holds=False, result=str(error))
     finally:
-        release(
-            puck.node, torque_id=table.number("T"), mode_id=table.number("MODE")
-        )
+        release(puck.node, torque_id=table.number("T"), mode_id=table.number("MODE"))
     torque = "T reads back" if options.checks_torque else "T not asked for"
     return Check(
         name="torque mode", holds=True, result=f"in and out of it; {torque}; idle now"

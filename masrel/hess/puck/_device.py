@@ -7,9 +7,9 @@ from typing import ClassVar
 
 from masrel.errors import BusError, DeviceError, LimitExceededError
 from masrel.hess.clock import Clock, SimulatedClock
-from masrel.hess.device import Device, IdleCommand, Reading
+from masrel.hess.device import Device, DeviceSetup, IdleCommand, Reading
 from masrel.hess.hand import Hand
-from masrel.hess.limits import HIGHEST_ANGLE, LOWEST_ANGLE
+from masrel.hess.limits import DeviceLimits
 from masrel.hess.puck._bring_up import (
     AwakePuck,
     Identity,
@@ -26,7 +26,6 @@ from masrel.hess.puck._node import Polls, PuckNode
 from masrel.hess.puck._options import PuckOptions
 from masrel.hess.puck._release import release, release_command
 from masrel.hess.puck._transmission import Transmission
-from masrel.hess.setup import DeviceSetup
 
 _channels = itertools.count(1)
 
@@ -108,7 +107,8 @@ class PuckDevice(Device):
     def _check_angle(self) -> None:
         _, counts = self._node.position(self._position_id, patience_s=0.05)
         angle = self.transmission.angle(counts)
-        if not LOWEST_ANGLE <= angle <= HIGHEST_ANGLE:
+        limits = DeviceLimits()
+        if not limits.lowest_angle <= angle <= limits.highest_angle:
             raise DeviceError(
                 f"puck {self._node.puck}: needs an arm between -5 and 185 deg, it "
                 f"reports {math.degrees(angle):.1f}; run masrel device zero"

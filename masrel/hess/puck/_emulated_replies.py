@@ -106,9 +106,7 @@ class EmulatedReplies:
         self._last_reply_ns = due_ns = max(due_ns, self._last_reply_ns + 1)
         self._events.add(due_ns, lambda due: self._send(frame, due))
         if self._faults.hit("duplicated-replies", due_ns):
-            self._events.add(
-                due_ns + _DUPLICATE_NS, lambda due: self._send(frame, due)
-            )
+            self._events.add(due_ns + _DUPLICATE_NS, lambda due: self._send(frame, due))
 
     def _send(self, frame: Frame, now_ns: int) -> None:
         if not self.is_cut_off(now_ns):

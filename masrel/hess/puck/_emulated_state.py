@@ -3,9 +3,8 @@
 import heapq
 from collections.abc import Callable
 
+from masrel.hess._plant import Plant, PlantParameters
 from masrel.hess.hand import Hand
-from masrel.hess.plant import Plant
-from masrel.hess.plant_parameters import PlantParameters
 from masrel.hess.puck._options import EmulatorOptions, FaultKind, InjectedFault
 from masrel.hess.puck._properties import (
     ASLEEP,

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field, replace
 from typing import Literal, Self, get_args
 
 from masrel.errors import ParameterError
+from masrel.hess.device import BackendOptions
 from masrel.hess.puck._properties import PropertyTable
 from masrel.hess.puck._transmission import GEAR_RATIO
-from masrel.hess.device import BackendOptions
 
 _MAX_MOTOR_NODE = 7  # 8 to 31 are hands, sensors and the safety module
 

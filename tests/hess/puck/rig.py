@@ -15,14 +15,12 @@ from masrel.hess import (
     open_device,
     run_presentation,
 )
-from masrel.hess.puck.backend import emulated_options
-from masrel.hess.puck.bus import Link, open_link
-from masrel.hess.puck.emulated import EmulatedPuckDevice
-from masrel.hess.puck.emulator import PuckEmulator
-from masrel.hess.puck.emulator_options import EmulatorOptions
-from masrel.hess.puck.faults import FaultKind, InjectedFault
-from masrel.hess.puck.node import PuckNode
-from masrel.hess.puck.options import PuckOptions
+from masrel.hess.puck import EmulatorOptions, InjectedFault, Link, PuckOptions
+from masrel.hess.puck._bus import open_link
+from masrel.hess.puck._device import EmulatedPuckDevice, emulated_options
+from masrel.hess.puck._emulator import PuckEmulator
+from masrel.hess.puck._node import PuckNode
+from masrel.hess.puck._options import FaultKind
 
 START, END = radians(30.0), radians(146.0)
 LIMITS = DeviceLimits(torque=20.0, speed=radians(400.0), missed_ticks=20)
@@ -66,7 +64,7 @@ def bench(*, hand: Hand | None = None, puck: int = 1, **options) -> Bench:
         options=EmulatorOptions(**options),
         puck=puck,
     )
-    link = open_link("virtual", channel, clock=clock, neighbour=emulator)
+    link = open_link("virtual", channel, clock=clock, peer=emulator)
     return Bench(clock, link, emulator, PuckNode(link, clock, puck))
 
 
@@ -97,6 +95,19 @@ def presented(
             device, controller, clock=clock, limits=LIMITS, end_angle=END
         )
     return done, device, clock
+
+
+def told(device: EmulatedPuckDevice) -> list[tuple[str, int]]:
+    """What an emulated puck was set to, in order."""
+    return [(setting.name, setting.value) for setting in device.emulator.settings]
+
+
+def packed_torques(first: int, second: int, third: int, fourth: int) -> bytes:
+    """Bytes that set T (42) of four pucks; the driver reads such frames, sends none."""
+    packed = 0
+    for torque in (first, second, third, fourth):
+        packed = packed << 14 | torque & 0x3FFF
+    return bytes((0x80 | 42,)) + packed.to_bytes(7, "big")
 
 
 def fault(kind: FaultKind, start_s: float = 0.4, **more) -> InjectedFault:

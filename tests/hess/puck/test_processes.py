@@ -23,10 +23,9 @@ import pytest
 from masrel.errors import BusError
 from masrel.hess import RealClock, SimulatedClock, open_device
 from masrel.hess._watchdog import watched
-from masrel.hess.puck.bus import open_link
-from masrel.hess.puck.emulator import PuckEmulator
-from masrel.hess.puck.emulator_options import EmulatorOptions
-from masrel.hess.puck.options import PuckOptions
+from masrel.hess.puck import EmulatorOptions, PuckOptions
+from masrel.hess.puck._bus import open_link
+from masrel.hess.puck._emulator import PuckEmulator
 from tests.hess.puck.rig import END, loose, opened
 
 TIMEOUT_S = 0.1
@@ -38,7 +37,7 @@ LONGEST_S = 2.0
 LOOP = """
 import sys, time
 from masrel.hess import RealClock, open_device
-from masrel.hess.puck.options import PuckOptions
+from masrel.hess.puck import PuckOptions
 from masrel.hess._watchdog import watched
 
 options = PuckOptions(interface=sys.argv[1], channel=sys.argv[2], patience_s=1.0)

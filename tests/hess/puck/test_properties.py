@@ -1,15 +1,16 @@
+"""Numbers of properties, of a firmware or from a file."""
+
+from pathlib import Path
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from masrel.errors import DeviceError, ParameterError
-from masrel.hess.puck.properties import (
-    PropertyTable,
-    property_table,
-)
+from masrel.hess.puck import PropertyTable, property_table, read_property_table
 
 # The least that a table needs
-LEAST = {
+REQUIRED = {
     "MODE": 8,
     "T": 42,
     "MT": 43,
@@ -25,7 +26,7 @@ LEAST = {
 @pytest.mark.parametrize("firmware", [65, 113, 119, 131, 132, 148, 200])
 def test_known_firmware_has_the_numbers_that_the_driver_needs(firmware: int) -> None:
     table = property_table(firmware)
-    assert {name: table.number(name) for name in LEAST} == LEAST
+    assert {name: table.number(name) for name in REQUIRED} == REQUIRED
 
 
 @pytest.mark.parametrize(("firmware", "enable", "hold"), [(131, 77, 94), (132, 94, 77)])
@@ -66,4 +67,30 @@ def test_a_table_that_contradicts_itself_is_refused(
     change: dict[str, int], words: str
 ) -> None:
     with pytest.raises(ParameterError, match=words):
-        PropertyTable(numbers={**LEAST, **change})
+        PropertyTable(numbers={**REQUIRED, **change})
+
+
+def test_a_table_of_ones_own_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "puck.toml"
+    lines = [f"{name} = {number}" for name, number in REQUIRED.items()]
+    path.write_text("\n".join(["[properties]", *lines]))
+    assert read_property_table(path).numbers == REQUIRED
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", r"puck.toml: needs one table, \[properties\]"),
+        ("properties = 3", r"puck.toml: needs one table, \[properties\]"),
+        ("[properties]\nT = 42", "puck.toml: properties: need MODE, MT, "),
+        ("[properties]\nT = '42'", "properties.T: needs a whole number, got '42'"),
+        ("[properties", "puck.toml: not TOML"),
+    ],
+)
+def test_a_file_that_is_no_table_is_refused(
+    tmp_path: Path, text: str, words: str
+) -> None:
+    path = tmp_path / "puck.toml"
+    path.write_text(text)
+    with pytest.raises(ParameterError, match=words):
+        read_property_table(path)

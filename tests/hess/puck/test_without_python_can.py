@@ -16,8 +16,8 @@ def run(code: str) -> subprocess.CompletedProcess[str]:
     "code",
     [
         "import masrel.hess.puck",
-        "import masrel.hess.puck.requests, masrel.hess.puck.replies",
-        "import masrel.hess.puck.positions, masrel.hess.puck.torques",
+        "import masrel.hess.puck._codec",
+        "from masrel.hess.puck import fit_friction, steady_runs",
         "from masrel.hess.puck import PuckOptions; PuckOptions()",
         "from masrel.cli import cli\ntry: cli(['device', '-h'])\nexcept SystemExit: 0",
     ],

@@ -1,14 +1,18 @@
-"""Waiting for a puck while others never fall silent."""
+"""A puck on a bus where others never fall silent, or on one that cannot be heard."""
 
 from collections.abc import Callable
 
 import pytest
 
-from masrel.errors import DeviceTimeoutError
+from masrel.errors import BusError, DeviceError, DeviceTimeoutError
 from masrel.hess import SimulatedClock
-from masrel.hess.puck.bus import Frame, Link, open_link
-from masrel.hess.puck.node import PuckNode
+from masrel.hess.puck import Frame, Link
+from masrel.hess.puck._bus import open_link
+from masrel.hess.puck._node import PuckNode
+from masrel.hess.puck._release import release
+from tests.hess.puck.rig import bench
 
+T, MODE = 42, 8
 _FRAME_NS = 50_000  # what a busy bus or a slow reader takes for a frame
 
 
@@ -32,7 +36,7 @@ class Babbling(Link):
 @pytest.mark.parametrize(
     "wait",
     [
-        lambda node: node.ask(8, patience_s=0.001),
+        lambda node: node.get(8, patience_s=0.001),
         lambda node: node.position(48, patience_s=0.001),
     ],
     ids=["ask", "position"],
@@ -49,3 +53,28 @@ def test_it_does_not_wait_for_ever_while_others_speak(
             wait(node)
         assert clock.now_ns() - begun_ns <= 4_000_000
     link.close()
+
+
+# Letting go
+
+
+class Deaf(Link):
+    """Takes frames, and gives none."""
+
+    def receive(self, deadline_ns: int) -> Frame | None:
+        super().receive(deadline_ns)
+        raise BusError("puck: the bus cannot be read (test)")
+
+
+def test_a_puck_that_cannot_be_heard_is_idled_all_the_same() -> None:
+    one = bench(awake=True)
+    one.node.set(MODE, 2)
+    one.node.set(T, 100)
+    assert one.node.get(T) == 100
+    node = PuckNode(Deaf(one.link._bus, one.clock, peer=one.emulator), one.clock, 1)
+    begun_ns = one.clock.now_ns()
+    with pytest.raises(DeviceError, match=r"cannot be read .* SWITCH ITS SUPPLY OFF"):
+        release(node, torque_id=T, mode_id=MODE)
+    assert one.clock.now_ns() - begun_ns <= 110_000_000
+    assert (one.emulator.registers.mode, one.emulator.registers.torque) == (0, 0)
+    one.close()

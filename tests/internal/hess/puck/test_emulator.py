@@ -5,13 +5,9 @@ from math import degrees, radians
 import pytest
 
 from masrel.errors import BusError, DeviceTimeoutError, FrameError, ParameterError
-from masrel.hess.puck.bus import Frame
-from masrel.hess.puck.emulator_options import EmulatorOptions
-from masrel.hess.puck.faults import InjectedFault
-from masrel.hess.puck.identifiers import to_group, to_puck
-from masrel.hess.puck.requests import encode_get
-from masrel.hess.puck.torques import encode_torques
-from tests.hess.puck.rig import Bench, bench, fault, loose
+from masrel.hess.puck import EmulatorOptions, Frame, InjectedFault
+from masrel.hess.puck._codec import encode_get, to_group, to_puck
+from tests.hess.puck.rig import Bench, bench, fault, loose, packed_torques
 
 VERS, ROLE, STAT = 0, 1, 5
 MODE, T, MT, P, CTS, IPNM, GRPA, PIDX = 8, 42, 43, 48, 68, 86, 26, 70
@@ -45,10 +41,10 @@ def silent(one: Bench, number: int) -> bool:
 
 
 def driving(one: Bench, units: int = 0) -> Bench:
-    one.node.tell(T, units)
-    one.node.tell(MODE, 2)
+    one.node.set(T, units)
+    one.node.set(MODE, 2)
     one.node.wait(0.001)
-    one.node.listen()
+    one.node.receive_waiting()
     return one
 
 
@@ -57,7 +53,7 @@ def driving(one: Bench, units: int = 0) -> Bench:
 
 def test_it_starts_in_its_monitor_and_answers_what_every_puck_does(on) -> None:
     node = on().node
-    assert [node.ask(number) for number in (STAT, VERS, ROLE)] == [0, 148, 0]
+    assert [node.get(number) for number in (STAT, VERS, ROLE)] == [0, 148, 0]
 
 
 @pytest.mark.parametrize("number", [MODE, T, P, CTS, IPNM])
@@ -67,9 +63,9 @@ def test_asleep_it_answers_nothing_else(on, number: int) -> None:
 
 def test_asleep_8_is_not_its_mode(on) -> None:
     one = on()
-    one.node.tell(MODE, 2)
+    one.node.set(MODE, 2)
     one.node.wait(0.001)
-    one.node.listen()
+    one.node.receive_waiting()
     assert one.emulator.settings[-1].name == "LOCK"
     assert one.emulator.registers.mode == 0
 
@@ -77,17 +73,17 @@ def test_asleep_8_is_not_its_mode(on) -> None:
 @pytest.mark.parametrize("wake_s", [0.01, 1.0])
 def test_it_leaves_the_bus_while_it_wakes(on, wake_s: float) -> None:
     one = on(wake_s=wake_s)
-    one.node.tell(STAT, 2)
+    one.node.set(STAT, 2)
     one.node.wait(wake_s - 0.001)
     assert silent(one, STAT)
     assert one.emulator.n_disturbances == 1
     one.node.wait(0.001)
-    assert one.node.ask(STAT) == 2
+    assert one.node.get(STAT) == 2
 
 
 def test_it_counts_from_where_the_arm_is_when_switched_on(on) -> None:
     one = on(wake_s=0.01)
-    one.node.tell(STAT, 2)
+    one.node.set(STAT, 2)
     one.node.wait(0.02)
     assert one.node.position(P, patience_s=0.001)[1] == 0
 
@@ -109,11 +105,11 @@ def test_answers_of_four_and_of_six_bytes_say_the_same(on, size: int) -> None:
     one = on(awake=True, reply_bytes=size)
     (frame,) = frames_after(one, Frame(to_puck(1), encode_get(IPNM)))
     assert len(frame.data) == size
-    assert one.node.ask(IPNM) == 2700
+    assert one.node.get(IPNM) == 2700
 
 
 def test_what_16_bits_cannot_hold_comes_in_six_bytes(on) -> None:
-    assert on(awake=True, reply_bytes=4, counts_per_turn=40960).node.ask(CTS) == 40960
+    assert on(awake=True, reply_bytes=4, counts_per_turn=40960).node.get(CTS) == 40960
 
 
 @pytest.mark.parametrize(("flagged", "first"), [(False, 0x00), (True, 0x80)])
@@ -136,10 +132,10 @@ def test_a_position_comes_with_that_of_a_second_encoder(on) -> None:
 
 def test_positions_wrap_at_22_bits(on) -> None:
     one = on(awake=True)
-    one.node.tell(P, 2**21 - 1)
+    one.node.set(P, 2**21 - 1)
     one.node.wait(0.001)
     assert one.node.position(P, patience_s=0.001)[1] == 2**21 - 1
-    one.node.tell(P, 2**21)
+    one.node.set(P, 2**21)
     one.node.wait(0.001)
     assert one.node.position(P, patience_s=0.001)[1] == -(2**21)
 
@@ -150,7 +146,7 @@ def test_a_group_is_answered_by_its_members(on) -> None:
     group_1 = Frame(to_group(1), encode_get(P))
     assert len(frames_after(one, group_2)) == 1
     assert frames_after(one, group_1) == []
-    one.node.tell(GRPA, 1)
+    one.node.set(GRPA, 1)
     one.node.wait(0.001)
     assert len(frames_after(one, group_1)) == 1
 
@@ -173,7 +169,7 @@ def test_noise_of_others_does_not_hide_its_answer(on) -> None:
     one = on(awake=True, is_noisy=True)
     for _ in range(3):
         assert one.node.position(P, patience_s=0.001)[1] == 19251
-    assert one.node.arrivals.n_foreign == 12
+    assert one.node.receiver.n_foreign == 12
     assert 0x540 in {
         frame.identifier
         for frame in frames_after(one, Frame(to_puck(1), encode_get(P)))
@@ -185,7 +181,7 @@ def test_noise_of_others_does_not_hide_its_answer(on) -> None:
 
 def test_idle_it_ignores_torques(on) -> None:
     one = on(awake=True)
-    one.node.tell(T, 1000)
+    one.node.set(T, 1000)
     one.node.wait(0.1)
     assert one.node.position(P, patience_s=0.001)[1] == 19251
 
@@ -193,33 +189,33 @@ def test_idle_it_ignores_torques(on) -> None:
 def test_it_holds_its_last_torque_for_ever(on) -> None:
     one = driving(on(awake=True), 144)
     one.node.wait(0.05)
-    one.node.listen()
+    one.node.receive_waiting()
     assert one.emulator.motor.torque_nm == pytest.approx(-144 * 18.8 / 2700, abs=1e-9)
     one.node.wait(60.0)  # nobody says anything for a minute
-    one.node.listen()
+    one.node.receive_waiting()
     assert one.emulator.motor.torque_nm == pytest.approx(-144 * 18.8 / 2700, abs=1e-9)
     assert degrees(one.emulator.motor.angle(one.clock.now_ns())) > 145.9
 
 
 def test_its_own_limit_clips(on) -> None:
     one = on(awake=True)
-    one.node.tell(MT, 100)
+    one.node.set(MT, 100)
     driving(one, 8000)
-    assert one.node.ask(T) == 100
-    one.node.tell(T, -8000)
+    assert one.node.get(T) == 100
+    one.node.set(T, -8000)
     one.node.wait(0.001)
-    assert one.node.ask(T) == -100
+    assert one.node.get(T) == -100
 
 
 def test_idle_it_brakes(on) -> None:
     def coasted_deg(idle: bool) -> float:
         one = driving(on(awake=True, hand=loose(45.0)), 288)  # 2 N·m
         one.node.wait(0.1)
-        one.node.tell(T, 0)
+        one.node.set(T, 0)
         if idle:
-            one.node.tell(MODE, 0)
+            one.node.set(MODE, 0)
         one.node.wait(0.001)
-        one.node.listen()
+        one.node.receive_waiting()
         here = one.emulator.motor.angle(one.clock.now_ns())
         one.node.wait(0.3)
         return degrees(one.emulator.motor.angle(one.clock.now_ns()) - here)
@@ -231,20 +227,20 @@ def test_idle_it_brakes(on) -> None:
 @pytest.mark.parametrize("slot", [1, 2, 3, 4])
 def test_it_obeys_its_place_in_a_packed_frame(on, slot: int) -> None:
     one = on(awake=True)
-    one.node.tell(GRPA, 1)
-    one.node.tell(PIDX, slot)
+    one.node.set(GRPA, 1)
+    one.node.set(PIDX, slot)
     driving(one)
-    one.link.send(Frame(to_group(1), encode_torques(10, 20, 30, 40)))
+    one.link.send(Frame(to_group(1), packed_torques(10, 20, 30, 40)))
     one.node.wait(0.001)
-    assert one.node.ask(T) == 10 * slot
+    assert one.node.get(T) == 10 * slot
 
 
 def test_writing_its_memory_is_counted(on) -> None:
     one = on(awake=True)
     for number in (30, 31, 32):  # SAVE, LOAD, DEF
-        one.node.tell(number, -1)
+        one.node.set(number, -1)
     one.node.wait(0.001)
-    one.node.listen()
+    one.node.receive_waiting()
     assert one.emulator.registers.n_memory_writes == 3
 
 
@@ -279,10 +275,10 @@ def test_every_third_answer_can_be_lost(on) -> None:
 def test_a_lost_torque_leaves_the_one_before(on) -> None:
     one = driving(on(awake=True, faults=(fault("dropped-torques", 0.05),)), 50)
     one.node.wait(0.1)
-    one.node.listen()
-    one.node.tell(T, 0)
+    one.node.receive_waiting()
+    one.node.set(T, 0)
     one.node.wait(0.001)
-    assert one.node.ask(T) == 50
+    assert one.node.get(T) == 50
 
 
 def test_a_late_answer_is_not_taken_for_the_next_one(on) -> None:
@@ -306,7 +302,7 @@ def test_a_late_answer_is_not_taken_for_the_next_one(on) -> None:
             previous = sampled_ns, counts
         one.clock.sleep_until_ns(next_ns)
     assert n_lost == 2
-    assert one.node.arrivals.n_late == 2
+    assert one.node.receiver.n_late == 2
 
 
 def test_a_second_answer_is_thrown_away(on) -> None:
@@ -314,7 +310,7 @@ def test_a_second_answer_is_thrown_away(on) -> None:
     for _ in range(5):
         one.node.position(P, patience_s=0.001)
         one.node.wait(0.001)
-    assert one.node.arrivals.n_late == 4  # the last has not been listened to
+    assert one.node.receiver.n_late == 4  # the last has not been listened to
 
 
 def test_a_short_answer_is_refused(on) -> None:
@@ -327,7 +323,7 @@ def test_error_frames_are_counted_and_too_many_refused(on) -> None:
     one = failing(on, "error-frames")
     for _ in range(10):
         one.node.position(P, patience_s=0.001)
-    assert one.node.arrivals.n_errors == 10
+    assert one.node.receiver.n_errors == 10
     with pytest.raises(BusError, match="at most 10 error frames") as caught:
         one.node.position(P, patience_s=0.001)
     assert caught.value.kind == "error-frames"
@@ -357,7 +353,7 @@ def test_an_encoder_fails(on, kind, counts: int) -> None:
     one = failing(on, kind)
     assert one.node.position(P, patience_s=0.001)[1] == counts
     if kind == "frozen-encoder":
-        one.node.tell(T, 300)
+        one.node.set(T, 300)
         one.node.wait(0.1)
         assert one.node.position(P, patience_s=0.001)[1] == counts
         assert one.emulator.motor.angle(one.clock.now_ns()) > radians(91.0)
@@ -365,24 +361,24 @@ def test_an_encoder_fails(on, kind, counts: int) -> None:
 
 def test_it_is_idled_from_outside(on) -> None:
     one = driving(on(awake=True, faults=(fault("idled", 0.01),)), 100)
-    assert one.node.ask(MODE) == 2
+    assert one.node.get(MODE) == 2
     one.node.wait(0.01)
-    assert one.node.ask(MODE) == 0
+    assert one.node.get(MODE) == 0
 
 
 def test_a_reset_puts_it_to_sleep(on) -> None:
     one = driving(on(awake=True, faults=(fault("reset", 0.01),)), 100)
     one.node.wait(0.02)
-    assert one.node.ask(STAT) == 0
+    assert one.node.get(STAT) == 0
     assert one.emulator.motor.torque_nm == pytest.approx(0.0, abs=0.05)
 
 
 def test_the_babbling_of_others_is_bounded(on) -> None:
     one = on(awake=True)
     other = on(awake=True)  # any second end would do
-    assert other.node.ask(STAT) == 2
+    assert other.node.get(STAT) == 2
     for _ in range(1001):
-        one.emulator._link.send(Frame(0x443, b"\x00\x00\x00"))
+        one.emulator.link.send(Frame(0x443, b"\x00\x00\x00"))
     with pytest.raises(BusError, match="flooded") as caught:
         one.node.position(P, patience_s=0.001)
     assert caught.value.kind == "flooded"
@@ -421,7 +417,7 @@ def test_answers_come_in_the_order_of_their_questions(on) -> None:
     late = one.clock.now_ns()
     numbers = [CTS, IPNM, STAT, VERS]
     for number in numbers:
-        one.node.inquire(number)
+        one.node.request(number)
         one.node.wait(0.0006)
     end_ns, answered = late + 10_000_000, []
     while (frame := one.link.receive(end_ns)) is not None:

@@ -8,8 +8,9 @@ from can.interfaces.virtual import VirtualBus
 
 from masrel.errors import BusError
 from masrel.hess import RealClock, SimulatedClock
-from masrel.hess.puck.arrivals import accepted_identifiers
-from masrel.hess.puck.bus import Frame, Link, open_link
+from masrel.hess.puck import Frame, Link
+from masrel.hess.puck._bus import open_link
+from masrel.hess.puck._codec import reply_identifiers
 
 
 @pytest.fixture
@@ -117,9 +118,7 @@ class Metronome:
 def test_a_neighbour_acts_while_this_end_waits_on_a_simulated_clock() -> None:
     clock = SimulatedClock()
     with can.Bus(interface="virtual", channel="tick", ignore_config=True) as bus:
-        link = open_link(
-            "virtual", "tick", clock=clock, neighbour=Metronome(clock, bus)
-        )
+        link = open_link("virtual", "tick", clock=clock, peer=Metronome(clock, bus))
         received = [(link.receive(20_000_000), clock.now_ns()) for _ in range(3)]
         assert received == [
             (Frame(1, b""), 2_000_000),
@@ -156,7 +155,7 @@ def test_the_kernel_is_asked_for_the_answers_of_one_puck_alone(
 
     monkeypatch.setattr(can, "Bus", opened)
     open_link(
-        interface, "can0", clock=RealClock(), accepted=accepted_identifiers(1)
+        interface, "can0", clock=RealClock(), accepted=reply_identifiers(1)
     ).close()
     assert asked == {
         "interface": interface,
