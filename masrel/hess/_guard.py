@@ -13,7 +13,7 @@ from masrel.hess.limits import DeviceLimits
 # An arm that was faster than this cannot stop within a tick without 20 N·m on its
 # 0.06 kg·m²; slower ones may come to rest between two steps of the encoder.
 _MOVING_SPEED = math.radians(20.0)
-_LONGEST_STOP_TICKS = 1.5
+_MAX_STOP_TICKS = 1.5
 
 # Of so many ticks `DeviceLimits.missed_replies_per_100` may be without a reading.
 _WINDOW_TICKS = 100
@@ -84,19 +84,19 @@ class Guard:
             self._raw_speed = 0.0
             self._still_for(time_s - self._moved_at)
             return
-        off = change - self._raw_speed * interval
+        deviation = change - self._raw_speed * interval
         ticks = interval / self._period if interval > self._period else 1.0
-        if not -limits.jump_angle <= off / ticks <= limits.jump_angle:
+        if not -limits.jump_angle <= deviation / ticks <= limits.jump_angle:
             raise LimitExceededError(
                 f"jump: needs an angle within {math.degrees(limits.jump_angle):g} deg "
                 f"of where the speed would have it, got one "
-                f"{math.degrees(off / ticks):.2f} deg a tick from there",
+                f"{math.degrees(deviation / ticks):.2f} deg a tick from there",
                 "jump",
             )
         self._raw_speed = speed = change / interval
         self._moved_at = time_s
         # Over a longer gap it may well have come to rest, against an end stop say.
-        self._stopped_dead = abs(speed) > _MOVING_SPEED and ticks < _LONGEST_STOP_TICKS
+        self._stopped_dead = abs(speed) > _MOVING_SPEED and ticks < _MAX_STOP_TICKS
 
     def _still_for(self, duration_s: float) -> None:
         limits = self._limits

@@ -14,9 +14,9 @@ from masrel.hess.friction import Friction
 from masrel.hess.hand import Hand
 
 _LOWER, _FREE, _UPPER = -1, 0, 1  # which end stop the arm touches
-_FINEST = 10  # halvings of a step in which something changes: 0.5 ms / 1024
+_MAX_HALVINGS = 10  # of a step in which something changes: 0.5 ms / 1024
 _TAYLOR_TERMS = 14
-_LARGEST_NORM = 0.25  # 0.25^15 / 15! is below 1e-21: the series is exact in floats
+_MAX_NORM = 0.25  # 0.25^15 / 15! is below 1e-21: the series is exact in floats
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,7 +103,7 @@ def _exponential(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     # (n, n) -> (n, n), by a Taylor series of the scaled matrix, squared back
     norm = float(np.abs(matrix).sum(axis=1).max())
     squarings = 0
-    while norm > _LARGEST_NORM:
+    while norm > _MAX_NORM:
         norm *= 0.5
         squarings += 1
     scaled = matrix * 0.5**squarings
@@ -247,10 +247,10 @@ class Plant:
     def _step_in_parts(self) -> None:
         # Something changes within this step: parts of a half, a quarter, ... of it,
         # each as long as the place reached allows.
-        done, total = 0, 1 << _FINEST
+        done, total = 0, 1 << _MAX_HALVINGS
         while done < total:
             size = done & -done or total >> 1
-            level = _FINEST + 1 - size.bit_length()
+            level = _MAX_HALVINGS + 1 - size.bit_length()
             while not self._try_step(level):
                 level += 1
             done += total >> level
@@ -297,7 +297,7 @@ class Plant:
         contact = _LOWER if angle < 0.0 else beyond
         holds = self._holds and end < self._hand.slip_time
         changes = turned or contact != self._contact or holds != self._holds
-        if changes and level < _FINEST:
+        if changes and level < _MAX_HALVINGS:
             return False
         self._time, self.angle, self.velocity, self._lag = end, angle, velocity, new_lag
         self._force = new_force

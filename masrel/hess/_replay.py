@@ -135,9 +135,9 @@ def _angles_of(path: _Path) -> list[float]:
 def _radians_of(angle_deg: float) -> list[float]:
     # Every float whose degrees are these, the nearest first: a degree is 57 of a
     # radian, so that up to two neighbours may share them.
-    near = math.radians(angle_deg)
-    lower, upper = math.nextafter(near, -math.inf), math.nextafter(near, math.inf)
-    return [angle for angle in (near, lower, upper) if _degrees(angle) == angle_deg]
+    nearest = math.radians(angle_deg)
+    lower, upper = math.nextafter(nearest, -math.inf), math.nextafter(nearest, math.inf)
+    return [angle for angle in (nearest, lower, upper) if _degrees(angle) == angle_deg]
 
 
 def _degrees(angle: float) -> float:

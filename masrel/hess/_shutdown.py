@@ -60,11 +60,11 @@ def _ramp_down(ticks: Ticks) -> None:
         next_ns = min((n_elapsed + 1) * ticks.period_ns, ramp_ns)
         clock.sleep_until_ns(begun_ns + next_ns)
         now_ns = clock.now_ns()
-        left = 1.0 - (now_ns - begun_ns) / ramp_ns
-        if left <= 0.0:
+        share = 1.0 - (now_ns - begun_ns) / ramp_ns
+        if share <= 0.0:
             break
-        ticks.device.command(torque * left)
-        ticks.sent = torque * left
+        ticks.device.command(torque * share)
+        ticks.sent = torque * share
         with suppress(DeviceError):  # `finish` says so; the ramp has to go on
             ticks.watchdog.beat()
         ticks.mark(now_ns, ticks.sent)

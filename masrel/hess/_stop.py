@@ -107,21 +107,21 @@ def stop_on_key(stop: EmergencyStop, keys: TextIO | None) -> Iterator[None]:
 
 @contextmanager
 def _waiting_for_key(stop: EmergencyStop, terminal: int) -> Iterator[None]:
-    ended, end = os.pipe()
-    waiting = threading.Thread(
-        target=_wait_for_key, args=(stop, terminal, ended), daemon=True
+    read_end, write_end = os.pipe()
+    thread = threading.Thread(
+        target=_wait_for_key, args=(stop, terminal, read_end), daemon=True
     )
-    waiting.start()
+    thread.start()
     try:
         yield
     finally:
-        os.close(end)
-        waiting.join()
-        os.close(ended)
+        os.close(write_end)
+        thread.join()
+        os.close(read_end)
 
 
-def _wait_for_key(stop: EmergencyStop, terminal: int, ended: int) -> None:
-    ready, _, _ = select.select([terminal, ended], [], [])
+def _wait_for_key(stop: EmergencyStop, terminal: int, read_end: int) -> None:
+    ready, _, _ = select.select([terminal, read_end], [], [])
     if terminal not in ready:
         return
     try:

@@ -85,13 +85,13 @@ class Watchdog:
         ready, _, _ = select.select([output], [], [], _READY_AFTER_S)
         if not ready:
             process.kill()
-            self._end()
+            self._reap()
             raise DeviceError(
                 f"watchdog: needs a process that is ready within {_READY_AFTER_S:g} s, "
                 f"{name} is not"
             )
         if output.readline() != b"ready\n":
-            self._end()
+            self._reap()
             raise DeviceError(
                 f"watchdog: needs a process that can idle the device, {name} "
                 f"ended with {process.returncode}"
@@ -123,9 +123,9 @@ class Watchdog:
             os.set_blocking(self._pipe, True)
             with contextlib.suppress(BrokenPipeError):  # it has just ended
                 os.write(self._pipe, b"q")  # all is well: nothing to idle
-        self._end()
+        self._reap()
 
-    def _end(self) -> None:
+    def _reap(self) -> None:
         process = self._process
         if process is None:
             return

@@ -29,9 +29,11 @@ def main(arguments: list[str]) -> int:
     if sys.platform == "linux":
         with contextlib.suppress(OSError):  # not permitted: as it is, then
             os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_PRIORITY))
-    timeout_s, module, *rest = arguments
+    timeout_s, module, *idle_arguments = arguments
     try:
-        idle: Callable[[], None] = importlib.import_module(module).prepare(*rest)
+        idle: Callable[[], None] = importlib.import_module(module).prepare(
+            *idle_arguments
+        )
         sys.stdout.write("ready\n")
         sys.stdout.flush()
         return watch(0, float(timeout_s), idle)

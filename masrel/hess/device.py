@@ -160,8 +160,8 @@ class Device(ABC):
         DeviceError
             If the device does not take the zero torque; it is let go all the same.
         """
-        was, self._state = self._state, "closed"
-        if was == "open":
+        state, self._state = self._state, "closed"
+        if state == "open":
             try:
                 self._send(0.0)
             finally:

@@ -8,7 +8,7 @@ from masrel.errors import ParameterError
 # No elbow is outside, rad; 5 deg because an end stop gives way a little.
 _LOWEST_ANGLE, _HIGHEST_ANGLE = math.radians(-5.0), math.radians(185.0)
 
-_LONGEST_RAMP_S = 0.1  # a fault's torque is zero after this at the latest
+_MAX_RAMP_S = 0.1  # a fault's torque is zero after this at the latest
 
 _POSITIVE = (
     "torque",
@@ -112,9 +112,9 @@ class DeviceLimits:
             value = getattr(self, name)
             if not 0 <= value < math.inf:
                 raise ParameterError(f"{name}: needs 0 or more, got {value}")
-        if not 0.0 <= self.ramp_time <= _LONGEST_RAMP_S:
+        if not 0.0 <= self.ramp_time <= _MAX_RAMP_S:
             raise ParameterError(
-                f"ramp_time: needs 0 to {_LONGEST_RAMP_S:g} s, got {self.ramp_time}"
+                f"ramp_time: needs 0 to {_MAX_RAMP_S:g} s, got {self.ramp_time}"
             )
         if not -math.inf < self.lowest_angle < self.highest_angle < math.inf:
             raise ParameterError(

@@ -105,9 +105,9 @@ def run_presentation(
     _check(device, controller, limits, rate_hz, max_duration_s, end_angle)
     n_ticks = math.ceil(max_duration_s * rate_hz)
     capacity = n_samples(n_ticks, rate_hz, limits)
-    known: dict[str, Fact] = {"simulated": device.simulated, "device": device.name}
-    known["rate_hz"] = rate_hz
-    with _samples(spool, capacity, known, controller.speed_threshold) as samples:
+    facts: dict[str, Fact] = {"simulated": device.simulated, "device": device.name}
+    facts["rate_hz"] = rate_hz
+    with _samples(spool, capacity, facts, controller.speed_threshold) as samples:
         ticks = Ticks(
             device,
             controller,
@@ -120,7 +120,7 @@ def run_presentation(
             stop or EmergencyStop(),
             watchdog or NoWatchdog(),
         )
-        with scheduled(clock) as known["scheduling"], collector_off():
+        with scheduled(clock) as facts["scheduling"], collector_off():
             ended, fault = run_to_the_end(ticks)
         columns = samples.columns()
     if ticks.n_missed:
@@ -128,7 +128,7 @@ def run_presentation(
         warnings.warn(message, OverrunWarning, stacklevel=2)
     return as_presented(
         columns,
-        known,
+        facts,
         speed_threshold=controller.speed_threshold,
         ended=ended,
         fault=fault,
@@ -170,12 +170,12 @@ def _check(
 
 @contextmanager
 def _samples(
-    spool: Path | None, capacity: int, known: dict[str, Fact], threshold: float
+    spool: Path | None, capacity: int, facts: dict[str, Fact], threshold: float
 ) -> Iterator[Samples]:
     # In memory, or in a file that outlives this process
     file = None
     if spool is not None:
-        file = Spool(spool, capacity, {**known, "speed_threshold": threshold})
+        file = Spool(spool, capacity, {**facts, "speed_threshold": threshold})
     samples = Samples(capacity, file)
     try:
         yield samples

@@ -12,7 +12,7 @@ MAX_FAULTS = 3  # in a row of one presentation; after that nobody is asked any m
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GradeRequest:
-    """What a grade is asked for.
+    """One request for a grade: to whom, and of which presentation.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class GradeRequest:
 
 
 class GradeSource(Protocol):
-    """Who is asked for grades."""
+    """A source of grades: a person, a script, or simulated raters."""
 
     @property
     def name(self) -> str:

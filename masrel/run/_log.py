@@ -99,12 +99,12 @@ def _verify(path: Path, lines: list[bytes]) -> tuple[Event, ...]:
     events = []
     for number, line in enumerate(lines, start=1):
         events.append(_parse_event(path, number, line))
-        carried = json.loads(line)["previous"]
-        if carried != previous:
+        claimed = json.loads(line)["previous"]
+        if claimed != previous:
             raise SessionLogError(
                 f"{path}: line {number}: needed previous = {previous}"
                 + (f" (the hash of line {number - 1})" if number > 1 else "")
-                + f", got {carried}: a line before was changed, removed or added"
+                + f", got {claimed}: a line before was changed, removed or added"
             )
         previous = _line_hash(line)
     return tuple(events)
@@ -235,13 +235,13 @@ class SessionLog:
             self._write(torn)
             self.append("recovered", {**facts, "kept": True, "moved_to": None})
             return
-        beside = self.path.with_name(self.path.name + ".torn")
-        with beside.open("ab") as file:
+        torn_file = self.path.with_name(self.path.name + ".torn")
+        with torn_file.open("ab") as file:
             file.write(torn + b"\n")
             file.flush()
             os.fsync(file.fileno())
         # The event overwrites the torn bytes, so that no crash here can lose both.
-        self.append("recovered", {**facts, "kept": False, "moved_to": beside.name})
+        self.append("recovered", {**facts, "kept": False, "moved_to": torn_file.name})
 
     @property
     def events(self) -> tuple[Event, ...]:
@@ -294,9 +294,9 @@ class SessionLog:
         descriptor, self._descriptor = self._descriptor, None
         is_written = False
         try:
-            rest = memoryview(line + b"\n")
-            while rest:
-                rest = rest[os.write(descriptor, rest) :]
+            remaining = memoryview(line + b"\n")
+            while remaining:
+                remaining = remaining[os.write(descriptor, remaining) :]
             os.ftruncate(descriptor, os.lseek(descriptor, 0, os.SEEK_CUR))
             os.fsync(descriptor)
             is_written = True

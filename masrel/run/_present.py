@@ -36,7 +36,7 @@ from masrel.run._settings import (
 from masrel.run._simulated_raters import intended_speed
 
 # After this a presentation ends, wherever the arm is.
-_LONGEST_STRETCH_S = 10.0
+_MAX_STRETCH_S = 10.0
 
 # How much of the recording before a fault goes into the log
 _BEFORE_FAULT_S = 0.2
@@ -158,9 +158,9 @@ def _hand_speed(protocol: Protocol, request: GradeRequest) -> float | None:
 
 def _max_duration_s(travel: float, speed: float | None) -> float:
     if speed is None:
-        return _LONGEST_STRETCH_S
+        return _MAX_STRETCH_S
     # A simulated hand that means to be slow gets the time it needs.
-    return max(_LONGEST_STRETCH_S, 2.0 * travel / speed)
+    return max(_MAX_STRETCH_S, 2.0 * travel / speed)
 
 
 def _spool_of(file: Path) -> Path:

@@ -102,8 +102,9 @@ class SimulatedGrades:
         code = lower + 1 if upper else lower
         if _uniform(seed, "accuracy", *key) >= self._settings.accuracy:
             last = len(self._grades) - 1
-            near = [c for c in (code - 1, code + 1) if 0 <= c <= last]
-            code = near[int(_uniform(seed, "neighbour", *key) * len(near))]
+            neighbours = [c for c in (code - 1, code + 1) if 0 <= c <= last]
+            share = _uniform(seed, "neighbour", *key)
+            code = neighbours[int(share * len(neighbours))]
         return self._grades[code]
 
 
@@ -121,8 +122,8 @@ def severity(protocol: Protocol, model: Model) -> float:
         raise ProtocolError(
             "models: simulated raters need a model with an intended_grade, got none"
         )
-    known = sorted((height, statistics.fmean(of)) for height, of in ranks.items())
-    return _interpolated(model.catch_torque_nms_rad, known)
+    anchors = sorted((height, statistics.fmean(of)) for height, of in ranks.items())
+    return _interpolated(model.catch_torque_nms_rad, anchors)
 
 
 def intended_speed(
@@ -136,14 +137,14 @@ def intended_speed(
     return min(max(speed, mean - 3 * sd, 0.2 * mean), mean + 3 * sd)
 
 
-def _interpolated(height: float, known: list[tuple[float, float]]) -> float:
-    # known: (height, rank), by height
-    if height <= known[0][0]:
-        return known[0][1]
-    for (low, low_rank), (high, high_rank) in itertools.pairwise(known):
+def _interpolated(height: float, anchors: list[tuple[float, float]]) -> float:
+    # anchors: (height, rank), by height
+    if height <= anchors[0][0]:
+        return anchors[0][1]
+    for (low, low_rank), (high, high_rank) in itertools.pairwise(anchors):
         if height <= high:
             return low_rank + (high_rank - low_rank) * (height - low) / (high - low)
-    return known[-1][1]
+    return anchors[-1][1]
 
 
 def _uniform(

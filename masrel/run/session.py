@@ -40,7 +40,7 @@ def run_session(
     rater, session : str
         Whose session.
     grades : GradeSource
-        Who is asked for grades.
+        Where grades come from.
     clock : {"real", "simulated"}
         The clock of the control loop; "simulated" needs a simulated hand.
     progress : callable, optional

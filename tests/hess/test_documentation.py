@@ -11,9 +11,9 @@ import pytest
 from masrel.elbow import STANDARD_MODELS, MinimumJerk, trace
 from masrel.hess import DeviceLimits, Friction, device_names
 from masrel.protocol import DeviceSettings
+from tests.internal.hess.test_backdrive import felt
 
 from .rig import END, START
-from .test_backdrive import felt
 from .test_controller import table_5
 
 PAGE = (Path(__file__).parents[2] / "docs" / "driver.md").read_text(encoding="utf-8")

@@ -11,13 +11,15 @@ from masrel.elbow import STANDARD_MODELS
 from masrel.errors import DeviceError
 from masrel.hess import (
     BackendOptions,
+    Clock,
     Controller,
+    Device,
     RealClock,
+    ReplayOptions,
     SimulatedClock,
     open_device,
     run_presentation,
 )
-from masrel.hess._replay import ReplayDevice, ReplayOptions
 from masrel.recording import (
     RECORDING_COLUMNS,
     Recording,
@@ -30,11 +32,15 @@ from tests.hess.rig import END, LIMITS, START
 from tests.hess.rig import present as on_the_simulated_device
 
 
+def replaying(recording: Recording, clock: Clock) -> Device:
+    options = ReplayOptions(recording=recording)
+    return open_device("replay", clock=clock, options=options)
+
+
 def played_back(recording: Recording, model: str, *, start_ns: int = 0) -> Recording:
     clock = SimulatedClock(start_ns)
-    options = ReplayOptions(recording=recording)
     controller = Controller(STANDARD_MODELS[model], start_angle=START)
-    with open_device("replay", clock=clock, options=options) as device:
+    with replaying(recording, clock) as device:
         return run_presentation(
             device, controller, clock=clock, limits=LIMITS, end_angle=END
         ).recording
@@ -101,7 +107,7 @@ def test_after_a_fault_the_recording_ends() -> None:
 def test_on_a_real_clock_it_takes_its_time() -> None:
     first = on_the_simulated_device("HM3", 100.0).recording
     clock = RealClock()
-    with ReplayDevice(first, clock=clock) as device:
+    with replaying(first, clock) as device:
         begun_ns = clock.now_ns()
         for _ in range(20):
             reading = device.read()
@@ -113,8 +119,8 @@ def test_speeds_of_another_estimate_leave_the_nearest_radians() -> None:
     first = on_the_simulated_device("HM3", 92.0).recording
     smoothed = first.columns["velocity_deg_s"] * 0.9
     foreign = replace(first, columns={**first.columns, "velocity_deg_s": smoothed})
-    device = ReplayDevice(foreign, clock=SimulatedClock())
-    assert not device.is_exact
+    with replaying(foreign, SimulatedClock()) as device:
+        assert not device.is_exact
     again = played_back(foreign, "HM3")
     # One last bit of the angle, 4e-16 rad, is 4e-13 rad/s over 1 ms
     for name in ("model_torque_nm", "command_torque_nm"):
@@ -138,10 +144,10 @@ def test_it_needs_readings_whose_times_grow(times: list[float]) -> None:
     columns["time_s"] = np.array(times)
     recording = Recording(columns=columns, facts={})
     with pytest.raises(DeviceError, match="readings whose times grow from 0 on"):
-        ReplayDevice(recording, clock=SimulatedClock())
+        replaying(recording, SimulatedClock())
 
 
 def test_its_first_reading_is_where_the_stretch_started() -> None:
     recording = on_the_simulated_device("HM1", 60.0).recording
-    with ReplayDevice(recording, clock=SimulatedClock()) as device:
+    with replaying(recording, SimulatedClock()) as device:
         assert device.read().angle == pytest.approx(radians(30.0), abs=1e-4)

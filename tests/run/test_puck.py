@@ -8,11 +8,16 @@ from click.testing import CliRunner
 
 from masrel.cli import cli
 from masrel.errors import ParameterError
-from masrel.hess import ReplayOptions, SimulatedClock, open_device, run_presentation
+from masrel.hess import (
+    DeviceLimits,
+    ReplayOptions,
+    SimulatedClock,
+    open_device,
+    run_presentation,
+)
 from masrel.protocol import Protocol, StudyPaths
 from masrel.recording import read_recording
-from masrel.run import SimulatedGrades, read_log, run_session
-from masrel.run._settings import device_limits, model_controller
+from masrel.run import SimulatedGrades, model_controller, read_log, run_session
 
 NewStudy = Callable[..., tuple[StudyPaths, Protocol]]
 
@@ -105,7 +110,7 @@ def test_a_recording_of_it_replays_to_the_same_torques(new_study: NewStudy) -> N
                 device,
                 model_controller(protocol, str(recording.facts["model"])),
                 clock=clock,
-                limits=device_limits(protocol.device),
+                limits=DeviceLimits(),
                 end_angle=np.radians(protocol.stretch.end_deg),
             )
         assert again.fault is None

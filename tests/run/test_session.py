@@ -4,7 +4,6 @@ import csv
 import hashlib
 import io
 import os
-import signal
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -21,7 +20,6 @@ from masrel.errors import (
     SessionLogError,
     SessionStoppedError,
 )
-from masrel.hess import SimulatedClock
 from masrel.protocol import DeviceSettings, Protocol, StudyPaths
 from masrel.ratings import ratings_from_logs
 from masrel.recording import RECORDING_COLUMNS, read_recording
@@ -36,7 +34,6 @@ from masrel.run import (
     record_correction,
     run_session,
 )
-from masrel.run._runner import CLOCKS
 from masrel.scales import MODIFIED_ASHWORTH
 from masrel.schedule import Presentation, read_schedule
 
@@ -218,38 +215,6 @@ def test_the_log_names_a_fault_with_the_data_before_it(faulty: Small) -> None:
         kept = recording.columns[name][-len(rows) :]
         np.testing.assert_allclose(logged, kept, atol=0.0051)
     assert float(rows[-1]["command_torque_nm"]) == 0.0
-
-
-@pytest.mark.parametrize(
-    ("number", "left"),
-    [
-        (signal.SIGINT, ["presented", "fault", "presented", "grade"]),
-        (signal.SIGTERM, ["presented", "fault", "stopped"]),
-    ],
-)
-def test_a_signal_is_an_emergency_stop(small: Small, number, left) -> None:
-    # The signal comes while the first presentation runs, from its own clock.
-    handlers = [signal.getsignal(number)]
-
-    class Signalling(SimulatedClock):
-        def sleep_until_ns(self, deadline_ns: int) -> None:
-            if deadline_ns == 300_000_000 and len(handlers) == 1:
-                handlers.append(signal.getsignal(number))
-                signal.raise_signal(number)
-            super().sleep_until_ns(deadline_ns)
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(CLOCKS, "simulated", Signalling)
-        if number == signal.SIGTERM:
-            with pytest.raises(SessionStoppedError, match="stopped by signal SIGTERM"):
-                run(small, SimulatedGrades(small[1]))
-        else:
-            run(small, SimulatedGrades(small[1]))
-    assert events(small)[1 : 1 + len(left)] == left
-    fault = read_log(small[0].log_file("R1", "test"))[2]
-    assert fault.fields["kind"] == "emergency-stop"
-    assert fault.fields["words"] == f"emergency stop: signal {number.name}"
-    assert signal.getsignal(number) is handlers[0]  # as it was before
 
 
 def test_a_person_decides_whether_to_try_again_after_a_fault(faulty: Small) -> None:

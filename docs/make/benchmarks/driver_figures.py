@@ -20,7 +20,7 @@ from masrel.hess import (
     run_presentation,
 )
 from masrel.recording import Recording
-from tests.hess.test_backdrive import felt
+from tests.internal.hess.test_backdrive import felt
 
 START, END = radians(30.0), radians(146.0)
 BLACK, GREY, BLUE, ORANGE, VERMILLION, GREEN = (

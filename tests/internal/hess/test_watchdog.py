@@ -14,10 +14,9 @@ from masrel.errors import DeviceError
 from masrel.hess import IdleCommand, _watchdog
 from masrel.hess._watchdog import Watchdog, watched
 from masrel.hess._watchdog_process import watch
-
-from .killed import LEAST_NM, torque_stood_ms
-from .rig import ScriptedDevice, SimulatedClock
-from .shared import SharedDevice, made
+from tests.hess.killed import LEAST_NM, torque_stood_ms
+from tests.hess.rig import ScriptedDevice, SimulatedClock
+from tests.hess.shared import SharedDevice, made
 
 
 # A hung loop is noticed after 50 ms of silence; ten seconds are for a busy machine.

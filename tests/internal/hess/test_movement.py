@@ -14,8 +14,7 @@ from masrel.hess._presented import (
     phase_sequence,
 )
 from masrel.recording import RECORDING_COLUMNS
-
-from .rig import START, present
+from tests.hess.rig import START, present
 
 THRESHOLD = radians(20.0)
 

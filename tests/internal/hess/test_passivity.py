@@ -17,7 +17,7 @@ from masrel.hess import Controller, Friction, SimulatedClock, SimulatedHand
 from masrel.hess._simulated import SimulatedDevice
 from masrel.hess._velocity import VelocityEstimate
 
-PAGE = (Path(__file__).parents[2] / "docs" / "driver.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[3] / "docs" / "driver.md").read_text(encoding="utf-8")
 PERIOD = 0.001
 B = Friction().viscous
 MODEL = STANDARD_MODELS["HM1"]

@@ -22,8 +22,7 @@ from masrel.hess import (
 )
 from masrel.hess._spool import Samples, Spool, read_spool
 from masrel.recording import RECORDING_COLUMNS
-
-from .rig import END, START
+from tests.hess.rig import END, START
 
 FACTS = {"device": "none", "rate_hz": 2000, "speed_threshold": 0.3}
 
@@ -167,3 +166,21 @@ def test_anything_else_is_refused_with_a_way_out(tmp_path, content: bytes) -> No
     path.write_bytes(content)
     with pytest.raises(RecordingError, match=r"a\.partial: needs .* move it away"):
         cut_off(path)
+
+
+# What the loop writes has the units and names of a recording
+
+
+def test_the_columns_have_the_units_in_their_names() -> None:
+    samples = Samples(3)
+    assert samples.last_time_s == -np.inf
+    samples.add(0.0, 0.5, 1.0, 2.0, 3.0, 0)
+    samples.add(0.1, 0.6, 1.1, 2.1, 3.1, 1)
+    assert samples.last_time_s == 0.1
+    written = samples.columns()
+    assert set(written) == set(RECORDING_COLUMNS)
+    assert written["angle_deg"].tolist() == [degrees(0.5), degrees(0.6)]
+    assert written["velocity_deg_s"].tolist() == [degrees(1.0), degrees(1.1)]
+    assert written["model_torque_nm"].tolist() == [2.0, 2.1]
+    assert written["command_torque_nm"].tolist() == [3.0, 3.1]
+    assert written["phase"].tolist() == [0.0, 1.0]

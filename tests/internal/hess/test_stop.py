@@ -27,9 +27,8 @@ from masrel.hess import (
 )
 from masrel.hess._stop import stop_on_key, stop_on_signals
 from masrel.run import read_log
-
-from .injected import small_study
-from .rig import END, START
+from tests.hess.injected import small_study
+from tests.hess.rig import END, START
 
 
 def test_it_stays_pressed_by_whoever_pressed_it_first() -> None:

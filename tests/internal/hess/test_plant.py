@@ -23,8 +23,7 @@ from masrel.hess import (
 from masrel.hess._plant import Plant, PlantParameters, propagator
 from masrel.hess._simulated import SimulatedDevice
 from tests.benchmarks.driver_integrators import by_solve_ivp, chosen, commands
-
-from .rig import END, START
+from tests.hess.rig import END, START
 
 STEP_NS = 500_000
 QUANTUM = 18.8 / 2700.0

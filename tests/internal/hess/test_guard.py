@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from masrel.elbow import STANDARD_MODELS, MinimumJerk, trace
 from masrel.errors import LimitExceededError
 from masrel.hess import DeviceLimits
-from masrel.hess._guard import Dropouts, Guard
+from masrel.hess._guard import Dropouts, Guard, SoftStops, check_overrun
 
 PERIOD = 0.001
 STEP = radians(0.005)  # of the encoder
@@ -291,3 +291,40 @@ def test_the_share_is_that_of_any_hundred_ticks(
 def test_every_refusal_says_degrees_where_it_speaks_of_angles() -> None:
     with pytest.raises(LimitExceededError, match=f"at {degrees(3.5):.1f} deg"):
         guard().reading(0.0, 3.5, 0.0)
+
+
+# A loop that is away too often or for too long is named
+
+
+def test_one_missed_tick_too_many_is_named() -> None:
+    limits = DeviceLimits(missed_ticks=3)
+    check_overrun(limits, 3, 0.005)
+    with pytest.raises(LimitExceededError, match=r"at most 3 .* missed 4") as caught:
+        check_overrun(limits, 4, 0.005)
+    assert caught.value.kind == "overrun"
+
+
+def test_a_gap_as_long_as_the_watchdog_waits_is_named() -> None:
+    limits = DeviceLimits(missed_ticks=100)
+    check_overrun(limits, 49, 0.0499)
+    words = r"silence: needs a command every 50 ms.* for 50\.0 ms"
+    with pytest.raises(LimitExceededError, match=words) as caught:
+        check_overrun(limits, 49, 0.05)
+    assert caught.value.kind == "overrun"
+
+
+# Springs before the ends of the range push back, and nothing does between them
+
+
+def test_they_push_back_from_five_degrees_before_the_ends() -> None:
+    stops = SoftStops(DeviceLimits())
+    assert stops.torque(radians(-5.0)) == pytest.approx(-10.0)
+    assert stops.torque(radians(182.5)) == pytest.approx(5.0)  # resists extension
+    assert stops.torque(radians(-1.0)) == pytest.approx(-2.0)
+    for angle in (0.0, 90.0, 180.0):
+        assert stops.torque(radians(angle)) == 0.0
+
+
+def test_there_may_be_none() -> None:
+    stops = SoftStops(DeviceLimits(soft_stop_torque=0.0))
+    assert stops.torque(radians(184.0)) == 0.0
