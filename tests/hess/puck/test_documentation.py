@@ -38,14 +38,17 @@ def test_there_are_three_of_them() -> None:
     ]
 
 
-def test_the_example_prints_what_the_page_says() -> None:
-    example, said = re.findall(
-        r"```python\n(.*?)```\n\nprints\n\n```text\n(.*?)```", PAGE, re.DOTALL
-    )[0]
+EXAMPLES = re.findall(
+    r"```python\n(.*?)```\n\nprints\n\n```text\n(.*?)```", PAGE, re.DOTALL
+)
+
+
+@pytest.mark.parametrize(("example", "output"), EXAMPLES, ids=["present", "check"])
+def test_the_examples_print_what_the_page_says(example: str, output: str) -> None:
     done = subprocess.run(
         [sys.executable, "-W", "error", "-c", example],
         capture_output=True,
         text=True,
         check=True,
     )
-    assert done.stdout == said
+    assert done.stdout == output
