@@ -10,7 +10,7 @@ from masrel.hess.device import BackendOptions, Device, DeviceSetup
 from masrel.hess.hand import Hand
 
 _BACKENDS = {
-    "puck": "masrel.hess.puck._device",
+    "puck": "masrel.hess.puck._puck_device",
     "replay": "masrel.hess._replay",
     "simulated": "masrel.hess._simulated",
 }

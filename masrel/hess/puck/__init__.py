@@ -7,12 +7,12 @@
 import importlib
 from typing import TYPE_CHECKING
 
-from masrel.hess.puck._options import EmulatorOptions, InjectedFault, PuckOptions
 from masrel.hess.puck._properties import (
     PropertyTable,
     property_table,
     read_property_table,
 )
+from masrel.hess.puck._puck_options import EmulatorOptions, InjectedFault, PuckOptions
 
 if TYPE_CHECKING:
     from masrel.hess.puck._bus import Frame, Link

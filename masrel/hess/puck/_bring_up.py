@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from masrel.errors import DeviceError, ParameterError
 from masrel.hess.puck._codec import MAX_TORQUE
 from masrel.hess.puck._node import PuckNode
-from masrel.hess.puck._options import PuckOptions
 from masrel.hess.puck._properties import (
     ASLEEP,
     IDLE,
@@ -22,6 +21,7 @@ from masrel.hess.puck._properties import (
     PropertyTable,
     property_table,
 )
+from masrel.hess.puck._puck_options import PuckOptions
 from masrel.hess.puck._transmission import Transmission
 
 _ROLE_MASK = 0x1F  # the other bits of ROLE say what encoder it has

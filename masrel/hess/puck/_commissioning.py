@@ -25,8 +25,8 @@ from masrel.hess.puck._bus import Link, open_link
 from masrel.hess.puck._codec import MAX_NODE, reply_identifiers
 from masrel.hess.puck._emulator import emulate
 from masrel.hess.puck._node import PuckNode
-from masrel.hess.puck._options import PuckOptions
 from masrel.hess.puck._properties import ASLEEP, READY, STATUS, PropertyTable
+from masrel.hess.puck._puck_options import PuckOptions
 from masrel.hess.puck._release import release
 
 _PROBE_PATIENCE_S = 0.01  # public drivers wait 1 and 100 ms
@@ -351,7 +351,7 @@ def _check_replies(took_s: list[float], n_lost: int) -> Check:
 def _check_position(counts: list[int], puck: AwakePuck) -> list[Check]:
     angle, limits = puck.transmission.angle(counts[-1]), DeviceLimits()
     advice = "not zeroed yet" if puck.was_asleep else "look whether the arm is there"
-    spread = max(counts) - min(counts)
+    n_moved = max(counts) - min(counts)
     return [
         Check(
             name="position",
@@ -360,8 +360,8 @@ def _check_position(counts: list[int], puck: AwakePuck) -> list[Check]:
         ),
         Check(
             name="rest",
-            holds=spread <= _REST_COUNTS,
-            result=f"{spread} counts in a second; at most {_REST_COUNTS} at rest",
+            holds=n_moved <= _REST_COUNTS,
+            result=f"{n_moved} counts in a second; at most {_REST_COUNTS} at rest",
         ),
     ]
 

@@ -5,7 +5,6 @@ from collections.abc import Callable
 
 from masrel.hess._plant import Plant, PlantParameters
 from masrel.hess.hand import Hand
-from masrel.hess.puck._options import EmulatorOptions, FaultKind, InjectedFault
 from masrel.hess.puck._properties import (
     ASLEEP,
     BROKEN,
@@ -20,6 +19,7 @@ from masrel.hess.puck._properties import (
     VERSION,
     property_table,
 )
+from masrel.hess.puck._puck_options import EmulatorOptions, FaultKind, InjectedFault
 from masrel.hess.puck._transmission import Transmission
 
 # What a puck answers before it has been woken; other numbers mean other things then.

@@ -22,8 +22,8 @@ from masrel.hess.puck._codec import (
 )
 from masrel.hess.puck._emulated_replies import EmulatedReplies
 from masrel.hess.puck._emulated_state import EmulatedState
-from masrel.hess.puck._options import EmulatorOptions, PuckOptions
 from masrel.hess.puck._properties import IDLE, TORQUE
+from masrel.hess.puck._puck_options import EmulatorOptions, PuckOptions
 
 _SETTING_NS = 110_000  # six bytes on the bus
 _NAP_NS = 10_000_000  # of an emulator with a thread of its own

@@ -85,9 +85,9 @@ class PropertyTable:
     numbers: Mapping[str, int]
 
     def __post_init__(self) -> None:
-        missing = [name for name in REQUIRED if name not in self.numbers]
-        if missing:
-            raise ParameterError(f"properties: need {', '.join(missing)} too")
+        absent = [name for name in REQUIRED if name not in self.numbers]
+        if absent:
+            raise ParameterError(f"properties: need {', '.join(absent)} too")
         taken: dict[int, str] = {}
         for name, number in self.numbers.items():
             if not 8 <= number <= 126:

@@ -9,8 +9,8 @@ from masrel.hess.device import IdleCommand
 from masrel.hess.puck._bus import open_link
 from masrel.hess.puck._codec import reply_identifiers
 from masrel.hess.puck._node import PuckNode
-from masrel.hess.puck._options import PuckOptions
 from masrel.hess.puck._properties import ASLEEP, IDLE, STATUS
+from masrel.hess.puck._puck_options import PuckOptions
 
 _PATIENCE_S = 0.1  # also what a bus needs that restarts itself after bus off
 _REPLY_PATIENCE_S = 0.005

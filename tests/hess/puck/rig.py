@@ -17,10 +17,10 @@ from masrel.hess import (
 )
 from masrel.hess.puck import EmulatorOptions, InjectedFault, Link, PuckOptions
 from masrel.hess.puck._bus import open_link
-from masrel.hess.puck._device import EmulatedPuckDevice, emulated_options
 from masrel.hess.puck._emulator import PuckEmulator
 from masrel.hess.puck._node import PuckNode
-from masrel.hess.puck._options import FaultKind
+from masrel.hess.puck._puck_device import EmulatedPuckDevice, emulated_options
+from masrel.hess.puck._puck_options import FaultKind
 
 START, END = radians(30.0), radians(146.0)
 LIMITS = DeviceLimits(torque=20.0, speed=radians(400.0), missed_ticks=20)

@@ -18,8 +18,8 @@ from hypothesis import strategies as st
 from masrel.errors import OverrunWarning
 from masrel.hess import Device, open_device
 from masrel.hess.puck import InjectedFault
-from masrel.hess.puck._device import EmulatedPuckDevice
-from masrel.hess.puck._options import FaultKind
+from masrel.hess.puck._puck_device import EmulatedPuckDevice
+from masrel.hess.puck._puck_options import FaultKind
 from masrel.hess.puck._transmission import Transmission
 from masrel.recording import read_recording
 from masrel.run import SimulatedGrades, read_log, run_session

@@ -16,13 +16,13 @@ from masrel.hess.puck._codec import (
     encode_position,
     encode_set,
 )
-from masrel.hess.puck._device import (
+from masrel.hess.puck._puck_device import (
     EmulatedPuckDevice,
     PuckDevice,
     UnwiredPuckDevice,
     build,
 )
-from masrel.hess.puck._options import FaultKind
+from masrel.hess.puck._puck_options import FaultKind
 from masrel.hess.puck._transmission import Transmission
 from tests.hess.puck.rig import END, START, fault, loose, opened, puck_options, told
 

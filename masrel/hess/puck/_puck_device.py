@@ -23,7 +23,7 @@ from masrel.hess.puck._bus import open_link
 from masrel.hess.puck._codec import reply_identifiers
 from masrel.hess.puck._emulator import PuckEmulator, emulate
 from masrel.hess.puck._node import Polls, PuckNode
-from masrel.hess.puck._options import PuckOptions
+from masrel.hess.puck._puck_options import PuckOptions
 from masrel.hess.puck._release import release, release_command
 from masrel.hess.puck._transmission import Transmission
 
