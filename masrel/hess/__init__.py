@@ -3,6 +3,7 @@
 from masrel.hess._presented import Fault, Presented, cut_off
 from masrel.hess._replay import ReplayOptions
 from masrel.hess._stop import EmergencyStop
+from masrel.hess.backends import device_names, open_device
 from masrel.hess.clock import Clock, RealClock, SimulatedClock
 from masrel.hess.controller import Controller
 from masrel.hess.device import (
@@ -16,7 +17,6 @@ from masrel.hess.friction import Friction, FrictionCompensation
 from masrel.hess.hand import Hand, SimulatedHand, YieldingHand
 from masrel.hess.limits import DeviceLimits
 from masrel.hess.loop import run_presentation
-from masrel.hess.registry import device_names, open_device
 
 __all__ = [
     "BackendOptions",

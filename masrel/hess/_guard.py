@@ -164,7 +164,7 @@ class Guard:
 
 
 class Dropouts:
-    """Count ticks without a new reading, and say when there are too many."""
+    """Count ticks without a new reading; too many in a row or in 100 are a fault."""
 
     __slots__ = ("_limits", "_times", "_window_s", "n_in_a_row", "n_missed")
 

@@ -119,8 +119,8 @@ def _exponential(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
 class Plant:
     """The arm, integrated in fixed steps from the time of its first use."""
 
-    # The arm turns in a horizontal plane (no gravity)::
-    # (I + I_arm) θ̈ = τ_hand - τ_motor - B θ̇ - β sgn(θ̇) - τ_stop
+    # The arm turns in a horizontal plane (no gravity):
+    #     (I + I_arm) θ̈ = τ_hand - τ_motor - B θ̇ - β sgn(θ̇) - τ_stop
     # with I, B, β of (7). While the arm rests, Coulomb friction takes any value up to
     # β, so the arm truly sticks. The motor's torque follows the command, rounded to its
     # quantum, after a delay and through a first-order lag.
@@ -209,8 +209,8 @@ class Plant:
         return spring + hand.damping * (velocity - self.velocity)
 
     def angle_at(self, now_ns: int) -> float:
-        """Return the angle at a time less than a step ahead."""
-        # rad, at the speed of now: within half a step at 100 rad/s² that is right to
+        """Return the angle at a time less than a step ahead, rad."""
+        # At the speed of now: within half a step at 100 rad/s² that is right to
         # 0.0007 deg, less than an encoder sees.
         return self.angle + self.velocity * (now_ns - self.now_ns) * 1e-9
 

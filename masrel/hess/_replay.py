@@ -32,7 +32,7 @@ class ReplayOptions(BackendOptions):
 
 
 class ReplayDevice(Device):
-    """Gives the readings of a recording one after the other, and takes any torque."""
+    """Give the readings of a recording one after the other, and take any torque."""
 
     # Every reading puts a simulated clock forward to the time of the recorded one; on a
     # real clock it waits for it, and the time between reading and tick is what the

@@ -9,7 +9,7 @@ from masrel.hess.device import Device
 
 
 def run_to_the_end(ticks: Ticks) -> tuple[str, Fault | None]:
-    """Run ticks until they end; whatever ends them, the torque is zero afterwards."""
+    """Run ticks -> how they ended, and the fault; the torque is zero afterwards."""
     try:
         return _run(ticks)
     except BaseException as error:

@@ -132,7 +132,7 @@ class Samples:
 
 
 def recorded_columns(written: NDArray[np.float64]) -> Columns:
-    """Name what the loop wrote, in the units of a recording."""
+    """Return what the loop wrote by name, in the units of a recording."""
     # written (6, n) -> (n,)
     time_s, angle, velocity, model, command, phase = written
     return {
@@ -154,7 +154,7 @@ class Spooled:
 
 
 def read_spool(path: Path) -> Spooled | None:
-    """Read what a process that died left; None when it left no sample."""
+    """Return the samples that a dead process left; None when it left none."""
     data = path.read_bytes()
     if len(data) < _HEADER + _WORD or not data[:_HEADER].strip():
         return None  # it died while it allocated the file

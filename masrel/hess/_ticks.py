@@ -83,7 +83,7 @@ class Ticks:
         self.samples = samples
 
     def run(self) -> str:
-        """Run ticks until the end, however it comes."""
+        """Run ticks until they end -> ``"arrived"`` or ``"max-duration"``."""
         self._start_ns = self._sent_ns = self.clock.now_ns()
         stop, device, beat = self._stop, self.device, self.watchdog.beat
         check_every = max(1, round(_CHECK_EVERY_S * 1e9 / self.period_ns))

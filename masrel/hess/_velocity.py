@@ -25,7 +25,7 @@ class VelocityEstimate:
         self._gain = 0.0
 
     def update(self, time_s: float, angle: float) -> float:
-        """Take one reading in."""
+        """Return the speed after one more reading, rad/s."""
         if self._time is None:
             self._time, self._angle = time_s, angle
             return 0.0

@@ -21,7 +21,7 @@ _PRIORITY = 81  # above that of the loop, which may be what hangs
 
 
 def main(arguments: list[str]) -> int:
-    """Take hold of the device, say so, and watch."""
+    """Take hold of the device, say so, and watch -> exit code."""
     # Whoever stops the loop must not stop this first; it ends when its input does.
     for name in ("SIGINT", "SIGTERM", "SIGHUP"):
         if hasattr(signal, name):
@@ -43,7 +43,7 @@ def main(arguments: list[str]) -> int:
 
 
 def watch(pipe: int, timeout_s: float, idle: Callable[[], None]) -> int:
-    """Wait for beats until they stop or all is well."""
+    """Wait for beats until they stop or all is well -> exit code."""
     patience: float | None = None  # until the first beat
     while True:
         ready, _, _ = select.select([pipe], [], [], patience)

@@ -8,7 +8,7 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from masrel.run._grades import GradeRequest, GradeSource, ScriptGrades
+    from masrel.run._grade_sources import GradeRequest, GradeSource, ScriptGrades
     from masrel.run._log import Event, SessionLog, read_log
     from masrel.run._runner import SessionSummary
     from masrel.run._settings import model_controller
@@ -32,7 +32,7 @@ __all__ = [
 ]
 
 _HOMES = {
-    "_grades": ("GradeRequest", "GradeSource", "ScriptGrades"),
+    "_grade_sources": ("GradeRequest", "GradeSource", "ScriptGrades"),
     "_log": ("Event", "SessionLog", "read_log"),
     "_runner": ("SessionSummary",),
     "_settings": ("model_controller",),

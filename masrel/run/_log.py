@@ -94,7 +94,7 @@ def _line_hash(line: bytes) -> str:
 
 
 def _verify(path: Path, lines: list[bytes]) -> tuple[Event, ...]:
-    """Verify a chain from its first line on."""
+    """Return the events of a chain that holds from its first line on."""
     previous = _FIRST_PREVIOUS
     events = []
     for number, line in enumerate(lines, start=1):
@@ -111,7 +111,7 @@ def _verify(path: Path, lines: list[bytes]) -> tuple[Event, ...]:
 
 
 def _parse_event(path: Path, number: int, line: bytes) -> Event:
-    """Read one line, without regard to the chain."""
+    """Return the event of one line, without regard to the chain."""
     try:
         document = json.loads(line.decode("utf-8"))
     except ValueError as error:

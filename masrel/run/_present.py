@@ -26,7 +26,7 @@ from masrel.hess._stop import stop_on_key, stop_on_signals
 from masrel.hess._watchdog import watched
 from masrel.protocol import Protocol, elbow_parameters
 from masrel.recording import RECORDING_COLUMNS, Fact, Recording, write_recording
-from masrel.run._grades import GradeRequest
+from masrel.run._grade_sources import GradeRequest
 from masrel.run._settings import (
     backend_options,
     device_limits,

@@ -15,7 +15,7 @@ from masrel.errors import (
 from masrel.hess import Clock, EmergencyStop, RealClock, SimulatedClock
 from masrel.protocol import Protocol, StudyPaths, presented_hash, protocol_hash
 from masrel.recording import Fact
-from masrel.run._grades import GradeRequest, GradeSource
+from masrel.run._grade_sources import GradeRequest, GradeSource
 from masrel.run._log import SessionLog
 from masrel.run._present import Outcome, present, recover
 from masrel.run._settings import moves_hardware
@@ -93,7 +93,7 @@ class SessionRunner:
         return self._grades.simulated or not moves_hardware(self._protocol.device)
 
     def begin(self, schedule_sha256: str) -> None:
-        """Log what this is; or, when the log says it, that it is still the same."""
+        """Log which session this is; check that it is the same when it is resumed."""
         protocol, schedule = self._protocol, self._schedule
         same: dict[str, Fact] = {
             "format": _FORMAT,
@@ -127,7 +127,7 @@ class SessionRunner:
             )
 
     def run(self, progress: Callable[[Presentation], object] | None) -> SessionSummary:
-        """Present and ask until every presentation has its grade."""
+        """Present and ask for grades until every presentation has one."""
         schedule = self._schedule
         for presentation in schedule.presentations:
             if presentation.code not in self._state.first_grades:

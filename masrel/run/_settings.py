@@ -106,7 +106,7 @@ def moves_hardware(settings: DeviceSettings) -> bool:
 def backend_options(
     settings: DeviceSettings, hand: Hand | None = None
 ) -> BackendOptions | None:
-    """Return what a protocol tells the backend alone."""
+    """Return the options of the backend that a protocol sets."""
     if settings.backend != "puck":
         return None
     options = _puck_options(settings)

@@ -12,7 +12,7 @@ from typing import ClassVar, Literal
 
 from masrel.errors import ParameterError, ProtocolError
 from masrel.protocol import Model, Protocol, scale_of
-from masrel.run._grades import MAX_FAULTS, GradeRequest
+from masrel.run._grade_sources import MAX_FAULTS, GradeRequest
 
 _Purpose = Literal["accuracy", "neighbour", "severity", "retest", "speed"]
 
@@ -109,7 +109,7 @@ class SimulatedGrades:
 
 
 def severity(protocol: Protocol, model: Model) -> float:
-    """Place a model on the scale, from facts of the protocol alone."""
+    """Return the rank of a model on the scale, from facts of the protocol alone."""
     scale = scale_of(protocol)
     if model.intended_grade is not None:
         return float(scale.code(model.intended_grade))

@@ -72,7 +72,7 @@ class SessionState:
 
 
 def replay(path: Path, events: Sequence[Event]) -> SessionState:
-    """Find out where a session stands from its log."""
+    """Return where a session stands after the events of its log."""
     state = SessionState()
     for event in events:
         fault = _contradiction(state, event)

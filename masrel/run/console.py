@@ -4,7 +4,7 @@ import sys
 from typing import ClassVar, TextIO
 
 from masrel.errors import SessionStoppedError
-from masrel.run._grades import GradeRequest
+from masrel.run._grade_sources import GradeRequest
 from masrel.scales import Scale
 
 

@@ -10,7 +10,7 @@ from datetime import datetime
 
 from masrel.errors import ParameterError, ScheduleError, SessionLogError
 from masrel.protocol import Protocol, StudyPaths
-from masrel.run._grades import GradeSource
+from masrel.run._grade_sources import GradeSource
 from masrel.run._log import SessionLog, utc_now
 from masrel.run._runner import CLOCKS, ClockName, SessionRunner, SessionSummary
 from masrel.run._settings import check_backend, has_simulated_hand
