@@ -26,9 +26,9 @@ from masrel.hess import (
     ReplayOptions,
     SimulatedClock,
     SimulatedHand,
+    backends,
     device_names,
     open_device,
-    registry,
     run_presentation,
 )
 from masrel.recording import Recording
@@ -117,7 +117,7 @@ def test_every_backend_that_is_written_is_registered() -> None:
         for module in pkgutil.walk_packages(hess.__path__, "masrel.hess.")
         if "\ndef build(setup: DeviceSetup)" in _source(module.name)
     }
-    assert written == set(registry._BACKENDS.values())
+    assert written == set(backends._BACKENDS.values())
 
 
 def _source(module: str) -> str:
