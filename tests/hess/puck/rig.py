@@ -1,4 +1,7 @@
-"""A bench for the tests: an emulated puck on a bus inside the process."""
+"""A bench for the tests: an emulated puck on a bus inside the process.
+
+It alone looks inside the driver; tests of its parts are in tests/internal/hess/puck.
+"""
 
 from dataclasses import dataclass, replace
 from itertools import count
@@ -21,9 +24,12 @@ from masrel.hess.puck._emulator import PuckEmulator
 from masrel.hess.puck._node import PuckNode
 from masrel.hess.puck._puck_device import EmulatedPuckDevice, emulated_options
 from masrel.hess.puck._puck_options import FaultKind
+from masrel.hess.puck._transmission import Transmission
 
 START, END = radians(30.0), radians(146.0)
 LIMITS = DeviceLimits(torque=20.0, speed=radians(400.0), missed_ticks=20)
+
+PUCK = Transmission(counts_per_turn=4096, units_per_nm=2700)
 
 _channels = count()
 

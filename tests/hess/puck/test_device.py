@@ -20,8 +20,8 @@ from masrel.hess import (
     open_device,
 )
 from masrel.hess.puck import EmulatorOptions, PuckOptions, property_table
-from masrel.hess.puck._transmission import Transmission
 from tests.hess.puck.rig import (
+    PUCK,
     fault,
     loose,
     opened,
@@ -30,9 +30,6 @@ from tests.hess.puck.rig import (
     stretching,
     told,
 )
-
-PUCK = Transmission(counts_per_turn=4096, units_per_nm=2700)
-
 
 # Opening
 

@@ -18,17 +18,20 @@ from hypothesis import strategies as st
 from masrel.errors import OverrunWarning
 from masrel.hess import Device, open_device
 from masrel.hess.puck import InjectedFault
-from masrel.hess.puck._puck_device import EmulatedPuckDevice
-from masrel.hess.puck._puck_options import FaultKind
-from masrel.hess.puck._transmission import Transmission
 from masrel.recording import read_recording
 from masrel.run import SimulatedGrades, read_log, run_session
 from masrel.run import _present as presenting
 from tests.hess.injected import small_study
-from tests.hess.puck.rig import fault, presented, puck_options
+from tests.hess.puck.rig import (
+    PUCK,
+    EmulatedPuckDevice,
+    FaultKind,
+    fault,
+    presented,
+    puck_options,
+)
 
 PAGE = Path(__file__).parents[3] / "docs" / "hardware.md"
-PUCK = Transmission(counts_per_turn=4096, units_per_nm=2700)
 CATCH = 0.7  # HM3 at 92 deg/s is in its catch from 0.63 to 0.96 s
 
 

@@ -24,9 +24,7 @@ from masrel.errors import BusError
 from masrel.hess import RealClock, SimulatedClock, open_device
 from masrel.hess._watchdog import watched
 from masrel.hess.puck import EmulatorOptions, PuckOptions
-from masrel.hess.puck._bus import open_link
-from masrel.hess.puck._emulator import PuckEmulator
-from tests.hess.puck.rig import END, loose, opened
+from tests.hess.puck.rig import END, PuckEmulator, loose, open_link, opened
 
 TIMEOUT_S = 0.1
 # A watchdog notices silence after its timeout, or the end of the pipe at once; then it

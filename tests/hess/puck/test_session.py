@@ -6,10 +6,8 @@ from pathlib import Path
 import pytest
 
 from masrel.hess import Device, open_device
-from masrel.hess.puck._puck_device import EmulatedPuckDevice
-from masrel.hess.puck._puck_options import FaultKind
 from tests.hess.injected import CATCH, injections, outcome
-from tests.hess.puck.rig import fault
+from tests.hess.puck.rig import EmulatedPuckDevice, FaultKind, fault
 from tests.hess.puck.test_faults import session
 
 

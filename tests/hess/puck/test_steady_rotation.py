@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 from math import radians
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -16,8 +17,14 @@ from masrel.errors import (
     LimitExceededError,
     ParameterError,
 )
-from masrel.hess import EmergencyStop, SimulatedClock, SimulatedHand, open_device
-from masrel.hess._simulated import SimulatedDevice
+from masrel.hess import (
+    Device,
+    EmergencyStop,
+    Reading,
+    SimulatedClock,
+    SimulatedHand,
+    open_device,
+)
 from masrel.hess.puck import SteadyRun, fit_friction, steady_runs
 from tests.hess.puck.rig import END, fault, loose, opened, puck_options
 from tests.hess.rig import ScriptedDevice
@@ -66,22 +73,43 @@ def test_an_arm_near_its_end_is_not_turned() -> None:
         steady_runs(device, clock)
 
 
+class Faulty(Device):
+    """The simulated device with an arm at 60 deg; a subclass says what is wrong."""
+
+    name: ClassVar[str] = "faulty"
+    simulated: ClassVar[bool] = True
+
+    def __init__(self, clock: SimulatedClock) -> None:
+        self.inner = open_device("simulated", clock=clock, hand=loose(60.0))
+
+    def _start(self) -> None: ...
+
+    def _read(self) -> Reading:
+        return self.inner.read()
+
+    def _send(self, torque_nm: float) -> None:
+        self.inner.command(torque_nm)
+
+    def _stop(self) -> None:
+        self.inner.close()
+
+
 def test_a_first_reading_that_is_lost_is_waited_for() -> None:
-    class Losing(SimulatedDevice):
+    class Losing(Faulty):
         n_lost = 0
 
-        def _read(self):
+        def _read(self) -> Reading:
             if self.n_lost < 2:
                 self.n_lost += 1
                 raise DeviceTimeoutError("no answer")
             return super()._read()
 
     clock = SimulatedClock()
-    with Losing(clock=clock, hand=loose(60.0)) as device:
+    with Losing(clock) as device:
         assert len(steady_runs(device, clock, speeds=(radians(80.0),))) == 2
 
 
-class Reversed(SimulatedDevice):
+class Reversed(Faulty):
     """Its motor turns the other way."""
 
     def _send(self, torque_nm: float) -> None:
@@ -91,7 +119,7 @@ class Reversed(SimulatedDevice):
 def test_a_motor_that_turns_the_other_way_is_noticed_at_once() -> None:
     # Under speed control it would run away.
     clock = SimulatedClock()
-    with Reversed(clock=clock, hand=loose(60.0)) as device:
+    with Reversed(clock) as device:
         with pytest.raises(
             DeviceError, match="counts of the puck have different signs"
         ):
@@ -212,10 +240,10 @@ def test_every_fourth_lost_reading_ends_it_as_it_ends_a_presentation() -> None:
 
 
 def test_a_reading_that_comes_again_is_none() -> None:
-    class Repeating(SimulatedDevice):
+    class Repeating(Faulty):
         n_read = 0
 
-        def _read(self):
+        def _read(self) -> Reading:
             self.n_read += 1
             if self.n_read <= 500:
                 self.last = super()._read()
@@ -223,7 +251,7 @@ def test_a_reading_that_comes_again_is_none() -> None:
 
     clock = SimulatedClock()
     with (
-        Repeating(clock=clock, hand=loose(60.0)) as device,
+        Repeating(clock) as device,
         pytest.raises(
             LimitExceededError, match=r"3 in a row \(one of 0.499000 s again"
         ),

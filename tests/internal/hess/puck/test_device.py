@@ -23,10 +23,16 @@ from masrel.hess.puck._puck_device import (
     build,
 )
 from masrel.hess.puck._puck_options import FaultKind
-from masrel.hess.puck._transmission import Transmission
-from tests.hess.puck.rig import END, START, fault, loose, opened, puck_options, told
-
-PUCK = Transmission(counts_per_turn=4096, units_per_nm=2700)
+from tests.hess.puck.rig import (
+    END,
+    PUCK,
+    START,
+    fault,
+    loose,
+    opened,
+    puck_options,
+    told,
+)
 
 
 @pytest.mark.parametrize(
