@@ -18,7 +18,7 @@ from masrel.agreement import (
     declared_weights,
 )
 from masrel.agreement._counts import distinct_rows
-from masrel.agreement._kernel import Floats, Kernel
+from masrel.agreement._kernel import Floats, Kernel, RaterSums
 from masrel.errors import (
     ParameterError,
     SmallSampleWarning,
@@ -50,6 +50,7 @@ class IntervalProblem:
     v: Floats = field(compare=False, repr=False)  # disagreement of two categories
     n_items: int  # items with a rating
     value: float  # the estimate; ``nan`` when undefined
+    min_value: float  # where intervals are cut
     target: Target
     level: float
 
@@ -71,11 +72,15 @@ class IntervalProblem:
         rated = (self.coded.codes >= 0).any(axis=1)
         return self.features(self.coded)[rated]
 
-    @property
-    def min_value(self) -> float:
-        """Where intervals are cut: -∞ for an estimate below the usual least value."""
-        # Weights, or items of a single rating, can bring a coefficient below -1.
-        return self.entry.lowest if self.value >= self.entry.lowest else -math.inf
+    def rater_sums(self) -> RaterSums:
+        """Return sums of features as a function of how often each rater is taken."""
+        fewest, most = self.entry.n_raters
+        if self.kernel.rater_sums is None or most == fewest:
+            raise ParameterError(
+                f"target: raters of {self.entry.title} cannot be resampled without "
+                "pairing a rater with a copy of itself"
+            )
+        return self.kernel.rater_sums(self.patterns, self.freq, self.v)
 
     def student_t(self, df: float) -> float:
         """Return the two-sided quantile of Student's t at the level."""
@@ -93,14 +98,11 @@ class IntervalProblem:
         notes: Sequence[str] = (),
     ) -> Interval:
         """Return a confidence interval, cut at the ends of the parameter space."""
-        min_value = self.min_value
-        if low < min_value or high > 1.0:
-            notes = (
-                *notes,
-                f"cut at the end of the parameter space [{min_value:g}, 1]",
-            )
+        if low < self.min_value or high > 1.0:
+            space = f"[{self.min_value:g}, 1]"
+            notes = (*notes, f"cut at the end of the parameter space {space}")
         return Interval(
-            low=max(low, min_value),
+            low=max(low, self.min_value),
             high=min(high, 1.0),
             level=self.level,
             kind="confidence",
@@ -161,6 +163,7 @@ def pose_problem(
     patterns = replace(coded, codes=codes)
     rows = _features(kernel, patterns, v)
     sums = np.asarray(freq @ rows)
+    value = float(kernel.value(sums, v))
     return IntervalProblem(
         entry=entry,
         kernel=kernel,
@@ -171,7 +174,9 @@ def pose_problem(
         sums=sums,
         v=v,
         n_items=int(freq.sum()),
-        value=float(kernel.value(sums, v)),
+        value=value,
+        # weights, or items of a single rating, can bring a coefficient below -1
+        min_value=entry.lowest if value >= entry.lowest else -math.inf,
         target=target,
         level=level,
     )

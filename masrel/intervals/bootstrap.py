@@ -1,8 +1,8 @@
 """Bootstrap intervals over items or raters: exact, or by Monte Carlo."""
 
-import dataclasses
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any, Literal, get_args
 
@@ -12,18 +12,17 @@ from numpy.typing import ArrayLike, NDArray
 from masrel.agreement import Label, WeightName
 from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target
-from masrel.intervals._problem import Statistic, pose_problem
+from masrel.intervals._endpoints import (
+    EndpointRule,
+    Kind,
+    Resamples,
+    distribution_of,
+    has_spread,
+)
+from masrel.intervals._problem import IntervalProblem, Statistic, pose_problem
+from masrel.intervals._resamples import DrawBudget, all_resamples, draw_resamples
 from masrel.intervals._seeds import check_rng, recorded_generator
-from masrel.intervals.resampling.draws import Effort, draw_resamples
-from masrel.intervals.resampling.endpoints import Ends, Kind, Rule
-from masrel.intervals.resampling.exact import enumerate_resamples
-from masrel.intervals.resampling.ground import pool_of, rule_of
-from masrel.intervals.resampling.pool import Pool
-from masrel.intervals.resampling.resamples import Resamples
-from masrel.intervals.resampling.samplers import sampler_of
-from masrel.intervals.resampling.slopes import studentized
-
-__all__ = ["Exact", "Kind", "bootstrap"]
+from masrel.intervals._units import SamplingUnits, sampling_units
 
 Exact = Literal["auto"] | bool
 """Whether all resamples are taken: always, never, or if there are few enough."""
@@ -42,7 +41,7 @@ def bootstrap(
     exact: Exact = "auto",
     clusters: Sequence[object] | NDArray[Any] | None = None,
     tolerance: float | None = None,
-    most_resamples: int = 10_000_000,
+    max_resamples: int = 10_000_000,
     rng: np.random.Generator | int | None = None,
 ) -> Interval:
     """Compute a bootstrap interval.
@@ -74,7 +73,7 @@ def bootstrap(
         drawn whole. Several stretches of one haptic model are such a cluster.
     tolerance : float, optional
         The largest Monte Carlo error of an end: resamples are drawn until it is met.
-    most_resamples : int, optional
+    max_resamples : int, optional
         How many are drawn for it at most.
     rng : Generator or int, optional
         Where randomness comes from; an integer is recorded as the seed. Without
@@ -91,13 +90,13 @@ def bootstrap(
     Raises
     ------
     ParameterError
-        If an option is none, raters of this coefficient cannot be resampled, there are
-        too many resamples for `exact` to be True, or not as many labels of clusters as
-        items.
+        If an option is invalid, raters of this coefficient cannot be resampled, there
+        are too many resamples for `exact` to be True, or not as many labels of clusters
+        as items.
     RatingsError
         If the ratings do not fit the coefficient.
     ConvergenceError
-        If `tolerance` takes more than `most_resamples`; it says how many more.
+        If `tolerance` takes more than `max_resamples`; it says how many more.
 
     Warns
     -----
@@ -118,8 +117,8 @@ def bootstrap(
     A quantile is the least value whose probability adds up to it, and where it adds up
     to just that, the middle between this value and the next. Ties with the estimate
     count half in the bias of BCa. "studentized" divides by the delta-method standard
-    error of every resample, from exact derivatives; a resample that is off without any
-    spread is infinitely many standard errors off.
+    error of every resample, from exact derivatives; where that is 0, and the resample
+    differs from the estimate, the ratio is infinite.
 
     What is drawn has a linear function of the resample as its control: its distribution
     is computed, and says how far the sample is off [2]_. The Monte Carlo error is what
@@ -137,22 +136,22 @@ def bootstrap(
     Of 20 items of three kinds there are 231 different resamples:
 
     >>> ratings = [["a", "a"], ["a", "b"], ["b", "b"], ["b", "b"]] * 5
-    >>> found = bootstrap("cohen_kappa", ratings, target="items")
-    >>> found.method, found.distribution.words
+    >>> interval = bootstrap("cohen_kappa", ratings, target="items")
+    >>> interval.method, interval.distribution.words
     ('percentile bootstrap, exact', 'exact bootstrap distribution, 231 resamples')
-    >>> found.n_resamples, round(found.low, 3), round(found.high, 3)
+    >>> interval.n_resamples, round(interval.low, 3), round(interval.high, 3)
     (None, 0.174, 0.802)
 
     Drawing some of them instead:
 
-    >>> found = bootstrap("cohen_kappa", ratings, target="items", exact=False, rng=1)
-    >>> found.seed, found.n_resamples, found.low < 0.5 < found.high
+    >>> interval = bootstrap("cohen_kappa", ratings, target="items", exact=False, rng=1)
+    >>> interval.seed, interval.n_resamples, interval.low < 0.5 < interval.high
     (1, 10000, True)
     """
-    effort = Effort(
-        n_resamples=n_resamples, tolerance=tolerance, most_resamples=most_resamples
+    budget = DrawBudget(
+        n_resamples=n_resamples, tolerance=tolerance, max_resamples=max_resamples
     )
-    _check(kind, exact, effort, rng)
+    _check_options(kind, exact, budget, rng)
     problem = pose_problem(
         coefficient,
         ratings,
@@ -161,74 +160,81 @@ def bootstrap(
         weights=weights,
         level=level,
     )
-    pool, notes, what = pool_of(problem, clusters)
-    rule = rule_of(problem, pool, kind)
-    method = f"{kind} bootstrap{what}"
-    reason = _no_ground(rule)
+    units = sampling_units(problem, clusters)
+    rule = _endpoint_rule(problem, units, kind)
+    method = f"{kind} bootstrap"
+    if clusters is not None:
+        method += f" of {units.n} clusters"
+    reason = _why_no_resamples(rule)
     if reason is not None:
         return problem.undefined(reason, method=method, unit=target)
-    found, seed = _resamples(pool, rule, exact, effort, rng)
-    if found.n_resamples is None:
+    resamples, seed = _resamples(units, rule, exact, budget, rng)
+    if resamples.n_resamples is None:
         method += ", exact"
-    ends = rule.ends(found.source) if found.has_spread else None
+    ends = rule.ends(resamples) if has_spread(resamples) else None
     if ends is None:
-        return problem.undefined(_no_ends(found), method=method, unit=target)
-    closed = problem.confidence(
+        return problem.undefined(_why_no_ends(resamples), method=method, unit=target)
+    interval = problem.confidence(
         ends.low,
         ends.high,
         method=method,
         unit=target,
-        notes=(*notes, *found.notes, *_endless(found)),
+        notes=(*units.notes, *resamples.notes, *_infinite_ratios(resamples)),
     )
-    return _drawn(closed, found, ends, seed, kind)
-
-
-def _drawn(
-    interval: Interval, found: Resamples, ends: Ends, seed: int | None, kind: Kind
-) -> Interval:
-    # the interval with what is to know of its resamples
-    return dataclasses.replace(
+    return replace(
         interval,
-        n_resamples=found.n_resamples,
-        n_undefined=found.n_undefined,
+        n_resamples=resamples.n_resamples,
+        n_undefined=resamples.n_undefined,
         monte_carlo_error=ends.errors,
         seed=seed,
         # ratios to standard errors are no values of the coefficient
-        distribution=None if kind == "studentized" else found.distribution,
+        distribution=None if kind == "studentized" else distribution_of(resamples),
     )
 
 
-def _check(kind: Kind, exact: Exact, effort: Effort, rng: object) -> None:
+def _check_options(kind: Kind, exact: Exact, budget: DrawBudget, rng: object) -> None:
     if kind not in get_args(Kind):
         raise ParameterError(
             f"kind: needs one of {', '.join(get_args(Kind))}, got {kind!r}"
         )
     if not (exact is True or exact is False or exact == "auto"):
         raise ParameterError(f'exact: needs "auto", True or False, got {exact!r}')
-    effort.check()
+    budget.check()
     check_rng(rng)
 
 
+def _endpoint_rule(
+    problem: IntervalProblem, units: SamplingUnits, kind: Kind
+) -> EndpointRule:
+    rule = EndpointRule(kind=kind, level=problem.level, value=problem.value)
+    if kind == "bca" and not math.isnan(rule.value):
+        return replace(rule, skew=units.acceleration())
+    if kind == "studentized" and not math.isnan(rule.value):
+        (error,) = units.standard_errors(units.freq[None].astype(np.float64))
+        return replace(rule, error=float(error))
+    return rule
+
+
 def _resamples(
-    pool: Pool,
-    rule: Rule,
+    units: SamplingUnits,
+    rule: EndpointRule,
     exact: Exact,
-    effort: Effort,
+    budget: DrawBudget,
     rng: np.random.Generator | int | None,
 ) -> tuple[Resamples, int | None]:
-    # all of them, or some with the seed that repeats them
+    """Take all resamples, or draw some and return the seed that repeats them."""
     statistic = None
     if rule.kind == "studentized":
-        statistic = partial(studentized, pool, value=rule.value, error=rule.error)
+        statistic = partial(units.studentized, value=rule.value, error=rule.error)
     if exact is not False:
-        every = enumerate_resamples(pool, statistic, insist=exact is True)
-        if every is not None:
-            return every, None
+        resamples = all_resamples(units, statistic, insist=exact is True)
+        if resamples is not None:
+            return resamples, None
     generator, seed = recorded_generator(rng)
-    return draw_resamples(sampler_of(pool, statistic), rule, effort, generator), seed
+    return draw_resamples(units, statistic, rule, budget, generator), seed
 
 
-def _no_ground(rule: Rule) -> str | None:
+def _why_no_resamples(rule: EndpointRule) -> str | None:
     if math.isnan(rule.value):
         return "the estimate itself is undefined"
     if rule.kind == "studentized" and not rule.error > 0.0:
@@ -236,17 +242,18 @@ def _no_ground(rule: Rule) -> str | None:
     return None
 
 
-def _no_ends(found: Resamples) -> str:
-    if not found.has_spread:
+def _why_no_ends(resamples: Resamples) -> str:
+    if not has_spread(resamples):
         return "every resample gives the same value or none, so there is no spread"
     return "all resamples lie on one side of the estimate, so BCa has no bias"
 
 
-def _endless(found: Resamples) -> tuple[str, ...]:
-    share = float(found.source.weights[np.isinf(found.ascending)].sum())
+def _infinite_ratios(resamples: Resamples) -> tuple[str, ...]:
+    """Return a note of resamples that cannot be studentized, if there are any."""
+    share = float(resamples.weights[np.isinf(resamples.values)].sum())
     if not share:
         return ()
     return (
-        f"resamples without any spread, of probability {share:.2g}, are infinitely "
-        "many of their standard errors off",
+        f"resamples of probability {share:.2g} have a standard error of 0: their "
+        "studentized values are infinite",
     )

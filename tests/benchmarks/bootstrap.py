@@ -4,7 +4,6 @@ Part of ``python -m docs.make.benchmarks.intervals``. Peers that are not
 installed are left out.
 """
 
-import importlib
 import math
 import time
 from collections.abc import Callable, Iterator
@@ -17,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.estimates import Interval
-from masrel.intervals import bootstrap
+from masrel.intervals import _resamples, bootstrap
 from tests.benchmarks.peers import present
 from tests.benchmarks.sidebyside import Timing, peak_megabytes, side_by_side
 
@@ -352,13 +351,12 @@ def _peers(
 
 @contextmanager
 def _no_control() -> Iterator[None]:
-    module = importlib.import_module("masrel.intervals.resampling.samplers")
-    least = module._LEAST
-    module._LEAST = 10**18
+    minimum = _resamples._MIN_CONTROLLED
+    _resamples._MIN_CONTROLLED = 10**18
     try:
         yield
     finally:
-        module._LEAST = least
+        _resamples._MIN_CONTROLLED = minimum
 
 
 def gains(quick: bool) -> list[tuple[str, float, float]]:

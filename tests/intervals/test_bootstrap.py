@@ -1,6 +1,5 @@
 """Bootstrap intervals against complete enumeration and another program."""
 
-import importlib
 import itertools
 import math
 from collections import Counter
@@ -165,18 +164,6 @@ def test_seeds_repeat_and_are_recorded() -> None:
         "fleiss_kappa", table, target="items", rng=np.random.default_rng(5)
     )
     assert (given.low, given.high, given.seed) == (one.low, one.high, None)
-
-
-def test_chunks_do_not_change_what_is_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    table = dirichlet_multinomial(np.random.default_rng(4), 20, 6, 0.5)
-    for target in ("items", "raters"):
-        whole = bootstrap("fleiss_kappa", table, target=target, rng=5, exact=False)  # type: ignore[arg-type]
-        with monkeypatch.context() as patch:
-            # the function of the same name hides the module from a dotted path
-            module = importlib.import_module("masrel.intervals.resampling.samplers")
-            patch.setattr(module, "_CHUNK", 4000)
-            cut = bootstrap("fleiss_kappa", table, target=target, rng=5, exact=False)  # type: ignore[arg-type]
-        assert cut == whole
 
 
 @few

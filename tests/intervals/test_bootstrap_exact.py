@@ -1,6 +1,5 @@
 """Exact bootstrap intervals against all n^n resamples in fractions."""
 
-import importlib
 import itertools
 import math
 import subprocess
@@ -183,34 +182,6 @@ def rater_resamples(table: textbook.Table) -> Counter[Fraction | None]:
     return counted
 
 
-@pytest.mark.parametrize("kind", ["percentile", "bca"])
-def test_merging_changes_nothing(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    # 11 440 resamples, fewer sums: by the transform, merged, and each by itself
-    table = dirichlet_multinomial(np.random.default_rng(5), 9, 4, 0.3)
-    module = importlib.import_module("masrel.intervals.resampling.exact")
-    found = []
-    for few, places in ((0, 10**9), (0, 0), (10**9, 0)):
-        monkeypatch.setattr(module, "_FEW", few)
-        monkeypatch.setattr(module, "_BOX", places)
-        monkeypatch.setattr(module, "_MOST", 10**9 if few else 11_000)
-        found.append(exact("fleiss_kappa", table, kind=kind))
-    transformed, merged, alone = found
-    words = [f.distribution.words for f in found]
-    assert words[0] == words[1]
-    assert "sums of resamples" in words[0]
-    assert "sums" not in words[2]
-    for one in (transformed, merged):
-        assert one.low == pytest.approx(alone.low, abs=1e-13)
-        assert one.high == pytest.approx(alone.high, abs=1e-13)
-        assert one.n_undefined == alone.n_undefined
-        np.testing.assert_allclose(
-            one.distribution.values, alone.distribution.values, atol=1e-12
-        )
-        np.testing.assert_allclose(
-            one.distribution.weights, alone.distribution.weights, atol=1e-13
-        )
-
-
 def test_clusters_are_drawn_whole() -> None:
     groups = [FIVE[:2], FIVE[2:3], [*FIVE[3:], [0, 1, 0]], [[2, 2, 1], [1, 1, 1]]]
     law = textbook.law_of_clusters(groups, textbook.fleiss)
@@ -320,18 +291,6 @@ def test_the_distribution_is_of_the_coefficient_or_not_there(
         assert other is not None
         np.testing.assert_array_equal(other.values, plain.values)
         np.testing.assert_array_equal(other.weights, plain.weights)
-
-
-def test_too_many_sums_are_drawn_or_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    table = dirichlet_multinomial(np.random.default_rng(5), 9, 4, 0.3)
-    module = importlib.import_module("masrel.intervals.resampling.exact")
-    monkeypatch.setattr(module, "_MOST", 3000)
-    for places in (10**9, 0):  # by the transform, and merged
-        monkeypatch.setattr(module, "_BOX", places)
-        with pytest.raises(ParameterError, match="more than 3000 different sums"):
-            exact("fleiss_kappa", table)
-        drawn = bootstrap("fleiss_kappa", table, target="items", rng=1)
-        assert drawn.n_resamples == 10_000
 
 
 def test_too_many_resamples_are_drawn_or_refused_with_their_number() -> None:

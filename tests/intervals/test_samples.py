@@ -1,12 +1,14 @@
 """Whoever asks for an interval of a small sample is told, where he or she asks."""
 
+import warnings
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 
 from masrel.errors import SmallSampleWarning
+from masrel.estimates import Interval
 from masrel.intervals import analytic, bootstrap, difference, jackknife
-from masrel.intervals._problem import warn_small
 
 TABLE = [["a", "a"], ["a", "b"], ["b", "b"], ["b", "b"], ["a", "a"]]
 OTHER = [["a", "b"], ["a", "b"], ["b", "b"], ["b", "a"], ["a", "a"], ["b", "b"]]
@@ -29,5 +31,45 @@ def test_the_warning_points_to_who_asked(method: str) -> None:
     assert first <= caught[0].lineno <= first + 2
 
 
-def test_enough_of_them_are_passed_over() -> None:
-    assert warn_small(10, 10, "items") == ()
+SMALLEST = [
+    ("items", 16, lambda n: {"target": "items"}),
+    ("clusters", 16, lambda n: {"target": "items", "clusters": range(n)}),
+    ("raters", 5, lambda n: {"target": "raters"}),
+]
+
+
+@pytest.mark.parametrize(("unit", "enough", "options"), SMALLEST)
+def test_a_bootstrap_warns_below_enough_units(
+    unit: str, enough: int, options: Callable[[int], dict[str, object]]
+) -> None:
+    rows = np.random.default_rng(1).integers(0, 3, (40, 40))
+    for n in (enough - 1, enough):
+        table = rows[:, :n] if unit == "raters" else rows[:n, :3]
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            interval = bootstrap(
+                "fleiss_kappa", table, categories=range(3), rng=1, **options(n)
+            )
+        note = f"{n} {unit}: below {enough} the interval may cover less than it says"
+        assert [str(w.message) for w in caught] == [note] * (n < enough)
+        assert (note in interval.notes) == (n < enough)
+
+
+@pytest.mark.parametrize(
+    ("method", "target", "enough"),
+    [
+        (analytic, "items", 10),
+        (jackknife, "items", 10),
+        (jackknife, "raters", 5),
+    ],
+)
+def test_a_closed_form_warns_below_enough_units(
+    method: Callable[..., Interval], target: str, enough: int
+) -> None:
+    rows = np.random.default_rng(1).integers(0, 3, (40, 40))
+    for n in (enough - 1, enough):
+        table = rows[:n, :4] if target == "items" else rows[:, :n]
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            method("fleiss_kappa", table, target=target, categories=range(3))
+        assert [w.category for w in caught] == [SmallSampleWarning] * (n < enough)

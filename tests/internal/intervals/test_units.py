@@ -5,13 +5,7 @@ import pytest
 
 from masrel.agreement import COEFFICIENTS
 from masrel.intervals._problem import IntervalProblem, pose_problem
-from masrel.intervals.resampling.pool import Pool, item_pool, rater_pool
-from masrel.intervals.resampling.slopes import (
-    acceleration,
-    influence,
-    standard_errors,
-    studentized,
-)
+from masrel.intervals._units import SamplingUnits, item_units, rater_units
 from tests.intervals.data import dirichlet_multinomial
 
 KERNELS = [name for name, entry in COEFFICIENTS.items() if entry.kernel is not None]
@@ -32,7 +26,7 @@ def ratings_of(name: str, n: int) -> list[list[object]]:
     return [list(row) for row in table]
 
 
-def case_of(name: str, n: int = 25, weights: str = "identity") -> IntervalProblem:
+def problem_of(name: str, n: int = 25, weights: str = "identity") -> IntervalProblem:
     return pose_problem(
         name,
         ratings_of(name, n),
@@ -43,13 +37,13 @@ def case_of(name: str, n: int = 25, weights: str = "identity") -> IntervalProble
     )
 
 
-def by_differences(pool: Pool, counts: np.ndarray, step: float) -> np.ndarray:  # type: ignore[type-arg]
+def by_differences(units: SamplingUnits, counts: np.ndarray, step: float) -> np.ndarray:  # type: ignore[type-arg]
     """Slopes by four-point differences, member by member."""
     found = []
     for one in np.eye(counts.size):
         near, far = (
-            pool.of_counts(counts + d * step * one)
-            - pool.of_counts(counts - d * step * one)
+            units.of_counts(counts + d * step * one)
+            - units.of_counts(counts - d * step * one)
             for d in (1, 2)
         )
         found.append((8 * near - far) / (12 * step))
@@ -59,10 +53,10 @@ def by_differences(pool: Pool, counts: np.ndarray, step: float) -> np.ndarray:  
 @pytest.mark.parametrize("weights", ["identity", "quadratic"])
 @pytest.mark.parametrize("name", KERNELS)
 def test_slopes_are_those_of_differences(name: str, weights: str) -> None:
-    pool = item_pool(case_of(name, weights=weights))
-    counts = pool.times + np.arange(pool.times.size) % 3.0
-    (slopes,) = influence(pool, counts[None])
-    expected = by_differences(pool, counts, 1e-2)
+    units = item_units(problem_of(name, weights=weights))
+    counts = units.freq + np.arange(units.freq.size) % 3.0
+    (slopes,) = units.influence(counts[None])
+    expected = by_differences(units, counts, 1e-2)
     # The same but for one number: along the mean row alone they say nothing.
     off = slopes - expected
     assert np.ptp(off) < 1e-8 * np.abs(expected).max()
@@ -70,11 +64,11 @@ def test_slopes_are_those_of_differences(name: str, weights: str) -> None:
 
 @pytest.mark.parametrize("name", POOLED)
 def test_slopes_of_raters_are_those_of_differences(name: str) -> None:
-    pool = rater_pool(case_of(name))
+    units = rater_units(problem_of(name))
     counts = np.array([1.0, 2.0, 0.0, 1.0])
-    (slopes,) = influence(pool, counts[None])
+    (slopes,) = units.influence(counts[None])
     np.testing.assert_allclose(
-        slopes, by_differences(pool, counts, 1e-3), rtol=1e-7, atol=1e-9
+        slopes, by_differences(units, counts, 1e-3), rtol=1e-7, atol=1e-9
     )
 
 
@@ -83,14 +77,14 @@ def test_slopes_of_raters_are_those_of_differences(name: str) -> None:
 def test_the_error_of_the_estimate_is_that_of_the_delta_method(
     name: str, weights: str
 ) -> None:
-    case = case_of(name, weights=weights)
-    pool = item_pool(case)
-    (error,) = standard_errors(pool, pool.times[None].astype(float))
+    problem = problem_of(name, weights=weights)
+    units = item_units(problem)
+    (error,) = units.standard_errors(units.freq[None].astype(float))
     entry = COEFFICIENTS[name]
     estimate = entry(ratings_of(name, 25), categories=range(3), weights=weights)
     # The coefficient's own formula, in integers, divides by n - 1. That of alpha
     # squares influences whose mean is not 0 but of the order of one rating in all.
-    n = case.n_items
+    n = problem.n_items
     near = 1e-3 if name == "krippendorff_alpha" else 1e-10
     assert error == pytest.approx(
         estimate.standard_error * np.sqrt((n - 1) / n), rel=near
@@ -100,12 +94,12 @@ def test_the_error_of_the_estimate_is_that_of_the_delta_method(
 def test_the_error_of_a_mean_is_that_of_its_bootstrap() -> None:
     # Percent agreement of complete ratings is a mean: its bootstrap's standard error
     # is the root of the sum of squared deviations over n, for every resample.
-    case = case_of("percent_agreement", n=12)
-    pool = item_pool(case)
-    counts = np.random.default_rng(1).multinomial(12, pool.shares, size=50)
-    errors = standard_errors(pool, counts.astype(float))
+    problem = problem_of("percent_agreement", n=12)
+    units = item_units(problem)
+    counts = np.random.default_rng(1).multinomial(12, units.shares, size=50)
+    errors = units.standard_errors(counts.astype(float))
     for times, error in zip(counts, errors, strict=True):
-        agreeing = 1.0 - np.repeat(pool.rows[:, 0], times)  # type: ignore[index]
+        agreeing = 1.0 - np.repeat(units.rows[:, 0], times)  # type: ignore[index]
         assert error == pytest.approx(agreeing.std() / np.sqrt(12), abs=1e-14)
 
 
@@ -113,22 +107,22 @@ def test_errors_of_resamples_are_those_of_a_double_loop() -> None:
     # 80 items: the delta method and an inner bootstrap differ by their order 1 / n. An
     # inner error of 2000 resamples is known to 1.6 %; over 30 outer ones the mean ratio
     # to 0.3 %, so 2 % off is 6 of its standard errors.
-    case = case_of("fleiss_kappa", n=80)
-    pool = item_pool(case)
+    problem = problem_of("fleiss_kappa", n=80)
+    units = item_units(problem)
     rng = np.random.default_rng(8)
-    outer = rng.multinomial(80, pool.shares, size=30)
+    outer = rng.multinomial(80, units.shares, size=30)
     inner = [
-        pool.of_counts(rng.multinomial(80, times / 80, size=2000).astype(float)).std()
+        units.of_counts(rng.multinomial(80, times / 80, size=2000).astype(float)).std()
         for times in outer
     ]
-    ratio = standard_errors(pool, outer.astype(float)) / np.array(inner)
+    ratio = units.standard_errors(outer.astype(float)) / np.array(inner)
     assert 0.97 < ratio.mean() < 1.02
     assert ratio.std() < 0.06
 
 
 def test_a_resample_without_spread_is_infinitely_far_off() -> None:
     table = [[0, 0, 0]] * 3 + [[1, 1, 1]] * 3 + [[0, 1, 1], [0, 0, 1]]
-    pool = item_pool(
+    units = item_units(
         pose_problem(
             "fleiss_kappa",
             table,
@@ -138,19 +132,19 @@ def test_a_resample_without_spread_is_infinitely_far_off() -> None:
             level=0.95,
         )
     )
-    rows = pool.rows
+    rows = units.rows
     assert rows is not None
     agreeing = rows[:, 0] == 0.0
     counts = np.zeros((2, len(rows)))
     counts[0, agreeing] = 4.0  # both categories, no disagreement: kappa is 1
     counts[1, np.flatnonzero(agreeing)[0]] = 8.0  # one category: undefined
-    (value,) = pool.of_counts(pool.times[None].astype(float))
-    (error,) = standard_errors(pool, pool.times[None].astype(float))
-    far, undefined = studentized(pool, counts, float(value), float(error))
+    (value,) = units.of_counts(units.freq[None].astype(float))
+    (error,) = units.standard_errors(units.freq[None].astype(float))
+    far, undefined = units.studentized(counts, float(value), float(error))
     assert far == np.inf
     assert np.isnan(undefined)
-    (itself,) = studentized(
-        pool, pool.times[None].astype(float), float(value), float(error)
+    (itself,) = units.studentized(
+        units.freq[None].astype(float), float(value), float(error)
     )
     assert itself == 0.0
 
@@ -159,7 +153,7 @@ def test_a_rater_without_a_pair_leaves_the_slopes_of_the_others_alone() -> None:
     # One more item of the second rater would count in full; the items drawn have none.
     first = [["a", "a"], ["b", "b"], ["a", "b"], ["b", "b"], ["b", "a"]]
     second = [["a", "b"], ["b", "b"], [None, None], [None, None], [None, None]]
-    pool = item_pool(
+    units = item_units(
         pose_problem(
             "stratified_kappa",
             [first, second],
@@ -169,17 +163,17 @@ def test_a_rater_without_a_pair_leaves_the_slopes_of_the_others_alone() -> None:
             level=0.95,
         )
     )
-    of_second = pool.rows[:, 7] > 0.0  # type: ignore[index]
+    of_second = units.rows[:, 7] > 0.0  # type: ignore[index]
     assert of_second.sum() == 2
     drawn = ~of_second
     counts = np.zeros((1, 5))
     counts[0, drawn] = 2.0, 2.0, 1.0
-    expected = by_differences(pool, counts[0], 1e-3)[drawn]
-    (slopes,) = influence(pool, counts)
+    expected = by_differences(units, counts[0], 1e-3)[drawn]
+    (slopes,) = units.influence(counts)
     np.testing.assert_allclose(slopes[drawn], expected, rtol=1e-8, atol=1e-10)
     times = counts[0, drawn]
-    (error,) = standard_errors(pool, counts)
-    off = expected - times @ expected / pool.n
+    (error,) = units.standard_errors(counts)
+    off = expected - times @ expected / units.n
     assert np.ptp(off) > 0.1
     assert error == pytest.approx(np.sqrt(times @ off**2), rel=1e-7)
 
@@ -187,7 +181,7 @@ def test_a_rater_without_a_pair_leaves_the_slopes_of_the_others_alone() -> None:
 def test_raters_who_are_not_drawn_are_not_asked_after() -> None:
     # The last item is rated by the third rater alone: were he drawn, it would count.
     table = [[0, 0, 0], [1, 1, 0], [2, 2, 2], [0, 1, 0], [None, None, 2]]
-    pool = rater_pool(
+    units = rater_units(
         pose_problem(
             "fleiss_kappa",
             table,
@@ -198,9 +192,9 @@ def test_raters_who_are_not_drawn_are_not_asked_after() -> None:
         )
     )
     counts = np.array([[1.0, 2.0, 0.0]])
-    (slopes,) = influence(pool, counts)
+    (slopes,) = units.influence(counts)
     assert np.isnan(slopes[2])
-    (error,) = standard_errors(pool, counts)
+    (error,) = units.standard_errors(counts)
     mean = counts[0, :2] @ slopes[:2] / 3
     assert error == pytest.approx(
         np.sqrt(counts[0, :2] @ (slopes[:2] - mean) ** 2), rel=1e-12
@@ -208,17 +202,17 @@ def test_raters_who_are_not_drawn_are_not_asked_after() -> None:
 
 
 def test_acceleration_is_a_sixth_of_the_skewness_of_values_left_out() -> None:
-    case = case_of("gwet_ac", n=14)
-    features = case.item_features()
-    left = case.values(features.sum(axis=0) - features)
+    problem = problem_of("gwet_ac", n=14)
+    features = problem.item_features()
+    left = problem.values(features.sum(axis=0) - features)
     deviation = left.mean() - left
     expected = (deviation**3).sum() / (6 * (deviation**2).sum() ** 1.5)
-    assert acceleration(item_pool(case)) == pytest.approx(expected, rel=1e-10)
+    assert item_units(problem).acceleration() == pytest.approx(expected, rel=1e-10)
 
 
 def test_acceleration_of_raters_leaves_out_raters() -> None:
     table = np.array(dirichlet_multinomial(np.random.default_rng(5), 20, 5, 0.5))
-    case = pose_problem(
+    problem = pose_problem(
         "fleiss_kappa",
         table,
         target="raters",
@@ -235,4 +229,4 @@ def test_acceleration_of_raters_leaves_out_raters() -> None:
     )
     deviation = left.mean() - left
     expected = (deviation**3).sum() / (6 * (deviation**2).sum() ** 1.5)
-    assert acceleration(rater_pool(case)) == pytest.approx(expected, rel=1e-9)
+    assert rater_units(problem).acceleration() == pytest.approx(expected, rel=1e-9)
