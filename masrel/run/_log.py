@@ -98,8 +98,8 @@ def _verify(path: Path, lines: list[bytes]) -> tuple[Event, ...]:
     previous = _FIRST_PREVIOUS
     events = []
     for number, line in enumerate(lines, start=1):
-        events.append(_parse_event(path, number, line))
-        claimed = json.loads(line)["previous"]
+        event, claimed = _parse_line(path, number, line)
+        events.append(event)
         if claimed != previous:
             raise SessionLogError(
                 f"{path}: line {number}: needed previous = {previous}"
@@ -110,8 +110,8 @@ def _verify(path: Path, lines: list[bytes]) -> tuple[Event, ...]:
     return tuple(events)
 
 
-def _parse_event(path: Path, number: int, line: bytes) -> Event:
-    """Return the event of one line, without regard to the chain."""
+def _parse_line(path: Path, number: int, line: bytes) -> tuple[Event, object]:
+    """Return the event of one line, and what it carries as the hash before it."""
     try:
         document = json.loads(line.decode("utf-8"))
     except ValueError as error:
@@ -138,9 +138,10 @@ def _parse_event(path: Path, number: int, line: bytes) -> Event:
                 f"{path}: line {number}: {name} needs text, a number, true, false or "
                 f"null, got {fact!r}"
             )
-    return Event(
+    event = Event(
         line=number, kind=kind, time_utc=time_utc, fields=MappingProxyType(fields)
     )
+    return event, document["previous"]
 
 
 def utc_now() -> datetime:
@@ -304,7 +305,8 @@ class SessionLog:
             # After a failed or interrupted write nothing may follow on this line.
             if not is_written:
                 os.close(descriptor)
-        self._events.append(_parse_event(self.path, len(self._events) + 1, line))
+        event, _ = _parse_line(self.path, len(self._events) + 1, line)
+        self._events.append(event)
         self._previous = _line_hash(line)
         self._descriptor = descriptor
 
@@ -328,10 +330,10 @@ class SessionLog:
 
 def _is_event(path: Path, number: int, line: bytes, previous: str) -> bool:
     try:
-        _parse_event(path, number, line)
+        _, claimed = _parse_line(path, number, line)
     except SessionLogError:
         return False
-    return bool(json.loads(line)["previous"] == previous)
+    return claimed == previous
 
 
 def _check_fact(path: Path, kind: str, name: str, fact: "Fact") -> None:
