@@ -11,7 +11,7 @@ from masrel.cli.latent_output import Output, output_options, put
 from masrel.errors import ParameterError, RatingsError
 
 if TYPE_CHECKING:
-    from masrel.intervals.latent.result import LatentTrait
+    from masrel.intervals import LatentTrait
     from masrel.ratings import Ratings
 
 __all__ = ["command"]

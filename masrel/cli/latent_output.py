@@ -13,8 +13,7 @@ from masrel.cli.output import figure_form, print_table, tell, write_json
 from masrel.errors import ParameterError
 
 if TYPE_CHECKING:
-    from masrel.intervals.latent.result import LatentTrait
-    from masrel.intervals.quantity import Quantity
+    from masrel.intervals import LatentTrait, Quantity
     from masrel.ratings import Ratings
     from masrel.report.figures import ScaleRow
 

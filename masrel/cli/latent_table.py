@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 from masrel.estimates import as_document
 
 if TYPE_CHECKING:
-    from masrel.intervals.latent.result import LatentTrait
-    from masrel.intervals.quantity import Quantity
+    from masrel.intervals import LatentTrait, Quantity
     from masrel.report._tables import Table, Value
 
 __all__ = ["latent_document", "latent_table", "unlikely"]

@@ -4,18 +4,29 @@ In: a coefficient's name, its ratings, and the `target` population. Out: an
 `Interval`. scipy and emcee load only when a method needs them.
 """
 
+from typing import TYPE_CHECKING
+
 from masrel.intervals.analytic import analytic
 from masrel.intervals.auto import estimate
 from masrel.intervals.bootstrap import bootstrap
 from masrel.intervals.difference import difference
 from masrel.intervals.jackknife import jackknife
-from masrel.intervals.latent.prior import LatentPrior
-from masrel.intervals.latent.trait import latent_trait
 from masrel.intervals.posterior import posterior
-from masrel.intervals.retest.model import retest_model
+from masrel.intervals.quantity import Quantity
+
+if TYPE_CHECKING:
+    from masrel.intervals.latent._density import LatentPrior
+    from masrel.intervals.latent._implied import PredictiveCheck
+    from masrel.intervals.latent._trait import LatentChains, LatentTrait, latent_trait
+    from masrel.intervals.retest import RetestModel, retest_model
 
 __all__ = [
+    "LatentChains",
     "LatentPrior",
+    "LatentTrait",
+    "PredictiveCheck",
+    "Quantity",
+    "RetestModel",
     "analytic",
     "bootstrap",
     "difference",
@@ -25,3 +36,22 @@ __all__ = [
     "posterior",
     "retest_model",
 ]
+
+_HOMES = {
+    "LatentChains": "latent._trait",
+    "LatentPrior": "latent._density",
+    "LatentTrait": "latent._trait",
+    "PredictiveCheck": "latent._implied",
+    "RetestModel": "retest",
+    "latent_trait": "latent._trait",
+    "retest_model": "retest",
+}
+
+
+def __getattr__(name: str) -> object:
+    # these load scipy, and the latent-trait model emcee
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    import importlib
+
+    return getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)

@@ -14,23 +14,17 @@ from numpy.typing import NDArray
 
 from masrel.agreement._counts import item_counts
 from masrel.estimates import Interval
+from masrel.intervals._priors import DEFAULT_PRIOR
 from masrel.intervals._problem import IntervalProblem
+from masrel.intervals._rho import RhoPosterior, default_rho_interval, lower_bound_of_rho
+from masrel.intervals._two_raters import applies_to, default_table_interval
 from masrel.intervals.analytic import _on_logit
-from masrel.intervals.dirichlet.rho import ExactPosterior
 from masrel.intervals.jackknife import (
     _excess_of_raters,
     _interval_around_estimate,
     _jackknife_variance,
     _JackknifeVariance,
 )
-from masrel.intervals.modelled import (
-    PRIOR,
-    lifted,
-    of_any_raters,
-    of_two_raters,
-    one_sided,
-)
-from masrel.intervals.table.interval import speaks_of
 
 _FEW = 10  # items, and raters, below which a posterior covers best
 _SEVERAL = 30  # items, below which a jackknife alone ends too low
@@ -54,7 +48,7 @@ class Choice:
     def tabular(self) -> bool:
         """Whether the table of two raters speaks of the coefficient instead."""
         problem = self.problem
-        return not self.modelled and problem.target == "items" and speaks_of(problem)
+        return not self.modelled and problem.target == "items" and applies_to(problem)
 
     @property
     def n_raters(self) -> int:
@@ -73,9 +67,9 @@ class Choice:
         return item_counts(self.problem.coded)
 
     @cached_property
-    def posterior(self) -> ExactPosterior:
+    def posterior(self) -> RhoPosterior:
         """The posterior under the default prior."""
-        return ExactPosterior.of(self.counts, PRIOR, self.problem.level)
+        return RhoPosterior.of(self.counts, DEFAULT_PRIOR, self.problem.level)
 
     def has_spread(self, variance: float) -> bool:
         """Whether a variance is more than an accident of few disagreements."""
@@ -115,10 +109,10 @@ def _choose(choice: Choice) -> tuple[Interval, str]:
         return _interval_around_estimate(problem, _jackknife_variance(problem)), why
     if choice.modelled and choice.is_small and problem.target == "items":
         why = f"few items ({problem.n_items}) and raters, where it covers best"
-        return of_any_raters(choice, 0.0), why
+        return default_rho_interval(problem, choice.counts, choice.posterior), why
     if choice.tabular and problem.n_items < _FEW:
         why = f"few items ({problem.n_items}), where it covers best"
-        return of_two_raters(choice), why
+        return default_table_interval(problem), why
     jackknifed = _jackknife_variance(problem)
     if not choice.has_spread(jackknifed.variance):
         return _without_spread(choice, jackknifed)
@@ -135,10 +129,10 @@ def _without_spread(
 ) -> tuple[Interval, str]:
     if choice.tabular:
         why = "leaving items out says nothing, so that a model must"
-        return of_two_raters(choice), why
+        return default_table_interval(choice.problem), why
     if choice.modelled:
         why = "the ratings hardly disagree, so that a model must say what that can hide"
-        return one_sided(choice), why
+        return lower_bound_of_rho(choice.problem, choice.counts, choice.posterior), why
     why = "the spread of the units left out"
     return _interval_around_estimate(choice.problem, jackknifed), why
 
@@ -151,8 +145,22 @@ def _other_items(
     method = f"item jackknife, t({df}) on the logit"
     interval = choice.on_logit(half, method, jackknifed.notes)
     if choice.modelled and choice.problem.n_items < _SEVERAL:
-        interval = lifted(interval, choice.posterior.high)
+        interval = _lift(interval, choice.posterior.high)
     return interval, "items left out, on a scale without ends"
+
+
+def _lift(interval: Interval, high: float) -> Interval:
+    # An estimate of few items is skewed: low where its error is low, too. The posterior
+    # knows, but trusts many raters too much where κ is low; halfway covers with either.
+    if not high > interval.high:
+        return interval
+    note = (
+        f"the upper end, {interval.high:.3f}, is lifted halfway to that of the "
+        f"Dirichlet-multinomial posterior, {high:.3f}: with few items an estimate "
+        "that is low by chance has a low error, too"
+    )
+    halfway = 0.5 * (interval.high + high)
+    return replace(interval, high=halfway, notes=(*interval.notes, note))
 
 
 def _other_items_and_raters(
@@ -163,7 +171,10 @@ def _other_items_and_raters(
     excess = t_raters**2 * _excess_of_raters(problem)
     if choice.modelled and choice.is_small:
         why = "few items and raters; raters add what they differ by"
-        return of_any_raters(choice, excess), why
+        interval = default_rho_interval(
+            problem, choice.counts, choice.posterior, excess
+        )
+        return interval, why
     items = _jackknife_variance(replace(problem, target="items")).variance
     half = math.sqrt(problem.student_t(problem.n_items - 1) ** 2 * items + excess)
     method = "two-way jackknife, t on the logit"

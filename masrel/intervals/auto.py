@@ -10,11 +10,12 @@ from numpy.typing import ArrayLike
 from masrel.agreement import Coefficient, Label
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Interval, Target
+from masrel.intervals._priors import RHO_COEFFICIENTS
 from masrel.intervals._problem import Statistic, find_entry, pose_problem
 from masrel.intervals.analytic import analytic
 from masrel.intervals.bootstrap import bootstrap
 from masrel.intervals.jackknife import jackknife
-from masrel.intervals.posterior import SPOKEN_OF, posterior
+from masrel.intervals.posterior import posterior
 
 if TYPE_CHECKING:
     from masrel.agreement import WeightName
@@ -119,4 +120,6 @@ def _chosen(entry: Coefficient, ratings: object, options: _Options) -> Interval:
     # Imported here: the other methods load no scipy.
     from masrel.intervals._choice import choose_interval
 
-    return choose_interval(problem, modelled=identity and entry.name in SPOKEN_OF)
+    return choose_interval(
+        problem, modelled=identity and entry.name in RHO_COEFFICIENTS
+    )

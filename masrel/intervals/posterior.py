@@ -9,19 +9,14 @@ from numpy.typing import ArrayLike
 from masrel.agreement import Label
 from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target
+from masrel.intervals._priors import RHO_COEFFICIENTS, Prior, PriorName
 from masrel.intervals._problem import IntervalProblem, Statistic, pose_problem
-from masrel.intervals.dirichlet.prior import Prior, PriorName
 
 if TYPE_CHECKING:
     from masrel.agreement import WeightName
 
-__all__ = ["SPOKEN_OF", "posterior"]
-
-SPOKEN_OF = ("fleiss_kappa", "scott_pi", "krippendorff_alpha")
-"""Coefficients whose value in the population is the model's ρ."""
-
-Model = Literal["auto", "dirichlet-multinomial", "table"]
-Method = Literal["exact", "emcee"]
+_Model = Literal["auto", "dirichlet-multinomial", "table"]
+_Method = Literal["exact", "emcee"]
 
 
 def posterior(
@@ -32,13 +27,13 @@ def posterior(
     categories: Sequence[Label] | None = None,
     weights: "WeightName | ArrayLike" = "identity",
     level: float = 0.95,
-    model: Model = "auto",
+    model: _Model = "auto",
     prior: PriorName = "uniform",
     concentration: float | None = None,
-    method: Method = "exact",
+    method: _Method = "exact",
     n_draws: int = 10_000,
     n_steps: int = 3_000,
-    most_steps: int = 48_000,
+    max_steps: int = 48_000,
     rng: np.random.Generator | int | None = None,
 ) -> Interval:
     """Compute the posterior of a coefficient in the population of items.
@@ -74,7 +69,7 @@ def posterior(
         Quadrature, which draws nothing; or a sampler, to check it.
     n_draws : int, optional
         Draws where the table of more than two categories needs them.
-    n_steps, most_steps : int, optional
+    n_steps, max_steps : int, optional
         Steps of every walker at first, and where the sampler gives up; for "emcee".
     rng : Generator or int, optional
         Where randomness comes from, if any is needed; an integer is recorded as the
@@ -89,11 +84,11 @@ def posterior(
     Raises
     ------
     ParameterError
-        If an option is none, or the model does not answer it.
+        If an option is invalid, or the model does not answer it.
     RatingsError
         If the ratings do not fit.
     ConvergenceError
-        If the sampler has not converged after `most_steps`.
+        If the sampler has not converged after `max_steps`.
 
     Warns
     -----
@@ -106,10 +101,10 @@ def posterior(
     ratings multinomial; ρ = 1 / (1 + A). π is integrated out in closed form, and ρ by
     quadrature, to about 1e-12 [1]_.
 
-    Table: the chances of the pairs of categories are Dirichlet. Percent agreement and
-    Brennan-Prediger's coefficient, unweighted, are then a Beta; with two categories all
-    are integrated by quadrature, to about 1e-10; with more, how often the raters agree
-    is integrated and the rest drawn.
+    Table: the probabilities of the pairs of categories are Dirichlet. Percent agreement
+    and Brennan-Prediger's coefficient, unweighted, are then a Beta; with two categories
+    all are integrated by quadrature, to about 1e-10; with more, how often the raters
+    agree is integrated and the rest drawn.
 
     Where the prior weighs, a note gives the interval under another.
 
@@ -121,8 +116,8 @@ def posterior(
     Examples
     --------
     >>> ratings = [["a", "a", "a"], ["b", "b", "a"], ["b", "b", "b"]] * 4
-    >>> found = posterior("fleiss_kappa", ratings, target="items")
-    >>> found.kind, round(found.low, 3), round(found.high, 3)
+    >>> interval = posterior("fleiss_kappa", ratings, target="items")
+    >>> interval.kind, round(interval.low, 3), round(interval.high, 3)
     ('credible', 0.188, 0.815)
     """
     problem = pose_problem(
@@ -133,35 +128,35 @@ def posterior(
         weights=weights,
         level=level,
     )
-    believed = Prior.of(prior, 1.0 if concentration is None else concentration)
+    checked_prior = Prior.of(prior, 1.0 if concentration is None else concentration)
     _check_options(problem, model, method)
     identity = isinstance(weights, str) and weights == "identity"
-    spoken_of = problem.entry.name in SPOKEN_OF and identity
-    asked = problem.entry.name if identity else f"weighted {problem.entry.name}"
+    has_rho = problem.entry.name in RHO_COEFFICIENTS and identity
+    name = problem.entry.name if identity else f"weighted {problem.entry.name}"
     # Imported here: the other intervals load neither scipy nor emcee.
-    if model == "table" or (model == "auto" and not spoken_of):
-        _check_table(problem, asked, model, method, believed)
-        from masrel.intervals.table.interval import table_interval
+    if model == "table" or (model == "auto" and not has_rho):
+        _check_table(problem, name, model, method, checked_prior)
+        from masrel.intervals._two_raters import table_interval
 
         return table_interval(problem, concentration, n_draws=n_draws, rng=rng)
-    _check_dirichlet(spoken_of, asked)
-    from masrel.intervals.dirichlet.interval import rho_interval
+    _check_dirichlet(has_rho, name)
+    from masrel.intervals._rho import rho_interval
 
     return rho_interval(
         problem,
-        believed,
+        checked_prior,
         sampled=method == "emcee",
         n_steps=n_steps,
-        most_steps=most_steps,
+        max_steps=max_steps,
         rng=rng,
     )
 
 
-def _check_options(problem: IntervalProblem, model: Model, method: Method) -> None:
-    for name, given, options in (("model", model, Model), ("method", method, Method)):
-        if given not in get_args(options):
+def _check_options(problem: IntervalProblem, model: _Model, method: _Method) -> None:
+    for name, value, options in (("model", model, _Model), ("method", method, _Method)):
+        if value not in get_args(options):
             known = ", ".join(get_args(options))
-            raise ParameterError(f"{name}: needs one of {known}, got {given!r}")
+            raise ParameterError(f"{name}: needs one of {known}, got {value!r}")
     if problem.target != "items":
         raise ParameterError(
             "target: a posterior speaks of other items, so "
@@ -169,24 +164,24 @@ def _check_options(problem: IntervalProblem, model: Model, method: Method) -> No
         )
 
 
-def _check_dirichlet(spoken_of: bool, asked: str) -> None:
-    if not spoken_of:
+def _check_dirichlet(has_rho: bool, name: str) -> None:
+    if not has_rho:
         raise ParameterError(
             "model: the Dirichlet-multinomial model speaks of unweighted fleiss_kappa, "
             "and of scott_pi and krippendorff_alpha, whose value in the population is "
-            f'the same; for two raters "table" speaks of others; got {asked}'
+            f'the same; for two raters "table" speaks of others; got {name}'
         )
 
 
 def _check_table(
-    problem: IntervalProblem, asked: str, model: Model, method: Method, prior: Prior
+    problem: IntervalProblem, name: str, model: _Model, method: _Method, prior: Prior
 ) -> None:
     n_raters = problem.coded.codes.shape[1]
     if model == "auto" and n_raters != 2:
         raise ParameterError(
             "coefficient: a posterior speaks of unweighted fleiss_kappa, scott_pi and "
             "krippendorff_alpha, and of others by exactly two raters; got "
-            f"{asked} by {n_raters}"
+            f"{name} by {n_raters}"
         )
     if method != "exact" or prior.name != "uniform":
         raise ParameterError(

@@ -4,17 +4,26 @@ from dataclasses import dataclass
 
 from masrel.estimates import Interval
 
-__all__ = ["Quantity"]
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Quantity:
-    """One unknown of a model after the data."""
+    """One unknown of a model after the data.
 
-    name: str  # what it is, or whose
-    value: float  # posterior median; ``nan`` when undefined
-    interval: Interval  # central credible interval
-    # r_hat, ess: rank-normalized split R-hat, and the smaller effective size of bulk
-    # and tails; None when nothing was drawn
+    Attributes
+    ----------
+    name : str
+        What it is, or whose.
+    value : float
+        Posterior median; ``nan`` when undefined.
+    interval : Interval
+        Central credible interval.
+    r_hat, ess : float or None
+        Rank-normalized split R-hat, and the effective size of the tails; None when
+        nothing was drawn.
+    """
+
+    name: str
+    value: float
+    interval: Interval
     r_hat: float | None = None
     ess: float | None = None

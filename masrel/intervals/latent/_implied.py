@@ -1,4 +1,4 @@
-"""Fleiss' kappa in the population of raters, implied by a latent-trait model.
+"""What a latent-trait model implies: kappa of new raters, and ratings made anew.
 
 A rater drawn from the population gives item i grade k with probability
 p_ik = E[Φ((τ_k - θ_i)/s) - Φ((τ_(k-1) - θ_i)/s)], s² = ω² + σ² e^(2 η w), where the
@@ -8,25 +8,25 @@ P_e = Σ_k π_k², κ = (P_o - P_e) / (1 - P_e), which is the variance of p_ik o
 as a share of the most it could be: Σ_k var(p_k) / Σ_k π_k (1 - π_k).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from masrel.agreement._kernel import Floats
-from masrel.intervals.latent.traits import Traits
+from masrel.agreement._labels import Codes
+from masrel.intervals.latent._coordinates import Traits
 
-__all__ = [
-    "Agreement",
-    "agreement_on_items",
-    "agreement_on_new_items",
-    "grade_probabilities",
-]
+Items = Literal["fixed", "random"]
+"""Whether kappa speaks of these items, or of new ones of their population."""
 
 _NOISES = np.linspace(-5.5, 5.5, 23)  # trapezoid sum over a rater's w
 _STEPS = 30  # points on either side of the centre of a tanh-sinh quadrature
-_REACH = 2.9  # where its weights end
-_FARTHEST = 8.5  # standard deviations of an item
+_MAX_T = 2.9  # where its weights end
+_MAX_Z = 8.5  # standard deviations of an item
 _CHUNK = 400  # positions at a time
 
 
@@ -44,8 +44,8 @@ class Agreement:
     def of(cls, shares: Floats, variance: Floats) -> "Agreement":
         """Put together shares π (n, n_categories) and Σ_k var(p_k) (n,)."""
         rest = shares @ (1.0 - np.eye(shares.shape[1]))  # 1 - π_k with all its digits
-        apart = (shares * rest).sum(axis=1)
-        kappa = np.divide(variance, apart, out=np.zeros_like(apart), where=apart > 0.0)
+        most = (shares * rest).sum(axis=1)
+        kappa = np.divide(variance, most, out=np.zeros_like(most), where=most > 0.0)
         chance = (shares**2).sum(axis=1)
         return cls(
             observed=chance + variance, chance=chance, kappa=kappa.clip(0.0, 1.0)
@@ -82,8 +82,8 @@ def agreement_on_new_items(traits: Traits) -> Agreement:
     # https://doi.org/10.2977/prims/1195192451
     below = np.zeros(traits.thresholds.shape)
     for deviation, weight in _perceived(traits):
-        whole = np.sqrt(traits.item_share + deviation**2)
-        below += weight * ndtr(traits.thresholds / whole[:, None])
+        total = np.sqrt(traits.item_share + deviation**2)
+        below += weight * ndtr(traits.thresholds / total[:, None])
     shares = _differences(below)
     firsts = range(0, len(shares), _CHUNK)
     variances = [_variance(traits, shares, slice(at, at + _CHUNK)) for at in firsts]
@@ -94,8 +94,8 @@ def _variance(traits: Traits, shares: Floats, rows: slice) -> Floats:
     # -> (rows,): ∫ Σ_k (p_k(z √ρ) - π_k)² φ(z) dz, between neighbouring thresholds
     root = np.sqrt(traits.item_share[rows])[:, None]
     tau = traits.thresholds[rows]
-    inner = (tau / root).clip(-_FARTHEST, _FARTHEST)
-    far = np.full_like(root, _FARTHEST)
+    inner = (tau / root).clip(-_MAX_Z, _MAX_Z)
+    far = np.full_like(root, _MAX_Z)
     ends = np.sort(np.hstack([-far, inner, 0.0 * far, far]), axis=1)
     point, mass = _tanh_sinh()
     half = 0.5 * np.diff(ends, axis=1)[:, :, None]
@@ -132,7 +132,94 @@ def _differences(below: Floats) -> Floats:
 
 def _tanh_sinh() -> tuple[Floats, Floats]:
     # points in (-1, 1) and weights of ∫ f
-    at = np.linspace(-_REACH, _REACH, 2 * _STEPS + 1)
+    at = np.linspace(-_MAX_T, _MAX_T, 2 * _STEPS + 1)
     inner = 0.5 * np.pi * np.sinh(at)
     weight = 0.5 * np.pi * np.cosh(at) / np.cosh(inner) ** 2 * (at[1] - at[0])
     return np.tanh(inner), weight
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PredictiveCheck:
+    """One property of the ratings beside what the model would have made of it.
+
+    Attributes
+    ----------
+    name : str
+        What it is.
+    observed : float
+        In the ratings.
+    low, high : float
+        Central 95 % of ratings made anew by the same raters on the same items.
+    p_value : float
+        Share of those that are larger, with half of those that are equal. Near 0 or 1
+        the model does not make ratings such as these.
+    """
+
+    name: str
+    observed: float
+    low: float
+    high: float
+    p_value: float
+
+
+def predictive_checks(
+    codes: Codes,
+    traits: Traits,
+    categories: Sequence[object],
+    generator: np.random.Generator,
+) -> tuple[PredictiveCheck, ...]:
+    """Compare ratings with ratings made anew from the posterior."""
+    # Takes codes (n_items, n_raters)
+    drawn = np.where(codes >= 0, replicate(traits, generator), -1)
+    n = len(categories)
+    names = [
+        "agreeing pairs",
+        *(f"ratings of {category}" for category in categories),
+        "spread of raters' mean grades",
+        "spread of items' mean grades",
+        "widest spread of the grades of an item",
+        "widest distance of a rater from items' means",
+    ]
+    observed, replicated = _properties(codes[None], n)[0], _properties(drawn, n)
+    return tuple(
+        PredictiveCheck(
+            name=name,
+            observed=float(value),
+            low=float(np.quantile(values, 0.025)),
+            high=float(np.quantile(values, 0.975)),
+            p_value=float((values > value).mean() + 0.5 * (values == value).mean()),
+        )
+        for name, value, values in zip(names, observed, replicated.T, strict=True)
+    )
+
+
+def replicate(traits: Traits, generator: np.random.Generator) -> NDArray[np.int64]:
+    """Let the same raters rate the same items anew."""
+    # -> (n, n_items, n_raters)
+    perceived = traits.severity[:, :, None] + traits.bias[:, None, :]
+    noise = generator.standard_normal(perceived.shape)
+    perceived = perceived + traits.noise[:, None, :] * noise
+    passed = perceived[..., None] > traits.thresholds[:, None, None, :]
+    return np.asarray(passed.sum(axis=-1))
+
+
+def _properties(codes: Codes, n_categories: int) -> Floats:
+    # (n, n_items, n_raters) -> (n, n_categories + 5)
+    rated = codes >= 0
+    counts = (codes[..., None] == np.arange(n_categories)).sum(axis=2)  # (n, items, q)
+    n_ratings = counts.sum(axis=2)
+    pairs = (n_ratings * (n_ratings - 1)).sum(axis=1)
+    grades = np.where(rated, codes, 0)
+    by_rater = grades.sum(axis=1) / rated.sum(axis=1)  # each has a rating
+    by_item = grades.sum(axis=2) / rated.sum(axis=2)
+    away = np.where(rated, codes - by_item[:, :, None], 0.0) ** 2
+    return np.column_stack(
+        [
+            (counts * (counts - 1)).sum(axis=(1, 2)) / pairs,
+            counts.sum(axis=1),
+            by_rater.std(axis=1),
+            by_item.std(axis=1),
+            np.sqrt(away.sum(axis=2) / rated.sum(axis=2)).max(axis=1),
+            np.sqrt(away.sum(axis=1) / rated.sum(axis=1)).max(axis=1),
+        ]
+    )

@@ -10,20 +10,10 @@ from arviz_stats.base import array_stats
 from masrel.agreement._kernel import Floats
 from masrel.errors import ConvergenceError
 
-__all__ = [
-    "LARGEST_R_HAT",
-    "Draws",
-    "Walkers",
-    "diagnose",
-    "not_converged",
-    "quantile_error",
-    "sample",
-]
-
 N_ENSEMBLES = 4
 WALKERS_PER_DIMENSION = 20  # a step costs emcee more than its walkers do
-LARGEST_R_HAT = 1.01
-LEAST_ESS = 20_000.0  # endpoints within about 0.002 on Table V
+MAX_R_HAT = 1.01
+MIN_ESS = 20_000.0  # endpoints within about 0.002 on Table V
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,11 +41,12 @@ def sample(
     *,
     generator: np.random.Generator,
     n_steps: int,
-    most_steps: int,
+    max_steps: int,
 ) -> Draws:
     """Sample a density until one quantity of it has converged."""
-    # The ensembles start apart and do not see each other. The move is differential
-    # evolution; the snooker variant of emcee 3.1.6 does not keep the density.
+    # The ensembles start far from each other and stay independent. The move is
+    # differential evolution; the snooker variant of emcee 3.1.6 does not keep the
+    # density.
     # [1] Foreman-Mackey, D. et al. (2013). emcee: The MCMC Hammer. PASP, 125, 306.
     # https://doi.org/10.1086/670067
     # [2] Vehtari, A. et al. (2021). Rank-normalization, folding, and localization: an
@@ -65,21 +56,21 @@ def sample(
         _Ensemble(log_density, n_dimensions, generator) for _ in range(N_ENSEMBLES)
     ]
     total = 0
-    while total < most_steps:
-        more = n_steps if total == 0 else min(total, most_steps - total)
+    while total < max_steps:
+        more = n_steps if total == 0 else min(total, max_steps - total)
         for ensemble in ensembles:
             ensemble.run(more)
         total += more
         chains = np.concatenate([e.values(quantity, total // 3) for e in ensembles])
         r_hat, ess = diagnose(chains)
-        if r_hat < LARGEST_R_HAT and ess >= LEAST_ESS:
+        if r_hat < MAX_R_HAT and ess >= MIN_ESS:
             return Draws(values=chains, r_hat=r_hat, ess=ess)
-    raise not_converged(total, r_hat, ess, LEAST_ESS)
+    raise not_converged(total, r_hat, ess, MIN_ESS)
 
 
 def diagnose(chains: Floats) -> tuple[float, float]:
     """Return rank-normalized split R-hat and the effective sample size of the tails."""
-    # Takes chains (n_chains, n_steps)
+    # shape of chains: (n_chains, n_steps)
     r_hat = array_stats.rhat(chains, chain_axis=0, draw_axis=1)
     ess = array_stats.ess(
         chains, chain_axis=0, draw_axis=1, method="tail", prob=(0.025, 0.975)
@@ -89,7 +80,7 @@ def diagnose(chains: Floats) -> tuple[float, float]:
 
 def quantile_error(chains: Floats, share: float) -> float:
     """Return the Monte Carlo standard error of a quantile."""
-    # Takes chains (n_chains, n_steps)
+    # shape of chains: (n_chains, n_steps)
     error = array_stats.mcse(
         chains, chain_axis=0, draw_axis=1, method="quantile", prob=share
     )
@@ -97,22 +88,22 @@ def quantile_error(chains: Floats, share: float) -> float:
 
 
 def not_converged(
-    total: int, r_hat: float, ess: float, least_ess: float
+    total: int, r_hat: float, ess: float, min_ess: float
 ) -> ConvergenceError:
-    """Say how many more steps a sampler needs."""
-    needed = max((r_hat - 1.0) / (LARGEST_R_HAT - 1.0), least_ess / max(ess, 1.0))
+    """Return the error that says how many more steps a sampler needs."""
+    needed = max((r_hat - 1.0) / (MAX_R_HAT - 1.0), min_ess / max(ess, 1.0))
     more = int(total * needed) - total if np.isfinite(needed) else total
     return ConvergenceError(
         f"the sampler has not converged after {total} steps: R-hat {r_hat:.4f} (needs "
-        f"below {LARGEST_R_HAT}), effective size {ess:.0f} (needs {least_ess:.0f}); "
+        f"below {MAX_R_HAT}), effective size {ess:.0f} (needs {min_ess:.0f}); "
         f"about {max(more, 1)} more steps are needed"
     )
 
 
 class Walkers:
-    """Chains that do not see each other, moved by one proposal."""
+    """Independent chains, moved by one proposal."""
 
-    # Takes start (n_chains, n_dimensions)
+    # shape of start: (n_chains, n_dimensions)
 
     def __init__(
         self,

@@ -1,0 +1,240 @@
+"""The credible interval of ρ in the Dirichlet-multinomial model."""
+
+import dataclasses
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import expit
+
+from masrel.agreement._counts import item_counts
+from masrel.estimates import Distribution, Interval
+from masrel.intervals._dirichlet_multinomial import DirichletMultinomial
+from masrel.intervals._priors import Prior
+from masrel.intervals._problem import IntervalProblem
+from masrel.intervals._quadrature import LineDistribution, line_distribution
+from masrel.intervals._seeds import recorded_generator
+from masrel.intervals._tilted_polynomial import RhoDensity
+
+_SHOWN = 201  # points of a distribution
+_FEW_ITEMS = 10
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RhoPosterior:
+    """The posterior of ρ = 1 / (1 + A), integrated."""
+
+    prior: Prior
+    # low, high: ends of the central interval
+    low: float
+    high: float
+    # the distribution of logit ρ
+    logit: LineDistribution = field(compare=False, repr=False)
+    # what it was integrated from
+    log_density: RhoDensity = field(compare=False, repr=False)
+
+    @classmethod
+    def of(
+        cls, counts: NDArray[np.int64], prior: Prior, level: float
+    ) -> "RhoPosterior":
+        """Integrate the posterior of counts (n_items, n_categories)."""
+        density = RhoDensity(
+            DirichletMultinomial.of_counts(
+                counts, concentration=prior.concentration, shape=prior.shape
+            )
+        )
+        tail = 0.5 * (1.0 - level)
+        first, last = density.bulk.logits[[0, -1]].tolist()
+        logit, ends = line_distribution(density, first, last, (tail, 1.0 - tail))
+        low, high = expit(ends).tolist()
+        return cls(prior=prior, low=low, high=high, logit=logit, log_density=density)
+
+    def quantile(self, share: float) -> float:
+        """Return a quantile of ρ."""
+        return float(expit(self.logit.quantile(share)))
+
+    def distribution(self) -> Distribution:
+        """Return the density of ρ at points between its outermost quantiles."""
+        # equally spaced in logit ρ, from about the quantile at 1e-6 to that at 1 - 1e-6
+        cumulative = self.logit.masses.cumsum()
+        ends = np.searchsorted(cumulative, (1e-6, 1.0 - 1e-6)) + np.array([-1, 1])
+        low, high = self.logit.points[ends.clip(0, cumulative.size - 1)]
+        logits = np.linspace(low, high, _SHOWN)
+        rho, rest = expit(logits), expit(-logits)
+        density = np.exp(self.log_density(logits) - self.logit.log_total)
+        return Distribution(
+            values=rho,
+            weights=density / (rho * rest),
+            continuous=True,
+            words=f"posterior of ρ, prior {self.prior.description}",
+        )
+
+
+def prior_notes(
+    counts: NDArray[np.int64], prior: Prior, level: float, low: float, high: float
+) -> tuple[str, ...]:
+    """Say where the prior weighs, by the interval under the one that moves it most."""
+    # shape of counts: (n_items, n_categories)
+    n_items = int((counts.sum(axis=1) >= 2).sum())
+    if (counts.sum(axis=0) > 0).sum() == 1:
+        what = "all ratings are in one category"
+    elif ((counts > 0).sum(axis=1) <= 1).all():
+        what = "agreement is perfect in these data"
+    elif n_items < _FEW_ITEMS:
+        what = f"{n_items} items are few"
+    else:
+        return ()
+    moved, other, ends = 0.0, prior, (low, high)
+    for candidate in prior.others(counts.shape[1]):
+        there = RhoPosterior.of(counts, candidate, level)
+        by = max(abs(there.low - low), abs(there.high - high))
+        if by > moved:
+            moved, other, ends = by, candidate, (there.low, there.high)
+    return (
+        f"{what}, so the prior weighs: {low:.3f} to {high:.3f} with "
+        f"{prior.description}, but {ends[0]:.3f} to {ends[1]:.3f} with "
+        f"{other.description}",
+    )
+
+
+def default_rho_interval(
+    problem: IntervalProblem,
+    counts: NDArray[np.int64],
+    posterior: RhoPosterior,
+    excess: float = 0.0,
+) -> Interval:
+    """Compute an interval that holds the estimate, and what raters differ by."""
+    # `excess` is the squared half-width that raters add
+    if not problem.value < 1.0:  # perfect, or undefined: one category
+        return lower_bound_of_rho(problem, counts, posterior)
+    low, high = posterior.low, posterior.high
+    notes = prior_notes(counts, posterior.prior, problem.level, low, high)
+    method = "Dirichlet-multinomial posterior, exact"
+    if excess:
+        method += ", and the spread of raters"
+        middle = posterior.quantile(0.5)
+        low = middle - math.hypot(middle - low, math.sqrt(excess))
+        high = middle + math.hypot(high - middle, math.sqrt(excess))
+    if not low <= problem.value <= high:
+        notes += ("widened to the estimate, which lies outside the posterior's",)
+    interval = problem.confidence(
+        min(low, problem.value), max(high, problem.value), method=method, unit=None
+    )
+    return dataclasses.replace(
+        interval,
+        kind="confidence" if excess else "credible",
+        notes=(*interval.notes, *notes),
+        distribution=posterior.distribution(),
+    )
+
+
+def lower_bound_of_rho(
+    problem: IntervalProblem, counts: NDArray[np.int64], posterior: RhoPosterior
+) -> Interval:
+    """Compute the interval of all that is above a lower quantile."""
+    share, prior = 1.0 - problem.level, posterior.prior
+    low = posterior.quantile(share)
+    others = [
+        (RhoPosterior.of(counts, other, problem.level).quantile(share), other)
+        for other in prior.others(counts.shape[1])
+    ]
+    there, other = max(others, key=lambda bound: abs(bound[0] - low))
+    note = (
+        f"the bound rests on the prior, too: {low:.3f} with {prior.description}, but "
+        f"{there:.3f} with {other.description}"
+    )
+    return Interval(
+        low=low,
+        high=1.0,
+        level=problem.level,
+        kind="credible",
+        method="Dirichlet-multinomial posterior, one-sided",
+        target=problem.target,
+        notes=(note,),
+        distribution=posterior.distribution(),
+    )
+
+
+def rho_interval(
+    problem: IntervalProblem,
+    prior: Prior,
+    *,
+    sampled: bool,
+    n_steps: int,
+    max_steps: int,
+    rng: np.random.Generator | int | None,
+) -> Interval:
+    """Compute the central credible interval of ρ."""
+    method = f"Dirichlet-multinomial posterior, {'emcee' if sampled else 'exact'}"
+    counts = item_counts(problem.coded)
+    reason = _nothing_to_learn(counts)
+    if reason is not None:
+        undefined = problem.undefined(reason, method=method, unit=None)
+        return dataclasses.replace(undefined, kind="credible")
+    level = problem.level
+    if sampled:
+        interval = _sampled(problem, counts, prior, method, n_steps, max_steps, rng)
+    else:
+        posterior = RhoPosterior.of(counts, prior, level)
+        interval = Interval(
+            low=posterior.low,
+            high=posterior.high,
+            level=level,
+            kind="credible",
+            method=method,
+            target=problem.target,
+            distribution=posterior.distribution(),
+        )
+    notes = prior_notes(counts, prior, level, interval.low, interval.high)
+    return dataclasses.replace(interval, notes=notes)
+
+
+def _nothing_to_learn(counts: NDArray[np.int64]) -> str | None:
+    # shape of counts: (n_items, n_categories)
+    if not (counts.sum(axis=1) >= 2).any():
+        return "no item has ratings of two raters"
+    if counts.shape[1] < 2:
+        return "one category is declared"
+    return None
+
+
+def _sampled(
+    problem: IntervalProblem,
+    counts: NDArray[np.int64],
+    prior: Prior,
+    method: str,
+    n_steps: int,
+    max_steps: int,
+    rng: np.random.Generator | int | None,
+) -> Interval:
+    # Imported here: the quadrature loads no sampler.
+    from masrel.intervals._mcmc import sample
+
+    generator, seed = recorded_generator(rng)
+    model = DirichletMultinomial.of_counts(
+        counts, concentration=prior.concentration, shape=prior.shape
+    )
+    draws = sample(
+        model.log_density,
+        model.n_dimensions,
+        lambda position: model.parts(position)[0],
+        generator=generator,
+        n_steps=n_steps,
+        max_steps=max_steps,
+    )
+    tail = 0.5 * (1.0 - problem.level)
+    return Interval(
+        low=draws.quantile(tail),
+        high=draws.quantile(1.0 - tail),
+        level=problem.level,
+        kind="credible",
+        method=method,
+        target=problem.target,
+        n_resamples=int(draws.values.size),
+        monte_carlo_error=(
+            draws.quantile_error(tail),
+            draws.quantile_error(1.0 - tail),
+        ),
+        seed=seed,
+    )

@@ -1,0 +1,193 @@
+"""The interval of a coefficient of two raters from a Dirichlet on their table."""
+
+import dataclasses
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from masrel.agreement._kernel import Floats
+from masrel.errors import ParameterError
+from masrel.estimates import Interval
+from masrel.intervals._priors import TablePrior
+from masrel.intervals._problem import IntervalProblem
+from masrel.intervals._seeds import recorded_generator
+from masrel.intervals._table_quadrature import (
+    CHANCE_AGREEMENT,
+    TablePosterior,
+    needs_draws,
+    table_quantiles,
+)
+
+_FEW_ITEMS = 10
+_MIN_DRAWS = 100
+_DEFAULT_DRAWS, _SEED = 4_000, 1  # always the same ones, so that they repeat
+_NOTED_DRAWS = 2_000  # for the interval under another prior: a note has three digits
+
+
+def applies_to(problem: IntervalProblem) -> bool:
+    """Return whether a table of two raters can answer a question."""
+    codes = problem.coded.codes
+    if problem.entry.name not in CHANCE_AGREEMENT or codes.shape[1] != 2:
+        return False
+    table, _ = _table(codes, problem.coded.n_categories)
+    return _nothing_to_learn(problem, table) is None
+
+
+def default_table_interval(problem: IntervalProblem) -> Interval:
+    """Compute an interval that holds the estimate, one-sided where that is perfect."""
+    perfect = not problem.value < 1.0
+    interval = table_interval(
+        problem, None, n_draws=_DEFAULT_DRAWS, rng=_SEED, one_sided=perfect
+    )
+    if perfect or interval.low <= problem.value <= interval.high:
+        return interval
+    note = "widened to the estimate, which lies outside the posterior's"
+    return dataclasses.replace(
+        interval,
+        low=min(interval.low, problem.value),
+        high=max(interval.high, problem.value),
+        notes=(*interval.notes, note),
+    )
+
+
+def table_interval(
+    problem: IntervalProblem,
+    concentration: float | None,
+    *,
+    n_draws: int,
+    rng: np.random.Generator | int | None,
+    one_sided: bool = False,
+) -> Interval:
+    """Compute the credible interval of a coefficient of two raters."""
+    _check(problem, n_draws)
+    table, n_single = _table(problem.coded.codes, problem.coded.n_categories)
+    reason = _nothing_to_learn(problem, table)
+    if reason is not None:
+        undefined = problem.undefined(reason, method="table posterior", unit=None)
+        return dataclasses.replace(undefined, kind="credible")
+    q = len(table)
+    prior = (
+        TablePrior.by_default(q)
+        if concentration is None
+        else TablePrior.of(concentration, q)
+    )
+    generator, seed = None, None
+    if needs_draws(CHANCE_AGREEMENT[problem.entry.name], problem.v):
+        generator, seed = recorded_generator(rng)
+    posterior, ends = _posterior(
+        problem, table + prior.cells, generator, n_draws, one_sided
+    )
+    what = _where_the_prior_weighs(table)
+    notes: tuple[str, ...] = ()
+    if n_single:
+        notes = (f"left out, items of a single rating: {n_single}",)
+    if what:
+        other = prior.other()
+        _, there = _posterior(
+            problem, table + other.cells, generator, _NOTED_DRAWS, one_sided
+        )
+        notes += (
+            f"{what}, so the prior weighs: {ends[0]:.3f} to {ends[1]:.3f} with "
+            f"{prior.description}, but {there[0]:.3f} to {there[1]:.3f} with "
+            f"{other.description}",
+        )
+    interval = _interval(problem, posterior, ends, prior, one_sided)
+    return dataclasses.replace(interval, seed=seed, notes=notes)
+
+
+def _posterior(
+    problem: IntervalProblem,
+    cells: Floats,
+    generator: np.random.Generator | None,
+    n_draws: int,
+    one_sided: bool,
+) -> tuple[TablePosterior, tuple[float, float]]:
+    # of a Dirichlet with these parameters, and the ends of its interval
+    tail = 1.0 - problem.level
+    tail = tail if one_sided else 0.5 * tail
+    posterior, (low, high) = table_quantiles(
+        CHANCE_AGREEMENT[problem.entry.name],
+        problem.v,
+        cells,
+        (tail, 1.0 - tail),
+        start=0.5 if math.isnan(problem.value) else problem.value,
+        generator=generator,
+        n_draws=n_draws,
+    )
+    return posterior, (low, 1.0 if one_sided else high)
+
+
+def _interval(
+    problem: IntervalProblem,
+    posterior: TablePosterior,
+    ends: tuple[float, float],
+    prior: TablePrior,
+    one_sided: bool,
+) -> Interval:
+    low, high = ends
+    method = "Dirichlet posterior of the table of two raters, exact"
+    errors = None
+    if posterior.n_draws is not None:
+        method = method.replace("exact", f"{posterior.n_draws} draws")
+        of_high = 0.0 if one_sided else posterior.quantile_error(high)
+        errors = (posterior.quantile_error(low), of_high)
+    width = high - low  # the density is shown as far beyond the ends
+    lowest = min(problem.entry.lowest, low)
+    return Interval(
+        low=low,
+        high=high,
+        level=problem.level,
+        kind="credible",
+        method=f"{method}, one-sided" if one_sided else method,
+        target=problem.target,
+        n_resamples=posterior.n_draws,
+        monte_carlo_error=errors,
+        distribution=posterior.distribution(
+            max(low - width, lowest),
+            min(high + width, 1.0),
+            f"posterior of {problem.entry.title}, prior {prior.description}",
+        ),
+    )
+
+
+def _check(problem: IntervalProblem, n_draws: int) -> None:
+    name, n_raters = problem.entry.name, problem.coded.codes.shape[1]
+    if name not in CHANCE_AGREEMENT or n_raters != 2:
+        raise ParameterError(
+            f'model: "table" speaks of {", ".join(CHANCE_AGREEMENT)} of exactly two '
+            f"raters; got {name} of {n_raters}"
+        )
+    if n_draws < _MIN_DRAWS:
+        raise ParameterError(f"n_draws: needs at least {_MIN_DRAWS}, got {n_draws}")
+
+
+def _table(codes: NDArray[np.signedinteger], n_categories: int) -> tuple[Floats, int]:
+    # (n_items, 2) -> items per pair of categories, and items of one rating
+    n_ratings = (codes >= 0).sum(axis=1)
+    both = codes[n_ratings == 2].astype(np.int64)
+    cells = np.bincount(both @ (n_categories, 1), minlength=n_categories**2)
+    shape = (n_categories, n_categories)
+    return cells.reshape(shape).astype(np.float64), int((n_ratings == 1).sum())
+
+
+def _nothing_to_learn(problem: IntervalProblem, table: Floats) -> str | None:
+    if not table.any():
+        return "no item has ratings of two raters"
+    if len(table) < 2:
+        return "one category is declared"
+    if np.isnan(problem.v).any():
+        return "the scale has no such weights"
+    if not problem.v.any():
+        return "the weights know no disagreement"
+    return None
+
+
+def _where_the_prior_weighs(table: Floats) -> str:
+    if (table > 0.0).sum() == 1 and table.trace():
+        return "all ratings are in one category"
+    if table.trace() == table.sum():
+        return "agreement is perfect in these data"
+    if table.sum() < _FEW_ITEMS:
+        return f"{table.sum():.0f} items are few"
+    return ""

@@ -1,1 +1,0 @@
-"""The Dirichlet-multinomial posterior of agreement by any raters, exactly."""

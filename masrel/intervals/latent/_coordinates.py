@@ -1,0 +1,249 @@
+"""Coordinates in which the posterior of the latent-trait model is nearly normal.
+
+Ratings tell how items and thresholds lie to each other in units of c = √(1 - ρ), by
+which a rating differs from its item; of ρ they tell nothing more. So thresholds are
+T_k = (τ_k - α) / c from the one of them that halves the ratings, α, and an item whose
+ratings place it is told by how far (θ_i - α) / c is from the thresholds between its
+grades. An item that its ratings hardly place is told by θ_i / √ρ, as its prior is.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import expit, ndtr, ndtri
+
+from masrel.agreement._kernel import Floats
+from masrel.agreement._labels import Codes
+
+_PLAIN = 5.0  # variance of items' means over its error, where ratings place items
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Traits:
+    """The unknowns at n positions, on the scale where a rating has variance 1."""
+
+    severity: Floats = field(compare=False, repr=False)  # (n, n_items): θ_i ~ N(0, ρ)
+    # (n, n_raters): b_r ~ N(0, ω²), ω² = (1 - ρ)(1 - f)
+    bias: Floats = field(compare=False, repr=False)
+    # (n, n_raters): σ_r = σ e^(η w_r), σ² = (1 - ρ) f, w_r ~ N(0, 1)
+    noise: Floats = field(compare=False, repr=False)
+    # (n, n_categories - 1): τ_k, ascending
+    thresholds: Floats = field(compare=False, repr=False)
+    # item_share, noise_fraction, noise_spread: (n,): ρ, f and η
+    item_share: Floats = field(compare=False, repr=False)
+    noise_fraction: Floats = field(compare=False, repr=False)
+    noise_spread: Floats = field(compare=False, repr=False)
+    # bias_variance, noise_variance: (n,): ω² and σ²
+    bias_variance: Floats = field(compare=False, repr=False)
+    noise_variance: Floats = field(compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UnconstrainedPoint:
+    """The unknowns at n positions in units of c, and the coordinates themselves."""
+
+    item: Floats = field(compare=False, repr=False)  # (n, n_items): u_i = (θ_i - α) / c
+    # bias, noise: (n, n_raters): b_r / c and σ_r / c
+    bias: Floats = field(compare=False, repr=False)
+    noise: Floats = field(compare=False, repr=False)
+    # (n, n_categories - 1): t_k = (τ_k - α) / c
+    threshold: Floats = field(compare=False, repr=False)
+    # (n, n_items): the items' coordinates
+    raw_item: Floats = field(compare=False, repr=False)
+    # b, w: (n, n_raters): b_r / ω and w_r
+    b: Floats = field(compare=False, repr=False)
+    w: Floats = field(compare=False, repr=False)
+    # logit_share, logit_fraction, log_spread: (n, 1): logit ρ, logit f, log η
+    logit_share: Floats = field(compare=False, repr=False)
+    logit_fraction: Floats = field(compare=False, repr=False)
+    log_spread: Floats = field(compare=False, repr=False)
+    # share, root, fraction, spread: (n, 1): ρ, c, f and η
+    share: Floats = field(compare=False, repr=False)
+    root: Floats = field(compare=False, repr=False)
+    fraction: Floats = field(compare=False, repr=False)
+    spread: Floats = field(compare=False, repr=False)
+    anchor: Floats = field(compare=False, repr=False)  # (n, 1): α
+    # (n, n_categories - 2): distances of neighbouring T_k
+    gap: Floats = field(compare=False, repr=False)
+
+    @property
+    def severity(self) -> Floats:
+        """Severities θ_i, (n, n_items)."""
+        return self.anchor + self.root * self.item
+
+    @property
+    def tau(self) -> Floats:
+        """Thresholds τ_k, (n, n_categories - 1)."""
+        return self.anchor + self.root * self.threshold
+
+    @property
+    def traits(self) -> Traits:
+        """All on the scale where a rating has variance 1."""
+        rest = (self.root**2)[:, 0]
+        fraction = self.fraction[:, 0]
+        return Traits(
+            severity=self.severity,
+            bias=self.root * self.bias,
+            noise=self.root * self.noise,
+            thresholds=self.tau,
+            item_share=self.share[:, 0],
+            noise_fraction=fraction,
+            noise_spread=self.spread[:, 0],
+            bias_variance=rest * expit(-self.logit_fraction[:, 0]),
+            noise_variance=rest * fraction,
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Coordinates:
+    """What a position holds."""
+
+    # In this order: one coordinate an item; b_r / ω and w_r (n_raters each); logit ρ,
+    # logit f, log η; α; and the logarithms of the distances between neighbouring T_k,
+    # from the lowest pair up.
+
+    # n_items, n_raters, n_categories: sizes
+    n_items: int
+    n_raters: int
+    n_categories: int
+    middle: int  # the threshold that is α: the one that halves the ratings best
+    # (n_items,): items whose coordinate is v_i = u_i - Σ_k W_ik T_k; of the others it
+    # is z_i = θ_i / √ρ
+    placed: NDArray[np.bool_] = field(compare=False, repr=False)
+    # (n_items, n_categories - 1): W: weights of the thresholds between an item's grades
+    threshold_weights: Floats = field(compare=False, repr=False)
+
+    @classmethod
+    def of(cls, codes: Codes, n_categories: int) -> "Coordinates":
+        """Fit coordinates to codes of shape (n_items, n_raters), -1 where missing."""
+        rated = codes >= 0
+        grades = np.arange(n_categories - 1)
+        at_most = (rated[:, :, None] & (codes[:, :, None] <= grades)).sum(axis=1)
+        n_each = rated.sum(axis=1)
+        share = at_most / n_each.clip(1)[:, None]
+        weight = share * (1.0 - share)  # 0 where all are on one side
+        total = weight.sum(axis=1)
+        placed = (total > 0.0) & _tell_items_apart(codes)
+        scale = np.where(placed, 1.0 / np.where(placed, total, 1.0), 0.0)
+        return cls(
+            n_items=codes.shape[0],
+            n_raters=codes.shape[1],
+            n_categories=n_categories,
+            middle=int(np.abs(2 * at_most.sum(axis=0) - rated.sum()).argmin()),
+            placed=placed,
+            threshold_weights=scale[:, None] * weight,
+        )
+
+    @property
+    def n_dimensions(self) -> int:
+        """Length of a position."""
+        return self.shares + 3 + self.n_categories - 1
+
+    @property
+    def shares(self) -> int:
+        """Where logit ρ, logit f and log η begin."""
+        return self.n_items + 2 * self.n_raters
+
+    def start(self, noise_spread: float) -> Floats:
+        """Return a position, (n_dimensions,), where the density is near its peak."""
+        position = np.zeros(self.n_dimensions)
+        at = self.shares
+        position[at] = 1.0
+        position[at + 2] = np.log(noise_spread)
+        tau = ndtri(np.arange(1, self.n_categories) / self.n_categories)
+        position[at + 3] = tau[self.middle]
+        position[at + 4 :] = np.log(np.diff(tau) / np.sqrt(expit(-1.0)))
+        return position
+
+    def point(self, position: Floats) -> UnconstrainedPoint:
+        """Return what positions (n, n_dimensions) hold."""
+        at, n = self.shares, self.n_items
+        raw_item, b, w = np.split(position[:, :at], [n, n + self.n_raters], axis=1)
+        rho, f, eta, anchor = np.split(position[:, at : at + 4], 4, axis=1)
+        share, fraction, spread = expit(rho), expit(f), np.exp(eta)
+        root = np.sqrt(expit(-rho))
+        gap = np.exp(position[:, at + 4 :])
+        threshold = self._thresholds(gap)
+        by_ratings = raw_item + threshold @ self.threshold_weights.T
+        by_prior = (np.sqrt(share) * raw_item - anchor) / root
+        return UnconstrainedPoint(
+            item=np.where(self.placed, by_ratings, by_prior),
+            bias=np.sqrt(expit(-f)) * b,
+            noise=np.sqrt(fraction) * np.exp(spread * w),
+            threshold=threshold,
+            raw_item=raw_item,
+            b=b,
+            w=w,
+            logit_share=rho,
+            logit_fraction=f,
+            log_spread=eta,
+            share=share,
+            root=root,
+            fraction=fraction,
+            spread=spread,
+            anchor=anchor,
+            gap=gap,
+        )
+
+    def _thresholds(self, gap: Floats) -> Floats:
+        # T_k from their distances, (n, n_categories - 1); that of α is 0
+        lower = -_from_right(gap[:, : self.middle])
+        upper = gap[:, self.middle :].cumsum(axis=1)
+        return np.hstack([lower, np.zeros((len(gap), 1)), upper])
+
+    def log_jacobian(self, point: UnconstrainedPoint) -> Floats:
+        """Return log |∂(θ, τ) / ∂(their coordinates)|, (n,), without items' √ρ."""
+        # z_i is a unit normal by its prior, whose density needs no Jacobian.
+        n_scaled = int(self.placed.sum()) + self.n_categories - 2
+        return np.asarray(
+            n_scaled * np.log(point.root[:, 0]) + np.log(point.gap).sum(axis=1)
+        )
+
+    def by_threshold(self, slope: Floats, point: UnconstrainedPoint) -> Floats:
+        """Turn slopes by T_k into slopes by the logarithms of their distances."""
+        # slope (n, n_categories - 1) -> (n, n_categories - 2)
+        # a distance below the middle moves all thresholds below it down
+        down = -slope.cumsum(axis=1)[:, : self.middle]
+        up = _from_right(slope)[:, self.middle + 1 :]
+        return np.asarray(point.gap * np.hstack([down, up]))
+
+
+def _tell_items_apart(codes: Codes) -> bool:
+    # whether the variance of items' mean codes is plainly more than its error
+    rated = codes >= 0
+    n_each = rated.sum(axis=1)
+    some = n_each > 0
+    df = int((n_each[some] - 1).sum())
+    if some.sum() < 2 or df < 1:
+        return False
+    mean = np.where(rated, codes, 0).sum(axis=1) / n_each.clip(1)
+    within = (np.where(rated, codes - mean[:, None], 0.0) ** 2).sum() / df
+    error = within * (1.0 / n_each[some]).mean()
+    return bool(mean[some].var(ddof=1) > _PLAIN * error)
+
+
+def _from_right(values: Floats) -> Floats:
+    # (n, m) -> (n, m): sums of each entry and all to its right
+    return values[:, ::-1].cumsum(axis=1)[:, ::-1]
+
+
+def grade_shares(thresholds: Floats) -> Floats:
+    """Return the shares of the grades over all items and raters."""
+    # thresholds (n, n_categories - 1) -> (n, n_categories)
+    far = np.full((len(thresholds), 1), np.inf)
+    ends = np.hstack([-far, thresholds, far])
+    return normal_probability(ends[:, :-1], ends[:, 1:])
+
+
+def normal_probability(low: Floats, high: Floats) -> Floats:
+    """Return Φ(high) - Φ(low), from the side where it keeps its digits."""
+    flip = low > 0.0  # in the upper tail from the other side
+    return np.asarray(
+        ndtr(np.where(flip, -low, high)) - ndtr(np.where(flip, -high, low))
+    )
+
+
+def normal_density(x: Floats) -> Floats:
+    """Return the density of a unit normal."""
+    return np.asarray(np.exp(-0.5 * x * x) / np.sqrt(2.0 * np.pi))

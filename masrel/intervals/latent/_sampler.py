@@ -1,0 +1,313 @@
+"""Hamiltonian sampling of the latent-trait model until all that is reported converges.
+
+Metric and step length are fitted in warm-up and then stay: a chain that goes on
+adapting has no distribution to converge to.
+"""
+
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from scipy.optimize import minimize
+
+from masrel.agreement._kernel import Floats
+from masrel.intervals._mcmc import MAX_R_HAT, Walkers, diagnose, not_converged
+from masrel.intervals.latent._coordinates import Traits
+from masrel.intervals.latent._density import LatentDensity
+from masrel.intervals.latent._implied import (
+    Agreement,
+    Items,
+    agreement_on_items,
+    agreement_on_new_items,
+)
+
+JOURNEY = 1.5
+"""How far a proposal goes in units of the metric: a quarter of an orbit is π/2."""
+
+MIN_ESS = 4_000.0  # an end of a 95 % interval within .04 posterior deviations
+_WARM_UP = (100, 100, 100)
+_FIRST_STEP = 0.1
+_BEST_ACCEPTANCE = (0.8, 0.97)
+_MAX_KEPT = 500  # positions of a chain; beyond, every other one is dropped
+_N_CHAINS = 64
+_MIN_CURVATURE = 0.2  # least curvature at the mode that is believed
+_MAX_DROP = 0.75  # how far below the mode chains may begin, per dimension
+_MAX_KAPPAS = 8_192  # positions where an integral over new items is computed
+
+_Proposal = Callable[[Floats, np.random.RandomState], tuple[Floats, Floats]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LatentFit:
+    """The model after the data."""
+
+    density: LatentDensity  # what was sampled
+    # draws of kappa and of all in `parts`, in that order
+    chains: "Chains" = field(repr=False)
+    # where "kappa", "severity", "bias", "noise", "thresholds", "shares" (of the items,
+    # the biases and the noises) and "noise_spread" are among the quantities
+    parts: dict[str, slice]
+    # of two new raters, at the positions where kappa was computed
+    agreement: Agreement = field(repr=False)
+
+    def draws(self, max_draws: int) -> Traits:
+        """Return the unknowns at no more than so many positions of all chains."""
+        return self.density.traits(_some(self.chains.positions, max_draws))
+
+
+def fit_latent(
+    density: LatentDensity,
+    items: Items,
+    *,
+    generator: np.random.Generator,
+    n_steps: int,
+    max_steps: int,
+    progress: Callable[[int], object] | None,
+) -> LatentFit:
+    """Sample the model until every reported quantity has converged."""
+    agreement: list[Agreement] = []
+
+    def quantities(positions: Floats) -> list[Floats]:
+        agreement[:] = [_agreement(density, positions, items)]
+        kappa = agreement[0].kappa
+        traits = density.traits(positions.reshape(-1, density.n_dimensions))
+        columns = np.column_stack([part for _, part in _reported(traits)]).T
+        rest = columns.reshape(len(columns), *positions.shape[:2])
+        return [kappa.reshape(len(positions), -1), *rest]
+
+    start, covariance = _begin(density, generator)
+    chains = sample_smooth(
+        density,
+        quantities,
+        start,
+        covariance,
+        generator=generator,
+        n_steps=n_steps,
+        max_steps=max_steps,
+        progress=progress,
+    )
+    return LatentFit(
+        density=density,
+        chains=chains,
+        parts=_parts(density.traits(start)),
+        agreement=agreement[0],
+    )
+
+
+def _reported(traits: Traits) -> list[tuple[str, Floats]]:
+    # Severities and thresholds can all move together: from the mean of these items
+    # they are known better than from the mean of their population.
+    centre = traits.severity.mean(axis=1, keepdims=True)
+    shares = (traits.item_share, traits.bias_variance, traits.noise_variance)
+    return [
+        ("severity", traits.severity - centre),
+        ("bias", traits.bias),
+        ("noise", traits.noise),
+        ("thresholds", traits.thresholds - centre),
+        ("shares", np.column_stack(shares)),
+        ("noise_spread", traits.noise_spread[:, None]),
+    ]
+
+
+def _parts(traits: Traits) -> dict[str, slice]:
+    named = [("kappa", 1)] + [(n, part.shape[1]) for n, part in _reported(traits)]
+    ends = itertools.accumulate(size for _, size in named)
+    return {
+        name: slice(end - size, end)
+        for (name, size), end in zip(named, ends, strict=True)
+    }
+
+
+def _agreement(density: LatentDensity, positions: Floats, items: Items) -> Agreement:
+    if items == "fixed":
+        flat = positions.reshape(-1, density.n_dimensions)
+        return agreement_on_items(density.traits(flat))
+    return agreement_on_new_items(density.traits(_some(positions, _MAX_KAPPAS)))
+
+
+def _some(positions: Floats, max_draws: int) -> Floats:
+    # (n_chains, n_kept, d) -> (n, d): every so many of each chain, the last included
+    n_chains, n_kept, d = positions.shape
+    every = -(-n_chains * n_kept // max_draws)
+    return positions[:, (n_kept - 1) % every :: every].reshape(-1, d)
+
+
+def _begin(
+    density: LatentDensity, generator: np.random.Generator
+) -> tuple[Floats, Floats]:
+    # -> starts (n_chains, d) spread as a normal around the mode, and its covariance
+    tilt = density.tilt
+
+    def height(x: Floats) -> Floats:
+        return np.asarray(density.log_density(x) + x @ tilt)
+
+    def downhill(x: Floats) -> tuple[float, Floats]:
+        row = x[None]
+        return -float(height(row)[0]), -density.gradient(row)[0] - tilt
+
+    optimum = minimize(downhill, density.start(), jac=True, method="BFGS")
+    mode = optimum.x
+    around = 1e-4 * np.eye(mode.size)
+    slopes = density.gradient(mode + around) - density.gradient(mode - around)
+    bend = -0.5 * (slopes + slopes.T) / 2e-4
+    curvature, axes = np.linalg.eigh(bend)
+    covariance = (axes / curvature.clip(_MIN_CURVATURE)) @ axes.T
+    away = generator.standard_normal((_N_CHAINS, mode.size))
+    away = away @ np.linalg.cholesky(covariance).T
+    lowest = -optimum.fun - _MAX_DROP * mode.size
+    while (low := ~(height(mode + away) > lowest)).any():
+        away[low] *= 0.8  # walls of the likelihood are nearer than a normal's
+    return mode + away, covariance
+
+
+class SmoothDensity(Protocol):
+    """A log-density with its slopes, of many positions at once."""
+
+    def log_density(self, position: Floats) -> Floats:
+        """Return the logarithm, (n,), at positions (n, n_dimensions)."""
+
+    def gradient(self, position: Floats) -> Floats:
+        """Return its slopes, (n, n_dimensions)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Chains:
+    """Draws of several quantities, converged."""
+
+    # (n_chains, n_kept, n_dimensions): where the chains were after warm-up
+    positions: Floats = field(compare=False, repr=False)
+    # (n_chains, at most n_kept): the quantities there, or at some of them
+    values: list[Floats] = field(compare=False, repr=False)
+    # r_hat, ess: (n_quantities,): rank-normalized split R-hat; effective size of the
+    # tails
+    r_hat: Floats = field(compare=False, repr=False)
+    ess: Floats = field(compare=False, repr=False)
+    n_steps: int  # steps of every chain after warm-up, kept or not
+    acceptance: float  # share of the proposals that were taken
+
+
+def sample_smooth(
+    density: SmoothDensity,
+    quantities: Callable[[Floats], list[Floats]],
+    start: Floats,
+    covariance: Floats,
+    *,
+    generator: np.random.Generator,
+    n_steps: int,
+    max_steps: int,
+    progress: Callable[[int], object] | None = None,
+) -> Chains:
+    """Sample a density by Hamiltonian proposals until its quantities have converged."""
+    # shape of start: (n_chains, n_dimensions); of covariance: n_dimensions squared
+    report = progress or _silent
+    walkers = _warm_up(density, start, covariance, generator, report)
+    kept = np.empty((len(start), 0, start.shape[1]))
+    total, thin = 0, 1
+    while total < max_steps:
+        more = n_steps if total == 0 else min(total, max_steps - total)
+        n_made, kept, thin = _go_on(walkers, more, kept, thin, report)
+        total += n_made
+        values = quantities(kept)
+        r_hat, ess = np.array([diagnose(of_one) for of_one in values]).T
+        if (r_hat < MAX_R_HAT).all() and (ess >= MIN_ESS).all():
+            return Chains(
+                positions=kept,
+                values=values,
+                r_hat=r_hat,
+                ess=ess,
+                n_steps=total,
+                acceptance=walkers.acceptance,
+            )
+    raise not_converged(total, float(r_hat.max()), float(ess.min()), MIN_ESS)
+
+
+def _warm_up(
+    density: SmoothDensity,
+    start: Floats,
+    covariance: Floats,
+    generator: np.random.Generator,
+    report: Callable[[int], object],
+) -> Walkers:
+    # fits the metric to where the chains went and the step to how many proposals
+    # were taken
+    step = _FIRST_STEP
+    for n_steps in (*_WARM_UP, 0):
+        root = np.linalg.cholesky(covariance).astype(np.float64)
+        proposal = hamiltonian_proposal(density.gradient, root, step)
+        walkers = Walkers(density.log_density, proposal, start, generator)
+        if n_steps == 0:
+            break
+        positions = walkers.run(n_steps)
+        report(n_steps)
+        start = positions[:, -1]
+        covariance = _covariance(positions[:, n_steps // 2 :], covariance)
+        if walkers.acceptance < _BEST_ACCEPTANCE[0]:
+            step *= 0.6
+        elif walkers.acceptance > _BEST_ACCEPTANCE[1]:
+            step *= 1.5
+    return walkers
+
+
+def _covariance(positions: Floats, before: Floats) -> Floats:
+    # (n_chains, n_steps, d) -> (d, d), with as much of the one before as it takes for
+    # the draws, of which one in ten counts, to know every direction
+    n_chains, n_steps, d = positions.shape
+    sample = np.asarray(np.cov(positions.reshape(-1, d).T), dtype=np.float64)
+    mix = d / (d + n_chains * n_steps / 10)
+    return np.asarray((1.0 - mix) * sample.reshape(d, d) + mix * before)
+
+
+def _go_on(
+    walkers: Walkers,
+    more: int,
+    kept: Floats,
+    thin: int,
+    report: Callable[[int], object],
+) -> tuple[int, Floats, int]:
+    # -> steps made, positions kept so far, and one in how many is kept
+    parts, n_made = [kept], 0
+    for _ in range(10):
+        block = max(more // (10 * thin), 1) * thin
+        parts.append(walkers.run(block, thin=thin))
+        n_made += block
+        report(block)
+    kept = np.concatenate(parts, axis=1)
+    while kept.shape[1] > _MAX_KEPT:
+        kept, thin = kept[:, 1::2], 2 * thin
+    return n_made, kept, thin
+
+
+def _silent(_: int) -> None: ...
+
+
+def hamiltonian_proposal(
+    gradient: Callable[[Floats], Floats], root: Floats, step: float
+) -> _Proposal:
+    """Make a proposal for a Metropolis step of many walkers at once."""
+    # Each walker gets a momentum p ~ N(0, I) and a step length of its own, and moves by
+    # leapfrog steps in coordinates whose covariance is about I.
+    # Takes root (n_dimensions, n_dimensions)
+    # Positions and random state to new positions and the logarithms of what the ratio
+    # of densities is multiplied by: exp(|p|²/2 - |p'|²/2). A leapfrog keeps volume and
+    # is its own inverse but for the sign of p, so that this is all.
+    # [1] Neal, R. M. (2011). MCMC using Hamiltonian dynamics. Handbook of Markov Chain
+    # Monte Carlo, ch. 5, eqs. 5.18-5.20. https://arxiv.org/abs/1206.1901
+    leaps = int(np.ceil(JOURNEY / step))
+
+    def propose(
+        position: Floats, random: np.random.RandomState
+    ) -> tuple[Floats, Floats]:
+        momentum = random.standard_normal(position.shape)
+        length = 1.4 * step * 0.1 ** random.uniform(size=(len(position), 1))
+        before = 0.5 * (momentum**2).sum(axis=1)
+        with np.errstate(over="ignore", invalid="ignore"):  # a wall; not taken then
+            momentum = momentum + 0.5 * length * (gradient(position) @ root)
+            for leap in range(leaps):
+                position = position + length * (momentum @ root.T)
+                share = 1.0 if leap < leaps - 1 else 0.5
+                momentum = momentum + share * length * (gradient(position) @ root)
+            return position, before - 0.5 * (momentum**2).sum(axis=1)
+
+    return propose

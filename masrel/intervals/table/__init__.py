@@ -1,1 +1,0 @@
-"""The posterior of a coefficient of two raters, from a Dirichlet on their table."""
