@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.intervals import posterior
-from masrel.intervals.dirichlet.model import DirichletMultinomial
-from masrel.intervals.dirichlet.prior import Prior
-from masrel.intervals.dirichlet.rho import ExactPosterior
+from masrel.intervals._dirichlet_multinomial import DirichletMultinomial
+from masrel.intervals._priors import DEFAULT_PRIOR
+from masrel.intervals._rho import RhoPosterior
 from tests.benchmarks.bootstrap import Codes, Point, Race, counted, made, measured
 from tests.benchmarks.sidebyside import Timing, side_by_side
-from tests.intervals.dirichlet.gauss_legendre import ByPanels
+from tests.intervals.gauss_legendre import ByPanels
 
 TAILS = (0.025, 0.975)
 ESS = 2000.0
@@ -137,12 +137,11 @@ def _study(n: int, r: int, q: int, *, quick: bool) -> Posterior:
     truth = (panels.quantile(TAILS[0]), panels.quantile(TAILS[1]))
     points = _points(codes, q, model, truth, quick)
     n_steps = {way: steps_for(way, model) for way in WALKERS}
-    prior = Prior.of("uniform", 1.0)
     works: dict[str, Callable[[], object]] = {
         INTERVAL: partial(
             posterior, "fleiss_kappa", codes, target="items", categories=range(q)
         ),
-        QUADRATURE: lambda: ExactPosterior.of(counts, prior, 0.95),
+        QUADRATURE: lambda: RhoPosterior.of(counts, DEFAULT_PRIOR, 0.95),
     }
     errors = {INTERVAL: points[0].error}
     for way, size in n_steps.items():

@@ -11,7 +11,7 @@ from masrel.report.figures.style import STYLE
 from tests.architecture.test_imports import loaded_after
 from tests.cli.process import Caller
 
-SAMPLER = "masrel.intervals.latent.sampler"
+SAMPLER = "masrel.intervals.latent._sampler"
 
 WIDE = "patient,Kim,Lee,Ann\nA,1,1+,1\nB,2,NA,2\nC,1,1,2\nD,3,3,3\n"
 NUMBERS = "patient,Kim,Lee,Ann\nA,1,2,1\nB,2,NA,2\nC,1,1,2\nD,3,3,3\n"
@@ -26,12 +26,12 @@ SESSIONS = "session,item,rater,grade,source\n" + "".join(
 @pytest.fixture(autouse=True)
 def brief(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let a second of sampling pass as converged."""
-    monkeypatch.setattr(f"{SAMPLER}.LEAST_ESS", 50.0)
-    monkeypatch.setattr(f"{SAMPLER}.LARGEST_R_HAT", 1.3)
+    monkeypatch.setattr(f"{SAMPLER}.MIN_ESS", 50.0)
+    monkeypatch.setattr(f"{SAMPLER}.MAX_R_HAT", 1.3)
     monkeypatch.setattr(f"{SAMPLER}._WARM_UP", (20, 20, 20))
-    monkeypatch.setattr("masrel.intervals.latent.fit._N_CHAINS", 16)
+    monkeypatch.setattr("masrel.intervals.latent._sampler._N_CHAINS", 16)
     monkeypatch.setattr(
-        "masrel.intervals.latent.trait.latent_trait.__kwdefaults__",
+        "masrel.intervals.latent._trait.latent_trait.__kwdefaults__",
         {**_defaults(), "n_steps": 50},
     )
 
@@ -148,10 +148,10 @@ def test_what_cannot_be_done_is_one_sentence(
 def test_too_few_steps_are_a_failed_run(
     masrel: Caller, wide: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(f"{SAMPLER}.LEAST_ESS", 1e9)
+    monkeypatch.setattr(f"{SAMPLER}.MIN_ESS", 1e9)
     monkeypatch.setattr(
-        "masrel.intervals.latent.trait.latent_trait.__kwdefaults__",
-        {**_defaults(), "most_steps": 50},
+        "masrel.intervals.latent._trait.latent_trait.__kwdefaults__",
+        {**_defaults(), "max_steps": 50},
     )
     done = masrel("latent", wide, "--items", "fixed", "--quiet")
     assert done.code == 1

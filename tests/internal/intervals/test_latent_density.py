@@ -7,10 +7,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy import stats
 
-from masrel.intervals.latent.coordinates import Coordinates
-from masrel.intervals.latent.density import LatentDensity
-from masrel.intervals.latent.prior import LatentPrior
-from masrel.intervals.latent.traits import grade_shares
+from masrel.intervals import LatentPrior
+from masrel.intervals.latent._coordinates import Coordinates, grade_shares
+from masrel.intervals.latent._density import LatentDensity
 
 Floats = NDArray[np.float64]
 PRIORS = [LatentPrior(), LatentPrior.other()]
@@ -21,7 +20,7 @@ RATINGS = np.array([[0, 1, 0], [2, 2, 3], [4, 3, -1], [2, -1, -1]])
 def natural(x: Floats, like: Coordinates) -> Floats:
     """Turn coordinates into θ, b, log σ_r, ρ, f, η and grades' shares, one by one."""
     n_items, n_raters = like.n_items, like.n_raters
-    own, b, w = np.split(x[: n_items + 2 * n_raters], [n_items, n_items + n_raters])
+    items, b, w = np.split(x[: n_items + 2 * n_raters], [n_items, n_items + n_raters])
     a, c, e, anchor, *gaps = x[n_items + 2 * n_raters :].tolist()
     rho, f, eta = 1 / (1 + math.exp(-a)), 1 / (1 + math.exp(-c)), math.exp(e)
     unit = math.sqrt(1 - rho)
@@ -35,7 +34,7 @@ def natural(x: Floats, like: Coordinates) -> Floats:
         if is_placed
         else math.sqrt(rho) * value
         for value, is_placed, weights in zip(
-            own, like.placed, like.between, strict=True
+            items, like.placed, like.threshold_weights, strict=True
         )
     ]
     below = stats.norm.cdf([-np.inf, *tau, np.inf])
@@ -92,7 +91,7 @@ def textbook(x: Floats, codes: NDArray[np.int64], n: int, prior: LatentPrior) ->
 def positions(density: LatentDensity, n: int) -> Floats:
     rng = np.random.default_rng(4)
     scatter: Floats = 0.5 * rng.normal(size=(n, density.n_dimensions))
-    return density.middle_of_prior() + scatter
+    return density.start() + scatter
 
 
 def test_items_that_ratings_tell_apart_are_placed_by_them() -> None:
@@ -100,11 +99,11 @@ def test_items_that_ratings_tell_apart_are_placed_by_them() -> None:
     # the grades of the first lie around 0 | 1, of the second around 2 | 3, of the third
     # around 3 | 4; the last has one grade
     assert like.placed.tolist() == [True, True, True, False]
-    assert like.between.tolist() == [
+    assert like.threshold_weights.tolist() == [
         [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1], [0, 0, 0, 0],
     ]  # fmt: skip
     wide = Coordinates.of(np.array([[0, 2, 2, 2], [4, 4, 4, 4], [4, 4, 4, 3]]), 5)
-    assert wide.between[0].tolist() == [0.5, 0.5, 0, 0]
+    assert wide.threshold_weights[0].tolist() == [0.5, 0.5, 0, 0]
     alike = Coordinates.of(np.array([[0, 1, 3], [2, 0, 1], [1, 3, 0]]), 4)
     assert not alike.placed.any()
 

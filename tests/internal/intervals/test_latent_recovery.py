@@ -4,17 +4,15 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from masrel.intervals import latent_trait
-from masrel.intervals.latent.density import LatentDensity
-from masrel.intervals.latent.fit import fit_latent
-from masrel.intervals.latent.kappa import agreement_on_items, agreement_on_new_items
-from masrel.intervals.latent.prior import LatentPrior
-from masrel.intervals.quantity import Quantity
-from tests.intervals.latent.studies import drawn
+from masrel.intervals import LatentPrior, Quantity, latent_trait
+from masrel.intervals.latent._density import LatentDensity
+from masrel.intervals.latent._implied import agreement_on_items, agreement_on_new_items
+from masrel.intervals.latent._sampler import fit_latent
+from tests.intervals.latent_studies import drawn
 
 pytestmark = pytest.mark.slow
 
-SAMPLER = "masrel.intervals.latent.sampler"
+SAMPLER = "masrel.intervals.latent._sampler"
 
 
 def misses(found: tuple[Quantity, ...], truth: np.ndarray) -> int:
@@ -26,8 +24,8 @@ def misses(found: tuple[Quantity, ...], truth: np.ndarray) -> int:
 
 
 def test_a_large_study_gives_back_what_made_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(f"{SAMPLER}.LEAST_ESS", 1_000.0)
-    monkeypatch.setattr(f"{SAMPLER}.LARGEST_R_HAT", 1.03)
+    monkeypatch.setattr(f"{SAMPLER}.MIN_ESS", 1_000.0)
+    monkeypatch.setattr(f"{SAMPLER}.MAX_R_HAT", 1.03)
     study = drawn(
         np.random.default_rng(11), 30, 14, [-1.2, -0.4, 0.5, 1.3],
         share=0.85, fraction=0.7, spread=0.4,
@@ -70,7 +68,7 @@ def places(rng: np.random.Generator, prior: LatentPrior) -> dict[str, float]:
             break
     fit = fit_latent(
         LatentDensity.of(study.codes, 3, prior), "random",
-        generator=rng, n_steps=60, most_steps=3_840, progress=None,
+        generator=rng, n_steps=60, max_steps=3_840, progress=None,
     )  # fmt: skip
     truth = study.truth
     draws = fit.chains.values
@@ -100,11 +98,11 @@ def test_the_truth_is_anywhere_in_its_posterior(
     # other seeds fails. Of faults that move z by 0.55, or make its standard deviation
     # 1.4 or 0.63, half are seen; a Kolmogorov-Smirnov test of uniform shares needs 100
     # studies to see as much of the first, and 700 of the second.
-    monkeypatch.setattr(f"{SAMPLER}.LEAST_ESS", 100.0)
-    monkeypatch.setattr(f"{SAMPLER}.LARGEST_R_HAT", 1.15)
+    monkeypatch.setattr(f"{SAMPLER}.MIN_ESS", 100.0)
+    monkeypatch.setattr(f"{SAMPLER}.MAX_R_HAT", 1.15)
     monkeypatch.setattr(f"{SAMPLER}._WARM_UP", (20, 20, 20))
-    monkeypatch.setattr("masrel.intervals.latent.fit._N_CHAINS", 32)
-    monkeypatch.setattr("masrel.intervals.latent.fit._MOST_KAPPAS", 500)
+    monkeypatch.setattr("masrel.intervals.latent._sampler._N_CHAINS", 32)
+    monkeypatch.setattr("masrel.intervals.latent._sampler._MAX_KAPPAS", 500)
     prior = LatentPrior(item_share=(3.0, 1.5), noise_fraction=(2.0, 2.0))
     rng = np.random.default_rng(7)
     found = [places(rng, prior) for _ in range(50)]

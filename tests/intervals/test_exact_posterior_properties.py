@@ -1,6 +1,5 @@
 """What holds of the exact posterior for any ratings, and what it tells the reader."""
 
-import dataclasses
 import math
 import random
 from collections.abc import Sequence
@@ -10,16 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from masrel.agreement import code_ratings
-from masrel.agreement._counts import item_counts
-from masrel.errors import ConvergenceError, ParameterError, UndefinedStatisticWarning
+from masrel.errors import ParameterError, UndefinedStatisticWarning
 from masrel.estimates import Interval
 from masrel.intervals import posterior
-from masrel.intervals.dirichlet.exact import ExactDensity
-from masrel.intervals.dirichlet.model import DirichletMultinomial
-from masrel.intervals.dirichlet.prior import Prior
-from masrel.intervals.dirichlet.rho import ExactPosterior
-from masrel.intervals.sinc import sinc_distribution
 from tests.intervals.data import SCALE, TABLE_V
 from tests.strategies import LABELS, Table, tables
 
@@ -50,25 +42,6 @@ def test_any_order_of_items_ratings_and_categories_gives_the_same(
     rows = [order.sample(row, len(row)) for row in order.sample(table, len(table))]
     scale = order.sample(LABELS, len(LABELS))
     assert ends(exact(rows, scale)) == pytest.approx(ends(exact(table)), abs=1e-10)
-
-
-@settings(max_examples=25)
-@given(WITH_PAIRS)
-def test_unused_categories_are_one_of_the_sum_of_their_priors(table: Table) -> None:
-    counts = item_counts(code_ratings(table, LABELS))
-    used = counts.any(axis=0)
-    unused = float((~used).sum())
-    few = np.column_stack([counts[:, used], np.zeros(len(counts), np.int64)])
-    merged = DirichletMultinomial.of_counts(few)
-    prior = merged.prior.copy()
-    prior[-1] = unused if unused else prior[-1]
-    merged = dataclasses.replace(merged, prior=prior)
-    whole = DirichletMultinomial.of_counts(counts)
-    at = np.array([-3.0, 0.0, 0.5, 4.0])
-    if unused:
-        assert ExactDensity(whole)(at) == pytest.approx(ExactDensity(merged)(at))
-    else:
-        assert whole.prior.size == used.sum()
 
 
 # Both items split, or each agreed: the shares of the categories stay as they were.
@@ -111,39 +84,6 @@ def test_the_density_says_its_prior_and_has_the_ends_as_quantiles() -> None:
     steps = 0.5 * (of.weights[1:] + of.weights[:-1]) * np.diff(of.values)
     below = np.interp(ends(found), of.values, np.append(0.0, steps.cumsum()))
     assert below == pytest.approx([0.025, 0.975], abs=2e-4)
-
-
-def test_probabilities_rise_and_are_those_of_quantiles() -> None:
-    counts = item_counts(code_ratings(TABLE_V, SCALE))
-    found = ExactPosterior.of(counts, Prior.of("uniform", 1.0), 0.95).logit
-    shares = [1e-6, 0.025, 0.3, 0.5, 0.9, 1.0 - 1e-6]
-    points = [found.quantile(share) for share in shares]
-    again = [found.probability(point) for point in points]
-    assert again == pytest.approx(shares, abs=1e-12)
-    grid = [found.probability(point) for point in np.linspace(-20.0, 12.0, 400)]
-    assert (np.diff(grid) > -1e-14).all()
-
-
-# The normal's tails are known to scipy; its quantiles are solved for here.
-@pytest.mark.parametrize("spread", [0.01, 1.0, 30.0])
-def test_the_quadrature_finds_the_quantiles_of_a_normal(spread: float) -> None:
-    _, found = sinc_distribution(
-        lambda x: -0.5 * ((x - 3.0) / spread) ** 2,
-        3.0 - 11.0 * spread,
-        3.0 + 13.0 * spread,
-        (0.025, 0.5, 0.999),
-    )
-    expected = np.array([-1.959963984540054, 0.0, 3.090232306167813])
-    assert (np.array(found) - 3.0) / spread == pytest.approx(expected, abs=1e-11)
-
-
-def test_a_density_that_is_cut_off_or_jumps_is_refused() -> None:
-    with pytest.raises(ConvergenceError, match="reaches beyond"):
-        sinc_distribution(lambda x: -0.5 * x**2, -6.0, 9.0, (0.5,))
-    with pytest.raises(ConvergenceError, match="not settled"):
-        sinc_distribution(
-            lambda x: np.where(x > 0.123, -np.abs(x), -50.0), -9.0, 50.0, (0.3,)
-        )
 
 
 @pytest.mark.parametrize(

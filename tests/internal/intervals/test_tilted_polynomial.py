@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from masrel.errors import ConvergenceError
-from masrel.intervals.dirichlet import powers as dirichlet_powers
-from masrel.intervals.dirichlet.model import DirichletMultinomial
-from masrel.intervals.dirichlet.powers import TRIMMED, Category
-from masrel.intervals.dirichlet.saddle import Factors
+from masrel.intervals import _tilted_polynomial
+from masrel.intervals._dirichlet_multinomial import DirichletMultinomial
+from masrel.intervals._tilted_polynomial import TRIMMED, Category
 
 
 def stirling(n: int) -> list[int]:
@@ -22,11 +21,10 @@ def stirling(n: int) -> list[int]:
     return row
 
 
-def of_one_item(n: int) -> tuple[Category, Factors]:
+def of_one_item(n: int) -> tuple[Category, DirichletMultinomial]:
     """One item whose n ratings are all in one category: every N_j is 1."""
     model = DirichletMultinomial.of_counts(np.array([[n, 0]]))
-    factors = Factors.of(model)
-    return Category(factors.powers[0], 1.0), factors
+    return Category(model.powers[0], 1.0), model
 
 
 @pytest.mark.parametrize("n", [5, 40, 700])
@@ -34,8 +32,8 @@ def of_one_item(n: int) -> tuple[Category, Factors]:
 def test_every_coefficient_is_the_integer_times_its_moment(
     n: int, log_tilt: float
 ) -> None:
-    category, factors = of_one_item(n)
-    x, _ = factors.saddle(np.exp([log_tilt]))
+    category, model = of_one_item(n)
+    x, _ = model.saddle(np.exp([log_tilt]))
     found = category.tilted(float(x[0, 0]), log_tilt)
     # Γ(1 + t) = t!
     exact = np.array(
@@ -52,15 +50,15 @@ def test_every_coefficient_is_the_integer_times_its_moment(
     assert logs == pytest.approx(exact[kept - 1], rel=1e-12, abs=1e-10)
 
 
-def test_what_a_law_in_floats_drops_is_multiplied_out_in_logarithms(
+def test_what_floats_drop_is_multiplied_out_in_logarithms(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    # At this tilt the moments still need powers whose law is below 1e-230.
-    category, factors = of_one_item(700)
-    x, _ = factors.saddle(np.exp([-2.0]))
+    # At this tilt the moments still need powers whose probability is below 1e-230.
+    category, model = of_one_item(700)
+    x, _ = model.saddle(np.exp([-2.0]))
     category.tilted(float(x[0, 0]), -2.0)
     assert "_log_coefficients" in vars(category)
-    monkeypatch.setattr(dirichlet_powers, "_MOST_FACTORS", 500)
+    monkeypatch.setattr(_tilted_polynomial, "_MAX_FACTORS", 500)
     again, _ = of_one_item(700)
     with pytest.raises(ConvergenceError, match='"emcee" samples it'):
         again.tilted(float(x[0, 0]), -2.0)

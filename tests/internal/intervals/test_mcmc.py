@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from masrel.errors import ConvergenceError
-from masrel.intervals.mcmc import LARGEST_R_HAT, N_ENSEMBLES, sample
+from masrel.intervals._mcmc import MAX_R_HAT, N_ENSEMBLES, sample
 
 Floats = NDArray[np.float64]
 
@@ -27,17 +27,17 @@ def first(position: Floats) -> Floats:
 def test_quantiles_of_a_normal_are_within_their_errors(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("masrel.intervals.mcmc.LEAST_ESS", 4_000.0)
+    monkeypatch.setattr("masrel.intervals._mcmc.MIN_ESS", 4_000.0)
     draws = sample(
         correlated_normal, 2, first,
-        generator=np.random.default_rng(2), n_steps=1500, most_steps=16_000,
+        generator=np.random.default_rng(2), n_steps=1500, max_steps=16_000,
     )  # fmt: skip
     for share, exact in ((0.025, -1.959964), (0.5, 0.0), (0.975, 1.959964)):
         # 4.5 errors, three times: once in 49 000 runs of other seeds
         off = abs(draws.quantile(share) - exact)
         assert off < 4.5 * draws.quantile_error(share)
         assert draws.quantile_error(share) < 0.05
-    assert draws.r_hat < LARGEST_R_HAT
+    assert draws.r_hat < MAX_R_HAT
     assert draws.ess >= 4_000
 
 
@@ -50,19 +50,19 @@ def test_two_far_modes_are_not_called_converged() -> None:
     with pytest.raises(ConvergenceError, match="R-hat"):
         sample(
             two_modes, 1, first,
-            generator=np.random.default_rng(2), n_steps=200, most_steps=400,
+            generator=np.random.default_rng(2), n_steps=200, max_steps=400,
         )  # fmt: skip
 
 
 def test_the_generator_decides_every_draw(monkeypatch: pytest.MonkeyPatch) -> None:
     # Randomness needs no convergence.
-    monkeypatch.setattr("masrel.intervals.mcmc.LEAST_ESS", 1.0)
-    monkeypatch.setattr("masrel.intervals.mcmc.LARGEST_R_HAT", 2.0)
+    monkeypatch.setattr("masrel.intervals._mcmc.MIN_ESS", 1.0)
+    monkeypatch.setattr("masrel.intervals._mcmc.MAX_R_HAT", 2.0)
 
     def drawn(seed: int) -> Floats:
         return sample(
             correlated_normal, 2, first,
-            generator=np.random.default_rng(seed), n_steps=100, most_steps=100,
+            generator=np.random.default_rng(seed), n_steps=100, max_steps=100,
         ).values  # fmt: skip
 
     one = drawn(2)
@@ -75,8 +75,8 @@ def test_every_ensemble_moves_by_differential_evolution_alone(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     # and never by the snooker move, which in emcee 3.1.6 does not keep the density
-    monkeypatch.setattr("masrel.intervals.mcmc.LEAST_ESS", 1.0)
-    monkeypatch.setattr("masrel.intervals.mcmc.LARGEST_R_HAT", 2.0)
+    monkeypatch.setattr("masrel.intervals._mcmc.MIN_ESS", 1.0)
+    monkeypatch.setattr("masrel.intervals._mcmc.MAX_R_HAT", 2.0)
     moves: list[object] = []
     plain = emcee.EnsembleSampler.__init__
 
@@ -87,7 +87,7 @@ def test_every_ensemble_moves_by_differential_evolution_alone(
     monkeypatch.setattr(emcee.EnsembleSampler, "__init__", spied)
     sample(
         correlated_normal, 2, first,
-        generator=np.random.default_rng(1), n_steps=100, most_steps=100,
+        generator=np.random.default_rng(1), n_steps=100, max_steps=100,
     )  # fmt: skip
     assert len(moves) == 2 * N_ENSEMBLES
     assert {type(move) for move in moves} == {emcee.moves.DEMove}

@@ -9,15 +9,19 @@ from numpy.typing import NDArray
 from scipy import special, stats
 
 from masrel.errors import ConvergenceError
-from masrel.intervals.latent import hamiltonian
-from masrel.intervals.latent.density import LatentDensity
-from masrel.intervals.latent.fit import fit_latent
-from masrel.intervals.latent.hamiltonian import hamiltonian_proposal
-from masrel.intervals.latent.kappa import agreement_on_items
-from masrel.intervals.latent.prior import LatentPrior
-from masrel.intervals.latent.sampler import Chains, SmoothDensity, sample_smooth
-from masrel.intervals.latent.traits import grade_shares
-from masrel.intervals.mcmc import Walkers, quantile_error
+from masrel.intervals import LatentPrior
+from masrel.intervals._mcmc import Walkers, quantile_error
+from masrel.intervals.latent._coordinates import grade_shares
+from masrel.intervals.latent._density import LatentDensity
+from masrel.intervals.latent._implied import agreement_on_items
+from masrel.intervals.latent._sampler import (
+    JOURNEY,
+    Chains,
+    SmoothDensity,
+    fit_latent,
+    hamiltonian_proposal,
+    sample_smooth,
+)
 
 Floats = NDArray[np.float64]
 
@@ -45,7 +49,7 @@ def drawn(density: SmoothDensity, seed: int = 1, d: int = 3) -> Chains:
     rng = np.random.default_rng(seed)
     return sample_smooth(
         density, coordinates, 0.1 * rng.normal(size=(64, d)), np.eye(d),
-        generator=rng, n_steps=300, most_steps=4_800,
+        generator=rng, n_steps=300, max_steps=4_800,
     )  # fmt: skip
 
 
@@ -162,13 +166,13 @@ def laws(density: SmoothDensity) -> dict[str, float]:
         return [column.reshape(position.shape[:2]) for column in columns]
 
     rng = np.random.default_rng(3)
-    start = model.middle_of_prior() + 0.5 * rng.normal(size=(64, model.n_dimensions))
+    start = model.start() + 0.5 * rng.normal(size=(64, model.n_dimensions))
     with pytest.MonkeyPatch.context() as patch:  # a thousand draws tell laws apart
-        patch.setattr("masrel.intervals.latent.sampler.LEAST_ESS", 1_000.0)
-        patch.setattr("masrel.intervals.latent.sampler.LARGEST_R_HAT", 1.05)
+        patch.setattr("masrel.intervals.latent._sampler.MIN_ESS", 1_000.0)
+        patch.setattr("masrel.intervals.latent._sampler.MAX_R_HAT", 1.05)
         found = sample_smooth(
             density, unknowns, start, np.eye(model.n_dimensions),
-            generator=rng, n_steps=200, most_steps=8_000,
+            generator=rng, n_steps=200, max_steps=8_000,
         )  # fmt: skip
     priors = {
         "ρ": stats.beta(2, 2),
@@ -277,14 +281,14 @@ def test_chains_agree_with_weighted_draws_of_the_prior(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     # Chains good enough for this: in the tails worth 1 000 draws.
-    monkeypatch.setattr("masrel.intervals.latent.sampler.LEAST_ESS", 1_000)
-    monkeypatch.setattr("masrel.intervals.latent.sampler.LARGEST_R_HAT", 1.05)
+    monkeypatch.setattr("masrel.intervals.latent._sampler.MIN_ESS", 1_000)
+    monkeypatch.setattr("masrel.intervals.latent._sampler.MAX_R_HAT", 1.05)
     codes = np.array([[0, 0, 1], [2, 2, 2]])
     shares = (0.025, 0.5, 0.975)
     kappa, bias = importance_quantiles(codes, 3, shares)
     fit = fit_latent(
         LatentDensity.of(codes, 3, LatentPrior()), "fixed",
-        generator=np.random.default_rng(2), n_steps=250, most_steps=16_000,
+        generator=np.random.default_rng(2), n_steps=250, max_steps=16_000,
         progress=None,
     )  # fmt: skip
     # Weighted draws are worth some 1 700 (errors of at most .008 and .025), the chains
@@ -298,7 +302,7 @@ def test_chains_agree_with_weighted_draws_of_the_prior(
 def test_snooker_moves_of_emcee_are_caught(monkeypatch: pytest.MonkeyPatch) -> None:
     # DESnookerMove of emcee 3.1.6 does not keep a density: it gives a unit normal a
     # variance of about 0.67. The package uses differential evolution without it.
-    from masrel.intervals.mcmc import sample
+    from masrel.intervals._mcmc import sample
 
     def unit(position: Floats) -> Floats:
         density: Floats = -0.5 * (position**2).sum(axis=1)
@@ -307,11 +311,11 @@ def test_snooker_moves_of_emcee_are_caught(monkeypatch: pytest.MonkeyPatch) -> N
     def off() -> float:
         draws = sample(
             unit, 2, lambda x: x[:, 0],
-            generator=np.random.default_rng(1), n_steps=1200, most_steps=9_600,
+            generator=np.random.default_rng(1), n_steps=1200, max_steps=9_600,
         )  # fmt: skip
         return misses(draws.values, stats.norm.ppf)
 
-    monkeypatch.setattr("masrel.intervals.mcmc.LEAST_ESS", 4_000)
+    monkeypatch.setattr("masrel.intervals._mcmc.MIN_ESS", 4_000)
     assert off() < 4.5
     snooker = emcee.moves.DESnookerMove
     monkeypatch.setattr(emcee.moves, "DEMove", lambda **_: snooker())
@@ -339,7 +343,7 @@ def test_far_modes_are_not_called_converged() -> None:
     with pytest.raises(ConvergenceError, match=r"R-hat.*more steps are needed"):
         sample_smooth(
             Two(), coordinates, start, np.eye(1),
-            generator=rng, n_steps=100, most_steps=200,
+            generator=rng, n_steps=100, max_steps=200,
         )  # fmt: skip
 
 
@@ -354,10 +358,10 @@ def test_progress_counts_every_step_and_few_positions_are_kept() -> None:
     with pytest.raises(ConvergenceError):
         sample_smooth(
             Normal(), strange, rng.normal(size=(8, 3)), np.eye(3),
-            generator=rng, n_steps=500, most_steps=4000, progress=steps.append,
+            generator=rng, n_steps=500, max_steps=4000, progress=steps.append,
         )  # fmt: skip
     assert sum(steps) == 300 + 4000
 
 
 def test_a_journey_is_a_quarter_of_an_orbit() -> None:
-    assert hamiltonian.JOURNEY == pytest.approx(np.pi / 2, abs=0.1)
+    assert JOURNEY == pytest.approx(np.pi / 2, abs=0.1)

@@ -2,29 +2,33 @@
 
 import math
 from collections.abc import Callable
-from functools import partial
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from scipy.special import betainc, betaincinv, betaln, expit, roots_jacobi
+from scipy.special import betainc, betaincinv, betaln, roots_jacobi
 
-from masrel.agreement import COEFFICIENTS
 from masrel.errors import ParameterError, UndefinedStatisticWarning
 from masrel.estimates import Interval
 from masrel.intervals import posterior
-from masrel.intervals.table.beta_nodes import beta_nodes
-from masrel.intervals.table.chances import CHANCE, Nodes, grid
-from masrel.intervals.table.posterior import TablePosterior
-from masrel.intervals.table.prior import TablePrior
-from masrel.intervals.table.quantiles import table_quantiles
 
 Floats = NDArray[np.float64]
 
 IDENTITY = 1.0 - np.eye(2)
 TAILS = (0.025, 0.975)
+COEFFICIENTS_OF_PAIRS = [
+    "brennan_prediger",
+    "cohen_kappa",
+    "conger_kappa",
+    "fleiss_kappa",
+    "gwet_ac",
+    "krippendorff_alpha",
+    "light_kappa",
+    "percent_agreement",
+    "scott_pi",
+]
 
 
 def pairs(table: list[list[int]]) -> list[list[str]]:
@@ -148,41 +152,6 @@ def test_two_categories_by_another_integral(
     assert found.n_resamples is None
 
 
-# κ <= 0 is an odds ratio of at most 1: the first rater's two rows have independent
-# Beta shares u <= w. Over the logit of w in panels, at priors far below 1, where the
-# densities have poles.
-@pytest.mark.parametrize(
-    "table",
-    [[[10, 0], [0, 0]], [[0, 3], [3, 0]], [[5, 1], [0, 4]], [[1, 1], [0, 0]]],
-)
-@pytest.mark.parametrize("a", [0.25, 0.05])
-def test_the_chance_of_no_agreement_beyond_chance(
-    table: list[list[int]], a: float
-) -> None:
-    prior = np.array(table) + a
-    x, weights = np.polynomial.legendre.leggauss(20)
-    edges = np.linspace(-40.0 / a, 40.0 / a, 801)
-    half = 0.5 * np.diff(edges)[:, None]
-    logit = edges[:-1, None] + half * (x + 1.0)
-    log = -prior[1, 0] * np.logaddexp(0.0, -logit)
-    log -= prior[1, 1] * np.logaddexp(0.0, logit) + betaln(prior[1, 0], prior[1, 1])
-    below = np.where(
-        logit < 0.0,
-        betainc(prior[0, 0], prior[0, 1], expit(logit)),
-        1.0 - betainc(prior[0, 1], prior[0, 0], expit(-logit)),
-    )
-    expected = float(((np.exp(log) * below) @ weights) @ half[:, 0])
-    found = TablePosterior(
-        nodes=partial(grid, "margins", IDENTITY, prior, 0.0625),
-        shown=partial(grid, "margins", IDENTITY, prior, 0.5),
-        apart=prior[0, 1] + prior[1, 0],
-        agreed=prior.trace(),
-    )
-    assert found.probability(0.0) == pytest.approx(
-        expected, abs=1e-7 if a < 0.1 else 1e-10
-    )
-
-
 def drawn_values(
     coefficient: str, prior: Floats, v: Floats, n: int = 200_000
 ) -> Floats:
@@ -207,16 +176,6 @@ def drawn_values(
 def by_default(q: int) -> Floats:
     """1.5 items, half on the diagonal: 3/8 a cell of 2 × 2."""
     return np.where(np.eye(q) > 0.0, 0.75 / q, 0.75 / (q * q - q))
-
-
-@pytest.mark.parametrize("q", [2, 3, 6])
-def test_the_default_prior_is_worth_one_item_and_a_half(q: int) -> None:
-    prior = TablePrior.by_default(q)
-    assert prior.cells == pytest.approx(by_default(q), rel=1e-15)
-    assert prior.cells.sum() == pytest.approx(1.5, rel=1e-15)
-    assert prior.cells.trace() == pytest.approx(0.75, rel=1e-15)
-    assert np.array_equal(TablePrior.of(1.0 / q, q).other().cells, prior.cells)
-    assert np.array_equal(prior.other().cells, np.full((q, q), 1.0 / q))
 
 
 @pytest.mark.parametrize("weights", ["identity", "linear", "quadratic"])
@@ -245,30 +204,6 @@ def test_whole_tables_drawn_give_the_same(
         assert abs(below - share) < 4.5 * noise  # once in 150 000
 
 
-# Of three categories two count as one: κ is that of two categories, and the Dirichlet
-# of their table the sum over cells that fall together.
-def test_draws_agree_with_the_quadrature_of_categories_that_count_as_one() -> None:
-    weights = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 1.0], [0.0, 1.0, 1.0]])
-    found = asked("cohen_kappa", TABLE, weights=weights, concentration=0.5)
-    prior = np.array(TABLE) + 0.5
-    merged = np.add.reduceat(np.add.reduceat(prior, [0, 1], axis=0), [0, 1], axis=1)
-    _, exact = table_quantiles(
-        "margins",
-        IDENTITY,
-        merged,
-        TAILS,
-        start=0.5,
-        generator=np.random.default_rng,
-        n_draws=0,
-    )
-    assert found.monte_carlo_error is not None
-    for end, expected, error in zip(
-        ends(found), exact, found.monte_carlo_error, strict=True
-    ):
-        assert abs(end - expected) < 4.5 * error
-        assert error < 3e-3
-
-
 def test_the_monte_carlo_error_is_the_spread_over_seeds() -> None:
     runs = [asked("cohen_kappa", TABLE, rng=seed, n_draws=500) for seed in range(30)]
     for end in (0, 1):
@@ -295,21 +230,12 @@ def test_coefficients_of_one_value_in_the_population_have_one_posterior() -> Non
             assert other == pytest.approx(first, abs=1e-10)
 
 
-def test_every_coefficient_of_two_raters_is_spoken_of() -> None:
-    of_pairs = {
-        name
-        for name, entry in COEFFICIENTS.items()
-        if entry.kernel is not None and entry.shape == "ratings"
-    }
-    assert set(CHANCE) == of_pairs
-
-
 counts = st.integers(0, 12)
 tables_of_two = st.lists(counts, min_size=4, max_size=4).filter(any)
 
 
 @settings(max_examples=15)
-@given(tables_of_two, st.sampled_from(sorted(CHANCE)))
+@given(tables_of_two, st.sampled_from(COEFFICIENTS_OF_PAIRS))
 def test_renaming_raters_or_categories_changes_nothing(
     cells: list[int], coefficient: str
 ) -> None:
@@ -320,7 +246,7 @@ def test_renaming_raters_or_categories_changes_nothing(
 
 
 @settings(max_examples=15)
-@given(tables_of_two, st.sampled_from(sorted(CHANCE)))
+@given(tables_of_two, st.sampled_from(COEFFICIENTS_OF_PAIRS))
 def test_levels_are_nested(cells: list[int], coefficient: str) -> None:
     table = [cells[:2], cells[2:]]
     inner = asked(coefficient, table, level=0.5)
@@ -364,34 +290,6 @@ def test_the_place_of_a_probability_is_its_quantile_at_every_level() -> None:
         shares = [0.5 - 0.5 * level, 0.5 + 0.5 * level]
         again = [cohen_probability(prior, end) for end in ends(found)]
         assert again == pytest.approx(shares, abs=1e-10)
-
-
-@pytest.mark.parametrize("a", [0.01, 0.5, 3.0, 1e6])
-@pytest.mark.parametrize("b", [0.01, 1.0, 2e5])
-def test_nodes_of_a_beta_have_its_moments(a: float, b: float) -> None:
-    x, weights = beta_nodes(a, b, 0.0625)
-    total = a + b
-    assert weights.sum() == pytest.approx(1.0, abs=1e-14)
-    assert x.sum(axis=1) == pytest.approx(np.ones(len(x)))
-    mean = a / total
-    variance = a * b / (total**2 * (total + 1.0))
-    assert weights @ x[:, 0] == pytest.approx(mean, rel=1e-12)
-    assert weights @ (x[:, 0] - mean) ** 2 == pytest.approx(variance, rel=1e-10)
-
-
-@pytest.mark.parametrize(("a", "b"), [(0.25, 0.25), (5.0, 0.5), (400.0, 300.0)])
-@pytest.mark.parametrize("least", [1e-6, 0.2, 0.45])
-def test_nodes_of_a_part_of_a_beta_have_its_probability_and_mean(
-    a: float, b: float, least: float
-) -> None:
-    x, weights = beta_nodes(a, b, 0.125, least)
-    assert x.min() >= least
-    assert weights.sum() == pytest.approx(
-        betainc(a, b, 1.0 - least) - betainc(a, b, least), rel=1e-9
-    )
-    # x times its density is that of a Beta(a + 1, b), times a / (a + b)
-    upper = betainc(a + 1.0, b, 1.0 - least) - betainc(a + 1.0, b, least)
-    assert weights @ x[:, 0] == pytest.approx(a / (a + b) * upper, rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -499,55 +397,3 @@ def test_what_the_table_does_not_answer_is_refused(
     row = ["a", "b", "a"] if wanted.pop("raters", 2) == 3 else ["a", "b"]
     with pytest.raises(ParameterError, match=said):
         posterior(ratings=[row] * 12, **wanted)  # type: ignore[arg-type]
-
-
-# Given what pairs agree on and how the others are apart, against every share t of pairs
-# apart on a fine grid, where the coefficient is computed from the table it makes.
-@pytest.mark.parametrize("value", [-0.6, -0.3, -0.05, 0.0, 0.4, 0.95])
-def test_given_the_rest_the_probability_is_that_of_a_grid_of_shares(
-    value: float,
-) -> None:
-    rng = np.random.default_rng(5)
-    n, q = 300, 3
-    x = rng.dirichlet(np.full(q, 0.3), size=n)
-    y = rng.dirichlet(np.full(q * (q - 1), 0.3), size=n)
-    v = np.array([[0.0, 0.25, 1.0], [0.25, 0.0, 0.25], [1.0, 0.25, 0.0]])
-    nodes = Nodes.of("margins", v, np.full(n, 1.0 / n), x, y)
-    found = TablePosterior(
-        nodes=lambda _: nodes, shown=lambda _: nodes, apart=2.5, agreed=1.5
-    )
-    edges = np.linspace(0.0, 1.0, 4001)
-    t = 0.5 * (edges[1:] + edges[:-1])
-    masses = np.diff(betainc(2.5, 1.5, edges))
-    below = twice = 0.0
-    for agreed, others in zip(x, y, strict=True):
-        cells = np.zeros((q, q))
-        cells[~np.eye(q, dtype=bool)] = others
-        theta = t[:, None, None] * cells + (1.0 - t)[:, None, None] * np.diag(agreed)
-        apart = (theta * v).sum(axis=(1, 2))
-        chance = np.einsum("tk,kl,tl->t", theta.sum(axis=2), v, theta.sum(axis=1))
-        inside = apart >= (1.0 - value) * chance
-        below += float(masses @ inside) / n
-        twice += bool(inside.any() and not inside[0] and not inside[-1])
-    assert found.probability(value) == pytest.approx(below, abs=2e-4)
-    assert twice > 0 or value >= 0.0  # of some tables shares in the middle alone
-
-
-@pytest.mark.parametrize(
-    "table", [[[0, 3], [3, 0]], [[1, 0], [0, 0]], [[2, 2], [2, 2]]]
-)
-@pytest.mark.parametrize("value", [-0.7, -0.1, -1e-6, 0.3])
-def test_halving_the_step_settles_on_both_sides_of_zero(
-    table: list[list[int]], value: float
-) -> None:
-    prior = np.array(table) + 0.25
-    one, two = (
-        TablePosterior(
-            nodes=partial(grid, "margins", IDENTITY, prior, step),
-            shown=partial(grid, "margins", IDENTITY, prior, step),
-            apart=prior[0, 1] + prior[1, 0],
-            agreed=prior.trace(),
-        ).probability(value)
-        for step in (0.125, 0.0625)
-    )
-    assert one == pytest.approx(two, abs=1e-6 if abs(value) < 1e-3 else 2e-8)

@@ -7,12 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from masrel.intervals import latent_trait
-from masrel.intervals.latent.prior import LatentPrior
-from masrel.intervals.latent.result import LatentTrait
+from masrel.intervals import LatentPrior, LatentTrait, latent_trait
 from tests.intervals.data import SCALE, TABLE_V
 
-DOCS = Path(__file__).parents[3] / "docs"
+DOCS = Path(__file__).parents[2] / "docs"
 PAGE = (DOCS / "latent_trait.md").read_text(encoding="utf-8")
 RATERS = {"Table V, 4 × 8": range(8), "its raters 1, 4, 6: 4 × 3": (0, 3, 5)}
 ROWS = re.findall(
@@ -66,8 +64,8 @@ def test_the_table_of_priors_is_what_comes_out(
 ) -> None:
     # Shorter chains than the page's: errors of at most .008 at an end, so that two
     # hundredths are missed in 1 of 80 runs of other seeds at the most.
-    monkeypatch.setattr("masrel.intervals.latent.sampler.LEAST_ESS", 1_500.0)
-    monkeypatch.setattr("masrel.intervals.latent.sampler.LARGEST_R_HAT", 1.03)
+    monkeypatch.setattr("masrel.intervals.latent._sampler.MIN_ESS", 1_500.0)
+    monkeypatch.setattr("masrel.intervals.latent._sampler.MAX_R_HAT", 1.03)
     study, items, *said = row
     found = latent_trait(
         [[grades[r] for r in RATERS[study]] for grades in TABLE_V],

@@ -8,14 +8,14 @@ import pytest
 from numpy.typing import NDArray
 from scipy import stats
 
-from masrel.intervals.latent.kappa import (
+from masrel.intervals.latent._coordinates import Traits
+from masrel.intervals.latent._implied import (
     Agreement,
     agreement_on_items,
     agreement_on_new_items,
     grade_probabilities,
+    replicate,
 )
-from masrel.intervals.latent.predictive import replicate
-from masrel.intervals.latent.traits import Traits
 
 Floats = NDArray[np.float64]
 

@@ -8,25 +8,24 @@ import pandas as pd
 import pytest
 
 from masrel.errors import ConvergenceError, MasrelError, ParameterError, RatingsError
-from masrel.intervals import LatentPrior, latent_trait
-from masrel.intervals.latent.result import LatentTrait
+from masrel.intervals import LatentPrior, LatentTrait, latent_trait
 from tests.intervals.data import SCALE, TABLE_V
-from tests.intervals.latent.studies import drawn
+from tests.intervals.latent_studies import drawn
 
 SMALL = [[1, 1, 2], [2, 2, 2], [3, 4, 3], [4, 4, 3]]
 
-SAMPLER = "masrel.intervals.latent.sampler"
+SAMPLER = "masrel.intervals.latent._sampler"
 
 
 @pytest.fixture(scope="module", autouse=True)
 def brief() -> Iterator[None]:
     """Let a second of sampling pass as converged."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(f"{SAMPLER}.LEAST_ESS", 100.0)
-        patch.setattr(f"{SAMPLER}.LARGEST_R_HAT", 1.2)
+        patch.setattr(f"{SAMPLER}.MIN_ESS", 100.0)
+        patch.setattr(f"{SAMPLER}.MAX_R_HAT", 1.2)
         patch.setattr(f"{SAMPLER}._WARM_UP", (25, 25, 25))
-        patch.setattr("masrel.intervals.latent.fit._N_CHAINS", 24)
-        patch.setattr("masrel.intervals.latent.fit._MOST_KAPPAS", 500)
+        patch.setattr("masrel.intervals.latent._sampler._N_CHAINS", 24)
+        patch.setattr("masrel.intervals.latent._sampler._MAX_KAPPAS", 500)
         yield
 
 
@@ -188,7 +187,7 @@ def test_small_studies_have_an_answer(
             SMALL,
             {"n_steps": 5},
             ParameterError,
-            "n_steps, most_steps: need at least 20",
+            "n_steps, max_steps: need at least 20",
         ),
         (SMALL, {"rng": -1}, ParameterError, "rng: needs"),
         (TABLE_V, {"categories": None}, ParameterError, "declared scale in order"),
@@ -229,9 +228,9 @@ def test_a_prior_has_to_be_one(wrong: dict[str, object]) -> None:
 def test_what_has_not_converged_is_no_interval_but_says_how_many_more_steps(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(f"{SAMPLER}.LEAST_ESS", 4_000.0)
+    monkeypatch.setattr(f"{SAMPLER}.MIN_ESS", 4_000.0)
     with pytest.raises(ConvergenceError, match="more steps are needed") as raised:
-        asked(n_steps=20, most_steps=40)
+        asked(n_steps=20, max_steps=40)
     message = str(raised.value)
     assert "after 40 steps" in message
     more = re.search(r"about (\d+) more steps", message)

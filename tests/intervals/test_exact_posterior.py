@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from masrel.estimates import Interval
 from masrel.intervals import posterior
 from tests.intervals.data import SCALE, TABLE_V, dirichlet_multinomial
-from tests.intervals.dirichlet.gauss_legendre import ByPanels
+from tests.intervals.gauss_legendre import ByPanels
 
-PUBLISHED = Path(__file__).parents[3] / "studies/hess2012/ratings/published.csv"
+PUBLISHED = Path(__file__).parents[2] / "studies/hess2012/ratings/published.csv"
 
 Ratings = list[list[str | None]]
 
