@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from masrel.intervals.latent._density import LatentPrior
     from masrel.intervals.latent._implied import PredictiveCheck
     from masrel.intervals.latent._trait import LatentChains, LatentTrait, latent_trait
-    from masrel.intervals.retest import RetestModel, retest_model
+    from masrel.intervals.self_agreement import RetestModel, retest_model
 
 __all__ = [
     "LatentChains",
@@ -42,9 +42,9 @@ _HOMES = {
     "LatentPrior": "latent._density",
     "LatentTrait": "latent._trait",
     "PredictiveCheck": "latent._implied",
-    "RetestModel": "retest",
+    "RetestModel": "self_agreement",
     "latent_trait": "latent._trait",
-    "retest_model": "retest",
+    "retest_model": "self_agreement",
 }
 
 

@@ -156,8 +156,8 @@ def beta_nodes(
     w = np.arange(-_MAX_W, _MAX_W + 0.5 * step, step)
     x, log = at(middle + scale * np.sinh(w))
     weights = np.exp(log - log.max()) * np.cosh(w)
-    kept = weights > NEGLIGIBLE * weights.max()
-    return x[kept], weights[kept] * (total / weights[kept].sum())
+    large = weights > NEGLIGIBLE * weights.max()
+    return x[large], weights[large] * (total / weights[large].sum())
 
 
 def _mode(log_density: Callable[[Floats], Floats]) -> tuple[float, float]:

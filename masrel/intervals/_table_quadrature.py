@@ -54,7 +54,7 @@ class Nodes:
     """Values of x and y with what the coefficient needs of them."""
 
     # The disagreement is t d, and by chance (1 - t)² e_0 + t (1 - t) e_1 + t² e_2. What
-    # is kept are differences from d, which for two categories lose no digits.
+    # is stored are differences from d, which for two categories lose no digits.
 
     # (n,): probabilities of the values; they sum to 1
     weights: Floats = field(compare=False, repr=False)
@@ -144,8 +144,8 @@ def grid_nodes(
         y, of_y = beta_nodes(float(cells[0, 1]), float(cells[1, 0]), step, least)
     weights = np.multiply.outer(of_x, of_y).ravel()
     x, y = np.repeat(x, len(of_y), axis=0), np.tile(y, (len(of_x), 1))
-    kept = weights > NEGLIGIBLE * weights.max()
-    return Nodes.of(chance, v, weights[kept], x[kept], y[kept])
+    large = weights > NEGLIGIBLE * weights.max()
+    return Nodes.of(chance, v, weights[large], x[large], y[large])
 
 
 def _drawn_nodes(

@@ -57,7 +57,7 @@ class Powers:
             scale=self.scale,
         )
 
-    def times(self, other: "Powers") -> "Powers":
+    def multiply(self, other: "Powers") -> "Powers":
         """Multiply two polynomials."""
         values = np.convolve(self.values, other.values)
         largest = float(values.max())
@@ -104,7 +104,7 @@ class Category:
         result = Powers(first=int(self.powers[0]), values=np.ones(1), scale=value)
         for j, n in enumerate(self.powers.tolist()):
             if j and n:
-                result = result.times(_binomial(int(n), x, j)).trimmed(_DROPPED)
+                result = result.multiply(_binomial(int(n), x, j)).trimmed(_DROPPED)
         return result
 
     @cached_property
@@ -198,7 +198,7 @@ class RhoDensity:
         x, _ = model.saddle(np.exp([log_tilt]))
         product = Powers(first=0, values=np.ones(1))
         for category, at in zip(self._categories, x[0].tolist(), strict=True):
-            product = product.times(category.tilted(at, log_tilt)).trimmed(TRIMMED)
+            product = product.multiply(category.tilted(at, log_tilt)).trimmed(TRIMMED)
         product = product.trimmed(_KEPT)
         t = product.exponents
         log = np.log(product.values) + product.scale

@@ -39,7 +39,7 @@ def test_on_many_pairs_of_alike_raters_it_is_stratified_kappa() -> None:
     assert found.kappa.value == pytest.approx(kappa.value, abs=0.01)
     # 3 standard errors of .021 around the truth: once in 370 runs of other seeds
     assert found.kappa.value == pytest.approx(0.7, abs=0.063)
-    assert found.spread.value < 0.1
+    assert found.standard_deviation.value < 0.1
 
 
 def test_raters_who_differ_are_told_apart_and_pulled_together() -> None:
@@ -49,7 +49,7 @@ def test_raters_who_differ_are_told_apart_and_pulled_together() -> None:
     found = retest_model(study, categories=[0, 1, 2])
     truth = np.mean(kappas)
     assert found.kappa.interval.low < truth < found.kappa.interval.high
-    assert found.spread.value == pytest.approx(np.std(kappas), abs=0.06)
+    assert found.standard_deviation.value == pytest.approx(np.std(kappas), abs=0.06)
     for of_rater, kappa in zip(found.raters, kappas, strict=True):
         assert of_rater.value == pytest.approx(kappa, abs=0.2)
     few = retest_model([pairs[:6] for pairs in study], categories=[0, 1, 2])

@@ -54,15 +54,15 @@ class UnconstrainedPoint:
     # b, w: (n, n_raters): b_r / ω and w_r
     b: Floats = field(compare=False, repr=False)
     w: Floats = field(compare=False, repr=False)
-    # logit_share, logit_fraction, log_spread: (n, 1): logit ρ, logit f, log η
+    # logit_share, logit_fraction, log_noise_sd: (n, 1): logit ρ, logit f, log η
     logit_share: Floats = field(compare=False, repr=False)
     logit_fraction: Floats = field(compare=False, repr=False)
-    log_spread: Floats = field(compare=False, repr=False)
-    # share, root, fraction, spread: (n, 1): ρ, c, f and η
+    log_noise_sd: Floats = field(compare=False, repr=False)
+    # share, root, fraction, noise_sd: (n, 1): ρ, c, f and η
     share: Floats = field(compare=False, repr=False)
     root: Floats = field(compare=False, repr=False)
     fraction: Floats = field(compare=False, repr=False)
-    spread: Floats = field(compare=False, repr=False)
+    noise_sd: Floats = field(compare=False, repr=False)
     anchor: Floats = field(compare=False, repr=False)  # (n, 1): α
     # (n, n_categories - 2): distances of neighbouring T_k
     gap: Floats = field(compare=False, repr=False)
@@ -89,7 +89,7 @@ class UnconstrainedPoint:
             thresholds=self.tau,
             item_share=self.share[:, 0],
             noise_fraction=fraction,
-            noise_spread=self.spread[:, 0],
+            noise_spread=self.noise_sd[:, 0],
             bias_variance=rest * expit(-self.logit_fraction[:, 0]),
             noise_variance=rest * fraction,
         )
@@ -161,7 +161,7 @@ class Coordinates:
         at, n = self.shares, self.n_items
         raw_item, b, w = np.split(position[:, :at], [n, n + self.n_raters], axis=1)
         rho, f, eta, anchor = np.split(position[:, at : at + 4], 4, axis=1)
-        share, fraction, spread = expit(rho), expit(f), np.exp(eta)
+        share, fraction, noise_sd = expit(rho), expit(f), np.exp(eta)
         root = np.sqrt(expit(-rho))
         gap = np.exp(position[:, at + 4 :])
         threshold = self._thresholds(gap)
@@ -170,18 +170,18 @@ class Coordinates:
         return UnconstrainedPoint(
             item=np.where(self.placed, by_ratings, by_prior),
             bias=np.sqrt(expit(-f)) * b,
-            noise=np.sqrt(fraction) * np.exp(spread * w),
+            noise=np.sqrt(fraction) * np.exp(noise_sd * w),
             threshold=threshold,
             raw_item=raw_item,
             b=b,
             w=w,
             logit_share=rho,
             logit_fraction=f,
-            log_spread=eta,
+            log_noise_sd=eta,
             share=share,
             root=root,
             fraction=fraction,
-            spread=spread,
+            noise_sd=noise_sd,
             anchor=anchor,
             gap=gap,
         )

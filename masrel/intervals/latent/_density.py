@@ -239,10 +239,10 @@ class LatentDensity:
         # Beta density and Jacobian of the logit: ρ^a (1 - ρ)^b
         shares = a * np.logaddexp(0.0, -rho) + b * np.logaddexp(0.0, rho)
         shares += c * np.logaddexp(0.0, -f) + d * np.logaddexp(0.0, f)
-        spread = point.log_spread - 0.5 * (point.spread / prior.noise_spread) ** 2
+        of_sd = point.log_noise_sd - 0.5 * (point.noise_sd / prior.noise_spread) ** 2
         # Dirichlet density of the shares Φ(τ_k) - Φ(τ_(k-1)), Jacobian Π φ(τ_k)
         tau = point.tau
-        density += (spread - shares)[:, 0] - 0.5 * (tau**2).sum(axis=1)
+        density += (of_sd - shares)[:, 0] - 0.5 * (tau**2).sum(axis=1)
         if prior.concentration != 1.0:
             grades = np.log(grade_shares(tau)).sum(axis=1)
             density += (prior.concentration - 1.0) * grades
@@ -279,7 +279,7 @@ class LatentDensity:
             [
                 by_raw_item,
                 bias_root * by.bias - point.b,
-                point.spread * by.log_noise - point.w,
+                point.noise_sd * by.log_noise - point.w,
                 self._by_share(point, item, tau, loose),
                 self._by_fraction_and_spread(point, by),
                 anchor[:, None],
@@ -321,7 +321,7 @@ class LatentDensity:
     ) -> Floats:
         # by logit f and log η, (n, 2)
         c, d = self.prior.noise_fraction
-        f, eta = point.fraction, point.spread
+        f, eta = point.fraction, point.noise_sd
         bias = 0.5 * (by.bias * point.bias).sum(axis=1, keepdims=True)
         noise = 0.5 * by.log_noise.sum(axis=1, keepdims=True)
         noises = (by.log_noise * point.w).sum(axis=1, keepdims=True)

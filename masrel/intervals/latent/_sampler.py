@@ -203,17 +203,17 @@ def sample_smooth(
     # shape of start: (n_chains, n_dimensions); of covariance: n_dimensions squared
     report = progress or _silent
     walkers = _warm_up(density, start, covariance, generator, report)
-    kept = np.empty((len(start), 0, start.shape[1]))
+    positions = np.empty((len(start), 0, start.shape[1]))
     total, thin = 0, 1
     while total < max_steps:
         more = n_steps if total == 0 else min(total, max_steps - total)
-        n_made, kept, thin = _go_on(walkers, more, kept, thin, report)
+        n_made, positions, thin = _go_on(walkers, more, positions, thin, report)
         total += n_made
-        values = quantities(kept)
+        values = quantities(positions)
         r_hat, ess = np.array([diagnose(of_one) for of_one in values]).T
         if (r_hat < MAX_R_HAT).all() and (ess >= MIN_ESS).all():
             return Chains(
-                positions=kept,
+                positions=positions,
                 values=values,
                 r_hat=r_hat,
                 ess=ess,
@@ -262,21 +262,21 @@ def _covariance(positions: Floats, before: Floats) -> Floats:
 def _go_on(
     walkers: Walkers,
     more: int,
-    kept: Floats,
+    positions: Floats,
     thin: int,
     report: Callable[[int], object],
 ) -> tuple[int, Floats, int]:
-    # -> steps made, positions kept so far, and one in how many is kept
-    parts, n_made = [kept], 0
+    # -> steps made, positions so far, and one in how many is kept
+    parts, n_made = [positions], 0
     for _ in range(10):
         block = max(more // (10 * thin), 1) * thin
         parts.append(walkers.run(block, thin=thin))
         n_made += block
         report(block)
-    kept = np.concatenate(parts, axis=1)
-    while kept.shape[1] > _MAX_KEPT:
-        kept, thin = kept[:, 1::2], 2 * thin
-    return n_made, kept, thin
+    positions = np.concatenate(parts, axis=1)
+    while positions.shape[1] > _MAX_KEPT:
+        positions, thin = positions[:, 1::2], 2 * thin
+    return n_made, positions, thin
 
 
 def _silent(_: int) -> None: ...

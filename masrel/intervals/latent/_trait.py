@@ -282,12 +282,12 @@ def _check_spread(codes: Codes, rated: NDArray[np.bool_]) -> None:
         )
 
 
-def _names(labels: object, what: str, kept: list[int]) -> tuple[str, ...]:
+def _names(labels: object, what: str, numbers: list[int]) -> tuple[str, ...]:
     # of the rows or columns of a DataFrame; otherwise counted from 1
     if isinstance(labels, Iterable):  # the index of a list is a method
         every = list(labels)
-        return tuple(str(every[i]) for i in kept)
-    return tuple(f"{what} {i + 1}" for i in kept)
+        return tuple(str(every[i]) for i in numbers)
+    return tuple(f"{what} {i + 1}" for i in numbers)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

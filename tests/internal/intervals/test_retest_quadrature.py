@@ -8,7 +8,12 @@ from numpy.typing import NDArray
 from scipy import integrate, special, stats
 
 from masrel.intervals._priors import DEFAULT_PRIOR
-from masrel.intervals.retest import _log_weights, _Moments, _Posterior, _RaterPairs
+from masrel.intervals.self_agreement import (
+    _log_weights,
+    _Moments,
+    _Posterior,
+    _RaterPairs,
+)
 from tests.intervals.test_retest_model import drawn_pairs
 
 Floats = NDArray[np.float64]
@@ -112,7 +117,7 @@ def test_quadrature_agrees_with_draws_of_every_unknown() -> None:
     # fails. A hundredth more of any median, or of m's low end, is 5 errors or more.
     exact = _Posterior.of(SMALL, SHARES, DEFAULT_PRIOR)
     draws, weights = weighted_draws(SMALL, np.random.default_rng(5), 500_000)
-    quantiles = [exact.quantiles, exact.spread_quantiles(SHARES)]
+    quantiles = [exact.quantiles, exact.sd_quantiles(SHARES)]
     quantiles += [exact.rater_quantiles(at, SHARES) for at in range(len(SMALL))]
     for column, of_one in zip(draws.T, quantiles, strict=True):
         for share, quantile in zip(SHARES, of_one, strict=True):
@@ -184,6 +189,4 @@ def test_extreme_tables_have_finite_ends(table: Table) -> None:
     assert 0 < found.quantiles[0] < found.quantiles[1] < found.quantiles[2] <= 1
     low, middle, high = found.rater_quantiles(0, SHARES)
     assert 0 <= low < middle < high <= 1
-    assert list(found.spread_quantiles(SHARES)) == sorted(
-        found.spread_quantiles(SHARES)
-    )
+    assert list(found.sd_quantiles(SHARES)) == sorted(found.sd_quantiles(SHARES))

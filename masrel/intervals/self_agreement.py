@@ -48,7 +48,7 @@ class RetestModel:
     ----------
     kappa : Quantity
         Mean of raters' kappas over their population.
-    spread : Quantity
+    standard_deviation : Quantity
         Standard deviation of raters' kappas over their population.
     raters : tuple of Quantity
         Kappa of every rater with a pair, pulled towards the others.
@@ -63,7 +63,7 @@ class RetestModel:
     """
 
     kappa: Quantity
-    spread: Quantity
+    standard_deviation: Quantity
     raters: tuple[Quantity, ...]
     n_pairs: tuple[int, ...]
     prior: str
@@ -157,9 +157,9 @@ def retest_model(
     other_kappa, other = max(others, key=lambda by: _moved(by[0].interval, kappa))
     return RetestModel(
         kappa=kappa,
-        spread=_quantity(
+        standard_deviation=_quantity(
             "kappa, standard deviation over raters",
-            posterior.spread_quantiles(shares),
+            posterior.sd_quantiles(shares),
             level,
             "raters",
         ),
@@ -221,7 +221,7 @@ def _undefined(reason: str, prior: Prior, level: float) -> RetestModel:
     nothing = replace(nothing, interval=replace(nothing.interval, reason=reason))
     return RetestModel(
         kappa=nothing,
-        spread=nothing,
+        standard_deviation=nothing,
         raters=(),
         n_pairs=(),
         prior=_describe(prior),
@@ -287,18 +287,18 @@ class _Posterior:
         # every other mean: the lattice before the last halving, which moved nothing
         masses, points = self.masses[::2], self.mean.points[::2]
         at, of = np.nonzero(_weighs(masses))
-        mean, spread = points[at], _GRID[of]
-        terms = pairs.log_terms(_Moments.of(mean, spread, pairs.agree + pairs.differ))
+        mean, logit_g = points[at], _GRID[of]
+        terms = pairs.log_terms(_Moments.of(mean, logit_g, pairs.agree + pairs.differ))
         terms -= log_sum_exp(terms)[:, None]
         mass = masses[at, of, None] * np.exp(terms)  # (n, agree + 1)
         node, j = np.nonzero(_weighs(mass))
-        size = 3.0 / expit(spread[node]) - 1.0  # 1 / g - 1, what the population weighs
+        size = 3.0 / expit(logit_g[node]) - 1.0  # 1 / g - 1, what the population weighs
         up = expit(mean[node]) * size + pairs.agree - j
         down = expit(-mean[node]) * size + pairs.differ + j
         weight = mass[node, j]
         return weight / weight.sum(), up, down
 
-    def spread_quantiles(self, shares: Sequence[float]) -> list[float]:
+    def sd_quantiles(self, shares: Sequence[float]) -> list[float]:
         """Return quantiles of the standard deviation of kappa over raters."""
         # of √(m (1 - m) g), to about 1e-9
         variance = expit(self.mean.points) * expit(-self.mean.points)
@@ -333,19 +333,19 @@ def _reach(raters: "Sequence[_RaterPairs]", shape: float) -> tuple[float, float]
 
 
 def _log_joint(
-    raters: "Sequence[_RaterPairs]", shape: float, mean: Floats, spread: Floats
+    raters: "Sequence[_RaterPairs]", shape: float, mean: Floats, logit_g: Floats
 ) -> Floats:
-    # mean (n,), spread (s,) -> log-density of (logit m, logit 3 g) but for a constant
+    # mean (n,), logit_g (s,) -> log-density of (logit m, logit 3 g) but for a constant
     max_pairs = max(pairs.agree + pairs.differ for pairs in raters)
-    means, spreads = np.repeat(mean, spread.size), np.tile(spread, mean.size)
-    moments = _Moments.of(means, spreads, max_pairs)
-    likelihood = np.zeros(mean.size * spread.size)
+    means, logits_g = np.repeat(mean, logit_g.size), np.tile(logit_g, mean.size)
+    moments = _Moments.of(means, logits_g, max_pairs)
+    likelihood = np.zeros(mean.size * logit_g.size)
     for pairs in raters:
         likelihood += log_sum_exp(pairs.log_terms(moments))
     # densities of m and 3 g times the Jacobians of their logits
     of_mean = shape * (_log_expit(mean) + _log_expit(-mean))
-    of_spread = _log_expit(spread) + _log_expit(-spread)
-    return likelihood.reshape(mean.size, -1) + of_mean[:, None] + of_spread
+    of_g = _log_expit(logit_g) + _log_expit(-logit_g)
+    return likelihood.reshape(mean.size, -1) + of_mean[:, None] + of_g
 
 
 def _log_expit(x: Floats) -> Floats:
@@ -366,9 +366,9 @@ class _Moments:
     denominator: Floats = field(compare=False, repr=False)
 
     @classmethod
-    def of(cls, mean: Floats, spread: Floats, max_pairs: int) -> "_Moments":
+    def of(cls, mean: Floats, logit_g: Floats, max_pairs: int) -> "_Moments":
         """Compute them for logit m and logit 3 g, both (n,), up to p + q."""
-        g = (expit(spread) / 3.0)[:, None]
+        g = (expit(logit_g) / 3.0)[:, None]
         depth = np.arange(max_pairs) * g  # (n, max_pairs)
         rest = 1.0 - g
         return cls(
