@@ -133,7 +133,14 @@ class Registers:
 class EmulatedMotor:
     """A simulated arm, driven by current units or braked, and read in counts."""
 
-    __slots__ = ("_braking", "_hand", "_is_driven", "_parameters", "_plant", "_turns")
+    __slots__ = (
+        "_braking",
+        "_hand",
+        "_is_driven",
+        "_parameters",
+        "_plant",
+        "_transmission",
+    )
 
     def __init__(
         self,
@@ -146,7 +153,7 @@ class EmulatedMotor:
         self._hand = hand
         # The current units on the bus are the quantum already.
         self._parameters = PlantParameters(range_end=range_end, torque_step=0.0)
-        self._turns = transmission
+        self._transmission = transmission
         self._braking = braking
         self._is_driven = False
         self._plant: Plant | None = None
@@ -171,7 +178,7 @@ class EmulatedMotor:
 
     def counts(self, now_ns: int) -> int:
         """Return the count of the encoder, from full flexion."""
-        return self._turns.counts(self.angle(now_ns))
+        return self._transmission.counts(self.angle(now_ns))
 
     def drive(self, units: int, now_ns: int) -> None:
         """Turn with a torque until the next command."""
@@ -179,7 +186,7 @@ class EmulatedMotor:
             self._plant = Plant(self._hand, self._parameters, start_ns=now_ns)
         self.advance(now_ns)
         self._is_driven = True
-        self._plant.command(self._turns.torque(units), now_ns)
+        self._plant.command(self._transmission.torque(units), now_ns)
 
     def brake(self, now_ns: int) -> None:
         """Short the windings: an idle motor damps the arm."""
@@ -266,7 +273,7 @@ class EventQueue:
 
 
 class EmulatedState:
-    """The four together, of one emulated puck."""
+    """Registers, motor, faults and events of one emulated puck."""
 
     __slots__ = ("events", "faults", "motor", "options", "puck", "registers")
 
