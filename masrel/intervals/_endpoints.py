@@ -27,22 +27,28 @@ class AllResamples:
     weights: Floats = field(compare=False, repr=False)
     # (n_values,): the probability of a value at most as large
     cumulative: Floats = field(compare=False, repr=False)
-    description: str = ""
-    n_undefined: int = 0  # of the distinct resamples
-    notes: tuple[str, ...] = ()
+    description: str
+    n_resamples: None = None  # none were drawn
+    n_undefined: int  # of the distinct resamples
+    notes: tuple[str, ...]
 
     @classmethod
     def of(
-        cls,
-        values: Floats,
-        weights: Floats,
-        *,
-        description: str = "",
-        n_undefined: int = 0,
-        notes: tuple[str, ...] = (),
+        cls, values: Floats, weights: Floats, what: str = "resamples"
     ) -> "AllResamples":
-        """Sort values and put equal ones together."""
+        """Leave out what is undefined, sort values, and put equal ones together."""
         # Takes values, weights (n_resamples,)
+        n = values.size
+        notes: tuple[str, ...] = ()
+        undefined = np.isnan(values)
+        n_undefined = int(undefined.sum())
+        if n_undefined:
+            lost = float(weights[undefined].sum())
+            notes = (
+                f"undefined, and left out: {n_undefined} of {n} distinct {what}, of "
+                f"probability {lost:.2g}",
+            )
+            values, weights = values[~undefined], weights[~undefined]
         order = np.argsort(values)
         values, weights = values[order], weights[order] / weights.sum()
         if values.size:
@@ -57,15 +63,10 @@ class AllResamples:
             values=values,
             weights=weights,
             cumulative=np.cumsum(weights),
-            description=description,
+            description=f"exact bootstrap distribution, {n} {what}",
             n_undefined=n_undefined,
             notes=notes,
         )
-
-    @property
-    def n_resamples(self) -> None:
-        """None were drawn."""
-        return None
 
     def quantile(self, position: float) -> float:
         """Return the least value whose probability adds up to a position."""
@@ -255,7 +256,9 @@ class EndpointRule:
     skew: float = 0.0  # the acceleration of BCa
 
     def ends(self, resamples: Resamples) -> Ends | None:
-        """Return the ends; None where BCa has no bias."""
+        """Return the ends; None where values are alike, or on one side of BCa's."""
+        if not has_spread(resamples):
+            return None
         tail = 0.5 * (1.0 - self.level)
         levels, pulls = (tail, 1.0 - tail), (0.0, 0.0)
         if self.kind == "bca":

@@ -60,8 +60,11 @@ class IntervalProblem:
 
     def values_without(self, sums: Floats, rows: Floats) -> Floats:
         """Return the coefficient for sums less each row of features, (n_rows,)."""
-        parts = [self.values(sums - rows[block]) for block in blocks(len(rows))]
-        return parts[0] if len(parts) == 1 else np.concatenate(parts)
+        if len(rows) <= _BLOCK:
+            return self.values(sums - rows)
+        return np.concatenate(
+            [self.values(sums - rows[block]) for block in blocks(len(rows))]
+        )
 
     def features(self, coded: CodedRatings) -> Floats:
         """Return the features of items, (n_items, n_features)."""

@@ -15,7 +15,6 @@ from masrel.intervals._endpoints import (
     Control,
     DrawnResamples,
     EndpointRule,
-    has_spread,
 )
 from masrel.intervals._lattice import (
     Integers,
@@ -70,7 +69,7 @@ def all_resamples(
     if n_distinct <= most:
         counts, weights = compositions(units.n, units.shares)
         values = _in_blocks(statistic or units.of_counts, counts)
-        return _without_undefined(values, weights, "resamples")
+        return AllResamples.of(values, weights)
     if insist:
         raise ParameterError(
             f"exact: there are {_rounded(n_distinct)} distinct resamples, with more "
@@ -98,7 +97,7 @@ def _merged(units: SamplingUnits, n_distinct: int) -> AllResamples | None:
     if weights.size > _MAX_ALL:
         return None
     values = _in_blocks(lambda block: units.values(lattice.sums(block, units.n)), steps)
-    return _without_undefined(values, weights, "sums of resamples")
+    return AllResamples.of(values, weights, "sums of resamples")
 
 
 def compositions(n: int, shares: Floats) -> tuple[NDArray[np.int32], Floats]:
@@ -132,26 +131,6 @@ def _in_blocks(statistic: Statistic, numbers: NDArray[np.integer[Any]]) -> Float
     return values
 
 
-def _without_undefined(values: Floats, weights: Floats, what: str) -> AllResamples:
-    undefined = np.isnan(values)
-    n_undefined, n = int(undefined.sum()), values.size
-    notes: tuple[str, ...] = ()
-    if n_undefined:
-        lost = float(weights[undefined].sum())
-        notes = (
-            f"undefined, and left out: {n_undefined} of {n} distinct {what}, of "
-            f"probability {lost:.2g}",
-        )
-        values, weights = values[~undefined], weights[~undefined]
-    return AllResamples.of(
-        values,
-        weights,
-        description=f"exact bootstrap distribution, {n} {what}",
-        n_undefined=n_undefined,
-        notes=notes,
-    )
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DrawBudget:
     """How many resamples are drawn."""
@@ -159,22 +138,6 @@ class DrawBudget:
     n_resamples: int  # at least
     tolerance: float | None = None  # the largest Monte Carlo error; None for any
     max_resamples: int
-
-    def check(self) -> None:
-        """Raise ParameterError if a number is out of its range."""
-        if self.n_resamples < 100:
-            raise ParameterError(
-                f"n_resamples: needs at least 100, got {self.n_resamples}"
-            )
-        if self.tolerance is not None and not self.tolerance > 0.0:
-            raise ParameterError(
-                f"tolerance: needs a number above 0, got {self.tolerance}"
-            )
-        if self.max_resamples < self.n_resamples:
-            raise ParameterError(
-                f"max_resamples: needs at least the {self.n_resamples} of "
-                f"n_resamples, got {self.max_resamples}"
-            )
 
     def n_more(self, n_drawn: int, error: float) -> int:
         """Return how many more the tolerance takes, after some with an error."""
@@ -214,7 +177,7 @@ def draw_resamples(
 
 def _error(resamples: DrawnResamples, rule: EndpointRule) -> float:
     """Return that of the end that is less certain; 0 if there is no interval."""
-    ends = rule.ends(resamples) if has_spread(resamples) else None
+    ends = rule.ends(resamples)
     return 0.0 if ends is None or ends.errors is None else max(ends.errors)
 
 

@@ -24,7 +24,9 @@ class SamplingUnits:
     """Distinct units, of which as many are drawn as there are."""
 
     n: int  # how many there are, and are drawn
-    freq: Integers = field(compare=False, repr=False)  # of each, (n_units,)
+    # (n_units,): how often each is there, and its probability at a draw
+    freq: Integers = field(compare=False, repr=False)
+    shares: Floats = field(compare=False, repr=False)
     # (n_units, n_features): features of each; None for raters, who have no sum
     rows: Floats | None = field(compare=False, repr=False)
     # how often each is drawn, (..., n_units), to sums (..., n_features)
@@ -32,11 +34,6 @@ class SamplingUnits:
     # sums (..., n_features) to the coefficient (...), ``nan`` where undefined
     values: Callable[[Floats], Floats]
     notes: tuple[str, ...] = ()  # that they are few
-
-    @cached_property
-    def shares(self) -> Floats:
-        """The probability of each at a draw, (n_units,)."""
-        return np.asarray(self.freq / self.n)
 
     @cached_property
     def lattice(self) -> Lattice | None:
@@ -149,15 +146,14 @@ def sampling_units(
             raise ParameterError('clusters: are of items, and need target="items"')
         units, name, minimum = rater_units(problem), "raters", 5
     elif clusters is None:
-        units, name, minimum = item_units(problem), "items", 16
+        units, name, minimum = (
+            row_units(problem, problem.rows, problem.freq),
+            "items",
+            16,
+        )
     else:
         units, name, minimum = cluster_units(problem, clusters), "clusters", 16
     return replace(units, notes=warn_small(units.n, minimum, name))
-
-
-def item_units(problem: IntervalProblem) -> SamplingUnits:
-    """Return the items, those with equal features together."""
-    return _units_of_rows(problem, problem.rows, problem.freq)
 
 
 def cluster_units(
@@ -172,7 +168,7 @@ def cluster_units(
         rated = np.any(codes[block] >= 0, axis=1)
         items = replace(problem.coded, codes=codes[block][rated])
         np.add.at(sums, numbers[block][rated], problem.features(items))
-    return _units_of_rows(problem, sums, np.ones(n_clusters, dtype=np.int64))
+    return row_units(problem, sums, np.ones(n_clusters, dtype=np.int64))
 
 
 def rater_units(problem: IntervalProblem) -> SamplingUnits:
@@ -182,6 +178,7 @@ def rater_units(problem: IntervalProblem) -> SamplingUnits:
     return SamplingUnits(
         n=n,
         freq=np.ones(n, dtype=np.int64),
+        shares=np.full(n, 1.0 / n),
         rows=None,
         sums=sums,
         values=problem.values,
@@ -216,13 +213,15 @@ def _numbered(
     return numbers, len(number)
 
 
-def _units_of_rows(
-    problem: IntervalProblem, rows: Floats, freq: Integers
-) -> SamplingUnits:
+def row_units(problem: IntervalProblem, rows: Floats, freq: Integers) -> SamplingUnits:
+    """Return items or clusters with their features, those with equal ones together."""
     rows, kind = _distinct(rows)
+    freq = np.bincount(kind, weights=freq).astype(np.int64)
+    n = int(freq.sum())
     return SamplingUnits(
-        n=int(freq.sum()),
-        freq=np.bincount(kind, weights=freq).astype(np.int64),
+        n=n,
+        freq=freq,
+        shares=np.asarray(freq / n),
         rows=rows,
         sums=lambda counts: counts @ rows,
         values=problem.values,

@@ -151,7 +151,8 @@ def bootstrap(
     budget = DrawBudget(
         n_resamples=n_resamples, tolerance=tolerance, max_resamples=max_resamples
     )
-    _check_options(kind, exact, budget, rng)
+    _check_options(kind, exact, budget)
+    check_rng(rng)
     problem = pose_problem(
         coefficient,
         ratings,
@@ -171,36 +172,46 @@ def bootstrap(
     resamples, seed = _resamples(units, rule, exact, budget, rng)
     if resamples.n_resamples is None:
         method += ", exact"
-    ends = rule.ends(resamples) if has_spread(resamples) else None
+    ends = rule.ends(resamples)
     if ends is None:
         return problem.undefined(_why_no_ends(resamples), method=method, unit=target)
-    interval = problem.confidence(
-        ends.low,
-        ends.high,
-        method=method,
-        unit=target,
-        notes=(*units.notes, *resamples.notes, *_infinite_ratios(resamples)),
-    )
+    notes, distribution = (*units.notes, *resamples.notes), None
+    if kind == "studentized":  # ratios to standard errors, no values of the coefficient
+        notes += _infinite_ratios(resamples)
+    else:
+        distribution = distribution_of(resamples)
     return replace(
-        interval,
+        problem.confidence(
+            ends.low, ends.high, method=method, unit=target, notes=notes
+        ),
         n_resamples=resamples.n_resamples,
         n_undefined=resamples.n_undefined,
         monte_carlo_error=ends.errors,
         seed=seed,
-        # ratios to standard errors are no values of the coefficient
-        distribution=None if kind == "studentized" else distribution_of(resamples),
+        distribution=distribution,
     )
 
 
-def _check_options(kind: Kind, exact: Exact, budget: DrawBudget, rng: object) -> None:
+def _check_options(kind: Kind, exact: Exact, budget: DrawBudget) -> None:
     if kind not in get_args(Kind):
         raise ParameterError(
             f"kind: needs one of {', '.join(get_args(Kind))}, got {kind!r}"
         )
     if not (exact is True or exact is False or exact == "auto"):
         raise ParameterError(f'exact: needs "auto", True or False, got {exact!r}')
-    budget.check()
-    check_rng(rng)
+    if budget.n_resamples < 100:
+        raise ParameterError(
+            f"n_resamples: needs at least 100, got {budget.n_resamples}"
+        )
+    if budget.tolerance is not None and not budget.tolerance > 0.0:
+        raise ParameterError(
+            f"tolerance: needs a number above 0, got {budget.tolerance}"
+        )
+    if budget.max_resamples < budget.n_resamples:
+        raise ParameterError(
+            f"max_resamples: needs at least the {budget.n_resamples} of n_resamples, "
+            f"got {budget.max_resamples}"
+        )
 
 
 def _endpoint_rule(

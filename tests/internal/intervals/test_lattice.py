@@ -20,7 +20,8 @@ from masrel.intervals._lattice import (
 )
 from masrel.intervals._problem import pose_problem
 from masrel.intervals._resamples import compositions
-from masrel.intervals._units import SamplingUnits, item_units
+from masrel.intervals._units import SamplingUnits
+from tests.internal.intervals.items import item_units
 from tests.intervals.data import dirichlet_multinomial
 
 

@@ -19,7 +19,8 @@ from masrel.intervals._resamples import (
     integer_scores,
     sampler_of,
 )
-from masrel.intervals._units import SamplingUnits, item_units, rater_units
+from masrel.intervals._units import SamplingUnits, rater_units
+from tests.internal.intervals.items import item_units
 from tests.intervals.data import dirichlet_multinomial
 
 few = pytest.mark.filterwarnings("ignore::masrel.errors.SmallSampleWarning")

@@ -5,7 +5,8 @@ import pytest
 
 from masrel.agreement import COEFFICIENTS
 from masrel.intervals._problem import IntervalProblem, pose_problem
-from masrel.intervals._units import SamplingUnits, item_units, rater_units
+from masrel.intervals._units import SamplingUnits, rater_units
+from tests.internal.intervals.items import item_units
 from tests.intervals.data import dirichlet_multinomial
 
 KERNELS = [name for name, entry in COEFFICIENTS.items() if entry.kernel is not None]
