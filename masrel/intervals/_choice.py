@@ -14,9 +14,13 @@ from numpy.typing import NDArray
 
 from masrel.agreement._counts import item_counts
 from masrel.estimates import Interval
-from masrel.intervals._priors import DEFAULT_PRIOR
 from masrel.intervals._problem import IntervalProblem
-from masrel.intervals._rho import RhoPosterior, default_rho_interval, lower_bound_of_rho
+from masrel.intervals._rho import (
+    DEFAULT_PRIOR,
+    RhoPosterior,
+    default_rho_interval,
+    lower_bound_of_rho,
+)
 from masrel.intervals._two_raters import applies_to, default_table_interval
 from masrel.intervals.analytic import _on_logit
 from masrel.intervals.jackknife import (

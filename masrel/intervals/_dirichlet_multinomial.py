@@ -1,23 +1,44 @@
-"""The Dirichlet-multinomial model of agreement.
+"""The Dirichlet-multinomial model of agreement, and the density of its ρ.
 
 An item has category probabilities p ~ Dirichlet(A π); its ratings are multinomial. Then
 ρ = 1 / (1 + A) is the population value of Fleiss' kappa. The likelihood is
 Π_k Π_j (A π_k + j)^N_kj / Π_j (A + j)^n_j, with N_kj the items with more than j ratings
 in category k, and n_j those with more than j ratings at all [1].
 
+To integrate π out: each category's product Π_j (x + j)^N_kj at x = A π_k is a
+polynomial. Under
+π ~ Dirichlet(a) the power π_k^t has the moment Γ(a_k + t) / Γ(a_k); convolved over
+categories and divided by Γ(Σ a + t) the powers give a polynomial in A [2], and with it
+the density of ρ. All coefficients are positive, so that sums and products lose no
+digits; each is tilted by λ^t, so that floats hold what matters.
+
 [1] Mosimann, J. E. (1962). On the compound multinomial distribution. Biometrika,
 49(1/2), 65-82. https://doi.org/10.2307/2333468
+[2] Antoniak, C. E. (1974). Mixtures of Dirichlet processes with applications to
+Bayesian nonparametric problems. Annals of Statistics, 2(6), 1152-1174.
+https://doi.org/10.1214/aos/1176342871
 """
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import expit, gammaln
+from scipy.special import expit, gammaln, xlogy
 
 from masrel.agreement._kernel import Floats
 from masrel.errors import ConvergenceError
+from masrel.intervals._quadrature import log_sum_exp
+
+TRIMMED = 1e-120
+"""What is dropped of a product, relative to its largest value."""
+
+_DROPPED = 1e-250  # what is dropped of a distribution; it is right above 1e-230
+_RIGHT = 1e-230
+_MAX_FACTORS = 20_000  # of a polynomial multiplied out in logarithms: some seconds
+_KEPT = 1e-100  # of the convolution: what the categories dropped is far below
+_NEGLIGIBLE = -43.0  # logarithm of a term at the edge, relative to the sum
 
 _MAX_LOG_TILT = 160.0  # either way: beyond any posterior that floats can hold
 _NATS = 45.0  # what is left out is below exp(-40) of the density's largest value
@@ -60,14 +81,14 @@ class DirichletMultinomial:
         if not used.all():
             prior = np.append(prior, concentration * float((~used).sum()))
         n = counts.sum(axis=1)
-        n_depths = int(n.max())
-        powers = [_items_above(column, n_depths) for column in counts.T[used]]
-        return cls(
-            prior=prior,
-            shape=shape,
-            powers=np.array(powers, dtype=np.float64),
-            sizes=_items_above(n, n_depths).astype(np.float64),
-        )
+        met = [
+            np.bincount(column, minlength=int(n.max()) + 1)
+            for column in (*counts.T[used], n)
+        ]
+        # items with more than j ratings, j = 0, 1, ...
+        more = np.array(met, dtype=np.float64)[:, :0:-1].cumsum(axis=1)[:, ::-1]
+        more = np.ascontiguousarray(more)
+        return cls(prior=prior, shape=shape, powers=more[:-1], sizes=more[-1])
 
     @property
     def n_dimensions(self) -> int:
@@ -138,9 +159,20 @@ class DirichletMultinomial:
 
     def bulk(self) -> Bulk:
         """Narrow a grid of tilts until a dozen of them lie where the density does."""
+        # The largest term of the density's logarithm is the density up to a slowly
+        # varying factor.
+        a, a_total = self.prior[: len(self.powers)], float(self.prior.sum())
+        depth = np.arange(self.sizes.size)
         grid = np.linspace(_MAX_LOG_TILT, -_MAX_LOG_TILT, 65)
         for _ in range(30):
-            logits, density = self._profile(np.exp(grid))
+            tilt = np.exp(grid)
+            x, t = self.saddle(tilt)
+            total = t.sum(axis=1)
+            logits = -np.log(tilt) - np.log(a_total + total)
+            terms = (self.powers * np.log(x[..., None] + depth)).sum(axis=-1)
+            terms += gammaln(a + t) - t * np.log(x)
+            density = terms.sum(axis=1) - gammaln(a_total + total) - total * logits
+            density += self.log_cofactor(logits)
             best = int(density.argmax())
             high = np.flatnonzero(density > density[best] - _NATS)
             first, last = max(high[0] - 1, 0), min(high[-1] + 1, grid.size - 1)
@@ -150,21 +182,174 @@ class DirichletMultinomial:
             grid = np.linspace(grid[first], grid[last], 33)
         raise ConvergenceError("the posterior is too narrow to be found")
 
-    def _profile(self, tilt: Floats) -> tuple[Floats, Floats]:
-        # the logits of ρ that tilts belong to, and the largest term of the density's
-        # logarithm there: the density up to a slowly varying factor; all (n,)
-        x, t = self.saddle(tilt)
-        total = t.sum(axis=1)
-        a, a_total = self.prior[: len(self.powers)], float(self.prior.sum())
-        logit = -np.log(tilt) - np.log(a_total + total)
-        depth = np.arange(self.sizes.size)
-        terms = (self.powers * np.log(x[..., None] + depth)).sum(axis=-1)
-        terms += gammaln(a + t) - t * np.log(x)
-        inner = terms.sum(axis=1) - gammaln(a_total + total) - total * logit
-        return logit, inner + self.log_cofactor(logit)
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Powers:
+    """Coefficients of consecutive powers, as value times exp(scale)."""
+
+    first: int  # the lowest power
+    values: Floats = field(compare=False, repr=False)  # (n_powers,): positive
+    scale: float = 0.0  # logarithm of what all are to be multiplied by
+
+    def trimmed(self, share: float) -> "Powers":
+        """Drop both ends as far as they are below a share of the largest."""
+        high = np.flatnonzero(self.values > share * self.values.max())
+        return Powers(
+            first=self.first + int(high[0]),
+            values=self.values[high[0] : high[-1] + 1],
+            scale=self.scale,
+        )
+
+    def multiply(self, other: "Powers") -> "Powers":
+        """Multiply two polynomials."""
+        values = np.convolve(self.values, other.values)
+        largest = float(values.max())
+        return Powers(
+            first=self.first + other.first,
+            values=values / largest,
+            scale=self.scale + other.scale + float(np.log(largest)),
+        )
 
 
-def _items_above(counts: NDArray[np.int64], n_depths: int) -> NDArray[np.int64]:
-    # (n_items,) -> (n_depths,): items with more than j ratings, j = 0, 1, ...
-    met = np.bincount(counts, minlength=n_depths + 1)
-    return np.asarray(met[:0:-1].cumsum()[::-1])
+@dataclass(frozen=True)
+class Category:
+    """One category's coefficients times the moments Γ(a + t) / Γ(a) of its share."""
+
+    powers: Floats  # (n_depths,): N_j
+    a: float  # the parameter of its share
+
+    def tilted(self, x: float, log_tilt: float) -> Powers:
+        """Return the coefficients of λ^t, the constant Γ(a) left out."""
+        by_mass = self._sum_of_binomials(x)
+        t = by_mass.first + np.arange(by_mass.values.size)
+        log = np.log(by_mass.values) - t * np.log(x)
+        result = self._with_moments(by_mass.first, by_mass.scale + log, log_tilt)
+        # The moments rise faster than any tilt: they may need what was dropped.
+        inside = by_mass.values[result.first - by_mass.first :][: result.values.size]
+        lacks_low = t[0] > self.powers[0] and inside[0] < _RIGHT
+        lacks_high = t[-1] < self.powers.sum() and inside[-1] < _RIGHT
+        if lacks_low or lacks_high:
+            log = self._log_coefficients
+            result = self._with_moments(int(self.powers[0]), log, log_tilt)
+        return result
+
+    def _with_moments(self, first: int, log: Floats, log_tilt: float) -> Powers:
+        t = first + np.arange(log.size)
+        log = log + gammaln(self.a + t) + t * log_tilt
+        largest = float(log.max())
+        values = np.exp(log - largest)
+        return Powers(first=first, values=values, scale=largest).trimmed(TRIMMED)
+
+    def _sum_of_binomials(self, x: float) -> Powers:
+        # Divided by its value at x, Π_j (x + j)^N_j is the distribution of a sum of
+        # binomials with probabilities x / (x + j).
+        value = float(self.powers @ np.log(x + np.arange(self.powers.size)))
+        result = Powers(first=int(self.powers[0]), values=np.ones(1), scale=value)
+        nats = -np.log(_DROPPED)
+        for j, n in enumerate(self.powers.tolist()):
+            if not (j and n):
+                continue
+            p, q = x / (x + j), j / (x + j)
+            # only as far out as Bernstein's inequality says matters
+            reach = nats / 3.0 + np.sqrt(nats**2 / 9.0 + 2.0 * nats * n * p * q)
+            low, high = max(0, int(n * p - reach)), min(int(n), int(n * p + reach) + 1)
+            k = np.arange(low, high + 1)
+            log = gammaln(n + 1.0) - gammaln(k + 1.0) - gammaln(n - k + 1.0)
+            log += xlogy(k, p) + xlogy(n - k, q)
+            binomial = Powers(first=low, values=np.exp(log))
+            result = result.multiply(binomial).trimmed(_DROPPED)
+        return result
+
+    @cached_property
+    def _log_coefficients(self) -> Floats:
+        # factor by factor in logarithms, which drops nothing
+        if self.powers[1:].sum() > _MAX_FACTORS:
+            raise ConvergenceError(
+                f"the exact posterior needs {self.powers.sum():.0f} ratings in one "
+                'category multiplied out in logarithms; method="emcee" samples it'
+            )
+        log = np.zeros(1)
+        for j, n in enumerate(self.powers.tolist()):
+            for _ in range(int(n) if j else 0):
+                log = log_convolve(np.array([np.log(j), 0.0]), log)  # times x + j
+        return log
+
+
+def log_convolve(short: Floats, long: Floats) -> Floats:
+    """Multiply two polynomials of which the logarithms of coefficients are known."""
+    product = np.full(short.size + long.size - 1, -np.inf)
+    for j, log in enumerate(short.tolist()):
+        reached = slice(j, j + long.size)
+        product[reached] = np.logaddexp(product[reached], log + long)
+    return product
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Expansion:
+    """The polynomial in A at one tilt: the logarithm of each term at A = λ."""
+
+    log_tilt: float
+    powers: Floats = field(compare=False, repr=False)  # t, (n_terms,)
+    terms: Floats = field(compare=False, repr=False)  # (n_terms,)
+    complete: tuple[bool, bool]  # whether no power is dropped below, and above
+
+    def log_sum(self, logit: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+        """Return the log of the polynomial, and where nothing it needs is dropped."""
+        terms = self.terms + np.multiply.outer(-logit - self.log_tilt, self.powers)
+        total = log_sum_exp(terms)
+        # Coefficients are log-concave: beyond an edge the terms only get smaller.
+        lowest = self.complete[0] | (terms[:, 0] < total + _NEGLIGIBLE)
+        highest = self.complete[1] | (terms[:, -1] < total + _NEGLIGIBLE)
+        return total, lowest & highest
+
+
+class RhoDensity:
+    """The log-density of logit ρ, constants left out."""
+
+    def __init__(self, model: DirichletMultinomial) -> None:
+        self._model = model
+        self.bulk = model.bulk()
+        a = model.prior[: len(model.powers)].tolist()
+        self._categories = [Category(*of) for of in zip(model.powers, a, strict=True)]
+        self._expansions = [self._expand(self.bulk.mode)]
+
+    def __call__(self, logit: Floats) -> Floats:
+        """Return the log-density at logits of ρ, (n,)."""
+        out = np.empty(logit.size)
+        left = np.arange(logit.size)
+        known = iter(tuple(self._expansions))
+        while left.size:
+            expansion = next(known, None)
+            fresh = expansion is None
+            if expansion is None:
+                expansion = self._expand(float(logit[left[left.size // 2]]))
+                self._expansions.append(expansion)
+            total, right = expansion.log_sum(logit[left])
+            if fresh and not right.any():
+                raise ConvergenceError(
+                    "the exact posterior needs terms that floats cannot hold; "
+                    'method="emcee" samples it'
+                )
+            out[left[right]] = total[right]
+            left = left[~right]
+        return out + self._model.log_cofactor(logit)
+
+    def _expand(self, logit: float) -> _Expansion:
+        model, bulk = self._model, self.bulk
+        log_tilt = float(np.interp(logit, bulk.logits, bulk.log_tilts))
+        x, _ = model.saddle(np.exp([log_tilt]))
+        product = Powers(first=0, values=np.ones(1))
+        for category, at in zip(self._categories, x[0].tolist(), strict=True):
+            product = product.multiply(category.tilted(at, log_tilt)).trimmed(TRIMMED)
+        product = product.trimmed(_KEPT)
+        t = product.first + np.arange(product.values.size, dtype=np.float64)
+        log = np.log(product.values) + product.scale
+        return _Expansion(
+            log_tilt=log_tilt,
+            powers=t,
+            terms=log - gammaln(float(model.prior.sum()) + t),
+            complete=(
+                bool(t[0] == model.powers[:, 0].sum()),
+                bool(t[-1] == model.powers.sum()),
+            ),
+        )

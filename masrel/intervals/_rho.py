@@ -3,22 +3,71 @@
 import dataclasses
 import math
 from dataclasses import dataclass, field
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit
 
 from masrel.agreement._counts import item_counts
+from masrel.errors import ParameterError
 from masrel.estimates import Distribution, Interval
-from masrel.intervals._dirichlet_multinomial import DirichletMultinomial
-from masrel.intervals._priors import Prior
+from masrel.intervals._dirichlet_multinomial import DirichletMultinomial, RhoDensity
 from masrel.intervals._problem import IntervalProblem
 from masrel.intervals._quadrature import LineDistribution, line_distribution
 from masrel.intervals._seeds import recorded_generator
-from masrel.intervals._tilted_polynomial import RhoDensity
 
+PriorName = Literal["uniform", "jeffreys"]
+"""Prior of ρ: U(0, 1), or Beta(1/2, 1/2), the prior of Jeffreys for a probability."""
+
+PRIOR_SHAPES: dict[str, float] = {"uniform": 1.0, "jeffreys": 0.5}
+"""The prior of ρ is Beta(shape, shape)."""
+
+_OF_RHO = {"uniform": "ρ ~ U(0, 1)", "jeffreys": "ρ ~ Beta(1/2, 1/2)"}
 _SHOWN = 201  # points of a distribution
 _FEW_ITEMS = 10
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Prior:
+    """The prior of the Dirichlet-multinomial model."""
+
+    name: PriorName  # that of ρ
+    # π ~ Dirichlet(concentration, ...) over the declared categories
+    concentration: float
+
+    @classmethod
+    def of(cls, name: PriorName, concentration: float) -> "Prior":
+        """Return a prior, checked."""
+        if name not in PRIOR_SHAPES:
+            raise ParameterError(
+                f"prior: needs one of {', '.join(get_args(PriorName))}, got {name!r}"
+            )
+        if not 0.0 < concentration < math.inf:
+            raise ParameterError(
+                f"concentration: needs a positive number, got {concentration!r}"
+            )
+        return cls(name=name, concentration=float(concentration))
+
+    @property
+    def description(self) -> str:
+        """Both priors, such as "ρ ~ U(0, 1), π ~ Dirichlet(1, ...)"."""
+        return f"{_OF_RHO[self.name]}, π ~ Dirichlet({self.concentration:.3g}, ...)"
+
+    def others(self, n_categories: int) -> "tuple[Prior, Prior]":
+        """Return two that are as reasonable: another of ρ, and another of π."""
+        # of π a Dirichlet as strong as one rating, Dirichlet(1/K, ...), or instead of
+        # that Dirichlet(1, ...)
+        of_rho: PriorName = "jeffreys" if self.name == "uniform" else "uniform"
+        as_one = 1.0 / n_categories
+        of_pi = 1.0 if math.isclose(self.concentration, as_one) else as_one
+        return (
+            Prior(name=of_rho, concentration=self.concentration),
+            Prior(name=self.name, concentration=of_pi),
+        )
+
+
+DEFAULT_PRIOR = Prior(name="uniform", concentration=1.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,7 +90,9 @@ class RhoPosterior:
         """Integrate the posterior of counts (n_items, n_categories)."""
         density = RhoDensity(
             DirichletMultinomial.of_counts(
-                counts, concentration=prior.concentration, shape=prior.shape
+                counts,
+                concentration=prior.concentration,
+                shape=PRIOR_SHAPES[prior.name],
             )
         )
         tail = 0.5 * (1.0 - level)
@@ -213,7 +264,7 @@ def _sampled(
 
     generator, seed = recorded_generator(rng)
     model = DirichletMultinomial.of_counts(
-        counts, concentration=prior.concentration, shape=prior.shape
+        counts, concentration=prior.concentration, shape=PRIOR_SHAPES[prior.name]
     )
     draws = sample(
         model.log_density,

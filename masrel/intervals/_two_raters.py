@@ -2,6 +2,8 @@
 
 import dataclasses
 import math
+from dataclasses import dataclass, field
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +11,6 @@ from numpy.typing import NDArray
 from masrel.agreement._kernel import Floats
 from masrel.errors import ParameterError
 from masrel.estimates import Interval
-from masrel.intervals._priors import TablePrior
 from masrel.intervals._problem import IntervalProblem
 from masrel.intervals._seeds import recorded_generator
 from masrel.intervals._table_quadrature import (
@@ -23,6 +24,45 @@ _FEW_ITEMS = 10
 _MIN_DRAWS = 100
 _DEFAULT_DRAWS, _SEED = 4_000, 1  # always the same ones, so that they repeat
 _NOTED_DRAWS = 2_000  # for the interval under another prior: a note has three digits
+
+_ITEMS = 1.5  # that the default prior is worth, by the study of coverage
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TablePrior:
+    """A Dirichlet over the pairs of categories."""
+
+    cells: Floats = field(repr=False)  # (n_categories, n_categories): its parameters
+    description: str  # the prior in words
+    # the one parameter of all cells; None where pairs that agree have others
+    concentration: float | None
+
+    @classmethod
+    def by_default(cls, n_categories: int) -> Self:
+        """Return a prior worth 1.5 items, half of it on pairs that agree."""
+        # With the same parameter in every cell agreement would be expected to be the
+        # rarer, the more categories are declared.
+        q = n_categories
+        cells = np.full((q, q), 0.5 * _ITEMS / (q * (q - 1)))
+        np.fill_diagonal(cells, 0.5 * _ITEMS / q)
+        description = (
+            f"a Dirichlet worth {_ITEMS:g} items, half of it on pairs that agree"
+        )
+        return cls(cells=cells, description=description, concentration=None)
+
+    @classmethod
+    def of(cls, concentration: float, n_categories: int) -> Self:
+        """Return a prior with one parameter for all cells."""
+        cells = np.full((n_categories, n_categories), concentration)
+        description = f"Dirichlet({concentration:.3g}, ...) over the cells of the table"
+        return cls(cells=cells, description=description, concentration=concentration)
+
+    def other(self) -> Self:
+        """Return another that is as reasonable."""
+        q = len(self.cells)
+        if self.concentration is not None and math.isclose(self.concentration, 1.0 / q):
+            return self.by_default(q)
+        return self.of(1.0 / q, q)
 
 
 def applies_to(problem: IntervalProblem) -> bool:

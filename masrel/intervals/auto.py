@@ -10,12 +10,11 @@ from numpy.typing import ArrayLike
 from masrel.agreement import Coefficient, Label
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Interval, Target
-from masrel.intervals._priors import RHO_COEFFICIENTS
 from masrel.intervals._problem import Statistic, find_entry, pose_problem
 from masrel.intervals.analytic import analytic
 from masrel.intervals.bootstrap import bootstrap
 from masrel.intervals.jackknife import jackknife
-from masrel.intervals.posterior import posterior
+from masrel.intervals.posterior import _RHO_COEFFICIENTS, posterior
 
 if TYPE_CHECKING:
     from masrel.agreement import WeightName
@@ -121,5 +120,5 @@ def _chosen(entry: Coefficient, ratings: object, options: _Options) -> Interval:
     from masrel.intervals._choice import choose_interval
 
     return choose_interval(
-        problem, modelled=identity and entry.name in RHO_COEFFICIENTS
+        problem, modelled=identity and entry.name in _RHO_COEFFICIENTS
     )

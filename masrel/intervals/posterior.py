@@ -9,11 +9,14 @@ from numpy.typing import ArrayLike
 from masrel.agreement import Label
 from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target
-from masrel.intervals._priors import RHO_COEFFICIENTS, Prior, PriorName
 from masrel.intervals._problem import IntervalProblem, Statistic, pose_problem
 
 if TYPE_CHECKING:
     from masrel.agreement import WeightName
+    from masrel.intervals._rho import Prior, PriorName
+
+# Coefficients whose value in the population is ρ of the Dirichlet-multinomial model.
+_RHO_COEFFICIENTS = ("fleiss_kappa", "scott_pi", "krippendorff_alpha")
 
 _Model = Literal["auto", "dirichlet-multinomial", "table"]
 _Method = Literal["exact", "emcee"]
@@ -28,7 +31,7 @@ def posterior(
     weights: "WeightName | ArrayLike" = "identity",
     level: float = 0.95,
     model: _Model = "auto",
-    prior: PriorName = "uniform",
+    prior: "PriorName" = "uniform",
     concentration: float | None = None,
     method: _Method = "exact",
     n_draws: int = 10_000,
@@ -128,20 +131,20 @@ def posterior(
         weights=weights,
         level=level,
     )
+    # Imported here: the other intervals load neither scipy nor emcee.
+    from masrel.intervals._rho import Prior, rho_interval
+
     checked_prior = Prior.of(prior, 1.0 if concentration is None else concentration)
     _check_options(problem, model, method)
     identity = isinstance(weights, str) and weights == "identity"
-    has_rho = problem.entry.name in RHO_COEFFICIENTS and identity
+    has_rho = problem.entry.name in _RHO_COEFFICIENTS and identity
     name = problem.entry.name if identity else f"weighted {problem.entry.name}"
-    # Imported here: the other intervals load neither scipy nor emcee.
     if model == "table" or (model == "auto" and not has_rho):
         _check_table(problem, name, model, method, checked_prior)
         from masrel.intervals._two_raters import table_interval
 
         return table_interval(problem, concentration, n_draws=n_draws, rng=rng)
     _check_dirichlet(has_rho, name)
-    from masrel.intervals._rho import rho_interval
-
     return rho_interval(
         problem,
         checked_prior,
@@ -174,7 +177,7 @@ def _check_dirichlet(has_rho: bool, name: str) -> None:
 
 
 def _check_table(
-    problem: IntervalProblem, name: str, model: _Model, method: _Method, prior: Prior
+    problem: IntervalProblem, name: str, model: _Model, method: _Method, prior: "Prior"
 ) -> None:
     n_raters = problem.coded.codes.shape[1]
     if model == "auto" and n_raters != 2:

@@ -23,14 +23,14 @@ from masrel.agreement._kernel import Floats
 from masrel.agreement._pairs import pair_table
 from masrel.errors import ParameterError, UndefinedStatisticWarning
 from masrel.estimates import Interval, Target
-from masrel.intervals._priors import Prior, PriorName
+from masrel.intervals._dirichlet_multinomial import log_convolve
 from masrel.intervals._quadrature import (
     LineDistribution,
     integrated_sinc,
     line_distribution,
     log_sum_exp,
 )
-from masrel.intervals._tilted_polynomial import log_convolve
+from masrel.intervals._rho import PRIOR_SHAPES, Prior, PriorName
 from masrel.intervals.quantity import Quantity
 
 _METHOD = "hierarchical kappa model, exact"
@@ -250,15 +250,16 @@ class _Posterior:
     ) -> "_Posterior":
         """Integrate the posterior of tables (n_categories, n_categories)."""
         # m ~ Beta(shape, shape); g ~ U(0, 1/3)
+        shape = PRIOR_SHAPES[prior.name]
         raters = tuple(_RaterPairs.of(table, prior.concentration) for table in tables)
         known: dict[float, Floats] = {}  # log-density over _GRID, by logit m
 
         def log_density(mean: Floats) -> Floats:
-            rows = _log_joint(raters, prior.shape, mean, _GRID)
+            rows = _log_joint(raters, shape, mean, _GRID)
             known.update(zip(mean.tolist(), rows, strict=True))
             return log_sum_exp(rows)
 
-        low, high = _reach(raters, prior.shape)
+        low, high = _reach(raters, shape)
         mean, ends = line_distribution(log_density, low, high, shares)
         joint = np.array([known[point] for point in mean.points.tolist()])
         masses = np.exp(joint - joint.max())

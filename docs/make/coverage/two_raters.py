@@ -17,7 +17,7 @@ from docs.make.coverage.methods import FEW
 from docs.make.coverage.page import markdown_table, marked
 from docs.make.coverage.simulate import KAPPAS, Counted
 from docs.make.coverage.tables import COEFFICIENTS, MODELS, SHARES, Tables, on_scale
-from masrel.intervals._priors import TablePrior
+from masrel.intervals._two_raters import TablePrior
 
 DOCS = Path(__file__).parents[2]
 SEED, SIZE, QUICK = 20_261, 2_000, 100

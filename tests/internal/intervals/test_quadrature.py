@@ -7,9 +7,8 @@ from scipy.special import betainc
 from masrel.agreement import code_ratings
 from masrel.agreement._counts import item_counts
 from masrel.errors import ConvergenceError
-from masrel.intervals._priors import DEFAULT_PRIOR
 from masrel.intervals._quadrature import beta_nodes, line_distribution
-from masrel.intervals._rho import RhoPosterior
+from masrel.intervals._rho import DEFAULT_PRIOR, RhoPosterior
 from tests.intervals.data import SCALE, TABLE_V
 
 

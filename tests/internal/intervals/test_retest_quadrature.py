@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy import integrate, special, stats
 
-from masrel.intervals._priors import DEFAULT_PRIOR
+from masrel.intervals._rho import DEFAULT_PRIOR
 from masrel.intervals.self_agreement import (
     _log_weights,
     _Moments,

@@ -7,7 +7,6 @@ import pytest
 from scipy.special import betainc, betaln, expit
 
 from masrel.agreement import COEFFICIENTS
-from masrel.intervals._priors import TablePrior
 from masrel.intervals._table_quadrature import (
     CHANCE_AGREEMENT,
     Nodes,
@@ -15,6 +14,7 @@ from masrel.intervals._table_quadrature import (
     grid_nodes,
     table_quantiles,
 )
+from masrel.intervals._two_raters import TablePrior
 from tests.intervals.test_two_raters import (
     IDENTITY,
     TABLE,

@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 
 from masrel.errors import ConvergenceError
-from masrel.intervals import _tilted_polynomial
-from masrel.intervals._dirichlet_multinomial import DirichletMultinomial
-from masrel.intervals._tilted_polynomial import TRIMMED, Category
+from masrel.intervals import _dirichlet_multinomial
+from masrel.intervals._dirichlet_multinomial import (
+    TRIMMED,
+    Category,
+    DirichletMultinomial,
+)
 
 
 def stirling(n: int) -> list[int]:
@@ -58,7 +61,7 @@ def test_what_floats_drop_is_multiplied_out_in_logarithms(
     x, _ = model.saddle(np.exp([-2.0]))
     category.tilted(float(x[0, 0]), -2.0)
     assert "_log_coefficients" in vars(category)
-    monkeypatch.setattr(_tilted_polynomial, "_MAX_FACTORS", 500)
+    monkeypatch.setattr(_dirichlet_multinomial, "_MAX_FACTORS", 500)
     again, _ = of_one_item(700)
     with pytest.raises(ConvergenceError, match='"emcee" samples it'):
         again.tilted(float(x[0, 0]), -2.0)
