@@ -17,10 +17,10 @@ from masrel.intervals._problem import (
     warn_small,
 )
 
-Distribution = Literal["t", "normal", "logit", "fisher"]
+_Distribution = Literal["t", "normal", "logit", "fisher"]
 """What an interval is taken from, and on which scale."""
 
-_METHODS: dict[Distribution, str] = {
+_METHODS: dict[_Distribution, str] = {
     "t": "delta method, t(n-1)",
     "normal": "delta method, normal",
     "logit": "delta method, t(n-1) on the logit",
@@ -36,7 +36,7 @@ def analytic(
     categories: Sequence[Label] | None = None,
     weights: "WeightName | ArrayLike" = "identity",
     level: float = 0.95,
-    distribution: Distribution = "t",
+    distribution: _Distribution = "t",
 ) -> Interval:
     """Compute an interval from the delta-method standard error.
 
@@ -88,9 +88,9 @@ def analytic(
     >>> round(interval.low, 3), round(interval.high, 3)
     (0.14, 0.86)
     """
-    if distribution not in get_args(Distribution):
+    if distribution not in get_args(_Distribution):
         raise ParameterError(
-            f"distribution: needs one of {', '.join(get_args(Distribution))}, "
+            f"distribution: needs one of {', '.join(get_args(_Distribution))}, "
             f"got {distribution!r}"
         )
     problem = pose_problem(
@@ -113,7 +113,7 @@ def analytic(
 
 
 def _interval_around_estimate(
-    problem: IntervalProblem, estimate: Estimate, distribution: Distribution
+    problem: IntervalProblem, estimate: Estimate, distribution: _Distribution
 ) -> Interval:
     method = _METHODS[distribution]
     reason = _why_undefined(estimate)
@@ -140,7 +140,7 @@ def _why_undefined(estimate: Estimate) -> str | None:
 
 
 def _ends(
-    problem: IntervalProblem, estimate: Estimate, distribution: Distribution
+    problem: IntervalProblem, estimate: Estimate, distribution: _Distribution
 ) -> tuple[float, float]:
     if distribution == "normal":
         from scipy.special import ndtri  # loaded only when an interval needs it

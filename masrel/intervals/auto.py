@@ -19,7 +19,7 @@ from masrel.intervals.posterior import _RHO_COEFFICIENTS, posterior
 if TYPE_CHECKING:
     from masrel.agreement import WeightName
 
-Method = Literal["auto", "analytic", "jackknife", "bootstrap", "posterior"]
+_Method = Literal["auto", "analytic", "jackknife", "bootstrap", "posterior"]
 """Kinds of intervals; "auto" chooses one by target and size."""
 
 
@@ -28,7 +28,7 @@ def estimate(
     ratings: object,
     *,
     target: Target,
-    method: Method = "auto",
+    method: _Method = "auto",
     categories: Sequence[Label] | None = None,
     weights: "WeightName | ArrayLike" = "identity",
     level: float = 0.95,
@@ -82,9 +82,9 @@ def estimate(
     >>> result.interval.method
     'item jackknife, t(11) on the logit'
     """
-    if method not in get_args(Method):
+    if method not in get_args(_Method):
         raise ParameterError(
-            f"method: needs one of {', '.join(get_args(Method))}, got {method!r}"
+            f"method: needs one of {', '.join(get_args(_Method))}, got {method!r}"
         )
     entry = find_entry(coefficient)
     result = entry(ratings, categories=categories, weights=weights, level=level)

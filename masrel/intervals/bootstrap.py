@@ -24,7 +24,7 @@ from masrel.intervals._resamples import DrawBudget, all_resamples, draw_resample
 from masrel.intervals._seeds import check_rng, recorded_generator
 from masrel.intervals._units import SamplingUnits, sampling_units
 
-Exact = Literal["auto"] | bool
+_Exact = Literal["auto"] | bool
 """Whether all resamples are taken: always, never, or if there are few enough."""
 
 
@@ -38,7 +38,7 @@ def bootstrap(
     level: float = 0.95,
     n_resamples: int = 10_000,
     kind: Kind = "percentile",
-    exact: Exact = "auto",
+    exact: _Exact = "auto",
     clusters: Sequence[object] | NDArray[Any] | None = None,
     tolerance: float | None = None,
     max_resamples: int = 10_000_000,
@@ -192,7 +192,7 @@ def bootstrap(
     )
 
 
-def _check_options(kind: Kind, exact: Exact, budget: DrawBudget) -> None:
+def _check_options(kind: Kind, exact: _Exact, budget: DrawBudget) -> None:
     if kind not in get_args(Kind):
         raise ParameterError(
             f"kind: needs one of {', '.join(get_args(Kind))}, got {kind!r}"
@@ -229,7 +229,7 @@ def _endpoint_rule(
 def _resamples(
     units: SamplingUnits,
     rule: EndpointRule,
-    exact: Exact,
+    exact: _Exact,
     budget: DrawBudget,
     rng: np.random.Generator | int | None,
 ) -> tuple[Resamples, int | None]:

@@ -18,7 +18,7 @@ from masrel.intervals._problem import (
 )
 from masrel.intervals.jackknife import _variance_of, _without_item
 
-Design = Literal["dependent", "independent"]
+_Design = Literal["dependent", "independent"]
 """Whether both sets of ratings are of the same items, row by row."""
 
 
@@ -27,7 +27,7 @@ def difference(
     first: object,
     second: object,
     *,
-    design: Design,
+    design: _Design,
     categories: Sequence[Label] | None = None,
     weights: "WeightName | ArrayLike" = "identity",
     level: float = 0.95,
@@ -93,9 +93,9 @@ def difference(
     >>> round(estimate.value, 3), round(estimate.interval.low, 3)
     (0.467, 0.08)
     """
-    if design not in get_args(Design):
+    if design not in get_args(_Design):
         raise ParameterError(
-            f"design: needs one of {', '.join(get_args(Design))}, got {design!r}"
+            f"design: needs one of {', '.join(get_args(_Design))}, got {design!r}"
         )
     problems = [
         pose_problem(

@@ -5,20 +5,19 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from masrel.agreement import Label, WeightName
 from masrel.agreement._kernel import Floats
 from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target
 from masrel.intervals._problem import (
+    Integers,
     IntervalProblem,
     Statistic,
     pose_problem,
     warn_small,
 )
-
-Integers = NDArray[np.int64]
 
 _UNITS = {"items": ("items",), "raters": ("raters",), "both": ("items", "raters")}
 

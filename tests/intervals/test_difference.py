@@ -2,6 +2,7 @@
 
 import math
 from fractions import Fraction
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -16,8 +17,9 @@ from masrel.errors import (
 )
 from masrel.estimates import Estimate
 from masrel.intervals import difference, jackknife
-from masrel.intervals.difference import Design
 from tests.intervals.data import dirichlet_multinomial
+
+Design = Literal["dependent", "independent"]
 
 CATEGORIES = range(3)
 

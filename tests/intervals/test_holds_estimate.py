@@ -1,0 +1,207 @@
+"""An interval holds its estimate: of every method that promises it, every coefficient.
+
+Whoever adds a method to `masrel.intervals` puts it into one of the two lists here.
+"""
+
+import math
+import warnings
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import masrel.intervals
+from masrel.agreement import COEFFICIENTS
+from masrel.errors import (
+    MasrelWarning,
+    ParameterError,
+    UndefinedStatisticWarning,
+)
+from masrel.estimates import Interval
+from masrel.intervals import analytic, difference, estimate, jackknife
+
+Outcome = tuple[float, Interval]
+Method = Callable[..., Outcome]
+
+
+def of_interval(method: Callable[..., Interval], **fixed: object) -> Method:
+    def outcome(coefficient: str, ratings: object, **options: object) -> Outcome:
+        options.update(fixed)
+        interval = method(coefficient, ratings, **options)
+        options = {k: options[k] for k in ("categories", "weights")}
+        return COEFFICIENTS[coefficient](ratings, **options).value, interval  # type: ignore[arg-type]
+
+    return outcome
+
+
+def of_estimate(target: str) -> Method:
+    def outcome(coefficient: str, ratings: object, **options: object) -> Outcome:
+        result = estimate(coefficient, ratings, target=target, **options)  # type: ignore[arg-type]
+        assert result.interval is not None
+        return result.value, result.interval
+
+    return outcome
+
+
+def of_difference(design: str) -> Method:
+    def outcome(coefficient: str, ratings: object, **options: object) -> Outcome:
+        # the same ratings shifted: two raters or more still rate every item
+        other = mirrored(ratings)
+        result = difference(coefficient, ratings, other, design=design, **options)  # type: ignore[arg-type]
+        assert result.interval is not None
+        return result.value, result.interval
+
+    return outcome
+
+
+def mirrored(ratings: object) -> object:
+    """Ratings of as many other items: every second grade of the first rater is 0."""
+    if isinstance(ratings, list):
+        return [mirrored(rater) for rater in ratings]
+    other = np.array(ratings)
+    other[::2, 0] = 0
+    return other
+
+
+PROMISE: dict[str, Method] = {
+    **{
+        f"analytic, {distribution}": of_interval(
+            analytic, target="items", distribution=distribution
+        )
+        for distribution in ("t", "normal", "logit", "fisher")
+    },
+    **{
+        f"jackknife of {target}": of_interval(jackknife, target=target)
+        for target in ("items", "raters", "both")
+    },
+    **{
+        f"estimate for other {target}": of_estimate(target)
+        for target in ("items", "raters", "both")
+    },
+    "difference, dependent": of_difference("dependent"),
+    "difference, independent": of_difference("independent"),
+}
+DO_NOT_PROMISE = {
+    "bootstrap": "a bootstrap distribution may lie to one side of the estimate",
+    "posterior": "so may a posterior, which a prior pulls",
+    "retest_model": "the same",
+    "latent_trait": "the same",
+}
+KERNELS = [name for name, entry in COEFFICIENTS.items() if entry.kernel is not None]
+OF_RATERS = ("raters", "both")
+OWN = [name for name, entry in COEFFICIENTS.items() if entry.has_interval]
+
+
+def test_every_method_is_in_a_list() -> None:
+    methods = {name for name in masrel.intervals.__all__ if name[0].islower()}
+    listed = {name.split(",")[0].split()[0] for name in PROMISE} | set(DO_NOT_PROMISE)
+    assert methods <= listed
+
+
+def made(coefficient: str, seed: int) -> tuple[object, int]:
+    """Ratings of some size, every second time with gaps, as codes 0 to q - 1; and q."""
+    rng = np.random.default_rng(seed)
+    n, r, q = rng.integers(3, 30), rng.integers(3, 6), int(rng.integers(2, 5))
+    shares = rng.dirichlet(np.full(q, rng.choice([0.1, 1.0, 10.0])), n).cumsum(axis=1)
+    codes = (rng.random((n, r, 1)) > shares[:, None, :-1]).sum(axis=2).astype(object)
+    entry = COEFFICIENTS[coefficient]
+    if entry.n_raters[1] == 2:
+        codes = codes[:, :2]
+    if seed % 2:
+        codes[1:][rng.random((n - 1, codes.shape[1])) < 0.1] = None
+    if entry.shape == "pairs":
+        return [codes[:, :2], codes[:, 1:3]], q
+    return codes, q
+
+
+def check(outcome: Outcome, noted: list[warnings.WarningMessage] | None = None) -> None:
+    value, interval = outcome
+    if math.isnan(interval.low) or math.isnan(value):
+        assert math.isnan(interval.low)
+        assert math.isnan(interval.high)
+        assert interval.reason
+        assert noted is None or any(
+            issubclass(w.category, UndefinedStatisticWarning) for w in noted
+        )
+        return
+    # the value is of integers and the interval of floats: they may differ in rounding
+    near = 1e-12 * max(1.0, abs(value))
+    assert interval.low - near <= value <= interval.high + near
+
+
+@pytest.mark.parametrize("level", [0.5, 0.95, 0.999])
+@pytest.mark.parametrize("coefficient", KERNELS)
+@pytest.mark.parametrize("method", PROMISE)
+def test_an_interval_holds_its_estimate(
+    method: str, coefficient: str, level: float
+) -> None:
+    for seed in range(6):
+        ratings, q = made(coefficient, seed)
+        options = {
+            "categories": range(q),
+            "weights": ("identity", "quadratic", "linear")[seed % 3],
+            "level": level,
+        }
+        if method.endswith(OF_RATERS) and COEFFICIENTS[coefficient].n_raters[1] == 2:
+            with pytest.raises(ParameterError, match="at least 3 raters"):
+                PROMISE[method](coefficient, ratings, **options)
+            continue
+        with warnings.catch_warnings(record=True) as noted:
+            warnings.simplefilter("always", MasrelWarning)
+            outcome = PROMISE[method](coefficient, ratings, **options)
+        check(outcome, noted)
+        assert outcome[1].level == level
+
+
+@pytest.mark.parametrize("level", [0.5, 0.95, 0.999])
+@pytest.mark.parametrize("coefficient", OWN)
+def test_an_interval_that_comes_with_an_estimate_holds_it(
+    coefficient: str, level: float
+) -> None:
+    rng = np.random.default_rng(7)
+    for _ in range(200):
+        n, r = rng.integers(2, 12), rng.integers(2, 6)
+        scores = rng.normal(size=(n, 1)) * rng.choice([0.1, 1.0, 5.0])
+        scores = scores + rng.normal(size=r) + rng.normal(size=(n, r))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", MasrelWarning)
+            result = estimate(coefficient, scores, target="items", level=level)
+        assert result.interval is not None
+        check((result.value, result.interval))
+
+
+@pytest.mark.parametrize("method", PROMISE)
+def test_an_interval_holds_an_estimate_below_minus_one(method: str) -> None:
+    # Only the categories 0 and 1 disagree, and always where they are met: of 33 items
+    # 4 disagree, 8 of 99 ratings are 0 or 1 and share it. With two raters
+    # D_o = 4/33, D_e = 2 (4/66)², and 1 - D_o / D_e = 1 - 2 · 33/4 = -15.5.
+    weights = [[1.0, 0.0, 1.0], [0.0, 1.0, 1.0], [1.0, 1.0, 1.0]]
+    ratings = np.array([[0, 1]] * 4 + [[2, 2]] * 29)
+    coefficient = "fleiss_kappa"
+    if method.endswith(OF_RATERS):  # a third rater, so that one can be left out
+        ratings = np.column_stack([ratings, ratings[:, 0]])
+    options = {"categories": range(3), "weights": weights, "level": 0.95}
+    value = COEFFICIENTS[coefficient](
+        ratings, categories=range(3), weights=weights
+    ).value
+    if not method.endswith(OF_RATERS):
+        assert value == pytest.approx(-15.5, rel=1e-12)
+    assert value < -1.0
+    with warnings.catch_warnings(record=True) as noted:
+        warnings.simplefilter("always", MasrelWarning)
+        outcome = PROMISE[method](coefficient, ratings, **options)
+    check(outcome, noted)
+
+
+def test_the_check_sees_an_interval_beside_its_estimate() -> None:
+    interval = jackknife(
+        "fleiss_kappa", [[0, 0, 1], [1, 1, 1], [2, 1, 2]] * 5, target="items"
+    )
+    check((0.5 * (interval.low + interval.high), interval))
+    for off in (interval.low - 1e-6, interval.high + 1e-6):
+        with pytest.raises(AssertionError):
+            check((off, interval))
+    nothing = replace(interval, low=math.nan, high=math.nan)
+    with pytest.raises(AssertionError):
+        check((0.5, nothing))
