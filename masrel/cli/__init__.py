@@ -36,7 +36,7 @@ VERBS = {
     "device": "Bring a Puck up on its CAN bus: probe, check, zero, friction.",
     "demo": "The whole flow on the simulated device.",
 }
-"""Verb to summary. The verb ``x`` is the command ``command`` of ``masrel.cli.x``."""
+"""Verb to summary. The verb ``x`` is the command ``x`` of ``masrel.cli.x``."""
 
 
 class _Verbs(click.Group):
@@ -48,9 +48,8 @@ class _Verbs(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002 - click's signature
         if cmd_name not in VERBS:
             return None
-        command: click.Command = importlib.import_module(
-            f"masrel.cli.{cmd_name}"
-        ).command
+        module = importlib.import_module(f"masrel.cli.{cmd_name}")
+        command: click.Command = getattr(module, cmd_name)
         return command
 
     def format_commands(

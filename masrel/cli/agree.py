@@ -1,34 +1,65 @@
 """``masrel agree``: agreement of any CSV file of ratings, no study needed."""
 
 import warnings
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from masrel.cli.agreement_output import Output, output_options, put
-from masrel.cli.agreement_rows import (
-    USUAL,
-    Row,
-    Wanted,
-    estimate_session,
+from masrel.cli._options import (
+    ColumnOptions,
+    column_options,
+    grouped,
     scale_notes,
+    split_commas,
 )
-from masrel.cli.columns import Columns, column_options
-from masrel.cli.options import grouped
-from masrel.errors import MasrelWarning, RatingsError
+from masrel.cli._output import OutputOptions, output_options, write_output
+from masrel.errors import MasrelError, MasrelWarning, ParameterError, RatingsError
+from masrel.estimates import Interval, Target, as_document
 
 if TYPE_CHECKING:
+    from masrel.agreement import BandScale, Coefficient, CountedRatings, WeightName
     from masrel.ratings import Ratings
+    from masrel.report._agreement_table import AgreementRow
 
-__all__ = ["command"]
+_USUAL = ("percent_agreement", "fleiss_kappa")
+_ALL = ("all",)
 
-_wanted_options = grouped(
-    "wanted",
-    Wanted,
+_NO_INTERVAL = (
+    "no interval: say what a new study would draw anew, with --target raters, items "
+    "or both"
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _EstimateOptions:
+    """What is estimated of every session."""
+
+    coefficients: str | None  # names, separated by commas, or "all"; None for `_USUAL`
+    weights: "WeightName"  # for coefficients that take any; checked where they are made
+    target: Target | None  # what a new study would draw anew; no interval when None
+    interval: str  # kind of interval; "auto" chooses one
+    level: float
+    # n_resamples, seed: for intervals that draw
+    n_resamples: int
+    seed: int
+    words: "BandScale | None"  # whose words for values
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The coefficients one by one, or ``("all",)``."""
+        if self.coefficients is None:
+            return _USUAL
+        return tuple(split_commas(self.coefficients))
+
+
+_estimate_options = grouped(
+    "options",
+    _EstimateOptions,
     click.option(
         "--coefficients",
-        show_default=",".join(USUAL),
+        show_default=",".join(_USUAL),
         help="Names of coefficients, separated by commas, or all.",
     ),
     click.option(
@@ -66,11 +97,20 @@ _wanted_options = grouped(
 @click.command("agree")
 @click.argument("file", type=click.Path(path_type=Path))
 @column_options
-@_wanted_options
+@_estimate_options
 @click.option("--by", type=click.Choice(["session"]), help="Estimate each session.")
-@output_options
-def command(
-    file: Path, columns: Columns, wanted: Wanted, by: str | None, output: Output
+@output_options(
+    json="Write the estimates here; - prints them, and nothing else, on stdout.",
+    figure="Draw the intervals into this .png, .svg or .pdf; needs --target.",
+    csv="Print every digit as CSV.",
+    latex="Print a LaTeX table.",
+)
+def agree(
+    file: Path,
+    columns: ColumnOptions,
+    options: _EstimateOptions,
+    by: str | None,
+    output: OutputOptions,
 ) -> None:
     """Estimate the agreement of the raters in FILE.
 
@@ -78,30 +118,149 @@ def command(
     named) or one row an item and one column a rater. Missing grades are empty or NA.
     Grades that are all numbers weigh by value, others by their place in the scale.
     """
-    output.check(wanted)
+    target = options.target
+    output.check_files()
+    if output.figure is not None and target is None:
+        raise ParameterError(
+            "--figure: shows intervals, so it needs --target raters, items or both"
+        )
     ratings = columns.read(file)
-    about = scale_notes(ratings, wanted.weights)
-    sessions = _sessions(ratings, file, by)
-    rows = _estimates(ratings, sessions, wanted)
-    put(output, rows, ratings, wanted, file=file, by=by, about=about)
+    notes = scale_notes(ratings, options.weights)
+    rows = _estimate(ratings, options, by, file)
+    from masrel.report._agreement_table import agreement_forest, agreement_table
+
+    write_output(
+        output,
+        document=lambda: _document(rows, by),
+        text=lambda: agreement_table(
+            rows,
+            caption=f"Agreement of the raters in {file}",
+            by=by,
+            bands=options.words,
+            notes=notes,
+            data="simulated" if ratings.simulated else "foreign",
+        ),
+        draw=None
+        if target is None
+        else lambda form: agreement_forest(
+            rows, target, simulated=ratings.simulated, form=form
+        ),
+        notes=notes,
+    )
+    if target is None:
+        click.echo(_NO_INTERVAL, err=True)
 
 
-def _estimates(ratings: "Ratings", sessions: list[str], wanted: Wanted) -> list[Row]:
-    with warnings.catch_warnings():
-        # Every note is in the result, and so below the table or in the JSON.
-        warnings.simplefilter("ignore", MasrelWarning)
-        return [
-            row
-            for session in sessions
-            for row in estimate_session(ratings, session, wanted)
-        ]
-
-
-def _sessions(ratings: "Ratings", file: Path, by: str | None) -> list[str]:
+def _estimate(
+    ratings: "Ratings", options: _EstimateOptions, by: str | None, file: Path
+) -> "list[AgreementRow]":
     sessions = list(dict.fromkeys(ratings.table["session"]))
     if by is None and len(sessions) > 1:
         raise RatingsError(
             f"{file}: holds {len(sessions)} sessions ({', '.join(sessions)}), so that "
             "raters graded the same item more than once; --by session estimates each"
         )
-    return sessions
+    with warnings.catch_warnings():
+        # Every note is in the result, and so below the table or in the JSON.
+        warnings.simplefilter("ignore", MasrelWarning)
+        return [
+            row
+            for session in sessions
+            for row in _estimate_session(ratings, session, options)
+        ]
+
+
+def _estimate_session(
+    ratings: "Ratings", session: str, options: _EstimateOptions
+) -> "list[AgreementRow]":
+    from masrel.agreement import count_ratings
+    from masrel.ratings import rating_matrix
+    from masrel.report._agreement_table import AgreementRow
+
+    matrix = rating_matrix(ratings, session=session)
+    values = ratings.scale.values
+    counted = count_ratings(ratings.scale.weigh(matrix.grades), values)
+    names = options.names
+    rows: list[AgreementRow] = []
+    refused: list[MasrelError] = []
+    for entry in _entries(names, len(matrix.raters)):
+        title, notes = entry.title, []
+        weights: WeightName = options.weights if entry.weighted else "identity"
+        if weights != "identity":
+            title += f", {weights}"
+        elif weights != options.weights and names != _ALL:
+            notes.append("unweighted, there are no weights for it")
+        estimate = entry(
+            counted, categories=values, weights=weights, level=options.level
+        )
+        # An interval that a coefficient comes with is not computed a second time.
+        is_done = entry.has_interval and (options.interval == "auto" or names == _ALL)
+        if options.target is not None and not is_done:
+            try:
+                interval = _interval(
+                    entry, counted, values, weights, options.target, options
+                )
+                estimate = replace(estimate, interval=interval)
+            except MasrelError as error:
+                if options.coefficients is not None and names != _ALL:
+                    raise  # just these were named: each must have the interval
+                refused.append(error)
+                notes.append(f"no interval: {error}")
+        rows.append(
+            AgreementRow(
+                session=session, title=title, estimate=estimate, notes=tuple(notes)
+            )
+        )
+    if names != _ALL and refused and len(refused) == len(rows):
+        raise refused[0]
+    return rows
+
+
+def _entries(names: tuple[str, ...], n_raters: int) -> list["Coefficient"]:
+    from masrel.agreement import COEFFICIENTS, coefficient
+
+    if names == _ALL:
+        return [
+            entry
+            for entry in COEFFICIENTS.values()
+            if entry.shape == "ratings" and n_raters <= (entry.n_raters[1] or n_raters)
+        ]
+    entries = [coefficient(name) for name in names]
+    for entry in entries:
+        if entry.shape == "pairs":
+            raise ParameterError(
+                f"--coefficients: {entry.name} takes each rater's grades of two "
+                "sessions; masrel analyze computes it from a study's plan"
+            )
+    return entries
+
+
+def _interval(
+    entry: "Coefficient",
+    counted: "CountedRatings",
+    values: tuple[float, ...],
+    weights: "WeightName",
+    target: Target,
+    options: _EstimateOptions,
+) -> Interval | None:
+    from masrel.analysis.interval import planned_interval
+
+    return planned_interval(
+        options.interval,
+        entry.name,
+        counted,
+        target=target,
+        categories=values,
+        weights=weights,
+        level=options.level,
+        n_resamples=options.n_resamples,
+        seed=options.seed,
+    )
+
+
+def _document(rows: "list[AgreementRow]", by: str | None) -> dict[str, object]:
+    documents = [
+        {**({} if by is None else {by: row.session}), **as_document(row.estimate)}
+        for row in rows
+    ]
+    return {"estimates": documents}

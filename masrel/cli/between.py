@@ -1,22 +1,50 @@
 """``masrel between``: model files at even steps between models."""
 
+import hashlib
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from masrel.cli.output import write_json
+import masrel
+from masrel.cli._output import OutputOptions, output_options, write_output
 from masrel.errors import ParameterError
 
 if TYPE_CHECKING:
-    from masrel.cli.between_models import Between
+    from masrel.elbow import ElbowParameters
+    from masrel.report._tables import Table
 
-__all__ = ["command"]
-
-RULE = (
+_RULE = (
     "Of n models in a gap, the i-th is i/(n + 1) of the way, each number interpolated "
     "linearly."
 )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Source:
+    """A model that others are put next to."""
+
+    name: str  # name of a standard model, or that of a file without its ending
+    label: str  # the same with the file and the start of its checksum
+    joint: "ElbowParameters"
+    simulated: bool  # whether it comes from simulated recordings
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Between:
+    """A model between two others."""
+
+    name: str  # ``D01`` and so on
+    # first, second: its neighbours among the sources
+    first: str
+    second: str
+    fraction: str  # of the way from the first to the second
+    simulated: bool  # whether one of them is
+    numbers: dict[str, float]  # L, H, Q and D by the key of a model file
+    document: dict[str, object]  # content of its model file
 
 
 @click.command("between")
@@ -41,18 +69,15 @@ RULE = (
     is_flag=True,
     help="Replace model files of these names that are there.",
 )
-@click.option(
-    "--json",
-    "json_file",
-    type=click.Path(path_type=Path, allow_dash=True),
-    help="Write everything as JSON here; - prints it, and nothing else, on stdout.",
+@output_options(
+    json="Write everything as JSON here; - prints it, and nothing else, on stdout.",
 )
-def command(
+def between(
     models: tuple[str, ...],
     n_models: int,
     folder: Path | None,
     overwrite: bool,
-    json_file: Path | None,
+    output: OutputOptions,
 ) -> None:
     """Put models at even steps between neighbours: dummies that hide standards.
 
@@ -60,22 +85,109 @@ def command(
     says who is whose neighbour. Prints L, H, Q and D of each; a protocol names the
     files.
     """
-    from masrel.cli.between_models import between, read_source
-
+    output.check_files()
     if overwrite and folder is None:
         raise ParameterError("--overwrite: needs --output: nothing is written without")
-    made = between([read_source(model) for model in models], n_models)
-    files = [] if folder is None else _write(made, folder, overwrite=overwrite)
-    if json_file is not None:
-        write_json(_document(made, files), json_file)
-    if json_file != Path("-"):
-        click.echo(_table(made))
+    placed = _place_between([_read_source(model) for model in models], n_models)
+    files = [] if folder is None else _write(placed, folder, overwrite=overwrite)
+    write_output(
+        output, document=lambda: _document(placed, files), text=lambda: _table(placed)
+    )
 
 
-def _write(made: "list[Between]", folder: Path, *, overwrite: bool) -> list[Path]:
+def _read_source(model: str) -> _Source:
+    from masrel.elbow import STANDARD_MODELS
+    from masrel.protocol import read_model_file
+
+    if not model.endswith(".toml"):
+        if model not in STANDARD_MODELS:
+            known = ", ".join(STANDARD_MODELS)
+            raise ParameterError(
+                f"MODEL: needs {known} or a model file (.toml), got {model!r}"
+            )
+        joint = STANDARD_MODELS[model]
+        return _Source(name=model, label=model, joint=joint, simulated=False)
+    path = Path(model)
+    joint = read_model_file(path)
+    content = path.read_bytes()
+    simulated = tomllib.loads(content.decode("utf-8-sig")).get("simulated")
+    if not isinstance(simulated, bool):
+        raise ParameterError(
+            f"{path}: simulated must be true or false: what is made of the model says "
+            f"the same; got {'nothing' if simulated is None else repr(simulated)}"
+        )
+    checksum = hashlib.sha256(content).hexdigest()
+    return _Source(
+        name=path.stem,
+        label=f"{path.stem} ({path}, sha256 {checksum[:16]})",
+        joint=joint,
+        simulated=simulated,
+    )
+
+
+def _place_between(sources: Sequence[_Source], n_models: int) -> list[_Between]:
+    from masrel.elbow import intermediate_models
+
+    joints = {source.name: source.joint for source in sources}
+    if len(joints) < len(sources):
+        names = [source.name for source in sources]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise ParameterError(
+            f"MODEL: needs models whose names differ, got two called {twice}"
+        )
+    gaps = len(sources) - 1
+    if gaps < 1:
+        raise ParameterError(f"MODEL: needs two or more, got {sources[0].name} alone")
+    if n_models < gaps or n_models % gaps:
+        raise ParameterError(
+            f"--number: needs a multiple of {gaps}, one or more in each gap, "
+            f"got {n_models}"
+        )
+    each = n_models // gaps
+    return [
+        _model_between(
+            name,
+            joint,
+            sources[i // each : i // each + 2],
+            f"{i % each + 1}/{each + 1}",
+        )
+        for i, (name, joint) in enumerate(intermediate_models(joints, n_models).items())
+    ]
+
+
+def _model_between(
+    name: str, joint: "ElbowParameters", neighbours: Sequence[_Source], fraction: str
+) -> _Between:
+    from masrel.elbow.identification import model_document
+    from masrel.elbow.identification.model_file import MODEL_KEYS
+
+    first, second = neighbours
+    simulated = first.simulated or second.simulated
+    return _Between(
+        name=name,
+        first=first.name,
+        second=second.name,
+        fraction=fraction,
+        simulated=simulated,
+        numbers={
+            key: getattr(joint, field) * factor
+            for key, (field, factor) in MODEL_KEYS.items()
+        },
+        document=model_document(
+            joint,
+            simulated=simulated,
+            made_from=(
+                f"masrel between {masrel.__version__}: {fraction} of the way from "
+                f"{first.label} to {second.label}"
+            ),
+        ),
+    )
+
+
+def _write(placed: list[_Between], folder: Path, *, overwrite: bool) -> list[Path]:
     from masrel.elbow.identification import as_toml
 
-    files = [folder / f"{model.name}.toml" for model in made]
+    files = [folder / f"{model.name}.toml" for model in placed]
     there = [path.name for path in files if path.exists()]
     if there and not overwrite:
         raise ParameterError(
@@ -84,38 +196,38 @@ def _write(made: "list[Between]", folder: Path, *, overwrite: bool) -> list[Path
             "what is there"
         )
     folder.mkdir(parents=True, exist_ok=True)
-    for path, model in zip(files, made, strict=True):
+    for path, model in zip(files, placed, strict=True):
         path.write_text(as_toml(model.document), encoding="utf-8")
     click.echo(f"models: {folder}, {files[0].name} to {files[-1].name}", err=True)
     return files
 
 
-def _document(made: "list[Between]", files: list[Path]) -> dict[str, object]:
-    named = [str(path) for path in files] if files else [None] * len(made)
+def _document(placed: list[_Between], files: list[Path]) -> dict[str, object]:
+    named = [str(path) for path in files] if files else [None] * len(placed)
     return {
-        "simulated": any(model.simulated for model in made),
-        "rule": RULE,
+        "simulated": any(model.simulated for model in placed),
+        "rule": _RULE,
         "models": [
             {
                 "name": model.name,
                 "from": model.first,
                 "to": model.second,
-                "way": model.way,
+                "way": model.fraction,
                 "file": file,
                 **model.document,
             }
-            for model, file in zip(made, named, strict=True)
+            for model, file in zip(placed, named, strict=True)
         ],
     }
 
 
-def _table(made: "list[Between]") -> str:
+def _table(placed: list[_Between]) -> "Table":
     from masrel.elbow.identification.model_file import MODEL_KEYS
     from masrel.elbow.identification.quantities import QUANTITIES
-    from masrel.report._tables import Column, Table, as_text
+    from masrel.report._tables import Column, Table
 
-    shown = [q for q in QUANTITIES.values() if q.key in MODEL_KEYS]
-    table = Table(
+    quantities = [q for q in QUANTITIES.values() if q.key in MODEL_KEYS]
+    return Table(
         name="between",
         caption="Models between models",
         columns=(
@@ -123,18 +235,17 @@ def _table(made: "list[Between]") -> str:
             Column(key="way", heading="Way", align="left"),
             *(
                 Column(key=q.key, heading=f"{q.symbol} ({q.unit})", digits=3)
-                for q in shown
+                for q in quantities
             ),
         ),
         rows=tuple(
             (
                 model.name,
-                f"{model.way} from {model.first} to {model.second}",
-                *(model.numbers[q.key] for q in shown),
+                f"{model.fraction} from {model.first} to {model.second}",
+                *(model.numbers[q.key] for q in quantities),
             )
-            for model in made
+            for model in placed
         ),
-        notes=(RULE,),
-        data="simulated" if any(model.simulated for model in made) else "foreign",
+        notes=(_RULE,),
+        data="simulated" if any(model.simulated for model in placed) else "foreign",
     )
-    return as_text(table)

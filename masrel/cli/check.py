@@ -10,15 +10,13 @@ from masrel.errors import MasrelError, ParameterError, ProtocolError
 from masrel.protocol import Protocol, StudyPaths, read_protocol, scale_of
 from masrel.schedule import schedule_problems
 
-__all__ = ["check_study", "command"]
-
 
 @click.command("check")
 @click.argument("study", type=click.Path(path_type=Path))
-def command(study: Path) -> None:
+def check(study: Path) -> None:
     """Check the protocol, schedules and ratings of STUDY and say every problem."""
     paths = StudyPaths(study)
-    problems = check_study(paths)
+    problems = _check_study(paths)
     for problem in problems:
         click.echo(problem, err=True)
     if problems:
@@ -27,7 +25,7 @@ def command(study: Path) -> None:
     click.echo(_summary(paths))
 
 
-def check_study(study: StudyPaths) -> tuple[str, ...]:
+def _check_study(study: StudyPaths) -> tuple[str, ...]:
     """Gather the problems of a study from every checker."""
     try:
         protocol = read_protocol(study.protocol)
@@ -81,13 +79,13 @@ _CHECKERS: tuple[Callable[[Protocol, StudyPaths], Iterable[str]], ...] = (
 
 def _summary(study: StudyPaths) -> str:
     protocol = read_protocol(study.protocol)
-    places = [(rater, s.id) for s in protocol.sessions for rater in s.raters]
-    n_drawn = sum(study.schedule_file(*place).is_file() for place in places)
+    pairs = [(rater, s.id) for s in protocol.sessions for rater in s.raters]
+    n_drawn = sum(study.schedule_file(*pair).is_file() for pair in pairs)
     return (
         f"{study.root}: no problems. {_count(len(protocol.models), 'model')}, "
         f"{_count(len(protocol.raters), 'rater')}, "
         f"{_count(len(protocol.sessions), 'session')}; "
-        f"{n_drawn} of {_count(len(places), 'schedule')} drawn."
+        f"{n_drawn} of {_count(len(pairs), 'schedule')} drawn."
     )
 
 

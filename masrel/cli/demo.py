@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import click
 from tqdm import tqdm
 
+from masrel.cli._output import OutputOptions, output_options
 from masrel.errors import MasrelWarning, ParameterError
 from masrel.protocol import (
     Protocol,
@@ -19,8 +20,6 @@ from masrel.protocol import (
 if TYPE_CHECKING:
     from masrel.ratings import Ratings
 
-__all__ = ["command"]
-
 
 @click.command("demo")
 @click.argument("out", type=click.Path(path_type=Path))
@@ -31,8 +30,8 @@ __all__ = ["command"]
     show_default=True,
     help="Bundled study to run.",
 )
-@click.option("--quiet", is_flag=True, help="No progress bars.")
-def command(out: Path, template: str, quiet: bool) -> None:
+@output_options(quiet="No progress bars.")
+def demo(out: Path, template: str, output: OutputOptions) -> None:
     """Run a complete simulated study in OUT and report it, and the published one.
 
     OUT must not exist or be empty. The same seed gives the same schedules, ratings,
@@ -40,6 +39,7 @@ def command(out: Path, template: str, quiet: bool) -> None:
     """
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise ParameterError(f"{out}: needs a new or empty folder for the demo")
+    quiet = output.quiet
     study = StudyPaths(out / "study")
     copy_template(template, study.root)
     protocol = read_protocol(study.protocol)

@@ -17,7 +17,7 @@ _N_NODES = 31
 
 
 @click.group("device")
-def command() -> None:
+def device() -> None:
     """Bring a Barrett Puck up on its CAN bus.
 
     In this order: probe asks who is there, check looks whether a puck can be driven,
@@ -26,7 +26,7 @@ def command() -> None:
     """
 
 
-@command.command("probe")
+@device.command("probe")
 @puck_command
 def probe_command(session: PuckSession) -> None:
     """Ask every node who it is; nothing is set and nobody is woken."""
@@ -47,7 +47,7 @@ def probe_command(session: PuckSession) -> None:
         sys.exit(1)
 
 
-@command.command("check")
+@device.command("check")
 @puck_command
 def check_command(session: PuckSession) -> None:
     """Wake a puck and see whether it can be driven. The arm must be at rest.
@@ -77,7 +77,7 @@ def check_command(session: PuckSession) -> None:
         sys.exit(1)
 
 
-@command.command("zero")
+@device.command("zero")
 @click.option(
     "--angle-deg",
     type=click.FloatRange(0.0, 180.0),
@@ -99,7 +99,7 @@ def zero_command(session: PuckSession, angle_deg: float) -> None:
     )
 
 
-@command.command("friction")
+@device.command("friction")
 @click.option(
     "--arm-is-free",
     is_flag=True,

@@ -1,24 +1,24 @@
 """``masrel fit``: identify a joint, or a device's friction, from recordings."""
 
 import math
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import click
 
-from masrel.cli.fit_figures import draw_friction_fit, draw_joint_fit
-from masrel.cli.notes import notes
-from masrel.cli.output import write_json
+from masrel.cli._output import (
+    OutputOptions,
+    output_options,
+    warnings_as_notes,
+    write_output,
+)
 from masrel.errors import ParameterError
 
 if TYPE_CHECKING:
     from masrel.elbow.identification import ElbowFit, FrictionFit, Movement
     from masrel.elbow.parameters import PostCatch
 
-__all__ = ["command"]
-
-Inertia = Literal["zero", "fitted"]
+_Inertia = Literal["zero", "fitted"]
 
 
 @click.command("fit")
@@ -77,26 +77,22 @@ Inertia = Literal["zero", "fitted"]
     type=click.Path(path_type=Path, file_okay=False),
     help="Draw the fit as PNG and SVG files in this folder.",
 )
-@click.option(
-    "--json",
-    "json_file",
-    type=click.Path(path_type=Path, allow_dash=True),
-    help="Write everything as JSON here; - prints it, and nothing else, on stdout.",
+@output_options(
+    json="Write everything as JSON here; - prints it, and nothing else, on stdout.",
+    quiet="Show no progress.",
 )
-@click.option("--quiet", is_flag=True, help="Show no progress.")
-def command(
+def fit(
     recordings: tuple[Path, ...],
     model_file: Path | None,
     of_device: bool,
     units: tuple[str, ...],
     columns: tuple[str, ...],
     slow_below: float | None,
-    inertia: Inertia,
+    inertia: _Inertia,
     post_catch: "PostCatch",
     level: float,
     folder: Path | None,
-    json_file: Path | None,
-    quiet: bool,
+    output: OutputOptions,
 ) -> None:
     """Identify the joint behind RECORDINGS of slow and fast stretches.
 
@@ -105,82 +101,87 @@ def command(
     its confidence interval, clustered by trial, and what these trials do not
     determine.
     """
+    output.check_files()
     if of_device:
         _check_device_options(model_file, slow_below, inertia, post_catch)
     if slow_below is not None and not slow_below > 0.0:
         raise ParameterError(
             f"--slow-below: needs more than 0 deg/s, got {slow_below:g}"
         )
-    named = _pairs("--column", columns), _pairs("--unit", units)
-    with notes():
-        movements = [_read(path, *named) for path in _shown(recordings, quiet=quiet)]
+    names = _pairs("--column", columns), _pairs("--unit", units)
+    fitted: ElbowFit | FrictionFit
+    with warnings_as_notes():
+        movements = _read(recordings, *names, hides_progress=output.hides_progress)
         if of_device:
-            _friction(movements, level, folder, json_file)
-            return
-        found = _joint(movements, slow_below, inertia, post_catch, level)
-    if folder is not None:
-        draw_joint_fit(found, folder)
-    _say(found, json_file)
+            from masrel.elbow.identification import fit_friction
+
+            fitted = fit_friction(movements, level=level)
+        else:
+            fitted = _fit_joint(movements, slow_below, inertia, post_catch, level)
+    _write(fitted, folder, output)
     if model_file is not None:
-        _write_model(found, model_file)
+        _write_model(fitted, model_file)
 
 
 def _check_device_options(
     model_file: Path | None,
     slow_below: float | None,
-    inertia: Inertia,
+    inertia: _Inertia,
     post_catch: "PostCatch",
 ) -> None:
     if model_file is not None:
         raise ParameterError("--output: a model file is of a joint, not of a device")
-    given = {
+    joint_options = {
         "--slow-below": slow_below is not None,
         "--inertia": inertia != "zero",
         "--post-catch": post_catch != "continuous",
     }
-    idle = [option for option, is_given in given.items() if is_given]
+    idle = [option for option, is_used in joint_options.items() if is_used]
     if idle:
         raise ParameterError(
             f"{idle[0]}: says something of a joint, not of a device (--friction)"
         )
 
 
-def _pairs(option: str, given: tuple[str, ...]) -> dict[str, str]:
-    made = {}
-    for entry in given:
+def _pairs(option: str, entries: tuple[str, ...]) -> dict[str, str]:
+    pairs = {}
+    for entry in entries:
         key, sign, value = entry.partition("=")
         if not sign or not value:
             raise ParameterError(f"{option}: needs QUANTITY=TEXT, got {entry!r}")
-        made[key] = value
-    return made
+        pairs[key] = value
+    return pairs
 
 
-def _shown(paths: tuple[Path, ...], *, quiet: bool) -> "Iterator[Path]":
+def _read(
+    paths: tuple[Path, ...],
+    columns: dict[str, str],
+    units: dict[str, str],
+    *,
+    hides_progress: bool | None,
+) -> "list[Movement]":
     from tqdm import tqdm
 
-    hidden = quiet or None  # None: shown at a terminal alone
-    yield from tqdm(paths, desc="reading", unit="file", disable=hidden, delay=1.0)
-
-
-def _read(path: Path, columns: dict[str, str], units: dict[str, str]) -> "Movement":
     from masrel.elbow.identification import read_movement
 
-    return read_movement(path, columns=columns, units=units)
+    with tqdm(
+        paths, desc="reading", unit="file", disable=hides_progress, delay=1.0
+    ) as bar:
+        return [read_movement(path, columns=columns, units=units) for path in bar]
 
 
-def _joint(
+def _fit_joint(
     movements: "list[Movement]",
     slow_below: float | None,
-    inertia: Inertia,
+    inertia: _Inertia,
     post_catch: "PostCatch",
     level: float,
 ) -> "ElbowFit":
     from dataclasses import replace
 
-    from masrel.elbow import STANDARD_MODELS
-    from masrel.elbow.identification import fit
+    from masrel.elbow import STANDARD_MODELS, identification
 
-    return fit(
+    return identification.fit(
         movements,
         constants=replace(STANDARD_MODELS["HM1"], post_catch=post_catch),
         inertia=inertia,
@@ -189,44 +190,35 @@ def _joint(
     )
 
 
-def _friction(
-    movements: "list[Movement]",
-    level: float,
-    folder: Path | None,
-    json_file: Path | None,
+def _write(
+    fitted: "ElbowFit | FrictionFit", folder: Path | None, output: OutputOptions
 ) -> None:
-    from masrel.elbow.identification import fit_friction
+    from masrel.report._fits import fit_document, fit_figures, fit_table
 
-    found = fit_friction(movements, level=level)
     if folder is not None:
-        draw_friction_fit(found, folder)
-    _say(found, json_file)
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, drawn in fit_figures(fitted).items():
+            (folder / f"{name}.png").write_bytes(drawn.png)
+            (folder / f"{name}.svg").write_bytes(drawn.svg)
+        click.echo(f"figures: {folder}", err=True)
+    write_output(
+        output,
+        document=lambda: fit_document(fitted),
+        text=lambda: fit_table(fitted),
+    )
 
 
-def _write_model(found: "ElbowFit", path: Path) -> None:
+def _write_model(fitted: "ElbowFit | FrictionFit", path: Path) -> None:
     import masrel
-    from masrel.elbow.identification import as_toml, model_document
+    from masrel.elbow.identification import ElbowFit, as_toml, model_document
 
+    if not isinstance(fitted, ElbowFit):
+        raise ParameterError("--output: a model file is of a joint, not of a device")
     document = model_document(
-        found.joint(),
-        simulated=found.simulated,
-        made_from=f"masrel fit {masrel.__version__}, {len(found.trials)} trials",
-        fit=found,
+        fitted.joint(),
+        simulated=fitted.simulated,
+        made_from=f"masrel fit {masrel.__version__}, {len(fitted.trials)} trials",
+        fit=fitted,
     )
     path.write_text(as_toml(document), encoding="utf-8")
     click.echo(f"model: {path}", err=True)
-
-
-def _say(found: "ElbowFit | FrictionFit", json_file: Path | None) -> None:
-    if json_file is not None:
-        from masrel.cli.fit_document import fit_document
-
-        write_json(fit_document(found), json_file)
-    if json_file == Path("-"):
-        return
-    from masrel.elbow.identification import ElbowFit
-    from masrel.report._tables import as_text
-    from masrel.report.fit_table import fit_table, friction_table
-
-    table = fit_table(found) if isinstance(found, ElbowFit) else friction_table(found)
-    click.echo(as_text(table))

@@ -1,31 +1,28 @@
 """``masrel grading``: what grades follow, by ordered regression."""
 
 import math
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import click
 
-from masrel.cli.columns import listed
-from masrel.cli.folders import check_folders
-from masrel.cli.material import read_material
-from masrel.cli.notes import notes
-from masrel.cli.output import write_json
+from masrel.cli._options import ratings_option, read_study, split_commas
+from masrel.cli._output import (
+    OutputOptions,
+    output_options,
+    warnings_as_notes,
+    write_output,
+)
 
 if TYPE_CHECKING:
     from masrel.analysis.grading import Effect, GradeRegression
-
-__all__ = ["command"]
+    from masrel.report._tables import Table
 
 
 @click.command("grading")
 @click.argument("study", type=click.Path(path_type=Path))
-@click.option(
-    "--ratings",
-    "ratings_file",
-    type=click.Path(path_type=Path),
-    help="File of ratings; default: the study's ratings.csv, else published.csv.",
-)
+@ratings_option
 @click.option(
     "--on",
     "predictors",
@@ -41,82 +38,79 @@ __all__ = ["command"]
 )
 @click.option("--session", help="Ratings of this session alone.")
 @click.option("--level", type=float, default=0.95, show_default=True)
-@click.option(
-    "--json",
-    "json_file",
-    type=click.Path(path_type=Path, allow_dash=True),
-    help="Write the result here; - prints it, and nothing else, on stdout.",
+@output_options(
+    json="Write the result here; - prints it, and nothing else, on stdout.",
 )
-def command(
+def grading(
     study: Path,
     ratings_file: Path | None,
     predictors: str,
     models: Literal["standard", "dummy", "all"],
     session: str | None,
     level: float,
-    json_file: Path | None,
+    output: OutputOptions,
 ) -> None:
     """Regress the grades of STUDY on the models' L, H, Q, D and the speed.
 
     Prints by how much one standard deviation of each multiplies the odds of a higher
     grade, the others held.
     """
-    check_folders(json=json_file)
+    output.check_files()
     from masrel.analysis.grading import grade_regression
 
-    material = read_material(study, ratings_file)
-    with notes():
-        found = grade_regression(
-            material.protocol,
-            material.ratings,
-            predictors=tuple(listed(predictors)),
+    data = read_study(study, ratings_file)
+    with warnings_as_notes():
+        regression = grade_regression(
+            data.protocol,
+            data.ratings,
+            predictors=tuple(split_commas(predictors)),
             models=models,
             session=session,
             level=level,
         )
-    if json_file is not None:
-        write_json(_document(found), json_file)
-    if json_file != Path("-"):
-        click.echo(_table(found))
+    write_output(
+        output,
+        document=lambda: _document(regression),
+        text=lambda: _table(regression),
+    )
 
 
-def _document(found: "GradeRegression") -> dict[str, object]:
-    from dataclasses import asdict
-
-    def known(value: object) -> object:
-        if isinstance(value, float) and not math.isfinite(value):
-            return None
-        if isinstance(value, dict):
-            return {key: known(part) for key, part in value.items()}
-        if isinstance(value, list | tuple):
-            return [known(part) for part in value]
-        return value
-
-    return {key: known(value) for key, value in asdict(found).items()}
+def _document(regression: "GradeRegression") -> dict[str, object]:
+    return {key: _plain(value) for key, value in asdict(regression).items()}
 
 
-def _table(found: "GradeRegression") -> str:
-    from masrel.report._tables import Column, Table, as_text
+def _plain(value: object) -> object:
+    # JSON has no nan and no infinity
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if isinstance(value, dict):
+        return {key: _plain(part) for key, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(part) for part in value]
+    return value
 
-    table = Table(
+
+def _table(regression: "GradeRegression") -> "Table":
+    from masrel.report._tables import Column, Table
+
+    return Table(
         name="grading",
         caption="Odds of a higher grade, per standard deviation",
         columns=(
             Column(key="predictor", heading="Predictor", align="left"),
             Column(key="per", heading="Standard deviation"),
             Column(key="odds_ratio", heading="Odds ratio", digits=2),
-            Column(key="interval", heading=f"{100.0 * found.level:g} % interval"),
+            Column(key="interval", heading=f"{100.0 * regression.level:g} % interval"),
         ),
-        rows=tuple(_row(effect) for effect in found.effects),
+        rows=tuple(_row(effect) for effect in regression.effects),
         notes=(
-            f"{found.n_ratings} ratings of {found.n_models} models by "
-            f"{found.n_raters} raters, {found.n_missing} without a grade or speed left "
-            "out; errors are clustered by rater.",
-            *(f"{name} is left out: {why}." for name, why in found.dropped),
+            f"{regression.n_ratings} ratings of {regression.n_models} models by "
+            f"{regression.n_raters} raters, {regression.n_missing} without a grade or "
+            "speed left out; errors are clustered by rater.",
+            *(f"{name} is left out: {why}." for name, why in regression.dropped),
         ),
-        data="simulated" if found.simulated else "foreign",
+        data="simulated" if regression.simulated else "foreign",
     )
-    return as_text(table)
 
 
 def _row(effect: "Effect") -> tuple[str, str, float, str]:

@@ -6,8 +6,6 @@ import click
 
 from masrel.protocol import copy_template
 
-__all__ = ["command"]
-
 
 @click.command("init")
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
@@ -19,7 +17,7 @@ __all__ = ["command"]
     metavar="NAME",
     help="Bundled study to copy: small, a template to edit, or hess2012.",
 )
-def command(folder: Path, template: str) -> None:
+def init(folder: Path, template: str) -> None:
     """Make a new study in DIR, which must not exist or be empty."""
     copy_template(template, folder)
     click.echo(f"{folder}: a study made from {template}. Next:")

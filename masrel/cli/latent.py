@@ -5,16 +5,13 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
-from masrel.cli.agreement_rows import scale_notes
-from masrel.cli.columns import Columns, column_options
-from masrel.cli.latent_output import Output, output_options, put
+from masrel.cli._options import ColumnOptions, column_options, scale_notes
+from masrel.cli._output import OutputOptions, output_options, write_output
 from masrel.errors import ParameterError, RatingsError
 
 if TYPE_CHECKING:
     from masrel.intervals import LatentTrait
     from masrel.ratings import Ratings
-
-__all__ = ["command"]
 
 
 @click.command("latent")
@@ -34,18 +31,21 @@ __all__ = ["command"]
     is_flag=True,
     help="Leave out the other prior: half the time, and its influence unseen.",
 )
-@output_options
-@click.option("--quiet", is_flag=True, help="No progress bar.")
-def command(
+@output_options(
+    json="Write the result here; - prints it, and nothing else, on stdout.",
+    figure="Draw the scale into this .png, .svg or .pdf.",
+    csv="Print every digit as CSV.",
+    quiet="No progress bar.",
+)
+def latent(
     file: Path,
     items: Literal["fixed", "random"],
-    columns: Columns,
+    columns: ColumnOptions,
     session: str | None,
     level: float,
     seed: int,
     one_prior: bool,
-    output: Output,
-    quiet: bool,
+    output: OutputOptions,
 ) -> None:
     """Place the raters and items in FILE on one scale.
 
@@ -53,24 +53,43 @@ def command(
     latent-trait model gives kappa for new raters, each rater's bias and noise, each
     item's severity, and the thresholds between grades. It takes seconds to minutes.
     """
+    output.check_files()
     if seed < 0:
         raise ParameterError(f"--seed: needs at least 0, got {seed}")
     ratings = columns.read(file)
-    about = _about(ratings)
-    found = _sample(
+    notes = _scale_notes(ratings)
+    result = _sample(
         ratings,
         _only_session(ratings, file, session),
         items=items,
         level=level,
         seed=seed,
         compare=not one_prior,
-        quiet=quiet,
+        hides_progress=output.hides_progress,
     )
-    put(output, found, ratings, file=file, about=about)
+    from masrel.report._latent_trait import (
+        latent_document,
+        latent_figure,
+        latent_table,
+    )
+
+    grades, simulated = ratings.scale.grades, ratings.simulated
+    write_output(
+        output,
+        document=lambda: latent_document(result),
+        text=lambda: latent_table(
+            result,
+            caption=f"Latent-trait model of the ratings in {file}",
+            notes=notes,
+            data="simulated" if simulated else "foreign",
+        ),
+        draw=lambda form: latent_figure(result, grades, simulated=simulated, form=form),
+        notes=notes,
+    )
 
 
-def _about(ratings: "Ratings") -> tuple[str, ...]:
-    # which scale was taken, where none was declared
+def _scale_notes(ratings: "Ratings") -> tuple[str, ...]:
+    # as of agree, but that the model needs an order whatever the weights
     try:
         return scale_notes(ratings, "linear")
     except ParameterError as error:
@@ -86,12 +105,12 @@ def _only_session(ratings: "Ratings", file: Path, session: str | None) -> str:
         return str(sessions[0])
     if session in sessions:
         return str(session)
-    held = ", ".join(sessions)
+    known = ", ".join(sessions)
     if session is None:
         raise RatingsError(
-            f"{file}: holds {len(sessions)} sessions ({held}); --session chooses one"
+            f"{file}: holds {len(sessions)} sessions ({known}); --session chooses one"
         )
-    raise RatingsError(f"{file}: holds no session {session}, but {held}")
+    raise RatingsError(f"{file}: holds no session {session}, but {known}")
 
 
 def _sample(
@@ -102,7 +121,7 @@ def _sample(
     level: float,
     seed: int,
     compare: bool,
-    quiet: bool,
+    hides_progress: bool | None,
 ) -> "LatentTrait":
     import pandas as pd
     from tqdm import tqdm
@@ -113,7 +132,9 @@ def _sample(
     matrix = rating_matrix(ratings, session=session)
     table = pd.DataFrame(matrix.grades, index=matrix.items, columns=matrix.raters)
     # nothing is shown of a call that is refused at once
-    with tqdm(desc="sampling", unit=" steps", delay=0.01, disable=quiet or None) as bar:
+    with tqdm(
+        desc="sampling", unit=" steps", delay=0.01, disable=hides_progress
+    ) as bar:
         return latent_trait(
             table,
             items=items,

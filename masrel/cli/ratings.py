@@ -6,8 +6,6 @@ import click
 
 from masrel.protocol import StudyPaths, read_protocol
 
-__all__ = ["command"]
-
 
 @click.command("ratings")
 @click.argument("study", type=click.Path(path_type=Path))
@@ -17,7 +15,7 @@ __all__ = ["command"]
     type=click.Path(path_type=Path),
     help="File to write; default: STUDY/ratings/ratings.csv.",
 )
-def command(study: Path, output: Path | None) -> None:
+def ratings(study: Path, output: Path | None) -> None:
     """Collect the ratings of STUDY from its session logs.
 
     Every chain of hashes is verified, and every recording that is there is held

@@ -5,10 +5,8 @@ from pathlib import Path
 import click
 from tqdm import tqdm
 
-from masrel.cli.material import read_material
-from masrel.cli.notes import notes
-
-__all__ = ["command"]
+from masrel.cli._options import ratings_option, read_study
+from masrel.cli._output import OutputOptions, output_options, warnings_as_notes
 
 
 @click.command("report")
@@ -20,15 +18,13 @@ __all__ = ["command"]
     type=click.Path(path_type=Path, file_okay=False),
     help="Folder to write into; default: STUDY/report.",
 )
-@click.option(
-    "--ratings",
-    "ratings_file",
-    type=click.Path(path_type=Path),
-    help="File of ratings; default: the study's ratings.csv, else published.csv.",
-)
-@click.option("--quiet", is_flag=True, help="No progress bar.")
-def command(
-    study: Path, destination: Path | None, ratings_file: Path | None, quiet: bool
+@ratings_option
+@output_options(quiet="No progress bar.")
+def report(
+    study: Path,
+    destination: Path | None,
+    ratings_file: Path | None,
+    output: OutputOptions,
 ) -> None:
     """Write the report of STUDY: HTML, Markdown, tables and figures.
 
@@ -38,23 +34,21 @@ def command(
     from masrel.analysis import analyze
     from masrel.report import write_report
 
-    material = read_material(study, ratings_file)
-    with notes():
-        analysis = analyze(
-            material.protocol, material.ratings, in_person=material.in_person
-        )
-    with tqdm(desc="report", unit=" parts", disable=quiet or None) as bar:
+    data = read_study(study, ratings_file)
+    with warnings_as_notes():
+        analysis = analyze(data.protocol, data.ratings, in_person=data.in_person)
+    with tqdm(desc="report", unit=" parts", disable=output.hides_progress) as bar:
 
         def progress(part: str) -> None:
             bar.set_postfix_str(part, refresh=False)
             bar.update()
 
         files = write_report(
-            material.protocol,
-            material.ratings,
+            data.protocol,
+            data.ratings,
             analysis,
-            destination or material.paths.root / "report",
-            in_person=material.in_person,
+            destination or data.paths.root / "report",
+            in_person=data.in_person,
             progress=progress,
         )
     click.echo(files.html)

@@ -6,13 +6,11 @@ from typing import TYPE_CHECKING, Literal
 import click
 from tqdm import tqdm
 
-from masrel.cli.notes import notes
+from masrel.cli._output import OutputOptions, output_options, warnings_as_notes
 from masrel.protocol import Protocol, StudyPaths, read_protocol, scale_of
 
 if TYPE_CHECKING:
     from masrel.run import GradeSource
-
-__all__ = ["command"]
 
 
 @click.command("run")
@@ -31,18 +29,18 @@ __all__ = ["command"]
     type=click.Choice(["real", "simulated"]),
     help="Clock of the control loop; default: real, for simulated grades simulated.",
 )
-@click.option("--quiet", is_flag=True, help="No progress bar and no closing line.")
+@output_options(quiet="No progress bar and no closing line.")
 @click.option("--correct", metavar="CODE", help="Correct the grade of this code.")
 @click.option("--grade", help="With --correct: what the grade should have been.")
 @click.option("--who", help="With --correct: who corrects it.")
 @click.option("--why", help="With --correct: for what reason.")
-def command(
+def run(
     study: Path,
     rater: str,
     session: str,
     grades: Literal["console", "simulated"],
     clock: Literal["real", "simulated"] | None,
-    quiet: bool,
+    output: OutputOptions,
     correct: str | None,
     grade: str | None,
     who: str | None,
@@ -57,7 +55,7 @@ def command(
     protocol = read_protocol(paths.protocol)
     if correct is None:
         _refuse_strays({"--grade": grade, "--who": who, "--why": why})
-        _run(paths, protocol, rater, session, grades, clock, quiet=quiet)
+        _run(paths, protocol, rater, session, grades, clock, quiet=output.quiet)
         return
     from masrel.run import record_correction
 
@@ -66,15 +64,15 @@ def command(
     record_correction(
         paths, protocol, rater, session, code=correct, grade=grade, who=who, why=why
     )
-    if not quiet:
+    if not output.quiet:
         click.echo(
             f"{correct} of {rater}, session {session}, is now {grade}; the first grade "
             f"stays in {paths.log_file(rater, session)}. Then: masrel ratings"
         )
 
 
-def _refuse_strays(given: dict[str, str | None]) -> None:
-    strays = [name for name, value in given.items() if value is not None]
+def _refuse_strays(options: dict[str, str | None]) -> None:
+    strays = [name for name, value in options.items() if value is not None]
     if strays:
         raise click.UsageError(f"{', '.join(strays)} needs --correct CODE too")
 
@@ -95,7 +93,7 @@ def _run(
     # A person's prompts count the presentations themselves.
     hidden = quiet or grades == "console"
     with (
-        notes(),
+        warnings_as_notes(),
         tqdm(total=n_presentations, unit="", desc=rater, disable=hidden or None) as bar,
     ):
         done = run_session(

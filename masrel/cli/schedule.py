@@ -7,8 +7,6 @@ import click
 from masrel.protocol import StudyPaths, read_protocol
 from masrel.schedule import write_schedules
 
-__all__ = ["command"]
-
 
 @click.command("schedule")
 @click.argument("study", type=click.Path(path_type=Path))
@@ -17,7 +15,7 @@ __all__ = ["command"]
     is_flag=True,
     help="Draw schedules anew that no longer fit the protocol.",
 )
-def command(study: Path, redraw: bool) -> None:
+def schedule(study: Path, redraw: bool) -> None:
     """Draw each rater's schedule and blinded sheet for every session of STUDY.
 
     Schedules are drawn once: those that are there stay as they are. When the

@@ -1,20 +1,223 @@
 """``masrel trace``: events, torque and samples of stretches of models."""
 
-from collections.abc import Sequence
+import csv
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 from tqdm import tqdm
 
-from masrel.cli.trace_files import Files, file_options, write_files
-from masrel.cli.trace_joint import Law, joints_of, law_options
-from masrel.cli.trace_motion import Asked, motion_of, motion_options
-from masrel.cli.trace_scene import Scene, Wanted, document, output_options
-from masrel.cli.trace_text import summary, table
+from masrel.cli._options import grouped
+from masrel.cli._output import (
+    OutputOptions,
+    check_folder,
+    figure_form,
+    output_options,
+    write_output,
+)
+from masrel.errors import ParameterError
+from masrel.report._traced_scenes import (
+    SCENE_OUTPUTS,
+    SCENE_VIEWS,
+    Scene,
+    check_view,
+    scene_document,
+    scene_text,
+    scenes_figure,
+    scenes_text,
+)
 
-__all__ = ["command"]
+if TYPE_CHECKING:
+    from masrel.elbow import ElbowParameters, Motion
 
-MOST_SPEEDS = 100_000
+_KINDS = ("constant", "minimum-jerk", "trapezoid", "recording")
+_COLUMNS = ("time_s", "angle_deg", "velocity_deg_s", "torque_nm", "phase")
+_PATH = click.Path(path_type=Path)
+
+_MAX_SPEEDS = 100_000
+_MAX_REPEATS = 1000  # which take a second to solve
+_MAX_SAMPLES = 5_000_000  # rows of a CSV file: at 1 kHz 83 minutes, and some 400 MB
+_N_AT_ONCE = 10_000  # rows between two signs of progress
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _MotionOptions:
+    """A motion as the command line has it; degrees and seconds."""
+
+    kind: str  # one of `_KINDS`
+    # start, end: deg; None for the usual ones, or those of a recording
+    start: float | None
+    end: float | None
+    acceleration: float | None  # of a trapezoid, deg/s²
+    recording: Path | None  # the file of a recording
+    interpolation: str | None  # of a recording
+    # stop, pause: when it is stopped and for how long, s
+    stop: float | None
+    pause: float | None
+    repeats: int  # how often it is made, with the way back in between
+
+    def __post_init__(self) -> None:
+        if (self.kind == "recording") != (self.recording is not None):
+            raise ParameterError(
+                "--recording: goes with --motion recording, and that needs a file"
+            )
+        if (self.kind == "trapezoid") != (self.acceleration is not None):
+            raise ParameterError(
+                "--acceleration-deg-s2: goes with --motion trapezoid, and that needs it"
+            )
+        if self.recording is None and self.interpolation is not None:
+            raise ParameterError("--interpolation: goes with --motion recording")
+        if self.recording is not None and (self.start, self.end) != (None, None):
+            raise ParameterError(
+                "--from-deg, --to-deg: a recording starts and ends where it does"
+            )
+        if (self.stop is None) != (self.pause is None):
+            raise ParameterError("--stop-at-s, --pause-s: each needs the other")
+        if self.pause is not None and not 0.0 < self.pause < math.inf:
+            raise ParameterError(
+                f"--pause-s: needs more than 0 and finite, got {self.pause:g} s"
+            )
+        if not 1 <= self.repeats <= _MAX_REPEATS:
+            raise ParameterError(
+                f"--repeat: needs 1 to {_MAX_REPEATS}, got {self.repeats}"
+            )
+
+    @property
+    def ends_deg(self) -> tuple[float, float]:
+        """Where it starts and ends unless it is a recording, deg."""
+        start = 30.0 if self.start is None else self.start
+        return start, 146.0 if self.end is None else self.end
+
+
+_motion_options = grouped(
+    "stretch",
+    _MotionOptions,
+    click.option(
+        "--motion", "kind", type=click.Choice(_KINDS), default="constant",
+        show_default=True,
+    ),
+    click.option("--from-deg", "start", type=float, help="[default: 30]"),
+    click.option("--to-deg", "end", type=float, help="[default: 146]"),
+    click.option(
+        "--acceleration-deg-s2", "acceleration", type=float,
+        help="Of a trapezoid's ramps.",
+    ),
+    click.option(
+        "--recording", type=click.Path(path_type=Path),
+        help="CSV with time_s and angle_deg, or npz.",
+    ),
+    click.option(
+        "--interpolation", type=click.Choice(["pchip", "linear"]),
+        help="Between the samples of a recording.  [default: pchip]",
+    ),
+    click.option("--stop-at-s", "stop", type=float, help="Stop the arm at this time."),
+    click.option(
+        "--pause-s", "pause", type=float, help="And hold it for as long as this."
+    ),
+    click.option(
+        "--repeat", "repeats", type=int, default=1, show_default=True,
+        help="Stretch so often, flexing in between as the stretch was made.",
+    ),
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _LawOptions:
+    """What the command line changes of every joint; None changes nothing."""
+
+    rest: float | None  # θ_rest, deg
+    post_catch: str | None  # reading of (5)
+    reading: str | None  # reading of Q
+    rise: float | None  # how long torque takes to its peak, s
+    inertia: float | None  # m of (1) and (5), kg·m²
+
+    def change(self, joint: "ElbowParameters") -> "ElbowParameters":
+        """Return a joint with these changes."""
+        changes: dict[str, object] = {
+            "rest_angle": None if self.rest is None else math.radians(self.rest),
+            "post_catch": self.post_catch,
+            "residual_reading": self.reading,
+            "catch_rise": self.rise,
+            "inertia": self.inertia,
+        }
+        changes = {name: value for name, value in changes.items() if value is not None}
+        return replace(joint, **changes)  # type: ignore[arg-type]
+
+
+_law_options = grouped(
+    "law",
+    _LawOptions,
+    click.option("--rest-deg", "rest", type=float, help="θ_rest; default: the start."),
+    click.option(
+        "--post-catch", type=click.Choice(["continuous", "additive"]),
+        help="How (5) is read.",
+    ),
+    click.option(
+        "--q-reading", "reading", type=click.Choice(["residual", "decrease"]),
+        help="What Q is a share of the peak for.",
+    ),
+    click.option(
+        "--catch-rise-s", "rise", type=float, help="Smooth the catch's onset."
+    ),
+    click.option("--inertia-kg-m2", "inertia", type=float, help="m of (1) and (5)."),
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _SampleOptions:
+    """The file of samples."""
+
+    rate_hz: float | None  # samples a second; None for 1000
+    csv_file: Path | None
+
+    def __post_init__(self) -> None:
+        if self.rate_hz is not None and self.csv_file is None:
+            raise ParameterError("--rate-hz: goes with --csv, whose samples it spaces")
+        if self.rate_hz is not None and not math.isfinite(self.rate_hz):
+            raise ParameterError(f"--rate-hz: needs a finite rate, got {self.rate_hz}")
+        if self.csv_file == Path("-"):
+            raise ParameterError("--csv: needs the name of a file, got -")
+
+
+_sample_options = grouped(
+    "samples",
+    _SampleOptions,
+    click.option(
+        "--rate-hz", type=click.FloatRange(min=0.0, min_open=True),
+        help="Samples a second of --csv.  [default: 1000]",
+    ),
+    click.option("--csv", "csv_file", type=_PATH, help="Write the samples here."),
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _QuantityOptions:
+    """What is computed of every scene beside events and peak."""
+
+    outputs: tuple[str, ...]  # of `SCENE_OUTPUTS`
+    times: tuple[float, ...]  # where torque is computed, s
+    angles: tuple[float, ...]  # where it is computed, deg
+
+
+_quantity_options = grouped(
+    "quantities",
+    _QuantityOptions,
+    click.option(
+        "--output", "outputs", type=click.Choice(tuple(SCENE_OUTPUTS)), multiple=True,
+        help="What to compute beside events and peak; may be given again.",
+    ),
+    click.option(
+        "--at-s", "times", type=float, multiple=True, help="Torque at this time."
+    ),
+    click.option(
+        "--at-deg", "angles", type=float, multiple=True,
+        help="Torque where this angle is first reached.",
+    ),
+)  # fmt: skip
 
 
 @click.command("trace")
@@ -28,51 +231,83 @@ MOST_SPEEDS = 100_000
 )  # fmt: skip
 @click.option(
     "--speeds-deg-s", "speed_range",
-    type=(float, float, click.IntRange(min=2, max=MOST_SPEEDS)),
+    type=(float, float, click.IntRange(min=2, max=_MAX_SPEEDS)),
     metavar="LOW HIGH N", help="N speeds from LOW to HIGH.",
 )  # fmt: skip
-@motion_options
+@_motion_options
 @click.option(
     "--study",
     type=click.Path(path_type=Path),
     help="Take models from this study's protocol.",
 )
-@law_options
-@output_options
-@file_options
+@_law_options
+@_quantity_options
+@_sample_options
+@output_options(
+    json="Write events and outputs as JSON here; - for the screen.",
+    figure="Draw this file: .png, .svg or .pdf.",
+)
+@click.option(
+    "--view", type=click.Choice(SCENE_VIEWS),
+    help="What --figure shows: torque by angle or time, the catches, or one of "
+    "them.  [default: angle]",
+)  # fmt: skip
 @click.option("--quiet", is_flag=True, help="Show no progress.")
-def command(
+def trace(
     models: tuple[str, ...],
     speeds: tuple[float, ...],
     speed_range: tuple[float, float, int] | None,
-    asked: Asked,
+    stretch: _MotionOptions,
     study: Path | None,
-    law: Law,
-    wanted: Wanted,
-    files: Files,
-    quiet: bool,
+    law: _LawOptions,
+    quantities: _QuantityOptions,
+    samples: _SampleOptions,
+    output: OutputOptions,
+    view: str | None,
 ) -> None:
     """Phases, peak torque and samples of stretches of models.
 
     Events and outputs are exact; the samples of --csv are what the controller commands
     at --rate-hz for that motion. Several models or speeds make one scene of each pair.
     """
-    scenes = _scenes(models, study, law, asked, [*speeds, *_spread(speed_range)])
-    files.check(scenes)
+    if view is not None and output.figure is None:
+        raise ParameterError("--view: goes with --figure, whose contents it chooses")
+    joints = _joints_of(models, study, law)
+    scenes = _scenes(joints, stretch, [*speeds, *_spaced(speed_range)])
+    check_folder("--csv", samples.csv_file)
+    output.check_files()
+    view = view or SCENE_VIEWS[0]
+    if output.figure is not None:
+        check_view(scenes, view)
     documents = [
-        document(scene, wanted)
-        for scene in tqdm(scenes, desc="scenes", delay=1.0, disable=quiet or None)
+        scene_document(
+            scene,
+            outputs=quantities.outputs,
+            times=quantities.times,
+            angles=quantities.angles,
+        )
+        for scene in tqdm(
+            scenes, desc="scenes", delay=1.0, disable=output.hides_progress
+        )
     ]
-    write_files(files, scenes, documents, quiet=quiet)
-    if files.json_file == "-":
-        return
-    if len(scenes) == 1:
-        click.echo(summary(documents[0], scenes[0].title))
-    else:
-        click.echo(table(documents))
+    if samples.csv_file is not None:
+        _write_samples(samples, scenes, documents, output.hides_progress)
+    if output.figure is not None:
+        form = figure_form(output.figure)
+        output.figure.write_bytes(scenes_figure(scenes, view, form=form))
+    only = documents[0] if len(documents) == 1 else None
+    write_output(
+        output,
+        document=lambda: {"scenes": documents} if only is None else only,
+        text=lambda: (
+            scenes_text(documents)
+            if only is None
+            else scene_text(only, scenes[0].title)
+        ),
+    )
 
 
-def _spread(speed_range: tuple[float, float, int] | None) -> list[float]:
+def _spaced(speed_range: tuple[float, float, int] | None) -> list[float]:
     if speed_range is None:
         return []
     low, high, n = speed_range
@@ -80,25 +315,177 @@ def _spread(speed_range: tuple[float, float, int] | None) -> list[float]:
 
 
 def _scenes(
-    models: Sequence[str],
-    study: Path | None,
-    law: Law,
-    asked: Asked,
+    joints: "dict[str, ElbowParameters]",
+    stretch: _MotionOptions,
     speeds: Sequence[float],
 ) -> list[Scene]:
-    # one of each model and speed, whatever is given twice
-    joints = joints_of(models, study, law)
-    motions = {speed: motion_of(asked, speed) for speed in speeds or (None,)}
-    return [
-        Scene(
-            model=model,
-            kind=asked.kind,
-            speed_deg_s=speed,
-            start_deg=asked.ends(motion)[0],
-            end_deg=asked.ends(motion)[1],
-            parameters=joint,
-            motion=motion,
+    # one of each model and speed, however often an option repeats it
+    motions = {speed: _motion_of(stretch, speed) for speed in speeds or (None,)}
+    scenes = []
+    for model, joint in joints.items():
+        for speed, motion in motions.items():
+            start, end = stretch.ends_deg
+            if stretch.recording is not None:
+                start, end = math.degrees(motion.start), math.degrees(motion.end)
+            scene = Scene(
+                model=model,
+                kind=stretch.kind,
+                speed_deg_s=speed,
+                start_deg=start,
+                end_deg=end,
+                parameters=joint,
+                motion=motion,
+            )
+            scenes.append(scene)
+    return scenes
+
+
+def _joints_of(
+    models: Sequence[str], study: Path | None, law: _LawOptions
+) -> dict[str, "ElbowParameters"]:
+    joints: dict[str, ElbowParameters] = {}
+    for model in dict.fromkeys(models):
+        is_file = model.endswith(".toml")
+        name = Path(model).stem if is_file else model
+        if name in joints:
+            raise ParameterError(
+                f"--model: needs models whose names differ, got two called {name}"
+            )
+        joints[name] = law.change(
+            _joint_in_file(model, study) if is_file else _named_joint(model, study)
         )
-        for model, joint in joints.items()
-        for speed, motion in motions.items()
-    ]
+    return joints
+
+
+def _joint_in_file(model: str, study: Path | None) -> "ElbowParameters":
+    from masrel.protocol import read_model_file
+
+    if study is not None:
+        raise ParameterError(
+            f"--model: needs a model of --study, got the file {model}; without --study "
+            "it is read with the usual constants"
+        )
+    return read_model_file(Path(model))
+
+
+def _named_joint(model: str, study: Path | None) -> "ElbowParameters":
+    from masrel.elbow import STANDARD_MODELS
+
+    if study is not None:
+        from masrel.protocol import StudyPaths, elbow_parameters, read_protocol
+
+        return elbow_parameters(read_protocol(StudyPaths(study).protocol), model)
+    if model not in STANDARD_MODELS:
+        raise ParameterError(
+            f"--model: needs one of {', '.join(STANDARD_MODELS)}, or a model file "
+            f"(.toml), or --study to name a study's own, got {model!r}"
+        )
+    return STANDARD_MODELS[model]
+
+
+def _motion_of(stretch: _MotionOptions, speed_deg_s: float | None) -> "Motion":
+    from masrel.elbow import Joined, Reversed, interrupted
+
+    once = _plain_motion(stretch, speed_deg_s)
+    motion = once
+    if stretch.stop is not None and stretch.pause is not None:
+        if not 0.0 < stretch.stop < once.duration:
+            raise ParameterError(
+                f"--stop-at-s: needs a time within the motion, 0 to {once.duration:g} "
+                f"s, got {stretch.stop:g} s"
+            )
+        motion = interrupted(once, at=stretch.stop, pause=stretch.pause)
+    if stretch.repeats == 1:
+        return motion
+    parts: list[Motion] = [motion]
+    for _ in range(stretch.repeats - 1):
+        parts += [Reversed(motion=once), motion]
+    return Joined(parts)
+
+
+def _plain_motion(stretch: _MotionOptions, speed_deg_s: float | None) -> "Motion":
+    from masrel.elbow import ConstantSpeed, MinimumJerk, Trapezoid
+    from masrel.elbow.motions.file import read_motion
+
+    if stretch.recording is not None:
+        if speed_deg_s is not None:
+            raise ParameterError("--speed-deg-s: a recording has its own speed")
+        return read_motion(
+            stretch.recording,
+            interpolation="linear" if stretch.interpolation == "linear" else "pchip",
+        )
+    if speed_deg_s is None:
+        raise ParameterError(
+            f"--speed-deg-s: needs a speed for --motion {stretch.kind}"
+        )
+    start, end = map(math.radians, stretch.ends_deg)
+    speed = math.radians(speed_deg_s)
+    if stretch.kind == "constant":
+        return ConstantSpeed(start=start, end=end, speed=speed)
+    if stretch.acceleration is not None:
+        rate = math.radians(stretch.acceleration)
+        return Trapezoid(start=start, end=end, speed=speed, acceleration_rate=rate)
+    return MinimumJerk(start=start, end=end, mean_speed=speed)
+
+
+def _write_samples(
+    samples: _SampleOptions,
+    scenes: Sequence[Scene],
+    documents: Sequence[dict[str, Any]],
+    hides_progress: bool | None,
+) -> None:
+    if samples.csv_file is None:
+        return
+    rate_hz = 1000.0 if samples.rate_hz is None else samples.rate_hz
+    n_rows = _n_samples(documents, rate_hz)
+    with (
+        samples.csv_file.open("w", encoding="utf-8", newline="") as out,
+        tqdm(total=n_rows, desc="samples", delay=1.0, disable=hides_progress) as bar,
+    ):
+        _write_rows(out, scenes, rate_hz, bar)
+
+
+def _n_samples(documents: Sequence[dict[str, Any]], rate_hz: float) -> int:
+    durations = [document["phases"][-1]["end_s"] for document in documents]
+    n_samples = sum(durations) * rate_hz + len(durations)
+    if not n_samples <= _MAX_SAMPLES:
+        raise ParameterError(
+            f"--csv: needs at most {_MAX_SAMPLES} samples, got {n_samples:.4g}: "
+            f"{sum(durations):.4g} s at {rate_hz:g} Hz; --rate-hz makes them fewer"
+        )
+    return int(n_samples)
+
+
+def _write_rows(
+    out: TextIO, scenes: Sequence[Scene], rate_hz: float, bar: "tqdm[Any]"
+) -> None:
+    # what the controller commands; columns name the scene where there are several
+    several = len(scenes) > 1
+    out.write("# simulated: true\n")
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow((*(("model", "speed_deg_s") if several else ()), *_COLUMNS))
+    for scene in scenes:
+        names = (scene.model, scene.speed_deg_s) if several else ()
+        rows = _rows(scene, rate_hz)
+        while block := list(islice(rows, _N_AT_ONCE)):
+            writer.writerows((*names, *row) for row in block)
+            bar.update(len(block))
+
+
+def _rows(scene: Scene, rate_hz: float) -> Iterator[tuple[object, ...]]:
+    import numpy as np
+
+    from masrel import elbow
+    from masrel.recording import PHASES
+
+    samples = elbow.trace(scene.parameters, scene.motion, rate_hz=rate_hz)
+    columns = (
+        samples.time,
+        np.degrees(samples.angle),
+        np.degrees(samples.velocity),
+        samples.torque,
+    )
+    for start in range(0, samples.time.size, _N_AT_ONCE):
+        block = slice(start, start + _N_AT_ONCE)
+        phases = [PHASES[code] for code in samples.phase[block].tolist()]
+        yield from zip(*(c[block].tolist() for c in columns), phases, strict=True)

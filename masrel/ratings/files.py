@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from masrel.errors import ParameterError, RatingsError
-from masrel.ratings._csv import (
+from masrel.ratings._csv_rows import (
     MISSING,
     CsvRows,
     LongColumns,

@@ -4,16 +4,16 @@ Goes in: a protocol. Comes out: for each rater and session a schedule file that
 names the models, and a blinded sheet that does not.
 """
 
-from masrel.schedule.files import (
-    read_schedule,
-    schedule_problems,
-    write_schedules,
-)
 from masrel.schedule.presentation import (
     Presentation,
     Schedule,
     check_schedule,
     draw_schedule,
+)
+from masrel.schedule.sheets import (
+    read_schedule,
+    schedule_problems,
+    write_schedules,
 )
 
 __all__ = [

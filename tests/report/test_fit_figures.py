@@ -5,13 +5,13 @@ import pytest
 
 from masrel.elbow import STANDARD_MODELS, fit, fit_friction
 from masrel.elbow.identification import ElbowFit
+from masrel.report._fits import fit_table
 from masrel.report._tables import as_text
 from masrel.report.figures.fit_catch import draw_catches
 from masrel.report.figures.fit_friction import draw_friction
 from masrel.report.figures.fit_residuals import draw_residuals
 from masrel.report.figures.fit_slow import draw_slow_trials
 from masrel.report.figures.fit_trial import draw_fast_trials
-from masrel.report.fit_table import fit_table, friction_table
 from tests.elbow.identification.synthesis import Scatter, study
 from tests.elbow.identification.test_friction import backdriven
 
@@ -51,7 +51,7 @@ def test_the_table_has_a_row_a_parameter_and_its_interval(found: ElbowFit) -> No
 def test_friction_has_its_figure_and_table() -> None:
     found = fit_friction([backdriven(1)])
     assert draw_friction(found, stamp="SIMULATED DATA").svg.startswith(b"<?xml")
-    assert [row[0] for row in friction_table(found).rows] == ["I", "B", "β"]
+    assert [row[0] for row in fit_table(found).rows] == ["I", "B", "β"]
 
 
 @pytest.fixture(scope="module")

@@ -4,12 +4,12 @@ import warnings
 
 import pytest
 
-from masrel.cli.notes import notes
+from masrel.cli._output import warnings_as_notes
 from masrel.errors import SmallSampleWarning
 
 
 def test_a_note_is_said_once_on_stderr(capsys: pytest.CaptureFixture[str]) -> None:
-    with notes():
+    with warnings_as_notes():
         for _ in range(2):
             warnings.warn("few raters", SmallSampleWarning, stacklevel=1)
     assert capsys.readouterr() == ("", "note: few raters\n")
@@ -19,7 +19,7 @@ def test_notes_are_said_even_when_an_error_ends_the_work(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     def work() -> None:
-        with notes():
+        with warnings_as_notes():
             warnings.warn("few raters", SmallSampleWarning, stacklevel=1)
             raise ValueError
 
@@ -29,6 +29,6 @@ def test_notes_are_said_even_when_an_error_ends_the_work(
 
 
 def test_a_foreign_warning_stays_a_warning(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.warns(DeprecationWarning, match="old"), notes():
+    with pytest.warns(DeprecationWarning, match="old"), warnings_as_notes():
         warnings.warn("old", DeprecationWarning, stacklevel=1)
     assert capsys.readouterr().err == ""

@@ -35,7 +35,7 @@ _CODE = re.compile(r"[0-9A-Za-z]{1,16}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Place:
+class _ScheduleFiles:
     """One rater in one session, and the files that belong to the two."""
 
     rater: str
@@ -112,9 +112,9 @@ def _read_head(lines: list[str], path: Path, problems: list[str]) -> dict[str, s
             head[key] = ""
         else:
             head[key] = value
-    missing = [key for key in _HEAD if key not in head]
-    if missing:
-        problems.append(f"{path}: needed a line '# {missing[0]}: ...', got none")
+    absent = [key for key in _HEAD if key not in head]
+    if absent:
+        problems.append(f"{path}: needed a line '# {absent[0]}: ...', got none")
     return head
 
 
@@ -189,22 +189,22 @@ def write_schedules(
     OSError
         If the system refuses a folder or file.
     """
-    places = _places(protocol, study)
+    every = _every_schedule(protocol, study)
     problems: list[str] = []
     texts: dict[Path, str] = {}
-    for place in places:
-        fault = _fault(place, protocol)
+    for files in every:
+        fault = _fault(files, protocol)
         if fault is None:
-            schedule = read_schedule(place.schedule)
-            if not place.sheet.exists():
-                texts[place.sheet] = _sheet_text(schedule)
+            schedule = read_schedule(files.schedule)
+            if not files.sheet.exists():
+                texts[files.sheet] = _sheet_text(schedule)
             continue
-        problem = _refusal(place, fault, redraw=redraw)
+        problem = _refusal(files, fault, redraw=redraw)
         if problem is not None:
             problems.append(problem)
-        drawn = draw_schedule(protocol, place.rater, place.session)
-        texts[place.schedule] = _schedule_text(drawn)
-        texts[place.sheet] = _sheet_text(drawn)
+        drawn = draw_schedule(protocol, files.rater, files.session)
+        texts[files.schedule] = _schedule_text(drawn)
+        texts[files.sheet] = _sheet_text(drawn)
     if problems:
         raise ScheduleError("\n".join(problems))
     study.schedules.mkdir(parents=True, exist_ok=True)
@@ -229,14 +229,14 @@ def schedule_problems(protocol: Protocol, study: StudyPaths) -> tuple[str, ...]:
         Each problem with its file: damaged, stale, a sheet with other codes, or a
         file that belongs to no rater and session. A schedule not drawn yet is none.
     """
-    places = _places(protocol, study)
+    every = _every_schedule(protocol, study)
     problems: list[str] = []
-    for place in places:
-        if place.schedule.exists():
-            fault = _fault(place, protocol)
-            fault = fault or _sheet_fault(place, read_schedule(place.schedule))
+    for files in every:
+        if files.schedule.exists():
+            fault = _fault(files, protocol)
+            fault = fault or _sheet_fault(files, read_schedule(files.schedule))
             problems.extend([fault] if fault else [])
-    expected = {path for place in places for path in (place.schedule, place.sheet)}
+    expected = {path for files in every for path in (files.schedule, files.sheet)}
     for path in sorted(study.schedules.glob("*.csv")):
         if path not in expected:
             problems.append(
@@ -246,9 +246,9 @@ def schedule_problems(protocol: Protocol, study: StudyPaths) -> tuple[str, ...]:
     return tuple(problems)
 
 
-def _places(protocol: Protocol, study: StudyPaths) -> list[_Place]:
+def _every_schedule(protocol: Protocol, study: StudyPaths) -> list[_ScheduleFiles]:
     return [
-        _Place(
+        _ScheduleFiles(
             rater=rater,
             session=session.id,
             schedule=study.schedule_file(rater, session.id),
@@ -260,40 +260,40 @@ def _places(protocol: Protocol, study: StudyPaths) -> list[_Place]:
     ]
 
 
-def _fault(place: _Place, protocol: Protocol) -> str | None:
+def _fault(files: _ScheduleFiles, protocol: Protocol) -> str | None:
     # Why the schedule's file cannot be used as it is, or None.
-    if not place.schedule.exists():
-        return f"{place.schedule}: needed a schedule file, got none"
+    if not files.schedule.exists():
+        return f"{files.schedule}: needed a schedule file, got none"
     try:
-        schedule = read_schedule(place.schedule)
+        schedule = read_schedule(files.schedule)
     except ScheduleError as error:
         return str(error)
-    if (schedule.rater, schedule.session) != (place.rater, place.session):
+    if (schedule.rater, schedule.session) != (files.rater, files.session):
         return (
-            f"{place.schedule}: needed the schedule of rater {place.rater} in session "
-            f"{place.session}, got that of {schedule.rater} in {schedule.session}"
+            f"{files.schedule}: needed the schedule of rater {files.rater} in session "
+            f"{files.session}, got that of {schedule.rater} in {schedule.session}"
         )
     try:
         check_schedule(schedule, protocol)
     except ScheduleError as error:
-        return f"{place.schedule}: {error}"
+        return f"{files.schedule}: {error}"
     return None
 
 
-def _refusal(place: _Place, fault: str, *, redraw: bool) -> str | None:
+def _refusal(files: _ScheduleFiles, fault: str, *, redraw: bool) -> str | None:
     # Why a schedule with this fault may not be drawn, or None.
-    if place.log.exists():
+    if files.log.exists():
         return (
-            f"{fault}. It was not drawn, because the session has begun: {place.log} "
+            f"{fault}. It was not drawn, because the session has begun: {files.log} "
             "was recorded by the schedule there was. Bring back that schedule and its "
             "protocol, or move the log out of the study"
         )
-    if place.sheet.exists() and _is_filled_in(place.sheet):
+    if files.sheet.exists() and _is_filled_in(files.sheet):
         return (
-            f"{fault}. It was not drawn, because {place.sheet} has grades on it. Move "
+            f"{fault}. It was not drawn, because {files.sheet} has grades on it. Move "
             "the sheet out of the study first"
         )
-    if place.schedule.exists() and not redraw:
+    if files.schedule.exists() and not redraw:
         return f"{fault}. It was kept; --redraw draws it anew"
     return None
 
@@ -304,17 +304,17 @@ def _is_filled_in(sheet: Path) -> bool:
     return any(not row.endswith(",") for row in rows if row)
 
 
-def _sheet_fault(place: _Place, schedule: Schedule) -> str | None:
+def _sheet_fault(files: _ScheduleFiles, schedule: Schedule) -> str | None:
     # The sheet may be missing or have grades, but its codes are the schedule's.
-    if not place.sheet.exists():
+    if not files.sheet.exists():
         return None
-    text = place.sheet.read_text(encoding="utf-8", errors="replace").splitlines()[1:]
+    text = files.sheet.read_text(encoding="utf-8", errors="replace").splitlines()[1:]
     rows = [tuple(row.split(",")[:2]) for row in text if row]
     expected = [(str(s.position), s.code) for s in schedule.presentations]
     if rows == expected:
         return None
     return (
-        f"{place.sheet}: needed the positions and codes of {place.schedule.name}, "
+        f"{files.sheet}: needed the positions and codes of {files.schedule.name}, "
         "got others"
     )
 

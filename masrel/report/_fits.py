@@ -1,0 +1,219 @@
+"""The table, the JSON and the figures of an identified joint or device."""
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from masrel.elbow.identification.friction import FrictionFit
+from masrel.elbow.identification.quantities import QUANTITIES, Quantity
+from masrel.elbow.identification.results import ElbowFit, FittedParameter
+from masrel.elbow.identification.trials import Trial
+from masrel.report._tables import (
+    ABSENT,
+    SIMULATED,
+    Column,
+    Table,
+    interval_text,
+    number,
+    percent,
+)
+
+if TYPE_CHECKING:
+    from masrel.report.figures.style import Drawn
+
+_FRICTION = {
+    "inertia": Quantity(symbol="I", key="inertia_kg_m2", unit="kg·m²"),
+    "viscous": Quantity(symbol="B", key="viscous_nms_rad", unit="N·m·s/rad"),
+    "coulomb": Quantity(symbol="β", key="coulomb_nm", unit="N·m"),
+}
+
+
+def fit_table(fit: ElbowFit | FrictionFit) -> Table:
+    """Return the table of an identified joint, or of a device's friction."""
+    return _joint_table(fit) if isinstance(fit, ElbowFit) else _friction_table(fit)
+
+
+def _joint_table(fit: ElbowFit) -> Table:
+    alone = {e.name: e for step in fit.steps for e in step.estimates}
+    rows = tuple(_row(e, alone.get(e.name), QUANTITIES[e.name]) for e in fit.estimates)
+    slow = sum(trial.pace == "slow" for trial in fit.trials)
+    fast = len(fit.trials) - slow
+    notes = (
+        f"{slow} slow and {fast} fast trials; intervals are clustered by trial.",
+        f"Slow trials differ from (1) by {number(100.0 * fit.relative_error, 1)} % of "
+        f"their mean torque; all trials from the law by {number(fit.torque_sd, 3)} N·m "
+        "(standard deviation).",
+        "The column of a step takes what earlier steps found as known.",
+        *fit.remarks,
+    )
+    return _table("joint", "Parameters of the joint", rows, notes, fit)
+
+
+def _friction_table(fit: FrictionFit) -> Table:
+    rows = tuple(_row(e, None, _FRICTION[e.name]) for e in fit.estimates)
+    notes = (
+        f"{len(fit.strokes)} strokes; intervals are clustered by stroke.",
+        f"Torque differs from (7) by {number(100.0 * fit.relative_error, 1)} % of its "
+        "mean.",
+    )
+    return _table("friction", "Friction of the device", rows, notes, fit)
+
+
+def _row(
+    estimate: FittedParameter, alone: FittedParameter | None, quantity: Quantity
+) -> tuple[str, str, str, str, str, str, int]:
+    factor = quantity.factor
+    value, error = estimate.value * factor, estimate.standard_error * factor
+    digits = _digits(value, error)
+    interval, step = ABSENT, ABSENT
+    if not math.isnan(error):
+        low, high = estimate.low * factor, estimate.high * factor
+        interval = interval_text(low, high, digits)
+    if alone is not None and not math.isnan(alone.value):
+        step = number(alone.value * factor, digits)
+    return (
+        quantity.symbol,
+        quantity.unit,
+        number(value, digits),
+        number(error, digits) if not math.isnan(error) else ABSENT,
+        interval,
+        step,
+        estimate.n_trials,
+    )
+
+
+def _digits(value: float, error: float) -> int:
+    # two digits of the error, or four of the value
+    if math.isnan(value):
+        return 0
+    size, digits = (error, 1) if error > 0.0 else (abs(value), 3)
+    return max(0, digits - math.floor(math.log10(size))) if size > 0.0 else 3
+
+
+def _table(
+    name: str,
+    caption: str,
+    rows: Sequence[tuple[str | int, ...]],
+    notes: tuple[str, ...],
+    fit: ElbowFit | FrictionFit,
+) -> Table:
+    return Table(
+        name=name,
+        caption=caption,
+        columns=(
+            Column(key="parameter", heading="Parameter", align="left"),
+            Column(key="unit", heading="Unit", align="left"),
+            Column(key="value", heading="Value"),
+            Column(key="standard_error", heading="SE"),
+            Column(key="interval", heading=f"{percent(fit.level)} % interval"),
+            Column(key="step", heading="Step alone"),
+            Column(key="n_trials", heading="Trials"),
+        ),
+        rows=tuple(rows),
+        notes=notes,
+        data="simulated" if fit.simulated else "recorded",
+    )
+
+
+def fit_document(fit: ElbowFit | FrictionFit) -> dict[str, object]:
+    """Return a fit as plain values for JSON, units in the keys, ``nan`` as None."""
+    if isinstance(fit, FrictionFit):
+        return _friction_document(fit)
+    return {
+        "simulated": fit.simulated,
+        "level": fit.level,
+        "relative_error": _finite(fit.relative_error),
+        "torque_sd_nm": fit.torque_sd,
+        "estimates": [_estimate(e, QUANTITIES[e.name]) for e in fit.estimates],
+        "correlation": _matrix(fit.correlation.tolist()),
+        "steps": [
+            {
+                "name": step.name,
+                "estimates": [_estimate(e, QUANTITIES[e.name]) for e in step.estimates],
+            }
+            for step in fit.steps
+        ],
+        "trials": [_trial(trial) for trial in fit.trials],
+        "recordings": [
+            {"name": name, "sha256": sha256} for name, sha256 in fit.sources.items()
+        ],
+        "remarks": list(fit.remarks),
+    }
+
+
+def _friction_document(fit: FrictionFit) -> dict[str, object]:
+    return {
+        "simulated": fit.simulated,
+        "level": fit.level,
+        "n_strokes": len(fit.strokes),
+        "relative_error": _finite(fit.relative_error),
+        "torque_sd_nm": fit.torque_sd,
+        "estimates": [_estimate(e, _FRICTION[e.name]) for e in fit.estimates],
+        "correlation": _matrix(fit.correlation.tolist()),
+    }
+
+
+def _estimate(estimate: FittedParameter, quantity: Quantity) -> dict[str, object]:
+    factor = quantity.factor
+    return {
+        "key": quantity.key,
+        "value": _finite(estimate.value * factor),
+        "standard_error": _finite(estimate.standard_error * factor),
+        "degrees_of_freedom": _finite(estimate.freedom),
+        "low": _finite(estimate.low * factor),
+        "high": _finite(estimate.high * factor),
+        "n_trials": estimate.n_trials,
+        "reason": estimate.reason,
+    }
+
+
+def _trial(trial: Trial) -> dict[str, object]:
+    document: dict[str, object] = {
+        "name": trial.name,
+        "pace": trial.pace,
+        "start_s": trial.start,
+        "duration_s": trial.duration,
+        "peak_speed_deg_s": math.degrees(trial.peak_speed),
+        "remark": trial.remark,
+    }
+    catch = trial.catch
+    if catch is not None:
+        document |= {
+            "catch_s": catch.time,
+            "catch_angle_deg": math.degrees(catch.angle),
+            "catch_speed_deg_s": math.degrees(catch.speed),
+            "mean_speed_deg_s": math.degrees(catch.mean_speed),
+            "catch_end_s": catch.end,
+            "catch_travel_deg": math.degrees(catch.travel),
+        }
+    return document
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _matrix(rows: list[list[float]]) -> list[list[float | None]]:
+    return [[_finite(value) for value in row] for row in rows]
+
+
+def fit_figures(fit: ElbowFit | FrictionFit) -> "dict[str, Drawn]":
+    """Return the figures of a fit by the names of their files."""
+    # Imported here: a table loads nothing that draws.
+    from masrel.report.figures.fit_catch import draw_catches
+    from masrel.report.figures.fit_friction import draw_friction
+    from masrel.report.figures.fit_residuals import draw_residuals
+    from masrel.report.figures.fit_slow import draw_slow_trials
+    from masrel.report.figures.fit_trial import draw_fast_trials
+
+    stamp = SIMULATED if fit.simulated else ""
+    if isinstance(fit, FrictionFit):
+        return {"fit_friction": draw_friction(fit, stamp=stamp)}
+    figures = {
+        "fit_slow": draw_slow_trials(fit, stamp=stamp),
+        "fit_residuals": draw_residuals(fit, stamp=stamp),
+    }
+    if any(trial.after is not None for trial in fit.trials):
+        figures["fit_trials"] = draw_fast_trials(fit, stamp=stamp)
+        figures["fit_catches"] = draw_catches(fit, stamp=stamp)
+    return figures

@@ -1,0 +1,349 @@
+"""The JSON, the text and the figures of scenes: a model stretched by a motion each."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+from masrel.errors import ParameterError
+from masrel.report._tables import aligned
+
+if TYPE_CHECKING:
+    from masrel.elbow import ElbowParameters, Events, Motion
+    from masrel.report.figures import CatchCurve, CatchSchematic, Form, StretchPanel
+
+SCENE_OUTPUTS = {
+    "residual-torque": "residual_torque_nm",
+    "work": "work_j",
+    "impulse": "impulse_nms",
+}
+"""What may be computed beside events and peak, and its key in the document."""
+
+SCENE_VIEWS = ("angle", "time", "catch", "schematic")
+"""What a figure may show."""
+
+_LINES = {
+    "residual_torque_nm": ("residual torque", "N·m"),
+    "work_j": ("work", "J"),
+    "impulse_nms": ("impulse", "N·m·s"),
+}
+
+_N_PIXELS = 800  # points a line has: a panel is less wide than that
+_STAMP = "computed from the joint model, not measured"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scene:
+    """A model and a motion."""
+
+    model: str  # name of the model
+    kind: str  # kind of the motion
+    speed_deg_s: float | None  # its speed, if it is named after one
+    # start_deg, end_deg: where it starts and ends
+    start_deg: float
+    end_deg: float
+    parameters: "ElbowParameters"
+    motion: "Motion"
+
+    @property
+    def title(self) -> str:
+        """Name of the scene."""
+        if self.speed_deg_s is None:
+            return f"{self.model}, {self.kind}"
+        return f"{self.model}, {self.kind} {self.speed_deg_s:g} deg/s"
+
+
+def scene_document(
+    scene: Scene,
+    *,
+    outputs: Sequence[str] = (),
+    times: Sequence[float] = (),
+    angles: Sequence[float] = (),
+) -> dict[str, object]:
+    """Return the events of a scene, its peak torque, and what else was requested."""
+    # outputs: of `SCENE_OUTPUTS`; times, angles: where torque is computed, s, deg
+    from masrel import elbow
+
+    joint, motion = scene.parameters, scene.motion
+    events = elbow.events(joint, motion)
+    document: dict[str, object] = {
+        "model": scene.model,
+        "motion": scene.kind,
+        "speed_deg_s": scene.speed_deg_s,
+        "from_deg": scene.start_deg,
+        "to_deg": scene.end_deg,
+        "catch_angle_deg": _degrees(events.catch_angle),
+        "mean_speed_deg_s": _degrees(events.mean_speed),
+        "peak_torque_nm": elbow.peak_torque(joint, motion),
+        "phases": _phases(events),
+    }
+    functions = {
+        "residual-torque": elbow.residual_torque,
+        "work": elbow.work,
+        "impulse": elbow.impulse,
+    }
+    for name in outputs:
+        value = functions[name](joint, motion)
+        document[SCENE_OUTPUTS[name]] = None if math.isnan(value) else value
+    if times:
+        values = elbow.torque(joint, motion, times, found=events).tolist()
+        document["torque_at_s"] = _torques("time_s", times, values)
+    if angles:
+        values = elbow.torque_at(joint, motion, [math.radians(a) for a in angles])
+        document["torque_at_deg"] = _torques("angle_deg", angles, values.tolist())
+    for key, number in document.items():
+        if isinstance(number, float) and not math.isfinite(number):
+            raise ParameterError(
+                f"{scene.title}: {key}: needs a number that a float can hold, got "
+                f"{number:g}; some parameter or speed is too large"
+            )
+    return document
+
+
+def _torques(
+    key: str, places: Sequence[float], values: Sequence[float]
+) -> list[dict[str, float]]:
+    return [
+        {key: place, "torque_nm": value}
+        for place, value in zip(places, values, strict=True)
+    ]
+
+
+def _degrees(value: float | None) -> float | None:
+    return None if value is None else math.degrees(value)
+
+
+def _phases(events: "Events") -> list[dict[str, object]]:
+    return [
+        {
+            "name": span.name,
+            "start_s": span.start,
+            "end_s": span.end,
+            "start_deg": math.degrees(span.start_angle),
+            "end_deg": math.degrees(span.end_angle),
+        }
+        for span in events.phases
+    ]
+
+
+def scene_text(document: dict[str, Any], title: str) -> str:
+    """Return the document of one scene for a person."""
+    lines = [title, _phase_line(["phase", "start s", "end s", "start deg", "end deg"])]
+    for span in document["phases"]:
+        times = [_shown(span[key], 3) for key in ("start_s", "end_s")]
+        angles = [_shown(span[key], 2) for key in ("start_deg", "end_deg")]
+        lines.append(_phase_line([span["name"], *times, *angles]))
+    lines.append(f"peak torque {_shown(document['peak_torque_nm'], 3)} N·m")
+    for key, (name, unit) in _LINES.items():
+        if key not in document:
+            continue
+        if document[key] is None:
+            lines.append(f"{name} none: the stretch has no catch")
+        else:
+            lines.append(f"{name} {_shown(document[key], 3)} {unit}")
+    lines += [
+        f"torque at {place} {_shown(value, 3)} N·m"
+        for place, value in _places(document)
+    ]
+    return "\n".join(lines)
+
+
+def _phase_line(cells: Sequence[str]) -> str:
+    # as wide as an ordinary stretch needs; a long number keeps its distance
+    name, *numbers = cells
+    widths = (9, 9, 11, 9)
+    parts = [
+        text.rjust(max(width, len(text) + 2))
+        for text, width in zip(numbers, widths, strict=True)
+    ]
+    return f"{name:<11}" + "".join(parts)
+
+
+def _places(document: dict[str, Any]) -> list[tuple[str, float]]:
+    # where torque was computed, and what it is
+    at_times = document.get("torque_at_s", [])
+    at_angles = document.get("torque_at_deg", [])
+    return [
+        *((f"{row['time_s']:g} s", row["torque_nm"]) for row in at_times),
+        *((f"{row['angle_deg']:g} deg", row["torque_nm"]) for row in at_angles),
+    ]
+
+
+def scenes_text(documents: Sequence[dict[str, Any]]) -> str:
+    """Return the documents of many scenes for a person, one a line."""
+    keys = ["speed_deg_s", "catch_angle_deg", "mean_speed_deg_s", "peak_torque_nm"]
+    keys += [key for key in _LINES if key in documents[0]]
+    places = [f"torque_nm at {place}" for place, _ in _places(documents[0])]
+    # two more spaces than there are between numbers set names off
+    width = max(8, *(len(document["model"]) + 2 for document in documents))
+    rows = [["model".ljust(width), *keys, *places]]
+    for document in documents:
+        torques = [value for _, value in _places(document)]
+        cells = [*(document[key] for key in keys), *torques]
+        rows.append(
+            [document["model"], *("–" if c is None else _shown(c, 3) for c in cells)]
+        )
+    numeric: list[Literal["right"]] = ["right"] * (len(rows[0]) - 1)
+    return "\n".join(aligned(rows, ["left", *numeric]))
+
+
+def _shown(value: float, decimals: int) -> str:
+    # fixed decimals where they show the number, else four digits of it
+    if value == 0.0 or 10.0 ** (1 - decimals) <= abs(value) < 1e7:
+        return f"{value:.{decimals}f}"
+    return f"{value:.4g}"
+
+
+def check_view(scenes: Sequence[Scene], view: str) -> None:
+    """Refuse a figure that cannot be drawn, before anything is computed for it."""
+    models = _by_model(scenes)
+    max_speeds = max(map(len, models.values()))
+    if len(models) > 5 or (view != "catch" and (len(models) > 4 or max_speeds > 5)):
+        raise ParameterError(
+            "--figure: shows 4 models at 5 speeds at most, or with --view catch 5 "
+            f"models, got {len(models)} and {max_speeds}"
+        )
+    if view == "catch":
+        _check_catches(models)
+    if view == "schematic":
+        if len(scenes) != 1:
+            raise ParameterError(
+                f"--view schematic: shows one scene, got {len(scenes)}"
+            )
+        if not _n_caught(scenes):
+            raise ParameterError("--view schematic: needs a stretch that catches")
+
+
+def _check_catches(models: dict[str, list[Scene]]) -> None:
+    for name, scenes in models.items():
+        if len(scenes) < 2:
+            raise ParameterError(
+                f"--view catch: needs two or more speeds, got {len(scenes)}"
+            )
+        if (n_caught := _n_caught(scenes)) < 2:
+            raise ParameterError(
+                f"--view catch: needs two or more speeds at which {name} catches, got "
+                f"{n_caught} of {len(scenes)}"
+            )
+
+
+def _n_caught(scenes: Sequence[Scene]) -> int:
+    import numpy as np
+
+    from masrel.elbow import evaluate
+
+    joints = [scene.parameters for scene in scenes]
+    outputs = evaluate(joints, [scene.motion for scene in scenes], ["catch"])
+    return int(np.isfinite(outputs.column("catch")).sum())
+
+
+def scenes_figure(scenes: Sequence[Scene], view: str, *, form: "Form") -> bytes:
+    """Return a figure of scenes as a file."""
+    # Imported here: a text loads nothing that draws.
+    from masrel.report import figures
+
+    models = _by_model(scenes)
+    if view == "catch":
+        curves = [_curve(name, subset) for name, subset in models.items()]
+        return figures.draw_catches(curves, form=form, stamp=_STAMP)
+    if view == "schematic":
+        schematic = _schematic(scenes[0])
+        return figures.draw_schematic(schematic, form=form, stamp=_STAMP)
+    against: Literal["angle", "time"] = "angle" if view == "angle" else "time"
+    panels = [_panel(name, subset) for name, subset in models.items()]
+    return figures.draw_stretches(panels, against=against, form=form, stamp=_STAMP)
+
+
+def _by_model(scenes: Sequence[Scene]) -> dict[str, list[Scene]]:
+    models: dict[str, list[Scene]] = {}
+    for scene in scenes:
+        models.setdefault(scene.model, []).append(scene)
+    return models
+
+
+def _panel(name: str, scenes: Sequence[Scene]) -> "StretchPanel":
+    import numpy as np
+
+    from masrel.elbow import outline
+    from masrel.report.figures import StretchLine, StretchPanel
+
+    lines = []
+    for scene in scenes:
+        line = outline(scene.parameters, scene.motion, n_points=_N_PIXELS)
+        speed = scene.speed_deg_s
+        lines.append(
+            StretchLine(
+                label=scene.kind if speed is None else f"{speed:g} deg/s",
+                time=line.time,
+                angle=np.degrees(line.angle),
+                torque=line.torque,
+                phases=tuple((s.name, s.start, s.end) for s in line.events.phases),
+            )
+        )
+    return StretchPanel(title=name, lines=tuple(lines))
+
+
+def _schematic(scene: Scene) -> "CatchSchematic":
+    from masrel.elbow import outline, residual_torque
+    from masrel.report.figures import CatchSchematic
+
+    line = outline(scene.parameters, scene.motion, n_points=_N_PIXELS)
+    events = line.events
+    if events.catch is None or events.catch_speed is None or events.peak_end is None:
+        raise ParameterError("--view schematic: needs a stretch that catches")
+    rise = scene.parameters.catch_torque_constant * events.catch_speed
+    residual = residual_torque(scene.parameters, scene.motion)
+    pre_end = residual - scene.parameters.residual_share * rise
+    return CatchSchematic(
+        title=scene.title,
+        time=line.time,
+        torque=line.torque,
+        phases=tuple((s.name, s.start, s.end) for s in events.phases),
+        catch=events.catch,
+        peak_end=events.peak_end,
+        catch_end=events.end if events.catch_end is None else events.catch_end,
+        pre_end=pre_end,
+        peak=pre_end + rise,
+        residual=residual,
+        residual_name=(
+            r"$Q\,H\,v_c$"
+            if scene.parameters.residual_reading == "residual"
+            else r"$(1-Q)\,H\,v_c$"
+        ),
+    )
+
+
+def _curve(name: str, scenes: Sequence[Scene]) -> "CatchCurve":
+    import numpy as np
+
+    from masrel.elbow import evaluate
+    from masrel.report.figures import CatchCurve
+
+    joint = scenes[0].parameters
+    joints = [scene.parameters for scene in scenes]
+    motions = [scene.motion for scene in scenes]
+    outputs = evaluate(
+        joints, motions, ("mean_speed", "catch_angle", "catch", "catch_end")
+    )
+    caught = np.flatnonzero(np.isfinite(outputs.column("catch")))
+    caught = caught[np.argsort(outputs.column("mean_speed")[caught])]
+    mean, angle, catch, end = outputs.values[caught].T
+    duration = end - catch
+    # from the catch angle on to where the catch ends; nan where the motion ends first
+    travel = [
+        float(motions[i].angle(until, origin)) if np.isfinite(until) else np.nan
+        for i, until, origin in zip(
+            caught.tolist(), end.tolist(), angle.tolist(), strict=True
+        )
+    ]
+    return CatchCurve(
+        label=name,
+        mean_speed=np.degrees(mean),
+        catch_angle=np.degrees(angle),
+        catch_speed=np.degrees(np.array(travel) / duration),
+        duration=duration,
+        clamps=(
+            math.degrees(joint.slowest_mean_speed),
+            math.degrees(joint.fastest_mean_speed),
+        ),
+    )
