@@ -108,7 +108,7 @@ def analytic(
         )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UndefinedStatisticWarning)  # given below
-        estimate = problem.entry(ratings, categories=categories, weights=weights)
+        estimate = problem.entry(problem.coded, weights=weights)
     return _interval_around_estimate(problem, estimate, distribution)
 
 

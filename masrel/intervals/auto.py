@@ -87,6 +87,8 @@ def estimate(
             f"method: needs one of {', '.join(get_args(_Method))}, got {method!r}"
         )
     entry = find_entry(coefficient)
+    if entry.kernel is not None:
+        ratings = entry.code(ratings, categories)  # once, for all that follows
     result = entry(ratings, categories=categories, weights=weights, level=level)
     if method == "auto" and entry.has_interval:
         return result

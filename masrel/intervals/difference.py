@@ -110,10 +110,7 @@ def difference(
     ]
     variance_of = _dependent if design == "dependent" else _independent
     variance, df = variance_of(*problems)
-    one, other = (
-        problem.entry(ratings, categories=categories, weights=weights)
-        for problem, ratings in zip(problems, (first, second), strict=True)
-    )
+    one, other = (problem.entry(problem.coded, weights=weights) for problem in problems)
     value, reason = one.value - other.value, one.reason or other.reason
     return Estimate(
         coefficient=f"difference of {one.coefficient}",
