@@ -41,7 +41,7 @@ class Choice:
     """A question whose interval is to be chosen, and what the rules look at."""
 
     problem: IntervalProblem
-    modelled: bool  # whether the Dirichlet-multinomial model speaks of the coefficient
+    modelled: bool  # whether the Dirichlet-multinomial model applies to the coefficient
 
     @property
     def is_small(self) -> bool:
@@ -50,7 +50,7 @@ class Choice:
 
     @cached_property
     def tabular(self) -> bool:
-        """Whether the table of two raters speaks of the coefficient instead."""
+        """Whether the table of two raters applies to the coefficient instead."""
         problem = self.problem
         return not self.modelled and problem.target == "items" and applies_to(problem)
 

@@ -5,12 +5,11 @@ An item has category probabilities p ~ Dirichlet(A π); its ratings are multinom
 Π_k Π_j (A π_k + j)^N_kj / Π_j (A + j)^n_j, with N_kj the items with more than j ratings
 in category k, and n_j those with more than j ratings at all [1].
 
-To integrate π out: each category's product Π_j (x + j)^N_kj at x = A π_k is a
-polynomial. Under
-π ~ Dirichlet(a) the power π_k^t has the moment Γ(a_k + t) / Γ(a_k); convolved over
-categories and divided by Γ(Σ a + t) the powers give a polynomial in A [2], and with it
-the density of ρ. All coefficients are positive, so that sums and products lose no
-digits; each is tilted by λ^t, so that floats hold what matters.
+π is integrated out: each category's product Π_j (x + j)^N_kj at x = A π_k is a
+polynomial. Under π ~ Dirichlet(a) the power π_k^t has the moment Γ(a_k + t) / Γ(a_k);
+convolved over categories and divided by Γ(Σ a + t) the powers give a polynomial in A
+[2], and with it the density of ρ. All coefficients are positive, so that sums and
+products lose no digits; each is tilted by λ^t, so that floats hold what matters.
 
 [1] Mosimann, J. E. (1962). On the compound multinomial distribution. Biometrika,
 49(1/2), 65-82. https://doi.org/10.2307/2333468

@@ -195,7 +195,7 @@ def _check(problem: IntervalProblem, n_draws: int) -> None:
     name, n_raters = problem.entry.name, problem.coded.codes.shape[1]
     if name not in CHANCE_AGREEMENT or n_raters != 2:
         raise ParameterError(
-            f'model: "table" speaks of {", ".join(CHANCE_AGREEMENT)} of exactly two '
+            f'model: "table" applies to {", ".join(CHANCE_AGREEMENT)} of exactly two '
             f"raters; got {name} of {n_raters}"
         )
     if n_draws < _MIN_DRAWS:
@@ -219,7 +219,7 @@ def _nothing_to_learn(problem: IntervalProblem, table: Floats) -> str | None:
     if np.isnan(problem.v).any():
         return "the scale has no such weights"
     if not problem.v.any():
-        return "the weights know no disagreement"
+        return "the weights count nothing as disagreement"
     return None
 
 

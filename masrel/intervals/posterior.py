@@ -61,7 +61,7 @@ def posterior(
         Level of the central credible interval.
     model : {"auto", "dirichlet-multinomial", "table"}, optional
         Any raters who are exchangeable; or exactly two, each with margins of their
-        own. By default the first where it speaks of the coefficient.
+        own. By default the first where it applies to the coefficient.
     prior : {"uniform", "jeffreys"}, optional
         ρ ~ U(0, 1), or ρ ~ Beta(1/2, 1/2), the prior of Jeffreys for a probability.
     concentration : float, optional
@@ -170,9 +170,9 @@ def _check_options(problem: IntervalProblem, model: _Model, method: _Method) -> 
 def _check_dirichlet(has_rho: bool, name: str) -> None:
     if not has_rho:
         raise ParameterError(
-            "model: the Dirichlet-multinomial model speaks of unweighted fleiss_kappa, "
-            "and of scott_pi and krippendorff_alpha, whose value in the population is "
-            f'the same; for two raters "table" speaks of others; got {name}'
+            "model: the Dirichlet-multinomial model applies to unweighted "
+            "fleiss_kappa, scott_pi and krippendorff_alpha, which have one value in "
+            f'the population; for two raters "table" applies to others; got {name}'
         )
 
 
@@ -182,8 +182,8 @@ def _check_table(
     n_raters = problem.coded.codes.shape[1]
     if model == "auto" and n_raters != 2:
         raise ParameterError(
-            "coefficient: a posterior speaks of unweighted fleiss_kappa, scott_pi and "
-            "krippendorff_alpha, and of others by exactly two raters; got "
+            "coefficient: a posterior applies to unweighted fleiss_kappa, scott_pi "
+            "and krippendorff_alpha, and to others by exactly two raters; got "
             f"{name} by {n_raters}"
         )
     if method != "exact" or prior.name != "uniform":

@@ -22,8 +22,8 @@ PUBLISHED = Path(__file__).parents[2] / "studies/hess2012/ratings/published.csv"
 Ratings = list[list[str | None]]
 
 
-def ends(found: Interval) -> tuple[float, float]:
-    return found.low, found.high
+def ends(result: Interval) -> tuple[float, float]:
+    return result.low, result.high
 
 
 def quadratic(constant: float, slope: float, share: float) -> float:
@@ -38,7 +38,7 @@ def quadratic(constant: float, slope: float, share: float) -> float:
 @pytest.mark.parametrize("n_categories", [2, 3, 6])
 @pytest.mark.parametrize("a", [1.0, 0.5, 1 / 6, 3.0])
 def test_one_agreeing_pair_by_hand(n_categories: int, a: float) -> None:
-    found = posterior(
+    result = posterior(
         "fleiss_kappa",
         [["0", "0"]],
         target="items",
@@ -47,13 +47,13 @@ def test_one_agreeing_pair_by_hand(n_categories: int, a: float) -> None:
     )
     square = (a + 1.0) / (n_categories * a + 1.0)
     by_hand = [quadratic(square, 1.0 - square, share) for share in (0.025, 0.975)]
-    assert ends(found) == pytest.approx(by_hand, abs=1e-12)
+    assert ends(result) == pytest.approx(by_hand, abs=1e-12)
 
 
 # Apart it is 2 π_1 π_2 A / (A + 1), and A / (A + 1) = 1 - ρ: the prior of π is lost.
 @pytest.mark.parametrize("a", [1.0, 1 / 6])
 def test_one_disagreeing_pair_by_hand(a: float) -> None:
-    found = posterior(
+    result = posterior(
         "fleiss_kappa",
         [["0", "1"]],
         target="items",
@@ -62,14 +62,14 @@ def test_one_disagreeing_pair_by_hand(a: float) -> None:
         level=0.9,
     )
     by_hand = [1.0 - math.sqrt(1.0 - share) for share in (0.05, 0.95)]
-    assert ends(found) == pytest.approx(by_hand, abs=1e-12)
+    assert ends(result) == pytest.approx(by_hand, abs=1e-12)
 
 
 # With Jeffreys' prior that is (1 - ρ) (ρ (1 - ρ))^(-1/2): a Beta(1/2, 3/2), whose
 # distribution function at sin² φ is (2 φ + sin 2φ) / π.
 def test_one_disagreeing_pair_with_jeffreys_prior_by_hand() -> None:
-    found = posterior("fleiss_kappa", [["0", "1"]], target="items", prior="jeffreys")
-    for end, share in zip(ends(found), (0.025, 0.975), strict=True):
+    result = posterior("fleiss_kappa", [["0", "1"]], target="items", prior="jeffreys")
+    for end, share in zip(ends(result), (0.025, 0.975), strict=True):
         angle = math.asin(math.sqrt(end))
         below = (2.0 * angle + math.sin(2.0 * angle)) / math.pi
         assert below == pytest.approx(share, abs=1e-12)
@@ -80,10 +80,10 @@ def test_one_disagreeing_pair_with_jeffreys_prior_by_hand() -> None:
 @pytest.mark.parametrize("m", [0, 1, 7])
 def test_single_ratings_inform_the_shares_only(m: int) -> None:
     ratings: Ratings = [["a", "a"], *[["a", None] for _ in range(m)]]
-    found = posterior("fleiss_kappa", ratings, target="items", categories=["a", "b"])
+    result = posterior("fleiss_kappa", ratings, target="items", categories=["a", "b"])
     square = (m + 2.0) / (m + 3.0)
     by_hand = [quadratic(square, 1.0 - square, share) for share in (0.025, 0.975)]
-    assert ends(found) == pytest.approx(by_hand, abs=1e-12)
+    assert ends(result) == pytest.approx(by_hand, abs=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -108,14 +108,14 @@ def test_table_v(
     ratings = [
         [grades[model, f"R{rater + 1}"] for rater in range(8)] for model in models
     ]
-    found = posterior(
+    result = posterior(
         "fleiss_kappa",
         ratings,
         target="items",
         categories=categories,
         **options,  # type: ignore[arg-type]
     )
-    assert ends(found) == pytest.approx(expected, abs=6e-6)
+    assert ends(result) == pytest.approx(expected, abs=6e-6)
 
 
 def test_the_bound_is_the_priors_where_one_category_was_used() -> None:
@@ -183,7 +183,7 @@ def test_ends_are_those_of_panels(name: str, a: Fraction, prior: str) -> None:
         scale += ["4", "5"]
     counts = [[row.count(grade) for grade in scale] for row in ratings]
     panels = ByPanels(counts, a, 1.0 if prior == "uniform" else 0.5)
-    found = posterior(
+    result = posterior(
         "fleiss_kappa",
         ratings,
         target="items",
@@ -192,18 +192,18 @@ def test_ends_are_those_of_panels(name: str, a: Fraction, prior: str) -> None:
         concentration=float(a),
     )
     expected = [panels.quantile(share) for share in (0.025, 0.975)]
-    assert ends(found) == pytest.approx(expected, abs=1e-9)
+    assert ends(result) == pytest.approx(expected, abs=1e-9)
 
 
 @pytest.mark.parametrize("level", [0.01, 0.5, 0.9999, 1.0 - 1e-9])
 def test_ends_are_right_at_every_level(level: float) -> None:
     counts = [[row.count(grade) for grade in SCALE] for row in TABLE_V]
     panels = ByPanels(counts)
-    found = posterior(
+    result = posterior(
         "fleiss_kappa", TABLE_V, target="items", categories=SCALE, level=level
     )
     expected = [panels.quantile(0.5 - 0.5 * level), panels.quantile(0.5 + 0.5 * level)]
-    assert ends(found) == pytest.approx(expected, abs=1e-8)
+    assert ends(result) == pytest.approx(expected, abs=1e-8)
 
 
 def test_two_categories_agree_with_an_integral_over_rho_and_the_share() -> None:
@@ -227,8 +227,8 @@ def test_two_categories_agree_with_an_integral_over_rho_and_the_share() -> None:
 
     total = inner(rho) @ w
     ratings = [["a"] * k + ["b"] * (n - k) for k in n_first.tolist()]
-    found = posterior("fleiss_kappa", ratings, target="items")
-    for end, below in zip(ends(found), (0.025, 0.975), strict=True):
+    result = posterior("fleiss_kappa", ratings, target="items")
+    for end, below in zip(ends(result), (0.025, 0.975), strict=True):
         assert inner(rho * end) @ w * end / total == pytest.approx(below, abs=1e-10)
 
 
@@ -243,10 +243,10 @@ def no(*arguments, **options):
 np.random.default_rng = np.random.SeedSequence = np.random.RandomState = no
 np.random.random = np.random.normal = np.random.rand = no
 ratings = [["a", "a", "b"], ["b", "b", "b"], ["a", "a", "a"]]
-found = posterior("fleiss_kappa", ratings, target="items", rng=1)
+result = posterior("fleiss_kappa", ratings, target="items", rng=1)
 heavy = ("emcee", "arviz_stats", "scipy.stats", "pandas")
 loaded = [name for name in heavy if name in sys.modules]
-print(json.dumps([found.n_resamples, found.monte_carlo_error, found.seed, loaded]))
+print(json.dumps([result.n_resamples, result.monte_carlo_error, result.seed, loaded]))
 """
 
 

@@ -30,8 +30,8 @@ def exact(
     )
 
 
-def ends(found: Interval) -> list[float]:
-    return [found.low, found.high]
+def ends(result: Interval) -> list[float]:
+    return [result.low, result.high]
 
 
 @settings(max_examples=25)
@@ -77,12 +77,12 @@ def test_the_density_integrates_to_one(table: Table) -> None:
 
 
 def test_the_density_says_its_prior_and_has_the_ends_as_quantiles() -> None:
-    found = exact(TABLE_V, SCALE)
-    of = found.distribution
+    result = exact(TABLE_V, SCALE)
+    of = result.distribution
     assert of is not None
     assert of.words == "posterior of ρ, prior ρ ~ U(0, 1), π ~ Dirichlet(1, ...)"
     steps = 0.5 * (of.weights[1:] + of.weights[:-1]) * np.diff(of.values)
-    below = np.interp(ends(found), of.values, np.append(0.0, steps.cumsum()))
+    below = np.interp(ends(result), of.values, np.append(0.0, steps.cumsum()))
     assert below == pytest.approx([0.025, 0.975], abs=2e-4)
 
 
@@ -97,9 +97,11 @@ def test_the_density_says_its_prior_and_has_the_ends_as_quantiles() -> None:
 def test_where_the_prior_weighs_another_stands_beside(
     ratings: list[list[str]], what: str
 ) -> None:
-    found = exact(ratings, ["a", "b", "c"])
-    (note,) = found.notes
-    mine = f"{found.low:.3f} to {found.high:.3f} with ρ ~ U(0, 1), π ~ Dirichlet(1, ..."
+    result = exact(ratings, ["a", "b", "c"])
+    (note,) = result.notes
+    mine = (
+        f"{result.low:.3f} to {result.high:.3f} with ρ ~ U(0, 1), π ~ Dirichlet(1, ..."
+    )
     assert note.startswith(f"{what}, so the prior weighs: {mine}")
     others = [
         posterior(
@@ -112,7 +114,7 @@ def test_where_the_prior_weighs_another_stands_beside(
         for options in ({"prior": "jeffreys"}, {"concentration": 1 / 3})
     ]
     moves = [
-        max(abs(other.low - found.low), abs(other.high - found.high))
+        max(abs(other.low - result.low), abs(other.high - result.high))
         for other in others
     ]
     other = others[int(np.argmax(moves))]
@@ -120,7 +122,7 @@ def test_where_the_prior_weighs_another_stands_beside(
 
 
 def test_the_note_names_the_prior_that_was_asked_for() -> None:
-    found = posterior(
+    result = posterior(
         "fleiss_kappa",
         TABLE_V,
         target="items",
@@ -128,7 +130,7 @@ def test_the_note_names_the_prior_that_was_asked_for() -> None:
         prior="jeffreys",
         concentration=1 / 6,
     )
-    assert "with ρ ~ Beta(1/2, 1/2), π ~ Dirichlet(0.167, ...), but" in found.notes[0]
+    assert "with ρ ~ Beta(1/2, 1/2), π ~ Dirichlet(0.167, ...), but" in result.notes[0]
 
 
 def test_enough_items_need_no_note() -> None:
@@ -138,8 +140,8 @@ def test_enough_items_need_no_note() -> None:
 @pytest.mark.parametrize("name", ["scott_pi", "krippendorff_alpha"])
 def test_coefficients_of_the_same_value_in_the_population_have_it(name: str) -> None:
     ratings = [["a", "a"], ["a", "b"], ["b", "b"]] * 4
-    found = posterior(name, ratings, target="items")
-    assert found == posterior("fleiss_kappa", ratings, target="items")
+    result = posterior(name, ratings, target="items")
+    assert result == posterior("fleiss_kappa", ratings, target="items")
 
 
 @pytest.mark.parametrize("method", ["exact", "emcee"])
@@ -154,10 +156,10 @@ def test_where_the_prior_alone_would_speak_it_is_undefined(
     ratings: list[list[str | None]], reason: str, method: str
 ) -> None:
     with pytest.warns(UndefinedStatisticWarning, match=reason):
-        found = posterior("fleiss_kappa", ratings, target="items", method=method)  # type: ignore[arg-type]
-    assert math.isnan(found.low)
-    assert math.isnan(found.high)
-    assert (found.reason, found.kind) == (reason, "credible")
+        result = posterior("fleiss_kappa", ratings, target="items", method=method)  # type: ignore[arg-type]
+    assert math.isnan(result.low)
+    assert math.isnan(result.high)
+    assert (result.reason, result.kind) == (reason, "credible")
 
 
 @pytest.mark.parametrize(
@@ -170,7 +172,7 @@ def test_where_the_prior_alone_would_speak_it_is_undefined(
         ({"method": "gibbs"}, "method: needs one of exact, emcee, got 'gibbs'"),
         ({"concentration": 0.0}, "concentration: needs a positive number, got 0.0"),
         ({"concentration": math.inf}, "concentration: needs a positive number"),
-        ({"weights": "linear", "model": "dirichlet-multinomial"}, "of unweighted"),
+        ({"weights": "linear", "model": "dirichlet-multinomial"}, "to unweighted"),
         ({"weights": "linear", "method": "emcee"}, "and no sampler"),
         ({"target": "raters"}, 'so "items"; for other raters use the jackknife'),
         ({"target": "both"}, 'got "both"'),

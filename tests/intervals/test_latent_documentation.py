@@ -52,9 +52,9 @@ def test_the_example_prints_what_the_page_says() -> None:
     assert out.getvalue().splitlines() == said
 
 
-def ends(found: LatentTrait) -> list[float]:
-    assert found.kappa.interval is not None
-    return [found.kappa.interval.low, found.kappa.interval.high]
+def ends(result: LatentTrait) -> list[float]:
+    assert result.kappa.interval is not None
+    return [result.kappa.interval.low, result.kappa.interval.high]
 
 
 @pytest.mark.slow
@@ -67,14 +67,14 @@ def test_the_table_of_priors_is_what_comes_out(
     monkeypatch.setattr("masrel.intervals.latent._sampler.MIN_ESS", 1_500.0)
     monkeypatch.setattr("masrel.intervals.latent._sampler.MAX_R_HAT", 1.03)
     study, items, *said = row
-    found = latent_trait(
+    result = latent_trait(
         [[grades[r] for r in RATERS[study]] for grades in TABLE_V],
         items=items,  # type: ignore[arg-type]
         categories=SCALE,
         n_steps=400,
         rng=4,
     )
-    assert found.other is not None
-    assert ends(found) + ends(found.other) == pytest.approx(
+    assert result.other is not None
+    assert ends(result) + ends(result.other) == pytest.approx(
         [float(number) for number in said], abs=0.02
     )

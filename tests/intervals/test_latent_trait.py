@@ -29,7 +29,7 @@ def brief() -> Iterator[None]:
         yield
 
 
-def asked(ratings: object = SMALL, **options: object) -> LatentTrait:
+def fitted(ratings: object = SMALL, **options: object) -> LatentTrait:
     given: dict[str, object] = {
         "items": "fixed",
         "n_steps": 40,
@@ -42,41 +42,41 @@ def asked(ratings: object = SMALL, **options: object) -> LatentTrait:
 
 
 @pytest.fixture(scope="module")
-def found(brief: None) -> LatentTrait:  # noqa: ARG001 - it has to come first
-    return asked(keep_chains=True, compare=True)
+def result(brief: None) -> LatentTrait:  # noqa: ARG001 - it has to come first
+    return fitted(keep_chains=True, compare=True)
 
 
-def test_everything_has_a_name_and_an_interval(found: LatentTrait) -> None:
-    assert [one.name for one in found.items] == [f"item {i}" for i in (1, 2, 3, 4)]
+def test_everything_has_a_name_and_an_interval(result: LatentTrait) -> None:
+    assert [one.name for one in result.items] == [f"item {i}" for i in (1, 2, 3, 4)]
     raters = ["rater 1", "rater 2", "rater 3"]
-    assert [one.name for one in found.raters] == raters
-    assert [one.name for one in found.noises] == raters
-    assert [one.name for one in found.thresholds] == [
+    assert [one.name for one in result.raters] == raters
+    assert [one.name for one in result.noises] == raters
+    assert [one.name for one in result.thresholds] == [
         "1 | 2",
         "2 | 3",
         "3 | 4",
         "4 | 5",
     ]
-    for one in (*found.items, *found.raters, *found.noises, *found.shares):
+    for one in (*result.items, *result.raters, *result.noises, *result.shares):
         assert one.interval.low < one.value < one.interval.high
         assert (one.interval.kind, one.interval.level) == ("credible", 0.95)
-    assert np.array(found.grades).sum(axis=1) == pytest.approx(np.ones(4))
+    assert np.array(result.grades).sum(axis=1) == pytest.approx(np.ones(4))
 
 
-def test_numbers_are_those_of_the_chains(found: LatentTrait) -> None:
-    chains, kappa = found.chains, found.kappa
+def test_numbers_are_those_of_the_chains(result: LatentTrait) -> None:
+    chains, kappa = result.chains, result.kappa
     assert chains is not None
     assert kappa.interval is not None
     assert kappa.value == np.median(chains.kappa)
     ends = np.quantile(chains.kappa, (0.025, 0.975)).tolist()
     assert [kappa.interval.low, kappa.interval.high] == pytest.approx(ends, rel=1e-12)
-    assert found.raters[1].value == np.median(chains.bias[..., 1])
-    assert found.thresholds[2].value == np.median(chains.thresholds[..., 2])
+    assert result.raters[1].value == np.median(chains.bias[..., 1])
+    assert result.thresholds[2].value == np.median(chains.thresholds[..., 2])
     assert kappa.interval.n_resamples == chains.kappa.size
 
 
-def test_the_scale_has_its_zero_and_its_unit(found: LatentTrait) -> None:
-    chains = found.chains
+def test_the_scale_has_its_zero_and_its_unit(result: LatentTrait) -> None:
+    chains = result.chains
     assert chains is not None
     assert np.abs(chains.severity.mean(axis=-1)).max() < 1e-12
     assert chains.shares.sum(axis=-1) == pytest.approx(np.ones(chains.shares.shape[:2]))
@@ -84,54 +84,54 @@ def test_the_scale_has_its_zero_and_its_unit(found: LatentTrait) -> None:
     assert (chains.noise > 0).all()
 
 
-def test_the_other_prior_is_shown_beside(found: LatentTrait) -> None:
-    assert found.other is not None
-    assert found.other.prior == LatentPrior.other()
-    there, here = found.other.kappa.interval, found.kappa.interval
+def test_the_other_prior_is_shown_beside(result: LatentTrait) -> None:
+    assert result.other is not None
+    assert result.other.prior == LatentPrior.other()
+    there, here = result.other.kappa.interval, result.kappa.interval
     assert there is not None
     assert here is not None
     assert here.notes == (
         f"under another prior {there.low:.3f} to {there.high:.3f}: "
         f"{LatentPrior.other().words}",
     )
-    assert found.other.other is None
-    alone = asked()
+    assert result.other.other is None
+    alone = fitted()
     assert alone.other is None
     assert alone.kappa.interval is not None
     assert alone.kappa.interval.notes == ()
-    assert alone.kappa.value == found.kappa.value  # one prior does not move the other
+    assert alone.kappa.value == result.kappa.value  # one prior does not move the other
 
 
-def test_the_distribution_of_kappa_can_be_had(found: LatentTrait) -> None:
-    assert found.kappa.interval is not None
-    law = found.kappa.interval.distribution
+def test_the_distribution_of_kappa_can_be_had(result: LatentTrait) -> None:
+    assert result.kappa.interval is not None
+    law = result.kappa.interval.distribution
     assert law is not None
     assert (np.diff(law.values) >= 0).all()
     assert law.weights.sum() == pytest.approx(1.0)
 
 
-def test_a_seed_repeats_every_byte(found: LatentTrait) -> None:
-    again = asked(keep_chains=True, compare=True)
-    assert again == found
+def test_a_seed_repeats_every_byte(result: LatentTrait) -> None:
+    again = fitted(keep_chains=True, compare=True)
+    assert again == result
     assert again.chains is not None
-    assert found.chains is not None
+    assert result.chains is not None
     for name in ("kappa", "severity", "bias", "noise", "thresholds", "shares"):
-        one, two = (getattr(of.chains, name) for of in (again, found))
+        one, two = (getattr(of.chains, name) for of in (again, result))
         assert one.tobytes() == two.tobytes()
 
 
-def test_a_generator_is_taken_and_a_fresh_seed_recorded(found: LatentTrait) -> None:
-    given = asked(rng=np.random.default_rng(1))
+def test_a_generator_is_taken_and_a_fresh_seed_recorded(result: LatentTrait) -> None:
+    given = fitted(rng=np.random.default_rng(1))
     assert given.seed is None
-    assert given.kappa.value == found.kappa.value
-    fresh = asked(rng=None)
+    assert given.kappa.value == result.kappa.value
+    fresh = fitted(rng=None)
     assert fresh.seed is not None
-    assert fresh.kappa.value != found.kappa.value
-    assert asked(rng=fresh.seed) == fresh
+    assert fresh.kappa.value != result.kappa.value
+    assert fitted(rng=fresh.seed) == fresh
 
 
-def test_random_items_speak_of_both_populations(found: LatentTrait) -> None:
-    fixed, new = found, asked(items="random")
+def test_random_items_speak_of_both_populations(result: LatentTrait) -> None:
+    fixed, new = result, fitted(items="random")
     assert fixed.kappa.interval is not None
     assert new.kappa.interval is not None
     assert (fixed.kappa.interval.target, new.kappa.interval.target) == (
@@ -153,10 +153,10 @@ def test_labels_give_the_names_and_what_has_no_rating_is_left_out() -> None:
         index=["HM1", "HM2", "HM3", "HM4"],
         columns=["A", "B", "C", "D"],
     )
-    found = asked(table, categories=SCALE)
-    assert [one.name for one in found.items] == ["HM1", "HM3", "HM4"]
-    assert [one.name for one in found.raters] == ["A", "B", "D"]
-    assert (found.kappa.n_items, found.kappa.n_raters) == (3, 3)
+    result = fitted(table, categories=SCALE)
+    assert [one.name for one in result.items] == ["HM1", "HM3", "HM4"]
+    assert [one.name for one in result.raters] == ["A", "B", "D"]
+    assert (result.kappa.n_items, result.kappa.n_raters) == (3, 3)
 
 
 @pytest.mark.parametrize(
@@ -172,7 +172,7 @@ def test_labels_give_the_names_and_what_has_no_rating_is_left_out() -> None:
 def test_small_studies_have_an_answer(
     ratings: list[list[int]], options: dict[str, object]
 ) -> None:
-    interval = asked(ratings, **options).kappa.interval
+    interval = fitted(ratings, **options).kappa.interval
     assert interval is not None
     assert 0.0 <= interval.low < interval.high <= 1.0
     assert interval.high - interval.low > 0.1  # they know little, and say so
@@ -208,7 +208,7 @@ def test_what_the_model_cannot_answer_is_refused(
     said: str,
 ) -> None:
     with pytest.raises(error, match=said):
-        asked(ratings, **options)
+        fitted(ratings, **options)
 
 
 @pytest.mark.parametrize(
@@ -230,7 +230,7 @@ def test_what_has_not_converged_is_no_interval_but_says_how_many_more_steps(
 ) -> None:
     monkeypatch.setattr(f"{SAMPLER}.MIN_ESS", 4_000.0)
     with pytest.raises(ConvergenceError, match="more steps are needed") as raised:
-        asked(n_steps=20, max_steps=40)
+        fitted(n_steps=20, max_steps=40)
     message = str(raised.value)
     assert "after 40 steps" in message
     more = re.search(r"about (\d+) more steps", message)
@@ -241,9 +241,9 @@ def test_what_has_not_converged_is_no_interval_but_says_how_many_more_steps(
 
 def test_progress_counts_warm_up_and_both_priors() -> None:
     steps: list[int] = []
-    found = asked(compare=True, progress=steps.append)
-    assert found.other is not None
-    assert sum(steps) == found.n_steps + found.other.n_steps + 2 * 75
+    result = fitted(compare=True, progress=steps.append)
+    assert result.other is not None
+    assert sum(steps) == result.n_steps + result.other.n_steps + 2 * 75
 
 
 def test_a_rater_who_grades_high_and_one_who_is_careless_are_found() -> None:
@@ -253,24 +253,24 @@ def test_a_rater_who_grades_high_and_one_who_is_careless_are_found() -> None:
     perceived[:, 1] += 1.0
     perceived[:, 3] += 1.2 * rng.normal(size=20)
     codes = np.digitize(perceived, [-2.5, -1.5, -0.5, 0.5, 1.5, 2.5])
-    found = asked(codes, categories=list(range(7)))
-    bias = [one.value for one in found.raters]
-    noise = [one.value for one in found.noises]
+    result = fitted(codes, categories=list(range(7)))
+    bias = [one.value for one in result.raters]
+    noise = [one.value for one in result.noises]
     assert (int(np.argmax(bias)), int(np.argmax(noise))) == (1, 3)
-    assert found.raters[1].interval.low > 0.0
+    assert result.raters[1].interval.low > 0.0
     others = max(noise[r] for r in (0, 2, 4))
-    assert found.noises[3].interval.low > others
+    assert result.noises[3].interval.low > others
     # thresholds are about one apart, so that the bias is about one grade
-    apart = found.thresholds[3].value - found.thresholds[2].value
+    apart = result.thresholds[3].value - result.thresholds[2].value
     assert bias[1] - bias[0] == pytest.approx(apart, rel=0.35)
-    order = np.argsort([one.value for one in found.items])
+    order = np.argsort([one.value for one in result.items])
     assert (np.diff(severity[order]) >= -1.0).all()
 
 
-def extreme(found: LatentTrait) -> dict[str, float]:
+def extreme(result: LatentTrait) -> dict[str, float]:
     return {
         check.name: check.p_value
-        for check in found.checks
+        for check in result.checks
         if not 0.005 <= check.p_value <= 0.995
     }
 
@@ -282,16 +282,16 @@ def test_the_predictive_check_is_calm_about_the_model_s_own_ratings() -> None:
         np.random.default_rng(1), 12, 6, [-1.0, 0.0, 1.0],
         share=0.8, fraction=0.6, spread=0.3,
     )  # fmt: skip
-    assert extreme(asked(study.codes, categories=[0, 1, 2, 3])) == {}
+    assert extreme(fitted(study.codes, categories=[0, 1, 2, 3])) == {}
 
 
 def test_raters_who_answer_at_random_agree_not_at_all_and_fit() -> None:
     # That raters do not look at the items is one of the things the model can say.
     codes = np.random.default_rng(5).integers(0, 4, (12, 6))
-    found = asked(codes, categories=[0, 1, 2, 3])
-    assert extreme(found) == {}
-    assert found.kappa.interval is not None
-    assert found.kappa.interval.high < 0.2
+    result = fitted(codes, categories=[0, 1, 2, 3])
+    assert extreme(result) == {}
+    assert result.kappa.interval is not None
+    assert result.kappa.interval.high < 0.2
 
 
 @pytest.mark.slow
@@ -300,8 +300,8 @@ def test_the_predictive_check_sees_an_item_of_two_minds() -> None:
     codes = np.tile(np.array([0, 1, 2, 3, 4, 1, 2, 3])[:, None], 8)
     codes[1, 0], codes[3, 5], codes[6, 2] = 2, 4, 1
     codes[7, ::2], codes[7, 1::2] = 0, 4
-    found = asked(codes, categories=[0, 1, 2, 3, 4])
-    assert extreme(found)["widest spread of the grades of an item"] < 0.005
+    result = fitted(codes, categories=[0, 1, 2, 3, 4])
+    assert extreme(result)["widest spread of the grades of an item"] < 0.005
 
 
 def test_the_predictive_check_sees_a_rater_who_turns_the_scale_round() -> None:
@@ -312,6 +312,6 @@ def test_the_predictive_check_sees_a_rater_who_turns_the_scale_round() -> None:
     codes = study.codes.copy()
     codes[:, 4] = 4 - codes[:, 4]
     tight = LatentPrior(noise_spread=0.1)  # raters who are alike
-    found = asked(codes, categories=[0, 1, 2, 3, 4], prior=tight)
+    result = fitted(codes, categories=[0, 1, 2, 3, 4], prior=tight)
     name = "widest distance of a rater from items' means"
-    assert extreme(found)[name] < 0.005
+    assert extreme(result)[name] < 0.005

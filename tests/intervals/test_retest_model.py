@@ -33,47 +33,47 @@ def test_on_many_pairs_of_alike_raters_it_is_stratified_kappa() -> None:
     rng = np.random.default_rng(11)
     shares = np.tile([0.1, 0.2, 0.4, 0.3], (6, 1))
     study = drawn_pairs(rng, np.full(6, 0.7), shares, 150)
-    found = retest_model(study, categories=[0, 1, 2, 3])
+    result = retest_model(study, categories=[0, 1, 2, 3])
     kappa = stratified_kappa(study, categories=[0, 1, 2, 3])
     # same margins for all: the mean of raters' kappas is the stratified one
-    assert found.kappa.value == pytest.approx(kappa.value, abs=0.01)
+    assert result.kappa.value == pytest.approx(kappa.value, abs=0.01)
     # 3 standard errors of .021 around the truth: once in 370 runs of other seeds
-    assert found.kappa.value == pytest.approx(0.7, abs=0.063)
-    assert found.standard_deviation.value < 0.1
+    assert result.kappa.value == pytest.approx(0.7, abs=0.063)
+    assert result.standard_deviation.value < 0.1
 
 
 def test_raters_who_differ_are_told_apart_and_pulled_together() -> None:
     rng = np.random.default_rng(12)
     kappas = np.array([0.3, 0.5, 0.7, 0.9] * 2)
     study = drawn_pairs(rng, kappas, np.full((8, 3), 1 / 3), 100)
-    found = retest_model(study, categories=[0, 1, 2])
+    result = retest_model(study, categories=[0, 1, 2])
     truth = np.mean(kappas)
-    assert found.kappa.interval.low < truth < found.kappa.interval.high
-    assert found.standard_deviation.value == pytest.approx(np.std(kappas), abs=0.06)
-    for of_rater, kappa in zip(found.raters, kappas, strict=True):
+    assert result.kappa.interval.low < truth < result.kappa.interval.high
+    assert result.standard_deviation.value == pytest.approx(np.std(kappas), abs=0.06)
+    for of_rater, kappa in zip(result.raters, kappas, strict=True):
         assert of_rater.value == pytest.approx(kappa, abs=0.2)
     few = retest_model([pairs[:6] for pairs in study], categories=[0, 1, 2])
     assert np.ptp([q.value for q in few.raters]) < np.ptp(
-        [q.value for q in found.raters]
+        [q.value for q in result.raters]
     )
 
 
 def test_three_raters_and_four_models_say_how_little_is_known() -> None:
     perfect = [[["1", "1"], ["1+", "1+"], ["2", "2"], ["3", "3"]]] * 2
     study = [*perfect, [["1", "1"], ["1+", "1"], ["2", "2"], ["3", "2"]]]
-    found = retest_model(study, categories=["0", "1", "1+", "2", "3", "4"])
-    assert found.kappa.interval.low < 0.5
-    assert found.kappa.interval.high > 0.9
-    assert found.raters[2].value < found.kappa.value < found.raters[0].value
-    assert found.n_pairs == (4, 4, 4)
-    assert found.prior.startswith("mean kappa ~ U(0, 1), π ~ Dirichlet(1")
-    assert found.other_prior != found.prior
-    assert found.other_kappa.interval != found.kappa.interval
-    assert (found.kappa.interval.target, found.kappa.interval.kind) == (
+    result = retest_model(study, categories=["0", "1", "1+", "2", "3", "4"])
+    assert result.kappa.interval.low < 0.5
+    assert result.kappa.interval.high > 0.9
+    assert result.raters[2].value < result.kappa.value < result.raters[0].value
+    assert result.n_pairs == (4, 4, 4)
+    assert result.prior.startswith("mean kappa ~ U(0, 1), π ~ Dirichlet(1")
+    assert result.other_prior != result.prior
+    assert result.other_kappa.interval != result.kappa.interval
+    assert (result.kappa.interval.target, result.kappa.interval.kind) == (
         "raters",
         "credible",
     )
-    assert found.raters[0].interval.target == "items"
+    assert result.raters[0].interval.target == "items"
 
 
 def test_jeffreys_prior_is_what_the_other_prior_was() -> None:
@@ -90,16 +90,16 @@ def test_gaps_and_raters_without_pairs_are_left_out() -> None:
     full = [["a", "a"], ["b", "b"], ["a", "b"]]
     gaps = [["a", None], ["b", "b"], [None, None]]
     none = [[None, "a"]] * 3
-    found = retest_model([full, none, gaps])
-    assert [q.name for q in found.raters] == ["rater 1", "rater 3"]
-    assert found.n_pairs == (3, 1)
+    result = retest_model([full, none, gaps])
+    assert [q.name for q in result.raters] == ["rater 1", "rater 3"]
+    assert result.n_pairs == (3, 1)
 
 
 def test_where_there_is_nothing_to_learn_it_is_undefined() -> None:
     with pytest.warns(UndefinedStatisticWarning, match="no rater has a pair"):
-        found = retest_model([[["a", None], [None, "b"]]])
-    assert math.isnan(found.kappa.value)
-    assert found.kappa.interval.reason == "no rater has a pair of grades"
+        result = retest_model([[["a", None], [None, "b"]]])
+    assert math.isnan(result.kappa.value)
+    assert result.kappa.interval.reason == "no rater has a pair of grades"
     with pytest.warns(UndefinedStatisticWarning, match="one category"):
         retest_model([[["a", "a"], ["a", "a"]]])
 

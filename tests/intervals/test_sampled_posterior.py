@@ -20,10 +20,10 @@ TWO = [
 ]
 
 
-def misses(found: Interval, ends: tuple[float, float]) -> list[float]:
+def misses(result: Interval, ends: tuple[float, float]) -> list[float]:
     """How many Monte Carlo errors each endpoint is off."""
-    assert found.monte_carlo_error is not None
-    off = zip((found.low, found.high), ends, found.monte_carlo_error, strict=True)
+    assert result.monte_carlo_error is not None
+    off = zip((result.low, result.high), ends, result.monte_carlo_error, strict=True)
     return [abs(end - exact) / error for end, exact, error in off]
 
 
@@ -39,8 +39,8 @@ def sampled(ratings: list[list[str]], **options: object) -> Interval:
 
 
 def exact_ends(ratings: list[list[str]], **options: object) -> tuple[float, float]:
-    found = posterior("fleiss_kappa", ratings, target="items", **options)  # type: ignore[arg-type]
-    return found.low, found.high
+    result = posterior("fleiss_kappa", ratings, target="items", **options)  # type: ignore[arg-type]
+    return result.low, result.high
 
 
 @pytest.fixture
@@ -52,11 +52,11 @@ def brief(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("brief")
 def test_two_categories_agree_with_the_exact_posterior() -> None:
-    found = sampled(TWO, n_steps=1000)
+    result = sampled(TWO, n_steps=1000)
     # 4.5 errors at either end: once in 70 000 runs of other seeds
-    assert max(misses(found, exact_ends(TWO))) < 4.5
-    assert found.monte_carlo_error is not None
-    assert max(found.monte_carlo_error) < 0.01
+    assert max(misses(result, exact_ends(TWO))) < 4.5
+    assert result.monte_carlo_error is not None
+    assert max(result.monte_carlo_error) < 0.01
 
 
 @pytest.mark.slow
@@ -66,21 +66,21 @@ def test_two_categories_agree_with_the_exact_posterior() -> None:
     ids=["uniform", "a = 1/6", "Jeffreys"],
 )
 def test_table_v_has_its_exact_ends(prior: dict[str, object]) -> None:
-    found = sampled(TABLE_V, categories=SCALE, **prior)
+    result = sampled(TABLE_V, categories=SCALE, **prior)
     ends = exact_ends(TABLE_V, categories=SCALE, **prior)
-    assert (found.low, found.high) == pytest.approx(ends, abs=3e-3)
-    assert max(misses(found, ends)) < 4.5
+    assert (result.low, result.high) == pytest.approx(ends, abs=3e-3)
+    assert max(misses(result, ends)) < 4.5
 
 
 @pytest.mark.usefixtures("brief")
 def test_what_was_drawn_is_said() -> None:
-    found = sampled(TWO, n_steps=300)
-    assert (found.kind, found.method) == (
+    result = sampled(TWO, n_steps=300)
+    assert (result.kind, result.method) == (
         "credible",
         "Dirichlet-multinomial posterior, emcee",
     )
-    assert (found.seed, found.unit, found.distribution) == (1, None, None)
-    assert found.n_resamples == 4 * 40 * 200  # a third of the steps is burn-in
+    assert (result.seed, result.unit, result.distribution) == (1, None, None)
+    assert result.n_resamples == 4 * 40 * 200  # a third of the steps is burn-in
 
 
 @pytest.mark.usefixtures("brief")

@@ -42,7 +42,7 @@ def pairs(table: list[list[int]]) -> list[list[str]]:
     ]
 
 
-def asked(
+def table_posterior(
     coefficient: str, table: list[list[int]], rng: int = 1, **options: object
 ) -> Interval:
     return posterior(
@@ -55,17 +55,17 @@ def asked(
     )
 
 
-def ends(found: Interval) -> tuple[float, float]:
-    return found.low, found.high
+def ends(result: Interval) -> tuple[float, float]:
+    return result.low, result.high
 
 
 # One pair in agreement, each of 2 × 2 cells of prior 1/2: the share of agreeing pairs
 # is Beta(1/2 + 1/2 + 1, 1/2 + 1/2), whose distribution function is x²; and
 # Brennan-Prediger's coefficient is 2 x - 1.
 def test_one_agreeing_pair_by_hand() -> None:
-    found = asked("brennan_prediger", [[1, 0], [0, 0]], concentration=0.5)
+    result = table_posterior("brennan_prediger", [[1, 0], [0, 0]], concentration=0.5)
     by_hand = [2.0 * math.sqrt(share) - 1.0 for share in TAILS]
-    assert ends(found) == pytest.approx(by_hand, abs=1e-11)
+    assert ends(result) == pytest.approx(by_hand, abs=1e-11)
 
 
 TABLE = [[8, 2, 0], [1, 9, 3], [0, 2, 7]]
@@ -74,14 +74,16 @@ TABLE = [[8, 2, 0], [1, 9, 3], [0, 2, 7]]
 def test_agreement_is_a_beta() -> None:
     # 24 of 32 pairs agree; of the prior, 1.5 items, half is on pairs that do
     agreed = betaincinv(24 + 0.75, 8 + 0.75, TAILS)
-    percent = asked("percent_agreement", TABLE)
+    percent = table_posterior("percent_agreement", TABLE)
     assert ends(percent) == pytest.approx(tuple(agreed), abs=1e-11)
-    corrected = asked("brennan_prediger", TABLE)
+    corrected = table_posterior("brennan_prediger", TABLE)
     assert ends(corrected) == pytest.approx(
         tuple(1.0 - 1.5 * (1.0 - agreed)), abs=1e-11
     )
-    for found in (percent, corrected):
-        assert (found.n_resamples, found.seed, found.monte_carlo_error) == (None,) * 3
+    for result in (percent, corrected):
+        assert (result.n_resamples, result.seed, result.monte_carlo_error) == (
+            None,
+        ) * 3
 
 
 def jacobi(a: float, b: float) -> tuple[Floats, Floats]:
@@ -145,11 +147,11 @@ def test_two_categories_by_another_integral(
     probability: Callable[[Floats, float], float],
 ) -> None:
     prior = np.array(table) + 2.0
-    found = asked(coefficient, table, concentration=2.0)
-    again = [probability(prior, end) for end in ends(found)]
+    result = table_posterior(coefficient, table, concentration=2.0)
+    again = [probability(prior, end) for end in ends(result)]
     # the other integrals have kinks where a share reaches 0 or 1
     assert again == pytest.approx(TAILS, abs=1e-8)
-    assert found.n_resamples is None
+    assert result.n_resamples is None
 
 
 def drawn_values(
@@ -191,11 +193,11 @@ def test_whole_tables_drawn_give_the_same(
     away: Floats = np.abs(np.subtract.outer(range(q), range(q))) / (q - 1.0)
     v = {"identity": (away > 0.0) * 1.0, "linear": away, "quadratic": away**2}[weights]
     values = drawn_values(coefficient, np.array(table) + by_default(q), v)
-    found = asked(coefficient, table, weights=weights)
-    errors = found.monte_carlo_error or (0.0, 0.0)
-    density = found.distribution
+    result = table_posterior(coefficient, table, weights=weights)
+    errors = result.monte_carlo_error or (0.0, 0.0)
+    density = result.distribution
     assert density is not None
-    for end, share, error in zip(ends(found), TAILS, errors, strict=True):
+    for end, share, error in zip(ends(result), TAILS, errors, strict=True):
         slope = float(np.interp(end, density.values, density.weights))
         below = float((values <= end).mean())
         noise = math.hypot(
@@ -205,7 +207,10 @@ def test_whole_tables_drawn_give_the_same(
 
 
 def test_the_monte_carlo_error_is_the_spread_over_seeds() -> None:
-    runs = [asked("cohen_kappa", TABLE, rng=seed, n_draws=500) for seed in range(30)]
+    runs = [
+        table_posterior("cohen_kappa", TABLE, rng=seed, n_draws=500)
+        for seed in range(30)
+    ]
     for end in (0, 1):
         spread = float(np.std([ends(run)[end] for run in runs], ddof=1))
         said = [run.monte_carlo_error[end] for run in runs if run.monte_carlo_error]
@@ -214,9 +219,9 @@ def test_the_monte_carlo_error_is_the_spread_over_seeds() -> None:
 
 
 def test_seeds_repeat_and_are_recorded() -> None:
-    one, two = (asked("cohen_kappa", TABLE, rng=seed) for seed in (1, 2))
+    one, two = (table_posterior("cohen_kappa", TABLE, rng=seed) for seed in (1, 2))
     assert (one.seed, one.n_resamples) == (1, 10_000)
-    assert one == asked("cohen_kappa", TABLE)
+    assert one == table_posterior("cohen_kappa", TABLE)
     assert one.low != two.low
 
 
@@ -225,7 +230,7 @@ def test_coefficients_of_one_value_in_the_population_have_one_posterior() -> Non
         ("cohen_kappa", "conger_kappa", "light_kappa"),
         ("scott_pi", "fleiss_kappa", "krippendorff_alpha"),
     ):
-        first, *others = (ends(asked(name, TABLE)) for name in names)
+        first, *others = (ends(table_posterior(name, TABLE)) for name in names)
         for other in others:
             assert other == pytest.approx(first, abs=1e-10)
 
@@ -240,17 +245,19 @@ def test_renaming_raters_or_categories_changes_nothing(
     cells: list[int], coefficient: str
 ) -> None:
     a, b, c, d = cells
-    found = asked(coefficient, [[a, b], [c, d]])
+    result = table_posterior(coefficient, [[a, b], [c, d]])
     for other in ([[a, c], [b, d]], [[d, c], [b, a]]):
-        assert ends(asked(coefficient, other)) == pytest.approx(ends(found), abs=1e-8)
+        assert ends(table_posterior(coefficient, other)) == pytest.approx(
+            ends(result), abs=1e-8
+        )
 
 
 @settings(max_examples=15)
 @given(tables_of_two, st.sampled_from(COEFFICIENTS_OF_PAIRS))
 def test_levels_are_nested(cells: list[int], coefficient: str) -> None:
     table = [cells[:2], cells[2:]]
-    inner = asked(coefficient, table, level=0.5)
-    outer = asked(coefficient, table, level=0.9)
+    inner = table_posterior(coefficient, table, level=0.5)
+    outer = table_posterior(coefficient, table, level=0.9)
     assert -1.0 <= outer.low < inner.low < inner.high < outer.high <= 1.0
 
 
@@ -258,8 +265,8 @@ def test_levels_are_nested(cells: list[int], coefficient: str) -> None:
 @given(tables_of_two)
 def test_agreement_where_there_was_none_moves_it_up(cells: list[int]) -> None:
     a, b, c, d = cells
-    apart = asked("cohen_kappa", [[a, b + 1], [c + 1, d]])
-    agreed = asked("cohen_kappa", [[a + 1, b], [c, d + 1]])
+    apart = table_posterior("cohen_kappa", [[a, b + 1], [c + 1, d]])
+    agreed = table_posterior("cohen_kappa", [[a + 1, b], [c, d + 1]])
     assert agreed.low > apart.low
     assert agreed.high > apart.high
 
@@ -269,14 +276,14 @@ def test_agreement_where_there_was_none_moves_it_up(cells: list[int]) -> None:
 def test_the_density_holds_what_lies_between_the_ends(
     coefficient: str, table: list[list[int]]
 ) -> None:
-    found = asked(coefficient, table)
-    of = found.distribution
+    result = table_posterior(coefficient, table)
+    of = result.distribution
     assert of is not None
     assert of.continuous
     steps = 0.5 * (of.weights[1:] + of.weights[:-1]) * np.diff(of.values)
     below = np.append(0.0, steps.cumsum())
     assert below[-1] == pytest.approx(1.0, abs=3e-3)
-    between = np.interp(ends(found), of.values, below)
+    between = np.interp(ends(result), of.values, below)
     assert between[1] - between[0] == pytest.approx(0.95, abs=4e-3)
     assert of.words.endswith("half of it on pairs that agree")
 
@@ -284,11 +291,11 @@ def test_the_density_holds_what_lies_between_the_ends(
 def test_the_place_of_a_probability_is_its_quantile_at_every_level() -> None:
     for level in (0.01, 0.9, 1.0 - 1e-9):
         prior = np.array([[20, 5], [10, 15]]) + 2.0
-        found = asked(
+        result = table_posterior(
             "cohen_kappa", [[20, 5], [10, 15]], concentration=2.0, level=level
         )
         shares = [0.5 - 0.5 * level, 0.5 + 0.5 * level]
-        again = [cohen_probability(prior, end) for end in ends(found)]
+        again = [cohen_probability(prior, end) for end in ends(result)]
         assert again == pytest.approx(shares, abs=1e-10)
 
 
@@ -303,24 +310,24 @@ def test_the_place_of_a_probability_is_its_quantile_at_every_level() -> None:
 def test_where_the_prior_weighs_another_stands_beside(
     table: list[list[int]], what: str
 ) -> None:
-    found = asked("cohen_kappa", table)
-    other = asked("cohen_kappa", table, concentration=0.5)
-    assert found.notes == (
-        f"{what}, so the prior weighs: {found.low:.3f} to {found.high:.3f} with "
+    result = table_posterior("cohen_kappa", table)
+    other = table_posterior("cohen_kappa", table, concentration=0.5)
+    assert result.notes == (
+        f"{what}, so the prior weighs: {result.low:.3f} to {result.high:.3f} with "
         "a Dirichlet worth 1.5 items, half of it on pairs that agree, but "
         f"{other.low:.3f} to {other.high:.3f} with Dirichlet(0.5, ...) over the cells "
         "of the table",
     )
-    assert f"{found.low:.3f} to {found.high:.3f} with a Dirichlet" in other.notes[0]
+    assert f"{result.low:.3f} to {result.high:.3f} with a Dirichlet" in other.notes[0]
 
 
 def test_items_of_a_single_rating_are_left_out_and_counted() -> None:
     ratings: list[list[str | None]] = [list(row) for row in pairs([[20, 5], [10, 15]])]
     whole = posterior("cohen_kappa", ratings, target="items", model="table")
     ratings += [["a", None], [None, "b"], [None, None]]
-    found = posterior("cohen_kappa", ratings, target="items", model="table")
-    assert ends(found) == ends(whole)
-    assert found.notes == ("left out, items of a single rating: 2",)
+    result = posterior("cohen_kappa", ratings, target="items", model="table")
+    assert ends(result) == ends(whole)
+    assert result.notes == ("left out, items of a single rating: 2",)
 
 
 @pytest.mark.parametrize(
@@ -331,7 +338,7 @@ def test_items_of_a_single_rating_are_left_out_and_counted() -> None:
         (
             [["a", "b"]],
             {"categories": ["a", "b"], "weights": np.ones((2, 2))},
-            "the weights know no disagreement",
+            "the weights count nothing as disagreement",
         ),
         (
             [[-1, 1], [1, 1]],
@@ -344,29 +351,29 @@ def test_where_nothing_can_be_said_it_is_undefined(
     ratings: object, options: dict[str, object], reason: str
 ) -> None:
     with pytest.warns(UndefinedStatisticWarning, match=reason):
-        found = posterior(
+        result = posterior(
             "cohen_kappa",
             ratings,
             target="items",
             model="table",
             **options,  # type: ignore[arg-type]
         )
-    assert math.isnan(found.low)
-    assert (found.reason, found.kind) == (reason, "credible")
+    assert math.isnan(result.low)
+    assert (result.reason, result.kind) == (reason, "credible")
 
 
-def test_of_two_raters_others_than_fleiss_kappa_have_the_table_unasked() -> None:
+def test_of_two_raters_others_than_fleiss_kappa_have_the_table_by_default() -> None:
     rows = [[1, 1], [1, 2], [2, 2]] * 4
     for coefficient, weights in (
         ("cohen_kappa", "identity"),
         ("scott_pi", "quadratic"),
     ):
-        asked = posterior(
+        by_table = posterior(
             coefficient, rows, target="items", weights=weights, model="table"
         )
-        unasked = posterior(coefficient, rows, target="items", weights=weights)
-        assert unasked == asked
-        assert "table of two raters" in unasked.method
+        by_default = posterior(coefficient, rows, target="items", weights=weights)
+        assert by_default == by_table
+        assert "table of two raters" in by_default.method
     assert "Dirichlet-multinomial" in posterior("scott_pi", rows, target="items").method
 
 

@@ -138,17 +138,17 @@ class Coordinates:
     @property
     def n_dimensions(self) -> int:
         """Length of a position."""
-        return self.shares + 3 + self.n_categories - 1
+        return self.share_start + 3 + self.n_categories - 1
 
     @property
-    def shares(self) -> int:
+    def share_start(self) -> int:
         """Where logit ρ, logit f and log η begin."""
         return self.n_items + 2 * self.n_raters
 
     def start(self, noise_spread: float) -> Floats:
         """Return a position, (n_dimensions,), where the density is near its peak."""
         position = np.zeros(self.n_dimensions)
-        at = self.shares
+        at = self.share_start
         position[at] = 1.0
         position[at + 2] = np.log(noise_spread)
         tau = ndtri(np.arange(1, self.n_categories) / self.n_categories)
@@ -158,7 +158,7 @@ class Coordinates:
 
     def point(self, position: Floats) -> UnconstrainedPoint:
         """Return what positions (n, n_dimensions) hold."""
-        at, n = self.shares, self.n_items
+        at, n = self.share_start, self.n_items
         raw_item, b, w = np.split(position[:, :at], [n, n + self.n_raters], axis=1)
         rho, f, eta, anchor = np.split(position[:, at : at + 4], 4, axis=1)
         share, fraction, noise_sd = expit(rho), expit(f), np.exp(eta)

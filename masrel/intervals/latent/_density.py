@@ -202,7 +202,7 @@ class LatentDensity:
         # Where ρ goes to 0, all severities can go to one point, and the joint density
         # to infinity, on next to no volume. With these slopes added it has a mode.
         slopes = np.zeros(self.n_dimensions)
-        slopes[self.coordinates.shares] = 0.5 * self.coordinates.placed.sum()
+        slopes[self.coordinates.share_start] = 0.5 * self.coordinates.placed.sum()
         return slopes
 
     def start(self) -> Floats:
@@ -281,7 +281,7 @@ class LatentDensity:
                 bias_root * by.bias - point.b,
                 point.noise_sd * by.log_noise - point.w,
                 self._by_share(point, item, tau, loose),
-                self._by_fraction_and_spread(point, by),
+                self._by_fraction_and_noise_sd(point, by),
                 anchor[:, None],
                 1.0 + self.coordinates.by_threshold(threshold, point),
             ]
@@ -316,7 +316,7 @@ class LatentDensity:
             slope + 0.5 * (loose * moved / root).sum(axis=1, keepdims=True)
         )
 
-    def _by_fraction_and_spread(
+    def _by_fraction_and_noise_sd(
         self, point: UnconstrainedPoint, by: CellSlopes
     ) -> Floats:
         # by logit f and log η, (n, 2)

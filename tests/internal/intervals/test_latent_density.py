@@ -186,7 +186,7 @@ def test_far_out_the_density_is_zero_and_not_nan() -> None:
 
 
 def test_shares_of_far_grades_keep_their_digits() -> None:
-    found = grade_shares(np.array([[-9.0, 0.0, 9.0, 9.5]]))[0]
+    result = grade_shares(np.array([[-9.0, 0.0, 9.0, 9.5]]))[0]
     exact = [
         stats.norm.cdf(-9),
         0.5,
@@ -194,7 +194,7 @@ def test_shares_of_far_grades_keep_their_digits() -> None:
         stats.norm.sf(9) - stats.norm.sf(9.5),
         stats.norm.sf(9.5),
     ]
-    assert found == pytest.approx(exact, rel=1e-12)
+    assert result == pytest.approx(exact, rel=1e-12)
 
 
 def test_many_walkers_are_one_call() -> None:

@@ -54,10 +54,10 @@ CASES = [
 @pytest.mark.parametrize("rho", [0.05, 0.5, 0.9, 0.98])
 def test_two_halves_have_the_arcsine_of_the_correlation(rho: float) -> None:
     # Sheppard: both of two normals with correlation ρ below 0: 1/4 + asin(ρ) / (2 π).
-    found = agreement_on_new_items(one(rho, 0.4, 1e-9, [0.0]))
-    assert found.observed[0] == pytest.approx(0.5 + math.asin(rho) / math.pi, abs=1e-7)
-    assert found.chance[0] == pytest.approx(0.5)
-    assert found.kappa[0] == pytest.approx(2 * math.asin(rho) / math.pi, abs=2e-7)
+    result = agreement_on_new_items(one(rho, 0.4, 1e-9, [0.0]))
+    assert result.observed[0] == pytest.approx(0.5 + math.asin(rho) / math.pi, abs=1e-7)
+    assert result.chance[0] == pytest.approx(0.5)
+    assert result.kappa[0] == pytest.approx(2 * math.asin(rho) / math.pi, abs=2e-7)
 
 
 def test_alike_noises_have_the_rectangles_of_a_bivariate_normal() -> None:
@@ -67,8 +67,8 @@ def test_alike_noises_have_the_rectangles_of_a_bivariate_normal() -> None:
     observed = sum(
         law.cdf([b, b], lower_limit=[a, a]) for a, b in itertools.pairwise(ends)
     )
-    found = agreement_on_new_items(one(rho, 0.5, 1e-9, tau))
-    assert found.observed[0] == pytest.approx(observed, abs=1e-6)
+    result = agreement_on_new_items(one(rho, 0.5, 1e-9, tau))
+    assert result.observed[0] == pytest.approx(observed, abs=1e-6)
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -85,9 +85,11 @@ def test_new_items_agree_with_a_fine_grid(
     below = stats.norm.cdf(away) @ weight  # (thresholds, z)
     p = np.diff(below, axis=0, prepend=0.0, append=1.0)
     observed, chance = (p**2).sum(axis=0) @ mass, ((p @ mass) ** 2).sum()
-    found = agreement_on_new_items(one(*case))
-    assert found.observed[0] == pytest.approx(observed, abs=1e-6)
-    assert found.kappa[0] == pytest.approx((observed - chance) / (1 - chance), abs=2e-6)
+    result = agreement_on_new_items(one(*case))
+    assert result.observed[0] == pytest.approx(observed, abs=1e-6)
+    assert result.kappa[0] == pytest.approx(
+        (observed - chance) / (1 - chance), abs=2e-6
+    )
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -110,11 +112,11 @@ def test_these_items_agree_with_simulated_raters(
         noise_variance=np.full(n, rest * f),
     )
     codes = replicate(drawn, rng)
-    found = agreement_on_items(one(*case))
+    result = agreement_on_items(one(*case))
     # 4.5 standard errors: once in 150 000 runs of other seeds
     error = 0.5 / math.sqrt(3 * n)
     equal = float((codes[:, :, 0] == codes[:, :, 1]).mean())
-    assert found.observed[0] == pytest.approx(equal, abs=4.5 * error)
+    assert result.observed[0] == pytest.approx(equal, abs=4.5 * error)
     p = grade_probabilities(one(*case))[0]
     for k in range(len(tau) + 1):
         share = float((codes[:, 1] == k).mean())
@@ -125,10 +127,10 @@ def test_kappa_is_fleiss_own_formula() -> None:
     traits = one(0.6, 0.5, 0.5, [-0.7, 0.2, 1.0])
     p = grade_probabilities(traits)[0]
     observed, chance = (p**2).sum(axis=1).mean(), (p.mean(axis=0) ** 2).sum()
-    found = agreement_on_items(traits)
-    assert found.observed[0] == pytest.approx(observed)
-    assert found.chance[0] == pytest.approx(chance)
-    assert found.kappa[0] == pytest.approx((observed - chance) / (1 - chance))
+    result = agreement_on_items(traits)
+    assert result.observed[0] == pytest.approx(observed)
+    assert result.chance[0] == pytest.approx(chance)
+    assert result.kappa[0] == pytest.approx((observed - chance) / (1 - chance))
 
 
 def test_alike_items_have_kappa_0_and_sure_raters_kappa_1() -> None:
@@ -140,8 +142,8 @@ def test_alike_items_have_kappa_0_and_sure_raters_kappa_1() -> None:
 
 
 def test_where_all_are_in_one_category_kappa_is_0_and_not_nan() -> None:
-    found = Agreement.of(np.array([[1.0, 0.0, 0.0]]), np.array([0.0]))
-    assert found.kappa.tolist() == [0.0]
+    result = Agreement.of(np.array([[1.0, 0.0, 0.0]]), np.array([0.0]))
+    assert result.kappa.tolist() == [0.0]
 
 
 def test_probabilities_of_grades_sum_to_one() -> None:

@@ -15,11 +15,11 @@ pytestmark = pytest.mark.slow
 SAMPLER = "masrel.intervals.latent._sampler"
 
 
-def misses(found: tuple[Quantity, ...], truth: np.ndarray) -> int:
+def misses(result: tuple[Quantity, ...], truth: np.ndarray) -> int:
     """How many true values lie outside of their intervals."""
     return sum(
         not one.interval.low <= value <= one.interval.high
-        for one, value in zip(found, truth.tolist(), strict=True)
+        for one, value in zip(result, truth.tolist(), strict=True)
     )
 
 
@@ -30,26 +30,26 @@ def test_a_large_study_gives_back_what_made_it(monkeypatch: pytest.MonkeyPatch) 
         np.random.default_rng(11), 30, 14, [-1.2, -0.4, 0.5, 1.3],
         share=0.85, fraction=0.7, spread=0.4,
     )  # fmt: skip
-    found = latent_trait(
+    result = latent_trait(
         study.codes, items="fixed", categories=[0, 1, 2, 3, 4],
         level=0.999, n_steps=300, compare=False, rng=1,
     )  # fmt: skip
     truth, centre = study.truth, study.truth.severity.mean()
     # 62 intervals of 99.9 %: two or more miss in 1 of 540 runs of other seeds
     n_missed = (
-        misses(found.items, truth.severity[0] - centre)
-        + misses(found.thresholds, truth.thresholds[0] - centre)
-        + misses(found.raters, truth.bias[0])
-        + misses(found.noises, truth.noise[0])
+        misses(result.items, truth.severity[0] - centre)
+        + misses(result.thresholds, truth.thresholds[0] - centre)
+        + misses(result.raters, truth.bias[0])
+        + misses(result.noises, truth.noise[0])
     )
     assert n_missed <= 1
-    widths = [one.interval.high - one.interval.low for one in found.noises]
+    widths = [one.interval.high - one.interval.low for one in result.noises]
     assert np.median(widths) < 0.6  # and they are not wide for nothing
     kappa = float(agreement_on_items(truth).kappa[0])
-    assert found.kappa.interval is not None
-    assert found.kappa.interval.low < kappa < found.kappa.interval.high
-    assert found.kappa.value == pytest.approx(kappa, abs=0.08)
-    closest = np.corrcoef([one.value for one in found.items], truth.severity[0])[0, 1]
+    assert result.kappa.interval is not None
+    assert result.kappa.interval.low < kappa < result.kappa.interval.high
+    assert result.kappa.value == pytest.approx(kappa, abs=0.08)
+    closest = np.corrcoef([one.value for one in result.items], truth.severity[0])[0, 1]
     assert closest > 0.95
 
 
@@ -105,13 +105,13 @@ def test_the_truth_is_anywhere_in_its_posterior(
     monkeypatch.setattr("masrel.intervals.latent._sampler._MAX_KAPPAS", 500)
     prior = LatentPrior(item_share=(3.0, 1.5), noise_fraction=(2.0, 2.0))
     rng = np.random.default_rng(7)
-    found = [places(rng, prior) for _ in range(50)]
+    result = [places(rng, prior) for _ in range(50)]
     p_values = {}
-    for name in found[0]:
-        z = stats.norm.ppf([one[name] for one in found])
+    for name in result[0]:
+        z = stats.norm.ppf([one[name] for one in result])
         p_values[f"{name}, mean"] = 2 * stats.norm.sf(abs(z.sum()) / np.sqrt(z.size))
         above = stats.chi2.sf((z**2).sum(), z.size)
         p_values[f"{name}, spread"] = 2 * min(above, 1 - above)
     assert min(p_values.values()) > 1e-4, p_values
     # 95 % intervals that miss 9 of 50 or more: one of 1 300 other seeds
-    assert sum(0.025 < one["kappa"] < 0.975 for one in found) >= 42
+    assert sum(0.025 < one["kappa"] < 0.975 for one in result) >= 42

@@ -63,12 +63,12 @@ def misses(values: Floats, law: Callable[[float], float]) -> float:
 
 
 def test_quantiles_of_a_normal_are_within_their_errors() -> None:
-    found = drawn(Normal())
+    result = drawn(Normal())
     # 4.5 errors, 15 times: once in 10 000 runs of other seeds
-    for values, variance in zip(found.values, np.diag(COVARIANCE), strict=True):
+    for values, variance in zip(result.values, np.diag(COVARIANCE), strict=True):
         assert misses(values, stats.norm(scale=np.sqrt(variance)).ppf) < 4.5
-    assert (found.r_hat < 1.01).all()
-    assert (found.ess >= 4000).all()
+    assert (result.r_hat < 1.01).all()
+    assert (result.ess >= 4000).all()
 
 
 def test_a_leapfrog_back_leads_home_and_keeps_volume() -> None:
@@ -170,7 +170,7 @@ def laws(density: SmoothDensity) -> dict[str, float]:
     with pytest.MonkeyPatch.context() as patch:  # a thousand draws tell laws apart
         patch.setattr("masrel.intervals.latent._sampler.MIN_ESS", 1_000.0)
         patch.setattr("masrel.intervals.latent._sampler.MAX_R_HAT", 1.05)
-        found = sample_smooth(
+        result = sample_smooth(
             density, unknowns, start, np.eye(model.n_dimensions),
             generator=rng, n_steps=200, max_steps=8_000,
         )  # fmt: skip
@@ -186,7 +186,7 @@ def laws(density: SmoothDensity) -> dict[str, float]:
     }
     return {
         name: misses(values, law.ppf)
-        for (name, law), values in zip(priors.items(), found.values, strict=True)
+        for (name, law), values in zip(priors.items(), result.values, strict=True)
     }
 
 

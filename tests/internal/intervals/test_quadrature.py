@@ -14,26 +14,26 @@ from tests.intervals.data import SCALE, TABLE_V
 
 def test_probabilities_rise_and_are_those_of_quantiles() -> None:
     counts = item_counts(code_ratings(TABLE_V, SCALE))
-    found = RhoPosterior.of(counts, DEFAULT_PRIOR, 0.95).logit
+    result = RhoPosterior.of(counts, DEFAULT_PRIOR, 0.95).logit
     shares = [1e-6, 0.025, 0.3, 0.5, 0.9, 1.0 - 1e-6]
-    points = [found.quantile(share) for share in shares]
-    again = [found.probability(point) for point in points]
+    points = [result.quantile(share) for share in shares]
+    again = [result.probability(point) for point in points]
     assert again == pytest.approx(shares, abs=1e-12)
-    grid = [found.probability(point) for point in np.linspace(-20.0, 12.0, 400)]
+    grid = [result.probability(point) for point in np.linspace(-20.0, 12.0, 400)]
     assert (np.diff(grid) > -1e-14).all()
 
 
 # The normal's tails are known to scipy; its quantiles are solved for here.
 @pytest.mark.parametrize("spread", [0.01, 1.0, 30.0])
 def test_the_quadrature_finds_the_quantiles_of_a_normal(spread: float) -> None:
-    _, found = line_distribution(
+    _, result = line_distribution(
         lambda x: -0.5 * ((x - 3.0) / spread) ** 2,
         3.0 - 11.0 * spread,
         3.0 + 13.0 * spread,
         (0.025, 0.5, 0.999),
     )
     expected = np.array([-1.959963984540054, 0.0, 3.090232306167813])
-    assert (np.array(found) - 3.0) / spread == pytest.approx(expected, abs=1e-11)
+    assert (np.array(result) - 3.0) / spread == pytest.approx(expected, abs=1e-11)
 
 
 def test_a_density_that_is_cut_off_or_jumps_is_refused() -> None:

@@ -130,7 +130,7 @@ def test_quadrature_agrees_with_draws_of_every_unknown() -> None:
 def test_one_rater_is_a_mixture_that_integrates_by_brute_force() -> None:
     # κ of one rater: prior ∫∫ Beta(κ | m, g) dm dg on a grid of midpoints.
     table = SMALL[1]
-    found = _Posterior.of([table], SHARES, DEFAULT_PRIOR)
+    result = _Posterior.of([table], SHARES, DEFAULT_PRIOR)
     points = (np.arange(60) + 0.5) / 60
     m, g = (a.ravel() for a in np.meshgrid(points, points / 3))
     size = 1 / g - 1
@@ -140,7 +140,7 @@ def test_one_rater_is_a_mixture_that_integrates_by_brute_force() -> None:
     prior = np.diff(cumulative)
     density = prior * [textbook_log(table, k) for k in kappa]
     below = np.cumsum(density) / density.sum()
-    ours = found.rater_quantiles(0, SHARES)
+    ours = result.rater_quantiles(0, SHARES)
     theirs = np.interp(SHARES, below, kappa + 0.5 / 400)
     assert ours == pytest.approx(theirs, abs=2e-3)
 
@@ -171,8 +171,8 @@ def test_ranks_of_what_made_the_data_are_uniform(n_raters: int, n_items: int) ->
             np.bincount(3 * a + b, minlength=9).reshape(3, 3)
             for a, b in np.moveaxis(study, 2, 1)
         ]
-        found = _Posterior.of(tables, (0.5,), DEFAULT_PRIOR)
-        below.append(found.mean.probability(float(special.logit(m))))
+        result = _Posterior.of(tables, (0.5,), DEFAULT_PRIOR)
+        below.append(result.mean.probability(float(special.logit(m))))
     assert stats.kstest(below, "uniform").pvalue > 1e-4
 
 
@@ -185,8 +185,8 @@ def test_ranks_of_what_made_the_data_are_uniform(n_raters: int, n_items: int) ->
     ],
 )
 def test_extreme_tables_have_finite_ends(table: Table) -> None:
-    found = _Posterior.of([table] * 3, SHARES, DEFAULT_PRIOR)
-    assert 0 < found.quantiles[0] < found.quantiles[1] < found.quantiles[2] <= 1
-    low, middle, high = found.rater_quantiles(0, SHARES)
+    result = _Posterior.of([table] * 3, SHARES, DEFAULT_PRIOR)
+    assert 0 < result.quantiles[0] < result.quantiles[1] < result.quantiles[2] <= 1
+    low, middle, high = result.rater_quantiles(0, SHARES)
     assert 0 <= low < middle < high <= 1
-    assert list(found.sd_quantiles(SHARES)) == sorted(found.sd_quantiles(SHARES))
+    assert list(result.sd_quantiles(SHARES)) == sorted(result.sd_quantiles(SHARES))

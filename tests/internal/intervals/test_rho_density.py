@@ -37,7 +37,7 @@ def test_every_coefficient_is_the_integer_times_its_moment(
 ) -> None:
     category, model = of_one_item(n)
     x, _ = model.saddle(np.exp([log_tilt]))
-    found = category.tilted(float(x[0, 0]), log_tilt)
+    result = category.tilted(float(x[0, 0]), log_tilt)
     # Γ(1 + t) = t!
     exact = np.array(
         [
@@ -47,9 +47,9 @@ def test_every_coefficient_is_the_integer_times_its_moment(
         ]
     )
     kept = np.flatnonzero(exact > exact.max() + math.log(TRIMMED)) + 1
-    assert found.first == kept[0]
-    assert found.values.size == kept.size
-    logs = np.log(found.values) + found.scale
+    assert result.first == kept[0]
+    assert result.values.size == kept.size
+    logs = np.log(result.values) + result.scale
     assert logs == pytest.approx(exact[kept - 1], rel=1e-12, abs=1e-10)
 
 

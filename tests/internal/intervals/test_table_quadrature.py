@@ -19,9 +19,9 @@ from tests.intervals.test_two_raters import (
     IDENTITY,
     TABLE,
     TAILS,
-    asked,
     by_default,
     ends,
+    table_posterior,
 )
 
 
@@ -49,13 +49,13 @@ def test_the_probability_of_no_agreement_beyond_chance(
         1.0 - betainc(prior[0, 1], prior[0, 0], expit(-logit)),
     )
     expected = float(((np.exp(log) * below) @ weights) @ half[:, 0])
-    found = TablePosterior(
+    result = TablePosterior(
         nodes=partial(grid_nodes, "margins", IDENTITY, prior, 0.0625),
         shown=partial(grid_nodes, "margins", IDENTITY, prior, 0.5),
         disagreeing=prior[0, 1] + prior[1, 0],
         agreeing=prior.trace(),
     )
-    assert found.probability(0.0) == pytest.approx(
+    assert result.probability(0.0) == pytest.approx(
         expected, abs=1e-7 if a < 0.1 else 1e-10
     )
 
@@ -74,7 +74,7 @@ def test_the_default_prior_is_worth_one_item_and_a_half(q: int) -> None:
 # of their table the sum over cells that fall together.
 def test_draws_agree_with_the_quadrature_of_categories_that_count_as_one() -> None:
     weights = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 1.0], [0.0, 1.0, 1.0]])
-    found = asked("cohen_kappa", TABLE, weights=weights, concentration=0.5)
+    result = table_posterior("cohen_kappa", TABLE, weights=weights, concentration=0.5)
     prior = np.array(TABLE) + 0.5
     merged = np.add.reduceat(np.add.reduceat(prior, [0, 1], axis=0), [0, 1], axis=1)
     _, exact = table_quantiles(
@@ -84,9 +84,9 @@ def test_draws_agree_with_the_quadrature_of_categories_that_count_as_one() -> No
         TAILS,
         start=0.5,
     )
-    assert found.monte_carlo_error is not None
+    assert result.monte_carlo_error is not None
     for end, expected, error in zip(
-        ends(found), exact, found.monte_carlo_error, strict=True
+        ends(result), exact, result.monte_carlo_error, strict=True
     ):
         assert abs(end - expected) < 4.5 * error
         assert error < 3e-3
@@ -113,7 +113,7 @@ def test_given_the_rest_the_probability_is_that_of_a_grid_of_shares(
     y = rng.dirichlet(np.full(q * (q - 1), 0.3), size=n)
     v = np.array([[0.0, 0.25, 1.0], [0.25, 0.0, 0.25], [1.0, 0.25, 0.0]])
     nodes = Nodes.of("margins", v, np.full(n, 1.0 / n), x, y)
-    found = TablePosterior(
+    result = TablePosterior(
         nodes=lambda _: nodes, shown=lambda _: nodes, disagreeing=2.5, agreeing=1.5
     )
     edges = np.linspace(0.0, 1.0, 4001)
@@ -129,7 +129,7 @@ def test_given_the_rest_the_probability_is_that_of_a_grid_of_shares(
         inside = apart >= (1.0 - value) * chance
         below += float(masses @ inside) / n
         twice += bool(inside.any() and not inside[0] and not inside[-1])
-    assert found.probability(value) == pytest.approx(below, abs=2e-4)
+    assert result.probability(value) == pytest.approx(below, abs=2e-4)
     assert twice > 0 or value >= 0.0  # of some tables shares in the middle alone
 
 
