@@ -41,9 +41,10 @@ class OutputOptions:
 
     def check_files(self) -> None:
         """Refuse files that cannot be written, before anything is computed for them."""
-        check_folder("--json", self.json_file)
-        check_folder("--figure", self.figure)
+        if self.json_file is not None:
+            check_folder("--json", self.json_file)
         if self.figure is not None:
+            check_folder("--figure", self.figure)
             figure_form(self.figure)
 
     @property
@@ -79,9 +80,9 @@ def output_options(
     return grouped("output", OutputOptions, *offered)
 
 
-def check_folder(option: str, file: Path | None) -> None:
+def check_folder(option: str, file: Path) -> None:
     """Refuse a file whose folder is not there."""
-    if file is not None and file != Path("-") and not file.parent.is_dir():
+    if file != Path("-") and not file.parent.is_dir():
         raise ParameterError(
             f"{option}: needs a folder that exists, got {file}, where {file.parent} "
             "is none"

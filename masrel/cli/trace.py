@@ -274,7 +274,8 @@ def trace(
         raise ParameterError("--view: goes with --figure, whose contents it chooses")
     joints = _joints_of(models, study, law)
     scenes = _scenes(joints, stretch, [*speeds, *_spaced(speed_range)])
-    check_folder("--csv", samples.csv_file)
+    if samples.csv_file is not None:
+        check_folder("--csv", samples.csv_file)
     output.check_files()
     view = view or SCENE_VIEWS[0]
     if output.figure is not None:

@@ -8,14 +8,8 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from masrel.ratings.files import (
-        InPerson,
-        InPersonRow,
-        ratings_hash,
-        read_in_person,
-        read_ratings,
-        write_ratings,
-    )
+    from masrel.ratings.files import read_ratings
+    from masrel.ratings.in_person import InPerson, InPersonRow, read_in_person
     from masrel.ratings.logs import ratings_from_logs
     from masrel.ratings.table import (
         DEFAULT_SESSION,
@@ -26,7 +20,9 @@ if TYPE_CHECKING:
         RetestPairs,
         rating_matrix,
         ratings_from_rows,
+        ratings_hash,
         retest_pairs,
+        write_ratings,
     )
 
 __all__ = [
@@ -49,14 +45,8 @@ __all__ = [
 ]
 
 _HOMES = {
-    "files": (
-        "InPerson",
-        "InPersonRow",
-        "ratings_hash",
-        "read_in_person",
-        "read_ratings",
-        "write_ratings",
-    ),
+    "files": ("read_ratings",),
+    "in_person": ("InPerson", "InPersonRow", "read_in_person"),
     "logs": ("ratings_from_logs",),
 }
 """Module to the names in it; all other names are of `table`."""

@@ -1,23 +1,14 @@
-"""Files of ratings: reading any as text, writing one, and grades given in person."""
+"""Reading any CSV file of ratings as text: its rows, its columns, its ratings."""
 
 import csv
-import hashlib
 import io
 import math
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from masrel.errors import ParameterError, RatingsError
-from masrel.ratings._csv_rows import (
-    MISSING,
-    CsvRows,
-    LongColumns,
-    Problems,
-    WideColumns,
-    find_columns,
-    read_rows,
-)
 from masrel.ratings.table import (
     DEFAULT_SESSION,
     RATING_COLUMNS,
@@ -27,7 +18,59 @@ from masrel.ratings.table import (
 )
 from masrel.scales import MODIFIED_ASHWORTH, Scale
 
+_MISSING = ("", "NA")
+"""Cells that stand for a missing value; nothing else does."""
+
+_MAX_PROBLEMS = 20
+
 _LOOKS_MISSING = frozenset({"n/a", "na", "nan", "null", "none", ".", "-", "?"})
+
+_NAMES = {
+    "item": ("item", "model", "subject"),
+    "rater": ("rater",),
+    "grade": ("grade", "rating", "score"),
+    "session": ("session",),
+}
+"""Names that are recognized, letter case aside."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _CsvRow:
+    """One record of a CSV file."""
+
+    line: int  # line of the file where it begins, from 1
+    # its cells without the blanks around them, as many as the header has
+    cells: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _CsvRows:
+    """A CSV file as text."""
+
+    path: Path  # the file
+    header: tuple[str, ...]  # names of the columns, all different
+    header_line: int  # line of the header
+    rows: tuple[_CsvRow, ...]  # the records below it; blank lines are left out
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _LongColumns:
+    """Columns of a long table: one row a rating."""
+
+    # item, rater, grade: their positions
+    item: int
+    rater: int
+    grade: int
+    session: int | None  # position of the session, if there is one
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _WideColumns:
+    """Columns of a wide table: one row an item, one column a rater."""
+
+    item: int  # position of the item
+    raters: tuple[int, ...]  # positions of the raters
+    session: int | None  # position of the session, if there is one
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,6 +86,29 @@ class _Cell:
     grade: str | None
     mean_speed_deg_s: float = math.nan
     source: str = "foreign"
+
+
+class _Problems:
+    """Problems of one file, collected to be raised together."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._noted: list[tuple[int, str]] = []
+
+    def add(self, line: int, column: str | None, message: str) -> None:
+        """Note a problem."""
+        where = f"line {line}" + ("" if column is None else f", column {column!r}")
+        self._noted.append((line, f"{self._path}: {where}: {message}"))
+
+    def raise_any(self) -> None:
+        """Raise what was noted, by line, at most 20 of them."""
+        if not self._noted:
+            return
+        texts = [text for _, text in sorted(self._noted, key=lambda noted: noted[0])]
+        more = len(texts) - _MAX_PROBLEMS
+        if more > 0:
+            texts = [*texts[:_MAX_PROBLEMS], f"{self._path}: and {more} more"]
+        raise RatingsError("\n".join(texts))
 
 
 def read_ratings(
@@ -97,11 +163,11 @@ def read_ratings(
         raise ParameterError("scale, categories: needed one of them, got both")
     if categories is not None:
         scale = Scale(name="declared", grades=tuple(categories))
-    rows = read_rows(Path(path))
+    rows = _read_rows(Path(path))
     names = {"item": item, "rater": rater, "grade": grade, "session": session}
-    columns = find_columns(rows, names)
-    problems = Problems(rows.path)
-    if isinstance(columns, LongColumns):
+    columns = _find_columns(rows, names)
+    problems = _Problems(rows.path)
+    if isinstance(columns, _LongColumns):
         cells = _long_cells(rows, columns, problems)
     else:
         cells = _wide_cells(rows, columns)
@@ -113,7 +179,9 @@ def read_ratings(
     return _assemble(values, scale, rows.path)
 
 
-def _long_cells(rows: CsvRows, columns: LongColumns, problems: Problems) -> list[_Cell]:
+def _long_cells(
+    rows: _CsvRows, columns: _LongColumns, problems: _Problems
+) -> list[_Cell]:
     extra = {
         name: rows.header.index(name)
         for name in ("repeat", "mean_speed_deg_s", "source")
@@ -132,7 +200,7 @@ def _long_cells(rows: CsvRows, columns: LongColumns, problems: Problems) -> list
                 session=DEFAULT_SESSION if at is None else row.cells[at],
                 rater=row.cells[columns.rater],
                 model=row.cells[columns.item],
-                grade=None if grade in MISSING else grade,
+                grade=None if grade in _MISSING else grade,
                 repeat=_repeat(texts.get("repeat", "1"), row.line, problems),
                 mean_speed_deg_s=_speed(speed, row.line, problems),
                 source=_source(texts.get("source", "foreign"), row.line, problems),
@@ -140,12 +208,12 @@ def _long_cells(rows: CsvRows, columns: LongColumns, problems: Problems) -> list
         )
         for role in ("item", "rater"):
             position = getattr(columns, role)
-            if row.cells[position] in MISSING:
+            if row.cells[position] in _MISSING:
                 problems.add(row.line, rows.header[position], f"needed the {role}")
     return cells
 
 
-def _wide_cells(rows: CsvRows, columns: WideColumns) -> list[_Cell]:
+def _wide_cells(rows: _CsvRows, columns: _WideColumns) -> list[_Cell]:
     at = columns.session
     return [
         _Cell(
@@ -154,22 +222,22 @@ def _wide_cells(rows: CsvRows, columns: WideColumns) -> list[_Cell]:
             session=DEFAULT_SESSION if at is None else row.cells[at],
             rater=rows.header[position],
             model=row.cells[columns.item],
-            grade=None if row.cells[position] in MISSING else row.cells[position],
+            grade=None if row.cells[position] in _MISSING else row.cells[position],
         )
         for row in rows.rows
         for position in columns.raters
     ]
 
 
-def _repeat(text: str, line: int, problems: Problems) -> int:
+def _repeat(text: str, line: int, problems: _Problems) -> int:
     if text.isascii() and text.isdigit() and int(text) >= 1:
         return int(text)
     problems.add(line, "repeat", f"needed a whole number from 1, got {text!r}")
     return 1
 
 
-def _speed(text: str, line: int, problems: Problems) -> float:
-    if text in MISSING:
+def _speed(text: str, line: int, problems: _Problems) -> float:
+    if text in _MISSING:
         return math.nan
     try:
         speed = float(text)
@@ -182,7 +250,7 @@ def _speed(text: str, line: int, problems: Problems) -> float:
     return speed
 
 
-def _source(text: str, line: int, problems: Problems) -> str:
+def _source(text: str, line: int, problems: _Problems) -> str:
     if text not in SOURCES:
         problems.add(
             line, "source", f"needed one of {', '.join(SOURCES)}, got {text!r}"
@@ -190,7 +258,7 @@ def _source(text: str, line: int, problems: Problems) -> str:
     return text
 
 
-def _check_cells(cells: list[_Cell], scale: Scale | None, problems: Problems) -> None:
+def _check_cells(cells: list[_Cell], scale: Scale | None, problems: _Problems) -> None:
     kind = "a grade" if scale is None else f"one of {', '.join(scale.grades)}"
     hint = "; name the categories if it is a grade" if scale is None else ""
     first_lines: dict[tuple[str, str, str, int], int] = {}
@@ -219,10 +287,10 @@ def _check_cells(cells: list[_Cell], scale: Scale | None, problems: Problems) ->
             )
 
 
-def _observed_scale(rows: CsvRows, cells: list[_Cell]) -> Scale:
+def _observed_scale(rows: _CsvRows, cells: list[_Cell]) -> Scale:
     grades = sorted({cell.grade for cell in cells if cell.grade is not None})
     if not grades:
-        problems = Problems(rows.path)
+        problems = _Problems(rows.path)
         problems.add(rows.header_line, None, "needed at least one grade, got none")
         problems.raise_any()
     try:
@@ -235,174 +303,159 @@ def _observed_scale(rows: CsvRows, cells: list[_Cell]) -> Scale:
     return Scale(name="observed", grades=tuple(sorted(grades, key=values.__getitem__)))
 
 
-def write_ratings(ratings: Ratings, path: Path) -> None:
-    """Write a table of ratings; the same table gives the same bytes.
-
-    Parameters
-    ----------
-    ratings : Ratings
-        The table.
-    path : Path
-        The CSV file; its folder is made when missing.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
-    """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    head = "# Ratings, one row a rating; grades are text; NA is missing.\n"
-    if ratings.simulated:
-        head = f"# SIMULATED: not grades of persons on hardware.\n{head}"
-    path.write_text(head + _body(ratings), encoding="utf-8", newline="")
-
-
-def ratings_hash(ratings: Ratings) -> str:
-    """Return the SHA-256 of a table's rows and of its scale.
-
-    Parameters
-    ----------
-    ratings : Ratings
-        The table.
-
-    Returns
-    -------
-    str
-        In hexadecimal; where the table was read from does not matter.
-    """
-    scale = "\n".join((ratings.scale.name, *ratings.scale.grades))
-    return hashlib.sha256(f"{scale}\n\n{_body(ratings)}".encode()).hexdigest()
-
-
-def _body(ratings: Ratings) -> str:
-    text = io.StringIO(newline="")
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(RATING_COLUMNS)
-    columns = [ratings.table[name].tolist() for name in RATING_COLUMNS]
-    for row in zip(*columns, strict=True):
-        writer.writerow([_as_text(value) for value in row])
-    return text.getvalue()
-
-
-def _as_text(value: object) -> str:
-    if value is None or (isinstance(value, float) and math.isnan(value)):
-        return "NA"
-    return repr(value) if isinstance(value, float) else str(value)
-
-
-_IN_PERSON_COLUMNS = (
-    "source_table",  # where the row is printed
-    "rater",
-    "subject",  # the patient
-    "model",  # the haptic model made of the patient
-    "in_person_grade",
-    "haptic_grade",
-    "note",
-)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class InPersonRow:
-    """One rater's grade of one patient and of the model made of the patient.
-
-    Attributes
-    ----------
-    line : int
-        Line of the file.
-    source_table : str
-        Where the row is printed.
-    rater, subject, model : str
-        Who graded whom, and the haptic model made of the patient.
-    in_person_grade, haptic_grade : str or None
-        The grades; None is missing.
-    note : str
-        A remark.
-    """
-
-    line: int
-    source_table: str
-    rater: str
-    subject: str
-    model: str
-    in_person_grade: str | None
-    haptic_grade: str | None
-    note: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class InPerson:
-    """A table of in-person grades.
-
-    Attributes
-    ----------
-    rows : tuple of InPersonRow
-        Its rows, in the order of the file.
-    source_path : Path
-        The file.
-    """
-
-    rows: tuple[InPersonRow, ...]
-    source_path: Path
-
-
-def read_in_person(path: Path | str) -> InPerson:
-    """Read a table of in-person grades.
-
-    Parameters
-    ----------
-    path : Path or str
-        CSV with the columns source_table, rater, subject, model, in_person_grade,
-        haptic_grade, note; others are left aside. An empty cell or NA is a missing
-        grade.
-
-    Returns
-    -------
-    InPerson
-        The table, everything text.
-
-    Raises
-    ------
-    RatingsError
-        If a column is missing, a row lacks source table, rater, subject or model,
-        or is there twice. The message lists up to 20 problems.
-    """
-    rows = read_rows(Path(path))
-    if not set(_IN_PERSON_COLUMNS) <= set(rows.header):
-        raise RatingsError(
-            f"{rows.path}: line {rows.header_line}: needed the columns "
-            f"{', '.join(_IN_PERSON_COLUMNS)}, got {', '.join(rows.header)}"
-        )
-    problems = Problems(rows.path)
-    seen: dict[tuple[str, str, str], int] = {}
-    graded = []
-    for row in rows.rows:
-        cell = dict(zip(rows.header, row.cells, strict=True))
-        for name in ("source_table", "rater", "subject", "model"):
-            if cell[name] in MISSING:
-                problems.add(row.line, name, "needed text, got none")
-        key = (cell["source_table"], cell["rater"], cell["subject"])
-        first = seen.setdefault(key, row.line)
-        if first != row.line:
+def _read_rows(path: Path) -> _CsvRows:
+    """Read a CSV file as text, without guessing any type."""
+    # A byte order mark, either line ending, blank lines, and blanks around cells do
+    # not matter.
+    records = _records(path, _text(path))
+    if not records:
+        raise RatingsError(f"{path}: needed a header and rows, the file has none")
+    header_line, header = records[0]
+    _check_header(path, header_line, header)
+    problems = _Problems(path)
+    for line, cells in records[1:]:
+        if len(cells) != len(header):
             problems.add(
-                row.line,
-                None,
-                f"needed one row of {cell['subject']!r} by {cell['rater']!r} in "
-                f"{cell['source_table']!r}, line {first} has one already",
+                line, None, f"needed {len(header)} cells, got {len(cells)}: {cells}"
             )
-        graded.append(_in_person_row(row.line, cell))
     problems.raise_any()
-    return InPerson(rows=tuple(graded), source_path=rows.path)
-
-
-def _in_person_row(line: int, cell: dict[str, str]) -> InPersonRow:
-    in_person, haptic = cell["in_person_grade"], cell["haptic_grade"]
-    return InPersonRow(
-        line=line,
-        source_table=cell["source_table"],
-        rater=cell["rater"],
-        subject=cell["subject"],
-        model=cell["model"],
-        in_person_grade=None if in_person in MISSING else in_person,
-        haptic_grade=None if haptic in MISSING else haptic,
-        note=cell["note"],
+    return _CsvRows(
+        path=path,
+        header=header,
+        header_line=header_line,
+        rows=tuple(_CsvRow(line=line, cells=cells) for line, cells in records[1:]),
     )
+
+
+def _text(path: Path) -> str:
+    if not path.is_file():
+        raise RatingsError(f"{path}: no such file")
+    data = path.read_bytes()
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise RatingsError(
+            f"{path}: line {line}: needed UTF-8 text, got the byte "
+            f"0x{data[error.start]:02x}; save the file as UTF-8"
+        ) from error
+    if "\0" in text:
+        line = text.count("\n", 0, text.index("\0")) + 1
+        raise RatingsError(f"{path}: line {line}: needed text, got a zero byte")
+    return text
+
+
+def _records(path: Path, text: str) -> list[tuple[int, tuple[str, ...]]]:
+    # -> (line where the record begins, stripped cells), blank records left out
+    lines = io.StringIO(text, newline="")
+    # lines at the head that begin with "#" are comments, blank lines between them too
+    n_before = 0
+    for line in io.StringIO(text, newline=""):
+        if line.strip() and not line.startswith("#"):
+            break
+        n_before += 1
+        lines.readline()
+    reader = csv.reader(lines, strict=True)
+    records = []
+    begins = n_before + 1
+    try:
+        for cells in reader:
+            stripped = tuple(cell.strip() for cell in cells)
+            if any(stripped):
+                records.append((begins, stripped))
+            begins = n_before + reader.line_num + 1
+    except csv.Error as error:
+        raise RatingsError(
+            f"{path}: line {begins}: needed cells separated by commas ({error})"
+        ) from error
+    return records
+
+
+def _check_header(path: Path, line: int, header: tuple[str, ...]) -> None:
+    if len(header) == 1:
+        other = re.search(r"[;\t|]", header[0])
+        got = f"one column {header[0]!r}"
+        if other:
+            got = f"{other.group()!r} as separator"
+        raise RatingsError(
+            f"{path}: line {line}: needed columns separated by commas, got {got}"
+        )
+    problems = _Problems(path)
+    for position, name in enumerate(header, start=1):
+        if not name:
+            problems.add(line, None, f"column {position} needs a name, got none")
+        elif name in header[: position - 1]:
+            problems.add(line, name, "needed different names, this one is there twice")
+    problems.raise_any()
+
+
+def _find_columns(
+    rows: _CsvRows, names: Mapping[str, str | None]
+) -> _LongColumns | _WideColumns:
+    """Decide whether a table is long or wide, and which column is what."""
+    # names: role to the column the caller named for it, or None.
+    # A table with a column for the rater or for the grade, named by the caller or by a
+    # name that is recognized, is long and needs item, rater and grade. Any other table
+    # is wide: the item is the column the caller named, else one whose name is
+    # recognized, else the first; every other column but the session is a rater.
+    positions = {role: _find(rows, role, names) for role in _NAMES}
+    if positions["rater"] is not None or positions["grade"] is not None:
+        return _long_columns(rows, positions)
+    item, session = positions["item"] or 0, positions["session"]
+    raters = tuple(p for p in range(len(rows.header)) if p not in (item, session))
+    if not raters:
+        raise _error(rows, "needed a column for a rater, got none")
+    return _WideColumns(item=item, raters=raters, session=session)
+
+
+def _long_columns(rows: _CsvRows, positions: Mapping[str, int | None]) -> _LongColumns:
+    required = {}
+    for role in ("item", "rater", "grade"):
+        position = positions[role]
+        if position is None:
+            raise _error(
+                rows,
+                f"needed a column for the {role} named {' or '.join(_NAMES[role])}, "
+                f"got {', '.join(rows.header)}; say which it is",
+            )
+        required[role] = position
+    used = [*required.values()]
+    if (session := positions["session"]) is not None:
+        used.append(session)
+    if len(set(used)) < len(used):
+        raise _error(
+            rows,
+            "needed different columns for item, rater, grade and session, got "
+            + ", ".join(rows.header[p] for p in used),
+        )
+    return _LongColumns(**required, session=session)
+
+
+def _find(rows: _CsvRows, role: str, names: Mapping[str, str | None]) -> int | None:
+    name = names[role]
+    if name is not None:
+        if name not in rows.header:
+            raise _error(
+                rows,
+                f"needed a column {name!r} for the {role}, got "
+                + ", ".join(rows.header),
+            )
+        return rows.header.index(name)
+    # a column the caller named for another role is no candidate for this one
+    taken = names.values()
+    candidates = [
+        column
+        for column in rows.header
+        if column.casefold() in _NAMES[role] and column not in taken
+    ]
+    if len(candidates) > 1:
+        raise _error(
+            rows,
+            f"needed one column for the {role}, got {' and '.join(candidates)}; say "
+            "which it is",
+        )
+    return rows.header.index(candidates[0]) if candidates else None
+
+
+def _error(rows: _CsvRows, message: str) -> RatingsError:
+    return RatingsError(f"{rows.path}: line {rows.header_line}: {message}")

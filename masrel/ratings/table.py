@@ -1,5 +1,8 @@
-"""What makes a data frame a table of ratings, and how statistics take its ratings."""
+"""What a table of ratings is, how statistics take its ratings, and its bytes."""
 
+import csv
+import hashlib
+import io
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -337,3 +340,58 @@ def _items(
     return keys, tuple(
         model if repeat == 1 else f"{model}#{repeat}" for model, repeat in keys
     )
+
+
+def write_ratings(ratings: Ratings, path: Path) -> None:
+    """Write a table of ratings; the same table gives the same bytes.
+
+    Parameters
+    ----------
+    ratings : Ratings
+        The table.
+    path : Path
+        The CSV file; its folder is made when missing.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    head = "# Ratings, one row a rating; grades are text; NA is missing.\n"
+    if ratings.simulated:
+        head = f"# SIMULATED: not grades of persons on hardware.\n{head}"
+    path.write_text(head + _body(ratings), encoding="utf-8", newline="")
+
+
+def ratings_hash(ratings: Ratings) -> str:
+    """Return the SHA-256 of a table's rows and of its scale.
+
+    Parameters
+    ----------
+    ratings : Ratings
+        The table.
+
+    Returns
+    -------
+    str
+        In hexadecimal; where the table was read from does not matter.
+    """
+    scale = "\n".join((ratings.scale.name, *ratings.scale.grades))
+    return hashlib.sha256(f"{scale}\n\n{_body(ratings)}".encode()).hexdigest()
+
+
+def _body(ratings: Ratings) -> str:
+    text = io.StringIO(newline="")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(RATING_COLUMNS)
+    columns = [ratings.table[name].tolist() for name in RATING_COLUMNS]
+    for row in zip(*columns, strict=True):
+        writer.writerow([_csv_cell(value) for value in row])
+    return text.getvalue()
+
+
+def _csv_cell(value: object) -> str:
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return "NA"
+    return repr(value) if isinstance(value, float) else str(value)
