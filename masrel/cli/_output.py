@@ -99,12 +99,12 @@ def write_output(
 ) -> None:
     """Write and print a result in the forms that were chosen, and make no other."""
     # notes: those of a table, which JSON has no place for
-    if output.json_file is not None:
-        write_json(document(), output.json_file)
     if output.prints_json:
         echo_notes(notes)
-    else:
+    else:  # first: a disk that is full then loses no result
         print_text(text(), csv=output.csv, latex=output.latex)
+    if output.json_file is not None:
+        write_json(document(), output.json_file)
     if draw is not None and output.figure is not None:
         output.figure.write_bytes(draw(figure_form(output.figure)))
         click.echo(f"figure: {output.figure}", err=True)
@@ -115,8 +115,12 @@ def write_json(document: dict[str, object], file: Path) -> None:
     text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
     if file == Path("-"):
         click.echo(text)
-    else:
+        return
+    try:
         file.write_text(text + "\n", encoding="utf-8", newline="\n")
+    except OSError as error:
+        error.filename = str(file)  # a full disk does not say which file it was
+        raise
 
 
 def print_text(table: "Table | str", *, csv: bool, latex: bool = False) -> None:

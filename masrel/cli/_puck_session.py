@@ -2,7 +2,6 @@
 
 import dataclasses
 import functools
-import json
 import math
 import sys
 from collections.abc import Callable, Iterator
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from tqdm import tqdm
 
+from masrel.cli._output import OutputOptions, output_options, write_output
 from masrel.hess import Clock, RealClock, SimulatedClock, SimulatedHand
 from masrel.hess.puck import PuckOptions, read_property_table
 
@@ -48,10 +48,9 @@ _OPTIONS = (
     click.option(
         "--emulate", is_flag=True, help="Emulate the puck; with --interface virtual."
     ),
-    click.option(
-        "--json", "json_file", help="Write what was found as JSON; - for the screen."
-    ),
-    click.option("--quiet", is_flag=True, help="No progress bar."),
+)
+_output_options = output_options(
+    json="Write what was found as JSON; - for the screen.", quiet="No progress bar."
 )
 
 
@@ -63,8 +62,7 @@ class PuckSession:
     clock: Clock  # simulated for an emulated puck
     # what holds the arm of an emulated puck: a hand that has let go
     hand: SimulatedHand | None
-    json_file: str | None  # where the JSON goes; "-" for the screen
-    quiet: bool  # whether there are no progress bars
+    output: OutputOptions  # where its results go
 
     @contextmanager
     def link(self, *, all_nodes: bool = False) -> "Iterator[Link]":
@@ -106,8 +104,8 @@ class PuckSession:
     @contextmanager
     def progress(self, total: int) -> Iterator[Callable[[], None]]:
         """Show a bar of steps on a terminal."""
-        hidden = self.quiet or self.json_file == "-"
-        with tqdm(total=total, unit="", leave=False, disable=hidden or None) as bar:
+        hidden = self.output.prints_json or self.output.hides_progress
+        with tqdm(total=total, unit="", leave=False, disable=hidden) as bar:
 
             def step() -> None:
                 bar.update()
@@ -115,19 +113,14 @@ class PuckSession:
             yield step
 
     def write_output(self, lines: list[str], document: dict[str, object]) -> None:
-        """Print lines, or write the document as JSON."""
+        """Print lines, or write the document as JSON; both say whether it is real."""
         simulated = not self.options.moves_hardware
-        if self.json_file != "-":
-            for line in lines:
-                click.echo(line)
-            if simulated:
-                click.echo("(simulated: there is no hardware on this bus)")
-        if self.json_file is not None:
-            text = json.dumps({**document, "simulated": simulated}, indent=1)
-            if self.json_file == "-":
-                click.echo(text)
-            else:
-                _write_text(Path(self.json_file), text + "\n")
+        note = ["(simulated: there is no hardware on this bus)"] if simulated else []
+        write_output(
+            self.output,
+            document=lambda: {**document, "simulated": simulated},
+            text=lambda: "\n".join([*lines, *note]),
+        )
 
 
 def puck_command(function: Callable[..., None]) -> Callable[..., None]:
@@ -143,10 +136,10 @@ def puck_command(function: Callable[..., None]) -> Callable[..., None]:
         gear_ratio: float,
         properties: Path | None,
         emulate: bool,
-        json_file: str | None,
-        quiet: bool,
+        output: OutputOptions,
         **kwargs: Any,
     ) -> None:
+        output.check_files()
         options = PuckOptions(
             interface=interface,
             channel=channel,
@@ -159,25 +152,17 @@ def puck_command(function: Callable[..., None]) -> Callable[..., None]:
             options=options.emulated(_EMULATED_START) if emulate else options,
             clock=SimulatedClock() if emulate else RealClock(),
             hand=_free_hand() if emulate else None,
-            json_file=json_file,
-            quiet=quiet,
+            output=output,
         )
         function(session, **kwargs)
 
+    decorated = _output_options(command)
     for option in reversed(_OPTIONS):
-        command = option(command)
-    return command
+        decorated = option(decorated)
+    return decorated
 
 
 def _free_hand() -> SimulatedHand:
     return SimulatedHand(
         start=_EMULATED_START, end=_RANGE_END, mean_speed=1.0, slip_time=0.0
     )
-
-
-def _write_text(path: Path, text: str) -> None:
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        error.filename = str(path)  # a full disk does not say which file it was
-        raise

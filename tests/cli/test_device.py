@@ -64,6 +64,11 @@ def test_zero_says_the_count(masrel: Caller, tmp_path: Path) -> None:
     assert document == {"angle_deg": 90.0, "counts": 19251, "simulated": True}
 
 
+def test_a_full_disk_loses_no_result(masrel: Caller) -> None:
+    done = masrel("device", "probe", *EMULATED, "--json", "/dev/full")
+    assert done.out.startswith("puck 1: motor, firmware 148, asleep\n")
+
+
 @pytest.mark.slow  # tests/hess/puck/test_documentation.py reads its lines by default
 def test_friction_finds_that_of_the_emulated_arm(masrel: Caller) -> None:
     done = masrel("device", "friction", "--arm-is-free", *EMULATED, "--json", "-")
@@ -114,6 +119,7 @@ def test_friction_does_not_move_an_arm_unasked(masrel: Caller) -> None:
         (("zero", "--angle-deg", 200, *EMULATED), 2, "200.0 is not in the range"),
         (("zero", "--angle-deg", "nan", *EMULATED), 2, "angle: needs 0 to 180 deg"),
         (("probe", *EMULATED, "--json", "/dev/full"), 2, "/dev/full: No space left"),
+        (("probe", *EMULATED, "--json", "no/x"), 2, "--json: needs a folder that"),
         (("check", "--properties", "none.toml"), 2, "none.toml: No such file"),
         (("check", "--channel", "can-none"), 1, "cannot open channel 'can-none'"),
         (
