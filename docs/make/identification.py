@@ -16,11 +16,8 @@ from tqdm import tqdm
 
 from masrel.elbow import STANDARD_MODELS, fit, fit_friction
 from masrel.elbow.identification.quantities import QUANTITIES
-from masrel.report.figures.fit_catch import draw_catches
-from masrel.report.figures.fit_friction import draw_friction
-from masrel.report.figures.fit_residuals import draw_residuals
-from masrel.report.figures.fit_slow import draw_slow_trials
-from masrel.report.figures.fit_trial import draw_fast_trials
+from masrel.report._figure_data import FrictionView, JointFitView
+from masrel.report.figures import draw
 from tests.elbow.identification.synthesis import Scatter, recording, study
 from tests.elbow.identification.test_friction import backdriven
 
@@ -44,15 +41,16 @@ def figures() -> None:
     """Draw the page's figures."""
     found = fit(study(STANDARD_MODELS["HM3"], seed=5, n_slow=4, scatter=HALF))
     stamp = "SIMULATED DATA"
-    drawn = {
-        "fit_slow": draw_slow_trials(found, stamp=stamp),
-        "fit_catches": draw_catches(found, stamp=stamp),
-        "fit_trials": draw_fast_trials(found, stamp=stamp),
-        "fit_residuals": draw_residuals(found, stamp=stamp),
-        "fit_friction": draw_friction(fit_friction([backdriven(1)]), stamp=stamp),
+    views: dict[str, JointFitView | FrictionView] = {
+        "fit_slow": JointFitView(fit=found, view="slow"),
+        "fit_catches": JointFitView(fit=found, view="catches"),
+        "fit_trials": JointFitView(fit=found, view="fast"),
+        "fit_residuals": JointFitView(fit=found, view="residuals"),
+        "fit_friction": FrictionView(fit=fit_friction([backdriven(1)])),
     }
-    for name, figure in drawn.items():
-        (FIGURES / f"{name}.png").write_bytes(figure.png)
+    for name, view in views.items():
+        files = draw(view, stamp=stamp, forms=("png",))
+        (FIGURES / f"{name}.png").write_bytes(files["png"])
 
 
 def coverage(n_studies: int) -> None:

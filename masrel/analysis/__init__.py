@@ -1,15 +1,16 @@
 """The estimates a study's plan asks for, and nothing else.
 
 In: a protocol, its ratings and grades given in person. Out: an `Analysis`, written
-as JSON in full precision.
+as JSON in full precision; or a regression of the grades.
 """
 
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from masrel.analysis.files import as_analysis_document, write_analysis
-    from masrel.analysis.plan import analyze
-    from masrel.analysis.results import (
+    from masrel.analysis._analysis_json import as_analysis_document, write_analysis
+    from masrel.analysis._grading import Effect, GradeRegression, grade_regression
+    from masrel.analysis._plan import analyze
+    from masrel.analysis._results import (
         Analysis,
         InPersonAgreement,
         InPersonPair,
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Analysis",
+    "Effect",
+    "GradeRegression",
     "InPersonAgreement",
     "InPersonPair",
     "IntendedAgreement",
@@ -35,13 +38,17 @@ __all__ = [
     "Speeds",
     "analyze",
     "as_analysis_document",
+    "grade_regression",
     "write_analysis",
 ]
 
 _HOMES = {
-    "analyze": "plan",
-    "as_analysis_document": "files",
-    "write_analysis": "files",
+    "Effect": "_grading",
+    "GradeRegression": "_grading",
+    "analyze": "_plan",
+    "as_analysis_document": "_analysis_json",
+    "grade_regression": "_grading",
+    "write_analysis": "_analysis_json",
 }
 
 
@@ -50,5 +57,5 @@ def __getattr__(name: str) -> object:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     import importlib
 
-    home = importlib.import_module(f"masrel.analysis.{_HOMES.get(name, 'results')}")
+    home = importlib.import_module(f"masrel.analysis.{_HOMES.get(name, '_results')}")
     return getattr(home, name)

@@ -14,8 +14,8 @@ from masrel.cli._options import Decorator, grouped
 from masrel.errors import MasrelWarning, ParameterError
 
 if TYPE_CHECKING:
+    from masrel.report._figure_data import Form
     from masrel.report._tables import Table
-    from masrel.report.figures import Form
 
 _FORMS: dict[str, "Form"] = {".png": "png", ".svg": "svg", ".pdf": "pdf"}
 

@@ -243,7 +243,7 @@ def _interval(
     target: Target,
     options: _EstimateOptions,
 ) -> Interval | None:
-    from masrel.analysis.interval import planned_interval
+    from masrel.analysis._planned_interval import planned_interval
 
     return planned_interval(
         options.interval,

@@ -47,16 +47,11 @@ def analyze(study: Path, ratings_file: Path | None, output: OutputOptions) -> No
 
 
 def _show(data: StudyData, analysis: "Analysis", *, csv: bool) -> None:
+    from masrel.report._document import SECTIONS
+    from masrel.report._material import Paragraph, gather
     from masrel.report._tables import Table, as_csv, as_text
-    from masrel.report.contents import SECTIONS
-    from masrel.report.material import Material, Paragraph
 
-    material = Material(
-        protocol=data.protocol,
-        ratings=data.ratings,
-        analysis=analysis,
-        in_person=data.in_person,
-    )
+    material = gather(data.protocol, data.ratings, analysis, data.in_person)
     for name in _computed(analysis):
         for block in SECTIONS[name](material).blocks:
             if isinstance(block, Table):

@@ -197,9 +197,9 @@ def _write(
 
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
-        for name, drawn in fit_figures(fitted).items():
-            (folder / f"{name}.png").write_bytes(drawn.png)
-            (folder / f"{name}.svg").write_bytes(drawn.svg)
+        for name, forms in fit_figures(fitted).items():
+            for form, picture in forms.items():
+                (folder / f"{name}.{form}").write_bytes(picture)
         click.echo(f"figures: {folder}", err=True)
     write_output(
         output,

@@ -16,7 +16,7 @@ from masrel.cli._output import (
 )
 
 if TYPE_CHECKING:
-    from masrel.analysis.grading import Effect, GradeRegression
+    from masrel.analysis import Effect, GradeRegression
     from masrel.report._tables import Table
 
 
@@ -56,7 +56,7 @@ def grading(
     grade, the others held.
     """
     output.check_files()
-    from masrel.analysis.grading import grade_regression
+    from masrel.analysis import grade_regression
 
     data = read_study(study, ratings_file)
     with warnings_as_notes():
@@ -125,7 +125,7 @@ def _row(effect: "Effect") -> tuple[str, str, float, str]:
 
 
 def _unit(predictor: str) -> str:
-    from masrel.analysis.predictors import PREDICTORS
+    from masrel.analysis._grading import PREDICTORS
 
     unit = PREDICTORS[predictor][1]
     return "" if unit == "1" else unit

@@ -7,14 +7,14 @@ same as Markdown, tables as CSV, figures as PNG and SVG.
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from masrel.report.document import ReportFiles, write_report
+    from masrel.report._document import ReportFiles, write_report
 
 __all__ = ["ReportFiles", "write_report"]
 
 
 def __getattr__(name: str) -> object:
     if name in __all__:
-        from masrel.report import document
+        from masrel.report import _document
 
-        return getattr(document, name)
+        return getattr(_document, name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -3,16 +3,18 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from masrel.agreement import COEFFICIENTS, BandScale, benchmark
 from masrel.estimates import Estimate, Interval, Target
+from masrel.report._estimate_words import (
+    aside,
+    estimate_text,
+    has_zero,
+    origin,
+    promise,
+)
+from masrel.report._figure_data import Forest, ForestRow, Form
 from masrel.report._tables import SIMULATED, Column, Table, Value, percent
-from masrel.report.estimate_words import as_words, has_zero
-from masrel.report.meaning import aside, origin, promise
-
-if TYPE_CHECKING:
-    from masrel.report.figures import ForestRow, Form
 
 _POPULATIONS = {"items": "items", "raters": "raters", "both": "items and raters"}
 
@@ -157,25 +159,22 @@ def _names(
 
 
 def agreement_forest(
-    rows: Sequence[AgreementRow], target: Target, *, simulated: bool, form: "Form"
+    rows: Sequence[AgreementRow], target: Target, *, simulated: bool, form: Form
 ) -> bytes:
     """Return the figure of estimates and their intervals as a file."""
     # Imported here: a table loads nothing that draws.
-    from masrel.report.figures import forest_file
+    from masrel.report.figures import draw
 
     population = _POPULATIONS[target]
     several = len({row.session for row in rows}) > 1
-    return forest_file(
-        [_forest_row(row, target, has_group=several) for row in rows],
+    forest = Forest(
+        rows=tuple(_forest_row(row, target, has_group=several) for row in rows),
         axis_label=f"agreement (1 is perfect); intervals for other {population}",
-        stamp=SIMULATED if simulated else "",
-        form=form,
     )
+    return draw(forest, stamp=SIMULATED if simulated else "", forms=(form,))[form]
 
 
-def _forest_row(row: AgreementRow, target: Target, *, has_group: bool) -> "ForestRow":
-    from masrel.report.figures import ForestRow
-
+def _forest_row(row: AgreementRow, target: Target, *, has_group: bool) -> ForestRow:
     estimate, interval = row.estimate, row.estimate.interval
     # what neither the axis nor the legend says of the interval
     details = []
@@ -188,7 +187,7 @@ def _forest_row(row: AgreementRow, target: Target, *, has_group: bool) -> "Fores
         detail=", ".join(filter(None, details)),
         value=estimate.value,
         interval=interval,
-        text=as_words(estimate),
+        text=estimate_text(estimate),
         has_zero=has_zero(estimate.coefficient),
         group=row.session if has_group else "",
     )

@@ -2,12 +2,12 @@
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from masrel.elbow.identification.friction import FrictionFit
 from masrel.elbow.identification.quantities import QUANTITIES, Quantity
 from masrel.elbow.identification.results import ElbowFit, FittedParameter
 from masrel.elbow.identification.trials import Trial
+from masrel.report._figure_data import Content, Form, FrictionView, JointFitView
 from masrel.report._tables import (
     ABSENT,
     SIMULATED,
@@ -18,14 +18,12 @@ from masrel.report._tables import (
     percent,
 )
 
-if TYPE_CHECKING:
-    from masrel.report.figures.style import Drawn
-
-_FRICTION = {
+FRICTION = {
     "inertia": Quantity(symbol="I", key="inertia_kg_m2", unit="kg·m²"),
     "viscous": Quantity(symbol="B", key="viscous_nms_rad", unit="N·m·s/rad"),
     "coulomb": Quantity(symbol="β", key="coulomb_nm", unit="N·m"),
 }
+"""Parameters of the friction law (7), as a reader sees them."""
 
 
 def fit_table(fit: ElbowFit | FrictionFit) -> Table:
@@ -50,7 +48,7 @@ def _joint_table(fit: ElbowFit) -> Table:
 
 
 def _friction_table(fit: FrictionFit) -> Table:
-    rows = tuple(_row(e, None, _FRICTION[e.name]) for e in fit.estimates)
+    rows = tuple(_row(e, None, FRICTION[e.name]) for e in fit.estimates)
     notes = (
         f"{len(fit.strokes)} strokes; intervals are clustered by stroke.",
         f"Torque differs from (7) by {number(100.0 * fit.relative_error, 1)} % of its "
@@ -148,7 +146,7 @@ def _friction_document(fit: FrictionFit) -> dict[str, object]:
         "n_strokes": len(fit.strokes),
         "relative_error": _finite(fit.relative_error),
         "torque_sd_nm": fit.torque_sd,
-        "estimates": [_estimate(e, _FRICTION[e.name]) for e in fit.estimates],
+        "estimates": [_estimate(e, FRICTION[e.name]) for e in fit.estimates],
         "correlation": _matrix(fit.correlation.tolist()),
     }
 
@@ -197,23 +195,19 @@ def _matrix(rows: list[list[float]]) -> list[list[float | None]]:
     return [[_finite(value) for value in row] for row in rows]
 
 
-def fit_figures(fit: ElbowFit | FrictionFit) -> "dict[str, Drawn]":
-    """Return the figures of a fit by the names of their files."""
+def fit_figures(fit: ElbowFit | FrictionFit) -> dict[str, dict[Form, bytes]]:
+    """Return the figures of a fit by the names of their files, in every form."""
     # Imported here: a table loads nothing that draws.
-    from masrel.report.figures.fit_catch import draw_catches
-    from masrel.report.figures.fit_friction import draw_friction
-    from masrel.report.figures.fit_residuals import draw_residuals
-    from masrel.report.figures.fit_slow import draw_slow_trials
-    from masrel.report.figures.fit_trial import draw_fast_trials
+    from masrel.report.figures import draw
 
-    stamp = SIMULATED if fit.simulated else ""
+    views: dict[str, Content] = {}
     if isinstance(fit, FrictionFit):
-        return {"fit_friction": draw_friction(fit, stamp=stamp)}
-    figures = {
-        "fit_slow": draw_slow_trials(fit, stamp=stamp),
-        "fit_residuals": draw_residuals(fit, stamp=stamp),
-    }
-    if any(trial.after is not None for trial in fit.trials):
-        figures["fit_trials"] = draw_fast_trials(fit, stamp=stamp)
-        figures["fit_catches"] = draw_catches(fit, stamp=stamp)
-    return figures
+        views["fit_friction"] = FrictionView(fit=fit)
+    else:
+        views["fit_slow"] = JointFitView(fit=fit, view="slow")
+        views["fit_residuals"] = JointFitView(fit=fit, view="residuals")
+        if any(trial.after is not None for trial in fit.trials):
+            views["fit_trials"] = JointFitView(fit=fit, view="fast")
+            views["fit_catches"] = JointFitView(fit=fit, view="catches")
+    stamp = SIMULATED if fit.simulated else ""
+    return {name: draw(view, stamp=stamp) for name, view in views.items()}

@@ -4,11 +4,19 @@ from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
 from masrel.estimates import as_document
-from masrel.report._tables import SIMULATED, Column, Table, Value, number, percent
+from masrel.report._figure_data import Form, LatentScale, ScaleRow
+from masrel.report._tables import (
+    SIMULATED,
+    Column,
+    Table,
+    Value,
+    number,
+    percent,
+    significant,
+)
 
 if TYPE_CHECKING:
     from masrel.intervals import LatentTrait, Quantity
-    from masrel.report.figures import Form, ScaleRow
 
 _UNLIKELY = 0.01
 """A p-value of the predictive check below this, or above 1 less this, is noted."""
@@ -86,8 +94,8 @@ def _notes(result: "LatentTrait") -> Iterator[str]:
         yield "The model makes ratings like these (predictive check)."
     yield (
         f"{result.n_chains} chains of {result.n_steps} steps; R-hat at most "
-        f"{result.r_hat:.4f}, effective size at least {result.ess:.0f}; seed "
-        f"{result.seed}."
+        f"{number(result.r_hat, 4)}, effective size at least {number(result.ess, 0)}; "
+        f"seed {result.seed}."
     )
 
 
@@ -118,8 +126,8 @@ def _meanings(result: "LatentTrait") -> Iterator[str]:
 def _unlikely(result: "LatentTrait") -> list[str]:
     # what of the ratings the model would hardly make
     return [
-        f"{check.name} {check.observed:.3g}, expected {check.low:.3g} to "
-        f"{check.high:.3g}"
+        f"{check.name} {significant(check.observed, 3)}, expected "
+        f"{significant(check.low, 3)} to {significant(check.high, 3)}"
         for check in result.checks
         if not _UNLIKELY <= check.p_value <= 1.0 - _UNLIKELY
     ]
@@ -167,11 +175,11 @@ def _quantity(quantity: "Quantity") -> dict[str, object]:
 
 
 def latent_figure(
-    result: "LatentTrait", grades: tuple[str, ...], *, simulated: bool, form: "Form"
+    result: "LatentTrait", grades: tuple[str, ...], *, simulated: bool, form: Form
 ) -> bytes:
     """Return the figure of raters, items and thresholds on one scale as a file."""
     # Imported here: a table loads nothing that draws.
-    from masrel.report.figures import LatentScale, latent_file
+    from masrel.report.figures import draw
 
     scale = LatentScale(
         items=tuple(map(_scale_row, result.items)),
@@ -183,12 +191,10 @@ def latent_figure(
         grades=grades,
         level=result.items[0].interval.level,
     )
-    return latent_file(scale, stamp=SIMULATED if simulated else "", form=form)
+    return draw(scale, stamp=SIMULATED if simulated else "", forms=(form,))[form]
 
 
-def _scale_row(quantity: "Quantity", noise: float | None = None) -> "ScaleRow":
-    from masrel.report.figures import ScaleRow
-
+def _scale_row(quantity: "Quantity", noise: float | None = None) -> ScaleRow:
     return ScaleRow(
         label=quantity.name,
         value=quantity.value,

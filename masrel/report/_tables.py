@@ -78,6 +78,18 @@ def number(value: float | None, digits: int) -> str:
     return text.replace("-", "−")
 
 
+def significant(value: float, digits: int = 6) -> str:
+    """Return a number with so many digits, whatever its size."""
+    return f"{value:.{digits}g}"
+
+
+def fixed_or_significant(value: float, decimals: int) -> str:
+    """Return a number with fixed decimals where they show it, else four digits."""
+    if value == 0.0 or 10.0 ** (1 - decimals) <= abs(value) < 1e7:
+        return f"{value:.{decimals}f}"
+    return significant(value, 4)
+
+
 def as_entered(value: float) -> str:
     """Return a number that somebody chose with the digits it was entered with."""
     if not math.isfinite(value):

@@ -6,11 +6,20 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from masrel.errors import ParameterError
-from masrel.report._tables import aligned
+from masrel.report._figure_data import (
+    CatchCurve,
+    CatchCurves,
+    CatchSchematic,
+    Content,
+    Form,
+    Stretches,
+    StretchLine,
+    StretchPanel,
+)
+from masrel.report._tables import aligned, fixed_or_significant, significant
 
 if TYPE_CHECKING:
     from masrel.elbow import ElbowParameters, Events, Motion
-    from masrel.report.figures import CatchCurve, CatchSchematic, Form, StretchPanel
 
 SCENE_OUTPUTS = {
     "residual-torque": "residual_torque_nm",
@@ -50,7 +59,7 @@ class Scene:
         """Name of the scene."""
         if self.speed_deg_s is None:
             return f"{self.model}, {self.kind}"
-        return f"{self.model}, {self.kind} {self.speed_deg_s:g} deg/s"
+        return f"{self.model}, {self.kind} {significant(self.speed_deg_s)} deg/s"
 
 
 def scene_document(
@@ -95,7 +104,7 @@ def scene_document(
         if isinstance(number, float) and not math.isfinite(number):
             raise ParameterError(
                 f"{scene.title}: {key}: needs a number that a float can hold, got "
-                f"{number:g}; some parameter or speed is too large"
+                f"{significant(number)}; some parameter or speed is too large"
             )
     return document
 
@@ -130,19 +139,23 @@ def scene_text(document: dict[str, Any], title: str) -> str:
     """Return the document of one scene for a person."""
     lines = [title, _phase_line(["phase", "start s", "end s", "start deg", "end deg"])]
     for span in document["phases"]:
-        times = [_shown(span[key], 3) for key in ("start_s", "end_s")]
-        angles = [_shown(span[key], 2) for key in ("start_deg", "end_deg")]
+        times = [fixed_or_significant(span[key], 3) for key in ("start_s", "end_s")]
+        angles = [
+            fixed_or_significant(span[key], 2) for key in ("start_deg", "end_deg")
+        ]
         lines.append(_phase_line([span["name"], *times, *angles]))
-    lines.append(f"peak torque {_shown(document['peak_torque_nm'], 3)} N·m")
+    lines.append(
+        f"peak torque {fixed_or_significant(document['peak_torque_nm'], 3)} N·m"
+    )
     for key, (name, unit) in _LINES.items():
         if key not in document:
             continue
         if document[key] is None:
             lines.append(f"{name} none: the stretch has no catch")
         else:
-            lines.append(f"{name} {_shown(document[key], 3)} {unit}")
+            lines.append(f"{name} {fixed_or_significant(document[key], 3)} {unit}")
     lines += [
-        f"torque at {place} {_shown(value, 3)} N·m"
+        f"torque at {place} {fixed_or_significant(value, 3)} N·m"
         for place, value in _places(document)
     ]
     return "\n".join(lines)
@@ -156,7 +169,7 @@ def _phase_line(cells: Sequence[str]) -> str:
         text.rjust(max(width, len(text) + 2))
         for text, width in zip(numbers, widths, strict=True)
     ]
-    return f"{name:<11}" + "".join(parts)
+    return name.ljust(11) + "".join(parts)
 
 
 def _places(document: dict[str, Any]) -> list[tuple[str, float]]:
@@ -164,8 +177,11 @@ def _places(document: dict[str, Any]) -> list[tuple[str, float]]:
     at_times = document.get("torque_at_s", [])
     at_angles = document.get("torque_at_deg", [])
     return [
-        *((f"{row['time_s']:g} s", row["torque_nm"]) for row in at_times),
-        *((f"{row['angle_deg']:g} deg", row["torque_nm"]) for row in at_angles),
+        *((f"{significant(row['time_s'])} s", row["torque_nm"]) for row in at_times),
+        *(
+            (f"{significant(row['angle_deg'])} deg", row["torque_nm"])
+            for row in at_angles
+        ),
     ]
 
 
@@ -181,17 +197,13 @@ def scenes_text(documents: Sequence[dict[str, Any]]) -> str:
         torques = [value for _, value in _places(document)]
         cells = [*(document[key] for key in keys), *torques]
         rows.append(
-            [document["model"], *("–" if c is None else _shown(c, 3) for c in cells)]
+            [
+                document["model"],
+                *("–" if c is None else fixed_or_significant(c, 3) for c in cells),
+            ]
         )
     numeric: list[Literal["right"]] = ["right"] * (len(rows[0]) - 1)
     return "\n".join(aligned(rows, ["left", *numeric]))
-
-
-def _shown(value: float, decimals: int) -> str:
-    # fixed decimals where they show the number, else four digits of it
-    if value == 0.0 or 10.0 ** (1 - decimals) <= abs(value) < 1e7:
-        return f"{value:.{decimals}f}"
-    return f"{value:.4g}"
 
 
 def check_view(scenes: Sequence[Scene], view: str) -> None:
@@ -237,21 +249,23 @@ def _n_caught(scenes: Sequence[Scene]) -> int:
     return int(np.isfinite(outputs.column("catch")).sum())
 
 
-def scenes_figure(scenes: Sequence[Scene], view: str, *, form: "Form") -> bytes:
+def scenes_figure(scenes: Sequence[Scene], view: str, *, form: Form) -> bytes:
     """Return a figure of scenes as a file."""
     # Imported here: a text loads nothing that draws.
-    from masrel.report import figures
+    from masrel.report.figures import draw
 
-    models = _by_model(scenes)
+    return draw(_content(scenes, view), stamp=_STAMP, forms=(form,))[form]
+
+
+def _content(scenes: Sequence[Scene], view: str) -> Content:
+    models = _by_model(scenes).items()
     if view == "catch":
-        curves = [_curve(name, subset) for name, subset in models.items()]
-        return figures.draw_catches(curves, form=form, stamp=_STAMP)
+        return CatchCurves(curves=tuple(_curve(*of_model) for of_model in models))
     if view == "schematic":
-        schematic = _schematic(scenes[0])
-        return figures.draw_schematic(schematic, form=form, stamp=_STAMP)
+        return _schematic(scenes[0])
     against: Literal["angle", "time"] = "angle" if view == "angle" else "time"
-    panels = [_panel(name, subset) for name, subset in models.items()]
-    return figures.draw_stretches(panels, against=against, form=form, stamp=_STAMP)
+    panels = tuple(_panel(*of_model) for of_model in models)
+    return Stretches(panels=panels, against=against)
 
 
 def _by_model(scenes: Sequence[Scene]) -> dict[str, list[Scene]]:
@@ -261,11 +275,10 @@ def _by_model(scenes: Sequence[Scene]) -> dict[str, list[Scene]]:
     return models
 
 
-def _panel(name: str, scenes: Sequence[Scene]) -> "StretchPanel":
+def _panel(name: str, scenes: Sequence[Scene]) -> StretchPanel:
     import numpy as np
 
     from masrel.elbow import outline
-    from masrel.report.figures import StretchLine, StretchPanel
 
     lines = []
     for scene in scenes:
@@ -273,7 +286,7 @@ def _panel(name: str, scenes: Sequence[Scene]) -> "StretchPanel":
         speed = scene.speed_deg_s
         lines.append(
             StretchLine(
-                label=scene.kind if speed is None else f"{speed:g} deg/s",
+                label=scene.kind if speed is None else f"{significant(speed)} deg/s",
                 time=line.time,
                 angle=np.degrees(line.angle),
                 torque=line.torque,
@@ -283,9 +296,8 @@ def _panel(name: str, scenes: Sequence[Scene]) -> "StretchPanel":
     return StretchPanel(title=name, lines=tuple(lines))
 
 
-def _schematic(scene: Scene) -> "CatchSchematic":
+def _schematic(scene: Scene) -> CatchSchematic:
     from masrel.elbow import outline, residual_torque
-    from masrel.report.figures import CatchSchematic
 
     line = outline(scene.parameters, scene.motion, n_points=_N_PIXELS)
     events = line.events
@@ -313,11 +325,10 @@ def _schematic(scene: Scene) -> "CatchSchematic":
     )
 
 
-def _curve(name: str, scenes: Sequence[Scene]) -> "CatchCurve":
+def _curve(name: str, scenes: Sequence[Scene]) -> CatchCurve:
     import numpy as np
 
     from masrel.elbow import evaluate
-    from masrel.report.figures import CatchCurve
 
     joint = scenes[0].parameters
     joints = [scene.parameters for scene in scenes]

@@ -6,10 +6,25 @@ import math
 import pandas as pd
 import pytest
 
-from masrel.analysis.accuracy import in_person_agreement, intended_agreement
+from masrel.analysis import InPersonAgreement, IntendedAgreement, analyze
 from masrel.errors import RatingsError
-from masrel.ratings import InPerson
-from tests.analysis.studies import hess2012, in_person, of_session, ratings
+from masrel.ratings import InPerson, Ratings
+from tests.analysis.studies import in_person, of_session, protocol_with, ratings
+
+
+def intended(rows: Ratings) -> IntendedAgreement:
+    """What an analysis says of intended grades."""
+    result = analyze(protocol_with(sections=("intended",)), rows).intended
+    assert result is not None
+    return result
+
+
+def paired(rows: Ratings, grades: InPerson | None) -> InPersonAgreement:
+    """What an analysis says of grades in person."""
+    protocol = protocol_with(sections=("in-person",))
+    result = analyze(protocol, rows, in_person=grades).in_person
+    assert result is not None
+    return result
 
 
 def without_haptic_grades() -> InPerson:
@@ -21,7 +36,7 @@ def without_haptic_grades() -> InPerson:
 
 
 def test_a_model_without_ratings_has_no_percentage() -> None:
-    found = intended_agreement(hess2012(), ratings(*of_session("test", R1=("1", "1"))))
+    found = intended(ratings(*of_session("test", R1=("1", "1"))))
     by_model = {row.model: row for row in found.models}
     assert by_model["HM1"].percent == 100.0
     assert by_model["HM2"].percent == 0.0
@@ -33,7 +48,7 @@ def test_a_model_without_ratings_has_no_percentage() -> None:
 
 
 def test_one_model_has_a_mean_and_no_deviation() -> None:
-    found = intended_agreement(hess2012(), ratings(("test", "R1", "HM1", "1")))
+    found = intended(ratings(("test", "R1", "HM1", "1")))
     assert found.mean == 100.0
     assert math.isnan(found.sd)
     assert found.reason == "one model has no standard deviation over models"
@@ -41,24 +56,24 @@ def test_one_model_has_a_mean_and_no_deviation() -> None:
 
 def test_a_missing_grade_is_no_rating() -> None:
     gap = ratings(*of_session("test", R1=("1",), R2=(None,)))
-    (hm1, *_) = intended_agreement(hess2012(), gap).models
+    (hm1, *_) = intended(gap).models
     assert (hm1.n_ratings, hm1.n_agree) == (1, 1)
 
 
 def test_the_first_session_that_has_ratings_is_used() -> None:
     later = ratings(("retest", "R1", "HM1", "1"))
-    assert intended_agreement(hess2012(), later).session == "retest"
+    assert intended(later).session == "retest"
 
 
 def test_ratings_without_in_person_grades_say_so() -> None:
-    found = in_person_agreement(hess2012(), ratings(("test", "R1", "HM1", "1")), None)
+    found = paired(ratings(("test", "R1", "HM1", "1")), None)
     assert found.pairs == ()
     assert found.reason == "no grades given in person belong to these ratings"
 
 
 def test_in_person_grades_alone_are_paired_with_the_ratings() -> None:
     rated = ratings(*of_session("test", R1=("1", "1+", "2", "2"), R4=("1",)))
-    found = in_person_agreement(hess2012(), rated, without_haptic_grades())
+    found = paired(rated, without_haptic_grades())
     # R1 in person: 1, 1+, 2, 3. The other eight entries meet no rating.
     assert [(p.model, p.in_person, p.haptic) for p in found.pairs] == [
         ("HM1", "1", "1"),
@@ -76,11 +91,11 @@ def test_of_repeated_presentations_the_first_is_paired() -> None:
     )
     table = pd.concat([second.table, first.table], ignore_index=True)
     both = dataclasses.replace(first, table=table)
-    (pair,) = in_person_agreement(hess2012(), both, without_haptic_grades()).pairs
+    (pair,) = paired(both, without_haptic_grades()).pairs
     assert pair.haptic == "1"
 
 
 def test_a_haptic_grade_that_contradicts_the_ratings_is_refused_with_its_line() -> None:
     rated = ratings(("test", "R1", "HM1", "3"))
     with pytest.raises(RatingsError, match=r"in_person\.csv: line \d+.*'3'.*got '1'"):
-        in_person_agreement(hess2012(), rated, in_person())
+        paired(rated, in_person())

@@ -9,7 +9,7 @@ import pytest
 import statsmodels.api as sm
 from scipy.optimize import minimize
 
-from masrel.analysis.grading import GradeRegression, grade_regression
+from masrel.analysis import GradeRegression, grade_regression
 from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
 from masrel.protocol import Protocol, read_protocol, scale_of
 from masrel.ratings import Ratings, ratings_from_rows, read_ratings

@@ -2,14 +2,21 @@
 
 import math
 
-from masrel.analysis.speeds import stretching_speeds
-from masrel.ratings import ratings_from_rows
+from masrel.analysis import Speeds, analyze
+from masrel.ratings import Ratings, ratings_from_rows
 from masrel.scales import MODIFIED_ASHWORTH
-from tests.analysis.studies import hess2012, ratings
+from tests.analysis.studies import protocol_with, ratings
+
+
+def stretching_speeds(rows: Ratings) -> Speeds:
+    """What an analysis says of speeds."""
+    result = analyze(protocol_with(sections=("speeds",)), rows).speeds
+    assert result is not None
+    return result
 
 
 def test_ratings_without_speeds_say_so() -> None:
-    found = stretching_speeds(hess2012(), ratings(("test", "R1", "HM1", "1")))
+    found = stretching_speeds(ratings(("test", "R1", "HM1", "1")))
     assert (found.values, found.by_model, found.by_rater) == ((), (), ())
     assert found.n_missing == 1
     assert found.reason == "no rating comes with a stretching speed"
@@ -29,7 +36,7 @@ def test_one_speed_has_no_deviation_and_sessions_stay_apart() -> None:
         ],
         MODIFIED_ASHWORTH,
     )
-    found = stretching_speeds(hess2012(), made)
+    found = stretching_speeds(made)
     test, retest = found.by_model  # in the protocol's order, not the file's
     # mean 85, deviations 5 and -5: sd sqrt(50 / 1)
     assert (test.session, test.n, test.mean, test.sd) == ("test", 2, 85.0, 50**0.5)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from masrel.analysis.grading import grade_regression
+from masrel.analysis import grade_regression
 from masrel.protocol import read_protocol, scale_of
 from masrel.ratings import read_ratings
 from tests.cli.process import Caller

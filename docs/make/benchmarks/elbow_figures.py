@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from masrel.report.figures.style import (
+from masrel.report.figures._style import (
     BLACK,
     BLUE,
     DASHES,
     GREY,
     ORANGE,
     VERMILLION,
-    as_bytes,
+    file_of,
     house_style,
 )
 
@@ -54,7 +54,7 @@ def draw_work(points: Sequence["Point"]) -> None:
         axes.grid(which="major")
         axes.set_xlim(right=axes.get_xlim()[1] * 4)
         axes.legend(fontsize=7.5, loc="center left", bbox_to_anchor=(0.0, 0.42))
-        (FIGURES / "elbow_work.png").write_bytes(as_bytes(figure, "png"))
+        (FIGURES / "elbow_work.png").write_bytes(file_of(figure, "png"))
 
 
 def draw_approach(rates: Sequence[float], late: dict[str, np.ndarray]) -> None:
@@ -77,4 +77,4 @@ def draw_approach(rates: Sequence[float], late: dict[str, np.ndarray]) -> None:
             axes.set_xlabel("samples a second (Hz)")
             axes.legend(fontsize=7.5, loc="upper right")
         panels[0].set_ylabel("sampled − exact (ms)")
-        (FIGURES / "elbow_sampled.png").write_bytes(as_bytes(figure, "png"))
+        (FIGURES / "elbow_sampled.png").write_bytes(file_of(figure, "png"))

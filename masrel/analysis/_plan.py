@@ -1,0 +1,276 @@
+"""Compute what a study's plan asks for, line by line, and nothing else."""
+
+import dataclasses
+import hashlib
+
+import masrel
+from masrel.agreement import coefficient, cohen_kappa
+from masrel.analysis._descriptions import (
+    in_person_agreement,
+    intended_agreement,
+    stretching_speeds,
+)
+from masrel.analysis._planned_interval import planned_interval
+from masrel.analysis._results import Analysis, PlannedEstimate, RaterEstimate
+from masrel.errors import CountsError, ParameterError, ProtocolError, RatingsError
+from masrel.estimates import Estimate
+from masrel.protocol import EstimatePlan, Protocol, protocol_hash, scale_of
+from masrel.ratings import (
+    InPerson,
+    Ratings,
+    RetestPairs,
+    rating_matrix,
+    ratings_hash,
+    retest_pairs,
+)
+
+
+def analyze(
+    protocol: Protocol, ratings: Ratings, *, in_person: InPerson | None = None
+) -> Analysis:
+    """Compute what the protocol's plan and report ask for.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        The study's protocol: ``analysis.estimates`` is the plan, and
+        ``report.sections`` says which descriptions are needed.
+    ratings : Ratings
+        The ratings.
+    in_person : InPerson, optional
+        Grades given to patients in person.
+
+    Returns
+    -------
+    Analysis
+        One entry per line of the plan; a line whose data are absent has a reason
+        instead of an estimate. Parts no section asks for are None.
+
+    Raises
+    ------
+    ProtocolError
+        If a coefficient or interval of the plan does not exist or does not fit its
+        data; the message names the line.
+    RatingsError
+        If the ratings have a session, rater or model the protocol has not, or
+        contradict the in-person grades.
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        If an estimate is undefined; its reason says why.
+    SmallSampleWarning
+        If an interval rests on too little data.
+    """
+    _check_known(protocol, ratings)
+    sections = set(protocol.report.sections)
+    return Analysis(
+        study=protocol.study.id,
+        level=protocol.analysis.level,
+        estimates=tuple(
+            _estimate(line, protocol, ratings) for line in protocol.analysis.estimates
+        ),
+        intended=(
+            intended_agreement(protocol, ratings) if "intended" in sections else None
+        ),
+        in_person=(
+            in_person_agreement(protocol, ratings, in_person)
+            if "in-person" in sections
+            else None
+        ),
+        speeds=(
+            stretching_speeds(protocol, ratings)
+            if sections & {"speeds", "traces"}
+            else None
+        ),
+        simulated=ratings.simulated,
+        inputs=_inputs(protocol, ratings, in_person),
+        masrel_version=masrel.__version__,
+    )
+
+
+def _check_known(protocol: Protocol, ratings: Ratings) -> None:
+    # refuses ratings of sessions, raters or models the protocol does not have
+    known = {
+        "session": [session.id for session in protocol.sessions],
+        "rater": [rater.id for rater in protocol.raters],
+        "model": [model.id for model in protocol.models],
+    }
+    where = "the ratings" if ratings.source_path is None else str(ratings.source_path)
+    problems = []
+    for column, ids in known.items():
+        strange = dict.fromkeys(x for x in ratings.table[column] if x not in ids)
+        problems += [
+            f"{where}: column {column!r}: needed one of the protocol's, "
+            f"{', '.join(ids)}, got {got!r}"
+            for got in strange
+        ]
+    if problems:
+        raise RatingsError("\n".join(problems))
+
+
+def _inputs(
+    protocol: Protocol, ratings: Ratings, in_person: InPerson | None
+) -> dict[str, str]:
+    # SHA-256 by name; of the file where there is one: anybody can check it
+    inputs = {"protocol_sha256": protocol_hash(protocol)}
+    files = {"ratings_sha256": ratings.source_path}
+    if in_person is not None:
+        files["in_person_sha256"] = in_person.source_path
+    for name, path in files.items():
+        inputs[name] = (
+            ratings_hash(ratings)
+            if path is None
+            else hashlib.sha256(path.read_bytes()).hexdigest()
+        )
+    return inputs
+
+
+def _estimate(
+    line: EstimatePlan, protocol: Protocol, ratings: Ratings
+) -> PlannedEstimate:
+    compute = _inter_rater if line.kind == "inter-rater" else _retest
+    try:
+        models, reason = _rated_models(line, protocol, ratings)
+        if reason is not None:
+            return PlannedEstimate(line=line, reason=reason)
+        return compute(line, protocol, ratings, models)
+    except (ParameterError, CountsError, RatingsError) as error:
+        raise ProtocolError(f"analysis.estimates {line.id!r}: {error}") from error
+
+
+def _rated_models(
+    line: EstimatePlan, protocol: Protocol, ratings: Ratings
+) -> tuple[tuple[str, ...], str | None]:
+    # the models a line uses, rated in each of its sessions; or why there are none
+    present = set(ratings.table["session"])
+    lost = [session for session in line.sessions if session not in present]
+    if lost:
+        return (), f"there are no ratings of session {' or '.join(lost)}"
+    planned = [m for m in protocol.models if line.models in ("all", m.role)]
+    if not planned:
+        return (), f"the study has no {line.models} models"
+    graded = ratings.table[ratings.table["grade"].notna()]
+    rated = set.intersection(
+        *(set(graded.loc[graded["session"] == s, "model"]) for s in line.sessions)
+    )
+    # A role without any rating was not part of these data: an estimate over the
+    # rest would carry the name of more than it holds.
+    for role in ("standard", "dummy"):
+        of_role = [model.id for model in planned if model.role == role]
+        if of_role and not rated.intersection(of_role):
+            sessions = " and ".join(line.sessions)
+            return (), f"no {role} model has ratings in session {sessions}"
+    return tuple(model.id for model in planned if model.id in rated), None
+
+
+def _inter_rater(
+    line: EstimatePlan, protocol: Protocol, ratings: Ratings, models: tuple[str, ...]
+) -> PlannedEstimate:
+    # agreement between the raters of one session
+    session, scale = line.sessions[0], scale_of(protocol)
+    matrix = rating_matrix(ratings, session=session, models=models)
+    if len(matrix.raters) < 2:
+        reason = f"session {session} has one rater; agreement needs two"
+        return PlannedEstimate(line=line, reason=reason)
+    grades = scale.weigh(matrix.grades)
+    estimate = coefficient(line.coefficient)(
+        grades,
+        categories=scale.values,
+        weights=line.weights,
+        level=protocol.analysis.level,
+    )
+    return PlannedEstimate(
+        line=line,
+        items=matrix.items,
+        raters=matrix.raters,
+        n_missing=matrix.n_missing,
+        estimate=_with_interval(estimate, line, protocol, grades, line.id),
+    )
+
+
+def _retest(
+    line: EstimatePlan, protocol: Protocol, ratings: Ratings, models: tuple[str, ...]
+) -> PlannedEstimate:
+    # Agreement of every rater with him- or herself. ``stratified_kappa`` gives one
+    # estimate over all raters, each a stratum, and ``pooled_kappa`` one of all their
+    # pairs in one table, both with every rater's Cohen's kappa beside it; any other
+    # coefficient is computed for every rater alone.
+    first, second = line.sessions
+    pairs = retest_pairs(ratings, first=first, second=second, models=models)
+    if not pairs.raters:
+        reason = f"no rater has ratings in both {first} and {second}"
+        return PlannedEstimate(line=line, reason=reason)
+    over_raters = coefficient(line.coefficient).shape == "pairs"
+    compute = _over_raters if over_raters else _each_rater
+    estimate, by_rater = compute(line, protocol, pairs)
+    return PlannedEstimate(
+        line=line,
+        items=pairs.items,
+        raters=pairs.raters,
+        n_missing=pairs.n_missing,
+        estimate=estimate,
+        by_rater=by_rater,
+    )
+
+
+def _over_raters(
+    line: EstimatePlan, protocol: Protocol, pairs: RetestPairs
+) -> tuple[Estimate, tuple[RaterEstimate, ...]]:
+    scale = scale_of(protocol)
+    weighed = [scale.weigh(of_rater) for of_rater in pairs.pairs]
+    estimate = coefficient(line.coefficient)(
+        weighed, categories=scale.values, weights=line.weights
+    )
+    by_rater = [
+        cohen_kappa(of_rater, categories=scale.values, weights=line.weights)
+        for of_rater in weighed
+    ]
+    return _with_interval(estimate, line, protocol, weighed, line.id), tuple(
+        RaterEstimate(rater=rater, estimate=of_rater)
+        for rater, of_rater in zip(pairs.raters, by_rater, strict=True)
+    )
+
+
+def _each_rater(
+    line: EstimatePlan, protocol: Protocol, pairs: RetestPairs
+) -> tuple[None, tuple[RaterEstimate, ...]]:
+    scale, by_rater = scale_of(protocol), []
+    for rater, grades in zip(pairs.raters, pairs.pairs, strict=True):
+        weighed = scale.weigh(grades)
+        estimate = coefficient(line.coefficient)(
+            weighed,
+            categories=scale.values,
+            weights=line.weights,
+            level=protocol.analysis.level,
+        )
+        purpose = f"{line.id}/{rater}"
+        estimate = _with_interval(estimate, line, protocol, weighed, purpose)
+        by_rater.append(RaterEstimate(rater=rater, estimate=estimate))
+    return None, tuple(by_rater)
+
+
+def _with_interval(
+    estimate: Estimate,
+    line: EstimatePlan,
+    protocol: Protocol,
+    ratings: object,
+    purpose: str,
+) -> Estimate:
+    # The seed is the purpose's own, derived from the study's: a line more in a plan
+    # moves no other line's numbers. It fits a signed integer of 64 bits, as other
+    # readers of the JSON have them.
+    root = f"{protocol.analysis.seed}/{purpose}"
+    digest = hashlib.sha256(root.encode()).digest()
+    interval = planned_interval(
+        line.interval,
+        line.coefficient,
+        ratings,
+        target=line.target,
+        categories=scale_of(protocol).values,
+        weights=line.weights,
+        level=protocol.analysis.level,
+        n_resamples=protocol.analysis.n_resamples,
+        seed=int.from_bytes(digest[:8], "big") >> 1,
+    )
+    return dataclasses.replace(estimate, interval=interval or estimate.interval)

@@ -1,0 +1,277 @@
+"""Sections `agreement` and `test-retest`: coefficients with their intervals.
+
+Their table is narrow on a page, and has every field in the CSV.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from masrel.agreement import strength
+from masrel.analysis import PlannedEstimate
+from masrel.estimates import Estimate, Interval
+from masrel.protocol import EstimatePlan
+from masrel.report._estimate_words import (
+    TARGETS,
+    aside,
+    coefficient_name,
+    estimate_text,
+    has_zero,
+    interval_name,
+    meaning,
+)
+from masrel.report._figure_data import Forest, ForestRow
+from masrel.report._material import Drawing, Material, Paragraph, Section
+from masrel.report._tables import Column, Table, Value, counted, interval_text
+
+_LOOKS = (
+    "confidence as lines with ends, credible as broad bars, with the posterior density "
+    "or the resamples above where there are any"
+)
+
+_AGREEMENTS = (
+    "p_o: observed agreement; p_e: agreement expected by chance, 0 where the "
+    "coefficient takes none off."
+)
+
+_LANDIS_KOCH = (
+    "Words after Landis JR, Koch GG (1977). The measurement of observer agreement "
+    "for categorical data. Biometrics 33(1), 159-174, doi 10.2307/2529310; they name "
+    "the point estimate alone."
+)
+
+_COLUMNS = (
+    Column(key="id", heading="Estimate", align="left"),
+    Column(key="coefficient", heading="Coefficient", align="left"),
+    Column(key="models_shown", heading="Models", align="left", where="page"),
+    Column(key="models", heading="Models", where="csv"),
+    Column(key="sessions", heading="Session", align="left"),
+    Column(key="n_items", heading="n models", where="csv"),
+    Column(key="n_raters", heading="Raters"),
+    Column(key="value", heading="Value", digits=3),
+    Column(key="interval_shown", heading="Interval", where="page"),
+    Column(key="low", heading="Low", digits=3, where="csv"),
+    Column(key="high", heading="High", digits=3, where="csv"),
+    Column(key="interval", heading="Interval", where="csv"),
+    Column(key="target", heading="Speaks of", where="csv"),
+    Column(key="strength", heading="Strength", align="left"),
+    Column(key="observed", heading="p_o", digits=3),
+    Column(key="chance", heading="p_e", digits=3),
+    Column(key="reason", heading="Reason", where="csv"),
+)
+
+_LETTERS = "ᵃᵇᶜᵈᵉᶠᵍʰⁱʲᵏˡᵐⁿᵒᵖʳˢᵗᵘᵛʷˣʸᶻ"  # they stand high without any markup
+
+
+def agreement_section(material: Material) -> Section:
+    """Show the inter-rater estimates of the plan."""
+    title = "Agreement between raters"
+    blocks = _blocks(material, "inter-rater", "agreement", title)
+    return Section(name="agreement", title=title, blocks=blocks)
+
+
+def retest_section(material: Material) -> Section:
+    """Show the test-retest estimates of the plan, and every rater's."""
+    caption = "Agreement of raters with themselves"
+    blocks = _blocks(material, "test-retest", "test_retest", caption)
+    return Section(name="test-retest", title="Test-retest agreement", blocks=blocks)
+
+
+def _blocks(
+    material: Material, kind: str, name: str, caption: str
+) -> tuple[Paragraph | Table | Drawing, ...]:
+    planned = [p for p in material.analysis.estimates if p.line.kind == kind]
+    if not planned:
+        return (Paragraph(text="The plan asks for no such estimate.", absent=True),)
+    if all(entry.estimate is None and not entry.by_rater for entry in planned):
+        texts = [f"{p.line.id} is not in these data: {p.reason}." for p in planned]
+        return tuple(Paragraph(text=text, absent=True) for text in texts)
+    rows = estimate_rows(planned)
+    meanings = dict.fromkeys(
+        meaning(row.interval, "model") for row in rows if row.interval is not None
+    )
+    return (
+        estimate_table(rows, name=name, caption=caption, data=material.data),
+        *(Paragraph(text=text) for text in meanings),
+        _forest(material, rows, name, caption),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EstimateRow:
+    """One row of a table or a forest: an estimate, or why there is none."""
+
+    name: str  # id of the line of the plan, and the rater if it is one rater's
+    coefficient: str  # its name for a reader
+    # models, sessions: what it was estimated from
+    models: str
+    sessions: str
+    estimate: Estimate | None
+    reason: str | None  # why there is none
+    single: bool  # whether it is one rater's agreement with him- or herself
+
+    @property
+    def interval(self) -> Interval | None:
+        """The interval, if the plan asks for one."""
+        return None if self.estimate is None else self.estimate.interval
+
+    @property
+    def text(self) -> str:
+        """The value with its interval, or that there is none."""
+        if self.estimate is None:
+            return "not in these data"
+        return estimate_text(self.estimate)
+
+
+def estimate_rows(planned: Sequence[PlannedEstimate]) -> list[EstimateRow]:
+    """Return the rows of planned estimates, each followed by those of its raters."""
+    rows = []
+    for entry in planned:
+        if entry.estimate is not None or not entry.by_rater:
+            rows.append(_row(entry.line, entry.estimate, entry.reason))
+        rows += [_row(entry.line, r.estimate, rater=r.rater) for r in entry.by_rater]
+    return rows
+
+
+def _row(
+    line: EstimatePlan,
+    estimate: Estimate | None,
+    reason: str | None = None,
+    rater: str | None = None,
+) -> EstimateRow:
+    name = line.coefficient
+    if rater is not None and estimate is not None:
+        name = estimate.coefficient
+    return EstimateRow(
+        name=line.id if rater is None else f"{line.id}: {rater}",
+        coefficient=coefficient_name(name, line.weights),
+        models=line.models,
+        sessions=" and ".join(line.sessions),
+        estimate=estimate,
+        reason=reason,
+        single=rater is not None,
+    )
+
+
+def estimate_table(
+    rows: Sequence[EstimateRow], *, name: str, caption: str, data: str
+) -> Table:
+    """Return a table of estimates."""
+    # On a page an interval is one column, marked with a letter; a note below says what
+    # each letter means: level, method, and of whom the interval speaks.
+    texts = (_interval_note(row.interval) for row in rows if row.interval is not None)
+    marks = {text: _mark(i) for i, text in enumerate(dict.fromkeys(texts))}
+    cells = tuple(_cells(row, marks) for row in rows)
+    notes = [f"{mark} {text}." for text, mark in marks.items()]
+    notes += [
+        f"{row.name}: {remark.rstrip('.')}." for row in rows for remark in _remarks(row)
+    ]
+    if any(row.estimate is not None for row in rows):
+        notes.append(_AGREEMENTS)
+    word = [column.key for column in _COLUMNS].index("strength")
+    if any(row[word] is not None for row in cells):
+        notes.append(_LANDIS_KOCH)
+    return Table(
+        name=name,
+        caption=caption,
+        columns=_COLUMNS,
+        rows=cells,
+        notes=tuple(notes),
+        data=data,
+    )
+
+
+def _interval_note(interval: Interval) -> str:
+    return f"{interval_name(interval)}; speaks of {TARGETS[interval.target]}"
+
+
+def _mark(position: int) -> str:
+    # a, b, ..., z, aa, bb, ...
+    rounds, letter = divmod(position, len(_LETTERS))
+    return _LETTERS[letter] * (rounds + 1)
+
+
+def _remarks(row: EstimateRow) -> list[str]:
+    # what a reader must know before relying on it, each once
+    remarks = [row.reason]
+    if row.estimate is not None:
+        remarks.append(row.estimate.reason)
+    if row.interval is not None:
+        remarks += [*row.interval.notes, row.interval.reason]
+        if row.interval.n_undefined:
+            remarks.append(f"undefined on {row.interval.n_undefined} resamples")
+    return list(dict.fromkeys(text for text in remarks if text))
+
+
+def _cells(row: EstimateRow, marks: dict[str, str]) -> tuple[Value, ...]:
+    estimate, interval = row.estimate, row.interval
+    head = (row.name, row.coefficient)
+    if estimate is None:
+        data = (row.models, row.models, row.sessions, None, None)
+        return (*head, *data, None, row.text, *[None] * 7, row.reason)
+    ends: tuple[Value, ...] = (None,) * 5
+    if interval is not None:
+        mark = marks[_interval_note(interval)]
+        ends = (
+            f"{interval_text(interval.low, interval.high)} {mark}",
+            interval.low,
+            interval.high,
+            interval_name(interval),
+            TARGETS[interval.target],
+        )
+    is_kappa = estimate.coefficient.endswith("kappa")
+    return (
+        *head,
+        f"{estimate.n_items} {row.models}",
+        row.models,
+        row.sessions,
+        estimate.n_items,
+        1 if row.single else estimate.n_raters,
+        estimate.value,
+        *ends,
+        strength(estimate.value)
+        if is_kappa and math.isfinite(estimate.value)
+        else None,
+        estimate.observed,
+        estimate.chance,
+        estimate.reason,
+    )
+
+
+def _forest(
+    material: Material, rows: Sequence[EstimateRow], name: str, caption: str
+) -> Drawing:
+    lines = [
+        ForestRow(
+            label=f"{row.coefficient}, {row.name}",
+            detail=_detail(row),
+            value=None if row.estimate is None else row.estimate.value,
+            interval=row.interval,
+            text=row.text,
+            has_zero=row.estimate is not None and has_zero(row.estimate.coefficient),
+        )
+        for row in rows
+    ]
+    texts = "; ".join(f"{line.label}: {line.text}" for line in lines)
+    return Drawing(
+        name=name,
+        caption=(
+            f"{caption}: estimates (dots) and their intervals, {_LOOKS}. Dashed: what "
+            "chance gives."
+        ),
+        alt=f"Forest plot. {texts}.",
+        content=Forest(rows=tuple(lines), axis_label="agreement (1 is perfect)"),
+        stamp=material.stamp,
+    )
+
+
+def _detail(row: EstimateRow) -> str:
+    # how much it rests on, and what its interval speaks of
+    if row.estimate is None:
+        return f"{row.models} models, {row.sessions}"
+    raters = "twice" if row.single else counted(row.estimate.n_raters, "rater")
+    size = f"{counted(row.estimate.n_items, 'model')}, {raters}"
+    if row.interval is None:
+        return size
+    texts = (row.interval.kind, aside(row.interval), TARGETS[row.interval.target])
+    return f"{size}; {', '.join(text for text in texts if text)}"

@@ -1,0 +1,226 @@
+"""Section `design`: what was presented to whom, with the constants of the joints."""
+
+from masrel.protocol import Session
+from masrel.report._material import Material, Paragraph, Section
+from masrel.report._tables import (
+    Column,
+    Table,
+    Value,
+    as_entered,
+    counted,
+    entered_decimals,
+)
+
+_PARAMETERS = (
+    ("catch_angle_constant_deg", "L (deg)"),
+    ("catch_torque_nms_rad", "H (N·m·s/rad)"),
+    ("residual_ratio", "Q"),
+    ("catch_travel_deg", "D (deg)"),
+)
+
+# Keys of ``[elbow]`` whose value is a number: symbol and meaning.
+_NUMBERS = {
+    "inertia_kg_m2": ("m", "inertia (kg·m²)"),
+    "damping_nms_rad": ("b", "damping (N·m·s/rad)"),
+    "stiffness_nm_rad": ("k", "stiffness (N·m/rad)"),
+    "catch_slope_s": ("α", "catch slope (s)"),
+    "peak_duration_s": ("ΔT_peak", "duration of the peak (s)"),
+    "post_catch_stiffness_nm_rad": ("k_post", "post-catch stiffness (N·m/rad)"),
+    "speed_threshold_deg_s": ("ν_th", "speed threshold (deg/s)"),
+    "slowest_mean_speed_deg_s": ("ν_L", "slowest mean speed (deg/s)"),
+    "smallest_catch_angle_deg": ("θ_L", "smallest catch angle (deg)"),
+    "rest_angle_deg": ("θ_rest", "angle without elastic torque (deg)"),
+    "catch_rise_s": ("ΔT_rise", "rise of the catch to its peak (s)"),
+}
+
+# Keys whose value is the name of a variant: symbol and meaning.
+_VARIANTS = {
+    "post_catch": ("τ post-catch", "reading of the torque after the catch"),
+    "residual_reading": ("Q", "reading of Q"),
+}
+
+_VARIANT_NAMES = {
+    "continuous": "continuous: from the residual torque on",
+    "additive": "additive: to the torque of pre-catch",
+    "residual": "residual over peak torque",
+    "decrease": "decrease after the peak over the rise",
+}
+
+# What the table of shared constants leaves out where no model departs from it.
+_DEFAULTS = {
+    "rest_angle_deg": None,
+    "catch_rise_s": 0.0,
+    "post_catch": "continuous",
+    "residual_reading": "residual",
+}
+
+_CONSTANT_COLUMNS = (
+    Column(key="symbol", heading="Symbol", align="left"),
+    Column(key="meaning", heading="Meaning", align="left"),
+    Column(key="value", heading="Value"),
+)
+
+
+def design_section(material: Material) -> Section:
+    """Describe the study: models with parameters, raters and sessions."""
+    protocol = material.protocol
+    study, settings = protocol.study, protocol.simulated_raters
+    n_models = len(protocol.models)
+    n_standard = sum(model.role == "standard" for model in protocol.models)
+    texts = [
+        f"{study.title}. {counted(n_models, 'haptic model')} ({n_standard} "
+        f"standard, {n_models - n_standard} dummy), "
+        f"{counted(len(protocol.raters), 'rater')}, "
+        f"{counted(len(protocol.sessions), 'session')}; scale {protocol.scale.name}: "
+        f"{', '.join(protocol.scale.grades)}."
+    ]
+    if study.notes:
+        texts.append(study.notes)
+    if study.source and material.data != "published":  # else it is in the head
+        texts.append(f"The study follows {study.source}.")
+    if material.ratings.simulated:
+        texts.append(
+            "The grades are simulated: every simulated rater gives the intended grade "
+            f"with probability {as_entered(settings.accuracy)} and repeats a grade at "
+            f"a retest with probability {as_entered(settings.retest_agreement)} (seed "
+            f"{settings.seed}). They show that the study runs; they say nothing about "
+            "people or about the models."
+        )
+    tables = (_models(material), *_constants(material), _sessions(material))
+    paragraphs = (Paragraph(text=text) for text in texts)
+    return Section(name="design", title="Design", blocks=(*paragraphs, *tables))
+
+
+def _models(material: Material) -> Table:
+    models = material.protocol.models
+    parameters = [
+        [float(getattr(model, key)) for model in models] for key, _ in _PARAMETERS
+    ]
+    notes = [
+        "L: catch angle constant; H: catch torque per stretching speed; Q: "
+        f"{_meaning_of_q(material)}; D: angle travelled during the catch."
+    ]
+    simulated = ", ".join(model.id for model in models if model.simulated)
+    if simulated:
+        notes.append(f"Fitted to SIMULATED recordings: {simulated}.")
+    return Table(
+        name="models",
+        caption="Haptic models and their parameters",
+        columns=(
+            Column(key="model", heading="Model", align="left"),
+            Column(key="role", heading="Role", align="left"),
+            Column(key="intended_grade", heading="Intended grade", align="center"),
+            *(
+                Column(key=key, heading=heading, digits=entered_decimals(values))
+                for (key, heading), values in zip(_PARAMETERS, parameters, strict=True)
+            ),
+        ),
+        rows=tuple(
+            (model.id, model.role, model.intended_grade, *values)
+            for model, *values in zip(models, *parameters, strict=True)
+        ),
+        notes=tuple(notes),
+        data=material.data,
+    )
+
+
+def _meaning_of_q(material: Material) -> str:
+    protocol = material.protocol
+    shared = protocol.elbow.residual_reading
+    readings = {m.constants.residual_reading or shared for m in protocol.models}
+    if readings == {"residual"}:
+        return "residual over peak torque of the catch"
+    if readings == {"decrease"}:
+        return "decrease after the peak of the catch over the rise to it"
+    return "share of the peak of the catch, as each model reads it (see below)"
+
+
+def _constants(material: Material) -> tuple[Table, ...]:
+    # those all models share, and, where there are any, those of single models
+    protocol = material.protocol
+    elbow, stretch = protocol.elbow, protocol.stretch
+    numbers = [key for key in _NUMBERS if getattr(elbow, key) != _DEFAULTS.get(key, "")]
+    shared: list[tuple[Value, ...]] = [
+        *(_constant(key, getattr(elbow, key)) for key in numbers),
+        ("θ_start", "start of a stretch (deg)", float(stretch.start_deg)),
+        ("θ_end", "end of the range of motion (deg)", float(elbow.range_end_deg)),
+        *(
+            _constant(key, getattr(elbow, key))
+            for key in _VARIANTS
+            if getattr(elbow, key) != _DEFAULTS[key]
+        ),
+    ]
+    single = [
+        (model.id, *_constant(key, value))
+        for model in protocol.models
+        for key in model.constants.__struct_fields__
+        for value in [getattr(model.constants, key)]
+        if value is not None and value != getattr(elbow, key)
+    ]
+    caption = "Constants all models share"
+    tables = [
+        Table(
+            name="constants",
+            caption=f"{caption}, but for those in the table below"
+            if single
+            else caption,
+            columns=_CONSTANT_COLUMNS,
+            rows=tuple(shared),
+            data=material.data,
+        )
+    ]
+    if single:
+        tables.append(
+            Table(
+                name="own_constants",
+                caption="Constants that single models have of their own",
+                columns=(
+                    Column(key="model", heading="Model", align="left"),
+                    *_CONSTANT_COLUMNS,
+                ),
+                rows=tuple(single),
+                data=material.data,
+            )
+        )
+    return tuple(tables)
+
+
+def _constant(key: str, value: float | str) -> tuple[Value, ...]:
+    if key in _VARIANTS:
+        return (*_VARIANTS[key], _VARIANT_NAMES[str(value)])
+    return (*_NUMBERS[key], float(value))
+
+
+def _sessions(material: Material) -> Table:
+    rows = [_session_row(material, session) for session in material.protocol.sessions]
+    absent = [str(row[0]) for row in rows if row[4] == 0]
+    notes = [f"No ratings in these data: session {', '.join(absent)}."]
+    return Table(
+        name="sessions",
+        caption="Sessions, their raters, and the ratings there are",
+        columns=(
+            Column(key="session", heading="Session", align="left"),
+            Column(key="n_raters", heading="Raters"),
+            Column(key="raters", heading="Who", align="left"),
+            Column(key="n_planned", heading="Ratings planned"),
+            Column(key="n_given", heading="Ratings given"),
+            Column(key="note", heading="Note", align="left"),
+        ),
+        rows=tuple(rows),
+        notes=tuple(notes if absent else ()),
+        data=material.data,
+    )
+
+
+def _session_row(material: Material, session: Session) -> tuple[Value, ...]:
+    protocol, table = material.protocol, material.ratings.table
+    of_session = table[table["session"] == session.id]
+    n_raters = len(session.raters)
+    return (
+        session.id,
+        n_raters,
+        ", ".join(session.raters),
+        n_raters * len(protocol.models) * protocol.schedule.repeats,
+        int(of_session["grade"].notna().sum()),
+        session.note or None,
+    )

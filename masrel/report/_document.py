@@ -1,0 +1,231 @@
+"""The report: one self-contained page, the same as Markdown, tables and figures.
+
+In: a protocol, its ratings and their analysis. Out: a folder with ``report.html``,
+``report.md``, ``tables/*.csv`` and ``figures/*.png`` and ``*.svg``. The same inputs
+give the same bytes; there is no time of day in any of them.
+"""
+
+import base64
+import html
+import re
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from masrel.analysis import Analysis
+from masrel.protocol import Protocol
+from masrel.ratings import InPerson, Ratings
+from masrel.report._agreement import agreement_section, retest_section
+from masrel.report._design import design_section
+from masrel.report._grades import grades_section, in_person_section, intended_section
+from masrel.report._material import Drawing, Material, Paragraph, Section, gather
+from masrel.report._stretches import speeds_section, traces_section
+from masrel.report._tables import Table, as_csv, page_cells
+
+Progress = Callable[[str], object]
+"""Called with the name of each figure, and of the pages, once it is made."""
+
+SECTIONS: dict[str, Callable[[Material], Section]] = {
+    "design": design_section,
+    "grades": grades_section,
+    "agreement": agreement_section,
+    "intended": intended_section,
+    "in-person": in_person_section,
+    "test-retest": retest_section,
+    "speeds": speeds_section,
+    "traces": traces_section,
+}
+"""Name in ``report.sections`` to what makes it: only what a protocol names is made."""
+
+_BANNER = "SIMULATED DATA – no person gave these grades"
+
+_KINDS = {Paragraph: "paragraph", Table: "table", Drawing: "figure"}
+
+# Symbols of the model as they are written in plain text: an index after "_".
+_SYMBOL = re.compile(r"(?<!\w)(ΔT|k|ν|θ|p)_(peak|post|th|L|start|end|o|e)(?!\w)")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReportFiles:
+    """The files of a report.
+
+    Attributes
+    ----------
+    html, markdown : Path
+        The document.
+    tables : tuple of Path
+        One CSV per table.
+    figures : tuple of Path
+        A PNG and an SVG per figure.
+    """
+
+    html: Path
+    markdown: Path
+    tables: tuple[Path, ...]
+    figures: tuple[Path, ...]
+
+
+def write_report(
+    protocol: Protocol,
+    ratings: Ratings,
+    analysis: Analysis,
+    destination: Path,
+    *,
+    in_person: InPerson | None = None,
+    progress: Progress | None = None,
+) -> ReportFiles:
+    """Write the report a protocol asks for.
+
+    Only the sections named in the protocol's ``report.sections`` are made, in
+    that order; matplotlib is loaded when a section has a figure.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        The study's protocol.
+    ratings : Ratings
+        The ratings.
+    analysis : Analysis
+        What `masrel.analysis.analyze` made of them.
+    destination : Path
+        The folder to write into; made if needed.
+    in_person : InPerson, optional
+        Grades given in person, whose notes are shown below their table.
+    progress : callable, optional
+        Called with the name of each figure, and of the pages, once it is made.
+
+    Returns
+    -------
+    ReportFiles
+        What was written.
+
+    Raises
+    ------
+    OSError
+        If a file cannot be written.
+    """
+    material = gather(protocol, ratings, analysis, in_person)
+    sections = [SECTIONS[name](material) for name in protocol.report.sections]
+    destination.mkdir(parents=True, exist_ok=True)
+    tables = _write_tables(sections, destination / "tables")
+    figures, uris = _write_figures(sections, destination / "figures", progress)
+    for name, page in _pages(material, sections, uris).items():
+        (destination / name).write_text(page, encoding="utf-8", newline="\n")
+    if progress is not None:
+        progress("pages")
+    return ReportFiles(
+        html=destination / "report.html",
+        markdown=destination / "report.md",
+        tables=tables,
+        figures=figures,
+    )
+
+
+def _write_tables(sections: Sequence[Section], folder: Path) -> tuple[Path, ...]:
+    paths = []
+    for table in (block for section in sections for block in section.blocks):
+        if isinstance(table, Table):
+            folder.mkdir(exist_ok=True)
+            path = folder / f"{table.name}.csv"
+            path.write_text(as_csv(table), encoding="utf-8", newline="\n")
+            paths.append(path)
+    return tuple(paths)
+
+
+def _write_figures(
+    sections: Sequence[Section], folder: Path, progress: Progress | None
+) -> tuple[tuple[Path, ...], dict[str, str]]:
+    # the files, and by name of the drawing its picture to be held inside the page
+    paths, uris = [], {}
+    for drawing in (block for section in sections for block in section.blocks):
+        if not isinstance(drawing, Drawing):
+            continue
+        files = drawing.draw()
+        folder.mkdir(exist_ok=True)
+        for form, picture in files.items():
+            paths.append(folder / f"{drawing.name}.{form}")
+            paths[-1].write_bytes(picture)
+        # An image of its own, not inline: ids inside two SVGs would collide.
+        encoded = base64.b64encode(files["svg"]).decode("ascii")
+        uris[drawing.name] = f"data:image/svg+xml;base64,{encoded}"
+        if progress is not None:
+            progress(drawing.name)
+    return tuple(paths), uris
+
+
+def _pages(
+    material: Material, sections: Sequence[Section], uris: Mapping[str, str]
+) -> dict[str, str]:
+    # Imported here: a section's tables alone load no templates.
+    from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
+
+    environment = Environment(
+        loader=PackageLoader("masrel.report"),
+        autoescape=select_autoescape(enabled_extensions=("html",)),
+        undefined=StrictUndefined,
+        keep_trailing_newline=True,
+    )
+    environment.filters |= {"md": _markdown, "symbols": _symbols}
+    analysis, study = material.analysis, material.protocol.study
+    style = Path(__file__).with_name("templates") / "report.css"
+    context = {
+        "title": material.protocol.report.title or study.title,
+        "simulated": material.ratings.simulated,
+        "banner": _BANNER,
+        "provenance": _provenance(material),
+        "sections": _numbered(sections, uris),
+        "inputs": [
+            (f"SHA-256 of the {name.removesuffix('_sha256').replace('_', '-')}", digest)
+            for name, digest in analysis.inputs.items()
+        ],
+        "style": style.read_text(encoding="utf-8"),
+        "version": analysis.masrel_version,
+    }
+    names = ("report.html", "report.md")
+    return {name: environment.get_template(name).render(context) for name in names}
+
+
+def _provenance(material: Material) -> str:
+    study = material.protocol.study
+    if material.ratings.simulated:
+        return (
+            "The grades and speeds in this report are simulated. They show that the "
+            "study runs; they say nothing about people or about the models."
+        )
+    if material.data == "published":
+        return f"Published grades and speeds: {study.source}".rstrip(": ")
+    return f"Study {study.id}, {material.data} ratings."
+
+
+def _numbered(
+    sections: Sequence[Section], uris: Mapping[str, str]
+) -> list[dict[str, object]]:
+    # what templates show: every block with its number among those of its kind
+    numbers: Counter[str] = Counter()
+    placed: list[dict[str, object]] = []
+    for section in sections:
+        blocks = []
+        for block in section.blocks:
+            kind = _KINDS[type(block)]
+            numbers[kind] += 1
+            shown = {"kind": kind, "number": numbers[kind], "content": block}
+            if isinstance(block, Table):
+                shown["columns"], shown["rows"] = page_cells(block)
+            elif isinstance(block, Drawing):
+                shown["uri"] = uris[block.name]
+            blocks.append(shown)
+        placed.append({"name": section.name, "title": section.title, "blocks": blocks})
+    return placed
+
+
+def _symbols(text: str) -> str:
+    # Escaped first; what is added after that is ours, and so safe in a template.
+    return _SYMBOL.sub(r"\1<sub>\2</sub>", html.escape(text))
+
+
+_MARKDOWN_ESCAPES = str.maketrans({letter: f"\\{letter}" for letter in "\\`*_|<>[]#"})
+
+
+def _markdown(text: str) -> str:
+    return " ".join(text.translate(_MARKDOWN_ESCAPES).split())

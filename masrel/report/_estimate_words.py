@@ -1,0 +1,115 @@
+"""Estimates and intervals in words: what they are, of whom, and what they promise."""
+
+import math
+from typing import Literal
+
+from masrel.agreement import COEFFICIENTS
+from masrel.estimates import Estimate, Interval
+from masrel.report._tables import UNDEFINED, interval_text, number, percent
+
+Noun = Literal["model", "item"]
+"""What is rated: a haptic model in a study, any item elsewhere."""
+
+TARGETS = {
+    "raters": "other raters",
+    "items": "other models",
+    "both": "other raters and models",
+}
+"""Target of an interval to what it speaks of."""
+
+_POPULATIONS = {
+    "raters": "the same {}s were put to other raters like these",
+    "items": "these raters graded other {}s like these",
+    "both": "other raters graded other {}s, both like these",
+}
+
+_WIDENED = "and the spread of raters"
+"""End of the method of a posterior that was widened by what raters differ by."""
+
+
+def coefficient_name(coefficient: str, weights: str = "identity") -> str:
+    """Return a coefficient's name for a reader."""
+    title = COEFFICIENTS[coefficient].title
+    if weights != "identity":
+        title = f"{title}, {weights} weights"
+    # A share as all others are: 1 is all, not 100.
+    return f"{title} (0–1)" if coefficient == "percent_agreement" else title
+
+
+def has_zero(coefficient: str) -> bool:
+    """Return whether 0 is what chance gives of a coefficient."""
+    # Not of a share, nor of a measure of order; of an ICC and a κ.
+    entry = COEFFICIENTS.get(coefficient)  # the forms of ICC have entries of their own
+    return entry is None or entry.chance_corrected
+
+
+def estimate_text(estimate: Estimate) -> str:
+    """Return a value with its interval, as shown."""
+    if not math.isfinite(estimate.value):
+        return UNDEFINED
+    value, interval = number(estimate.value, 3), estimate.interval
+    if interval is None:
+        return value
+    return f"{value} {interval_text(interval.low, interval.high)}"
+
+
+def interval_name(interval: Interval) -> str:
+    """Return level, kind and method of an interval."""
+    return f"{percent(interval.level)} % {interval.kind}, {interval.method}"
+
+
+def meaning(interval: Interval, noun: Noun) -> str:
+    """Return in one sentence what an interval promises and what it was made from."""
+    kind = "bound" if _is_bound(interval) else "interval"
+    name = f"{interval.kind.capitalize()} {kind}"
+    return f"{name}{origin(interval, noun)}: {promise(interval, noun)}."
+
+
+def promise(interval: Interval, noun: Noun) -> str:
+    """Return what an interval promises, and of whom."""
+    level = f"{percent(interval.level)} %"
+    population = _POPULATIONS[interval.target].replace("{}", noun)
+    if interval.kind == "confidence":
+        return (
+            f"if {population}, again and again, about {level} of the intervals made "
+            "this way would hold the value that all such studies together would give"
+        )
+    # A probability rests on the prior, and of other raters on how they differ.
+    premises = "these ratings, the prior and the model of how raters differ"
+    if interval.target == "items":
+        premises = "these ratings and the prior"
+    elif interval.method.startswith("Dirichlet-multinomial"):  # it knows of no rater
+        premises = "these ratings, the prior and raters who differ by chance alone"
+    where = "above the lower end" if _is_bound(interval) else "inside"
+    return (
+        f"given {premises}, the value that would be found if {population}, "
+        f"without end, lies {where} with probability {level}"
+    )
+
+
+def origin(interval: Interval, noun: Noun) -> str:
+    """Return in brackets what the ends of an interval came from."""
+    units = {"items": f"{noun}s", "raters": "raters", "both": f"{noun}s and raters"}
+    if interval.method.endswith(_WIDENED):
+        return " (a posterior, made wider by what raters differ by)"
+    if interval.unit is None:
+        return ""
+    if "bootstrap" in interval.method:
+        return f" (from {units[interval.unit]} drawn with replacement)"
+    if interval.unit == "both":
+        return f" (from leaving out {noun}s and raters, one at a time)"
+    one = units[interval.unit].removesuffix("s")
+    return f" (from leaving out one {one} at a time)"
+
+
+def aside(interval: Interval) -> str:
+    """Return in few words how the ends differ from quantiles of the distribution."""
+    if _is_bound(interval):
+        return "one-sided"
+    if interval.method.endswith(_WIDENED):
+        return "posterior, wider by the spread of raters"
+    return ""
+
+
+def _is_bound(interval: Interval) -> bool:
+    return interval.method.endswith("one-sided")

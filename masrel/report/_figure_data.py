@@ -1,0 +1,232 @@
+"""What figures show, as plain values: they load nothing that draws."""
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from masrel.elbow.identification import ElbowFit, FrictionFit
+    from masrel.estimates import Distribution, Interval
+
+    Floats = NDArray[np.float64]
+
+Form = Literal["png", "svg", "pdf"]
+"""What a figure's file can be."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GradeGrid:
+    """Grades of one session, one row a model and one column a rater."""
+
+    # models, raters: names of the rows and columns
+    models: tuple[str, ...]
+    raters: tuple[str, ...]
+    intended: tuple[str | None, ...]  # by model
+    # by model and rater, the grades of every presentation in order; no None
+    grades: tuple[tuple[tuple[str, ...], ...], ...]
+    scale: tuple[str, ...]  # every grade of the scale, mildest first
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ForestRow:
+    """One estimate with its interval."""
+
+    # label, detail: what is estimated; how and for whom, or nothing
+    label: str
+    detail: str = ""
+    value: float | None  # None or ``nan`` is not drawn
+    interval: "Interval | None"  # drawn with its distribution if it has one
+    text: str  # the numbers, or why there are none, as shown at the right
+    has_zero: bool = True  # whether 0 is what chance gives, so that it is marked
+    group: str = ""  # heading above the first row of those that share it
+
+    @property
+    def drawn(self) -> "Interval | None":
+        """The interval, if its ends are known."""
+        if self.interval is None:
+            return None
+        known = map(math.isfinite, (self.interval.low, self.interval.high))
+        return self.interval if all(known) else None
+
+    @property
+    def distribution(self) -> "Distribution | None":
+        """The distribution of the interval, if there is one to draw."""
+        return None if self.drawn is None else self.drawn.distribution
+
+    @property
+    def is_known(self) -> bool:
+        """Whether there is a value to draw."""
+        return self.value is not None and math.isfinite(self.value)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Forest:
+    """Estimates with their intervals, one below the other."""
+
+    rows: tuple[ForestRow, ...]  # first on top
+    axis_label: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SpeedColumn:
+    """Mean speeds of one model in one session, deg/s."""
+
+    model: str
+    session: str
+    speeds: tuple[tuple[float, ...], ...]  # of every rater, in the raters' order
+    mean: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SpeedDots:
+    """Every rater's mean speed for every model."""
+
+    columns: tuple[SpeedColumn, ...]  # by session and model
+    raters: tuple[str, ...]
+    slowest: float  # below it the catch angle stays the same, deg/s
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TracePanel:
+    """All stretches of one model."""
+
+    title: str  # the model, its intended grade, and the range of speeds
+    # per rater: time (s), angle (deg), torque (N·m), code of the phase
+    stretches: "tuple[tuple[NDArray[np.generic], ...], ...]"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TraceColumns:
+    """Torque and angle against time, one column a model."""
+
+    panels: tuple[TracePanel, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ScaleRow:
+    """One unknown of a latent-trait model."""
+
+    label: str  # whose it is
+    # value, low, high: where it is, and its interval
+    value: float
+    low: float
+    high: float
+    # of a rater, how far the same item is perceived from one time to the next
+    noise: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LatentScale:
+    """What a latent-trait model places on its scale."""
+
+    # severities and thresholds from the mean severity, biases from no bias
+    items: tuple[ScaleRow, ...]
+    thresholds: tuple[ScaleRow, ...]
+    raters: tuple[ScaleRow, ...]
+    grades: tuple[str, ...]  # the scale, one more than thresholds
+    level: float  # of the intervals
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StretchLine:
+    """One motion of one model."""
+
+    label: str  # what tells it from the others, such as its speed
+    # (n_points,): s, deg, N·m; where the torque jumps, two points have one time
+    time: "Floats" = field(compare=False, repr=False)
+    angle: "Floats" = field(compare=False, repr=False)
+    torque: "Floats" = field(compare=False, repr=False)
+    # name, first and last time of each phase, s
+    phases: tuple[tuple[str, float, float], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StretchPanel:
+    """The motions of one model."""
+
+    title: str  # the model
+    lines: tuple[StretchLine, ...]  # the phases of one are shaded
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stretches:
+    """Torque against angle, or torque and angle against time."""
+
+    panels: tuple[StretchPanel, ...]  # at most four, beside each other
+    against: Literal["angle", "time"]  # what is on the horizontal axis
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CatchCurve:
+    """Catches of one model in motions of many speeds."""
+
+    label: str  # the model
+    # (n_motions,): mean speed from onset to catch, deg/s
+    mean_speed: "Floats" = field(compare=False, repr=False)
+    catch_angle: "Floats" = field(compare=False, repr=False)  # (n_motions,): deg
+    # (n_motions,): mean speed during the catch, deg/s
+    catch_speed: "Floats" = field(compare=False, repr=False)
+    # (n_motions,): of the catch, s; ``nan`` where the motion ends within it
+    duration: "Floats" = field(compare=False, repr=False)
+    clamps: tuple[float, float]  # ν_L and ν_H of (6), deg/s
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CatchCurves:
+    """Angle, duration, and duration times speed of catches against mean speed."""
+
+    curves: tuple[CatchCurve, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CatchSchematic:
+    """One stretch, with the parts of its catch named."""
+
+    title: str  # the model and its motion
+    # (n_points,): s and N·m; where the torque jumps, two points have one time
+    time: "Floats" = field(compare=False, repr=False)
+    torque: "Floats" = field(compare=False, repr=False)
+    # name, first and last time of each phase, s
+    phases: tuple[tuple[str, float, float], ...]
+    # s; the last is the end of the stretch if that comes first
+    catch: float
+    peak_end: float
+    catch_end: float
+    # torque before, at and after the peak, N·m
+    pre_end: float
+    peak: float
+    residual: float
+    residual_name: str  # what the residual is above `pre_end`, in matplotlib's TeX
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointFitView:
+    """An identified joint, seen in one of four ways."""
+
+    fit: "ElbowFit"
+    view: Literal["slow", "fast", "catches", "residuals"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FrictionView:
+    """The identified friction of a device."""
+
+    fit: "FrictionFit"
+
+
+Content = (
+    GradeGrid
+    | Forest
+    | SpeedDots
+    | TraceColumns
+    | LatentScale
+    | Stretches
+    | CatchCurves
+    | CatchSchematic
+    | JointFitView
+    | FrictionView
+)
+"""Whatever can be drawn."""

@@ -1,0 +1,170 @@
+"""Sections `grades`, `intended` and `in-person`: every grade, and what it should be."""
+
+from collections import Counter
+
+from masrel.analysis import InPersonAgreement
+from masrel.report._figure_data import GradeGrid
+from masrel.report._material import (
+    Drawing,
+    Material,
+    Paragraph,
+    Section,
+    absent_section,
+)
+from masrel.report._tables import Column, Table, counted, number
+
+
+def grades_section(material: Material) -> Section:
+    """Show every grade of every session, as a grid of models by raters."""
+    blocks: list[Paragraph | Table | Drawing] = []
+    for session in material.sessions:
+        grid = _grid(material, session)
+        blocks += [
+            _grid_table(material, session, grid),
+            _grid_drawing(material, session, grid),
+        ]
+    if not blocks:
+        blocks.append(Paragraph(text="These data hold no ratings.", absent=True))
+    return Section(name="grades", title="Grades", blocks=tuple(blocks))
+
+
+def _grid(material: Material, session: str) -> GradeGrid:
+    table = material.ratings.table
+    rows = table[table["session"] == session].sort_values("repeat", kind="stable")
+    grades: dict[tuple[str, str], tuple[str, ...]] = {}
+    columns = (rows["model"], rows["rater"], rows["grade"])
+    for model, rater, grade in zip(*columns, strict=True):
+        if isinstance(grade, str):
+            grades[model, rater] = (*grades.get((model, rater), ()), grade)
+    with_rows, with_columns = set(rows["model"]), set(rows["rater"])
+    models = [model for model in material.protocol.models if model.id in with_rows]
+    raters = [r.id for r in material.protocol.raters if r.id in with_columns]
+    return GradeGrid(
+        raters=tuple(raters),
+        models=tuple(model.id for model in models),
+        intended=tuple(model.intended_grade for model in models),
+        grades=tuple(
+            tuple(grades.get((model.id, rater), ()) for rater in raters)
+            for model in models
+        ),
+        scale=material.ratings.scale.grades,
+    )
+
+
+def _grid_table(material: Material, session: str, grid: GradeGrid) -> Table:
+    n_missing = sum(not cell for row in grid.grades for cell in row)
+    notes = [f"{counted(n_missing, 'rating')} missing, shown as –."]
+    return Table(
+        name=f"grades_{session}",
+        caption=f"Grades of session {session}: models by raters",
+        columns=(
+            Column(key="model", heading="Model", align="left"),
+            Column(key="intended_grade", heading="Intended", align="center"),
+            *(Column(key=name, heading=name, align="center") for name in grid.raters),
+        ),
+        rows=tuple(
+            (model, intended, *(", ".join(cell) or None for cell in row))
+            for model, intended, row in zip(
+                grid.models, grid.intended, grid.grades, strict=True
+            )
+        ),
+        notes=tuple(notes if n_missing else ()),
+        data=material.data,
+    )
+
+
+def _grid_drawing(material: Material, session: str, grid: GradeGrid) -> Drawing:
+    caption = f"Grades of session {session}. Darker is a higher grade"
+    if any(intended is not None for intended in grid.intended):
+        caption += "; a frame marks a grade other than the intended one"
+    rows = []
+    for model, intended, cells in zip(
+        grid.models, grid.intended, grid.grades, strict=True
+    ):
+        counts = Counter(grade for cell in cells for grade in cell)
+        listed = ", ".join(f"{n} of grade {grade}" for grade, n in counts.items())
+        aim = "" if intended is None else f" (intended {intended})"
+        rows.append(f"{model}{aim}: {listed or 'no grades'}")
+    return Drawing(
+        name=f"grades_{session}",
+        caption=f"{caption}.",
+        alt=f"Grid of grades. {'; '.join(rows)}.",
+        content=grid,
+        stamp=material.stamp,
+    )
+
+
+def intended_section(material: Material) -> Section:
+    """Show how many raters gave each standard model its intended grade."""
+    result = material.analysis.intended
+    title = "Agreement with the intended grade"
+    if result is None or not result.models:
+        return absent_section("intended", title, result.reason if result else None)
+    table = Table(
+        name="intended",
+        caption=f"Raters who gave the intended grade, session {result.session}",
+        columns=(
+            Column(key="model", heading="Model", align="left"),
+            Column(key="intended_grade", heading="Intended grade", align="center"),
+            Column(key="n_ratings", heading="Ratings"),
+            Column(key="n_agree", heading="As intended"),
+            Column(key="percent", heading="Percent", digits=1),
+        ),
+        rows=tuple(
+            (row.model, row.intended_grade, row.n_ratings, row.n_agree, row.percent)
+            for row in result.models
+        ),
+        notes=() if result.reason is None else (f"Mean or SD: {result.reason}.",),
+        data=material.data,
+    )
+    text = (
+        f"Mean over the {counted(len(result.models), 'standard model')}: "
+        f"{number(result.mean, 1)} % (standard deviation between models "
+        f"{number(result.sd, 1)}, n − 1)."
+    )
+    return Section(name="intended", title=title, blocks=(table, Paragraph(text=text)))
+
+
+def in_person_section(material: Material) -> Section:
+    """Show grades given to patients beside those given to their models."""
+    result = material.analysis.in_person
+    title = "In-person and haptic grades"
+    if result is None or result.n_pairs == 0:
+        return absent_section("in-person", title, result.reason if result else None)
+    percent = number(100 * result.n_equal / result.n_pairs, 1)
+    text = f"{result.n_equal} of {result.n_pairs} pairs are equal ({percent} %)."
+    if result.n_unpaired:
+        text += f" Entries that lack one of the two grades: {result.n_unpaired}."
+    blocks = (Paragraph(text=text), _pairs(material, result))
+    return Section(name="in-person", title=title, blocks=blocks)
+
+
+def _pairs(material: Material, result: InPersonAgreement) -> Table:
+    entries = () if material.in_person is None else material.in_person.rows
+    notes = (
+        f"{row.rater}, {row.model} (subject {row.subject}, source table "
+        f"{row.source_table}): {row.note}"
+        for row in entries
+        if row.note
+    )
+    return Table(
+        name="in_person",
+        caption=(
+            "Grade of the patient in person and of the model built from that patient, "
+            f"by the same rater (session {result.session})"
+        ),
+        columns=(
+            Column(key="model", heading="Model", align="left"),
+            Column(key="rater", heading="Rater", align="left"),
+            Column(key="in_person", heading="In person", align="center"),
+            Column(key="haptic", heading="Haptic", align="center"),
+            Column(key="equal", heading="Equal", align="center"),
+        ),
+        rows=tuple(
+            (p.model, p.rater, p.in_person, p.haptic, "yes" if equal else "no")
+            for p in result.pairs
+            for equal in [p.in_person == p.haptic]
+        ),
+        notes=tuple(dict.fromkeys(notes)),
+        data=material.data,
+    )

@@ -1,0 +1,101 @@
+"""What a section of the report is made from, and what it is made of."""
+
+from dataclasses import dataclass
+
+from masrel.analysis import Analysis
+from masrel.protocol import Protocol
+from masrel.ratings import InPerson, Ratings
+from masrel.report._figure_data import Content, Form
+from masrel.report._tables import SIMULATED, Table
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Material:
+    """Everything a report is made from."""
+
+    protocol: Protocol
+    ratings: Ratings
+    analysis: Analysis
+    # grades given in person, whose notes are shown below their table
+    in_person: InPerson | None
+    # where the data come from, in one word; more than one joined by "+"
+    data: str
+    stamp: str  # the line every figure carries
+    trace_stamp: str  # the line a figure of reconstructed traces carries
+    # sessions, raters: those that have ratings, in the protocol's order
+    sessions: tuple[str, ...]
+    raters: tuple[str, ...]
+
+
+def gather(
+    protocol: Protocol,
+    ratings: Ratings,
+    analysis: Analysis,
+    in_person: InPerson | None = None,
+) -> Material:
+    """Return ratings and their analysis with what every section says of them."""
+    table = ratings.table
+    sources = sorted(set(table["source"]))
+    if ratings.simulated and "simulated" not in sources:
+        sources.append("simulated")
+    data = "+".join(sources) or "foreign"
+    source, stamp = protocol.study.source, ""
+    trace_stamp = "Model reconstruction at recorded mean speeds, not a measurement"
+    if ratings.simulated:
+        stamp = trace_stamp = SIMULATED
+    elif data == "published":
+        stamp = f"Published data: {source}".rstrip(": ")
+        trace_stamp = "Model reconstruction at published mean speeds, not a measurement"
+        trace_stamp = f"{trace_stamp}: {source}".rstrip(": ")
+    sessions, raters = set(table["session"]), set(table["rater"])
+    return Material(
+        protocol=protocol,
+        ratings=ratings,
+        analysis=analysis,
+        in_person=in_person,
+        data=data,
+        stamp=stamp,
+        trace_stamp=trace_stamp,
+        sessions=tuple(s.id for s in protocol.sessions if s.id in sessions),
+        raters=tuple(r.id for r in protocol.raters if r.id in raters),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Paragraph:
+    """One paragraph of plain text."""
+
+    text: str
+    absent: bool = False  # whether it says that something planned is not in the data
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drawing:
+    """A figure that is drawn when the document is written, and not before."""
+
+    name: str  # name of its files, without extension
+    caption: str  # what it shows, understood alone
+    alt: str  # what a reader who cannot see it needs to know
+    content: Content  # what is drawn
+    stamp: str  # the line that says where its data come from
+
+    def draw(self) -> dict[Form, bytes]:
+        """Return its files; what draws is loaded here."""
+        from masrel.report.figures import draw
+
+        return draw(self.content, stamp=self.stamp)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Section:
+    """One section of the report."""
+
+    name: str  # its name in the protocol's ``report.sections``
+    title: str  # its heading
+    blocks: tuple[Paragraph | Table | Drawing, ...]  # its contents in order
+
+
+def absent_section(name: str, title: str, reason: str | None) -> Section:
+    """Return a section whose data are not there, and why."""
+    text = f"Not in these data: {reason or 'this was not computed'}."
+    return Section(name=name, title=title, blocks=(Paragraph(text=text, absent=True),))

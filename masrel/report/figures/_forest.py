@@ -1,0 +1,209 @@
+"""Estimates with their intervals and distributions, one below the other."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.legend_handler import HandlerLine2D
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from masrel.estimates import Interval
+from masrel.report._figure_data import Forest, ForestRow
+from masrel.report._tables import percent
+from masrel.report.figures._ridge import (
+    RIDGE_ALPHA,
+    RIDGE_COLOURS,
+    Part,
+    draw_ridge,
+    lowest_shown,
+    parts,
+)
+from masrel.report.figures._style import BLACK, BLUE, DASHES, GREY, ORANGE
+
+# Heights in inches: of a line of text, of a line below it, of a ridge and a heading.
+_LINE, _DETAIL, _RIDGE, _GROUP = 0.25, 0.14, 0.34, 0.28
+
+_LEFT, _RIGHT = -1.0, 1.03  # the axis goes no further: what does is an arrow at its end
+
+_INTERVALS: dict[str, dict[str, Any]] = {
+    "confidence": {
+        "color": BLUE,
+        "linewidth": 1.8,
+        "marker": "|",
+        "markersize": 8,
+        "markeredgewidth": 1.8,
+    },
+    "credible": {"color": ORANGE, "linewidth": 5.0, "solid_capstyle": "butt"},
+}
+_DOT: dict[str, Any] = {"marker": "o", "color": BLACK, "markersize": 5}
+_ZERO: dict[str, Any] = {"color": GREY, "linewidth": 0.8, "linestyle": DASHES}
+
+_PARTS: dict[Part, str] = {
+    "density": "posterior density, each to its own height",
+    "stems": "resamples of one value, each row to its own height",
+    "bars": "resamples together in bars, each row to its own height",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Placed:
+    # a row, and how many inches from the top its parts are
+    row: ForestRow
+    top: float
+    line: float  # where its interval is
+    bottom: float
+    heading: float | None  # of its group, if it is the first of it
+
+
+def forest_figure(forest: Forest) -> Figure:
+    """Return a forest of estimates."""
+    places = _placed(forest.rows)
+    bottom = places[-1].bottom + 0.05
+    handles = _legend_handles(forest.rows)
+    figure = Figure(figsize=(7.2, bottom + 0.6 + 0.17 * len(handles)))
+    axes = figure.add_subplot()
+    left = max(_lowest(forest.rows), _LEFT) - 0.05
+    axes.set_xlim(left, _RIGHT)
+    axes.set_ylim(bottom, 0.0)
+    _draw_zeros(axes, places)
+    for place in places:
+        if place.heading is not None:
+            _at_left(axes, place.heading, place.row.group, weight="bold")
+        _draw_row(axes, place.line, place.row, left)
+    axes.set_yticks([])
+    axes.spines["left"].set_visible(False)
+    axes.grid(axis="x")
+    axes.set_xlabel(forest.axis_label)
+    # each kind of interval with two marks, and a dot with one
+    dots = [h for h in handles if isinstance(h, Line2D) and h.get_linestyle() == "None"]
+    figure.legend(
+        handles=handles,
+        loc="outside lower center",
+        fontsize=8,
+        borderaxespad=0.2,
+        numpoints=2,
+        handler_map={dot: HandlerLine2D(numpoints=1) for dot in dots},
+    )
+    return figure
+
+
+def _placed(rows: Sequence[ForestRow]) -> list[_Placed]:
+    # every row with its place, from the top down
+    places: list[_Placed] = []
+    bottom, group = 0.0, ""
+    for row in rows:
+        top, heading = bottom, None
+        if row.group and row.group != group:
+            heading = bottom + 0.6 * _GROUP
+            bottom += _GROUP
+        group = row.group
+        text = _LINE + (_DETAIL if row.detail else 0.0)
+        bottom += text + (0.0 if row.distribution is None else _RIDGE)
+        line = bottom - 0.5 * text
+        places.append(
+            _Placed(row=row, top=top, line=line, bottom=bottom, heading=heading)
+        )
+    return places
+
+
+def _lowest(rows: Sequence[ForestRow]) -> float:
+    # the lowest of 0 and all that rows show
+    numbers = [0.0]
+    for row in rows:
+        if row.value is not None and row.is_known:
+            numbers.append(row.value)
+        if row.drawn is not None:
+            numbers.append(row.drawn.low)
+        if row.distribution is not None:
+            numbers.append(lowest_shown(row.distribution))
+    return min(numbers)
+
+
+def _draw_zeros(axes: Axes, places: Sequence[_Placed]) -> None:
+    # where rows next to each other have a zero: one line for all of them
+    lines: list[tuple[float, float]] = []
+    for place in places:
+        if not place.row.has_zero:
+            continue
+        start = place.top
+        if lines and lines[-1][1] == start:
+            start = lines.pop()[0]
+        lines.append((start, place.bottom))
+    for start, end in lines:
+        axes.plot([0.0, 0.0], [start, end], **_ZERO, zorder=1.0)
+
+
+def _draw_row(axes: Axes, y: float, row: ForestRow, left: float) -> None:
+    if row.distribution is not None:
+        base = y - 0.3 * _LINE
+        draw_ridge(axes, row.distribution, base=base, top=base - 0.95 * _RIDGE)
+    if row.drawn is not None:
+        _draw_interval(axes, y, row.drawn, left)
+    if row.value is not None and row.is_known:
+        inside = min(max(row.value, left), _RIGHT)
+        marker = "o" if inside == row.value else "<" if row.value < left else ">"
+        axes.plot([inside], [y], clip_on=False, **{**_DOT, "marker": marker})
+    _at_left(axes, y, row.label, lifted=5.0 if row.detail else 0.0)
+    if row.detail:
+        _at_left(axes, y, row.detail, lifted=-5.5, color=GREY, fontsize=7.5)
+    axes.annotate(
+        row.text,
+        (1.0, y),
+        xycoords=("axes fraction", "data"),
+        xytext=(6, 0),
+        textcoords="offset points",
+        va="center",
+        color=BLACK if row.is_known else GREY,
+        style="normal" if row.is_known else "italic",
+    )
+
+
+def _draw_interval(axes: Axes, y: float, interval: Interval, left: float) -> None:
+    look = _INTERVALS[interval.kind]
+    axes.plot([max(interval.low, left), interval.high], [y, y], **look)
+    if interval.low < left:
+        arrow = {"marker": "<", "markersize": 7, "color": look["color"]}
+        axes.plot([left], [y], clip_on=False, **arrow)
+
+
+def _at_left(
+    axes: Axes, y: float, text: str, *, lifted: float = 0.0, **look: Any
+) -> None:
+    axes.annotate(
+        text,
+        (0.0, y),
+        xycoords=("axes fraction", "data"),
+        xytext=(-8, lifted),
+        textcoords="offset points",
+        ha="right",
+        va="center",
+        **look,
+    )
+
+
+def _legend_handles(rows: Sequence[ForestRow]) -> list[Artist]:
+    # what the legend explains, each mark once
+    handles: dict[str, Artist] = {}
+    if any(row.is_known for row in rows):
+        handles["estimate"] = Line2D([], [], linestyle="none", **_DOT)
+    for interval in (row.drawn for row in rows if row.drawn is not None):
+        label = f"{percent(interval.level)} % {interval.kind} interval"
+        handles[label] = Line2D([], [], **_INTERVALS[interval.kind])
+        if interval.distribution is not None:
+            for part in parts(interval.distribution):
+                handles[_PARTS[part]] = _part_handle(part)
+    for label, handle in handles.items():
+        handle.set_label(label)
+    return list(handles.values())
+
+
+def _part_handle(part: Part) -> Artist:
+    colour = RIDGE_COLOURS[part]
+    if part == "stems":
+        look: dict[str, Any] = {"marker": "|", "markersize": 9, "markeredgewidth": 1.4}
+        return Line2D([], [], color=colour, linestyle="none", **look)
+    return Patch(facecolor=(colour, RIDGE_ALPHA), edgecolor=colour, linewidth=0.8)

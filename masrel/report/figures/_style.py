@@ -1,0 +1,95 @@
+"""The look all figures share, and how a figure becomes files.
+
+Colours are Okabe and Ito's, which colour-blind readers tell apart; shapes, line
+styles and text repeat what the colours say, so that a grey print loses nothing.
+"""
+
+import io
+import textwrap
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+import matplotlib as mpl
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_pdf import FigureCanvasPdf
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+
+from masrel.report._figure_data import Form
+
+if TYPE_CHECKING:
+    from matplotlib.typing import RcKeyType
+
+BLACK = "#000000"
+GREY = "#6B6B6B"
+BLUE = "#0072B2"
+ORANGE = "#E69F00"
+VERMILLION = "#D55E00"
+
+DASHES = (0, (4, 3))
+"""Line style of what is a reference, not data."""
+
+SHADES = {"pre-catch": "#FFFFFF", "catch": "#D9D9D9", "post-catch": "#F0F0F0"}
+"""Background of each phase of a stretch."""
+
+STYLE: "dict[RcKeyType, object]" = {
+    "font.family": "DejaVu Sans",  # ships with matplotlib: the same everywhere
+    "font.size": 9,
+    "axes.labelsize": 9,
+    "axes.titlesize": 9.5,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.7,
+    "axes.axisbelow": True,
+    "grid.color": "#DDDDDD",
+    "grid.linewidth": 0.6,
+    "legend.frameon": False,
+    "svg.hashsalt": "masrel",  # ids of an SVG are otherwise random
+    "svg.fonttype": "path",
+    "pdf.fonttype": 42,  # letters stay letters, as journals ask
+    "figure.constrained_layout.use": True,
+}
+
+
+@contextmanager
+def house_style() -> Iterator[None]:
+    """Draw in the house style alone: a reader's own matplotlibrc changes nothing."""
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(STYLE)
+        yield
+
+
+def put_stamp(figure: Figure, stamp: str) -> None:
+    """Say at the top of a figure where its data come from."""
+    if not stamp:
+        return
+    loud = stamp.isupper()
+    # 7 pt letters are about 0.054 in wide; a long source goes on two lines
+    n_letters = int(figure.get_figwidth() / 0.054) - 2
+    figure.suptitle(
+        textwrap.fill(stamp, n_letters),
+        x=0.995,
+        ha="right",
+        fontsize=9.5 if loud else 7,
+        color=VERMILLION if loud else GREY,
+        weight="bold" if loud else "normal",
+    )
+
+
+def file_of(figure: Figure, form: Form) -> bytes:
+    """Return one file of a figure, without a time of day."""
+    file = io.BytesIO()
+    if form == "png":
+        canvas = FigureCanvasAgg(figure)
+        canvas.print_figure(file, format="png", dpi=200, metadata={"Software": None})
+    elif form == "svg":
+        FigureCanvasSVG(figure).print_figure(
+            file, format="svg", metadata={"Date": None}
+        )
+    else:
+        FigureCanvasPdf(figure).print_figure(
+            file, format="pdf", metadata={"CreationDate": None}
+        )
+    return file.getvalue()

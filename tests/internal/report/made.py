@@ -1,0 +1,8 @@
+"""Sections made for tests, before they are written."""
+
+from masrel.report._document import SECTIONS
+from masrel.report._material import Material, Section
+
+
+def build_sections(material: Material) -> list[Section]:
+    return [SECTIONS[name](material) for name in material.protocol.report.sections]

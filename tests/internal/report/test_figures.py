@@ -1,0 +1,232 @@
+"""Figures: what they say, that they repeat, and that they stay inside their data."""
+
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+
+from masrel.estimates import Distribution, Interval
+from masrel.report._figure_data import (
+    Forest,
+    ForestRow,
+    GradeGrid,
+    SpeedColumn,
+    SpeedDots,
+    TraceColumns,
+    TracePanel,
+)
+from masrel.report.figures import draw
+from masrel.report.figures._forest import forest_figure
+from masrel.report.figures._style import STYLE, house_style
+
+PNG = b"\x89PNG\r\n\x1a\n"
+
+
+def grid(n_raters: int = 2) -> GradeGrid:
+    return GradeGrid(
+        models=("HM1", "HM2"),
+        raters=tuple(f"R{i}" for i in range(n_raters)),
+        intended=("1", None),
+        grades=((("1",),) * (n_raters - 1) + (("2",),), ((),) * n_raters),
+        scale=("0", "1", "2"),
+    )
+
+
+def interval(**changes: Any) -> Interval:
+    made: dict[str, Any] = {
+        "low": 0.3,
+        "high": 0.7,
+        "level": 0.95,
+        "kind": "confidence",
+        "method": "m",
+        "target": "items",
+    }
+    return Interval(**{**made, **changes})
+
+
+def posterior() -> Interval:
+    at = np.linspace(0.1, 0.9, 41)
+    density = Distribution(
+        values=at, weights=np.exp(-20.0 * (at - 0.5) ** 2), continuous=True, words="p"
+    )
+    return interval(kind="credible", distribution=density)
+
+
+def resampled(n_values: int = 100) -> Interval:
+    # one value has a fifth of the resamples, the others share the rest
+    weights = np.full(n_values, 0.8 / (n_values - 1))
+    weights[-1] = 0.2
+    values = np.linspace(-0.2, 1.0, n_values)
+    return interval(
+        distribution=Distribution(
+            values=values, weights=weights, continuous=False, words="b"
+        )
+    )
+
+
+def forest() -> list[ForestRow]:
+    shared = {"detail": "4 models", "interval": None}
+    return [
+        ForestRow(label="a", value=0.6, text="0.600", **shared),
+        ForestRow(label="b", value=float("nan"), text="undefined", **shared),
+        ForestRow(label="c", value=None, text="not in these data", **shared),
+        ForestRow(label="d", value=0.5, interval=posterior(), text="[0.3, 0.7]"),
+        ForestRow(label="e", value=0.5, interval=resampled(), text="[0.2, 0.8]"),
+    ]
+
+
+def panel() -> TracePanel:
+    time = np.linspace(0.0, 1.0, 50)
+    phase = np.repeat([0, 1, 2], [20, 20, 10])
+    stretch = (time, 30 + 100 * time, 5 * time, phase)
+    return TracePanel(title="HM1", stretches=(stretch, stretch))
+
+
+DRAWINGS = {
+    "grades": grid(),
+    "many raters": grid(14),
+    "forest": Forest(rows=tuple(forest()), axis_label="κ"),
+    "speeds": SpeedDots(
+        columns=(
+            SpeedColumn(
+                model="HM1", session="first", speeds=((80.0,), (90.0, 95.0)), mean=85.0
+            ),
+        ),
+        raters=("R1", "R2"),
+        slowest=60.0,
+    ),
+    "traces": TraceColumns(panels=(panel(),)),
+}
+
+
+def svg_of(name: str, stamp: str) -> bytes:
+    return draw(DRAWINGS[name], stamp=stamp)["svg"]
+
+
+@pytest.mark.parametrize("name", DRAWINGS)
+def test_the_same_data_give_the_same_bytes(name: str) -> None:
+    first, second = (draw(DRAWINGS[name], stamp="SIMULATED DATA") for _ in range(2))
+    assert first["png"].startswith(PNG)
+    assert first == second
+
+
+@pytest.mark.parametrize("name", DRAWINGS)
+def test_a_readers_own_matplotlib_settings_change_nothing(name: str) -> None:
+    plain = svg_of(name, "")
+    with mpl.rc_context({"font.size": 20.0, "svg.hashsalt": "other"}):
+        assert svg_of(name, "") == plain
+        assert mpl.rcParams["font.size"] == 20.0
+
+
+@pytest.mark.parametrize("name", DRAWINGS)
+def test_a_figure_holds_no_time_of_day(name: str) -> None:
+    drawn = draw(DRAWINGS[name], stamp="")
+    assert b"<dc:date>" not in drawn["svg"]
+    assert b"Software" not in drawn["png"]
+
+
+@pytest.mark.parametrize("name", DRAWINGS)
+def test_a_simulated_figure_carries_the_stamp(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # With text kept as text the SVG says what can be read in the figure.
+    monkeypatch.setitem(STYLE, "svg.fonttype", "none")
+    assert b"SIMULATED DATA" in svg_of(name, "SIMULATED DATA")
+    assert b"SIMULATED DATA" not in svg_of(name, "")
+
+
+def test_a_grade_is_written_in_its_cell_and_a_missing_one_is_a_dash(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(STYLE, "svg.fonttype", "none")
+    svg = svg_of("grades", "").decode()
+    assert svg.count(">1</text>") == 2  # intended, and the one rater who agrees
+    assert svg.count(">2</text>") == 1
+    assert svg.count(">–</text>") == 3  # two missing grades, no intended one
+
+
+def forest_text(rows: list[ForestRow], monkeypatch: pytest.MonkeyPatch) -> str:
+    monkeypatch.setitem(STYLE, "svg.fonttype", "none")
+    shown = Forest(rows=tuple(rows), axis_label="κ")
+    return draw(shown, stamp="", forms=("svg",))["svg"].decode()
+
+
+def row(shown: Interval | None = None, **changes: Any) -> ForestRow:
+    made = {"label": "a", "value": 0.5, "interval": shown, "text": "0.5"}
+    return ForestRow(**{**made, **changes})
+
+
+def test_an_estimate_that_is_not_there_is_said_in_the_figure(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    svg = forest_text(forest(), monkeypatch)
+    assert "undefined" in svg
+    assert "not in these data" in svg
+
+
+@pytest.mark.parametrize(
+    ("shown", "named"),
+    [
+        (None, set()),
+        (interval(low=float("nan"), high=float("nan")), set()),
+        (interval(), {"95 % confidence interval"}),
+        (interval(level=0.9), {"90 % confidence interval"}),
+        (posterior(), {"95 % credible interval", "posterior density"}),
+        (resampled(), {"95 % confidence interval", "in bars", "of one value"}),
+        (resampled(50), {"95 % confidence interval", "of one value"}),
+    ],
+)
+def test_the_legend_names_what_is_drawn_and_nothing_else(
+    monkeypatch: pytest.MonkeyPatch, shown: Interval | None, named: set[str]
+) -> None:
+    svg = forest_text([row(shown)], monkeypatch)
+    every = {
+        "90 % confidence interval",
+        "95 % confidence interval",
+        "95 % credible interval",
+        "posterior density",
+        "in bars",
+        "of one value",
+    }
+    assert {words for words in every if words in svg} == named
+
+
+def test_a_heading_stands_once_above_its_rows(monkeypatch: pytest.MonkeyPatch) -> None:
+    rows = [row(group=group) for group in ("test", "test", "retest")]
+    svg = forest_text(rows, monkeypatch)
+    assert (svg.count(">test<"), svg.count(">retest<")) == (1, 1)
+
+
+def drawn_axes(*rows: ForestRow) -> Axes:
+    with house_style():
+        (axes,) = forest_figure(Forest(rows=rows, axis_label="κ")).axes
+    return axes
+
+
+def lines_at_zero(axes: Axes) -> list[tuple[float, float]]:
+    found = (line.get_xydata() for line in axes.lines if line.get_zorder() == 1.0)
+    return [(ends[0][1], ends[1][1]) for ends in found]
+
+
+def test_zero_is_marked_where_chance_gives_it_alone() -> None:
+    axes = drawn_axes(row(has_zero=False), row(), row(), row(has_zero=False), row())
+    first, second = lines_at_zero(axes)
+    assert first == pytest.approx((0.25, 0.75))
+    assert second == pytest.approx((1.0, 1.25))
+    assert lines_at_zero(drawn_axes(row(has_zero=False))) == []
+
+
+@pytest.mark.parametrize(
+    ("value", "low", "markers"),
+    [(0.5, -0.9, {"|", "o"}), (0.5, -7.0, {"|", "o", "<"}), (-9.0, -20.0, {"|", "<"})],
+)
+def test_what_leaves_the_axis_is_an_arrow_at_its_end(
+    value: float, low: float, markers: set[str]
+) -> None:
+    axes = drawn_axes(row(interval(low=low), value=value))
+    assert axes.get_xlim()[0] >= -1.05
+    assert {line.get_marker() for line in axes.lines} - {"None"} == markers
+    inside = [x for line in axes.lines for x in line.get_xdata()]
+    assert min(inside) >= axes.get_xlim()[0]
