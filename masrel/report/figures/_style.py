@@ -6,7 +6,7 @@ styles and text repeat what the colours say, so that a grey print loses nothing.
 
 import io
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -16,7 +16,7 @@ from matplotlib.backends.backend_pdf import FigureCanvasPdf
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
-from masrel.report._figure_data import Form
+from masrel.report import _figure_data as data
 
 if TYPE_CHECKING:
     from matplotlib.typing import RcKeyType
@@ -78,7 +78,7 @@ def put_stamp(figure: Figure, stamp: str) -> None:
     )
 
 
-def file_of(figure: Figure, form: Form) -> bytes:
+def file_of(figure: Figure, form: data.Form) -> bytes:
     """Return one file of a figure, without a time of day."""
     file = io.BytesIO()
     if form == "png":
@@ -93,3 +93,53 @@ def file_of(figure: Figure, form: Form) -> bytes:
             file, format="pdf", metadata={"CreationDate": None}
         )
     return file.getvalue()
+
+
+def draw(
+    content: data.Content, *, stamp: str, forms: Sequence[data.Form] = ("png", "svg")
+) -> dict[data.Form, bytes]:
+    """Draw values in the house style.
+
+    Parameters
+    ----------
+    content : Content
+        What is drawn.
+    stamp : str
+        The line that says where the data come from; none if empty.
+    forms : sequence of {"png", "svg", "pdf"}, optional
+        Which files to make.
+
+    Returns
+    -------
+    dict of str to bytes
+        Each form's file.
+    """
+    with house_style():
+        figure = _figure(content)
+        put_stamp(figure, stamp)
+        return {form: file_of(figure, form) for form in forms}
+
+
+def _figure(content: data.Content) -> Figure:
+    # Imported here: one figure loads what no other needs.
+    match content:
+        case data.GradeGrid() | data.SpeedDots() | data.TraceColumns():
+            from masrel.report.figures._study_figures import study_figure
+
+            return study_figure(content)
+        case data.Forest():
+            from masrel.report.figures._forest import forest_figure
+
+            return forest_figure(content)
+        case data.LatentScale():
+            from masrel.report.figures._latent_scale import latent_figure
+
+            return latent_figure(content)
+        case data.Stretches() | data.CatchCurves() | data.CatchSchematic():
+            from masrel.report.figures._scene_figures import scene_figure
+
+            return scene_figure(content)
+        case data.JointFitView() | data.FrictionView():
+            from masrel.report.figures._fit_figures import fit_figure
+
+            return fit_figure(content)
