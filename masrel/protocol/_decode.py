@@ -72,10 +72,10 @@ def _decode_array(
     key: str,
     into: Decoded,
 ) -> None:
-    tables = _is_struct(entry)
-    words = f"an array of tables [[{where}]]" if tables else needed(annotation)
     if not isinstance(value, list):
-        into.problems.append(f"{where}: needed {words}, got {got(value)}")
+        tables = f"an array of tables [[{where}]]"
+        form = tables if _is_struct(entry) else needed(annotation)
+        into.problems.append(f"{where}: needed {form}, got {got(value)}")
         return
     entries = Decoded()
     for index, item in enumerate(value):
@@ -100,16 +100,18 @@ def _name_entry(item: object, problems: list[str], start: int) -> None:
 
 
 def _leaf_problem(value: object, annotation: object, where: str) -> str | None:
-    problem = f"{where}: needed {needed(annotation)}, got {got(value)}"
-    if isinstance(value, float) and not math.isfinite(value):
-        return problem  # TOML has inf and nan; no key of a protocol does
-    try:
-        msgspec.convert(value, annotation)
-    except msgspec.ValidationError:
-        info = inspect.type_info(annotation)
-        options = info.values if isinstance(info, inspect.LiteralType) else ()
-        return problem + _closest(value, [str(option) for option in options])
-    return None
+    # TOML has inf and nan; no key of a protocol does
+    if not isinstance(value, float) or math.isfinite(value):
+        try:
+            msgspec.convert(value, annotation)
+        except msgspec.ValidationError:
+            pass
+        else:
+            return None
+    info = inspect.type_info(annotation)
+    options = info.values if isinstance(info, inspect.LiteralType) else ()
+    hint = _closest(value, [str(option) for option in options])
+    return f"{where}: needed {needed(annotation)}, got {got(value)}{hint}"
 
 
 def _unknown(where: str, key: str, fields: Mapping[str, FieldInfo]) -> str:

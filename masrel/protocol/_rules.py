@@ -102,18 +102,22 @@ def _raters(values: Values) -> Iterator[str]:
 
 def _file_names(values: Values) -> Iterator[str]:
     # Schedules are SESSION_RATER.csv and SESSION_RATER_sheet.csv.
-    owner: dict[str, str] = {}
+    first: dict[str, tuple[str, str]] = {}
     for index, session in _entries(values, "sessions"):
         raters = dict.fromkeys(r for r in session.get("raters") or [] if r)
         for rater in raters if session.get("id") else ():
-            stem = f"{session['id']}_{rater}".casefold()
-            pair = f"session {got(session['id'])} with rater {got(rater)}"
+            pair = (session["id"], rater)
+            stem = "_".join(pair).casefold()
             for name in (stem, f"{stem}_sheet"):
-                other = owner.setdefault(name, pair)
-                if other.casefold() != pair.casefold():
+                other = first.setdefault(name, pair)
+                if [p.casefold() for p in other] != [p.casefold() for p in pair]:
+                    both = " and for ".join(
+                        f"session {got(session_id)} with rater {got(rater_id)}"
+                        for session_id, rater_id in (pair, other)
+                    )
                     yield (
                         f"sessions[{index}]: needed ids that give each schedule a file "
-                        f"of its own, got {name}.csv for {pair} and for {other}"
+                        f"of its own, got {name}.csv for {both}"
                     )
 
 
