@@ -85,7 +85,6 @@ def between(
     says who is whose neighbour. Prints L, H, Q and D of each; a protocol names the
     files.
     """
-    output.check_files()
     if overwrite and folder is None:
         raise ParameterError("--overwrite: needs --output: nothing is written without")
     placed = _place_between([_read_source(model) for model in models], n_models)

@@ -101,7 +101,6 @@ def fit(
     its confidence interval, clustered by trial, and what these trials do not
     determine.
     """
-    output.check_files()
     if of_device:
         _check_device_options(model_file, slow_below, inertia, post_catch)
     if slow_below is not None and not slow_below > 0.0:

@@ -252,7 +252,7 @@ _quantity_options = grouped(
     help="What --figure shows: torque by angle or time, the catches, or one of "
     "them.  [default: angle]",
 )  # fmt: skip
-@click.option("--quiet", is_flag=True, help="Show no progress.")
+@click.option("--quiet", is_flag=True, help="Show no progress.")  # of the output
 def trace(
     models: tuple[str, ...],
     speeds: tuple[float, ...],

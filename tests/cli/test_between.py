@@ -191,3 +191,13 @@ def test_a_folder_that_is_a_file_is_refused(masrel: Caller, tmp_path: Path) -> N
     path.write_text("", encoding="utf-8")
     said = refused(masrel("between", "HM1", "HM2", "-n", "1", "-o", path))
     assert str(path) in said
+
+
+def test_json_may_lie_in_the_folder_that_is_made(
+    masrel: Caller, tmp_path: Path
+) -> None:
+    folder = tmp_path / "new"
+    file = folder / "all.json"
+    done = masrel("between", "HM1", "HM2", "-n", "1", "-o", folder, "--json", file)
+    assert done.code == 0, done.err
+    assert sorted(path.name for path in folder.iterdir()) == ["D01.toml", "all.json"]

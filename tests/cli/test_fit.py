@@ -81,11 +81,13 @@ def test_only_slow_trials_make_no_model_file(
 
 
 def test_figures_are_drawn(masrel: Caller, files: list[Path], tmp_path: Path) -> None:
-    done = masrel("fit", *files, "--figures", tmp_path, "--quiet")
+    folder = tmp_path / "new"  # where JSON may lie, too
+    more = ("--json", folder / "a.json", "--quiet")
+    done = masrel("fit", *files, "--figures", folder, *more)
     assert done.code == 0, done.err
     names = ("fit_catches", "fit_residuals", "fit_slow", "fit_trials")
-    expected = [f"{name}.{form}" for name in names for form in ("png", "svg")]
-    assert sorted(path.name for path in tmp_path.iterdir()) == expected
+    drawn = [f"{name}.{form}" for name in names for form in ("png", "svg")]
+    assert sorted(path.name for path in folder.iterdir()) == ["a.json", *drawn]
 
 
 def test_friction_is_fitted_and_drawn(masrel: Caller, tmp_path: Path) -> None:

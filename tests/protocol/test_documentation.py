@@ -7,7 +7,8 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from masrel.protocol import Protocol, definition
+from masrel import protocol as definition
+from masrel.protocol import Protocol
 
 PAGE = (Path(__file__).parents[2] / "docs" / "protocol.md").read_text(encoding="utf-8")
 
