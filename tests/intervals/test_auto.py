@@ -13,7 +13,12 @@ from scipy.special import betaincinv, expit, logit
 from scipy.stats import t as student
 
 from masrel.agreement import COEFFICIENTS, fleiss_kappa, stratified_kappa
-from masrel.errors import MasrelWarning, ParameterError, SmallSampleWarning
+from masrel.errors import (
+    MasrelWarning,
+    ParameterError,
+    SmallSampleWarning,
+    UndefinedStatisticWarning,
+)
 from masrel.estimates import Estimate, Interval, Target
 from masrel.intervals import bootstrap, estimate, jackknife, posterior
 from tests.intervals.data import dirichlet_multinomial
@@ -323,3 +328,18 @@ def test_the_interval_of_two_raters_holds_the_estimate() -> None:
     assert found.interval is not None
     assert (found.value, found.interval.low) == (-1.0, -1.0)
     assert any("widened to the estimate" in note for note in found.interval.notes)
+
+
+@pytest.mark.parametrize("target", ["items", "raters", "both"])
+@pytest.mark.parametrize("coefficient", ["fleiss_kappa", "gwet_ac"])
+def test_a_table_without_a_rating_has_no_interval(
+    coefficient: str, target: Target
+) -> None:
+    with pytest.warns(UndefinedStatisticWarning):
+        found = estimate(
+            coefficient, [[None] * 3] * 4, target=target, categories=["a", "b"]
+        )
+    assert math.isnan(found.value)
+    assert found.interval is not None
+    assert math.isnan(found.interval.low)
+    assert found.interval.reason == "the estimate itself is undefined"
