@@ -34,6 +34,10 @@ _NAMES = {
 """Names that are recognized, letter case aside."""
 
 
+_Problem = tuple[int, str | None, str]
+"""What is wrong with a file: its line, its column if it is of one, and a message."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _CsvRow:
     """One record of a CSV file."""
@@ -86,29 +90,6 @@ class _Cell:
     grade: str | None
     mean_speed_deg_s: float = math.nan
     source: str = "foreign"
-
-
-class _Problems:
-    """Problems of one file, collected to be raised together."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._noted: list[tuple[int, str]] = []
-
-    def add(self, line: int, column: str | None, message: str) -> None:
-        """Note a problem."""
-        where = f"line {line}" + ("" if column is None else f", column {column!r}")
-        self._noted.append((line, f"{self._path}: {where}: {message}"))
-
-    def raise_any(self) -> None:
-        """Raise what was noted, by line, at most 20 of them."""
-        if not self._noted:
-            return
-        texts = [text for _, text in sorted(self._noted, key=lambda noted: noted[0])]
-        more = len(texts) - _MAX_PROBLEMS
-        if more > 0:
-            texts = [*texts[:_MAX_PROBLEMS], f"{self._path}: and {more} more"]
-        raise RatingsError("\n".join(texts))
 
 
 def read_ratings(
@@ -166,13 +147,14 @@ def read_ratings(
     rows = _read_rows(Path(path))
     names = {"item": item, "rater": rater, "grade": grade, "session": session}
     columns = _find_columns(rows, names)
-    problems = _Problems(rows.path)
+    problems: list[_Problem] = []
     if isinstance(columns, _LongColumns):
         cells = _long_cells(rows, columns, problems)
     else:
         cells = _wide_cells(rows, columns)
     _check_cells(cells, scale, problems)
-    problems.raise_any()
+    if problems:
+        raise _refusal(rows.path, problems)
     if scale is None:
         scale = _observed_scale(rows, cells)
     values = {n: [getattr(cell, n) for cell in cells] for n in RATING_COLUMNS}
@@ -180,7 +162,7 @@ def read_ratings(
 
 
 def _long_cells(
-    rows: _CsvRows, columns: _LongColumns, problems: _Problems
+    rows: _CsvRows, columns: _LongColumns, problems: list[_Problem]
 ) -> list[_Cell]:
     extra = {
         name: rows.header.index(name)
@@ -209,7 +191,7 @@ def _long_cells(
         for role in ("item", "rater"):
             position = getattr(columns, role)
             if row.cells[position] in _MISSING:
-                problems.add(row.line, rows.header[position], f"needed the {role}")
+                problems.append((row.line, rows.header[position], f"needed the {role}"))
     return cells
 
 
@@ -229,14 +211,14 @@ def _wide_cells(rows: _CsvRows, columns: _WideColumns) -> list[_Cell]:
     ]
 
 
-def _repeat(text: str, line: int, problems: _Problems) -> int:
+def _repeat(text: str, line: int, problems: list[_Problem]) -> int:
     if text.isascii() and text.isdigit() and int(text) >= 1:
         return int(text)
-    problems.add(line, "repeat", f"needed a whole number from 1, got {text!r}")
+    problems.append((line, "repeat", f"needed a whole number from 1, got {text!r}"))
     return 1
 
 
-def _speed(text: str, line: int, problems: _Problems) -> float:
+def _speed(text: str, line: int, problems: list[_Problem]) -> float:
     if text in _MISSING:
         return math.nan
     try:
@@ -244,55 +226,54 @@ def _speed(text: str, line: int, problems: _Problems) -> float:
     except ValueError:
         speed = math.nan
     if not 0 <= speed < math.inf:
-        problems.add(
-            line, "mean_speed_deg_s", f"needed a speed of 0 or more, got {text!r}"
+        problems.append(
+            (line, "mean_speed_deg_s", f"needed a speed of 0 or more, got {text!r}")
         )
     return speed
 
 
-def _source(text: str, line: int, problems: _Problems) -> str:
+def _source(text: str, line: int, problems: list[_Problem]) -> str:
     if text not in SOURCES:
-        problems.add(
-            line, "source", f"needed one of {', '.join(SOURCES)}, got {text!r}"
+        problems.append(
+            (line, "source", f"needed one of {', '.join(SOURCES)}, got {text!r}")
         )
     return text
 
 
-def _check_cells(cells: list[_Cell], scale: Scale | None, problems: _Problems) -> None:
+def _check_cells(
+    cells: list[_Cell], scale: Scale | None, problems: list[_Problem]
+) -> None:
     kind = "a grade" if scale is None else f"one of {', '.join(scale.grades)}"
     hint = "; name the categories if it is a grade" if scale is None else ""
     first_lines: dict[tuple[str, str, str, int], int] = {}
     for cell in cells:
         if not cell.model or not cell.session:
-            problems.add(cell.line, None, "needed an item and a session, got none")
+            problems.append((cell.line, None, "needed an item and a session, got none"))
             continue
         key = (cell.session, cell.rater, cell.model, cell.repeat)
         first = first_lines.setdefault(key, cell.line)
         if first != cell.line:
-            problems.add(
-                cell.line,
-                cell.column,
+            message = (
                 f"needed one rating of {cell.model!r} by {cell.rater!r} in session "
-                f"{cell.session!r}, line {first} has one already",
+                f"{cell.session!r}, line {first} has one already"
             )
+            problems.append((cell.line, cell.column, message))
         if cell.grade is None:
             continue
         looks_missing = cell.grade.casefold() in _LOOKS_MISSING
         if looks_missing if scale is None else cell.grade not in scale.grades:
-            problems.add(
-                cell.line,
-                cell.column,
+            message = (
                 f"needed {kind}, or an empty cell or NA when missing, "
-                f"got {cell.grade!r}{hint}",
+                f"got {cell.grade!r}{hint}"
             )
+            problems.append((cell.line, cell.column, message))
 
 
 def _observed_scale(rows: _CsvRows, cells: list[_Cell]) -> Scale:
     grades = sorted({cell.grade for cell in cells if cell.grade is not None})
     if not grades:
-        problems = _Problems(rows.path)
-        problems.add(rows.header_line, None, "needed at least one grade, got none")
-        problems.raise_any()
+        problem = (rows.header_line, None, "needed at least one grade, got none")
+        raise _refusal(rows.path, [problem])
     try:
         values = {grade: float(grade) for grade in grades}
     except ValueError:
@@ -312,13 +293,14 @@ def _read_rows(path: Path) -> _CsvRows:
         raise RatingsError(f"{path}: needed a header and rows, the file has none")
     header_line, header = records[0]
     _check_header(path, header_line, header)
-    problems = _Problems(path)
+    problems: list[_Problem] = []
     for line, cells in records[1:]:
         if len(cells) != len(header):
-            problems.add(
-                line, None, f"needed {len(header)} cells, got {len(cells)}: {cells}"
+            problems.append(
+                (line, None, f"needed {len(header)} cells, got {len(cells)}: {cells}")
             )
-    problems.raise_any()
+    if problems:
+        raise _refusal(path, problems)
     return _CsvRows(
         path=path,
         header=header,
@@ -380,13 +362,16 @@ def _check_header(path: Path, line: int, header: tuple[str, ...]) -> None:
         raise RatingsError(
             f"{path}: line {line}: needed columns separated by commas, got {got}"
         )
-    problems = _Problems(path)
+    problems: list[_Problem] = []
     for position, name in enumerate(header, start=1):
         if not name:
-            problems.add(line, None, f"column {position} needs a name, got none")
+            problems.append((line, None, f"column {position} needs a name, got none"))
         elif name in header[: position - 1]:
-            problems.add(line, name, "needed different names, this one is there twice")
-    problems.raise_any()
+            problems.append(
+                (line, name, "needed different names, this one is there twice")
+            )
+    if problems:
+        raise _refusal(path, problems)
 
 
 def _find_columns(
@@ -459,3 +444,15 @@ def _find(rows: _CsvRows, role: str, names: Mapping[str, str | None]) -> int | N
 
 def _error(rows: _CsvRows, message: str) -> RatingsError:
     return RatingsError(f"{rows.path}: line {rows.header_line}: {message}")
+
+
+def _refusal(path: Path, problems: Sequence[_Problem]) -> RatingsError:
+    # the error with the problems of a file by line, the first 20 of them
+    texts = []
+    for line, column, message in sorted(problems, key=lambda problem: problem[0]):
+        where = f"line {line}" + ("" if column is None else f", column {column!r}")
+        texts.append(f"{path}: {where}: {message}")
+    more = len(texts) - _MAX_PROBLEMS
+    if more > 0:
+        texts = [*texts[:_MAX_PROBLEMS], f"{path}: and {more} more"]
+    return RatingsError("\n".join(texts))

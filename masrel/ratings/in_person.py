@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from masrel.errors import RatingsError
-from masrel.ratings.files import _MISSING, _Problems, _read_rows
+from masrel.ratings.files import _MISSING, _Problem, _read_rows, _refusal
 
 _IN_PERSON_COLUMNS = (
     "source_table",  # where the row is printed
@@ -88,25 +88,25 @@ def read_in_person(path: Path | str) -> InPerson:
             f"{rows.path}: line {rows.header_line}: needed the columns "
             f"{', '.join(_IN_PERSON_COLUMNS)}, got {', '.join(rows.header)}"
         )
-    problems = _Problems(rows.path)
+    problems: list[_Problem] = []
     seen: dict[tuple[str, str, str], int] = {}
     graded = []
     for row in rows.rows:
         cell = dict(zip(rows.header, row.cells, strict=True))
         for name in ("source_table", "rater", "subject", "model"):
             if cell[name] in _MISSING:
-                problems.add(row.line, name, "needed text, got none")
+                problems.append((row.line, name, "needed text, got none"))
         key = (cell["source_table"], cell["rater"], cell["subject"])
         first = seen.setdefault(key, row.line)
         if first != row.line:
-            problems.add(
-                row.line,
-                None,
+            message = (
                 f"needed one row of {cell['subject']!r} by {cell['rater']!r} in "
-                f"{cell['source_table']!r}, line {first} has one already",
+                f"{cell['source_table']!r}, line {first} has one already"
             )
+            problems.append((row.line, None, message))
         graded.append(_in_person_row(row.line, cell))
-    problems.raise_any()
+    if problems:
+        raise _refusal(rows.path, problems)
     return InPerson(rows=tuple(graded), source_path=rows.path)
 
 
