@@ -75,13 +75,10 @@ class RhoPosterior:
     """The posterior of ρ = 1 / (1 + A), integrated."""
 
     prior: Prior
-    # low, high: ends of the central interval
-    low: float
+    low: float  # ends of the central interval
     high: float
-    # the distribution of logit ρ
-    logit: LineDistribution = field(compare=False, repr=False)
-    # what it was integrated from
-    log_density: RhoDensity = field(compare=False, repr=False)
+    logit: LineDistribution = field(compare=False, repr=False)  # of logit ρ
+    log_density: RhoDensity = field(compare=False, repr=False)  # of logit ρ
 
     @classmethod
     def of(

@@ -1,10 +1,11 @@
 """Coordinates in which the posterior of the latent-trait model is nearly normal.
 
-Ratings tell how items and thresholds lie to each other in units of c = √(1 - ρ), by
-which a rating differs from its item; of ρ they tell nothing more. So thresholds are
-T_k = (τ_k - α) / c from the one of them that halves the ratings, α, and an item whose
-ratings place it is told by how far (θ_i - α) / c is from the thresholds between its
-grades. An item that its ratings hardly place is told by θ_i / √ρ, as its prior is.
+Ratings determine where items and thresholds lie relative to each other in units of
+c = √(1 - ρ), the standard deviation of a rating around its item; about ρ they say
+nothing more. So thresholds are T_k = (τ_k - α) / c from the one of them that halves the
+ratings, α. The coordinate of an item that its ratings place is how far (θ_i - α) / c is
+from the thresholds between its grades; that of an item they hardly place is θ_i / √ρ,
+the unit of its prior.
 """
 
 from dataclasses import dataclass, field
