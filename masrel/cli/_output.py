@@ -84,8 +84,8 @@ def check_folder(option: str, file: Path) -> None:
     """Refuse a file whose folder is not there."""
     if file != Path("-") and not file.parent.is_dir():
         raise ParameterError(
-            f"{option}: needs a folder that exists, got {file}, where {file.parent} "
-            "is none"
+            f"{option}: needs a folder that exists, got {file}: there is no folder "
+            f"{file.parent}"
         )
 
 
