@@ -25,7 +25,9 @@ PRIOR_SHAPES: dict[str, float] = {"uniform": 1.0, "jeffreys": 0.5}
 
 _OF_RHO = {"uniform": "ρ ~ U(0, 1)", "jeffreys": "ρ ~ Beta(1/2, 1/2)"}
 _SHOWN = 201  # points of a distribution
-_FEW_ITEMS = 10
+
+FEW_ITEMS = 10
+"""Items below which the interval under another prior is noted."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -129,7 +131,7 @@ def prior_notes(
         what = "all ratings are in one category"
     elif ((counts > 0).sum(axis=1) <= 1).all():
         what = "agreement is perfect in these data"
-    elif n_items < _FEW_ITEMS:
+    elif n_items < FEW_ITEMS:
         what = f"{n_items} items are few"
     else:
         return ()

@@ -12,6 +12,7 @@ from masrel.agreement._kernel import Floats
 from masrel.errors import ParameterError
 from masrel.estimates import Interval
 from masrel.intervals._problem import IntervalProblem
+from masrel.intervals._rho import FEW_ITEMS
 from masrel.intervals._seeds import recorded_generator
 from masrel.intervals._table_quadrature import (
     CHANCE_AGREEMENT,
@@ -20,7 +21,6 @@ from masrel.intervals._table_quadrature import (
     table_quantiles,
 )
 
-_FEW_ITEMS = 10
 _MIN_DRAWS = 100
 _DEFAULT_DRAWS, _SEED = 4_000, 1  # always the same ones, so that they repeat
 _NOTED_DRAWS = 2_000  # for the interval under another prior: a note has three digits
@@ -228,6 +228,6 @@ def _where_the_prior_weighs(table: Floats) -> str:
         return "all ratings are in one category"
     if table.trace() == table.sum():
         return "agreement is perfect in these data"
-    if table.sum() < _FEW_ITEMS:
+    if table.sum() < FEW_ITEMS:
         return f"{table.sum():.0f} items are few"
     return ""
