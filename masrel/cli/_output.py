@@ -14,7 +14,7 @@ from masrel.cli._options import Decorator, grouped
 from masrel.errors import MasrelWarning, ParameterError
 
 if TYPE_CHECKING:
-    from masrel.report._figure_data import Form
+    from masrel.report._figure_data import Content, Form
     from masrel.report._tables import Table
 
 _FORMS: dict[str, "Form"] = {".png": "png", ".svg": "svg", ".pdf": "pdf"}
@@ -94,19 +94,26 @@ def write_output(
     *,
     document: Callable[[], dict[str, object]],
     text: "Callable[[], Table | str]",
-    draw: "Callable[[Form], bytes] | None" = None,
+    figure: "Callable[[], Content] | None" = None,
+    stamp: str = "",
     notes: tuple[str, ...] = (),
 ) -> None:
     """Write and print a result in the forms that were chosen, and make no other."""
-    # notes: those of a table, which JSON has no place for
+    # stamp: what the figure says of its data; notes: those of a table, which JSON has
+    # no place for
     if output.prints_json:
         echo_notes(notes)
     else:  # first: a disk that is full then loses no result
         print_text(text(), csv=output.csv, latex=output.latex)
     if output.json_file is not None:
         write_json(document(), output.json_file)
-    if draw is not None and output.figure is not None:
-        output.figure.write_bytes(draw(figure_form(output.figure)))
+    if figure is not None and output.figure is not None:
+        # Imported here: a table loads nothing that draws.
+        from masrel.report.figures import draw
+
+        form = figure_form(output.figure)
+        files = draw(figure(), stamp=stamp, forms=(form,))
+        output.figure.write_bytes(files[form])
         click.echo(f"figure: {output.figure}", err=True)
 
 

@@ -128,6 +128,7 @@ def agree(
     notes = scale_notes(ratings, options.weights)
     rows = _estimate(ratings, options, by, file)
     from masrel.report._agreement_table import agreement_forest, agreement_table
+    from masrel.report._tables import SIMULATED
 
     write_output(
         output,
@@ -140,11 +141,8 @@ def agree(
             notes=notes,
             data="simulated" if ratings.simulated else "foreign",
         ),
-        draw=None
-        if target is None
-        else lambda form: agreement_forest(
-            rows, target, simulated=ratings.simulated, form=form
-        ),
+        figure=None if target is None else lambda: agreement_forest(rows, target),
+        stamp=SIMULATED if ratings.simulated else "",
         notes=notes,
     )
     if target is None:

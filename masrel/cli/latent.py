@@ -69,9 +69,10 @@ def latent(
     )
     from masrel.report._latent_trait import (
         latent_document,
-        latent_figure,
+        latent_scale,
         latent_table,
     )
+    from masrel.report._tables import SIMULATED
 
     grades, simulated = ratings.scale.grades, ratings.simulated
     write_output(
@@ -83,7 +84,8 @@ def latent(
             notes=notes,
             data="simulated" if simulated else "foreign",
         ),
-        draw=lambda form: latent_figure(result, grades, simulated=simulated, form=form),
+        figure=lambda: latent_scale(result, grades),
+        stamp=SIMULATED if simulated else "",
         notes=notes,
     )
 

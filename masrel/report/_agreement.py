@@ -10,17 +10,16 @@ from dataclasses import dataclass
 from masrel.agreement import strength
 from masrel.analysis import PlannedEstimate
 from masrel.estimates import Estimate, Interval
-from masrel.protocol import EstimatePlan
 from masrel.report._estimate_words import (
+    NOT_THERE,
     TARGETS,
     aside,
     coefficient_name,
-    estimate_text,
-    has_zero,
+    forest_row,
     interval_name,
     meaning,
 )
-from masrel.report._figure_data import Forest, ForestRow
+from masrel.report._figure_data import Forest
 from masrel.report._material import Drawing, Material, Paragraph, Section
 from masrel.report._tables import Column, Table, Value, counted, interval_text
 
@@ -63,38 +62,43 @@ _COLUMNS = (
 _LETTERS = "ᵃᵇᶜᵈᵉᶠᵍʰⁱʲᵏˡᵐⁿᵒᵖʳˢᵗᵘᵛʷˣʸᶻ"  # they stand high without any markup
 
 
-def agreement_section(material: Material) -> Section:
-    """Show the inter-rater estimates of the plan."""
-    title = "Agreement between raters"
-    blocks = _blocks(material, "inter-rater", "agreement", title)
-    return Section(name="agreement", title=title, blocks=blocks)
+# Kind of the plan's lines: name of the section, its title, and caption of its table.
+_SECTIONS = {
+    "inter-rater": (
+        "agreement",
+        "Agreement between raters",
+        "Agreement between raters",
+    ),
+    "test-retest": (
+        "test-retest",
+        "Test-retest agreement",
+        "Agreement of raters with themselves",
+    ),
+}
 
 
-def retest_section(material: Material) -> Section:
-    """Show the test-retest estimates of the plan, and every rater's."""
-    caption = "Agreement of raters with themselves"
-    blocks = _blocks(material, "test-retest", "test_retest", caption)
-    return Section(name="test-retest", title="Test-retest agreement", blocks=blocks)
-
-
-def _blocks(
-    material: Material, kind: str, name: str, caption: str
-) -> tuple[Paragraph | Table | Drawing, ...]:
+def estimates_section(material: Material, kind: str) -> Section:
+    """Show the plan's estimates of a kind: between raters, or test-retest."""
+    name, title, caption = _SECTIONS[kind]
     planned = [p for p in material.analysis.estimates if p.line.kind == kind]
+    blocks: list[Paragraph | Table | Drawing] = []
     if not planned:
-        return (Paragraph(text="The plan asks for no such estimate.", absent=True),)
-    if all(entry.estimate is None and not entry.by_rater for entry in planned):
+        text = "The plan asks for no such estimate."
+        blocks.append(Paragraph(text=text, absent=True))
+    elif all(entry.estimate is None and not entry.by_rater for entry in planned):
         texts = [f"{p.line.id} is not in these data: {p.reason}." for p in planned]
-        return tuple(Paragraph(text=text, absent=True) for text in texts)
-    rows = estimate_rows(planned)
-    meanings = dict.fromkeys(
-        meaning(row.interval, "model") for row in rows if row.interval is not None
-    )
-    return (
-        estimate_table(rows, name=name, caption=caption, data=material.data),
-        *(Paragraph(text=text) for text in meanings),
-        _forest(material, rows, name, caption),
-    )
+        blocks += [Paragraph(text=text, absent=True) for text in texts]
+    else:
+        rows = estimate_rows(planned)
+        file = name.replace("-", "_")
+        intervals = [row.interval for row in rows if row.interval is not None]
+        meanings = dict.fromkeys(meaning(interval, "model") for interval in intervals)
+        blocks = [
+            estimate_table(rows, name=file, caption=caption, data=material.data),
+            *(Paragraph(text=text) for text in meanings),
+            _forest(material, rows, file, caption),
+        ]
+    return Section(name=name, title=title, blocks=tuple(blocks))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -107,50 +111,36 @@ class EstimateRow:
     models: str
     sessions: str
     estimate: Estimate | None
+    interval: Interval | None  # of the estimate
     reason: str | None  # why there is none
     single: bool  # whether it is one rater's agreement with him- or herself
-
-    @property
-    def interval(self) -> Interval | None:
-        """The interval, if the plan asks for one."""
-        return None if self.estimate is None else self.estimate.interval
-
-    @property
-    def text(self) -> str:
-        """The value with its interval, or that there is none."""
-        if self.estimate is None:
-            return "not in these data"
-        return estimate_text(self.estimate)
 
 
 def estimate_rows(planned: Sequence[PlannedEstimate]) -> list[EstimateRow]:
     """Return the rows of planned estimates, each followed by those of its raters."""
     rows = []
     for entry in planned:
+        line = entry.line
+        estimates: list[tuple[str, str, Estimate | None]] = [
+            (f"{line.id}: {r.rater}", r.estimate.coefficient, r.estimate)
+            for r in entry.by_rater
+        ]
         if entry.estimate is not None or not entry.by_rater:
-            rows.append(_row(entry.line, entry.estimate, entry.reason))
-        rows += [_row(entry.line, r.estimate, rater=r.rater) for r in entry.by_rater]
+            estimates.insert(0, (line.id, line.coefficient, entry.estimate))
+        rows += [
+            EstimateRow(
+                name=name,
+                coefficient=coefficient_name(coefficient, line.weights),
+                models=line.models,
+                sessions=" and ".join(line.sessions),
+                estimate=estimate,
+                interval=None if estimate is None else estimate.interval,
+                reason=entry.reason if name == line.id else None,
+                single=name != line.id,
+            )
+            for name, coefficient, estimate in estimates
+        ]
     return rows
-
-
-def _row(
-    line: EstimatePlan,
-    estimate: Estimate | None,
-    reason: str | None = None,
-    rater: str | None = None,
-) -> EstimateRow:
-    name = line.coefficient
-    if rater is not None and estimate is not None:
-        name = estimate.coefficient
-    return EstimateRow(
-        name=line.id if rater is None else f"{line.id}: {rater}",
-        coefficient=coefficient_name(name, line.weights),
-        models=line.models,
-        sessions=" and ".join(line.sessions),
-        estimate=estimate,
-        reason=reason,
-        single=rater is not None,
-    )
 
 
 def estimate_table(
@@ -160,7 +150,11 @@ def estimate_table(
     # On a page an interval is one column, marked with a letter; a note below says what
     # each letter means: level, method, and of whom the interval speaks.
     texts = (_interval_note(row.interval) for row in rows if row.interval is not None)
-    marks = {text: _mark(i) for i, text in enumerate(dict.fromkeys(texts))}
+    n = len(_LETTERS)
+    marks = {
+        text: _LETTERS[i % n] * (i // n + 1)  # a, b, ..., z, aa, bb, ...
+        for i, text in enumerate(dict.fromkeys(texts))
+    }
     cells = tuple(_cells(row, marks) for row in rows)
     notes = [f"{mark} {text}." for text, mark in marks.items()]
     notes += [
@@ -185,12 +179,6 @@ def _interval_note(interval: Interval) -> str:
     return f"{interval_name(interval)}; speaks of {TARGETS[interval.target]}"
 
 
-def _mark(position: int) -> str:
-    # a, b, ..., z, aa, bb, ...
-    rounds, letter = divmod(position, len(_LETTERS))
-    return _LETTERS[letter] * (rounds + 1)
-
-
 def _remarks(row: EstimateRow) -> list[str]:
     # what a reader must know before relying on it, each once
     remarks = [row.reason]
@@ -208,7 +196,7 @@ def _cells(row: EstimateRow, marks: dict[str, str]) -> tuple[Value, ...]:
     head = (row.name, row.coefficient)
     if estimate is None:
         data = (row.models, row.models, row.sessions, None, None)
-        return (*head, *data, None, row.text, *[None] * 7, row.reason)
+        return (*head, *data, None, NOT_THERE, *[None] * 7, row.reason)
     ends: tuple[Value, ...] = (None,) * 5
     if interval is not None:
         mark = marks[_interval_note(interval)]
@@ -242,14 +230,7 @@ def _forest(
     material: Material, rows: Sequence[EstimateRow], name: str, caption: str
 ) -> Drawing:
     lines = [
-        ForestRow(
-            label=f"{row.coefficient}, {row.name}",
-            detail=_detail(row),
-            value=None if row.estimate is None else row.estimate.value,
-            interval=row.interval,
-            text=row.text,
-            has_zero=row.estimate is not None and has_zero(row.estimate.coefficient),
-        )
+        forest_row(f"{row.coefficient}, {row.name}", row.estimate, detail=_detail(row))
         for row in rows
     ]
     texts = "; ".join(f"{line.label}: {line.text}" for line in lines)

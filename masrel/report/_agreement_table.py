@@ -8,13 +8,12 @@ from masrel.agreement import COEFFICIENTS, BandScale, benchmark
 from masrel.estimates import Estimate, Interval, Target
 from masrel.report._estimate_words import (
     aside,
-    estimate_text,
-    has_zero,
+    forest_row,
     origin,
     promise,
 )
-from masrel.report._figure_data import Forest, ForestRow, Form
-from masrel.report._tables import SIMULATED, Column, Table, Value, percent
+from masrel.report._figure_data import Forest, ForestRow
+from masrel.report._tables import Column, Table, Value, percent
 
 _POPULATIONS = {"items": "items", "raters": "raters", "both": "items and raters"}
 
@@ -158,36 +157,27 @@ def _names(
     return names
 
 
-def agreement_forest(
-    rows: Sequence[AgreementRow], target: Target, *, simulated: bool, form: Form
-) -> bytes:
-    """Return the figure of estimates and their intervals as a file."""
-    # Imported here: a table loads nothing that draws.
-    from masrel.report.figures import draw
-
+def agreement_forest(rows: Sequence[AgreementRow], target: Target) -> Forest:
+    """Return what a figure shows: the estimates and their intervals."""
     population = _POPULATIONS[target]
     several = len({row.session for row in rows}) > 1
-    forest = Forest(
+    return Forest(
         rows=tuple(_forest_row(row, target, has_group=several) for row in rows),
         axis_label=f"agreement (1 is perfect); intervals for other {population}",
     )
-    return draw(forest, stamp=SIMULATED if simulated else "", forms=(form,))[form]
 
 
 def _forest_row(row: AgreementRow, target: Target, *, has_group: bool) -> ForestRow:
-    estimate, interval = row.estimate, row.estimate.interval
+    interval = row.estimate.interval
     # what neither the axis nor the legend says of the interval
     details = []
     if interval is not None:
         details.append(aside(interval))
         if interval.target != target:
             details.append(f"other {_POPULATIONS[interval.target]}")
-    return ForestRow(
-        label=row.title,
+    return forest_row(
+        row.title,
+        row.estimate,
         detail=", ".join(filter(None, details)),
-        value=estimate.value,
-        interval=interval,
-        text=estimate_text(estimate),
-        has_zero=has_zero(estimate.coefficient),
         group=row.session if has_group else "",
     )

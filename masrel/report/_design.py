@@ -1,6 +1,5 @@
 """Section `design`: what was presented to whom, with the constants of the joints."""
 
-from masrel.protocol import Session
 from masrel.report._material import Material, Paragraph, Section
 from masrel.report._tables import (
     Column,
@@ -192,8 +191,18 @@ def _constant(key: str, value: float | str) -> tuple[Value, ...]:
 
 
 def _sessions(material: Material) -> Table:
-    rows = [_session_row(material, session) for session in material.protocol.sessions]
-    absent = [str(row[0]) for row in rows if row[4] == 0]
+    protocol, table = material.protocol, material.ratings.table
+    graded = table[table["grade"].notna()]
+    rows, absent = [], []
+    for session in protocol.sessions:
+        n_raters = len(session.raters)
+        n_planned = n_raters * len(protocol.models) * protocol.schedule.repeats
+        n_given = int((graded["session"] == session.id).sum())
+        names = ", ".join(session.raters)
+        note = session.note or None
+        rows.append((session.id, n_raters, names, n_planned, n_given, note))
+        if n_given == 0:
+            absent.append(session.id)
     notes = [f"No ratings in these data: session {', '.join(absent)}."]
     return Table(
         name="sessions",
@@ -209,18 +218,4 @@ def _sessions(material: Material) -> Table:
         rows=tuple(rows),
         notes=tuple(notes if absent else ()),
         data=material.data,
-    )
-
-
-def _session_row(material: Material, session: Session) -> tuple[Value, ...]:
-    protocol, table = material.protocol, material.ratings.table
-    of_session = table[table["session"] == session.id]
-    n_raters = len(session.raters)
-    return (
-        session.id,
-        n_raters,
-        ", ".join(session.raters),
-        n_raters * len(protocol.models) * protocol.schedule.repeats,
-        int(of_session["grade"].notna().sum()),
-        session.note or None,
     )

@@ -11,12 +11,13 @@ import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from masrel.analysis import Analysis
 from masrel.protocol import Protocol
 from masrel.ratings import InPerson, Ratings
-from masrel.report._agreement import agreement_section, retest_section
+from masrel.report._agreement import estimates_section
 from masrel.report._design import design_section
 from masrel.report._grades import grades_section, in_person_section, intended_section
 from masrel.report._material import Drawing, Material, Paragraph, Section, gather
@@ -29,10 +30,10 @@ Progress = Callable[[str], object]
 SECTIONS: dict[str, Callable[[Material], Section]] = {
     "design": design_section,
     "grades": grades_section,
-    "agreement": agreement_section,
+    "agreement": partial(estimates_section, kind="inter-rater"),
     "intended": intended_section,
     "in-person": in_person_section,
-    "test-retest": retest_section,
+    "test-retest": partial(estimates_section, kind="test-retest"),
     "speeds": speeds_section,
     "traces": traces_section,
 }
@@ -141,7 +142,10 @@ def _write_figures(
     for drawing in (block for section in sections for block in section.blocks):
         if not isinstance(drawing, Drawing):
             continue
-        files = drawing.draw()
+        # Imported here: a report without figures loads nothing that draws.
+        from masrel.report.figures import draw
+
+        files = draw(drawing.content, stamp=drawing.stamp)
         folder.mkdir(exist_ok=True)
         for form, picture in files.items():
             paths.append(folder / f"{drawing.name}.{form}")
@@ -173,7 +177,7 @@ def _pages(
         "title": material.protocol.report.title or study.title,
         "simulated": material.ratings.simulated,
         "banner": _BANNER,
-        "provenance": _provenance(material),
+        "provenance": material.provenance,
         "sections": _numbered(sections, uris),
         "inputs": [
             (f"SHA-256 of the {name.removesuffix('_sha256').replace('_', '-')}", digest)
@@ -184,18 +188,6 @@ def _pages(
     }
     names = ("report.html", "report.md")
     return {name: environment.get_template(name).render(context) for name in names}
-
-
-def _provenance(material: Material) -> str:
-    study = material.protocol.study
-    if material.ratings.simulated:
-        return (
-            "The grades and speeds in this report are simulated. They show that the "
-            "study runs; they say nothing about people or about the models."
-        )
-    if material.data == "published":
-        return f"Published grades and speeds: {study.source}".rstrip(": ")
-    return f"Study {study.id}, {material.data} ratings."
 
 
 def _numbered(

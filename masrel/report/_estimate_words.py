@@ -5,6 +5,7 @@ from typing import Literal
 
 from masrel.agreement import COEFFICIENTS
 from masrel.estimates import Estimate, Interval
+from masrel.report._figure_data import ForestRow
 from masrel.report._tables import UNDEFINED, interval_text, number, percent
 
 Noun = Literal["model", "item"]
@@ -23,6 +24,9 @@ _POPULATIONS = {
     "both": "other raters graded other {}s, both like these",
 }
 
+NOT_THERE = "not in these data"
+"""What is shown where a plan's estimate is not."""
+
 _WIDENED = "and the spread of raters"
 """End of the method of a posterior that was widened by what raters differ by."""
 
@@ -36,21 +40,33 @@ def coefficient_name(coefficient: str, weights: str = "identity") -> str:
     return f"{title} (0–1)" if coefficient == "percent_agreement" else title
 
 
-def has_zero(coefficient: str) -> bool:
-    """Return whether 0 is what chance gives of a coefficient."""
-    # Not of a share, nor of a measure of order; of an ICC and a κ.
-    entry = COEFFICIENTS.get(coefficient)  # the forms of ICC have entries of their own
-    return entry is None or entry.chance_corrected
-
-
-def estimate_text(estimate: Estimate) -> str:
-    """Return a value with its interval, as shown."""
-    if not math.isfinite(estimate.value):
-        return UNDEFINED
-    value, interval = number(estimate.value, 3), estimate.interval
-    if interval is None:
-        return value
-    return f"{value} {interval_text(interval.low, interval.high)}"
+def forest_row(
+    label: str, estimate: Estimate | None, *, detail: str = "", group: str = ""
+) -> ForestRow:
+    """Return the row of an estimate in a forest, or one that says there is none."""
+    value = interval = None
+    text, has_zero = NOT_THERE, False
+    if estimate is not None:
+        text, interval = UNDEFINED, estimate.interval
+        if math.isfinite(estimate.value):
+            value = estimate.value
+            text = number(value, 3)
+            if interval is not None:
+                text += f" {interval_text(interval.low, interval.high)}"
+        if interval is not None and not math.isfinite(interval.high - interval.low):
+            interval = None
+        # 0 is what chance gives of an ICC and a κ; not of a share, nor of an order
+        entry = COEFFICIENTS.get(estimate.coefficient)  # None: a form of the ICC
+        has_zero = entry is None or entry.chance_corrected
+    return ForestRow(
+        label=label,
+        detail=detail,
+        value=value,
+        interval=interval,
+        text=text,
+        has_zero=has_zero,
+        group=group,
+    )
 
 
 def interval_name(interval: Interval) -> str:

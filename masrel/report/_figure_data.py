@@ -1,6 +1,5 @@
 """What figures show, as plain values: they load nothing that draws."""
 
-import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
@@ -9,7 +8,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from masrel.elbow.identification import ElbowFit, FrictionFit
-    from masrel.estimates import Distribution, Interval
+    from masrel.estimates import Interval
 
     Floats = NDArray[np.float64]
 
@@ -37,29 +36,12 @@ class ForestRow:
     # label, detail: what is estimated; how and for whom, or nothing
     label: str
     detail: str = ""
-    value: float | None  # None or ``nan`` is not drawn
-    interval: "Interval | None"  # drawn with its distribution if it has one
+    value: float | None  # None where there is no finite one
+    # None where its ends are not finite; drawn with its distribution if it has one
+    interval: "Interval | None"
     text: str  # the numbers, or why there are none, as shown at the right
     has_zero: bool = True  # whether 0 is what chance gives, so that it is marked
     group: str = ""  # heading above the first row of those that share it
-
-    @property
-    def drawn(self) -> "Interval | None":
-        """The interval, if its ends are known."""
-        if self.interval is None:
-            return None
-        known = map(math.isfinite, (self.interval.low, self.interval.high))
-        return self.interval if all(known) else None
-
-    @property
-    def distribution(self) -> "Distribution | None":
-        """The distribution of the interval, if there is one to draw."""
-        return None if self.drawn is None else self.drawn.distribution
-
-    @property
-    def is_known(self) -> bool:
-        """Whether there is a value to draw."""
-        return self.value is not None and math.isfinite(self.value)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

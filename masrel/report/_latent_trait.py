@@ -4,9 +4,8 @@ from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
 from masrel.estimates import as_document
-from masrel.report._figure_data import Form, LatentScale, ScaleRow
+from masrel.report._figure_data import LatentScale, ScaleRow
 from masrel.report._tables import (
-    SIMULATED,
     Column,
     Table,
     Value,
@@ -174,14 +173,9 @@ def _quantity(quantity: "Quantity") -> dict[str, object]:
     }
 
 
-def latent_figure(
-    result: "LatentTrait", grades: tuple[str, ...], *, simulated: bool, form: Form
-) -> bytes:
-    """Return the figure of raters, items and thresholds on one scale as a file."""
-    # Imported here: a table loads nothing that draws.
-    from masrel.report.figures import draw
-
-    scale = LatentScale(
+def latent_scale(result: "LatentTrait", grades: tuple[str, ...]) -> LatentScale:
+    """Return what a figure shows: raters, items and thresholds on one scale."""
+    return LatentScale(
         items=tuple(map(_scale_row, result.items)),
         thresholds=tuple(map(_scale_row, result.thresholds)),
         raters=tuple(
@@ -191,7 +185,6 @@ def latent_figure(
         grades=grades,
         level=result.items[0].interval.level,
     )
-    return draw(scale, stamp=SIMULATED if simulated else "", forms=(form,))[form]
 
 
 def _scale_row(quantity: "Quantity", noise: float | None = None) -> ScaleRow:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from masrel.analysis import Analysis
 from masrel.protocol import Protocol
 from masrel.ratings import InPerson, Ratings
-from masrel.report._figure_data import Content, Form
+from masrel.report._figure_data import Content
 from masrel.report._tables import SIMULATED, Table
 
 
@@ -20,6 +20,7 @@ class Material:
     in_person: InPerson | None
     # where the data come from, in one word; more than one joined by "+"
     data: str
+    provenance: str  # the sentence at the head of the pages
     stamp: str  # the line every figure carries
     trace_stamp: str  # the line a figure of reconstructed traces carries
     # sessions, raters: those that have ratings, in the protocol's order
@@ -39,14 +40,20 @@ def gather(
     if ratings.simulated and "simulated" not in sources:
         sources.append("simulated")
     data = "+".join(sources) or "foreign"
-    source, stamp = protocol.study.source, ""
+    study, stamp = protocol.study, ""
+    provenance = f"Study {study.id}, {data} ratings."
     trace_stamp = "Model reconstruction at recorded mean speeds, not a measurement"
     if ratings.simulated:
+        provenance = (
+            "The grades and speeds in this report are simulated. They show that the "
+            "study runs; they say nothing about people or about the models."
+        )
         stamp = trace_stamp = SIMULATED
     elif data == "published":
-        stamp = f"Published data: {source}".rstrip(": ")
+        provenance = f"Published grades and speeds: {study.source}".rstrip(": ")
+        stamp = f"Published data: {study.source}".rstrip(": ")
         trace_stamp = "Model reconstruction at published mean speeds, not a measurement"
-        trace_stamp = f"{trace_stamp}: {source}".rstrip(": ")
+        trace_stamp = f"{trace_stamp}: {study.source}".rstrip(": ")
     sessions, raters = set(table["session"]), set(table["rater"])
     return Material(
         protocol=protocol,
@@ -54,6 +61,7 @@ def gather(
         analysis=analysis,
         in_person=in_person,
         data=data,
+        provenance=provenance,
         stamp=stamp,
         trace_stamp=trace_stamp,
         sessions=tuple(s.id for s in protocol.sessions if s.id in sessions),
@@ -78,12 +86,6 @@ class Drawing:
     alt: str  # what a reader who cannot see it needs to know
     content: Content  # what is drawn
     stamp: str  # the line that says where its data come from
-
-    def draw(self) -> dict[Form, bytes]:
-        """Return its files; what draws is loaded here."""
-        from masrel.report.figures import draw
-
-        return draw(self.content, stamp=self.stamp)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

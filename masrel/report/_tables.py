@@ -150,14 +150,12 @@ def as_csv(table: Table) -> str:
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow([*(column.key for _, column in places), "data"])
     for row in table.rows:
-        writer.writerow([*(_csv_cell(row[i]) for i, _ in places), table.data])
+        cells = [row[i] for i, _ in places]
+        known = [
+            None if isinstance(c, float) and not math.isfinite(c) else c for c in cells
+        ]
+        writer.writerow([*known, table.data])  # None is written as nothing
     return out.getvalue()
-
-
-def _csv_cell(value: Value) -> str:
-    if value is None or (isinstance(value, float) and not math.isfinite(value)):
-        return ""
-    return repr(value) if isinstance(value, float) else str(value)
 
 
 def as_text(table: Table) -> str:

@@ -102,7 +102,8 @@ def _placed(rows: Sequence[ForestRow]) -> list[_Placed]:
             bottom += _GROUP
         group = row.group
         text = _LINE + (_DETAIL if row.detail else 0.0)
-        bottom += text + (0.0 if row.distribution is None else _RIDGE)
+        has_ridge = row.interval is not None and row.interval.distribution is not None
+        bottom += text + (_RIDGE if has_ridge else 0.0)
         line = bottom - 0.5 * text
         places.append(
             _Placed(row=row, top=top, line=line, bottom=bottom, heading=heading)
@@ -114,12 +115,12 @@ def _lowest(rows: Sequence[ForestRow]) -> float:
     # the lowest of 0 and all that rows show
     numbers = [0.0]
     for row in rows:
-        if row.value is not None and row.is_known:
+        if row.value is not None:
             numbers.append(row.value)
-        if row.drawn is not None:
-            numbers.append(row.drawn.low)
-        if row.distribution is not None:
-            numbers.append(lowest_shown(row.distribution))
+        if row.interval is not None:
+            numbers.append(row.interval.low)
+            if row.interval.distribution is not None:
+                numbers.append(lowest_shown(row.interval.distribution))
     return min(numbers)
 
 
@@ -138,12 +139,9 @@ def _draw_zeros(axes: Axes, places: Sequence[_Placed]) -> None:
 
 
 def _draw_row(axes: Axes, y: float, row: ForestRow, left: float) -> None:
-    if row.distribution is not None:
-        base = y - 0.3 * _LINE
-        draw_ridge(axes, row.distribution, base=base, top=base - 0.95 * _RIDGE)
-    if row.drawn is not None:
-        _draw_interval(axes, y, row.drawn, left)
-    if row.value is not None and row.is_known:
+    if row.interval is not None:
+        _draw_interval(axes, y, row.interval, left)
+    if row.value is not None:
         inside = min(max(row.value, left), _RIGHT)
         marker = "o" if inside == row.value else "<" if row.value < left else ">"
         axes.plot([inside], [y], clip_on=False, **{**_DOT, "marker": marker})
@@ -157,12 +155,15 @@ def _draw_row(axes: Axes, y: float, row: ForestRow, left: float) -> None:
         xytext=(6, 0),
         textcoords="offset points",
         va="center",
-        color=BLACK if row.is_known else GREY,
-        style="normal" if row.is_known else "italic",
+        color=GREY if row.value is None else BLACK,
+        style="italic" if row.value is None else "normal",
     )
 
 
 def _draw_interval(axes: Axes, y: float, interval: Interval, left: float) -> None:
+    if interval.distribution is not None:
+        base = y - 0.3 * _LINE
+        draw_ridge(axes, interval.distribution, base=base, top=base - 0.95 * _RIDGE)
     look = _INTERVALS[interval.kind]
     axes.plot([max(interval.low, left), interval.high], [y, y], **look)
     if interval.low < left:
@@ -188,9 +189,9 @@ def _at_left(
 def _legend_handles(rows: Sequence[ForestRow]) -> list[Artist]:
     # what the legend explains, each mark once
     handles: dict[str, Artist] = {}
-    if any(row.is_known for row in rows):
+    if any(row.value is not None for row in rows):
         handles["estimate"] = Line2D([], [], linestyle="none", **_DOT)
-    for interval in (row.drawn for row in rows if row.drawn is not None):
+    for interval in (row.interval for row in rows if row.interval is not None):
         label = f"{percent(interval.level)} % {interval.kind} interval"
         handles[label] = Line2D([], [], **_INTERVALS[interval.kind])
         if interval.distribution is not None:

@@ -41,15 +41,8 @@ _PHASES: tuple[tuple[str, dict[str, Any]], ...] = (
 )
 
 
-def study_figure(content: GradeGrid | SpeedDots | TraceColumns) -> Figure:
-    """Return a figure of a study's report."""
-    if isinstance(content, GradeGrid):
-        return _grades(content)
-    return _speeds(content) if isinstance(content, SpeedDots) else _traces(content)
-
-
-def _grades(grid: GradeGrid) -> Figure:
-    # shaded cells with the grade written in each
+def grade_figure(grid: GradeGrid) -> Figure:
+    """Return grades as shaded cells, with the grade written in each."""
     n_rows, n_columns = len(grid.models), len(grid.raters)
     size = (1.3 + 0.56 * (n_columns + 1.3), 1.15 + 0.34 * n_rows)
     figure = Figure(figsize=size)
@@ -113,8 +106,8 @@ def _box(axes: Axes, left: float, y: float, width: float, **look: object) -> Non
     axes.add_patch(box)
 
 
-def _speeds(dots: SpeedDots) -> Figure:
-    # every rater's mean speed, one column a model
+def speed_figure(dots: SpeedDots) -> Figure:
+    """Return every rater's mean speed, one column a model."""
     models = list(dict.fromkeys(column.model for column in dots.columns))
     sessions = list(dict.fromkeys(column.session for column in dots.columns))
     starts = range(0, len(models), _MODELS_IN_A_ROW)
@@ -177,8 +170,8 @@ def _speed_column(
     axes.plot(ends, [column.mean, column.mean], color=BLACK, linewidth=1.6)
 
 
-def _traces(columns: TraceColumns) -> Figure:
-    # torque and angle against time, one column a model
+def trace_figure(columns: TraceColumns) -> Figure:
+    """Return torque and angle against time, one column a model."""
     n_panels = len(columns.panels)
     figure = Figure(figsize=(max(3.4, 0.5 + 2.05 * n_panels), 4.7))
     grid = figure.subplots(

@@ -124,9 +124,13 @@ def _figure(content: data.Content) -> Figure:
     # Imported here: one figure loads what no other needs.
     match content:
         case data.GradeGrid() | data.SpeedDots() | data.TraceColumns():
-            from masrel.report.figures._study_figures import study_figure
+            from masrel.report.figures import _study_figures as study
 
-            return study_figure(content)
+            if isinstance(content, data.GradeGrid):
+                return study.grade_figure(content)
+            if isinstance(content, data.SpeedDots):
+                return study.speed_figure(content)
+            return study.trace_figure(content)
         case data.Forest():
             from masrel.report.figures._forest import forest_figure
 

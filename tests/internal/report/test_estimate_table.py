@@ -11,12 +11,11 @@ import pytest
 from masrel.analysis import PlannedEstimate, RaterEstimate, analyze
 from masrel.estimates import Estimate, Interval
 from masrel.report._agreement import (
-    agreement_section,
     estimate_rows,
     estimate_table,
-    retest_section,
+    estimates_section,
 )
-from masrel.report._estimate_words import coefficient_name, interval_name
+from masrel.report._estimate_words import coefficient_name, forest_row, interval_name
 from masrel.report._figure_data import Forest
 from masrel.report._material import Drawing, Paragraph, gather
 from masrel.report._tables import Table, as_csv, as_text, page_cells
@@ -60,9 +59,7 @@ def blocks(*planned: PlannedEstimate) -> tuple[Paragraph | Table | Drawing, ...]
     protocol, rows = protocol_with(sections=()), table_v()
     analysis = replace(analyze(protocol, rows), estimates=planned)
     material = gather(protocol, rows, analysis)
-    if planned[0].line.kind == "test-retest":
-        return retest_section(material).blocks
-    return agreement_section(material).blocks
+    return estimates_section(material, planned[0].line.kind).blocks
 
 
 def one(**changes: Any) -> PlannedEstimate:
@@ -168,6 +165,22 @@ def test_one_raters_own_agreement_counts_one_rater() -> None:
     (drawing,) = (block for block in blocks(planned) if isinstance(block, Drawing))
     assert isinstance(drawing.content, Forest)
     assert [line.detail for line in drawing.content.rows] == ["4 models, twice"]
+
+
+def test_what_is_not_finite_is_not_drawn() -> None:
+    nan = math.nan
+    assert forest_row("a", estimate(value=nan)).value is None
+    assert forest_row("a", estimate(value=nan)).text == "undefined"
+    ends = forest_row("a", estimate(interval=interval(low=nan)))
+    assert (ends.interval, ends.text) == (None, "0.626 [undefined]")
+    assert forest_row("a", None).text == "not in these data"
+
+
+def test_zero_is_marked_of_what_is_corrected_for_chance() -> None:
+    assert forest_row("a", estimate()).has_zero
+    assert forest_row("a", estimate(coefficient="icc_a1")).has_zero
+    assert not forest_row("a", estimate(coefficient="percent_agreement")).has_zero
+    assert not forest_row("a", None).has_zero
 
 
 def test_percent_agreement_is_said_to_be_a_share() -> None:

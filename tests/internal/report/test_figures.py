@@ -70,7 +70,7 @@ def forest() -> list[ForestRow]:
     shared = {"detail": "4 models", "interval": None}
     return [
         ForestRow(label="a", value=0.6, text="0.600", **shared),
-        ForestRow(label="b", value=float("nan"), text="undefined", **shared),
+        ForestRow(label="b", value=None, text="undefined", **shared),
         ForestRow(label="c", value=None, text="not in these data", **shared),
         ForestRow(label="d", value=0.5, interval=posterior(), text="[0.3, 0.7]"),
         ForestRow(label="e", value=0.5, interval=resampled(), text="[0.2, 0.8]"),
@@ -170,7 +170,6 @@ def test_an_estimate_that_is_not_there_is_said_in_the_figure(
     ("shown", "named"),
     [
         (None, set()),
-        (interval(low=float("nan"), high=float("nan")), set()),
         (interval(), {"95 % confidence interval"}),
         (interval(level=0.9), {"90 % confidence interval"}),
         (posterior(), {"95 % credible interval", "posterior density"}),

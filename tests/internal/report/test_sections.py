@@ -18,6 +18,7 @@ from masrel.report import ReportFiles, write_report
 from masrel.report._document import SECTIONS
 from masrel.report._material import Drawing, Material, Paragraph, gather
 from masrel.report._tables import Table, as_text
+from masrel.report.figures import draw
 from masrel.report.figures._style import STYLE
 from tests.analysis.studies import (
     hess2012,
@@ -107,7 +108,7 @@ def test_repeated_presentations_are_all_shown_in_their_order() -> None:
     assert isinstance(shown, Table)
     assert shown.rows == (("HM1", "1", "1+, 1"), ("HM2", "1+", "2"))
     assert isinstance(drawing, Drawing)
-    assert drawing.draw()["png"]  # two grades share a cell
+    assert draw(drawing.content, stamp="")["png"]  # two grades share a cell
 
 
 def test_missing_grades_are_counted_below_the_grid() -> None:
@@ -294,6 +295,6 @@ def test_the_forest_shows_the_posterior_behind_an_interval(
     made = gather(protocol, rows, analysis)
     (section,) = build_sections(made)
     (forest,) = [block for block in section.blocks if isinstance(block, Drawing)]
-    first, second = forest.draw()["svg"], forest.draw()["svg"]
+    first, second = (draw(forest.content, stamp="")["svg"] for _ in range(2))
     assert b"posterior density" in first
     assert first == second
