@@ -1,98 +1,227 @@
-"""Distinct items and distinct rows of ratings, each with how often it occurs."""
+"""Distinct items and distinct rows of ratings, each with how often it occurs.
 
-from collections.abc import Callable, Sequence
+An item of unnamed raters is a row of counts: how many raters put it into each
+category. Sums over items are whole numbers, and exact.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from functools import partial
+from operator import mul
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from masrel.agreement._data import (
-    CodedRatings,
-    check_scale,
-    code_ratings,
-    label_rows,
-)
-from masrel.agreement._labels import Codes, Label, check_categories
-from masrel.agreement.few_items import FewItems
-from masrel.agreement.many_items import ManyItems
+from masrel.agreement._data import CodedRatings, check_scale, code_ratings
+from masrel.agreement._labels import Codes, Label, check_categories, label_rows
+from masrel.agreement.weights import Weights
 from masrel.errors import CountsError, ParameterError
 
+Array = NDArray[Any]
 Integers = NDArray[np.int64]
 
-_FEW_COUNTS = 4_000  # counts that Python sums about as fast as numpy
-
-ItemTable = FewItems | ManyItems
-"""Distinct items with how often each occurs."""
-
-
-def item_table(counts: Integers, times: Integers | None = None) -> ItemTable:
-    """Choose how distinct items are kept."""
-    # Takes counts (n_rows, n_categories), times (n_rows,)
-    if counts.size <= _FEW_COUNTS:
-        how_often = [1] * len(counts) if times is None else times.tolist()
-        return FewItems(counts.tolist(), how_often, counts.shape[1])
-    if times is None:
-        times = np.ones(len(counts), dtype=np.int64)
-    return ManyItems(counts, times)
-
-
-def check_counts(counts: ArrayLike) -> Integers:
-    """Check a table of counts."""
-    # counts (n_items, n_categories) -> (n_items, n_categories)
-    try:
-        table = np.asarray(counts)
-    except ValueError as error:
-        raise CountsError("counts: needs rows of the same length") from error
-    if table.ndim != 2 or 0 in table.shape:
-        raise CountsError(
-            "counts: needs a table (items, categories) of at least one of each, "
-            f"got shape {table.shape}"
-        )
-    if table.dtype.kind not in "iuf":
-        raise CountsError(f"counts: needs whole numbers, got {table.dtype}")
-    wrong = ~((table >= 0) & (table == np.floor(table)) & (table < 2**53))
-    if wrong.any():
-        row, column = np.argwhere(wrong)[0]
-        raise CountsError(
-            f"counts: row {row}, column {column}: needs a whole number of at least 0 "
-            f"and below 2^53, got {table[row, column]}"
-        )
-    return table.astype(np.int64)
-
-
-def column_categories(
-    categories: Sequence[Label] | None, n_columns: int
-) -> Sequence[Label]:
-    """Return the declared scale of a table of counts, 1 to n_columns unless given."""
-    if categories is None:
-        return range(1, n_columns + 1)
-    declared = check_categories(categories)
-    if len(declared) != n_columns:
-        raise ParameterError(
-            f"categories: needs {n_columns}, one per column of counts, got "
-            f"{len(declared)}"
-        )
-    return declared
-
-
-def check_table(table: ArrayLike) -> Integers:
-    """Check a contingency table of two raters."""
-    # table (n_categories, n_categories) -> (n_categories, n_categories)
-    checked = check_counts(table)
-    if checked.shape[0] != checked.shape[1]:
-        raise CountsError(
-            f"table: needs as many rows as columns, got shape {checked.shape}"
-        )
-    return checked
-
-
-FEW = 200
-"""Ratings that Python counts about as fast as numpy."""
-
+_FEW = 200  # ratings or counts that Python sums about as fast as numpy
 _FEW_PLACES = 1 << 15  # ratings times categories that are counted one by one
-_MOST_KEYS = 1 << 22  # patterns that are counted in a table rather than sorted
-_MOST_SORTED = 20_000  # items that are sorted to find those alike
+_FEW_ROWS = 1 << 10  # rows for which one call costs less than a few for each rater
+_MAX_KEYS = 1 << 22  # keys that are counted in a table rather than sorted
+_MAX_SORTED = 20_000  # items that are sorted to find those alike
 _BLOCK = 1 << 16  # items counted at once, so that they stay in the cache
+
+
+class SizeGroup(NamedTuple):
+    """Sums over the items that have the same number of ratings."""
+
+    size: int  # ratings of each item, at least 1
+    n_items: int
+    totals: list[int]  # (n_categories,): ratings per category
+    disagreement: int  # Σ_i Σ_kl v_kl n_ik n_il, times the denominator of the weights
+
+
+class SufficientStatistics(NamedTuple):
+    """What the value of a coefficient of unnamed raters depends on."""
+
+    groups: list[SizeGroup]  # items by their number of ratings
+    n_rated: int  # items with at least one rating
+    n_usable: int  # items with at least two
+    # D_o, the mean over usable items of Σ_kl v_kl n_ik n_il / (n_i (n_i - 1)), is
+    # `observed` / `denominator`; the denominator is 0 if no item is usable
+    observed: int
+    denominator: int
+    # p_k, the mean over rated items of the part of their raters who chose category k,
+    # is `marginals`_k / `total`
+    marginals: list[int]
+    total: int
+
+
+class ItemArrays(NamedTuple):
+    """Distinct items with their disagreement, in floats or exactly."""
+
+    counts: Array  # (n_distinct, n_categories)
+    freq: Array  # (n_distinct,)
+    size: Any  # ratings of each, (n_distinct,); a number where all have as many
+    disagreement: Array  # (n_distinct,): Σ_kl v_kl n_k n_l
+
+
+@dataclass(slots=True, eq=False)
+class DistinctItems:
+    """Distinct rows of counts with how often each occurs; items without ratings go."""
+
+    # Few, or too large for sums in 64 bits, are lists of Python's integers; many are
+    # arrays.
+    rows: list[tuple[int, ...]] | Integers  # (n_distinct, n_categories)
+    freq: list[int] | Integers  # (n_distinct,)
+    n_categories: int
+    _sums: SufficientStatistics | None = None  # of identity weights
+    _arrays: ItemArrays | None = None
+
+    @classmethod
+    def of_counter(
+        cls, counter: dict[tuple[int, ...], int], n_categories: int
+    ) -> "DistinctItems":
+        """Take rows that a dictionary has counted."""
+        counter.pop((0,) * n_categories, None)
+        return cls(list(counter), list(counter.values()), n_categories)
+
+    @classmethod
+    def of_arrays(cls, rows: Integers, freq: Integers | None = None) -> "DistinctItems":
+        """Take rows in an array, once each unless it is said how often."""
+        if freq is None:
+            freq = np.ones(len(rows), dtype=np.int64)
+        rated = rows.any(axis=1)
+        if not rated.all():
+            rows, freq = rows[rated], freq[rated]
+        q = rows.shape[1]
+        max_size = q * int(rows.max(initial=0))
+        if rows.size <= _FEW or max_size**2 * int(freq.sum()) >= 2**62:
+            return cls(list(map(tuple, rows.tolist())), freq.tolist(), q)
+        return cls(rows, freq, q)
+
+    @classmethod
+    def of_counts(cls, counts: Integers) -> "DistinctItems":
+        """Put equal rows of a table of counts together."""
+        # Takes counts (n_items, n_categories)
+        base = int(counts.max()) + 1
+        if counts.size > _FEW and base ** counts.shape[1] <= _MAX_KEYS:
+            powers = base ** np.arange(counts.shape[1], dtype=np.int64)
+            freq = np.bincount(counts @ powers)
+            keys = np.flatnonzero(freq)
+            return cls.of_arrays(keys[:, None] // powers % base, freq[keys])
+        return cls.of_arrays(counts)
+
+    @classmethod
+    def of_codes(cls, coded: CodedRatings) -> "DistinctItems":
+        """Count the raters of each category, and put equal items together."""
+        codes, q = coded.codes, coded.n_categories
+        n_items, n_raters = codes.shape
+        if codes.size <= _FEW:
+            return cls.of_counter(Counter(map(tuple, item_counts(coded).tolist())), q)
+        # An item is one number: Σ over its raters of (n_raters + 1) to the power code.
+        base = n_raters + 1
+        n_keys = base**q
+        if n_keys <= min(_MAX_KEYS, 16 * n_items):
+            counted = _blocks(n_items, lambda at: _item_keys(codes[at], base, q))
+            freq = _table_of_keys(counted, n_keys)
+            keys = np.flatnonzero(freq)
+            freq = freq[keys]
+        elif n_keys < 2**62 and n_items <= _MAX_SORTED:
+            keys, freq = np.unique(_item_keys(codes, base, q), return_counts=True)
+        else:
+            return cls.of_arrays(item_counts(coded))
+        powers = base ** np.arange(q, dtype=np.int64)
+        return cls.of_arrays(keys[:, None] // powers % base, freq)
+
+    def sums(self, v: Weights) -> SufficientStatistics:
+        """Add the items up."""
+        if v.numerators is None and self._sums is not None:
+            return self._sums
+        groups = sum_groups(self.rows, self.freq, v)
+        n_rated = n_usable = observed = 0
+        multiple = 1  # of n (n - 1) for every number of ratings n
+        for size, n_items, _, disagreement in groups:
+            n_rated += n_items
+            if size > 1:
+                pairs = size * (size - 1)
+                common = math.lcm(multiple, pairs)
+                observed *= common // multiple
+                observed += disagreement * (common // pairs)
+                n_usable, multiple = n_usable + n_items, common
+        if len(groups) == 1:
+            marginals, total = groups[0].totals, n_rated * groups[0].size
+        else:
+            common = math.lcm(*[group.size for group in groups])
+            weighed = [[t * (common // g.size) for t in g.totals] for g in groups]
+            marginals = list(map(sum, zip(*weighed, strict=True)))
+            total = n_rated * common
+        denominator = n_usable * multiple
+        sums = SufficientStatistics(
+            groups, n_rated, n_usable, observed, denominator, marginals, total
+        )
+        if v.numerators is None:
+            self._sums = sums
+        return sums
+
+    def arrays(self, v: Weights, exact: bool) -> ItemArrays:
+        """Return the items as floats, or as whole numbers and fractions."""
+        if v.numerators is None and self._arrays is not None and not exact:
+            return self._arrays
+        dtype = object if exact else np.float64
+        counts, freq = np.array(self.rows, dtype), np.array(self.freq, dtype)
+        sizes = counts.sum(axis=1)
+        # As a rule everybody rated everything.
+        size = sizes[0].item() if not exact and (sizes == sizes[0]).all() else sizes
+        disagreement = ((counts @ (v.fractions if exact else v.floats)) * counts).sum(
+            axis=1
+        )
+        arrays = ItemArrays(counts, freq, size, disagreement)
+        if v.numerators is None and not exact:
+            self._arrays = arrays
+        return arrays
+
+
+def sum_groups(
+    rows: list[tuple[int, ...]] | Integers, freq: list[int] | Integers, v: Weights
+) -> list[SizeGroup]:
+    """Add up items by their number of ratings."""
+    # Takes rows (n_distinct, n_categories), freq (n_distinct,)
+    groups = []
+    if isinstance(rows, list):
+        sizes = list(map(sum, rows))
+        for size in sorted(set(sizes)):
+            same = [i for i, n in enumerate(sizes) if n == size]
+            of, often = [rows[i] for i in same], [freq[i] for i in same]
+            totals = [sum(map(mul, often, column)) for column in zip(*of, strict=True)]
+            disagreement = sum(map(mul, often, [bilinear(v, row, row) for row in of]))
+            groups.append(SizeGroup(size, sum(often), totals, disagreement))
+        return groups
+    ratings = rows.sum(axis=1)
+    for size in np.unique(ratings).tolist():
+        same = ratings == size
+        of, often = rows[same], freq[same]
+        weighed = of * often[:, None]
+        n_items, totals = int(often.sum()), weighed.sum(axis=0).tolist()
+        if v.numerators is None:
+            disagreement = n_items * size * size - int((weighed * of).sum())
+        else:  # Σ_kl v_kl Σ_i n_ik n_il
+            products = (weighed.T @ of).tolist()
+            disagreement = sum(
+                sum(map(mul, *both))
+                for both in zip(v.numerators, products, strict=True)
+            )
+        groups.append(SizeGroup(size, n_items, totals, disagreement))
+    return groups
+
+
+def bilinear(v: Weights, x: Sequence[int], y: Sequence[int]) -> int:
+    """Return Σ_kl v_kl x_k y_l of whole numbers, times the denominator of v."""
+    if v.numerators is None:
+        agreeing: int = sum(map(mul, x, y))
+        return sum(x) * sum(y) - agreeing
+    return sum(
+        n * sum(map(mul, row, y)) for row, n in zip(v.numerators, x, strict=True) if n
+    )
 
 
 def item_counts(coded: CodedRatings) -> Integers:
@@ -102,43 +231,54 @@ def item_counts(coded: CodedRatings) -> Integers:
     if coded.codes.size * coded.n_categories <= _FEW_PLACES:
         width = coded.n_categories + 1  # code -1 is the first
         places = coded.codes + (width * np.arange(n_items)[:, None] + 1)
-        found = np.bincount(places.ravel(), minlength=width * n_items)
-        return np.asarray(found.reshape(n_items, width)[:, 1:], dtype=np.int64)
+        counted = np.bincount(places.ravel(), minlength=width * n_items)
+        return np.asarray(counted.reshape(n_items, width)[:, 1:], dtype=np.int64)
     if coded.n_categories <= n_raters:
         parts = [(coded.codes == k).sum(axis=1) for k in range(coded.n_categories)]
         return np.column_stack(parts)
     counts = np.zeros((n_items, coded.n_categories), dtype=np.int64)
     every = np.arange(n_items)
     for column in coded.codes.T:
-        given = column >= 0
-        counts[every[given], column[given]] += 1  # an item once a column
+        rated = column >= 0
+        counts[every[rated], column[rated]] += 1  # an item once a column
     return counts
 
 
-def coded_items(coded: CodedRatings) -> ItemTable:
-    """Count the raters of each category, equal items together."""
-    n_items, n_raters = coded.codes.shape
-    if coded.codes.size <= FEW:
-        return _few(coded.codes.tolist(), coded.n_categories)
-    # An item is one number: Σ over its raters of (n_raters + 1) to the power code.
-    base, q = n_raters + 1, coded.n_categories
-    n_keys = base**q
-    if n_keys <= min(_MOST_KEYS, 16 * n_items):
-        times = np.zeros(n_keys, dtype=np.int64)
-        for start in range(0, n_items, _BLOCK):
-            keys = _keys(coded.codes[start : start + _BLOCK], base, q)
-            times += np.bincount(keys, minlength=n_keys)
-        met = np.flatnonzero(times)
-        times = times[met]
-    elif n_keys < 2**62 and n_items <= _MOST_SORTED:
-        met, times = np.unique(_keys(coded.codes, base, q), return_counts=True)
+def distinct_rows(codes: Codes, n_categories: int) -> tuple[Integers, Integers]:
+    """Put equal rows of codes together: the rows, and how often each occurs."""
+    # codes (n_items, n_raters) -> (n_distinct, n_raters), (n_distinct,)
+    n_items, n_raters = codes.shape
+    base = n_categories + 1
+    n_keys = base**n_raters  # a row is one number with n_raters digits
+    if n_keys > 2**62:
+        rows, freq = np.unique(codes, axis=0, return_counts=True)
+        return rows.astype(np.int64), freq.astype(np.int64)
+    if n_items <= _FEW_ROWS:
+        return _sorted_rows(codes, _row_keys(codes, base))
+    if n_keys > min(_MAX_KEYS, 16 * n_items):
+        keys, freq = np.unique(_row_keys(codes, base), return_counts=True)
     else:
-        return item_table(item_counts(coded))
-    powers = base ** np.arange(q, dtype=np.int64)
-    return item_table(met[:, None] // powers % base, times)
+        counted = _blocks(n_items, lambda at: _row_keys(codes[at], base))
+        table = _table_of_keys(counted, n_keys)
+        keys = np.flatnonzero(table)
+        freq = table[keys]
+    digits = base ** np.arange(n_raters, dtype=np.int64)
+    return keys[:, None] // digits % base - 1, freq.astype(np.int64)
 
 
-def _keys(codes: Codes, base: int, n_categories: int) -> Integers:
+def _blocks(n_items: int, keys: Callable[[slice], Integers]) -> Iterable[Integers]:
+    return (keys(slice(at, at + _BLOCK)) for at in range(0, n_items, _BLOCK))
+
+
+def _table_of_keys(blocks: Iterable[Integers], n_keys: int) -> Integers:
+    # how often each key from 0 to n_keys - 1 occurs
+    freq = np.zeros(n_keys, dtype=np.int64)
+    for keys in blocks:
+        freq += np.bincount(keys, minlength=n_keys)
+    return freq
+
+
+def _item_keys(codes: Codes, base: int, n_categories: int) -> Integers:
     powers = base ** np.arange(n_categories + 1, dtype=np.int64)
     powers[-1] = 0  # code -1 is the last entry
     if base**n_categories < 2**31:
@@ -147,68 +287,6 @@ def _keys(codes: Codes, base: int, n_categories: int) -> Integers:
     for column in codes.T[1:]:
         keys += powers[column]
     return keys
-
-
-def _few(codes: list[list[int]], n_categories: int) -> FewItems:
-    found: dict[tuple[int, ...], int] = {}
-    for row in codes:
-        counts = [0] * (n_categories + 1)
-        for code in row:
-            counts[code] += 1  # code -1 is the last entry
-        item = tuple(counts[:n_categories])
-        found[item] = found.get(item, 0) + 1
-    return FewItems(list(found), list(found.values()), n_categories)
-
-
-def rows_alike(counts: Integers) -> ItemTable:
-    """Count equal rows of a table of counts together."""
-    # Takes counts (n_items, n_categories)
-    base = int(counts.max()) + 1
-    if counts.size > FEW and base ** counts.shape[1] <= _MOST_KEYS:
-        powers = base ** np.arange(counts.shape[1], dtype=np.int64)
-        times = np.bincount(counts @ powers)
-        met = np.flatnonzero(times)
-        return item_table(met[:, None] // powers % base, times[met])
-    return item_table(counts)
-
-
-_FEW_ROWS = 1 << 10  # items for which one call costs less than a few for each rater
-
-
-def distinct_rows(codes: Codes, n_categories: int) -> tuple[Integers, Integers]:
-    """Put equal rows of codes together."""
-    # Takes codes (n_items, n_raters)
-    n_items, n_raters = codes.shape
-    base = n_categories + 1
-    n_keys = base**n_raters  # a row is one number with n_raters digits
-    if n_keys > 2**62:
-        rows, times = np.unique(codes, axis=0, return_counts=True)
-        return rows.astype(np.int64), times.astype(np.int64)
-    if n_items <= _FEW_ROWS:
-        return _sorted(codes, _row_keys(codes, base))
-    if n_keys > min(_MOST_KEYS, 16 * n_items):
-        met, times = np.unique(_row_keys(codes, base), return_counts=True)
-    else:
-        counted = np.zeros(n_keys, dtype=np.int64)
-        for start in range(0, n_items, _BLOCK):
-            keys = _row_keys(codes[start : start + _BLOCK], base)
-            counted += np.bincount(keys, minlength=n_keys)
-        met = np.flatnonzero(counted)
-        times = counted[met]
-    digits = base ** np.arange(n_raters, dtype=np.int64)
-    return met[:, None] // digits % base - 1, times.astype(np.int64)
-
-
-def _sorted(codes: Codes, keys: Integers) -> tuple[Integers, Integers]:
-    # distinct rows in the order of their keys, by the last of those that are equal
-    order = keys.argsort()
-    ascending = keys[order]
-    is_last = np.ones(keys.size, dtype=bool)
-    np.not_equal(ascending[1:], ascending[:-1], out=is_last[:-1])
-    (last,) = is_last.nonzero()
-    times = last + 1
-    times[1:] -= times[:-1]  # numpy sees that they overlap
-    return codes[order[last]].astype(np.int64), times
 
 
 def _row_keys(codes: Codes, base: int) -> Integers:
@@ -224,51 +302,48 @@ def _row_keys(codes: Codes, base: int) -> Integers:
     return keys
 
 
+def _sorted_rows(codes: Codes, keys: Integers) -> tuple[Integers, Integers]:
+    # distinct rows in the order of their keys, by the last of those that are equal
+    order = keys.argsort()
+    ascending = keys[order]
+    is_last = np.ones(keys.size, dtype=bool)
+    np.not_equal(ascending[1:], ascending[:-1], out=is_last[:-1])
+    (last,) = is_last.nonzero()
+    freq = last + 1
+    freq[1:] -= freq[:-1]  # numpy sees that they overlap
+    return codes[order[last]].astype(np.int64), freq
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
 class CountedRatings:
     """Ratings with their distinct items counted, for several coefficients at once.
 
-    Parameters
+    Attributes
     ----------
     categories : tuple of str, int or float
         Declared categories in order.
-    items : FewItems or ManyItems
+    items : DistinctItems
         Distinct items with how often each occurs.
     n_raters : int
         Raters with at least one rating.
-    coded : CodedRatings, callable or None
-        The ratings, or a call that gives them; None where only counts are known, and
-        not who rated what.
-    declared : bool, optional
+    source : CodedRatings, callable or None
+        The ratings, or a call that gives them; None where only counts are known.
+    declared : bool
         False if nobody declared the categories, and they are the labels met.
-
-    Attributes
-    ----------
-    categories, items, n_raters, declared
-        As given.
     """
 
-    __slots__ = ("_coded", "categories", "declared", "items", "n_raters")
-
-    def __init__(
-        self,
-        categories: tuple[Label, ...],
-        items: ItemTable,
-        n_raters: int,
-        coded: CodedRatings | Callable[[], CodedRatings] | None,
-        declared: bool = True,
-    ) -> None:
-        self.categories = categories
-        self.items = items
-        self.n_raters = n_raters
-        self.declared = declared
-        self._coded = coded
+    categories: tuple[Label, ...]
+    items: DistinctItems
+    n_raters: int
+    source: CodedRatings | Callable[[], CodedRatings] | None
+    declared: bool = True
 
     @property
     def coded(self) -> CodedRatings | None:
         """The ratings; None where only counts are known, and not who rated what."""
-        if callable(self._coded):
-            self._coded = self._coded()
-        return self._coded
+        if callable(self.source):
+            self.source = self.source()
+        return self.source
 
 
 def count_ratings(
@@ -305,27 +380,44 @@ def count_ratings(
             check_scale(ratings.categories, categories)
         return ratings
     few = ratings
-    if type(ratings) is np.ndarray and ratings.ndim == 2 and ratings.size <= FEW:
+    if type(ratings) is np.ndarray and ratings.ndim == 2 and ratings.size <= _FEW:
         few = ratings.tolist()
-    if isinstance(few, list) and len(few) <= FEW:
-        rows, declared = label_rows(few, categories)
-        items = _count_complete(rows, declared)
-        if items is not None:
+    if isinstance(few, list) and len(few) <= _FEW:
+        rows, scale = label_rows(few, categories)
+        counter = _count_complete(rows, scale)
+        if counter is not None:
             return CountedRatings(
-                categories=declared,
+                categories=scale,
                 declared=categories is not None,
-                items=items,
+                items=DistinctItems(list(counter), list(counter.values()), len(scale)),
                 n_raters=len(rows[0]),
-                coded=partial(code_ratings, rows, categories),
+                source=partial(code_ratings, rows, categories),
             )
     coded = code_ratings(ratings, categories)
     return CountedRatings(
         categories=coded.categories,
         declared=coded.declared,
-        items=coded_items(coded),
+        items=DistinctItems.of_codes(coded),
         n_raters=coded.n_raters,
-        coded=coded,
+        source=coded,
     )
+
+
+def _count_complete(
+    rows: list[list[object]], scale: tuple[Label, ...]
+) -> dict[tuple[int, ...], int] | None:
+    # few labels of a scale of few, without codes; None if one is missing or no label
+    n_raters = len(rows[0])
+    if len(rows) * n_raters > _FEW or len(scale) > n_raters:
+        return None
+    freq: dict[tuple[int, ...], int] = {}
+    try:
+        for row in rows:
+            item = tuple(map(row.count, scale))
+            freq[item] = freq.get(item, 0) + 1
+    except (TypeError, ValueError):  # something that is neither equal nor unequal
+        return None
+    return freq if set(map(sum, freq)) == {n_raters} else None
 
 
 def count_table(
@@ -361,39 +453,18 @@ def count_table(
     """
     cells: list[list[int]] = check_table(table).tolist()
     q = len(cells)
-    found: dict[tuple[int, ...], int] = {}
-    for first in range(q):
-        for second in range(q):
-            if cells[first][second]:
-                row = [0] * q
-                row[first] += 1
-                row[second] += 1
-                item = tuple(row)
-                found[item] = found.get(item, 0) + cells[first][second]
+    freq: dict[tuple[int, ...], int] = {}
+    for first, row in enumerate(cells):
+        for second, n in enumerate(row):
+            if n:
+                item = tuple((k == first) + (k == second) for k in range(q))
+                freq[item] = freq.get(item, 0) + n
     return CountedRatings(
         categories=tuple(column_categories(categories, q)),
-        items=FewItems(list(found), list(found.values()), q),
-        n_raters=2 if found else 0,
-        coded=None,
+        items=DistinctItems.of_counter(freq, q),
+        n_raters=2 if freq else 0,
+        source=None,
     )
-
-
-def _count_complete(
-    rows: list[list[object]], declared: tuple[Label, ...]
-) -> FewItems | None:
-    # few labels of a scale of few, without codes; None if one is missing or no label
-    n_raters, q = len(rows[0]), len(declared)
-    if len(rows) * n_raters > FEW or q > n_raters:
-        return None
-    try:
-        counts = [tuple(map(row.count, declared)) for row in rows]
-    except (TypeError, ValueError):  # something that is neither equal nor unequal
-        return None
-    times: dict[tuple[int, ...], int] = {}
-    for item in counts:
-        times[item] = times.get(item, 0) + 1
-    items = FewItems(list(times), list(times.values()), q)
-    return items if items.sizes == [n_raters] else None
 
 
 def take_counts(
@@ -402,16 +473,61 @@ def take_counts(
     """Take a table of counts as counted ratings, equal rows together."""
     # Takes counts (n_items, n_categories)
     table = check_counts(counts)
+    n_columns = table.shape[1]
+    small = int(table.max()) * n_columns < 2**62  # else Python's integers
     return CountedRatings(
-        categories=tuple(column_categories(categories, table.shape[1])),
-        items=rows_alike(table),
-        n_raters=_largest_sum(table),
-        coded=None,
+        categories=tuple(column_categories(categories, n_columns)),
+        items=DistinctItems.of_counts(table),
+        n_raters=int((table if small else table.astype(object)).sum(axis=1).max()),
+        source=None,
     )
 
 
-def _largest_sum(table: Integers) -> int:
-    # in Python's integers where a row may sum to more than 64 bits hold
-    if int(table.max()) * table.shape[1] < 2**62:
-        return int(table.sum(axis=1).max())
-    return max(map(sum, table.tolist()))
+def check_counts(counts: ArrayLike) -> Integers:
+    """Check a table of counts."""
+    # counts (n_items, n_categories) -> (n_items, n_categories)
+    try:
+        table = np.asarray(counts)
+    except ValueError as error:
+        raise CountsError("counts: needs rows of the same length") from error
+    if table.ndim != 2 or 0 in table.shape:
+        raise CountsError(
+            "counts: needs a table (items, categories) of at least one of each, "
+            f"got shape {table.shape}"
+        )
+    if table.dtype.kind not in "iuf":
+        raise CountsError(f"counts: needs whole numbers, got {table.dtype}")
+    wrong = ~((table >= 0) & (table == np.floor(table)) & (table < 2**53))
+    if wrong.any():
+        row, column = np.argwhere(wrong)[0]
+        raise CountsError(
+            f"counts: row {row}, column {column}: needs a whole number of at least 0 "
+            f"and below 2^53, got {table[row, column]}"
+        )
+    return table.astype(np.int64)
+
+
+def check_table(table: ArrayLike) -> Integers:
+    """Check a contingency table of two raters."""
+    # table (n_categories, n_categories) -> (n_categories, n_categories)
+    checked = check_counts(table)
+    if checked.shape[0] != checked.shape[1]:
+        raise CountsError(
+            f"table: needs as many rows as columns, got shape {checked.shape}"
+        )
+    return checked
+
+
+def column_categories(
+    categories: Sequence[Label] | None, n_columns: int
+) -> Sequence[Label]:
+    """Return the declared scale of a table of counts, 1 to n_columns unless given."""
+    if categories is None:
+        return range(1, n_columns + 1)
+    declared = check_categories(categories)
+    if len(declared) != n_columns:
+        raise ParameterError(
+            f"categories: needs {n_columns}, one per column of counts, got "
+            f"{len(declared)}"
+        )
+    return declared

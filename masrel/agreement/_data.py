@@ -1,7 +1,6 @@
 """Ratings in any form, checked once, as integer codes."""
 
-import itertools
-from collections.abc import Iterable, Mapping, Sequence, Set
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, get_args
 
@@ -9,12 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.agreement._labels import (
+    NOTHING,
     Codes,
     Label,
     array_codes,
     check_categories,
     code_type,
     frame_codes,
+    label_rows,
     labels_met,
     lookup,
 )
@@ -122,7 +123,7 @@ def code_ratings(
             f"got {ratings.ndim} with shape {ratings.shape}"
         )
     if 0 in ratings.shape:
-        raise RatingsError(_NOTHING)
+        raise RatingsError(NOTHING)
     return _coded(*array_codes(ratings, declared), declared is not None)
 
 
@@ -155,52 +156,6 @@ def complete(coded: CodedRatings) -> CodedRatings:
     if whole.all():
         return coded
     return replace(coded, codes=coded.codes[whole])
-
-
-_NOTHING = "ratings: needs at least one item and one rater, got none"
-
-
-def _rows(ratings: Any) -> list[list[object]]:
-    # nested sequences -> n_items lists of n_raters labels
-    if not _is_row(ratings):
-        raise RatingsError(
-            f"ratings: needs an item × rater table, got {type(ratings).__name__}"
-        )
-    rows: list[list[object]] = []
-    for row in ratings:
-        if type(row) is not list and not _is_row(row):
-            raise RatingsError(
-                f"ratings: row {len(rows)} needs one rating per rater, got {row!r}"
-            )
-        rows.append(list(row))
-    if not rows or not rows[0]:
-        raise RatingsError(_NOTHING)
-    n_raters = len(rows[0])
-    for i, row in enumerate(rows):
-        if len(row) != n_raters:
-            raise RatingsError(
-                f"ratings: row {i} needs {n_raters} ratings as row 0 has, "
-                f"got {len(row)}"
-            )
-    return rows
-
-
-def _is_row(row: object) -> bool:
-    # a mapping would give its keys, a set its labels in any order
-    return isinstance(row, Iterable) and not isinstance(
-        row, str | bytes | Mapping | Set
-    )
-
-
-def label_rows(
-    ratings: object, categories: Sequence[Label] | None
-) -> tuple[list[list[object]], tuple[Label, ...]]:
-    """Check the shape of a nested sequence of labels and find its scale."""
-    # Takes ratings (n_items, n_raters)
-    rows = _rows(ratings)
-    if categories is None:
-        return rows, labels_met(itertools.chain.from_iterable(rows))
-    return rows, check_categories(categories)
 
 
 def _row_codes(

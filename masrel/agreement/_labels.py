@@ -1,6 +1,7 @@
 """Labels of ratings to codes, from lists, arrays and frames."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+import itertools
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,9 @@ Label = str | int | float
 
 Codes = NDArray[np.signedinteger[Any]]
 """Codes in the smallest integers that hold them."""
+
+
+_PLAIN = ({str}, {int})
 
 
 def is_missing(label: object) -> bool:
@@ -55,7 +59,7 @@ def labels_met(labels: Iterable[object]) -> tuple[Label, ...]:
         raise RatingsError(
             f"ratings: labels need to be text or numbers ({error})"
         ) from error
-    if set(map(type, met)) != {str}:  # text alone needs no more care
+    if set(map(type, met)) not in _PLAIN:  # those need no more care
         met = {label for label in met if not is_missing(label)}
         _one_kind(met, "ratings")
     return tuple(sorted(met))
@@ -96,6 +100,59 @@ def lookup(
             f"ratings: row {row}, column {column!r}: needs one of {known} or a missing "
             f"value, got {label!r}"
         ) from error
+
+
+NOTHING = "ratings: needs at least one item and one rater, got none"
+
+
+def label_rows(
+    ratings: object, categories: Sequence[Label] | None
+) -> tuple[list[list[object]], tuple[Label, ...]]:
+    """Check the shape of a nested sequence of labels, and return its rows and scale."""
+    # Takes ratings (n_items, n_raters)
+    if type(ratings) is list and set(map(type, ratings)) == {list}:
+        rows = list(map(list, ratings))
+    else:
+        rows = _rows(ratings)
+    if len(widths := set(map(len, rows))) != 1 or 0 in widths:
+        _refuse_shape(rows)
+    if categories is None:
+        return rows, labels_met(itertools.chain.from_iterable(rows))
+    return rows, check_categories(categories)
+
+
+def _rows(ratings: Any) -> list[list[object]]:
+    # nested sequences -> n_items lists of labels
+    if not _is_row(ratings):
+        raise RatingsError(
+            f"ratings: needs an item × rater table, got {type(ratings).__name__}"
+        )
+    rows: list[list[object]] = []
+    for row in ratings:
+        if not _is_row(row):
+            raise RatingsError(
+                f"ratings: row {len(rows)} needs one rating per rater, got {row!r}"
+            )
+        rows.append(list(row))
+    return rows
+
+
+def _is_row(row: object) -> bool:
+    # a mapping would give its keys, a set its labels in any order
+    return isinstance(row, Iterable) and not isinstance(
+        row, str | bytes | Mapping | Set
+    )
+
+
+def _refuse_shape(rows: list[list[object]]) -> None:
+    if not rows or not rows[0]:
+        raise RatingsError(NOTHING)
+    for i, row in enumerate(rows):
+        if len(row) != len(rows[0]):
+            raise RatingsError(
+                f"ratings: row {i} needs {len(rows[0])} ratings as row 0 has, "
+                f"got {len(row)}"
+            )
 
 
 Array = NDArray[Any]

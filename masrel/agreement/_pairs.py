@@ -3,78 +3,110 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from masrel.agreement._kernel import NO_CHANCE, NO_PAIR, undefined
+from masrel.agreement._counts import bilinear
+from masrel.agreement._data import CodedRatings
+from masrel.agreement._kernel import (
+    NO_CHANCE,
+    NO_PAIR,
+    Array,
+    Floats,
+    Integers,
+    Kernel,
+    divide,
+    undefined,
+)
 from masrel.agreement._labels import Codes
 from masrel.agreement.weights import Weights
+from masrel.errors import RatingsError
 from masrel.estimates import Estimate
 
-Table = NDArray[np.int64]
+
+def two_raters(coded: CodedRatings, title: str) -> CodedRatings:
+    """Return ratings that are of two raters."""
+    n_columns = coded.codes.shape[1]
+    if n_columns != 2:
+        raise RatingsError(f"{title} needs the ratings of two raters, got {n_columns}")
+    return coded
 
 
-def pair_table(codes: Codes, n_categories: int) -> Table:
+def pair_table(codes: Codes, n_categories: int) -> Integers:
     """Count the pairs of two columns of codes."""
     # codes (n_items, 2) -> (n_categories, n_categories)
     side = n_categories + 1
     # Missing, -1, becomes the last row and column, which is cut off.
     flat = codes[:, 0].astype(np.int32) * side + codes[:, 1] + side + 1
-    times = np.bincount(flat, minlength=side * side).reshape(side, side)
-    return times[1:, 1:].astype(np.int64)
+    freq = np.bincount(flat, minlength=side * side).reshape(side, side)
+    return freq[1:, 1:].astype(np.int64)
 
 
 @dataclass(frozen=True, slots=True)
 class PairSums:
     """What kappa of a table of pairs is made of, in integers."""
 
-    # With t the table and n its sum, D_o = `above` / (n · w) and D_e = `below` / (n² ·
-    # w), where w is the denominator of the weights.
+    # With t the table, n its sum and w the denominator of the weights,
+    # D_o = `observed` / (n w) and D_e = `expected` / (n² w).
 
-    cells: list[list[int]]
     n: int
-    above: int  # Σ_kl v_kl t_kl
-    below: int  # Σ_kl v_kl t_k. t_.l
-    to_second: list[int]  # Σ_l v_kl t_.l
-    to_first: list[int]  # Σ_k v_kl t_k.
+    observed: int  # Σ_kl v_kl t_kl
+    expected: int  # Σ_kl v_kl t_k. t_.l
 
     @classmethod
-    def of(cls, table: Table, v: Weights) -> "PairSums":
+    def of(cls, table: Integers, v: Weights) -> "PairSums":
         """Sum a table of pairs."""
         # Takes table (n_categories, n_categories)
         cells: list[list[int]] = table.tolist()
-        first = [sum(row) for row in cells]
-        second = [sum(column) for column in zip(*cells, strict=True)]
+        first = list(map(sum, cells))
+        second = list(map(sum, zip(*cells, strict=True)))
         n = sum(first)
-        to_second = v.products(second)
         if v.numerators is None:
-            above = n - sum([cells[k][k] for k in range(len(cells))])
+            observed = n - sum([cells[k][k] for k in range(len(cells))])
         else:
-            above = sum(
-                [
-                    sum([x * t for x, t in zip(of_v, row, strict=True) if t])
-                    for of_v, row in zip(v.numerators, cells, strict=True)
-                ]
+            observed = sum(
+                x * t
+                for of_v, row in zip(v.numerators, cells, strict=True)
+                for x, t in zip(of_v, row, strict=True)
             )
-        below = sum([t * vt for t, vt in zip(first, to_second, strict=True)])
-        return cls(cells, n, above, below, to_second, v.products(first))
-
-    def influence(self, k: int, l: int, v: Weights) -> int:  # noqa: E741 - as in the formula
-        """Return the influence of an item in cell (k, l), times `below`² / n."""
-        # An item moves D_o by v_kl - D_o, and D_e by Σ_m (v_km p_.m + v_ml p_m.) - 2
-        # D_e.
-        if v.numerators is None:
-            own = 0 if k == l else 1
-        else:
-            own = v.numerators[k][l]
-        margins = self.to_second[k] + self.to_first[l]
-        raised = self.n * self.above * margins
-        return raised - self.n * own * self.below - self.above * self.below
+        return cls(n, observed, bilinear(v, first, second))
 
 
-def kappa_of_sums(
-    found: PairSums,
+class PairSlopes(NamedTuple):
+    """What one more item in a cell of a table of pairs moves, times the table's sum."""
+
+    d_o: Any
+    d_e: Any
+    # (n_categories + 1, n_categories + 1): of D_o and D_e; the last row and column are
+    # those of missing ratings, -1
+    observed: Array
+    expected: Array
+
+    @classmethod
+    def of(cls, table: Integers, v: Weights, exact: bool) -> "PairSlopes":
+        """Return the slopes at a table that is not empty, in floats or fractions."""
+        # Takes table (n_categories, n_categories)
+        freq = table.astype(object if exact else np.float64)
+        p = freq * (Fraction(1, freq.sum()) if exact else 1.0 / freq.sum())
+        matrix, q = v.fractions if exact else v.floats, len(table)
+        to_second, to_first = matrix @ p.sum(axis=0), p.sum(axis=1) @ matrix
+        d_o, d_e = (matrix * p).sum(), p.sum(axis=1) @ to_second
+        observed, expected = np.zeros((2, q + 1, q + 1), dtype=freq.dtype)
+        observed[:q, :q] = matrix - d_o
+        # D_e = Σ_kl v_kl p_k. p_.l is bilinear: Σ_m (v_km p_.m + v_ml p_m.) - 2 D_e
+        expected[:q, :q] = to_second[:, None] + to_first - 2 * d_e
+        return cls(d_o, d_e, observed, expected)
+
+    def influence(self) -> Array:
+        """Return the influence on κ = 1 - D_o/D_e of an item in each cell."""
+        moved = self.d_o / self.d_e * self.expected - self.observed
+        return np.asarray(moved / self.d_e)
+
+
+def estimate_pairs(
+    sums: PairSums,
     v: Weights,
     name: str,
     title: str,
@@ -84,20 +116,20 @@ def kappa_of_sums(
     n_raters: int,
 ) -> Estimate:
     """Make kappa of a table of pairs, 1 - D_o / D_e, with one division."""
-    n, reason = found.n, None
+    n, reason = sums.n, None
     if n == 0:
         reason = undefined(title, NO_PAIR)
     elif v.reason is not None:
         reason = undefined(title, v.reason)
-    elif found.below == 0:
+    elif sums.expected == 0:
         reason = undefined(title, NO_CHANCE)
     value = observed = chance = math.nan
     if n and v.reason is None:
         w = v.denominator
-        observed = (n * w - found.above) / (n * w)
-        chance = (n * n * w - found.below) / (n * n * w)
+        observed = (n * w - sums.observed) / (n * w)
+        chance = (n * n * w - sums.expected) / (n * n * w)
     if reason is None:
-        value = (found.below - n * found.above) / found.below
+        value = (sums.expected - n * sums.observed) / sums.expected
     return Estimate(
         coefficient=name,
         weights=v.name,
@@ -110,3 +142,34 @@ def kappa_of_sums(
         n_categories=v.n_categories,
         reason=reason,
     )
+
+
+def _features(coded: CodedRatings, v: Floats) -> Floats:
+    # (n_items, 2 + 2 n_categories): disagreement, presence, both categories; zeros
+    # where a rating is missing
+    codes, ranks = coded.codes, np.arange(len(v))
+    both = np.min(codes, axis=1) >= 0
+    disagreement = np.where(both, v[codes[:, 0], codes[:, 1]], 0.0)
+    first, second = (both[:, None] & (codes[:, [r]] == ranks) for r in (0, 1))
+    return np.column_stack([disagreement, both, first, second]).astype(np.float64)
+
+
+def _value(sums: Floats, v: Floats) -> Floats:
+    # sums (..., 2 + 2 n_categories) -> (...); D_o and D_e times n²
+    q = len(v)
+    first, second = sums[..., 2 : 2 + q], sums[..., 2 + q :]
+    expected = ((first @ v) * second).sum(axis=-1)
+    return 1.0 - divide(sums[..., 1] * sums[..., 0], expected)
+
+
+PAIR_KERNEL = Kernel(features=_features, value=_value)
+"""Cohen's kappa of two columns of ratings."""
+
+
+def pair_features(coded: CodedRatings, pairs: list[Codes], v: Floats) -> list[Floats]:
+    """Return the features of several pairs of columns of ratings."""
+    # each (n_items, 2 + 2 n_categories)
+    return [
+        PAIR_KERNEL.features(CodedRatings(codes=pair, categories=coded.categories), v)
+        for pair in pairs
+    ]

@@ -1,39 +1,64 @@
-"""Coefficients of unnamed raters: 1 - D_o / D_e, exact, with its delta-method error.
+"""Coefficients of unnamed raters: 1 - D_o / D_e, and the error and kernel of each.
 
 D_o is the observed disagreement of two raters of an item, averaged over items, and D_e
-what chance would give. Coefficients differ in D_e alone.
+what chance would give. Coefficients differ in D_e alone: it is `Chance`, in integers
+for the value and in floats for errors and intervals.
 """
 
 import math
 from collections.abc import Callable, Sequence
+from fractions import Fraction
 from functools import partial
-from typing import NamedTuple
+from operator import truediv
+from typing import Any, NamedTuple
 
+import numpy as np
 from numpy.typing import ArrayLike
 
-from masrel.agreement._counts import ItemTable, count_ratings, take_counts
+from masrel.agreement._counts import (
+    DistinctItems,
+    SufficientStatistics,
+    bilinear,
+    count_ratings,
+    item_counts,
+)
+from masrel.agreement._data import CodedRatings
 from masrel.agreement._kernel import (
     NO_CHANCE,
     NO_PAIR,
+    VARIANCES,
+    Floats,
+    Influence,
+    Integers,
+    Kernel,
+    RaterSums,
     Variance,
     check_population,
     check_variance,
+    divide,
     standard_error,
     undefined,
+    weighted_disagreement,
 )
-from masrel.agreement._labels import Label
-from masrel.agreement.influence import (
-    Expected,
-    Slopes,
-    as_irrcac,
-    pooled_influence,
-    rounded_influence,
+from masrel.agreement._labels import Codes, Label
+from masrel.agreement.weights import (
+    WeightName,
+    Weights,
+    declared_weights,
+    identity_weights,
+    named_weights,
 )
-from masrel.agreement.tally import Observed, Shares, Tally
-from masrel.agreement.weights import WeightName, Weights, declared_weights
 from masrel.estimates import Estimate
 
-_LONG = 500  # bits of a multiple of all numbers of ratings that integers are slow with
+_BLOCK = 1 << 14  # items whose categories are spread out at once
+
+
+class Chance(NamedTuple):
+    """Chance disagreement, D_e = (constant + factor · Σ_kl v_kl p_k p_l) / divisor."""
+
+    constant: Any
+    factor: Any
+    divisor: Any
 
 
 class PooledCoefficient(NamedTuple):
@@ -42,124 +67,199 @@ class PooledCoefficient(NamedTuple):
     # name, title: in code and for a reader
     name: str
     title: str
-    # shares and weights to the disagreement by chance
-    expected: Callable[[Shares, Weights], Expected]
-    # shares and weights to its slopes in the shares; None where no share matters
-    slopes: Callable[[Shares, Weights], Slopes] | None = None
+    # the number of categories q, T = Σ_kl v_kl times the denominator w of the weights,
+    # and w, to D_e: in integers, or in floats with w = 1
+    chance: Callable[[int, Any, Any], Chance]
+    # whether chance counts any two categories as different, whatever the weights
+    nominal: bool = False
 
 
-class Options(NamedTuple):
-    """The options of a public function, as they were given."""
-
-    categories: Sequence[Label] | None = None
-    weights: "WeightName | ArrayLike" = "identity"
-    variance: Variance = "delta"
-    population: int | None = None
-
-
-def estimate_ratings(
-    coefficient: PooledCoefficient, ratings: object, options: Options
-) -> Estimate:
-    """Check ratings and options, and estimate the coefficient."""
-    # Takes ratings (n_items, n_raters)
-    counted = count_ratings(ratings, options.categories)
-    weights = declared_weights(
-        options.weights, counted.categories, declared=counted.declared
-    )
-    return pooled_estimate(
-        coefficient, counted.items, counted.n_raters, weights, options
-    )
-
-
-def estimate_counts(
-    coefficient: PooledCoefficient, counts: ArrayLike, options: Options
-) -> Estimate:
-    """Check counts and options, and estimate the coefficient."""
-    # Takes counts (n_items, n_categories)
-    counted = take_counts(counts, options.categories)
-    return estimate_ratings(coefficient, counted, options._replace(categories=None))
-
-
-def pooled_estimate(
+def estimate_pooled(
     coefficient: PooledCoefficient,
-    items: ItemTable,
-    n_raters: int,
-    weights: Weights,
-    options: Options,
+    ratings: object,
+    categories: Sequence[Label] | None,
+    weights: "WeightName | ArrayLike",
+    variance: Variance = "delta",
+    population: int | None = None,
 ) -> Estimate:
-    """Estimate 1 - D_o / D_e with one division of integers."""
-    check_variance(options.variance)
-    tally = items.tally(weights)
-    check_population(options.population, tally.n_rated)
-    observed, reason = tally.observed, None
+    """Check ratings and options, and estimate 1 - D_o / D_e with one division."""
+    counted = count_ratings(ratings, categories)
+    if isinstance(weights, str):  # made once for a scale
+        v = named_weights(weights, counted.categories, counted.declared)
+    else:
+        v = declared_weights(weights, counted.categories, declared=counted.declared)
+    sums = counted.items.sums(v)
+    if variance not in VARIANCES or population is not None:
+        check_variance(variance)
+        check_population(population, sums.n_rated)
     value = p_o = p_e = math.nan
     error: float | Callable[[], float] = math.nan
-    if observed is None:
+    reason = None
+    if sums.n_usable == 0:
         reason = undefined(coefficient.title, NO_PAIR)
-    elif weights.reason is not None:
-        reason = undefined(coefficient.title, weights.reason)
+    elif v.reason is not None:
+        reason = undefined(coefficient.title, v.reason)
     else:
-        chance = coefficient.expected(tally.shares, weights)
-        p_o, p_e = _agreements(observed, chance)
-        if chance.numerator == 0:
+        d_o, over_o = sums.observed, sums.denominator * v.denominator
+        d_e, over_e = _expected(coefficient, sums, v)
+        p_o, p_e = (over_o - d_o) / over_o, (over_e - d_e) / over_e
+        if d_e == 0:
             reason = undefined(coefficient.title, NO_CHANCE)
         else:
-            value = _value(observed, chance)
-            scene = _Scene(coefficient, items, weights, tally, observed, chance)
-            error = partial(_error, scene, options)
+            value = (d_e * over_o - d_o * over_e) / (d_e * over_o)
+            problem = _Problem(
+                coefficient, counted.items, v, (d_e, over_e), variance == "irrcac"
+            )
+            influence = partial(_influence, problem)
+            error = partial(standard_error, influence, sums.n_rated, population)
     return Estimate(
         coefficient=coefficient.name,
-        weights=weights.name,
+        weights=v.name,
         value=value,
         standard_error=error,
         observed=p_o,
         chance=p_e,
-        n_items=tally.n_rated,
-        n_raters=n_raters,
-        n_categories=items.n_categories,
+        n_items=sums.n_rated,
+        n_raters=counted.n_raters,
+        n_categories=counted.items.n_categories,
         reason=reason,
     )
 
 
-def _agreements(observed: Observed, chance: Expected) -> tuple[float, float]:
-    # 1 - D_o and 1 - D_e
-    d_o, over_o = observed.numerator, observed.denominator
-    d_e, over_e = chance.numerator, chance.denominator
-    return (over_o - d_o) / over_o, (over_e - d_e) / over_e
+def _expected(
+    coefficient: PooledCoefficient, sums: SufficientStatistics, v: Weights
+) -> tuple[int, int]:
+    # D_e as numerator and denominator
+    p, total = sums.marginals, sums.total
+    constant, factor, divisor = coefficient.chance(len(p), v.total, v.denominator)
+    if factor == 0:
+        return constant, divisor
+    if coefficient.nominal:
+        v = identity_weights(len(p))
+    scale = total * total * v.denominator
+    return constant * scale + factor * bilinear(v, p, p), divisor * scale
 
 
-def _value(observed: Observed, chance: Expected) -> float:
-    # 1 - D_o / D_e, in one division
-    apart = observed.numerator * chance.denominator
-    by_chance = chance.numerator * observed.denominator
-    return (by_chance - apart) / by_chance
-
-
-class _Scene(NamedTuple):
+class _Problem(NamedTuple):
     # what a standard error is computed from
     coefficient: PooledCoefficient
-    items: ItemTable
-    weights: Weights
-    tally: Tally
-    observed: Observed
-    chance: Expected
+    items: DistinctItems
+    v: Weights
+    expected: tuple[int, int]  # D_e as numerator and denominator
+    irrcac: bool
 
 
-def _error(scene: _Scene, options: Options) -> float:
-    coefficient, items, weights, tally, observed, chance = scene
-    if tally.n_rated < 2:
-        return math.nan
-    slopes = Slopes()
-    if coefficient.slopes is not None:
-        slopes = coefficient.slopes(tally.shares, weights)
-    theirs, n = options.variance == "irrcac", tally.n_rated
-    if observed.multiple.bit_length() > _LONG:
-        nearly = rounded_influence(tally, observed, chance, slopes, theirs)
-        rounded = items.rounded_square_sum(weights, nearly)
-        if rounded is not None:
-            return standard_error(rounded, 1, n, options.population)
-    influence = pooled_influence(tally, observed, chance, slopes)
-    if theirs:
-        influence = as_irrcac(influence, tally, observed, chance)
-    squares, over = items.square_sum(weights, influence)
-    return standard_error(squares, over, n, options.population)
+def _influence(problem: _Problem, exact: bool) -> Influence:
+    # With d_i an item's disagreement, s_i = 1 if it has a pair, x_ik its shares and
+    # h_k = ∂D_e/∂p_k,
+    #   D_e u_i = (D_o/D_e) Σ_k h_k (x_ik - p_k) - (n/n') (d_i - D_o s_i).
+    coefficient, items, v, (d_e, over_e), irrcac = problem
+    divide: Callable[[int, int], Any] = Fraction if exact else truediv
+    sums, (counts, freq, size, disagreement) = items.sums(v), items.arrays(v, exact)
+    rate, inverse = divide(sums.n_rated, sums.n_usable), divide(over_e, d_e)
+    ratio = divide(sums.observed * over_e, d_e * sums.denominator * v.denominator)
+    pairs = size * (size - 1)
+    if sums.n_usable < sums.n_rated:  # a single rating has no disagreement
+        pairs = np.maximum(pairs, 1)
+    terms = disagreement * (-rate * inverse / pairs)
+    u = terms
+    if sums.n_usable < sums.n_rated:
+        # irrCAC takes u_i + κ (s_i n/n' - 1): an item without a pair counts as one
+        # with a κ of 0.
+        u = u + (size > 1) * (rate * (1 if irrcac else ratio))
+    q = len(sums.marginals)
+    _, factor, divisor = coefficient.chance(q, v.total, v.denominator)
+    if factor:
+        p = np.array([divide(part, sums.total) for part in sums.marginals])
+        of_chance = identity_weights(q) if coefficient.nominal else v
+        matrix = of_chance.fractions if exact else of_chance.floats
+        slopes = matrix @ p * (2 * divide(factor, divisor) * ratio * inverse)
+        u = u + counts @ slopes / size
+    return Influence(u - freq @ u / sums.n_rated, freq, terms)
+
+
+def _features(counts: Floats, v: Floats) -> Floats:
+    # (n_items, n_categories) -> (n_items, 3 + n_categories): disagreement of two of
+    # its ratings, whether it has two, whether it has one, shares of the categories
+    n = counts.sum(axis=1)
+    features = np.empty((len(counts), 3 + counts.shape[1]))
+    # a single rating, or none, has no disagreement
+    features[:, 0] = weighted_disagreement(counts, v) / np.maximum(n * (n - 1), 1.0)
+    features[:, 1] = n > 1
+    features[:, 2] = n > 0
+    features[:, 3:] = counts / np.maximum(n, 1.0)[:, None]
+    return features
+
+
+def pooled_kernel(coefficient: PooledCoefficient) -> Kernel:
+    """Return a coefficient of unnamed raters as a function of sums over items."""
+
+    def features(coded: CodedRatings, v: Floats) -> Floats:
+        return _features(item_counts(coded).astype(np.float64), v)
+
+    def value(sums: Floats, v: Floats) -> Floats:
+        observed = divide(sums[..., 0], sums[..., 1])
+        constant, factor, divisor = coefficient.chance(len(v), v.sum(), 1.0)
+        if factor == 0:
+            return 1.0 - divide(observed, np.asarray(constant / divisor))
+        # One category has a share of exactly 1, and so a disagreement of exactly 0.
+        shares = divide(sums[..., 3:], sums[..., 2:3])
+        if coefficient.nominal:
+            between = (shares * (1.0 - shares)).sum(axis=-1)
+        else:
+            between = weighted_disagreement(shares, v)
+        expected = constant / divisor + factor / divisor * between
+        return 1.0 - divide(observed, expected)
+
+    return Kernel(features=features, value=value, rater_sums=_resampled_raters)
+
+
+def _resampled_raters(coded: CodedRatings, freq: Integers, v: Floats) -> RaterSums:
+    # Items that the same raters rated are summed once, pair of raters by pair: Σ_i v of
+    # their categories is a quadratic form in how often each rater is taken.
+    patterns, kind = np.unique(coded.codes >= 0, axis=0, return_inverse=True)
+    groups = [
+        (rated.astype(np.float64), *_rater_pairs(coded.codes[same], freq[same], v))
+        for rated, same in zip(
+            patterns, kind.ravel() == np.arange(len(patterns))[:, None], strict=True
+        )
+    ]
+
+    def sums(taken: Floats) -> Floats:
+        # (..., n_raters) -> (..., 3 + n_categories)
+        total = np.zeros((*taken.shape[:-1], 3 + len(v)), dtype=taken.dtype)
+        for rated, n_items, disagreement, chosen in groups:
+            of = taken * rated
+            n = of.sum(axis=-1)
+            # Pairs of a rater with its own copies always agree: they are left out.
+            pairs = n * n - (of * of).sum(axis=-1)
+            total[..., 0] += _over((of @ disagreement * of).sum(axis=-1), pairs)
+            total[..., 1] += n_items * (pairs != 0)
+            total[..., 2] += n_items * (n != 0)  # raters who rated none add nothing
+            total[..., 3:] += _over(of @ chosen, n[..., None])
+        return total
+
+    return sums
+
+
+def _rater_pairs(codes: Codes, freq: Integers, v: Floats) -> tuple[int, Floats, Floats]:
+    # how many items; Σ_i v of two raters' categories, (n_raters, n_raters); how often
+    # each rater chose each category, (n_raters, n_categories)
+    n_items, n_raters = codes.shape
+    side = (n_raters, len(v))
+    both = np.zeros(side * 2)
+    chosen = np.zeros(side)
+    for start in range(0, n_items, _BLOCK):
+        block = slice(start, start + _BLOCK)
+        each = (codes[block, :, None] == np.arange(len(v))).astype(np.float64)
+        weighed = each * freq[block, None, None]
+        flat = weighed.reshape(len(each), -1).T @ each.reshape(len(each), -1)
+        both += flat.reshape(side * 2)
+        chosen += weighed.sum(axis=0)
+    return int(freq.sum()), np.einsum("rksl,kl->rs", both, v), chosen
+
+
+def _over(numerator: Floats, denominator: Floats) -> Floats:
+    # 0 where there is nothing to divide by
+    empty = denominator == 0
+    return np.where(empty, 0.0, numerator) / np.where(empty, 1.0, denominator)

@@ -1,28 +1,21 @@
 """Brennan and Prediger's coefficient: chance picks every category alike."""
 
 from collections.abc import Sequence
+from typing import Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from masrel.agreement._kernel import Floats, Variance, pooled_kernel
+from masrel.agreement._counts import take_counts
+from masrel.agreement._kernel import Variance
 from masrel.agreement._labels import Label
 from masrel.agreement._pooled import (
-    Options,
+    Chance,
     PooledCoefficient,
-    estimate_counts,
-    estimate_ratings,
+    estimate_pooled,
+    pooled_kernel,
 )
-from masrel.agreement.influence import Expected
-from masrel.agreement.tally import Shares
-from masrel.agreement.weights import WeightName, Weights
+from masrel.agreement.weights import WeightName
 from masrel.estimates import Estimate
-
-__all__ = [
-    "BRENNAN_PREDIGER_KERNEL",
-    "brennan_prediger",
-    "brennan_prediger_from_counts",
-]
 
 
 def brennan_prediger(
@@ -83,8 +76,9 @@ def brennan_prediger(
     >>> round(brennan_prediger([["a", "a"], ["b", "b"], ["a", "b"]]).value, 3)
     0.333
     """
-    options = Options(categories, weights, variance, population)
-    return estimate_ratings(_COEFFICIENT, ratings, options)
+    return estimate_pooled(
+        _COEFFICIENT, ratings, categories, weights, variance, population
+    )
 
 
 def brennan_prediger_from_counts(
@@ -126,22 +120,16 @@ def brennan_prediger_from_counts(
     >>> round(brennan_prediger_from_counts([[2, 0], [2, 0], [1, 1]]).value, 3)
     0.333
     """
-    options = Options(categories, weights, variance, population)
-    return estimate_counts(_COEFFICIENT, counts, options)
+    counted = take_counts(counts, categories)
+    return estimate_pooled(_COEFFICIENT, counted, None, weights, variance, population)
 
 
-def _expected(shares: Shares, weights: Weights) -> Expected:  # noqa: ARG001 - no share matters
-    # 1 - Σ_kl w_kl / q² = Σ_kl v_kl / q²
-    return Expected(weights.total(), weights.n_categories**2 * weights.denominator)
+def _chance(q: int, total: Any, w: Any) -> Chance:
+    return Chance(total, 0, q * q * w)  # 1 - Σ_kl w_kl / q² = Σ_kl v_kl / q²
 
 
 _COEFFICIENT = PooledCoefficient(
-    "brennan_prediger", "the Brennan-Prediger coefficient", _expected
+    "brennan_prediger", "the Brennan-Prediger coefficient", _chance
 )
 
-
-def _in_floats(shares: Floats, v: Floats) -> Floats:  # noqa: ARG001 - no share matters
-    return np.asarray(v.mean())
-
-
-BRENNAN_PREDIGER_KERNEL = pooled_kernel(_in_floats)
+BRENNAN_PREDIGER_KERNEL = pooled_kernel(_COEFFICIENT)

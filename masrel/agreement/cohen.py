@@ -3,25 +3,27 @@
 from collections.abc import Sequence
 from functools import partial
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from masrel.agreement._counts import check_table, column_categories
-from masrel.agreement._data import CodedRatings, code_ratings
+from masrel.agreement._data import code_ratings
 from masrel.agreement._kernel import (
-    Floats,
-    Kernel,
+    Influence,
+    Integers,
     check_population,
-    divide,
     standard_error,
 )
 from masrel.agreement._labels import Label
-from masrel.agreement._pairs import PairSums, Table, kappa_of_sums, pair_table
+from masrel.agreement._pairs import (
+    PAIR_KERNEL,
+    PairSlopes,
+    PairSums,
+    estimate_pairs,
+    pair_table,
+    two_raters,
+)
 from masrel.agreement.weights import WeightName, Weights, declared_weights
-from masrel.errors import RatingsError
 from masrel.estimates import Estimate
-
-__all__ = ["COHEN_KERNEL", "cohen_kappa", "cohen_kappa_from_table", "two_raters"]
 
 
 def cohen_kappa(
@@ -129,55 +131,27 @@ def cohen_kappa_from_table(
     return _estimate(checked, declared_weights(weights, labels), population)
 
 
-def two_raters(coded: CodedRatings, title: str) -> CodedRatings:
-    """Return ratings that are of two raters."""
-    n_columns = coded.codes.shape[1]
-    if n_columns != 2:
-        raise RatingsError(f"{title} needs the ratings of two raters, got {n_columns}")
-    return coded
-
-
-def _estimate(table: Table, v: Weights, population: int | None) -> Estimate:
+def _estimate(table: Integers, v: Weights, population: int | None) -> Estimate:
     # shape of table: (n_categories, n_categories)
-    found = PairSums.of(table, v)
-    check_population(population, found.n)
-    return kappa_of_sums(
-        found,
+    sums = PairSums.of(table, v)
+    check_population(population, sums.n)
+    return estimate_pairs(
+        sums,
         v,
         "cohen_kappa",
         "Cohen's kappa",
-        partial(_error, found, v, population),
-        n_items=found.n,
-        n_raters=2 if found.n else 0,
+        partial(standard_error, partial(_influence, table, v), sums.n, population),
+        n_items=sums.n,
+        n_raters=2 if sums.n else 0,
     )
 
 
-def _error(found: PairSums, v: Weights, population: int | None) -> float:
-    squares = sum(
-        t * found.influence(k, l, v) ** 2
-        for k, row in enumerate(found.cells)
-        for l, t in enumerate(row)  # noqa: E741 - k, l as in the formula
-        if t
-    )
-    return standard_error(squares * found.n**2, found.below**4, found.n, population)
+def _influence(table: Integers, v: Weights, exact: bool) -> Influence:
+    # of the cells of the table
+    slopes, q = PairSlopes.of(table, v, exact), len(table)
+    u, terms = slopes.influence()[:q, :q], slopes.observed[:q, :q] / slopes.d_e
+    freq = table.astype(u.dtype)
+    return Influence(u.ravel(), freq.ravel(), terms.ravel())
 
 
-def _features(coded: CodedRatings, v: Floats) -> Floats:
-    # (n_items, 2 + 2 n_categories): disagreement, presence, both categories; zeros
-    # where a rating is missing
-    codes, ranks = coded.codes, np.arange(len(v))
-    both = np.min(codes, axis=1) >= 0
-    apart = np.where(both, v[codes[:, 0], codes[:, 1]], 0.0)
-    first, second = (both[:, None] & (codes[:, [r]] == ranks) for r in (0, 1))
-    return np.column_stack([apart, both, first, second]).astype(np.float64)
-
-
-def _value(sums: Floats, v: Floats) -> Floats:
-    # sums (..., 2 + 2 n_categories) -> (...); D_o and D_e times n²
-    q = len(v)
-    first, second = sums[..., 2 : 2 + q], sums[..., 2 + q :]
-    expected = ((first @ v) * second).sum(axis=-1)
-    return 1.0 - divide(sums[..., 1] * sums[..., 0], expected)
-
-
-COHEN_KERNEL = Kernel(features=_features, value=_value)
+COHEN_KERNEL = PAIR_KERNEL

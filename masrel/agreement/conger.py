@@ -2,17 +2,21 @@
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from masrel.agreement._counts import coded_items, item_counts
+from masrel.agreement._counts import DistinctItems, bilinear, distinct_rows, item_counts
 from masrel.agreement._data import CodedRatings, code_ratings
 from masrel.agreement._kernel import (
     NO_CHANCE,
     NO_PAIR,
     Floats,
+    Influence,
     Kernel,
     Variance,
     check_population,
@@ -23,12 +27,8 @@ from masrel.agreement._kernel import (
     weighted_disagreement,
 )
 from masrel.agreement._labels import Label
-from masrel.agreement.conger_influence import Margins, influence_squares
-from masrel.agreement.tally import Observed
 from masrel.agreement.weights import WeightName, Weights, declared_weights
 from masrel.estimates import Estimate
-
-__all__ = ["CONGER_KERNEL", "conger_kappa"]
 
 
 def conger_kappa(
@@ -95,19 +95,32 @@ def conger_kappa(
     v = declared_weights(weights, coded.categories, declared=coded.declared)
     check_variance(variance)
     check_population(population, coded.n_items)
-    observed = coded_items(coded).tally(v).observed
-    margins = Margins.of(coded, v)
-    reason = _reason(coded, observed, margins, v)
+    sums = DistinctItems.of_codes(coded).sums(v)
+    margins = _Margins.of(coded, v)
+    reason = None
+    if sums.n_usable == 0:
+        reason = undefined("Conger's kappa", NO_PAIR)
+    elif v.reason is not None:
+        reason = undefined("Conger's kappa", v.reason)
+    elif 0 in margins.n_ratings:
+        column = margins.n_ratings.index(0)
+        reason = undefined("Conger's kappa", f"0/0: no ratings in column {column}")
+    elif margins.numerator == 0:
+        reason = undefined("Conger's kappa", NO_CHANCE)
     value = p_o = p_e = math.nan
     error: float | Callable[[], float] = math.nan
-    if observed is not None and v.reason is None:
-        d_o, over_o = observed.numerator, observed.denominator
+    if sums.n_usable and v.reason is None:
+        d_o, over_o = sums.observed, sums.denominator * v.denominator
         d_e, over_e = margins.numerator, margins.denominator
         p_o, p_e = (over_o - d_o) / over_o, (over_e - d_e) / over_e
         if reason is None:
             value = (d_e * over_o - d_o * over_e) / (d_e * over_o)
-            as_irrcac = variance == "irrcac"
-            error = partial(_error, coded, v, observed, margins, as_irrcac, population)
+            ratio = Fraction(d_o * over_e, d_e * over_o)
+            rate = Fraction(coded.n_items, sums.n_usable)
+            influence = partial(
+                _influence, coded, v, margins, ratio, rate, variance == "irrcac"
+            )
+            error = partial(standard_error, influence, coded.n_items, population)
     return Estimate(
         coefficient="conger_kappa",
         weights=v.name,
@@ -122,32 +135,75 @@ def conger_kappa(
     )
 
 
-def _reason(
-    coded: CodedRatings, observed: Observed | None, margins: Margins, v: Weights
-) -> str | None:
-    title = "Conger's kappa"
-    if observed is None:
-        return undefined(title, NO_PAIR)
-    if v.reason is not None:
-        return undefined(title, v.reason)
-    if len(margins.raters) < coded.codes.shape[1]:
-        without = set(range(coded.codes.shape[1])).difference(margins.raters)
-        return undefined(title, f"0/0: no ratings in column {min(without)}")
-    if margins.numerator == 0:
-        return undefined(title, NO_CHANCE)
-    return None
+@dataclass(frozen=True, slots=True)
+class _Margins:
+    # chance disagreement, D_e = Σ_{g≠h} Σ_kl v_kl p_gk p_hl / (r (r - 1)), in integers,
+    # of the r raters who rated anything
+    counts: list[list[int]]  # (n_raters, n_categories)
+    n_ratings: list[int]  # how many each, n_g
+    numerator: int
+    denominator: int
+
+    @classmethod
+    def of(cls, coded: CodedRatings, v: Weights) -> "_Margins":
+        q = coded.n_categories
+        counts = [
+            np.bincount(column[column >= 0], minlength=q).tolist()
+            for column in coded.codes.T
+        ]
+        n_ratings = list(map(sum, counts))
+        multiple = math.lcm(*filter(None, n_ratings))
+        shares = [
+            [n * (multiple // n_g) for n in row]
+            for row, n_g in zip(counts, n_ratings, strict=True)
+            if n_g
+        ]
+        total = list(map(sum, zip(*shares, strict=True))) or [0] * q
+        # all pairs of raters, less each rater with itself
+        numerator = bilinear(v, total, total) - sum(bilinear(v, p, p) for p in shares)
+        r = len(shares)
+        denominator = max(r * (r - 1), 1) * multiple**2 * v.denominator
+        return cls(counts, n_ratings, numerator, denominator)
 
 
-def _error(
+def _influence(
     coded: CodedRatings,
     v: Weights,
-    observed: Observed,
-    margins: Margins,
-    as_irrcac: bool,
-    population: int | None,
-) -> float:
-    squares = influence_squares(coded, v, observed, margins, as_irrcac)
-    return standard_error(squares, 1.0, coded.n_items, population)
+    margins: _Margins,
+    ratio: Any,
+    rate: Any,
+    irrcac: bool,
+    exact: bool,
+) -> Influence:
+    # With d_i an item's disagreement and s_i = 1 if it has a pair,
+    #   D_e u_i = (D_o/D_e) Σ_g moves_g - (n/n') (d_i - D_o s_i).
+    # A rating of k by rater g moves D_e by 2 (h_gk - Σ_l p_gl h_gl) / (r (r - 1) n_g),
+    # h_gk = Σ_l v_kl Σ_{h≠g} p_hl.
+    number: Callable[[Fraction], Any] = Fraction if exact else float
+    matrix = v.fractions if exact else v.floats
+    dtype = object if exact else np.float64
+    inverse = number(Fraction(margins.denominator, margins.numerator))
+    ratio, rate = number(ratio), number(rate)
+    rows, freq = distinct_rows(coded.codes, coded.n_categories)
+    rated = (rows >= 0).any(axis=1)
+    rows, freq = rows[rated], freq[rated].astype(dtype)
+    counts = item_counts(replace(coded, codes=rows)).astype(dtype)
+    size = counts.sum(axis=1)
+    disagreement = ((counts @ matrix) * counts).sum(axis=1)
+    terms = disagreement * (rate * inverse / np.maximum(size * (size - 1), 1))
+    # irrCAC takes u_i + κ (s_i n/n' - 1)
+    u = (size > 1) * (rate * (1 if irrcac else ratio)) - terms
+    if irrcac:
+        u = u + (ratio - 1)
+    once = np.array([number(Fraction(1, n)) for n in margins.n_ratings])[:, None]
+    p = np.array(margins.counts, dtype) * once
+    h = (p.sum(axis=0) - p) @ matrix
+    moves = (h - (p * h).sum(axis=1, keepdims=True)) * once
+    r = len(p)
+    moves = moves * (ratio * inverse * number(Fraction(2 * coded.n_items, r * (r - 1))))
+    for column, of_g in zip(rows.T, moves, strict=True):
+        u = u + np.append(of_g, 0)[column]  # missing, -1, is the last
+    return Influence(u, freq, terms)
 
 
 def _features(coded: CodedRatings, v: Floats) -> Floats:
@@ -156,8 +212,8 @@ def _features(coded: CodedRatings, v: Floats) -> Floats:
     counts = item_counts(coded).astype(np.float64)
     size = counts.sum(axis=1)
     pairs = np.where(size > 1, size * (size - 1), 1.0)
-    apart = np.where(size > 1, weighted_disagreement(counts, v), 0.0) / pairs
-    parts = [apart, size > 1]
+    disagreement = np.where(size > 1, weighted_disagreement(counts, v), 0.0) / pairs
+    parts = [disagreement, size > 1]
     for column in coded.codes.T:
         parts += [column >= 0, column[:, None] == np.arange(len(v))]
     return np.column_stack(parts).astype(np.float64)
@@ -171,9 +227,9 @@ def _value(sums: Floats, v: Floats) -> Floats:
     shares = divide(of_raters[..., 1:], n_ratings)  # nan for a rater without any
     total = shares.sum(axis=-2)
     others = total[..., None, :] - shares
-    apart = ((others @ v) * shares).sum(axis=(-1, -2))
+    expected = ((others @ v) * shares).sum(axis=(-1, -2))
     r = of_raters.shape[-2]
-    return 1.0 - divide(observed, apart / (r * (r - 1)))
+    return 1.0 - divide(observed, expected / (r * (r - 1)))
 
 
 CONGER_KERNEL = Kernel(features=_features, value=_value)

@@ -11,8 +11,7 @@ from masrel.agreement._counts import check_table
 from masrel.agreement._data import code_ratings
 from masrel.agreement._kernel import NO_CHANCE, NO_PAIR, undefined
 from masrel.agreement._labels import Label
-from masrel.agreement._pairs import pair_table
-from masrel.agreement.cohen import two_raters
+from masrel.agreement._pairs import pair_table, two_raters
 from masrel.agreement.significance import Significance, chi_squared
 from masrel.errors import CountsError, ParameterError
 

@@ -1,31 +1,21 @@
 """Fleiss' kappa: agreement of two or more raters who are not told apart."""
 
 from collections.abc import Sequence
-from operator import mul
+from typing import Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from masrel.agreement._kernel import Floats, Variance, pooled_kernel
+from masrel.agreement._counts import take_counts
+from masrel.agreement._kernel import Variance
 from masrel.agreement._labels import Label
 from masrel.agreement._pooled import (
-    Options,
+    Chance,
     PooledCoefficient,
-    estimate_counts,
-    estimate_ratings,
+    estimate_pooled,
+    pooled_kernel,
 )
-from masrel.agreement.influence import Expected, Slopes
-from masrel.agreement.tally import Shares
-from masrel.agreement.weights import WeightName, Weights
+from masrel.agreement.weights import WeightName
 from masrel.estimates import Estimate
-
-__all__ = [
-    "FLEISS_KERNEL",
-    "expected_disagreement",
-    "expected_slopes",
-    "fleiss_kappa",
-    "fleiss_kappa_from_counts",
-]
 
 
 def fleiss_kappa(
@@ -89,8 +79,9 @@ def fleiss_kappa(
     >>> round(fleiss_kappa([["a", "a"], ["b", "b"], ["a", "b"]]).value, 3)
     0.333
     """
-    options = Options(categories, weights, variance, population)
-    return estimate_ratings(_COEFFICIENT, ratings, options)
+    return estimate_pooled(
+        _COEFFICIENT, ratings, categories, weights, variance, population
+    )
 
 
 def fleiss_kappa_from_counts(
@@ -132,35 +123,15 @@ def fleiss_kappa_from_counts(
     >>> round(fleiss_kappa_from_counts([[2, 0], [0, 2], [1, 1]]).value, 3)
     0.333
     """
-    options = Options(categories, weights, variance, population)
-    return estimate_counts(_COEFFICIENT, counts, options)
+    counted = take_counts(counts, categories)
+    return estimate_pooled(_COEFFICIENT, counted, None, weights, variance, population)
 
 
-def expected_disagreement(shares: Shares, weights: Weights) -> Expected:
+def shared_margins(_q: int, _total: Any, _w: Any) -> Chance:
     """Return Σ_kl v_kl p_k p_l, 1 - P̄_e of [1] in `fleiss_kappa`."""
-    products = weights.products(shares.numerators)
-    return Expected(
-        sum(map(mul, shares.numerators, products)),
-        shares.total * shares.total * weights.denominator,
-    )
+    return Chance(0, 1, 1)
 
 
-def expected_slopes(shares: Shares, weights: Weights) -> Slopes:
-    """Return 2 Σ_l v_kl p_l, the slope of `expected_disagreement` in p_k."""
-    return Slopes(
-        [2 * vp for vp in weights.products(shares.numerators)],
-        shares.total * weights.denominator,
-    )
+_COEFFICIENT = PooledCoefficient("fleiss_kappa", "Fleiss' kappa", shared_margins)
 
-
-_COEFFICIENT = PooledCoefficient(
-    "fleiss_kappa", "Fleiss' kappa", expected_disagreement, expected_slopes
-)
-
-
-def _in_floats(shares: Floats, v: Floats) -> Floats:
-    # shares (..., n_categories) -> (...)
-    return np.asarray(np.einsum("...k,...k->...", shares @ v, shares))
-
-
-FLEISS_KERNEL = pooled_kernel(_in_floats)
+FLEISS_KERNEL = pooled_kernel(_COEFFICIENT)

@@ -1,24 +1,21 @@
 """Gwet's AC1 and, weighted, AC2: chance agreement among hard items only."""
 
 from collections.abc import Sequence
+from typing import Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from masrel.agreement._kernel import Floats, Variance, pooled_kernel
+from masrel.agreement._counts import take_counts
+from masrel.agreement._kernel import Variance
 from masrel.agreement._labels import Label
 from masrel.agreement._pooled import (
-    Options,
+    Chance,
     PooledCoefficient,
-    estimate_counts,
-    estimate_ratings,
+    estimate_pooled,
+    pooled_kernel,
 )
-from masrel.agreement.influence import Expected, Slopes
-from masrel.agreement.tally import Shares
-from masrel.agreement.weights import WeightName, Weights
+from masrel.agreement.weights import WeightName
 from masrel.estimates import Estimate
-
-__all__ = ["GWET_KERNEL", "gwet_ac", "gwet_ac_from_counts"]
 
 
 def gwet_ac(
@@ -79,8 +76,9 @@ def gwet_ac(
     >>> round(gwet_ac([["a", "a"], ["b", "b"], ["a", "b"]]).value, 3)
     0.333
     """
-    options = Options(categories, weights, variance, population)
-    return estimate_ratings(_COEFFICIENT, ratings, options)
+    return estimate_pooled(
+        _COEFFICIENT, ratings, categories, weights, variance, population
+    )
 
 
 def gwet_ac_from_counts(
@@ -122,42 +120,18 @@ def gwet_ac_from_counts(
     >>> round(gwet_ac_from_counts([[2, 0], [2, 0], [1, 1]]).value, 3)
     0.538
     """
-    options = Options(categories, weights, variance, population)
-    return estimate_counts(_COEFFICIENT, counts, options)
+    counted = take_counts(counts, categories)
+    return estimate_pooled(_COEFFICIENT, counted, None, weights, variance, population)
 
 
-def _expected(shares: Shares, weights: Weights) -> Expected:
+def _chance(q: int, total: Any, w: Any) -> Chance:
     # 1 - p_e with p_e = T_w / (q (q - 1)) Σ_k p_k (1 - p_k), T_w = Σ_kl w_kl
-    q, total = weights.n_categories, shares.total
     if q == 1:
-        return Expected(0, 1)  # one category leaves no room for chance: 0/0
-    t_w = q * q * weights.denominator - weights.total()
-    spread = sum([p * (total - p) for p in shares.numerators])
-    over = weights.denominator * q * (q - 1) * total * total
-    return Expected(over - t_w * spread, over)
+        return Chance(0, 0, 1)  # one category leaves no room for chance: 0/0
+    divisor = q * (q - 1) * w
+    return Chance(divisor, total - q * q * w, divisor)
 
 
-def _slopes(shares: Shares, weights: Weights) -> Slopes:
-    # -T_w / (q (q - 1)) (1 - 2 p_k)
-    q, total = weights.n_categories, shares.total
-    t_w = q * q * weights.denominator - weights.total()
-    return Slopes(
-        [-t_w * (total - 2 * p) for p in shares.numerators],
-        weights.denominator * q * (q - 1) * total,
-    )
+_COEFFICIENT = PooledCoefficient("gwet_ac", "Gwet's AC", _chance, nominal=True)
 
-
-_COEFFICIENT = PooledCoefficient("gwet_ac", "Gwet's AC", _expected, _slopes)
-
-
-def _in_floats(shares: Floats, v: Floats) -> Floats:
-    # shares (..., n_categories) -> (...)
-    q = len(v)
-    if q == 1:
-        return np.zeros(shares.shape[:-1])
-    t_w = q * q - v.sum()
-    spread = (shares * (1.0 - shares)).sum(axis=-1)
-    return np.asarray(1.0 - t_w / (q * (q - 1)) * spread)
-
-
-GWET_KERNEL = pooled_kernel(_in_floats)
+GWET_KERNEL = pooled_kernel(_COEFFICIENT)

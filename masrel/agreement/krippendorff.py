@@ -2,16 +2,19 @@
 
 import math
 from collections.abc import Callable, Sequence
+from fractions import Fraction
 from functools import partial
-from operator import mul
-from typing import NamedTuple
+from operator import truediv
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from masrel.agreement._counts import (
     CountedRatings,
-    ItemTable,
+    DistinctItems,
+    SizeGroup,
+    bilinear,
     count_ratings,
     item_counts,
     take_counts,
@@ -21,6 +24,7 @@ from masrel.agreement._kernel import (
     NO_CHANCE,
     NO_PAIR,
     Floats,
+    Influence,
     Kernel,
     check_population,
     divide,
@@ -29,22 +33,22 @@ from masrel.agreement._kernel import (
     weighted_disagreement,
 )
 from masrel.agreement._labels import Label
-from masrel.agreement.influence import Linear
-from masrel.agreement.metrics import Metric, metric_weights
-from masrel.agreement.tally import SizeGroup
 from masrel.agreement.weights import (
     WeightName,
     Weights,
+    category_values,
     declared_weights,
+    every_pair,
+    identity_weights,
+    named_weights,
+    over_one_denominator,
+    squared_ratio,
 )
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate
 
-__all__ = [
-    "KRIPPENDORFF_KERNEL",
-    "krippendorff_alpha",
-    "krippendorff_alpha_from_counts",
-]
+Metric = Literal["nominal", "ordinal", "interval", "ratio"]
+"""Names of the difference functions."""
 
 
 def krippendorff_alpha(
@@ -166,68 +170,81 @@ class _Sums(NamedTuple):
     # α = 1 - (n - 1) A / B over the n ratings of items that have at least two
     n_items: int
     n_ratings: int
-    pairs: int  # multiple of every n_i - 1
-    above: int  # A = Σ_i V_i / (n_i - 1), times `pairs`
-    products: list[int]  # Σ_l v_kl n_l
-    below: int  # B = Σ_kl v_kl n_k n_l
+    multiple: int  # of every n_i - 1
+    observed: int  # A = Σ_i V_i / (n_i - 1), times `multiple`
+    totals: list[int]  # ratings per category
+    expected: int  # B = Σ_kl v_kl n_k n_l
 
-    @classmethod
-    def of(cls, usable: list[SizeGroup], weights: Weights) -> "_Sums":
-        size, n_items, totals, above = usable[0]
-        pairs = size - 1
-        for size, n_alike, of_size, apart in usable[1:]:
-            common = math.lcm(pairs, size - 1)
-            above = above * (common // pairs) + apart * (common // (size - 1))
-            n_items, pairs = n_items + n_alike, common
-            totals = [a + b for a, b in zip(totals, of_size, strict=True)]
-        products = weights.products(totals)
-        below = sum(map(mul, totals, products))
-        return cls(n_items, sum(totals), pairs, above, products, below)
 
-    def agreements(self, denominator: int) -> tuple[float, float]:
-        """Return 1 - D_o and 1 - D_e, v_kl being over a denominator."""
-        n, over = self.n_ratings, self.pairs * denominator
-        over_e = n * (n - 1) * denominator
-        return (n * over - self.above) / (n * over), (over_e - self.below) / over_e
-
-    @property
-    def alpha(self) -> float:
-        """1 - D_o / D_e, in one division."""
-        d_e = self.below * self.pairs
-        return (d_e - (self.n_ratings - 1) * self.above) / d_e
+def _sums(usable: list[SizeGroup], v: Weights) -> _Sums:
+    multiple = math.lcm(*[group.size - 1 for group in usable])
+    observed = sum([g.disagreement * (multiple // (g.size - 1)) for g in usable])
+    totals = usable[0].totals
+    if len(usable) > 1:
+        totals = list(map(sum, zip(*[g.totals for g in usable], strict=True)))
+    n_items = sum([group.n_items for group in usable])
+    expected = bilinear(v, totals, totals)
+    return _Sums(n_items, sum(totals), multiple, observed, totals, expected)
 
 
 def _estimate(counted: CountedRatings, v: Weights, population: int | None) -> Estimate:
-    table = counted.items
-    usable = [group for group in table.tally(v).groups if group.size > 1]
-    found = _Sums.of(usable, v) if usable else None
-    check_population(population, 0 if found is None else found.n_items)
+    usable = [group for group in counted.items.sums(v).groups if group.size > 1]
+    sums = _sums(usable, v) if usable else None
+    if population is not None:
+        check_population(population, 0 if sums is None else sums.n_items)
     reason = None
-    if found is None:
+    if sums is None:
         reason = undefined("Krippendorff's alpha", NO_PAIR)
     elif v.reason is not None:
         reason = undefined("Krippendorff's alpha", v.reason)
-    elif found.below == 0:
+    elif sums.expected == 0:
         reason = undefined("Krippendorff's alpha", NO_CHANCE)
-    value = observed = chance = math.nan
+    value = p_o = p_e = math.nan
     error: float | Callable[[], float] = math.nan
-    if found is not None and v.reason is None:
-        observed, chance = found.agreements(v.denominator)
+    if sums is not None and v.reason is None:
+        n, over = sums.n_ratings, sums.multiple * v.denominator
+        over_e = n * (n - 1) * v.denominator
+        p_o = (n * over - sums.observed) / (n * over)
+        p_e = (over_e - sums.expected) / over_e
         if reason is None:
-            value = found.alpha
-            error = partial(_error, table, v, found, population)
+            d_e = sums.expected * sums.multiple
+            value = (d_e - (n - 1) * sums.observed) / d_e
+            influence = partial(_influence, counted.items, v, sums)
+            error = partial(standard_error, influence, sums.n_items, population)
     return Estimate(
         coefficient="krippendorff_alpha",
         weights=v.name,
         value=value,
         standard_error=error,
-        observed=observed,
-        chance=chance,
-        n_items=0 if found is None else found.n_items,
+        observed=p_o,
+        chance=p_e,
+        n_items=0 if sums is None else sums.n_items,
         n_raters=counted.n_raters,
-        n_categories=table.n_categories,
+        n_categories=counted.items.n_categories,
         reason=reason,
     )
+
+
+def _influence(items: DistinctItems, v: Weights, sums: _Sums, exact: bool) -> Influence:
+    # With Q = 1 - α = (n - 1) A / B, the influence of item i among m is
+    #   u_i = m Q [2 Σ_k h_k n_ik / B - V_i / ((n_i - 1) A) - n_i / (n - 1)],
+    # h_k = Σ_l v_kl n_l.
+    divide: Callable[[int, int], Any] = Fraction if exact else truediv
+    m, n, w = sums.n_items, sums.n_ratings, v.denominator
+    counts, freq, size, disagreement = items.arrays(v, exact)
+    if not isinstance(size, float) and (single := size < 2).any():
+        counts, freq, size = counts[~single], freq[~single], size[~single]
+        disagreement = disagreement[~single]
+    q = divide((n - 1) * sums.observed, sums.multiple * sums.expected)
+    totals = np.array(sums.totals, dtype=object if exact else np.float64)
+    h = (
+        (v.fractions if exact else v.floats)
+        @ totals
+        * (2 * q * divide(w, sums.expected))
+    )
+    terms = disagreement * (-m * divide((n - 1) * w, sums.expected) / (size - 1))
+    u = counts @ (m * h - m * q * divide(1, n - 1)) + terms
+    return Influence(u, freq, terms)
 
 
 def _disagreement(
@@ -236,35 +253,55 @@ def _disagreement(
     metric: Metric | None,
 ) -> Weights:
     if metric is None:
-        asked = "identity" if weights is None else weights
-        return declared_weights(asked, counted.categories, declared=counted.declared)
+        weights = "identity" if weights is None else weights
+        if isinstance(weights, str):  # made once for a scale
+            return named_weights(weights, counted.categories, counted.declared)
+        return declared_weights(weights, counted.categories, declared=counted.declared)
     if weights is not None:
         raise ParameterError("weights, metric: needs one of them, got both")
-    return metric_weights(metric, counted)
+    return _metric_weights(metric, counted)
 
 
-def _error(table: ItemTable, v: Weights, found: _Sums, population: int | None) -> float:
-    # With Q = 1 - α = (n - 1) A / B, the influence of item i among m is
-    #   -u_i = m Q [V_i / ((n_i - 1) A) + n_i / (n - 1) - 2 Σ_k h_k n_ik / B],
-    # h_k = Σ_l v_kl n_l.
-    m, n = found.n_items, found.n_ratings
-    by_size = {
-        size: (
-            m * (n - 1) * (found.pairs // (size - 1)) * found.below,
-            m * size * found.above * found.below,
-            -2 * m * (n - 1) * found.above,
+def _metric_weights(metric: Metric, counted: CountedRatings) -> Weights:
+    # Krippendorff's difference functions δ², exact; they grow without bound.
+    # [1], pp. 232-236
+    if metric not in get_args(Metric):
+        raise ParameterError(
+            f"metric: needs one of {', '.join(get_args(Metric))}, got {metric!r}"
         )
-        for size in table.sizes
-        if size > 1
-    }
-    by_size[1] = (0, 0, 0)
-    influence = Linear(
-        by_size=by_size,
-        slopes=found.products,
-        denominator=found.pairs * found.below**2,
-    )
-    squares, over = table.square_sum(v, influence)
-    return standard_error(squares, over, m, population)
+    if metric == "nominal":
+        return Weights(name="nominal", n_categories=len(counted.categories))
+    if not counted.declared and isinstance(counted.categories[0], str):
+        raise ParameterError(
+            f"categories: the {metric} metric needs the declared scale in order, the "
+            f"ratings are text: {', '.join(map(str, counted.categories))}"
+        )
+    if metric == "ordinal":
+        squares = every_pair(_middles(counted), lambda x, y: (x - y) ** 2)
+        return over_one_denominator("ordinal metric", squares)
+    values = category_values(counted.categories)
+    if metric == "interval":
+        squares = every_pair(values, lambda x, y: (x - y) ** 2)
+        return over_one_denominator("interval", squares)
+    if any(x + y == 0 for i, x in enumerate(values) for y in values[:i]):
+        raise ParameterError(
+            "metric: ratio needs values of which no two sum to 0, got "
+            f"{', '.join(str(float(value)) for value in values)}"
+        )
+    return over_one_denominator("ratio metric", every_pair(values, squared_ratio))
+
+
+def _middles(counted: CountedRatings) -> list[Fraction]:
+    # Σ_{g<k} n_g + n_k/2: ratings up to the middle of each grade, of items with a pair
+    q = len(counted.categories)
+    groups = counted.items.sums(identity_weights(q)).groups
+    usable = [group.totals for group in groups if group.size > 1]
+    middles, lower = [], 0
+    for k in range(q):
+        total = sum(totals[k] for totals in usable)
+        middles.append(Fraction(2 * lower + total, 2))
+        lower += total
+    return middles
 
 
 def _features(coded: CodedRatings, v: Floats) -> Floats:
@@ -278,8 +315,8 @@ def _features(coded: CodedRatings, v: Floats) -> Floats:
 def _value(sums: Floats, v: Floats) -> Floats:
     # sums (..., 1 + n_categories) -> (...)
     totals = sums[..., 1:]
-    below = weighted_disagreement(totals, v)
-    return 1.0 - divide((totals.sum(axis=-1) - 1.0) * sums[..., 0], below)
+    expected = weighted_disagreement(totals, v)
+    return 1.0 - divide((totals.sum(axis=-1) - 1.0) * sums[..., 0], expected)
 
 
 KRIPPENDORFF_KERNEL = Kernel(features=_features, value=_value)

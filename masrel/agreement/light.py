@@ -5,7 +5,7 @@ import math
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from functools import partial
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,21 +13,26 @@ from numpy.typing import ArrayLike
 from masrel.agreement._counts import distinct_rows
 from masrel.agreement._data import CodedRatings, code_ratings, complete
 from masrel.agreement._kernel import (
+    Array,
     Floats,
+    Influence,
+    Integers,
     Kernel,
     check_population,
     standard_error,
     undefined,
 )
 from masrel.agreement._labels import Label
-from masrel.agreement._pairs import PairSums, pair_table
-from masrel.agreement.cohen import COHEN_KERNEL
-from masrel.agreement.float_sums import cancelled
+from masrel.agreement._pairs import (
+    PAIR_KERNEL,
+    PairSlopes,
+    PairSums,
+    pair_features,
+    pair_table,
+)
 from masrel.agreement.weights import WeightName, Weights, declared_weights
 from masrel.errors import ParameterError, RatingsError
 from masrel.estimates import Estimate
-
-__all__ = ["LIGHT_KERNEL", "Missing", "light_kappa"]
 
 Missing = Literal["listwise", "pairwise"]
 """Which items count when ratings are missing."""
@@ -99,14 +104,17 @@ def light_kappa(
     if n_raters < 2:
         raise RatingsError(f"Light's kappa needs at least two raters, got {n_raters}")
     pairs = list(itertools.combinations(range(n_raters), 2))
-    sums = [
-        PairSums.of(pair_table(coded.codes[:, pair], coded.n_categories), v)
-        for pair in pairs
-    ]
+    tables = [pair_table(coded.codes[:, pair], coded.n_categories) for pair in pairs]
+    sums = [PairSums.of(table, v) for table in tables]
     reason = _reason(pairs, sums, v)
     error: float | Callable[[], float] = math.nan
     if reason is None:
-        error = partial(_error, coded, v, pairs, sums, population)
+        error = partial(
+            standard_error,
+            partial(_influence, coded, v, dict(zip(pairs, tables, strict=True))),
+            coded.n_items,
+            population,
+        )
     return _estimate(coded, v, sums, reason, error)
 
 
@@ -120,10 +128,10 @@ def _estimate(
     value = observed = chance = math.nan
     if v.reason is None and all(s.n for s in sums):
         w = v.denominator
-        observed = _mean([1 - Fraction(s.above, s.n * w) for s in sums])
-        chance = _mean([1 - Fraction(s.below, s.n * s.n * w) for s in sums])
+        observed = _mean([1 - Fraction(s.observed, s.n * w) for s in sums])
+        chance = _mean([1 - Fraction(s.expected, s.n * s.n * w) for s in sums])
     if reason is None:
-        value = _mean([1 - Fraction(s.n * s.above, s.below) for s in sums])
+        value = _mean([1 - Fraction(s.n * s.observed, s.expected) for s in sums])
     return Estimate(
         coefficient="light_kappa",
         weights=v.name,
@@ -147,71 +155,49 @@ def _reason(
 ) -> str | None:
     if v.reason is not None:
         return undefined("Light's kappa", v.reason)
-    for (first, second), found in zip(pairs, sums, strict=True):
+    for (first, second), of_two in zip(pairs, sums, strict=True):
         of_pair = f"of the raters in columns {first} and {second}"
-        if found.n == 0:
+        if of_two.n == 0:
             return undefined("Light's kappa", f"no item has both ratings {of_pair}")
-        if found.below == 0:
+        if of_two.expected == 0:
             return undefined("Light's kappa", f"0/0: one category is all {of_pair}")
     return None
 
 
-def _error(
+def _influence(
     coded: CodedRatings,
     v: Weights,
-    pairs: list[tuple[int, int]],
-    sums: list[PairSums],
-    population: int | None,
-) -> float:
-    n = coded.n_items
-    rows, times = distinct_rows(coded.codes, coded.n_categories)
-    every = [_moves(found, n, len(pairs), v) for found in sums]
-    parts = []
-    for (g, h), cells in zip(pairs, every, strict=True):
-        in_floats = np.array([[float(x) for x in of_k] for of_k in cells])
-        parts.append(in_floats[rows[:, g], rows[:, h]])
-    value, size = np.sum(parts, axis=0), np.sum(np.abs(parts), axis=0)
-    if not cancelled(value, size, times):
-        squares = float((times * value * value).sum())
-        return standard_error(squares, 1.0, n, population)
-    exact = Fraction(0)
-    for row, often in zip(rows.tolist(), times.tolist(), strict=True):
-        of_pairs = zip(every, pairs, strict=True)
-        moved = sum((cells[row[g]][row[h]] for cells, (g, h) in of_pairs), Fraction(0))
-        exact += often * moved**2
-    return standard_error(float(exact), 1.0, n, population)
-
-
-def _moves(found: PairSums, n: int, n_pairs: int, v: Weights) -> list[list[Fraction]]:
-    # What an item in cell (k, l) moves the mean of the pairs' kappas by, times n items:
-    # its influence of n_pair items on one kappa, n / n_pair times as often. The last
-    # row and column are those of missing ratings, -1.
-    q = v.n_categories
-    by_cell = [[Fraction(0)] * (q + 1) for _ in range(q + 1)]
-    for k, cells in enumerate(found.cells):
-        for l, times in enumerate(cells):  # noqa: E741 - k, l as in the formula
-            if times:
-                moved = n * found.influence(k, l, v)
-                by_cell[k][l] = Fraction(moved, found.below**2 * n_pairs)
-    return by_cell
+    tables: dict[tuple[int, int], Integers],
+    exact: bool,
+) -> Influence:
+    # An item moves the mean of the pairs' kappas by its influence on each, n / n_pair
+    # times as often as one of the n_pair items that both rated.
+    rows, freq = distinct_rows(coded.codes, coded.n_categories)
+    freq = freq.astype(object if exact else np.float64)
+    u: Array = np.zeros(len(rows), dtype=freq.dtype)
+    terms = u.copy()
+    for (g, h), table in tables.items():
+        slopes, at = PairSlopes.of(table, v, exact), (rows[:, g], rows[:, h])
+        often = Fraction(coded.n_items, int(table.sum()) * len(tables))
+        rate: Any = often if exact else float(often)
+        u += (slopes.influence() * rate)[at]
+        terms += abs(slopes.observed * (rate / slopes.d_e))[at]
+    return Influence(u, freq, terms)
 
 
 def _features(coded: CodedRatings, v: Floats) -> Floats:
     # (n_items, n_pairs (2 + 2 n_categories)): each pair's features in turn, 0 for
     # items that not every rater rated
-    parts = []
     whole = np.min(coded.codes, axis=1) >= 0
     codes = np.where(whole[:, None], coded.codes, -1)
-    for pair in itertools.combinations(range(codes.shape[1]), 2):
-        of_pair = CodedRatings(codes=codes[:, pair], categories=coded.categories)
-        parts.append(COHEN_KERNEL.features(of_pair, v))
-    return np.hstack(parts)
+    pairs = itertools.combinations(range(codes.shape[1]), 2)
+    return np.hstack(pair_features(coded, [codes[:, pair] for pair in pairs], v))
 
 
 def _value(sums: Floats, v: Floats) -> Floats:
     # sums (..., n_pairs (2 + 2 n_categories)) -> (...)
     of_pairs = sums.reshape(*sums.shape[:-1], -1, 2 + 2 * len(v))
-    return np.asarray(COHEN_KERNEL.value(of_pairs, v).mean(axis=-1))
+    return np.asarray(PAIR_KERNEL.value(of_pairs, v).mean(axis=-1))
 
 
 LIGHT_KERNEL = Kernel(features=_features, value=_value)

@@ -1,23 +1,21 @@
 """Percent agreement: how often two raters of an item agree, not corrected."""
 
 from collections.abc import Sequence
+from typing import Any
 
 from numpy.typing import ArrayLike
 
-from masrel.agreement._kernel import Variance, pooled_kernel
+from masrel.agreement._counts import take_counts
+from masrel.agreement._kernel import Variance
 from masrel.agreement._labels import Label
 from masrel.agreement._pooled import (
-    Options,
+    Chance,
     PooledCoefficient,
-    estimate_counts,
-    estimate_ratings,
+    estimate_pooled,
+    pooled_kernel,
 )
-from masrel.agreement.influence import Expected
-from masrel.agreement.tally import Shares
-from masrel.agreement.weights import WeightName, Weights
+from masrel.agreement.weights import WeightName
 from masrel.estimates import Estimate
-
-__all__ = ["PERCENT_KERNEL", "percent_agreement", "percent_agreement_from_counts"]
 
 
 def percent_agreement(
@@ -75,8 +73,9 @@ def percent_agreement(
     >>> percent_agreement([["a", "a"], ["a", "b"]]).value
     0.5
     """
-    options = Options(categories, weights, variance, population)
-    return estimate_ratings(_COEFFICIENT, ratings, options)
+    return estimate_pooled(
+        _COEFFICIENT, ratings, categories, weights, variance, population
+    )
 
 
 def percent_agreement_from_counts(
@@ -118,16 +117,14 @@ def percent_agreement_from_counts(
     >>> percent_agreement_from_counts([[2, 0], [1, 1]]).value
     0.5
     """
-    options = Options(categories, weights, variance, population)
-    return estimate_counts(_COEFFICIENT, counts, options)
+    counted = take_counts(counts, categories)
+    return estimate_pooled(_COEFFICIENT, counted, None, weights, variance, population)
 
 
-def _expected(shares: Shares, weights: Weights) -> Expected:  # noqa: ARG001 - chance is not asked
-    # 1 - D_o / 1: what is observed, as it is
-    return Expected(1, 1)
+def _chance(_q: int, _total: Any, _w: Any) -> Chance:
+    return Chance(1, 0, 1)  # 1 - D_o / 1: what is observed, as it is
 
 
-_COEFFICIENT = PooledCoefficient("percent_agreement", "percent agreement", _expected)
+_COEFFICIENT = PooledCoefficient("percent_agreement", "percent agreement", _chance)
 
-
-PERCENT_KERNEL = pooled_kernel(lambda shares, v: 1.0)  # noqa: ARG005 - chance is not asked
+PERCENT_KERNEL = pooled_kernel(_COEFFICIENT)

@@ -1,7 +1,6 @@
 """Agreement of raters with themselves: pairs of ratings, rater by rater."""
 
 import math
-from collections import Counter
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from functools import partial
@@ -15,14 +14,22 @@ from masrel.agreement._kernel import (
     NO_CHANCE,
     NO_PAIR,
     Floats,
+    Influence,
+    Integers,
     Kernel,
     divide,
     standard_error,
     undefined,
 )
 from masrel.agreement._labels import Label
-from masrel.agreement._pairs import PairSums, kappa_of_sums, pair_table
-from masrel.agreement.cohen import COHEN_KERNEL
+from masrel.agreement._pairs import (
+    PAIR_KERNEL,
+    PairSlopes,
+    PairSums,
+    estimate_pairs,
+    pair_features,
+    pair_table,
+)
 from masrel.agreement.weights import WeightName, Weights, declared_weights
 from masrel.estimates import Estimate
 
@@ -87,20 +94,27 @@ def stratified_kappa(
     """
     coded = code_pairs(pairs, categories)
     v = declared_weights(weights, coded.categories, declared=coded.declared)
-    strata = _strata(coded, v)
-    apart = sum([Fraction(s.above, s.n * v.denominator) for s in strata], Fraction(0))
-    by_chance = sum(
-        [Fraction(s.below, s.n * s.n * v.denominator) for s in strata], Fraction(0)
+    tables = _tables(coded)
+    used = [sums for table in tables if (sums := PairSums.of(table, v)).n]
+    d_o = sum([Fraction(s.observed, s.n * v.denominator) for s in used], Fraction(0))
+    d_e = sum(
+        [Fraction(s.expected, s.n * s.n * v.denominator) for s in used], Fraction(0)
     )
-    reason = _reason(strata, by_chance, v)
+    reason = None
+    if not used:
+        reason = undefined("stratified kappa", NO_PAIR)
+    elif v.reason is not None:
+        reason = undefined("stratified kappa", v.reason)
+    elif d_e == 0:
+        reason = undefined("stratified kappa", NO_CHANCE)
     value = observed = chance = math.nan
     error: float | Callable[[], float] = math.nan
-    if strata and v.reason is None:
-        observed = float(1 - apart / len(strata))
-        chance = float(1 - by_chance / len(strata))
+    if used and v.reason is None:
+        observed, chance = float(1 - d_o / len(used)), float(1 - d_e / len(used))
     if reason is None:
-        value = float(1 - apart / by_chance)
-        error = partial(_error, coded, v, apart, by_chance)
+        value = float(1 - d_o / d_e)
+        influence = partial(_stratified_influence, coded, tables, v)
+        error = partial(standard_error, influence, coded.n_items, None)
     return Estimate(
         coefficient="stratified_kappa",
         weights=v.name,
@@ -109,80 +123,35 @@ def stratified_kappa(
         observed=observed,
         chance=chance,
         n_items=coded.n_items,
-        n_raters=len(strata),
+        n_raters=len(used),
         n_categories=coded.n_categories,
         reason=reason,
     )
 
 
-def _strata(coded: CodedRatings, v: Weights) -> list[PairSums]:
-    # of each rater with a pair
-    tables = (pair_table(codes, coded.n_categories) for codes in pairs_of_raters(coded))
-    return [found for table in tables if (found := PairSums.of(table, v)).n]
+def _tables(coded: CodedRatings) -> list[Integers]:
+    # of each rater's pairs
+    return [pair_table(codes, coded.n_categories) for codes in pairs_of_raters(coded)]
 
 
-def _reason(strata: list[PairSums], by_chance: Fraction, v: Weights) -> str | None:
-    if not strata:
-        return undefined("stratified kappa", NO_PAIR)
-    if v.reason is not None:
-        return undefined("stratified kappa", v.reason)
-    if by_chance == 0:
-        return undefined("stratified kappa", NO_CHANCE)
-    return None
-
-
-def _error(
-    coded: CodedRatings, v: Weights, apart: Fraction, by_chance: Fraction
-) -> float:
-    n_items = coded.n_items
-    # Σ_r D_o,r / Σ_r D_e,r: an item pulls at both sums in every stratum it is in
-    ratio = float(apart / by_chance)
-    weights = v.as_floats()
-    influence = np.zeros(coded.codes.shape[0])
-    for codes in pairs_of_raters(coded):
-        features = COHEN_KERNEL.features(
-            CodedRatings(codes=codes, categories=coded.categories), weights
-        )
-        n = features[:, 1].sum()
-        if n == 0:
-            continue
-        q = coded.n_categories
-        means = features.sum(axis=0) / n
-        first, second = features[:, 2 : 2 + q], features[:, 2 + q :]
-        to_second, to_first = weights @ means[2 + q :], weights @ means[2 : 2 + q]
-        expected = means[2 : 2 + q] @ to_second
-        on_chance = (
-            first @ to_second + second @ to_first - 2 * expected * features[:, 1]
-        )
-        on_observed = features[:, 0] - means[0] * features[:, 1]
-        influence += (ratio * on_chance - on_observed) * n_items / n
-    influence /= float(by_chance)
-    return standard_error(float((influence**2).sum()), 1.0, n_items, None)
-
-
-def _features(coded: CodedRatings, v: Floats) -> Floats:
-    # (n_items, n_raters (2 + 2 n_categories)): each rater's pair features in turn
-    return np.hstack(
-        [
-            COHEN_KERNEL.features(
-                CodedRatings(codes=codes, categories=coded.categories), v
-            )
-            for codes in pairs_of_raters(coded)
-        ]
-    )
-
-
-def _value(sums: Floats, v: Floats) -> Floats:
-    # sums (..., n_raters (2 + 2 n_categories)) -> (...)
-    q = len(v)
-    parts = sums.reshape(*sums.shape[:-1], -1, 2 + 2 * q)
-    n = np.where(parts[..., 1] > 0, parts[..., 1], 1.0)  # no pair adds 0 to both
-    first, second = parts[..., 2 : 2 + q], parts[..., 2 + q :]
-    expected = ((first @ v) * second).sum(axis=-1) / (n * n)
-    return 1.0 - divide((parts[..., 0] / n).sum(axis=-1), expected.sum(axis=-1))
-
-
-STRATIFIED_KERNEL = Kernel(features=_features, value=_value)
+def _stratified_influence(
+    coded: CodedRatings, tables: list[Integers], v: Weights, exact: bool
+) -> Influence:
+    # An item moves Σ_r D_o,r and Σ_r D_e,r in every stratum that it has a pair in,
+    # n / n_r times as often as one of the n_r items of the stratum.
+    slopes = {r: PairSlopes.of(t, v, exact) for r, t in enumerate(tables) if t.any()}
+    d_e = sum(of.d_e for of in slopes.values())
+    ratio = sum(of.d_o for of in slopes.values()) / d_e
+    rows, freq = distinct_rows(coded.codes, coded.n_categories)
+    freq = freq.astype(object if exact else np.float64)
+    u, terms = np.zeros((2, len(rows)), dtype=freq.dtype)
+    for r, of in slopes.items():
+        at = rows[:, 2 * r], rows[:, 2 * r + 1]
+        often = Fraction(coded.n_items, int(tables[r].sum()))
+        rate = (often if exact else float(often)) / d_e
+        u += ((ratio * of.expected - of.observed) * rate)[at]
+        terms += abs(of.observed * rate)[at]
+    return Influence(u, freq, terms)
 
 
 def pooled_kappa(
@@ -242,42 +211,57 @@ def pooled_kappa(
     """
     coded = code_pairs(pairs, categories)
     v = declared_weights(weights, coded.categories, declared=coded.declared)
-    q = coded.n_categories
-    tables = [pair_table(codes, q) for codes in pairs_of_raters(coded)]
-    found = PairSums.of(np.asarray(sum(tables[1:], tables[0])), v)
-    return kappa_of_sums(
-        found,
+    tables = _tables(coded)
+    table = np.asarray(sum(tables[1:], tables[0]))
+    return estimate_pairs(
+        PairSums.of(table, v),
         v,
         "pooled_kappa",
         "pooled kappa",
-        partial(_pooled_error, coded, found, v),
+        partial(
+            standard_error,
+            partial(_pooled_influence, coded, table, v),
+            coded.n_items,
+            None,
+        ),
         n_items=coded.n_items,
-        n_raters=sum(1 for table in tables if table.any()),
+        n_raters=sum(1 for of_rater in tables if of_rater.any()),
     )
 
 
-def _pooled_error(coded: CodedRatings, found: PairSums, v: Weights) -> float:
+def _pooled_influence(
+    coded: CodedRatings, table: Integers, v: Weights, exact: bool
+) -> Influence:
     # An item moves kappa by the sum of what its pairs do; items are the sample.
-    n_items, squares = coded.n_items, 0
-    rows, times = distinct_rows(coded.codes, coded.n_categories)
-    for row, often in zip(rows.tolist(), times.tolist(), strict=True):
-        cells = Counter(zip(row[::2], row[1::2], strict=True))
-        moved = sum(
-            t * found.influence(k, l, v)
-            for (k, l), t in cells.items()  # noqa: E741 - k, l as in the formula
-            if k >= 0 and l >= 0
-        )
-        squares += often * moved**2
-    return standard_error(squares * n_items**2, found.below**4, n_items, None)
+    slopes = PairSlopes.of(table, v, exact)
+    often = Fraction(coded.n_items, int(table.sum()))
+    rate = often if exact else float(often)
+    rows, freq = distinct_rows(coded.codes, coded.n_categories)
+    at = rows[:, ::2], rows[:, 1::2]
+    u = (slopes.influence() * rate)[at].sum(axis=1)
+    terms = abs(slopes.observed * (rate / slopes.d_e))[at].sum(axis=1)
+    return Influence(u, freq.astype(u.dtype), terms)
+
+
+def _stratified_features(coded: CodedRatings, v: Floats) -> Floats:
+    # (n_items, n_raters (2 + 2 n_categories)): each rater's pair features in turn
+    return np.hstack(pair_features(coded, pairs_of_raters(coded), v))
+
+
+def _stratified_value(sums: Floats, v: Floats) -> Floats:
+    # sums (..., n_raters (2 + 2 n_categories)) -> (...)
+    q = len(v)
+    parts = sums.reshape(*sums.shape[:-1], -1, 2 + 2 * q)
+    n = np.where(parts[..., 1] > 0, parts[..., 1], 1.0)  # no pair adds 0 to both
+    first, second = parts[..., 2 : 2 + q], parts[..., 2 + q :]
+    expected = ((first @ v) * second).sum(axis=-1) / (n * n)
+    return 1.0 - divide((parts[..., 0] / n).sum(axis=-1), expected.sum(axis=-1))
 
 
 def _pooled_features(coded: CodedRatings, v: Floats) -> Floats:
     # (n_items, 2 + 2 n_categories): sums of an item's pairs, as for Cohen's kappa
-    parts = [
-        COHEN_KERNEL.features(CodedRatings(codes=codes, categories=coded.categories), v)
-        for codes in pairs_of_raters(coded)
-    ]
-    return np.asarray(np.sum(parts, axis=0))
+    return np.asarray(np.sum(pair_features(coded, pairs_of_raters(coded), v), axis=0))
 
 
-POOLED_PAIRS_KERNEL = Kernel(features=_pooled_features, value=COHEN_KERNEL.value)
+STRATIFIED_KERNEL = Kernel(features=_stratified_features, value=_stratified_value)
+POOLED_PAIRS_KERNEL = Kernel(features=_pooled_features, value=PAIR_KERNEL.value)

@@ -4,25 +4,15 @@ from collections.abc import Sequence
 
 from numpy.typing import ArrayLike
 
-from masrel.agreement._counts import coded_items, count_table
+from masrel.agreement._counts import count_table
 from masrel.agreement._data import CodedRatings, code_ratings, complete
 from masrel.agreement._kernel import Floats, Kernel
 from masrel.agreement._labels import Label
-from masrel.agreement._pooled import Options, PooledCoefficient, pooled_estimate
-from masrel.agreement.cohen import two_raters
-from masrel.agreement.fleiss import (
-    FLEISS_KERNEL,
-    expected_disagreement,
-    expected_slopes,
-)
-from masrel.agreement.weights import WeightName, declared_weights
+from masrel.agreement._pairs import two_raters
+from masrel.agreement._pooled import PooledCoefficient, estimate_pooled
+from masrel.agreement.fleiss import FLEISS_KERNEL, shared_margins
+from masrel.agreement.weights import WeightName
 from masrel.estimates import Estimate
-
-__all__ = ["SCOTT_KERNEL", "scott_pi", "scott_pi_from_table"]
-
-_COEFFICIENT = PooledCoefficient(
-    "scott_pi", "Scott's pi", expected_disagreement, expected_slopes
-)
 
 
 def scott_pi(
@@ -78,15 +68,8 @@ def scott_pi(
     >>> round(scott_pi([["a", "a"], ["b", "b"], ["a", "b"]]).value, 3)
     0.333
     """
-    coded = code_ratings(ratings, categories)
-    coded = complete(two_raters(coded, _COEFFICIENT.title))
-    return pooled_estimate(
-        _COEFFICIENT,
-        coded_items(coded),
-        coded.n_raters,
-        declared_weights(weights, coded.categories, declared=coded.declared),
-        Options(population=population),
-    )
+    coded = complete(two_raters(code_ratings(ratings, categories), "Scott's pi"))
+    return estimate_pooled(_COEFFICIENT, coded, None, weights, population=population)
 
 
 def scott_pi_from_table(
@@ -128,13 +111,10 @@ def scott_pi_from_table(
     0.333
     """
     counted = count_table(table, categories=categories)
-    return pooled_estimate(
-        _COEFFICIENT,
-        counted.items,
-        counted.n_raters,
-        declared_weights(weights, counted.categories),
-        Options(population=population),
-    )
+    return estimate_pooled(_COEFFICIENT, counted, None, weights, population=population)
+
+
+_COEFFICIENT = PooledCoefficient("scott_pi", "Scott's pi", shared_margins)
 
 
 def _features(coded: CodedRatings, v: Floats) -> Floats:

@@ -8,17 +8,14 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache
+from functools import cache, cached_property, lru_cache
 from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from masrel.agreement._labels import Label
-from masrel.agreement.irrational import sine_squared, square_root
 from masrel.errors import ParameterError
-
-__all__ = ["WeightName", "Weights", "declared_weights", "identity_weights"]
 
 WeightName = Literal[
     "identity",
@@ -35,7 +32,7 @@ WeightName = Literal[
 _NAMES = get_args(WeightName)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Weights:
     """How much two categories disagree: v_kl = 1 - w_kl = numerators / denominator.
 
@@ -46,7 +43,7 @@ class Weights:
     n_categories : int
         Declared categories.
     numerators : tuple of tuple of int, shape (n_categories, n_categories), or None
-        None for identity weights, of which no matrix is ever made.
+        None for identity weights, of which no matrix of integers is ever made.
     denominator : int
         What the numerators are divided by.
     reason : str or None
@@ -59,37 +56,37 @@ class Weights:
     denominator: int = 1
     reason: str | None = None
 
-    def disagreement(self, counts: Sequence[int], size: int) -> int:
-        """Return Σ_kl v_kl n_k n_l of the counts of one item, times the denominator."""
-        if self.numerators is None:
-            return size * size - sum([n * n for n in counts])
-        return sum([n * v for n, v in zip(counts, self.products(counts), strict=True)])
-
-    def products(self, vector: Sequence[int]) -> list[int]:
-        """Return Σ_l v_kl x_l for every k, times the denominator."""
-        if self.numerators is None:
-            total = sum(vector)
-            return [total - x for x in vector]
-        return [
-            sum([v * x for v, x in zip(row, vector, strict=True) if x])
-            for row in self.numerators
-        ]
-
+    @cached_property
     def total(self) -> int:
-        """Return Σ_kl v_kl, times the denominator."""
+        """Σ_kl v_kl, times the denominator."""
         if self.numerators is None:
             return self.n_categories * (self.n_categories - 1)
         return sum(map(sum, self.numerators))
 
+    @cached_property
+    def floats(self) -> NDArray[np.float64]:
+        """The v_kl as floats, (n_categories, n_categories); ``nan`` for a reason."""
+        if self.reason is not None:
+            floats = np.full((self.n_categories, self.n_categories), np.nan)
+        elif self.numerators is None:
+            floats = 1.0 - np.eye(self.n_categories)
+        else:
+            w = self.denominator
+            floats = np.array([[v / w for v in row] for row in self.numerators])
+        floats.setflags(write=False)
+        return floats
+
+    @cached_property
+    def fractions(self) -> NDArray[Any]:
+        """The v_kl as fractions, (n_categories, n_categories)."""
+        q = range(self.n_categories)
+        rows = self.numerators or [[int(k != l) for l in q] for k in q]  # noqa: E741 - k, l as in the formulas
+        numerators: NDArray[Any] = np.array(rows, dtype=object)
+        return np.asarray(numerators * Fraction(1, self.denominator))
+
     def as_floats(self) -> NDArray[np.float64]:
         """Return v as floats, (n_categories, n_categories); ``nan`` for a reason."""
-        if self.reason is not None:
-            return np.full((self.n_categories, self.n_categories), np.nan)
-        if self.numerators is None:
-            return 1.0 - np.eye(self.n_categories)
-        return np.array(
-            [[v / self.denominator for v in row] for row in self.numerators]
-        )
+        return self.floats
 
 
 @cache
@@ -124,7 +121,7 @@ def declared_weights(
     Raises
     ------
     ParameterError
-        If the name is none, the matrix is no such matrix, the values of the
+        If the name is unknown, the matrix is not such a matrix, the values of the
         categories do not fit the weights, or text was not declared: its order is not
         known.
 
@@ -151,45 +148,54 @@ def declared_weights(
     >>> made.numerators, made.denominator
     (((0, 1, 2), (1, 0, 1), (2, 1, 0)), 2)
     """
+    if isinstance(weights, str):
+        return named_weights(weights, tuple(categories), declared)
+    _check_order(categories, declared)
+    return _of_matrix(weights, len(categories))
+
+
+@lru_cache(maxsize=64)
+def named_weights(name: str, categories: tuple[Label, ...], declared: bool) -> Weights:
+    """Return the weights of that name, made once for a scale."""
     n = len(categories)
-    named = isinstance(weights, str)
-    if named and weights not in _NAMES:
+    if name not in _NAMES:
         raise ParameterError(
-            f"weights: needs one of {', '.join(_NAMES)} or a matrix, got {weights!r}"
+            f"weights: needs one of {', '.join(_NAMES)} or a matrix, got {name!r}"
         )
-    if named and weights == "identity":
+    if name == "identity":
         return identity_weights(n)
-    if not declared and n > 1 and isinstance(categories[0], str):
+    _check_order(categories, declared)
+    values = category_values(categories)
+    if (reason := _absence(name, values)) is not None:
+        return Weights(name=name, n_categories=n, reason=reason)
+    if name == "ordinal":
+        values = [Fraction(rank) for rank in range(1, n + 1)]
+    distance = _DISTANCES[name](values)
+    matrix = every_pair(values, distance)
+    largest = max(map(max, matrix))
+    return over_one_denominator(
+        name, [[value / largest for value in row] for row in matrix]
+    )
+
+
+def _check_order(categories: Sequence[Label], declared: bool) -> None:
+    if not declared and len(categories) > 1 and isinstance(categories[0], str):
         raise ParameterError(
             "categories: weights need the declared scale in order, the ratings are "
             f"text: {', '.join(map(str, categories))}"
         )
-    if not isinstance(weights, str):
-        return _given(weights, n)
-    values = category_values(categories)
-    if (reason := _absence(weights, values)) is not None:
-        return Weights(name=weights, n_categories=n, reason=reason)
-    if weights == "ordinal":
-        values = [Fraction(rank) for rank in range(1, n + 1)]
-    matrix = _MAKERS[weights](values)
-    largest = max(map(max, matrix))
-    return over_one_denominator(
-        weights, [[value / largest for value in row] for row in matrix]
-    )
 
 
 def category_values(categories: Sequence[Label]) -> list[Fraction]:
     """Return what categories weigh: numbers by value, text by rank from 1."""
     if isinstance(categories[0], str):
         return [Fraction(rank) for rank in range(1, len(categories) + 1)]
-    found = []
     for value in categories:
         if not math.isfinite(float(value)):
             raise ParameterError(
                 f"categories: weights need finite numbers, got {value!r}"
             )
-        found.append(Fraction(value))
-    return found
+    return [Fraction(value) for value in categories]
 
 
 def _absence(weights: str, values: list[Fraction]) -> str | None:
@@ -203,11 +209,11 @@ def _absence(weights: str, values: list[Fraction]) -> str | None:
 
 
 _Matrix = list[list[Fraction]]
+_Distance = Callable[[Fraction, Fraction], Fraction]
 
 
-def every_pair(
-    values: list[Fraction], distance: Callable[[Fraction, Fraction], Fraction]
-) -> _Matrix:
+def every_pair(values: list[Fraction], distance: _Distance) -> _Matrix:
+    """Return the distance of every two values."""
     # 0 on the diagonal by definition, also where a formula would be 0/0
     return [
         [Fraction(0) if k == l else distance(x, y) for l, y in enumerate(values)]  # noqa: E741 - k, l as in the formulas
@@ -215,55 +221,71 @@ def every_pair(
     ]
 
 
-def _linear(values: list[Fraction]) -> _Matrix:
-    return every_pair(values, lambda x, y: abs(x - y))
-
-
-def _quadratic(values: list[Fraction]) -> _Matrix:
-    return every_pair(values, lambda x, y: (x - y) ** 2)
-
-
-def _radical(values: list[Fraction]) -> _Matrix:
+def _radical(values: list[Fraction]) -> _Distance:
     # √ of the share of the range, so that the largest is 1 exactly
     span = max(values) - min(values)
-    return every_pair(values, lambda x, y: square_root(abs(x - y) / span))
+    return lambda x, y: _square_root(abs(x - y) / span)
 
 
-def _ordinal(ranks: list[Fraction]) -> _Matrix:
-    # C(d + 1, 2) pairs of ranks lie between two ranks d apart, both included
-    return every_pair(ranks, lambda x, y: abs(x - y) * (abs(x - y) + 1) / 2)
-
-
-def _ratio(values: list[Fraction]) -> _Matrix:
-    return every_pair(values, lambda x, y: ((x - y) / (x + y)) ** 2)
-
-
-def _circular(values: list[Fraction]) -> _Matrix:
+def _circular(values: list[Fraction]) -> _Distance:
     turn = max(values) - min(values) + 1
-    return every_pair(values, lambda x, y: sine_squared(abs(x - y) / turn))
+    return lambda x, y: _sine_squared(abs(x - y) / turn)
 
 
-def _bipolar(values: list[Fraction]) -> _Matrix:
+def _bipolar(values: list[Fraction]) -> _Distance:
     low, high = min(values), max(values)
-
-    def distance(x: Fraction, y: Fraction) -> Fraction:
-        return (x - y) ** 2 / ((x + y - 2 * low) * (2 * high - x - y))
-
-    return every_pair(values, distance)
+    return lambda x, y: (x - y) ** 2 / ((x + y - 2 * low) * (2 * high - x - y))
 
 
-_MAKERS: dict[str, Callable[[list[Fraction]], _Matrix]] = {
-    "linear": _linear,
-    "quadratic": _quadratic,
-    "ordinal": _ordinal,
+def squared_ratio(x: Fraction, y: Fraction) -> Fraction:
+    """Return the square of the difference over the sum."""
+    return ((x - y) / (x + y)) ** 2
+
+
+# From the values to the distance of two of them, up to a common factor. Of ranks d
+# apart, C(d + 1, 2) pairs of ranks lie between, both included.
+_DISTANCES: dict[str, Callable[[list[Fraction]], _Distance]] = {
+    "linear": lambda _: lambda x, y: abs(x - y),
+    "quadratic": lambda _: lambda x, y: (x - y) ** 2,
+    "ordinal": lambda _: lambda x, y: abs(x - y) * (abs(x - y) + 1) / 2,
     "radical": _radical,
-    "ratio": _ratio,
+    "ratio": lambda _: squared_ratio,
     "circular": _circular,
     "bipolar": _bipolar,
 }
 
+# Roots and sines as fractions of 40 decimals: of a float, a difference of sums over
+# them would keep the rounding error.
+_SCALE = 10**40
+# π to 60 digits (OEIS A000796)
+_PI = Fraction(3141592653589793238462643383279502884197169399375105820974944, 10**60)
+
+
+def _square_root(value: Fraction) -> Fraction:
+    # √value, rounded down; exact for a square of such decimals
+    root = math.isqrt(value.numerator * _SCALE**2 // value.denominator)
+    return Fraction(root, _SCALE)
+
+
+def _sine_squared(turns: Fraction) -> Fraction:
+    # sin²(π · turns) = (1 - cos(2π · turns)) / 2
+    arc = min(turns, 1 - turns)  # sin² is the same on both sides of a half turn
+    angle = 2 * _PI * min(arc, Fraction(1, 2) - arc)  # in [0, π/2]
+    # Series of the cosine, in integers with ten digits more than are kept.
+    scale = _SCALE * 10**10
+    square = angle * angle
+    total, term, n = scale, scale, 0
+    while term:
+        n += 2
+        term = term * square.numerator // (square.denominator * n * (n - 1))
+        total += -term if n % 4 else term
+    if arc > Fraction(1, 4):
+        total = -total  # cos(π - x) = -cos x
+    return Fraction((scale - total + 10**10) // (2 * 10**10), _SCALE)
+
 
 def over_one_denominator(name: str, matrix: _Matrix) -> Weights:
+    """Return fractions of disagreement as weights."""
     denominator = math.lcm(*(value.denominator for row in matrix for value in row))
     return Weights(
         name=name,
@@ -276,7 +298,7 @@ def over_one_denominator(name: str, matrix: _Matrix) -> Weights:
     )
 
 
-def _given(weights: Any, n_categories: int) -> Weights:
+def _of_matrix(weights: Any, n_categories: int) -> Weights:
     try:
         table = np.asarray(weights)
     except ValueError as error:

@@ -1,7 +1,6 @@
-"""Distinct items and patterns, counted in whichever way, are those of a plain count."""
+"""Distinct items and rows, counted in whichever way, are those of a plain count."""
 
 from collections import Counter
-from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -22,19 +21,15 @@ from masrel.agreement import (
     percent_agreement_from_counts,
 )
 from masrel.agreement._counts import (
-    FewItems,
-    ItemTable,
-    ManyItems,
+    DistinctItems,
+    bilinear,
     check_counts,
     check_table,
-    coded_items,
     column_categories,
     distinct_rows,
     item_counts,
-    item_table,
     take_counts,
 )
-from masrel.agreement.influence import Linear
 from masrel.errors import CountsError, ParameterError
 
 Codes = NDArray[np.int8]
@@ -52,20 +47,18 @@ def random_codes(
 
 
 def plain_count(codes: Codes, n_categories: int) -> Counter[tuple[int, ...]]:
-    """Count items by what the word means: rating after rating."""
-    return Counter(
+    """Count items with a rating by what the word means: rating after rating."""
+    counted = Counter(
         tuple(row.count(k) for k in range(n_categories)) for row in codes.tolist()
     )
+    del counted[(0,) * n_categories]
+    return counted
 
 
-def found(table: ItemTable) -> Counter[tuple[int, ...]]:
-    if isinstance(table, FewItems):
-        rows, times = table.rows, table.times
-    else:
-        rows, times = table.counts.tolist(), table.times.tolist()
+def frequencies(items: DistinctItems) -> Counter[tuple[int, ...]]:
     counted: Counter[tuple[int, ...]] = Counter()
-    for row, n in zip(rows, times, strict=True):
-        counted[tuple(row)] += n
+    for row, n in zip(items.rows, items.freq, strict=True):
+        counted[tuple(map(int, row))] += int(n)
     return counted
 
 
@@ -88,9 +81,9 @@ def test_distinct_items_are_those_of_a_plain_count(
     shape: tuple[int, int, int],
 ) -> None:
     codes = random_codes(*shape)
-    table = coded_items(coded(codes, shape[2]))
+    table = DistinctItems.of_codes(coded(codes, shape[2]))
     assert table.n_categories == shape[2]
-    assert found(table) == plain_count(codes, shape[2])
+    assert frequencies(table) == plain_count(codes, shape[2])
 
 
 @given(
@@ -102,7 +95,7 @@ def test_counts_of_items_are_those_of_a_plain_count(rows: list[list[int]]) -> No
     assert [tuple(row) for row in counts.tolist()] == [
         tuple(row.count(k) for k in range(3)) for row in rows
     ]
-    assert found(take_counts(counts, None).items) == plain_count(codes, 3)
+    assert frequencies(take_counts(counts, None).items) == plain_count(codes, 3)
 
 
 @pytest.mark.parametrize("largest", [1, 9, 40, 10_000])
@@ -111,26 +104,26 @@ def test_equal_rows_of_a_table_of_counts_are_put_together(largest: int) -> None:
     rng = np.random.Generator(np.random.PCG64(2))
     counts = rng.integers(0, largest + 1, (1_500, 5))
     counts[0, 0] = largest
-    assert found(take_counts(counts, None).items) == Counter(
-        map(tuple, counts.tolist())
-    )
+    expected = Counter(map(tuple, counts.tolist()))
+    del expected[(0,) * 5]
+    assert frequencies(take_counts(counts, None).items) == expected
 
 
 @pytest.mark.parametrize("shape", [*SHAPES[:6], (300, 40, 4), (300, 70, 126)])
-def test_distinct_patterns_are_those_of_a_plain_count(
+def test_distinct_rows_are_those_of_a_plain_count(
     shape: tuple[int, int, int],
 ) -> None:
     codes = random_codes(*shape)
-    rows, times = distinct_rows(codes, shape[2])
-    assert rows.dtype == times.dtype == np.int64
-    pairs = zip(map(tuple, rows.tolist()), times.tolist(), strict=True)
+    rows, freq = distinct_rows(codes, shape[2])
+    assert rows.dtype == freq.dtype == np.int64
+    pairs = zip(map(tuple, rows.tolist()), freq.tolist(), strict=True)
     assert dict(pairs) == Counter(map(tuple, codes.tolist()))
 
 
 def test_a_pattern_of_missing_ratings_and_of_the_last_category_come_back() -> None:
     codes = np.array([[-1, -1, -1], [3, 3, 3], [-1, 3, -1], [3, 3, 3]], dtype=np.int8)
-    rows, times = distinct_rows(codes, 4)
-    assert sorted(zip(rows.tolist(), times.tolist(), strict=True)) == [
+    rows, freq = distinct_rows(codes, 4)
+    assert sorted(zip(rows.tolist(), freq.tolist(), strict=True)) == [
         ([-1, -1, -1], 1),
         ([-1, 3, -1], 1),
         ([3, 3, 3], 2),
@@ -143,41 +136,46 @@ NAMES = ["identity", "linear", "quadratic", "radical"]
 @pytest.mark.parametrize("name", NAMES)
 def test_few_and_many_items_have_the_same_sums(name: str) -> None:
     counts = item_counts(coded(random_codes(200, 4, 3), 3))
-    times = np.arange(200) % 5 + 1
-    few = FewItems(counts.tolist(), times.tolist(), 3)
-    many = ManyItems(counts, times)
-    weights = declared_weights(name, [1, 2, 4])  # type: ignore[arg-type]
-    exact, in_arrays = few.tally(weights).groups, many.tally(weights).groups
-    # an item of one rating has no disagreement, weighted or not
-    assert exact == in_arrays
-    assert [group.size for group in exact] == [1, 2, 3, 4]
-    slopes = [3, -1, 2]
-    function = Linear(
-        by_size={n: (n, 1 - n, 2) for n in range(1, 5)}, slopes=slopes, denominator=7
+    counts = counts[counts.any(axis=1)]
+    freq = np.arange(len(counts)) % 5 + 1
+    few = DistinctItems(list(map(tuple, counts.tolist())), freq.tolist(), 3)
+    many = DistinctItems(counts, freq, 3)
+    v = declared_weights(name, [1, 2, 4])  # type: ignore[arg-type]
+    assert few.sums(v) == many.sums(v)
+    assert [group.size for group in few.sums(v).groups] == [1, 2, 3, 4]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_bilinear_sums_are_those_of_the_matrix(name: str) -> None:
+    v = declared_weights(name, [1, 2, 4, 7])  # type: ignore[arg-type]
+    x, y = np.array([3, 0, 2, 5]), np.array([1, 4, 0, 2])
+    assert float(bilinear(v, x.tolist(), y.tolist()) / v.denominator) == pytest.approx(
+        float(x @ v.as_floats() @ y), rel=1e-15
     )
-    above, below = few.square_sum(weights, function)
-    as_float, one = many.square_sum(weights, function)
-    assert one == 1
-    assert as_float == pytest.approx(float(Fraction(above, below)), rel=1e-12)
+    assert v.total / v.denominator == pytest.approx(v.as_floats().sum(), rel=1e-15)
 
 
-def test_sums_of_groups_by_hand() -> None:
-    # (2, 0), (1, 1) twice, (0, 1), and nothing: pairs that differ: 0, 2, 2
-    table = FewItems([[2, 0], [1, 1], [0, 1], [0, 0]], [1, 2, 1, 4], 2)
-    one, two = table.tally(declared_weights("identity", ["a", "b"])).groups
+def test_sums_by_hand() -> None:
+    # (2, 0), (1, 1) twice and (0, 1): pairs that differ: 0, 2, 2
+    items = DistinctItems([(2, 0), (1, 1), (0, 1)], [1, 2, 1], 2)
+    sums = items.sums(declared_weights("identity", ["a", "b"]))
+    one, two = sums.groups
     assert (one.size, one.n_items, one.totals, one.disagreement) == (1, 1, [0, 1], 0)
     assert (two.size, two.n_items, two.totals, two.disagreement) == (2, 3, [4, 2], 4)
+    assert (sums.n_rated, sums.n_usable) == (4, 3)
+    assert sums.observed * 3 == sums.denominator * 2  # D_o = (0 + 1 + 1)/3
+    # shares, each a half: 2/2 + 1/2 + 1/2 of 4 items, and 1/2 + 1/2 + 1/1
+    assert sums.marginals == [sums.total // 2, sums.total // 2]
 
 
 def test_sums_that_pass_64_bits_stay_exact() -> None:
     # sizes of 2³², squared 2⁶⁴: n² Σ t = 3 · 2⁶⁴, of which a² + b² agree
     a, b = 2**32 - 1, 1
-    table = ManyItems(np.array([[a, b]]), np.array([3]))
-    (group,) = table.tally(declared_weights("identity", ["a", "b"])).groups
-    assert group.disagreement == 3 * 2 * a * b
-    assert group.totals == [3 * a, 3 * b]
-    (linear,) = table.tally(declared_weights("linear", [0, 1])).groups
-    assert linear.disagreement == 3 * 2 * a * b
+    items = DistinctItems.of_arrays(np.array([[a, b]] * 150), np.full(150, 3))
+    for name in ("identity", "linear"):
+        (group,) = items.sums(declared_weights(name, [0, 1])).groups  # type: ignore[arg-type]
+        assert group.disagreement == 150 * 3 * 2 * a * b
+        assert group.totals == [450 * a, 450 * b]
 
 
 def test_coefficients_of_huge_counts_are_exact() -> None:
@@ -187,12 +185,6 @@ def test_coefficients_of_huge_counts_are_exact() -> None:
     assert percent_agreement_from_counts(counts).value == (a - 1) / (2 * a - 1)
     few = percent_agreement_from_counts(counts[:2])
     assert few.value == (a - 1) / (2 * a - 1)
-
-
-def test_the_table_is_chosen_by_its_size() -> None:
-    counts = np.ones((_counts._FEW_COUNTS // 2, 2), dtype=np.int64)
-    assert isinstance(item_table(counts), FewItems)
-    assert isinstance(item_table(np.vstack([counts, counts])), ManyItems)
 
 
 @pytest.mark.parametrize(
@@ -209,10 +201,10 @@ def test_items_in_arrays_and_in_integers_give_the_same(
     rows = coded(random_codes(1_000, 7, 6, seed=3), 6)
     for weights in ("identity", "quadratic"):
         both = []
-        for few, kind in ((0, ManyItems), (10**9, FewItems)):
+        for few, kind in ((0, np.ndarray), (10**9, list)):
             with monkeypatch.context() as patched:
-                patched.setattr(_counts, "_FEW_COUNTS", few)
-                assert isinstance(coded_items(rows), kind)
+                patched.setattr(_counts, "_FEW", few)
+                assert isinstance(DistinctItems.of_codes(rows).rows, kind)
                 both.append(COEFFICIENTS[name](rows, weights=weights))  # type: ignore[arg-type]
         in_arrays, exact = both
         assert in_arrays.value == exact.value
@@ -234,6 +226,31 @@ def test_counted_ratings_are_counted_once() -> None:
     assert count_ratings(counted) is counted
     assert code_ratings(counted) is counted.coded
     assert (counted.n_raters, counted.coded.n_items) == (2, 2)
+
+
+@pytest.mark.parametrize(
+    ("n_items", "n_raters", "n_categories"),
+    [
+        (0, 3, 4),
+        (1, 1, 1),
+        (40, 5, 4),  # sorted with their keys
+        (1024, 3, 2),
+        (1025, 3, 2),  # counted in a table of keys
+        (1025, 8, 12),  # more keys than that
+        (50, 40, 4),  # a key is no integer of 64 bits
+    ],
+)
+def test_every_row_is_counted(n_items: int, n_raters: int, n_categories: int) -> None:
+    rng = np.random.default_rng(n_items + n_raters)
+    codes = rng.integers(-1, n_categories, (n_items, n_raters), dtype=np.int8)
+    codes[: n_items // 3] = codes[:1]
+    codes[n_items // 2 : n_items // 2 + 2] = -1
+    rows, freq = distinct_rows(codes, n_categories)
+    assert (rows.dtype, freq.dtype) == (np.int64, np.int64)
+    counted = dict(zip(map(tuple, rows.tolist()), freq.tolist(), strict=True))
+    assert counted == Counter(map(tuple, codes.tolist()))
+    if n_items > 1:
+        assert (rows[0] == -1).all()  # an item without ratings comes first
 
 
 @pytest.mark.parametrize(

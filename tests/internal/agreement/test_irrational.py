@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from masrel.agreement.irrational import sine_squared, square_root
+from masrel.agreement.weights import _sine_squared, _square_root
 
 ULP = Fraction(1, 10**40)  # the last of 40 decimals
 
@@ -20,14 +20,14 @@ def as_fraction(value: mpmath.mpf) -> Fraction:
 
 @given(shares)
 def test_a_root_is_rounded_down_to_forty_decimals(value: Fraction) -> None:
-    root = square_root(value)
+    root = _square_root(value)
     assert root**2 <= value < (root + ULP) ** 2
 
 
 @given(st.integers(0, 10**9), st.integers(1, 12))
 def test_roots_of_squares_of_decimals_are_exact(whole: int, decimals: int) -> None:
     root = Fraction(whole, 10**decimals)
-    assert square_root(root**2) == root
+    assert _square_root(root**2) == root
 
 
 @given(shares)
@@ -35,7 +35,7 @@ def test_sines_are_right_to_forty_decimals(turns: Fraction) -> None:
     with mpmath.workdps(70):
         x = mpmath.mpf(turns.numerator) / turns.denominator
         peer = as_fraction(mpmath.sin(mpmath.pi * x) ** 2)
-    assert abs(sine_squared(turns) - peer) <= ULP
+    assert abs(_sine_squared(turns) - peer) <= ULP
 
 
 @pytest.mark.parametrize(
@@ -54,21 +54,21 @@ def test_sines_are_right_to_forty_decimals(turns: Fraction) -> None:
     ],
 )
 def test_rational_sines_are_exact(turns: Fraction, value: Fraction) -> None:
-    assert sine_squared(turns) == value
+    assert _sine_squared(turns) == value
 
 
 @given(shares)
 def test_equal_arcs_have_equal_sines(turns: Fraction) -> None:
-    assert sine_squared(turns) == sine_squared(1 - turns)
+    assert _sine_squared(turns) == _sine_squared(1 - turns)
 
 
 @given(st.fractions(0, Fraction(1, 2), max_denominator=10**6))
 def test_sine_and_cosine_sum_to_one(turns: Fraction) -> None:
     # sin² x + sin² (π/2 - x) = 1; each of the two is rounded
-    total = sine_squared(turns) + sine_squared(Fraction(1, 2) - turns)
+    total = _sine_squared(turns) + _sine_squared(Fraction(1, 2) - turns)
     assert abs(total - 1) <= ULP
 
 
 def test_roots_of_zero_and_one() -> None:
-    assert square_root(Fraction(0)) == 0
-    assert square_root(Fraction(1)) == 1
+    assert _square_root(Fraction(0)) == 0
+    assert _square_root(Fraction(1)) == 1
