@@ -67,7 +67,8 @@ def bootstrap(
     exact : {"auto", True, False}, optional
         Whether every distinct resample is taken with its probability, instead of
         drawing some: then nothing is random. "auto" does so up to 300 000 resamples, or
-        different sums of features; 60 000 resamples for "studentized".
+        different sums of features; 60 000 resamples for "studentized". True also takes
+        up to a million resamples, 300 000 for "studentized".
     clusters : sequence, shape (n_items,), optional
         Label of the cluster each item belongs to, for target "items": clusters are
         drawn whole. Several stretches of one haptic model are such a cluster.
