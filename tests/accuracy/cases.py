@@ -51,7 +51,7 @@ class Case:
     n_categories: int = 2
     values: Sequence[int | float] = ()
     weights: Sequence[str] = ("identity",)
-    slow: bool = field(default=False, compare=False)
+    long: bool = field(default=False, compare=False)  # minutes in fractions
 
     @property
     def scale(self) -> tuple[int | float, ...]:
@@ -281,7 +281,7 @@ CATEGORIES = [
         "200 categories, 400 items × 3 raters",
         rows=_rated(3, (400, 3), 200, alike=0.7),
         n_categories=200,
-        slow=True,
+        long=True,
     ),
     Case(
         "Many categories",
@@ -290,7 +290,7 @@ CATEGORIES = [
             [(k * m) % 7 + 10**6 * (k == m) for m in range(200)] for k in range(200)
         ],
         n_categories=200,
-        slow=True,
+        long=True,
     ),
 ]
 

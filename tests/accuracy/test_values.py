@@ -38,7 +38,7 @@ def wrong_with(case: Case, weights: Sequence[str]) -> list[str]:
             case,
             weights,
             id=f"{case.name}-{weights}",
-            marks=[pytest.mark.slow] if case.slow else [],
+            marks=[pytest.mark.long] if case.long else [],
         )
         for case in CASES
         for weights in case.weights
@@ -65,7 +65,7 @@ def test_estimates_of_drawn_tables_are_exact(kind: str, data: st.DataObject) -> 
     assert wrong_with(case, ["identity", data.draw(drawn.weights)]) == []
 
 
-@pytest.mark.slow
+@pytest.mark.long  # the test before draws 50
 @kinds
 @settings(max_examples=1000)
 @given(data=st.data())

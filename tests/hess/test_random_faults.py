@@ -1,8 +1,8 @@
 """Random sequences of faults, presentation after presentation: what always holds.
 
 Hypothesis plans faults of readings, commands, clock, model and people at random times,
-presents, and looks at what was sent; then plans more. The slow run has thousands of
-sequences, the usual one enough to see that it works.
+presents, and looks at what was sent; then plans more. The run by hand has thousands of
+sequences, the slow one a tenth, the usual one enough to see that it works.
 """
 
 import math
@@ -248,18 +248,26 @@ QUICK = settings(
     deadline=None,
     suppress_health_check=list(HealthCheck),
 )
-MANY = settings(QUICK, max_examples=2000, stateful_step_count=20)
+HUNDREDS = settings(QUICK, max_examples=200, stateful_step_count=20)
+THOUSANDS = settings(HUNDREDS, max_examples=2000)
 
 
 class TestSomeSequences(Faults.TestCase):
     settings = QUICK
 
 
-@pytest.mark.slow
-class TestThousandsOfSequences(Faults.TestCase):
-    settings = MANY
-
+class Counted:
     def runTest(self) -> None:  # noqa: N802 - unittest's name
         Faults.n_presented = 0
         super().runTest()
-        assert Faults.n_presented >= 2000
+        assert Faults.n_presented >= self.settings.max_examples
+
+
+@pytest.mark.slow
+class TestHundredsOfSequences(Counted, Faults.TestCase):
+    settings = HUNDREDS
+
+
+@pytest.mark.long
+class TestThousandsOfSequences(Counted, Faults.TestCase):
+    settings = THOUSANDS

@@ -282,9 +282,8 @@ def assert_invariants(faults: tuple[InjectedFault, ...]) -> None:
 
 
 few = settings(deadline=None, max_examples=8)
-many = settings(
-    deadline=None, max_examples=1000, suppress_health_check=[HealthCheck.too_slow]
-)
+hundred = settings(few, max_examples=100, suppress_health_check=[HealthCheck.too_slow])
+thousand = settings(hundred, max_examples=1000)
 
 
 @few
@@ -297,7 +296,16 @@ def test_some_sequences_of_faults_leave_no_torque(
 
 
 @pytest.mark.slow
-@many
+@hundred
+@given(fault_sequences())
+def test_a_hundred_sequences_of_faults_leave_no_torque(
+    faults: tuple[InjectedFault, ...],
+) -> None:
+    assert_invariants(faults)
+
+
+@pytest.mark.long
+@thousand
 @given(fault_sequences())
 def test_a_thousand_sequences_of_faults_leave_no_torque(
     faults: tuple[InjectedFault, ...],
