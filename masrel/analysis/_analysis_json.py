@@ -61,12 +61,13 @@ def write_analysis(analysis: Analysis, path: Path) -> None:
 
 def _with_inputs(part: object, analysis: Analysis) -> dict[str, object]:
     # A line of the plan reads best beside its numbers.
-    named = {**_fields(getattr(part, "line", None)), **_fields(part)}
+    named = {**plain_fields(getattr(part, "line", None)), **plain_fields(part)}
     named.pop("line", None)
     return {**named, "inputs": dict(analysis.inputs)}
 
 
-def _fields(part: object) -> dict[str, object]:
+def plain_fields(part: object) -> dict[str, object]:
+    """Return the fields of a result as plain values for JSON, ``nan`` as None."""
     if isinstance(part, msgspec.Struct):
         part = msgspec.structs.asdict(part)
     elif dataclasses.is_dataclass(part):
@@ -81,7 +82,7 @@ def _plain(value: object) -> object:
     if isinstance(value, Interval):
         return as_document(value)
     if dataclasses.is_dataclass(value) or isinstance(value, msgspec.Struct | Mapping):
-        return _fields(value)
+        return plain_fields(value)
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, tuple | list):

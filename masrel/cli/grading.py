@@ -1,7 +1,5 @@
 """``masrel grading``: what grades follow, by ordered regression."""
 
-import math
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -57,6 +55,7 @@ def grading(
     """
     output.check_files()
     from masrel.analysis import grade_regression
+    from masrel.analysis._analysis_json import plain_fields
 
     data = read_study(study, ratings_file)
     with warnings_as_notes():
@@ -70,24 +69,9 @@ def grading(
         )
     write_output(
         output,
-        document=lambda: _document(regression),
+        document=lambda: plain_fields(regression),
         text=lambda: _table(regression),
     )
-
-
-def _document(regression: "GradeRegression") -> dict[str, object]:
-    return {key: _plain(value) for key, value in asdict(regression).items()}
-
-
-def _plain(value: object) -> object:
-    # JSON has no nan and no infinity
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    if isinstance(value, dict):
-        return {key: _plain(part) for key, part in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(part) for part in value]
-    return value
 
 
 def _table(regression: "GradeRegression") -> "Table":
