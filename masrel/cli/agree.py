@@ -23,8 +23,7 @@ if TYPE_CHECKING:
     from masrel.ratings import Ratings
     from masrel.report._agreement_table import AgreementRow
 
-_USUAL = ("percent_agreement", "fleiss_kappa")
-_ALL = ("all",)
+_USUAL = "percent_agreement,fleiss_kappa"
 
 _NO_INTERVAL = (
     "no interval: say what a new study would draw anew, with --target raters, items "
@@ -46,20 +45,13 @@ class _EstimateOptions:
     seed: int
     words: "BandScale | None"  # whose words for values
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The coefficients one by one, or ``("all",)``."""
-        if self.coefficients is None:
-            return _USUAL
-        return tuple(split_commas(self.coefficients))
-
 
 _estimate_options = grouped(
     "options",
     _EstimateOptions,
     click.option(
         "--coefficients",
-        show_default=",".join(_USUAL),
+        show_default=_USUAL,
         help="Names of coefficients, separated by commas, or all.",
     ),
     click.option(
@@ -178,7 +170,9 @@ def _estimate_session(
     matrix = rating_matrix(ratings, session=session)
     values = ratings.scale.values
     counted = count_ratings(ratings.scale.weigh(matrix.grades), values)
-    names = options.names
+    is_named = options.coefficients is not None
+    names = (_USUAL if options.coefficients is None else options.coefficients).strip()
+    takes_all = names == "all"
     rows: list[AgreementRow] = []
     refused: list[MasrelError] = []
     for entry in _entries(names, len(matrix.raters)):
@@ -186,13 +180,13 @@ def _estimate_session(
         weights: WeightName = options.weights if entry.weighted else "identity"
         if weights != "identity":
             title += f", {weights}"
-        elif weights != options.weights and names != _ALL:
+        elif weights != options.weights and not takes_all:
             notes.append("unweighted, there are no weights for it")
         estimate = entry(
             counted, categories=values, weights=weights, level=options.level
         )
         # An interval that a coefficient comes with is not computed a second time.
-        is_done = entry.has_interval and (options.interval == "auto" or names == _ALL)
+        is_done = entry.has_interval and (options.interval == "auto" or takes_all)
         if options.target is not None and not is_done:
             try:
                 interval = _interval(
@@ -200,7 +194,7 @@ def _estimate_session(
                 )
                 estimate = replace(estimate, interval=interval)
             except MasrelError as error:
-                if options.coefficients is not None and names != _ALL:
+                if is_named and not takes_all:
                     raise  # just these were named: each must have the interval
                 refused.append(error)
                 notes.append(f"no interval: {error}")
@@ -209,21 +203,21 @@ def _estimate_session(
                 session=session, title=title, estimate=estimate, notes=tuple(notes)
             )
         )
-    if names != _ALL and refused and len(refused) == len(rows):
+    if not takes_all and refused and len(refused) == len(rows):
         raise refused[0]
     return rows
 
 
-def _entries(names: tuple[str, ...], n_raters: int) -> list["Coefficient"]:
+def _entries(names: str, n_raters: int) -> list["Coefficient"]:
     from masrel.agreement import COEFFICIENTS, coefficient
 
-    if names == _ALL:
+    if names == "all":
         return [
             entry
             for entry in COEFFICIENTS.values()
             if entry.shape == "ratings" and n_raters <= (entry.n_raters[1] or n_raters)
         ]
-    entries = [coefficient(name) for name in names]
+    entries = [coefficient(name) for name in split_commas(names)]
     for entry in entries:
         if entry.shape == "pairs":
             raise ParameterError(
