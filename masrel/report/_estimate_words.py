@@ -27,6 +27,9 @@ _POPULATIONS = {
 NOT_THERE = "not in these data"
 """What is shown where a plan's estimate is not."""
 
+_ONE_SIDED = "one-sided"
+"""End of the method of a bound."""
+
 _WIDENED = "and the spread of raters"
 """End of the method of a posterior that was widened by what raters differ by."""
 
@@ -76,7 +79,7 @@ def interval_name(interval: Interval) -> str:
 
 def meaning(interval: Interval, noun: Noun) -> str:
     """Return in one sentence what an interval promises and what it was made from."""
-    kind = "bound" if _is_bound(interval) else "interval"
+    kind = "bound" if interval.method.endswith(_ONE_SIDED) else "interval"
     name = f"{interval.kind.capitalize()} {kind}"
     return f"{name}{origin(interval, noun)}: {promise(interval, noun)}."
 
@@ -96,7 +99,8 @@ def promise(interval: Interval, noun: Noun) -> str:
         premises = "these ratings and the prior"
     elif interval.method.startswith("Dirichlet-multinomial"):  # it knows of no rater
         premises = "these ratings, the prior and raters who differ by chance alone"
-    where = "above the lower end" if _is_bound(interval) else "inside"
+    is_bound = interval.method.endswith(_ONE_SIDED)
+    where = "above the lower end" if is_bound else "inside"
     return (
         f"given {premises}, the value that would be found if {population}, "
         f"without end, lies {where} with probability {level}"
@@ -120,12 +124,8 @@ def origin(interval: Interval, noun: Noun) -> str:
 
 def aside(interval: Interval) -> str:
     """Return in few words how the ends differ from quantiles of the distribution."""
-    if _is_bound(interval):
-        return "one-sided"
+    if interval.method.endswith(_ONE_SIDED):
+        return _ONE_SIDED
     if interval.method.endswith(_WIDENED):
         return "posterior, wider by the spread of raters"
     return ""
-
-
-def _is_bound(interval: Interval) -> bool:
-    return interval.method.endswith("one-sided")

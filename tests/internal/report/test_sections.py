@@ -1,10 +1,7 @@
 """Sections: what they say, and that they say it when there is nothing."""
 
-import csv
 import dataclasses
-import re
 from math import radians
-from pathlib import Path
 
 import msgspec
 import pandas as pd
@@ -14,7 +11,6 @@ from masrel.analysis import analyze
 from masrel.elbow import ConstantSpeed, peak_torque
 from masrel.protocol import elbow_parameters
 from masrel.ratings import Ratings
-from masrel.report import ReportFiles, write_report
 from masrel.report._document import SECTIONS
 from masrel.report._material import Drawing, Material, Paragraph, gather
 from masrel.report._tables import Table, as_text
@@ -41,12 +37,6 @@ def material(rows: Ratings, *sections: str) -> Material:
 def said(rows: Ratings, section: str) -> list[str]:
     (made,) = build_sections(material(rows, section))
     return [block.text for block in made.blocks if isinstance(block, Paragraph)]
-
-
-def rows_of(files: ReportFiles, name: str) -> list[dict[str, str]]:
-    (path,) = [path for path in files.tables if path.stem == name]
-    with path.open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
 
 
 def test_every_section_of_a_protocol_is_made_here() -> None:
@@ -126,42 +116,6 @@ def test_the_mean_agreement_is_told_with_its_deviation() -> None:
         "Mean over the 4 standard models: 84.4 % (standard deviation between models "
         "12.0, n − 1)."
     ]
-
-
-def test_in_person_pairs_and_remarks_are_told(published: ReportFiles) -> None:
-    text = published.markdown.read_text(encoding="utf-8")
-    assert "11 of 11 pairs are equal (100.0 %)" in text
-    assert "absent by Table IV and its footnote" in text
-    rows = rows_of(published, "in_person")
-    assert len(rows) == 11
-    assert {row["equal"] for row in rows} == {"yes"}
-
-
-def test_the_peaks_are_those_of_the_law(published: ReportFiles) -> None:
-    # R1 stretched HM1 at 122 deg/s from 30 deg to the end of the range, 146 deg.
-    protocol = hess2012()
-    motion = ConstantSpeed(start=radians(30), end=radians(146), speed=radians(122))
-    peak = peak_torque(elbow_parameters(protocol, "HM1"), motion)
-    (hm1, *_) = rows_of(published, "peak_torque")
-    assert float(hm1["R1_nm"]) == peak
-    own = [float(hm1[f"R{n}_nm"]) for n in range(1, 9)]
-    assert (float(hm1["least_nm"]), float(hm1["most_nm"])) == (min(own), max(own))
-
-
-def test_traces_are_called_reconstructions(published: ReportFiles) -> None:
-    text = published.markdown.read_text(encoding="utf-8")
-    assert "reconstructions, not measurements" in text
-    assert "published mean speeds" in text
-
-
-def test_the_parameters_are_shown_as_they_were_given(tmp_path: Path) -> None:
-    protocol = protocol_with(sections=("design",))
-    first = msgspec.structs.replace(protocol.models[0], residual_ratio=0.1255)
-    protocol = msgspec.structs.replace(protocol, models=(first, *protocol.models[1:]))
-    rows = table_v()
-    files = write_report(protocol, rows, analyze(protocol, rows), tmp_path)
-    text = files.markdown.read_text(encoding="utf-8")
-    assert re.search(r"\| HM1 \| standard \| 1 \| 130 \| 1.40 \| 0.1255 \| 60 \|", text)
 
 
 def with_laws(elbow: dict[str, object], own: dict[str, object]) -> Material:

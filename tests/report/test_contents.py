@@ -1,0 +1,56 @@
+"""What a report says of its data, in the files that it writes."""
+
+import csv
+import re
+from math import radians
+from pathlib import Path
+
+import msgspec
+
+from masrel.analysis import analyze
+from masrel.elbow import ConstantSpeed, peak_torque
+from masrel.protocol import elbow_parameters
+from masrel.report import ReportFiles, write_report
+from tests.analysis.studies import hess2012, protocol_with, table_v
+
+
+def rows_of(files: ReportFiles, name: str) -> list[dict[str, str]]:
+    (path,) = [path for path in files.tables if path.stem == name]
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_in_person_pairs_and_remarks_are_told(published: ReportFiles) -> None:
+    text = published.markdown.read_text(encoding="utf-8")
+    assert "11 of 11 pairs are equal (100.0 %)" in text
+    assert "absent by Table IV and its footnote" in text
+    rows = rows_of(published, "in_person")
+    assert len(rows) == 11
+    assert {row["equal"] for row in rows} == {"yes"}
+
+
+def test_the_peaks_are_those_of_the_law(published: ReportFiles) -> None:
+    # R1 stretched HM1 at 122 deg/s from 30 deg to the end of the range, 146 deg.
+    protocol = hess2012()
+    motion = ConstantSpeed(start=radians(30), end=radians(146), speed=radians(122))
+    peak = peak_torque(elbow_parameters(protocol, "HM1"), motion)
+    (hm1, *_) = rows_of(published, "peak_torque")
+    assert float(hm1["R1_nm"]) == peak
+    own = [float(hm1[f"R{n}_nm"]) for n in range(1, 9)]
+    assert (float(hm1["least_nm"]), float(hm1["most_nm"])) == (min(own), max(own))
+
+
+def test_traces_are_called_reconstructions(published: ReportFiles) -> None:
+    text = published.markdown.read_text(encoding="utf-8")
+    assert "reconstructions, not measurements" in text
+    assert "published mean speeds" in text
+
+
+def test_the_parameters_are_shown_as_they_were_given(tmp_path: Path) -> None:
+    protocol = protocol_with(sections=("design",))
+    first = msgspec.structs.replace(protocol.models[0], residual_ratio=0.1255)
+    protocol = msgspec.structs.replace(protocol, models=(first, *protocol.models[1:]))
+    rows = table_v()
+    files = write_report(protocol, rows, analyze(protocol, rows), tmp_path)
+    text = files.markdown.read_text(encoding="utf-8")
+    assert re.search(r"\| HM1 \| standard \| 1 \| 130 \| 1.40 \| 0.1255 \| 60 \|", text)
