@@ -133,6 +133,16 @@ def test_studentized_has_the_error_of_every_resample() -> None:
         assert ours.high == pytest.approx(min(high, 1.0), abs=1e-7)
 
 
+def test_resamples_whose_standard_error_is_0_are_noted_with_their_probability() -> None:
+    # Two items agree and one does not. Drawn three times, the first two alone (8 of 27)
+    # or the third alone (1 of 27) give an agreement without spread, off by 1/3 or 2/3.
+    found = exact("percent_agreement", [[0, 0], [1, 1], [0, 1]], kind="studentized")
+    assert (
+        "resamples of probability 0.33 have a standard error of 0: their studentized "
+        "values are infinite"
+    ) in found.notes
+
+
 @pytest.mark.parametrize("whole", [True, False])
 def test_raters_in_all_their_resamples(whole: bool) -> None:
     table: list[list[int | None]] = [
