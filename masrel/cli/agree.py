@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from masrel.ratings import Ratings
     from masrel.report._agreement_table import AgreementRow
 
-_USUAL = "percent_agreement,fleiss_kappa"
+_USUAL = ["percent_agreement", "fleiss_kappa"]
 
 _NO_INTERVAL = (
     "no interval: say what a new study would draw anew, with --target raters, items "
@@ -51,7 +51,7 @@ _estimate_options = grouped(
     _EstimateOptions,
     click.option(
         "--coefficients",
-        show_default=_USUAL,
+        show_default=",".join(_USUAL),
         help="Names of coefficients, separated by commas, or all.",
     ),
     click.option(
@@ -171,8 +171,10 @@ def _estimate_session(
     values = ratings.scale.values
     counted = count_ratings(ratings.scale.weigh(matrix.grades), values)
     is_named = options.coefficients is not None
-    names = (_USUAL if options.coefficients is None else options.coefficients).strip()
-    takes_all = names == "all"
+    names = (
+        _USUAL if options.coefficients is None else split_commas(options.coefficients)
+    )
+    takes_all = names == ["all"]
     rows: list[AgreementRow] = []
     refused: list[MasrelError] = []
     for entry in _entries(names, len(matrix.raters)):
@@ -208,16 +210,16 @@ def _estimate_session(
     return rows
 
 
-def _entries(names: str, n_raters: int) -> list["Coefficient"]:
+def _entries(names: list[str], n_raters: int) -> list["Coefficient"]:
     from masrel.agreement import COEFFICIENTS, coefficient
 
-    if names == "all":
+    if names == ["all"]:
         return [
             entry
             for entry in COEFFICIENTS.values()
             if entry.shape == "ratings" and n_raters <= (entry.n_raters[1] or n_raters)
         ]
-    entries = [coefficient(name) for name in split_commas(names)]
+    entries = [coefficient(name) for name in names]
     for entry in entries:
         if entry.shape == "pairs":
             raise ParameterError(
