@@ -170,26 +170,24 @@ def aligned(
     rows: Sequence[Sequence[str]], aligns: Sequence[Align], *, rule: bool = False
 ) -> list[str]:
     """Return rows of cells as lines that line up, with a rule below the first."""
-    widths = [max(map(_width, cells)) for cells in zip(*rows, strict=True)]
-    if rule:
-        rows = [rows[0], ["-" * width for width in widths], *rows[1:]]
+    # combining marks take no column of the screen
+    sizes = [
+        [sum(not unicodedata.combining(letter) for letter in cell) for cell in cells]
+        for cells in rows
+    ]
+    widths = [max(column) for column in zip(*sizes, strict=True)]
     lines = []
-    for cells in rows:
-        spaces = [
-            " " * (width - _width(cell))
-            for cell, width in zip(cells, widths, strict=True)
-        ]
+    for row in zip(rows, sizes, strict=True):
         padded = [
-            space + cell if align == "right" else cell + space
-            for cell, space, align in zip(cells, spaces, aligns, strict=True)
+            " " * (width - size) + cell
+            if align == "right"
+            else cell + " " * (width - size)
+            for cell, size, width, align in zip(*row, widths, aligns, strict=True)
         ]
         lines.append("  ".join(padded).rstrip())
+    if rule:
+        lines.insert(1, "  ".join("-" * width for width in widths))
     return lines
-
-
-def _width(text: str) -> int:
-    # combining marks take no column of the screen
-    return sum(1 for letter in text if not unicodedata.combining(letter))
 
 
 def _caption(table: Table) -> str:

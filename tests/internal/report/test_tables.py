@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from masrel.report._tables import (
     Column,
     Table,
+    aligned,
     as_csv,
     as_entered,
     as_latex,
@@ -17,10 +18,12 @@ from masrel.report._tables import (
     cell_text,
     counted,
     entered_decimals,
+    fixed_or_significant,
     interval_text,
     number,
     page_cells,
     percent,
+    significant,
     whole_or_tenths,
 )
 
@@ -147,3 +150,15 @@ def test_letters_that_latex_reads_as_its_own_are_escaped() -> None:
     text = as_latex(example("simulated"))
     assert r"\caption{SIMULATED DATA. Values by model}" in text
     assert "HM3 & -- \\\\" in text
+
+
+def test_a_number_too_small_or_large_for_its_decimals_keeps_four_digits() -> None:
+    shown = [fixed_or_significant(x, 3) for x in (0.0, 0.01, 0.0099, -2.5, 12345678.9)]
+    assert shown == ["0.000", "0.010", "0.0099", "-2.500", "1.235e+07"]
+    assert significant(92.0) == "92"
+    assert significant(0.123456, 3) == "0.123"
+
+
+def test_marks_above_letters_take_no_column() -> None:
+    rows = [["law", "N"], ["θ̇", "1"]]
+    assert aligned(rows, ["left", "right"]) == ["law  N", "θ̇    1"]
