@@ -4,7 +4,7 @@ import math
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import get_args
+from typing import NoReturn, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -61,7 +61,7 @@ class IntervalProblem:
     def values_without(self, sums: Floats, rows: Floats) -> Floats:
         """Return the coefficient for sums less each row of features, (n_rows,)."""
         if len(rows) <= _BLOCK:
-            return self.values(sums - rows)
+            return self.kernel.value(sums - rows, self.v)
         return np.concatenate(
             [self.values(sums - rows[block]) for block in blocks(len(rows))]
         )
@@ -152,7 +152,10 @@ def pose_problem(
     if not 0.0 < level < 1.0:
         raise ParameterError(f"level: needs (0, 1), got {level}")
     coded = entry.code(ratings, categories)
-    _check_raters(entry, coded)
+    fewest, most = entry.n_raters
+    n_raters = coded.codes.shape[1]
+    if entry.shape == "ratings" and not fewest <= n_raters <= (most or n_raters):
+        _refuse_raters(entry, n_raters)
     kernel = entry.kernel
     if kernel is None:
         raise ParameterError(
@@ -194,14 +197,10 @@ def find_entry(statistic: Statistic) -> Coefficient:
     return coefficient(getattr(statistic, "__name__", repr(statistic)))
 
 
-def _check_raters(entry: Coefficient, coded: CodedRatings) -> None:
+def _refuse_raters(entry: Coefficient, n_raters: int) -> NoReturn:
     fewest, most = entry.n_raters
-    n_raters = coded.codes.shape[1]
-    if entry.shape == "ratings" and (
-        n_raters < fewest or (most is not None and n_raters > most)
-    ):
-        needed = f"{fewest}" if most == fewest else f"at least {fewest}"
-        raise ParameterError(f"{entry.title} needs {needed} raters, got {n_raters}")
+    needed = f"{fewest}" if most == fewest else f"at least {fewest}"
+    raise ParameterError(f"{entry.title} needs {needed} raters, got {n_raters}")
 
 
 def _features(kernel: Kernel, coded: CodedRatings, v: Floats) -> Floats:
