@@ -58,7 +58,7 @@ class Interval:
     low, high : float
         Endpoints; ``nan`` when undefined.
     level : float
-        Nominal level, 0.95 unless asked otherwise.
+        Nominal level, 0.95 unless stated otherwise.
     kind : {"confidence", "credible"}
         What the level promises.
     method : str
@@ -100,24 +100,24 @@ class Interval:
     distribution: Distribution | None = field(default=None, compare=False, repr=False)
 
 
-T = TypeVar("T")
+_T = TypeVar("_T")
 
 
-class OnDemand(Generic[T]):
+class OnDemand(Generic[_T]):
     """A field of a dataclass, or a call that computes it when it is first read."""
 
     def __set_name__(self, owner: type, name: str) -> None:
         self._name = name
 
-    def __get__(self, instance: object, owner: type) -> T:
+    def __get__(self, instance: object, owner: type) -> _T:
         if instance is None:  # asked for a default: there is none
             raise AttributeError(self._name)
-        value: T | Callable[[], T] = instance.__dict__[self._name]
+        value: _T | Callable[[], _T] = instance.__dict__[self._name]
         if callable(value):
             value = instance.__dict__[self._name] = value()
         return value
 
-    def __set__(self, instance: object, value: T | Callable[[], T]) -> None:
+    def __set__(self, instance: object, value: _T | Callable[[], _T]) -> None:
         instance.__dict__[self._name] = value
 
 

@@ -61,11 +61,12 @@ class Scale:
         (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
         """
         try:
-            found = tuple(float(grade) for grade in self.grades)
+            numbers = tuple(float(grade) for grade in self.grades)
         except ValueError:
             return tuple(float(rank) for rank in range(1, len(self.grades) + 1))
-        distinct = len(set(found)) == len(found) and all(map(math.isfinite, found))
-        return found if distinct else tuple(map(float, range(1, len(found) + 1)))
+        distinct = len(set(numbers)) == len(numbers)
+        distinct = distinct and all(map(math.isfinite, numbers))
+        return numbers if distinct else tuple(map(float, range(1, len(numbers) + 1)))
 
     def weigh(self, rows: Iterable[Iterable[str | None]]) -> list[list[float | None]]:
         """Replace grades by their values.

@@ -7,6 +7,7 @@ In: item × rater labels (or counts, or a contingency table). Out: an `Estimate`
 from masrel.agreement._counts import CountedRatings, count_ratings, count_table
 from masrel.agreement._data import CodedRatings, code_long, code_ratings
 from masrel.agreement._labels import Label
+from masrel.agreement._weights import WeightName, Weights, declared_weights
 from masrel.agreement.benchmarks import Band, BandScale, bands, benchmark, strength
 from masrel.agreement.brennan_prediger import (
     brennan_prediger,
@@ -16,6 +17,7 @@ from masrel.agreement.category import category_kappa, fleiss_null
 from masrel.agreement.cohen import cohen_kappa, cohen_kappa_from_table
 from masrel.agreement.conger import conger_kappa
 from masrel.agreement.contingency import (
+    McnemarKind,
     bhapkar,
     bias_index,
     bowker,
@@ -27,20 +29,19 @@ from masrel.agreement.contingency import (
 )
 from masrel.agreement.fleiss import fleiss_kappa, fleiss_kappa_from_counts
 from masrel.agreement.gwet import gwet_ac, gwet_ac_from_counts
-from masrel.agreement.icc import icc, icc_f_test
+from masrel.agreement.icc import IccForm, icc, icc_f_test, robinson_a
 from masrel.agreement.kendall import kendall_w, kendall_w_test
 from masrel.agreement.krippendorff import (
+    Metric,
     krippendorff_alpha,
     krippendorff_alpha_from_counts,
 )
-from masrel.agreement.light import light_kappa
+from masrel.agreement.light import Deletion, light_kappa
 from masrel.agreement.percent import percent_agreement, percent_agreement_from_counts
-from masrel.agreement.registry import COEFFICIENTS, Coefficient, coefficient
-from masrel.agreement.retest import pooled_kappa, stratified_kappa
-from masrel.agreement.robinson import robinson_a
+from masrel.agreement.registry import COEFFICIENTS, Coefficient, Property, coefficient
 from masrel.agreement.scott import scott_pi, scott_pi_from_table
 from masrel.agreement.significance import Significance, p_value
-from masrel.agreement.weights import WeightName, Weights, declared_weights
+from masrel.agreement.two_sessions import pooled_kappa, stratified_kappa
 
 __all__ = [
     "COEFFICIENTS",
@@ -49,7 +50,12 @@ __all__ = [
     "CodedRatings",
     "Coefficient",
     "CountedRatings",
+    "Deletion",
+    "IccForm",
     "Label",
+    "McnemarKind",
+    "Metric",
+    "Property",
     "Significance",
     "WeightName",
     "Weights",

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from masrel.agreement._data import CodedRatings, check_scale, code_ratings
 from masrel.agreement._labels import Codes, Label, check_categories, label_rows
-from masrel.agreement.weights import Weights
+from masrel.agreement._weights import Weights
 from masrel.errors import CountsError, ParameterError
 
 Array = NDArray[Any]

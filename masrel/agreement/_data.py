@@ -19,7 +19,7 @@ from masrel.agreement._labels import (
     labels_met,
     lookup,
 )
-from masrel.agreement.weights import category_values
+from masrel.agreement._weights import category_values
 from masrel.errors import ParameterError, RatingsError
 
 MISSING = -1
@@ -49,21 +49,21 @@ class CodedRatings:
     @property
     def n_items(self) -> int:
         """Items with at least one rating."""
-        given = self.codes[:, 0] != MISSING
+        rated = self.codes[:, 0] != MISSING
         for column in self.codes.T[1:]:
-            if given.all():  # as a rule after the first column
+            if rated.all():  # as a rule after the first column
                 break
-            given |= column != MISSING
-        return int(given.sum())
+            rated |= column != MISSING
+        return int(rated.sum())
 
     @property
     def n_raters(self) -> int:
         """Raters with at least one rating."""
         # As a rule every rater has one of the first ratings: look no further.
-        given = (self.codes[:_FIRST] != MISSING).any(axis=0)
-        if not given.all():
-            given = (self.codes != MISSING).any(axis=0)
-        return int(given.sum())
+        rates = (self.codes[:_FIRST] != MISSING).any(axis=0)
+        if not rates.all():
+            rates = (self.codes != MISSING).any(axis=0)
+        return int(rates.sum())
 
     @property
     def n_categories(self) -> int:
@@ -213,7 +213,7 @@ def code_long(
         If a column is not there, an item or a rater is missing, a grade is not among
         the categories, or a rating is repeated.
     ParameterError
-        If `repeated` is none of the three.
+        If `repeated` is not one of the three.
 
     Examples
     --------
@@ -266,7 +266,7 @@ def _factors(column: Any, name: str) -> tuple[NDArray[np.intp], Any]:
 def _grades(
     column: Any, name: str, categories: Sequence[Label] | None
 ) -> tuple[NDArray[np.signedinteger[Any]], tuple[Label, ...]]:
-    found, labels = column.factorize()
+    positions, labels = column.factorize()
     known = labels.tolist()
     declared = labels_met(known) if categories is None else check_categories(categories)
     position: dict[object, int] = {label: code for code, label in enumerate(declared)}
@@ -275,21 +275,21 @@ def _grades(
         try:
             table[code] = position[label]
         except KeyError:
-            row = int(np.argmax(found == code))
+            row = int(np.argmax(positions == code))
             lookup(label, position, row, name)
-    return table[found], declared  # missing, -1, is the last
+    return table[positions], declared  # missing, -1, is the last
 
 
 def _refuse_repeats(
     places: NDArray[np.intp], n_places: int, items: Any, raters: Any
 ) -> None:
-    times = np.bincount(places, minlength=n_places)
-    if len(places) == 0 or times.max() < 2:
+    freq = np.bincount(places, minlength=n_places)
+    if len(places) == 0 or freq.max() < 2:
         return
-    met = [divmod(int(place), len(raters)) for place in np.flatnonzero(times > 1)[:5]]
+    met = [divmod(int(place), len(raters)) for place in np.flatnonzero(freq > 1)[:5]]
     items, raters = items.tolist(), raters.tolist()  # without numpy's types
     named = "; ".join(f"{items[i]!r} by {raters[r]!r}" for i, r in met)
-    more = int((times > 1).sum()) - len(met)
+    more = int((freq > 1).sum()) - len(met)
     raise RatingsError(
         f"ratings: each rater needs to rate an item once, rated more than once: {named}"
         + (f" and {more} more" if more else "")
@@ -345,8 +345,8 @@ def _plain(table: object, rater: int) -> list[list[object]]:
 
 
 def pairs_of_raters(coded: CodedRatings) -> list[Codes]:
-    """Take pairs that lie side by side apart, rater by rater."""
-    # -> (n_items, 2)
+    """Return each rater's two columns of pairs that lie side by side."""
+    # -> n_raters arrays (n_items, 2)
     width = coded.codes.shape[1]
     return [coded.codes[:, start : start + 2] for start in range(0, width, 2)]
 

@@ -236,17 +236,17 @@ def _span(plain: Array) -> tuple[int, int] | None:
 def _whole_numbers_met(plain: Array, lowest: int, highest: int) -> tuple[Label, ...]:
     met = np.zeros(highest - lowest + 1, dtype=bool)
     for rows in _blocks(plain):
-        met[_above(plain[rows], lowest)] = True
+        met[_offsets(plain[rows], lowest)] = True
         if met.all():  # as a rule after the first block
             break
     return tuple(lowest + place for place in np.flatnonzero(met).tolist())
 
 
-def _above(block: Array, lowest: int) -> Array:
+def _offsets(block: Array, lowest: int) -> Array:
     # block - lowest, which need not fit the small integers of the block
     if block.dtype.kind == "u":
-        above: Array = block - block.dtype.type(lowest)
-        return above
+        offsets: Array = block - block.dtype.type(lowest)
+        return offsets
     return np.subtract(block, lowest, dtype=np.int64)
 
 
@@ -265,12 +265,12 @@ def _coder(plain: Array, dtype: np.dtype[Any], known: tuple[Label, ...]) -> _Cod
         held = np.iinfo(dtype)
         fits = [_is_whole(label, int(held.min), int(held.max)) for label in known]
     codes = np.flatnonzero(fits)
-    own = [known[code] for code in codes.tolist()]
+    fitting = [known[code] for code in codes.tolist()]
     if dtype.kind == "U":
-        values = np.array(own, dtype=dtype)
+        values = np.array(fitting, dtype=dtype)
         values = values.view(plain.dtype) if plain.dtype.kind == "u" else values
     else:
-        values = np.array([int(label) for label in own], dtype=dtype)
+        values = np.array([int(label) for label in fitting], dtype=dtype)
     order = np.argsort(values, kind="stable")
     return _search_coder(values[order], codes[order])
 
@@ -290,8 +290,8 @@ def _table_coder(lowest: int, highest: int, known: tuple[Label, ...]) -> _Coder:
         if table.dtype == np.int8:  # modulo 256 the small difference stays what it is
             low = np.int64(lowest).astype(np.int8)
             return lambda block: np.subtract(block.astype(np.int8), low)
-        return lambda block: _above(block, lowest)
-    return lambda block: table[_above(block, lowest)]
+        return lambda block: _offsets(block, lowest)
+    return lambda block: table[_offsets(block, lowest)]
 
 
 def _float_coder(known: Array) -> _Coder:
@@ -306,13 +306,13 @@ def _float_coder(known: Array) -> _Coder:
     table[(known - lowest).astype(np.intp)] = np.arange(len(known))
 
     def coder(block: Array) -> Array:
-        missing = np.isnan(block)
-        place = np.where(missing, 0.0, block - lowest)
+        absent = np.isnan(block)
+        place = np.where(absent, 0.0, block - lowest)
         with np.errstate(invalid="ignore"):  # infinite, or beyond whole numbers
             whole = place.astype(np.intp)
         if (whole != place).any() or whole.min() < 0 or whole.max() > span:
             return slow(block)
-        return np.where(missing, _MISSING, table[whole])
+        return np.where(absent, _MISSING, table[whole])
 
     return coder
 
@@ -320,10 +320,10 @@ def _float_coder(known: Array) -> _Coder:
 def _search_coder(values: Array, codes: NDArray[np.intp]) -> _Coder:
     def coder(block: Array) -> Array:
         at = np.minimum(np.searchsorted(values, block), values.size - 1)
-        found = np.where(values[at] == block, codes[at], _UNKNOWN)
+        result = np.where(values[at] == block, codes[at], _UNKNOWN)
         if block.dtype.kind == "f":
-            found[np.isnan(block)] = _MISSING
-        return found
+            result[np.isnan(block)] = _MISSING
+        return result
 
     if values.size == 0:
         return lambda block: np.full(block.shape, _UNKNOWN)

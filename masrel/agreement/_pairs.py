@@ -1,5 +1,6 @@
 """Tables of pairs of two ratings, and kappa as a ratio of their sums."""
 
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from masrel.agreement._counts import bilinear
-from masrel.agreement._data import CodedRatings
+from masrel.agreement._data import CodedRatings, pairs_of_raters
 from masrel.agreement._kernel import (
     NO_CHANCE,
     NO_PAIR,
@@ -21,7 +22,7 @@ from masrel.agreement._kernel import (
     undefined,
 )
 from masrel.agreement._labels import Codes
-from masrel.agreement.weights import Weights
+from masrel.agreement._weights import Weights
 from masrel.errors import RatingsError
 from masrel.estimates import Estimate
 
@@ -162,14 +163,56 @@ def _value(sums: Floats, v: Floats) -> Floats:
     return 1.0 - divide(sums[..., 1] * sums[..., 0], expected)
 
 
-PAIR_KERNEL = Kernel(features=_features, value=_value)
+COHEN_KERNEL = Kernel(features=_features, value=_value)
 """Cohen's kappa of two columns of ratings."""
 
 
-def pair_features(coded: CodedRatings, pairs: list[Codes], v: Floats) -> list[Floats]:
+def _pair_features(coded: CodedRatings, pairs: list[Codes], v: Floats) -> list[Floats]:
     """Return the features of several pairs of columns of ratings."""
     # each (n_items, 2 + 2 n_categories)
     return [
-        PAIR_KERNEL.features(CodedRatings(codes=pair, categories=coded.categories), v)
+        COHEN_KERNEL.features(CodedRatings(codes=pair, categories=coded.categories), v)
         for pair in pairs
     ]
+
+
+def _light_features(coded: CodedRatings, v: Floats) -> Floats:
+    # (n_items, n_pairs (2 + 2 n_categories)): each pair's features in turn, 0 for
+    # items that not every rater rated
+    whole = np.min(coded.codes, axis=1) >= 0
+    codes = np.where(whole[:, None], coded.codes, -1)
+    pairs = itertools.combinations(range(codes.shape[1]), 2)
+    return np.hstack(_pair_features(coded, [codes[:, pair] for pair in pairs], v))
+
+
+def _light_value(sums: Floats, v: Floats) -> Floats:
+    # sums (..., n_pairs (2 + 2 n_categories)) -> (...)
+    of_pairs = sums.reshape(*sums.shape[:-1], -1, 2 + 2 * len(v))
+    return np.asarray(COHEN_KERNEL.value(of_pairs, v).mean(axis=-1))
+
+
+LIGHT_KERNEL = Kernel(features=_light_features, value=_light_value)
+
+
+def _stratified_features(coded: CodedRatings, v: Floats) -> Floats:
+    # (n_items, n_raters (2 + 2 n_categories)): each rater's pair features in turn
+    return np.hstack(_pair_features(coded, pairs_of_raters(coded), v))
+
+
+def _stratified_value(sums: Floats, v: Floats) -> Floats:
+    # sums (..., n_raters (2 + 2 n_categories)) -> (...)
+    q = len(v)
+    parts = sums.reshape(*sums.shape[:-1], -1, 2 + 2 * q)
+    n = np.where(parts[..., 1] > 0, parts[..., 1], 1.0)  # no pair adds 0 to both
+    first, second = parts[..., 2 : 2 + q], parts[..., 2 + q :]
+    expected = ((first @ v) * second).sum(axis=-1) / (n * n)
+    return 1.0 - divide((parts[..., 0] / n).sum(axis=-1), expected.sum(axis=-1))
+
+
+def _pooled_features(coded: CodedRatings, v: Floats) -> Floats:
+    # (n_items, 2 + 2 n_categories): sums of an item's pairs, as for Cohen's kappa
+    return np.asarray(np.sum(_pair_features(coded, pairs_of_raters(coded), v), axis=0))
+
+
+STRATIFIED_KERNEL = Kernel(features=_stratified_features, value=_stratified_value)
+POOLED_PAIRS_KERNEL = Kernel(features=_pooled_features, value=COHEN_KERNEL.value)

@@ -41,7 +41,7 @@ from masrel.agreement._kernel import (
     weighted_disagreement,
 )
 from masrel.agreement._labels import Codes, Label
-from masrel.agreement.weights import (
+from masrel.agreement._weights import (
     WeightName,
     Weights,
     declared_weights,
@@ -72,6 +72,35 @@ class PooledCoefficient(NamedTuple):
     chance: Callable[[int, Any, Any], Chance]
     # whether chance counts any two categories as different, whatever the weights
     nominal: bool = False
+
+
+def _nothing(_q: int, _total: Any, _w: Any) -> Chance:
+    return Chance(1, 0, 1)  # 1 - D_o / 1: what is observed, as it is
+
+
+def _shared_margins(_q: int, _total: Any, _w: Any) -> Chance:
+    return Chance(0, 1, 1)  # Σ_kl v_kl p_k p_l, 1 - P̄_e of Fleiss (1971)
+
+
+def _every_category_alike(q: int, total: Any, w: Any) -> Chance:
+    return Chance(total, 0, q * q * w)  # 1 - Σ_kl w_kl / q² = Σ_kl v_kl / q²
+
+
+def _hard_items(q: int, total: Any, w: Any) -> Chance:
+    # 1 - p_e with p_e = T_w / (q (q - 1)) Σ_k p_k (1 - p_k), T_w = Σ_kl w_kl
+    if q == 1:
+        return Chance(0, 0, 1)  # one category leaves no room for chance: 0/0
+    divisor = q * (q - 1) * w
+    return Chance(divisor, total - q * q * w, divisor)
+
+
+PERCENT = PooledCoefficient("percent_agreement", "percent agreement", _nothing)
+FLEISS = PooledCoefficient("fleiss_kappa", "Fleiss' kappa", _shared_margins)
+SCOTT = PooledCoefficient("scott_pi", "Scott's pi", _shared_margins)
+BRENNAN_PREDIGER = PooledCoefficient(
+    "brennan_prediger", "the Brennan-Prediger coefficient", _every_category_alike
+)
+GWET = PooledCoefficient("gwet_ac", "Gwet's AC", _hard_items, nominal=True)
 
 
 def estimate_pooled(
@@ -212,6 +241,18 @@ def pooled_kernel(coefficient: PooledCoefficient) -> Kernel:
         return 1.0 - divide(observed, expected)
 
     return Kernel(features=features, value=value, rater_sums=_resampled_raters)
+
+
+def complete_kernel(coefficient: PooledCoefficient) -> Kernel:
+    """Return the kernel of a coefficient of the items that every rater rated."""
+    kernel = pooled_kernel(coefficient)
+
+    def features(coded: CodedRatings, v: Floats) -> Floats:
+        every = kernel.features(coded, v)
+        every[(coded.codes < 0).any(axis=1)] = 0.0
+        return every
+
+    return Kernel(features=features, value=kernel.value)
 
 
 def _resampled_raters(coded: CodedRatings, freq: Integers, v: Floats) -> RaterSums:

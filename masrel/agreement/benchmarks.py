@@ -86,13 +86,13 @@ def bands(estimate: Estimate, *, scale: BandScale = "landis_koch") -> tuple[Band
     Raises
     ------
     ParameterError
-        If the scale is none.
+        If the scale is unknown.
 
     Notes
     -----
-    Gwet's interval membership probability [1]_: the normal law around the estimate,
-    cut to [-1, 1]. An estimate below -1, which weights and few ratings allow, has a
-    law that is not cut there. The words themselves [2-5]_ are conventions and no more.
+    Gwet's interval membership probability [1]_: the normal distribution around the
+    estimate, cut to [-1, 1], or at 1 only for an estimate below -1, which weights and
+    few ratings allow. The words themselves [2-5]_ are conventions and no more.
 
     References
     ----------
@@ -108,12 +108,12 @@ def bands(estimate: Estimate, *, scale: BandScale = "landis_koch") -> tuple[Band
     Examples
     --------
     >>> from masrel.agreement import cohen_kappa_from_table
-    >>> found = bands(cohen_kappa_from_table([[20, 5], [10, 15]]))
-    >>> [(band.word, round(band.cumulative, 2)) for band in found[:3]]
+    >>> every = bands(cohen_kappa_from_table([[20, 5], [10, 15]]))
+    >>> [(band.word, round(band.cumulative, 2)) for band in every[:3]]
     [('almost perfect', 0.0), ('substantial', 0.06), ('moderate', 0.5)]
     """
     steps = _steps(scale)
-    found: list[Band] = []
+    every: list[Band] = []
     high, better = 1.0, 0.0
     for low, closed, word in steps:
         end = -math.inf if low == -1.0 > estimate.value else low
@@ -121,9 +121,9 @@ def bands(estimate: Estimate, *, scale: BandScale = "landis_koch") -> tuple[Band
         band = Band(
             low=end, high=high, word=word, probability=inside, cumulative=cumulative
         )
-        found.append(band)
+        every.append(band)
         high, better = low, cumulative
-    return tuple(found)
+    return tuple(every)
 
 
 def strength(value: float, *, scale: BandScale = "landis_koch") -> str:
@@ -144,7 +144,7 @@ def strength(value: float, *, scale: BandScale = "landis_koch") -> str:
     Raises
     ------
     ParameterError
-        If the scale is invalid.
+        If the scale is unknown.
 
     Examples
     --------
@@ -188,7 +188,7 @@ def benchmark(
     Raises
     ------
     ParameterError
-        If the scale is none, or the level is not within (0, 1).
+        If the scale is unknown, or the level is not within (0, 1).
 
     Examples
     --------
@@ -198,10 +198,10 @@ def benchmark(
     """
     if not 0.0 < level < 1.0:
         raise ParameterError(f"level: needs (0, 1), got {level}")
-    found = bands(estimate, scale=scale)
-    if math.isnan(found[-1].cumulative):
+    every = bands(estimate, scale=scale)
+    if math.isnan(every[-1].cumulative):
         return "undefined"
-    return next((b.word for b in found if b.cumulative >= level), found[-1].word)
+    return next((b.word for b in every if b.cumulative >= level), every[-1].word)
 
 
 def _probabilities(
@@ -220,8 +220,8 @@ def _probabilities(
 
 
 def _between(value: float, error: float, low: float, high: float) -> float:
-    # probability of [low, high] under the normal law, taken in the tail where the
-    # difference of two small numbers is exact
+    # probability of [low, high] under the normal distribution, taken in the tail where
+    # the difference of two small numbers is exact
     from scipy.special import ndtr
 
     if low > value:

@@ -1,20 +1,14 @@
 """Brennan and Prediger's coefficient: chance picks every category alike."""
 
 from collections.abc import Sequence
-from typing import Any
 
 from numpy.typing import ArrayLike
 
 from masrel.agreement._counts import take_counts
 from masrel.agreement._kernel import Variance
 from masrel.agreement._labels import Label
-from masrel.agreement._pooled import (
-    Chance,
-    PooledCoefficient,
-    estimate_pooled,
-    pooled_kernel,
-)
-from masrel.agreement.weights import WeightName
+from masrel.agreement._pooled import BRENNAN_PREDIGER, estimate_pooled
+from masrel.agreement._weights import WeightName
 from masrel.estimates import Estimate
 
 
@@ -51,7 +45,7 @@ def brennan_prediger(
     RatingsError
         If the ratings are not such a table.
     ParameterError
-        If an option is none, or the weights do not fit the categories.
+        If an option is invalid, or the weights do not fit the categories.
 
     Warns
     -----
@@ -77,7 +71,7 @@ def brennan_prediger(
     0.333
     """
     return estimate_pooled(
-        _COEFFICIENT, ratings, categories, weights, variance, population
+        BRENNAN_PREDIGER, ratings, categories, weights, variance, population
     )
 
 
@@ -121,15 +115,6 @@ def brennan_prediger_from_counts(
     0.333
     """
     counted = take_counts(counts, categories)
-    return estimate_pooled(_COEFFICIENT, counted, None, weights, variance, population)
-
-
-def _chance(q: int, total: Any, w: Any) -> Chance:
-    return Chance(total, 0, q * q * w)  # 1 - Σ_kl w_kl / q² = Σ_kl v_kl / q²
-
-
-_COEFFICIENT = PooledCoefficient(
-    "brennan_prediger", "the Brennan-Prediger coefficient", _chance
-)
-
-BRENNAN_PREDIGER_KERNEL = pooled_kernel(_COEFFICIENT)
+    return estimate_pooled(
+        BRENNAN_PREDIGER, counted, None, weights, variance, population
+    )

@@ -16,8 +16,6 @@ from masrel.agreement.significance import Significance
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate
 
-__all__ = ["category_kappa", "fleiss_null"]
-
 
 def category_kappa(
     ratings: object,
@@ -76,11 +74,10 @@ def category_kappa(
             f"got {category!r}"
         )
     counts = item_counts(coded)
-    own = counts[:, coded.categories.index(category)]
-    two = np.column_stack([own, counts.sum(axis=1) - own])
-    found = fleiss_kappa_from_counts(two)
+    chosen = counts[:, coded.categories.index(category)]
+    two = np.column_stack([chosen, counts.sum(axis=1) - chosen])
     return replace(
-        found,
+        fleiss_kappa_from_counts(two),
         coefficient="category_kappa",
         weights=str(category),
         n_raters=coded.n_raters,
@@ -143,8 +140,8 @@ def fleiss_null(
     n_raters = coded.codes.shape[1]
     counts = counts[counts.sum(axis=1) == n_raters]
     if category is not None:
-        own = counts[:, coded.categories.index(category)]
-        counts = np.column_stack([own, n_raters - own])
+        chosen = counts[:, coded.categories.index(category)]
+        counts = np.column_stack([chosen, n_raters - chosen])
     statistic = p = math.nan
     reason = None
     if len(counts) == 0 or n_raters < 2:
@@ -174,7 +171,7 @@ def _z(counts: NDArray[np.int64], n_raters: int) -> tuple[float, float]:
     p = counts.sum(axis=0) / total
     q = (total - counts.sum(axis=0)) / total
     pq = (p * q).sum()
-    spread = pq**2 - (p * q * (q - p)).sum()
-    error = math.sqrt(2.0 * spread / (total * (n_raters - 1))) / pq
+    difference = pq**2 - (p * q * (q - p)).sum()
+    error = math.sqrt(2.0 * difference / (total * (n_raters - 1))) / pq
     z = fleiss_kappa_from_counts(counts).value / error
     return z, 2.0 * float(ndtr(-abs(z)))

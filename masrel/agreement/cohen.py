@@ -15,14 +15,13 @@ from masrel.agreement._kernel import (
 )
 from masrel.agreement._labels import Label
 from masrel.agreement._pairs import (
-    PAIR_KERNEL,
     PairSlopes,
     PairSums,
     estimate_pairs,
     pair_table,
     two_raters,
 )
-from masrel.agreement.weights import WeightName, Weights, declared_weights
+from masrel.agreement._weights import WeightName, Weights, declared_weights
 from masrel.estimates import Estimate
 
 
@@ -56,7 +55,7 @@ def cohen_kappa(
     RatingsError
         If the ratings are not such a table or not of two raters.
     ParameterError
-        If an option is none, or the weights do not fit the categories.
+        If an option is invalid, or the weights do not fit the categories.
 
     Warns
     -----
@@ -152,6 +151,3 @@ def _influence(table: Integers, v: Weights, exact: bool) -> Influence:
     u, terms = slopes.influence()[:q, :q], slopes.observed[:q, :q] / slopes.d_e
     freq = table.astype(u.dtype)
     return Influence(u.ravel(), freq.ravel(), terms.ravel())
-
-
-COHEN_KERNEL = PAIR_KERNEL

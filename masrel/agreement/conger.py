@@ -27,7 +27,7 @@ from masrel.agreement._kernel import (
     weighted_disagreement,
 )
 from masrel.agreement._labels import Label
-from masrel.agreement.weights import WeightName, Weights, declared_weights
+from masrel.agreement._weights import WeightName, Weights, declared_weights
 from masrel.estimates import Estimate
 
 
@@ -64,7 +64,7 @@ def conger_kappa(
     RatingsError
         If the ratings are not such a table.
     ParameterError
-        If an option is none, or the weights do not fit the categories.
+        If an option is invalid, or the weights do not fit the categories.
 
     Warns
     -----
@@ -232,4 +232,4 @@ def _value(sums: Floats, v: Floats) -> Floats:
     return 1.0 - divide(observed, expected / (r * (r - 1)))
 
 
-CONGER_KERNEL = Kernel(features=_features, value=_value)
+_KERNEL = Kernel(features=_features, value=_value)

@@ -12,13 +12,13 @@ from masrel.agreement._data import code_ratings
 from masrel.agreement._kernel import NO_CHANCE, NO_PAIR, undefined
 from masrel.agreement._labels import Label
 from masrel.agreement._pairs import pair_table, two_raters
-from masrel.agreement.significance import Significance, chi_squared
+from masrel.agreement.significance import Significance
 from masrel.errors import CountsError, ParameterError
 
-_COUNTED = 1_000  # changes up to which the binomial law is summed in integers
+_MAX_SUMMED = 1_000  # changes up to which binomial probabilities are summed
 
 McnemarKind = Literal["exact", "uncorrected", "corrected"]
-"""The binomial law, or chi-squared without or with the continuity correction."""
+"""The binomial distribution, or chi-squared without or with continuity correction."""
 
 
 def contingency_table(
@@ -60,19 +60,19 @@ def mcnemar(table: ArrayLike, *, kind: McnemarKind = "exact") -> Significance:
     table : array_like of int, shape (2, 2)
         Items per category of the first (rows) and second rating (columns).
     kind : {"exact", "uncorrected", "corrected"}, optional
-        The binomial law of the items that changed; or chi-squared.
+        The binomial distribution of the items that changed; or chi-squared.
 
     Returns
     -------
     Significance
-        The smaller count of changes with its binomial law, or chi-squared.
+        The smaller count of changes with its binomial distribution, or chi-squared.
 
     Raises
     ------
     CountsError
         If it is not a 2 × 2 table of counts.
     ParameterError
-        If the kind is none.
+        If the kind is unknown.
 
     Warns
     -----
@@ -114,15 +114,15 @@ def mcnemar(table: ArrayLike, *, kind: McnemarKind = "exact") -> Significance:
             p_value=_both_tails(min(b, c), b + c),
             n_items=n_items,
         )
-    apart = max(abs(b - c) - 1, 0) if kind == "corrected" else abs(b - c)
-    return chi_squared("mcnemar", hypothesis, apart * apart, b + c, 1, n_items)
+    shift = max(abs(b - c) - 1, 0) if kind == "corrected" else abs(b - c)
+    return _chi_squared("mcnemar", hypothesis, shift * shift, b + c, 1, n_items)
 
 
 def _both_tails(fewer: int, n: int) -> float:
     # 2 P(X ≤ fewer), X ~ Binomial(n, 1/2), at most 1
-    if n <= _COUNTED:
-        ways = sum(math.comb(n, k) for k in range(fewer + 1))
-        return min(1.0, float(2 * ways / 2**n))
+    if n <= _MAX_SUMMED:
+        tail = sum(math.comb(n, k) for k in range(fewer + 1))
+        return min(1.0, float(2 * tail / 2**n))
     from scipy.special import bdtr
 
     return min(1.0, 2.0 * float(bdtr(fewer, n, 0.5)))
@@ -171,11 +171,11 @@ def bowker(table: ArrayLike) -> Significance:
         if cells[k][other] + cells[other][k]
     ]
     common = math.lcm(*[b + c for b, c in pairs])
-    above = sum((b - c) ** 2 * (common // (b + c)) for b, c in pairs)
-    return chi_squared(
+    numerator = sum((b - c) ** 2 * (common // (b + c)) for b, c in pairs)
+    return _chi_squared(
         "bowker",
         "the table is symmetric",
-        above,
+        numerator,
         common if pairs else 0,
         len(pairs),
         sum(map(sum, cells)),
@@ -223,7 +223,7 @@ def stuart_maxwell(table: ArrayLike) -> Significance:
     """
     cells = check_table(table)
     statistic, df = _margin_statistic(cells)
-    return chi_squared(
+    return _chi_squared(
         "stuart_maxwell",
         "both ratings have the same margins",
         statistic,
@@ -278,7 +278,7 @@ def bhapkar(table: ArrayLike) -> Significance:
         statistic = statistic / (1.0 - statistic / n)
     elif df:
         statistic = math.inf
-    return chi_squared(
+    return _chi_squared(
         "bhapkar",
         "both ratings have the same margins",
         statistic,
@@ -298,12 +298,12 @@ def _margin_statistic(cells: NDArray[np.int64]) -> tuple[float, int]:
     shift = cells.sum(axis=1) - cells.sum(axis=0)
     statistic, df = 0.0, 0
     for group in _groups(changes):
-        kept = group[1:]
-        if kept:
-            part = laplacian[np.ix_(kept, kept)].astype(np.float64)
-            d = shift[kept].astype(np.float64)
+        rest = group[1:]
+        if rest:
+            part = laplacian[np.ix_(rest, rest)].astype(np.float64)
+            d = shift[rest].astype(np.float64)
             statistic += float(d @ np.linalg.solve(part, d))
-            df += len(kept)
+            df += len(rest)
     return statistic, df
 
 
@@ -437,22 +437,50 @@ def kappa_max(table: ArrayLike) -> float:
     n = sum(first)
     if n == 0:
         return _no_item("the largest kappa")
-    most = sum(min(r, c) for r, c in zip(first, second, strict=True))
+    agreeing = sum(min(r, c) for r, c in zip(first, second, strict=True))
     by_chance = sum(r * c for r, c in zip(first, second, strict=True))
     if by_chance == n * n:
         undefined("the largest kappa", NO_CHANCE)
         return math.nan
-    return float((n * most - by_chance) / (n * n - by_chance))
+    return float((n * agreeing - by_chance) / (n * n - by_chance))
 
 
 def _two_by_two(table: ArrayLike) -> list[list[int]]:
     cells = check_table(table)
     if cells.shape != (2, 2):
         raise CountsError(f"table: needs 2 × 2, got {len(cells)} × {len(cells)}")
-    found: list[list[int]] = cells.tolist()
-    return found
+    return [[int(n) for n in row] for row in cells]
 
 
 def _no_item(title: str) -> float:
     undefined(title, NO_PAIR)
     return math.nan
+
+
+def _chi_squared(
+    name: str,
+    hypothesis: str,
+    numerator: float,
+    denominator: int,
+    df: int,
+    n_items: int,
+) -> Significance:
+    """Refer a ratio of two ratings' changes to chi-squared."""
+    from scipy.special import chdtrc
+
+    if denominator == 0:  # an empty sum is 0; of no degrees of freedom it says nothing
+        statistic, p = 0.0 if df == 0 else math.nan, math.nan
+        reason = undefined(name, "0/0: no item changed")
+    else:
+        statistic, reason = numerator / denominator, None
+        p = float(chdtrc(df, statistic))
+    return Significance(
+        name=name,
+        hypothesis=hypothesis,
+        statistic=statistic,
+        distribution="chi-squared",
+        df=(float(df),),
+        p_value=p,
+        n_items=n_items,
+        reason=reason,
+    )

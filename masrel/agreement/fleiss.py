@@ -1,20 +1,14 @@
 """Fleiss' kappa: agreement of two or more raters who are not told apart."""
 
 from collections.abc import Sequence
-from typing import Any
 
 from numpy.typing import ArrayLike
 
 from masrel.agreement._counts import take_counts
 from masrel.agreement._kernel import Variance
 from masrel.agreement._labels import Label
-from masrel.agreement._pooled import (
-    Chance,
-    PooledCoefficient,
-    estimate_pooled,
-    pooled_kernel,
-)
-from masrel.agreement.weights import WeightName
+from masrel.agreement._pooled import FLEISS, estimate_pooled
+from masrel.agreement._weights import WeightName
 from masrel.estimates import Estimate
 
 
@@ -51,7 +45,7 @@ def fleiss_kappa(
     RatingsError
         If the ratings are not such a table.
     ParameterError
-        If an option is none, or the weights do not fit the categories.
+        If an option is invalid, or the weights do not fit the categories.
 
     Warns
     -----
@@ -79,9 +73,7 @@ def fleiss_kappa(
     >>> round(fleiss_kappa([["a", "a"], ["b", "b"], ["a", "b"]]).value, 3)
     0.333
     """
-    return estimate_pooled(
-        _COEFFICIENT, ratings, categories, weights, variance, population
-    )
+    return estimate_pooled(FLEISS, ratings, categories, weights, variance, population)
 
 
 def fleiss_kappa_from_counts(
@@ -124,14 +116,4 @@ def fleiss_kappa_from_counts(
     0.333
     """
     counted = take_counts(counts, categories)
-    return estimate_pooled(_COEFFICIENT, counted, None, weights, variance, population)
-
-
-def shared_margins(_q: int, _total: Any, _w: Any) -> Chance:
-    """Return Σ_kl v_kl p_k p_l, 1 - P̄_e of [1] in `fleiss_kappa`."""
-    return Chance(0, 1, 1)
-
-
-_COEFFICIENT = PooledCoefficient("fleiss_kappa", "Fleiss' kappa", shared_margins)
-
-FLEISS_KERNEL = pooled_kernel(_COEFFICIENT)
+    return estimate_pooled(FLEISS, counted, None, weights, variance, population)

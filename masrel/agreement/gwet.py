@@ -1,20 +1,14 @@
 """Gwet's AC1 and, weighted, AC2: chance agreement among hard items only."""
 
 from collections.abc import Sequence
-from typing import Any
 
 from numpy.typing import ArrayLike
 
 from masrel.agreement._counts import take_counts
 from masrel.agreement._kernel import Variance
 from masrel.agreement._labels import Label
-from masrel.agreement._pooled import (
-    Chance,
-    PooledCoefficient,
-    estimate_pooled,
-    pooled_kernel,
-)
-from masrel.agreement.weights import WeightName
+from masrel.agreement._pooled import GWET, estimate_pooled
+from masrel.agreement._weights import WeightName
 from masrel.estimates import Estimate
 
 
@@ -51,7 +45,7 @@ def gwet_ac(
     RatingsError
         If the ratings are not such a table.
     ParameterError
-        If an option is none, or the weights do not fit the categories.
+        If an option is invalid, or the weights do not fit the categories.
 
     Warns
     -----
@@ -76,9 +70,7 @@ def gwet_ac(
     >>> round(gwet_ac([["a", "a"], ["b", "b"], ["a", "b"]]).value, 3)
     0.333
     """
-    return estimate_pooled(
-        _COEFFICIENT, ratings, categories, weights, variance, population
-    )
+    return estimate_pooled(GWET, ratings, categories, weights, variance, population)
 
 
 def gwet_ac_from_counts(
@@ -121,17 +113,4 @@ def gwet_ac_from_counts(
     0.538
     """
     counted = take_counts(counts, categories)
-    return estimate_pooled(_COEFFICIENT, counted, None, weights, variance, population)
-
-
-def _chance(q: int, total: Any, w: Any) -> Chance:
-    # 1 - p_e with p_e = T_w / (q (q - 1)) Σ_k p_k (1 - p_k), T_w = Σ_kl w_kl
-    if q == 1:
-        return Chance(0, 0, 1)  # one category leaves no room for chance: 0/0
-    divisor = q * (q - 1) * w
-    return Chance(divisor, total - q * q * w, divisor)
-
-
-_COEFFICIENT = PooledCoefficient("gwet_ac", "Gwet's AC", _chance, nominal=True)
-
-GWET_KERNEL = pooled_kernel(_COEFFICIENT)
+    return estimate_pooled(GWET, counted, None, weights, variance, population)

@@ -1,4 +1,4 @@
-"""Intraclass correlations: the six forms of McGraw and Wong."""
+"""What mean squares say: six intraclass correlations, and Robinson's A."""
 
 import math
 from collections.abc import Sequence
@@ -14,8 +14,6 @@ from masrel.agreement._labels import Label
 from masrel.agreement.significance import Significance
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Interval
-
-__all__ = ["IccForm", "icc", "icc_f_test"]
 
 IccForm = Literal["ICC(1)", "ICC(1,k)", "ICC(C,1)", "ICC(C,k)", "ICC(A,1)", "ICC(A,k)"]
 """One-way; consistency and absolute agreement; of one rating and of the mean of k."""
@@ -56,7 +54,7 @@ def icc(
     RatingsError
         If the ratings are not such a table, or text without categories.
     ParameterError
-        If the form or the level is none.
+        If the form is unknown, or the level is not within (0, 1).
 
     Warns
     -----
@@ -91,12 +89,12 @@ def icc(
     """
     _check(form, level)
     values = complete_values(ratings, categories)
-    found = _Anova.of(values)
-    reason = _reason(values, found, form)
+    anova = _Anova.of(values)
+    reason = _reason(values, anova, form)
     value, interval = math.nan, None
     if reason is None:
-        value = found.value(form)
-        interval = _interval(found, form, level)
+        value = anova.value(form)
+        interval = _interval(anova, form, level)
     n_items, n_raters = values.shape
     return Estimate(
         coefficient="icc",
@@ -137,7 +135,7 @@ def icc_f_test(
     RatingsError
         If the ratings are not such a table, or text without categories.
     ParameterError
-        If the form is none.
+        If the form is unknown.
 
     Warns
     -----
@@ -157,15 +155,15 @@ def icc_f_test(
     """
     _check(form, 0.5)
     values = complete_values(ratings, categories)
-    found = _Anova.of(values)
-    reason = _reason(values, found, form.replace(",k)", ",1)"))
+    anova = _Anova.of(values)
+    reason = _reason(values, anova, form.replace(",k)", ",1)"))
     statistic = p = math.nan
-    df = found.df(form)
+    df = anova.df(form)
     if reason is None:
         from scipy.special import fdtrc
 
-        error = found.error(form)
-        statistic = math.inf if error == 0.0 else found.items / error
+        error = anova.error(form)
+        statistic = math.inf if error == 0.0 else anova.items / error
         p = float(fdtrc(*df, statistic))
     return Significance(
         name="icc_f_test",
@@ -175,6 +173,74 @@ def icc_f_test(
         df=df,
         p_value=p,
         n_items=len(values),
+        reason=reason,
+    )
+
+
+def robinson_a(
+    ratings: object, *, categories: Sequence[Label] | None = None
+) -> Estimate:
+    """Estimate Robinson's A.
+
+    Parameters
+    ----------
+    ratings : nested sequence, array_like or DataFrame, shape (n_items, n_raters)
+        Numbers, or labels of a declared scale; None and ``nan`` are missing.
+    categories : sequence of str, int or float, optional
+        The declared scale in order; needed for text.
+
+    Returns
+    -------
+    Estimate
+        A within [0, 1]. It has no delta-method error, observed or chance agreement.
+
+    Raises
+    ------
+    RatingsError
+        If the ratings are not such a table, or text without categories.
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        If there are fewer than two complete items or raters, or no variance; the
+        value is then ``nan``.
+
+    Notes
+    -----
+    Items with a missing rating are left out. A = SS_items / (SS_items + SS_residual):
+    a rater who is always one grade higher loses nothing.
+
+    References
+    ----------
+    .. [1] Robinson, W. S. (1957). The statistical measurement of agreement. American
+       Sociological Review, 22(1), 17-25. https://doi.org/10.2307/2088760
+
+    Examples
+    --------
+    >>> robinson_a([[1, 2], [2, 3], [3, 4]]).value
+    1.0
+    """
+    values = complete_values(ratings, categories)
+    anova = _Anova.of(values)
+    n, k = values.shape
+    reason, value = None, math.nan
+    if n < 2 or k < 2:
+        why = "fewer than two items or raters in the items that every rater rated"
+        reason = undefined("Robinson's A", why)
+    elif (total := anova.ss_items + anova.ss_residual) == 0.0:
+        reason = undefined("Robinson's A", "0/0: no variance but between raters")
+    else:
+        value = anova.ss_items / total
+    return Estimate(
+        coefficient="robinson_a",
+        weights="quadratic",
+        value=value,
+        standard_error=math.nan,
+        observed=math.nan,
+        chance=math.nan,
+        n_items=n,
+        n_raters=k,
+        n_categories=len(np.unique(values)) if categories is None else len(categories),
         reason=reason,
     )
 
@@ -189,28 +255,28 @@ def _check(form: str, level: float) -> None:
 
 
 def _reason(
-    values: NDArray[np.float64], found: "_Anova", form: str = "ICC(1)"
+    values: NDArray[np.float64], anova: "_Anova", form: str = "ICC(1)"
 ) -> str | None:
     if values.shape[0] < 2:
         return undefined(form, "fewer than two items are rated by every rater")
     if values.shape[1] < 2:
         return undefined(form, "fewer than two raters")
-    if found.items == 0.0 and found.error(form) == 0.0:
+    if anova.items == 0.0 and anova.error(form) == 0.0:
         return undefined(form, "0/0: neither items nor ratings of an item differ")
-    if found.below(form) == 0.0:
+    if anova.denominator(form) == 0.0:
         return undefined(form, "division by 0: the total variance is estimated as 0")
     return None
 
 
 @dataclass(frozen=True, slots=True)
 class _Anova:
-    # mean squares of [1]: rows, columns, residual, and within rows
+    # sums of squares of [1] times (n k)²: items, raters, residual, and within items
     n: int
     k: int
-    items: float
-    raters: float
-    residual: float
-    within: float
+    ss_items: float
+    ss_raters: float
+    ss_residual: float
+    ss_within: float
 
     @classmethod
     def of(cls, values: NDArray[np.float64]) -> "_Anova":
@@ -225,15 +291,33 @@ class _Anova:
         rows, columns = n * of_items - total, k * of_raters - total
         within = n * (k * x - of_items)
         residual = within - columns
-        scale = float(n * k) ** 2
         return cls(
             n,
             k,
-            float(k * (rows**2).sum()) / (scale * (n - 1)),
-            float(n * (columns**2).sum()) / (scale * (k - 1)),
-            float((residual**2).sum()) / (scale * (n - 1) * (k - 1)),
-            float((within**2).sum()) / (scale * n * (k - 1)),
+            float(k * (rows**2).sum()),
+            float(n * (columns**2).sum()),
+            float((residual**2).sum()),
+            float((within**2).sum()),
         )
+
+    def _mean(self, squares: float, df: float) -> float:
+        return squares / (float(self.n * self.k) ** 2 * df) if df > 0 else math.nan
+
+    @property
+    def items(self) -> float:
+        return self._mean(self.ss_items, self.n - 1)
+
+    @property
+    def raters(self) -> float:
+        return self._mean(self.ss_raters, self.k - 1)
+
+    @property
+    def residual(self) -> float:
+        return self._mean(self.ss_residual, (self.n - 1) * (self.k - 1))
+
+    @property
+    def within(self) -> float:
+        return self._mean(self.ss_within, self.n * (self.k - 1))
 
     def error(self, form: str) -> float:
         return self.within if form.startswith("ICC(1") else self.residual
@@ -243,7 +327,7 @@ class _Anova:
         error = self.n * (self.k - 1) if one_way else (self.n - 1) * (self.k - 1)
         return float(self.n - 1), float(error)
 
-    def below(self, form: str) -> float:
+    def denominator(self, form: str) -> float:
         # denominators of Table 4 of [1]
         of_raters = self.raters - self.residual if form.startswith("ICC(A") else 0.0
         if form.endswith("k)"):
@@ -252,20 +336,20 @@ class _Anova:
         return self.items + error + self.k * of_raters / self.n
 
     def value(self, form: str) -> float:
-        return (self.items - self.error(form)) / self.below(form)
+        return (self.items - self.error(form)) / self.denominator(form)
 
 
-def _interval(found: _Anova, form: IccForm, level: float) -> Interval:
+def _interval(anova: _Anova, form: IccForm, level: float) -> Interval:
     reason = None
     if form.startswith("ICC(A"):
-        reason = _without_interval(found, form)
-        low, high = (math.nan, math.nan) if reason else _absolute(found, level)
+        reason = _without_interval(anova, form)
+        low, high = (math.nan, math.nan) if reason else _absolute(anova, level)
         if reason is None and math.isnan(low):
             reason = "Satterthwaite's degrees of freedom are too few"
     else:
-        low, high = _ratio(found, form, level)
+        low, high = _ratio(anova, form, level)
     if form.endswith("k)"):
-        low, high = _stepped_up(low, found.k), _stepped_up(high, found.k)
+        low, high = _stepped_up(low, anova.k), _stepped_up(high, anova.k)
     return Interval(
         low=low,
         high=high,
@@ -277,11 +361,11 @@ def _interval(found: _Anova, form: IccForm, level: float) -> Interval:
     )
 
 
-def _without_interval(found: _Anova, form: str) -> str | None:
+def _without_interval(anova: _Anova, form: str) -> str | None:
     # why absolute agreement has no interval, or None
-    if not found.below("ICC(A,1)") > 0.0:
+    if not anova.denominator("ICC(A,1)") > 0.0:
         return "the total variance is estimated as less than 0"
-    if form == "ICC(A,k)" and not found.below(form) > 0.0:
+    if form == "ICC(A,k)" and not anova.denominator(form) > 0.0:
         return "the variance of the raters' mean is estimated as less than 0"
     return None
 
@@ -289,29 +373,29 @@ def _without_interval(found: _Anova, form: str) -> str | None:
 def _stepped_up(rho: float, k: int) -> float:
     # Spearman and Brown's k ρ / (1 + (k - 1) ρ), which falls to -∞ at ρ = -1/(k - 1);
     # an end of the interval that lies beyond is no bound
-    below = 1.0 + (k - 1) * rho
-    return -math.inf if below <= 0.0 else k * rho / below
+    denominator = 1.0 + (k - 1) * rho
+    return -math.inf if denominator <= 0.0 else k * rho / denominator
 
 
-def _ratio(found: _Anova, form: str, level: float) -> tuple[float, float]:
+def _ratio(anova: _Anova, form: str, level: float) -> tuple[float, float]:
     # Table 7 of [1]: F over its upper and lower quantiles, for a single rating
-    error = found.error(form)
+    error = anova.error(form)
     if error == 0.0:
         return 1.0, 1.0
-    f = found.items / error
-    first, second = found.df(form)
+    f = anova.items / error
+    first, second = anova.df(form)
     upper = 0.5 + 0.5 * level
     lowest = f / _f_quantile(first, second, upper)
     highest = f * _f_quantile(second, first, upper)
-    k = found.k
+    k = anova.k
     return (lowest - 1) / (lowest + k - 1), (highest - 1) / (highest + k - 1)
 
 
-def _absolute(found: _Anova, level: float) -> tuple[float, float]:
+def _absolute(anova: _Anova, level: float) -> tuple[float, float]:
     # Table 7 of [1], Case 2A and 3A, with Satterthwaite's degrees at ICC(A,1)
-    n, k = found.n, found.k
-    rows, columns, error = found.items, found.raters, found.residual
-    rho = found.value("ICC(A,1)")
+    n, k = anova.n, anova.k
+    rows, columns, error = anova.items, anova.raters, anova.residual
+    rho = anova.value("ICC(A,1)")
     if rho == 1.0:
         return 1.0, 1.0
     a = k * rho / (n * (1 - rho))

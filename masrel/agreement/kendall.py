@@ -13,8 +13,6 @@ from masrel.agreement._labels import Label
 from masrel.agreement.significance import Significance
 from masrel.estimates import Estimate
 
-__all__ = ["kendall_w", "kendall_w_test"]
-
 
 def kendall_w(
     ratings: object,
@@ -66,9 +64,9 @@ def kendall_w(
     0.4444444444444444
     """
     values = complete_values(ratings, categories)
-    found = _Ranks.of(values)
-    reason = _reason(values, found, ties=ties)
-    value = math.nan if reason else found.above / found.below(ties=ties)
+    ranks = _Ranks.of(values)
+    reason = _reason(values, ranks, ties=ties)
+    value = math.nan if reason else ranks.numerator / ranks.denominator(ties=ties)
     return Estimate(
         coefficient="kendall_w",
         weights="tie-corrected" if ties else "uncorrected",
@@ -76,8 +74,8 @@ def kendall_w(
         standard_error=math.nan,
         observed=math.nan,
         chance=math.nan,
-        n_items=found.n,
-        n_raters=found.m,
+        n_items=ranks.n,
+        n_raters=ranks.m,
         n_categories=len(np.unique(values)) if categories is None else len(categories),
         reason=reason,
     )
@@ -114,48 +112,50 @@ def kendall_w_test(
 
     Examples
     --------
-    >>> found = kendall_w_test([[1, 1, 2], [2, 3, 1], [3, 2, 3]])
-    >>> print(found)
+    >>> print(kendall_w_test([[1, 1, 2], [2, 3, 1], [3, 2, 3]]))
     kendall_w_test: 2.667, chi-squared(2), p = 0.264
     """
     values = complete_values(ratings, categories)
-    found = _Ranks.of(values)
-    reason = _reason(values, found, ties=ties)
+    ranks = _Ranks.of(values)
+    reason = _reason(values, ranks, ties=ties)
     statistic = p = math.nan
     if reason is None:
         from scipy.special import chdtrc
 
-        statistic = found.m * (found.n - 1) * found.above / found.below(ties=ties)
-        p = float(chdtrc(found.n - 1, statistic))
+        statistic = (
+            ranks.m * (ranks.n - 1) * ranks.numerator / ranks.denominator(ties=ties)
+        )
+        p = float(chdtrc(ranks.n - 1, statistic))
     return Significance(
         name="kendall_w_test",
         hypothesis="the raters' orders are unrelated",
         statistic=statistic,
         distribution="chi-squared",
-        df=(float(max(found.n - 1, 0)),),
+        df=(float(max(ranks.n - 1, 0)),),
         p_value=p,
-        n_items=found.n,
+        n_items=ranks.n,
         reason=reason,
     )
 
 
-def _reason(values: NDArray[np.float64], found: "_Ranks", *, ties: bool) -> str | None:
+def _reason(values: NDArray[np.float64], ranks: "_Ranks", *, ties: bool) -> str | None:
     if values.shape[0] < 2:
         why = "fewer than two items are rated by every rater"
         return undefined("Kendall's W", why)
     if values.shape[1] < 2:
         return undefined("Kendall's W", "fewer than two raters")
-    if found.below(ties=ties) == 0:
+    if ranks.denominator(ties=ties) == 0:
         return undefined("Kendall's W", "0/0: every rater gives all items one rating")
     return None
 
 
 @dataclass(frozen=True, slots=True)
 class _Ranks:
-    # Doubled ranks, so that those of ties are whole: W = above / below, as in [2].
+    # Doubled ranks, so that those of ties are whole; W = numerator / denominator, as in
+    # [2].
     n: int
     m: int
-    above: int
+    numerator: int
     ties: int  # Σ (t³ - t) over the ties of all raters
 
     @classmethod
@@ -163,15 +163,15 @@ class _Ranks:
         n, m = values.shape
         sums, ties = np.zeros(n, dtype=np.int64), 0
         for column in values.T:
-            _, place, times = np.unique(column, return_inverse=True, return_counts=True)
+            _, place, freq = np.unique(column, return_inverse=True, return_counts=True)
             # the mean rank of a tie, doubled: those below twice, then t + 1
-            doubled = 2 * (np.cumsum(times) - times) + times + 1
+            doubled = 2 * (np.cumsum(freq) - freq) + freq + 1
             sums += doubled[place]
-            ties += sum(t**3 - t for t in times.tolist())
+            ties += sum(t**3 - t for t in freq.tolist())
         mean = m * (n + 1)  # of doubled rank sums
         return cls(n, m, 3 * sum((s - mean) ** 2 for s in sums.tolist()), ties)
 
-    def below(self, *, ties: bool) -> int:
+    def denominator(self, *, ties: bool) -> int:
         # 12 S / (m² (n³ - n) - m ΣT); S of doubled ranks is four times as large
         whole = self.m**2 * (self.n**3 - self.n)
         return whole - self.m * self.ties if ties else whole

@@ -33,7 +33,7 @@ from masrel.agreement._kernel import (
     weighted_disagreement,
 )
 from masrel.agreement._labels import Label
-from masrel.agreement.weights import (
+from masrel.agreement._weights import (
     WeightName,
     Weights,
     category_values,
@@ -88,7 +88,7 @@ def krippendorff_alpha(
     RatingsError
         If the ratings are not such a table.
     ParameterError
-        If an option is none, both `weights` and `metric` are given, or they do not
+        If an option is invalid, both `weights` and `metric` are given, or they do not
         fit the categories.
 
     Warns
@@ -319,4 +319,4 @@ def _value(sums: Floats, v: Floats) -> Floats:
     return 1.0 - divide((totals.sum(axis=-1) - 1.0) * sums[..., 0], expected)
 
 
-KRIPPENDORFF_KERNEL = Kernel(features=_features, value=_value)
+_KERNEL = Kernel(features=_features, value=_value)

@@ -14,27 +14,23 @@ from masrel.agreement._counts import distinct_rows
 from masrel.agreement._data import CodedRatings, code_ratings, complete
 from masrel.agreement._kernel import (
     Array,
-    Floats,
     Influence,
     Integers,
-    Kernel,
     check_population,
     standard_error,
     undefined,
 )
 from masrel.agreement._labels import Label
 from masrel.agreement._pairs import (
-    PAIR_KERNEL,
     PairSlopes,
     PairSums,
-    pair_features,
     pair_table,
 )
-from masrel.agreement.weights import WeightName, Weights, declared_weights
+from masrel.agreement._weights import WeightName, Weights, declared_weights
 from masrel.errors import ParameterError, RatingsError
 from masrel.estimates import Estimate
 
-Missing = Literal["listwise", "pairwise"]
+Deletion = Literal["listwise", "pairwise"]
 """Which items count when ratings are missing."""
 
 
@@ -43,7 +39,7 @@ def light_kappa(
     *,
     categories: Sequence[Label] | None = None,
     weights: "WeightName | ArrayLike" = "identity",
-    missing: Missing = "listwise",
+    deletion: Deletion = "listwise",
     population: int | None = None,
 ) -> Estimate:
     """Estimate Light's kappa: the mean of Cohen's kappa over pairs of raters.
@@ -56,7 +52,7 @@ def light_kappa(
         The declared scale in order; the labels met when not given.
     weights : str or array_like, shape (n_categories, n_categories), optional
         How much two categories agree; see `declared_weights`.
-    missing : {"listwise", "pairwise"}, optional
+    deletion : {"listwise", "pairwise"}, optional
         Use the items that every rater rated, or for each pair of raters those that
         both rated.
     population : int, optional
@@ -73,7 +69,7 @@ def light_kappa(
     RatingsError
         If the ratings are not such a table or of fewer than two raters.
     ParameterError
-        If an option is none, or the weights do not fit the categories.
+        If an option is invalid, or the weights do not fit the categories.
 
     Warns
     -----
@@ -92,11 +88,11 @@ def light_kappa(
     0.5
     """
     coded = code_ratings(ratings, categories)
-    if missing not in get_args(Missing):
+    if deletion not in get_args(Deletion):
         raise ParameterError(
-            f"missing: needs one of {', '.join(get_args(Missing))}, got {missing!r}"
+            f"deletion: needs one of {', '.join(get_args(Deletion))}, got {deletion!r}"
         )
-    if missing == "listwise":
+    if deletion == "listwise":
         coded = complete(coded)
     v = declared_weights(weights, coded.categories, declared=coded.declared)
     check_population(population, coded.n_items)
@@ -183,21 +179,3 @@ def _influence(
         u += (slopes.influence() * rate)[at]
         terms += abs(slopes.observed * (rate / slopes.d_e))[at]
     return Influence(u, freq, terms)
-
-
-def _features(coded: CodedRatings, v: Floats) -> Floats:
-    # (n_items, n_pairs (2 + 2 n_categories)): each pair's features in turn, 0 for
-    # items that not every rater rated
-    whole = np.min(coded.codes, axis=1) >= 0
-    codes = np.where(whole[:, None], coded.codes, -1)
-    pairs = itertools.combinations(range(codes.shape[1]), 2)
-    return np.hstack(pair_features(coded, [codes[:, pair] for pair in pairs], v))
-
-
-def _value(sums: Floats, v: Floats) -> Floats:
-    # sums (..., n_pairs (2 + 2 n_categories)) -> (...)
-    of_pairs = sums.reshape(*sums.shape[:-1], -1, 2 + 2 * len(v))
-    return np.asarray(PAIR_KERNEL.value(of_pairs, v).mean(axis=-1))
-
-
-LIGHT_KERNEL = Kernel(features=_features, value=_value)

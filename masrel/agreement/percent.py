@@ -1,20 +1,14 @@
 """Percent agreement: how often two raters of an item agree, not corrected."""
 
 from collections.abc import Sequence
-from typing import Any
 
 from numpy.typing import ArrayLike
 
 from masrel.agreement._counts import take_counts
 from masrel.agreement._kernel import Variance
 from masrel.agreement._labels import Label
-from masrel.agreement._pooled import (
-    Chance,
-    PooledCoefficient,
-    estimate_pooled,
-    pooled_kernel,
-)
-from masrel.agreement.weights import WeightName
+from masrel.agreement._pooled import PERCENT, estimate_pooled
+from masrel.agreement._weights import WeightName
 from masrel.estimates import Estimate
 
 
@@ -51,7 +45,7 @@ def percent_agreement(
     RatingsError
         If the ratings are not such a table.
     ParameterError
-        If an option is none, or the weights do not fit the categories.
+        If an option is invalid, or the weights do not fit the categories.
 
     Warns
     -----
@@ -73,9 +67,7 @@ def percent_agreement(
     >>> percent_agreement([["a", "a"], ["a", "b"]]).value
     0.5
     """
-    return estimate_pooled(
-        _COEFFICIENT, ratings, categories, weights, variance, population
-    )
+    return estimate_pooled(PERCENT, ratings, categories, weights, variance, population)
 
 
 def percent_agreement_from_counts(
@@ -118,13 +110,4 @@ def percent_agreement_from_counts(
     0.5
     """
     counted = take_counts(counts, categories)
-    return estimate_pooled(_COEFFICIENT, counted, None, weights, variance, population)
-
-
-def _chance(_q: int, _total: Any, _w: Any) -> Chance:
-    return Chance(1, 0, 1)  # 1 - D_o / 1: what is observed, as it is
-
-
-_COEFFICIENT = PooledCoefficient("percent_agreement", "percent agreement", _chance)
-
-PERCENT_KERNEL = pooled_kernel(_COEFFICIENT)
+    return estimate_pooled(PERCENT, counted, None, weights, variance, population)

@@ -11,29 +11,38 @@ from numpy.typing import ArrayLike
 from masrel.agreement._data import CodedRatings, code_pairs, code_ratings
 from masrel.agreement._kernel import Kernel
 from masrel.agreement._labels import Label
-from masrel.agreement.brennan_prediger import BRENNAN_PREDIGER_KERNEL, brennan_prediger
-from masrel.agreement.cohen import COHEN_KERNEL, cohen_kappa
-from masrel.agreement.conger import CONGER_KERNEL, conger_kappa
-from masrel.agreement.fleiss import FLEISS_KERNEL, fleiss_kappa
-from masrel.agreement.gwet import GWET_KERNEL, gwet_ac
-from masrel.agreement.icc import IccForm, icc
-from masrel.agreement.kendall import kendall_w
-from masrel.agreement.krippendorff import KRIPPENDORFF_KERNEL, krippendorff_alpha
-from masrel.agreement.light import LIGHT_KERNEL, light_kappa
-from masrel.agreement.percent import PERCENT_KERNEL, percent_agreement
-from masrel.agreement.retest import (
+from masrel.agreement._pairs import (
+    COHEN_KERNEL,
+    LIGHT_KERNEL,
     POOLED_PAIRS_KERNEL,
     STRATIFIED_KERNEL,
-    pooled_kappa,
-    stratified_kappa,
 )
-from masrel.agreement.robinson import robinson_a
-from masrel.agreement.scott import SCOTT_KERNEL, scott_pi
-from masrel.agreement.weights import WeightName
+from masrel.agreement._pooled import (
+    BRENNAN_PREDIGER,
+    FLEISS,
+    GWET,
+    PERCENT,
+    SCOTT,
+    complete_kernel,
+    pooled_kernel,
+)
+from masrel.agreement._weights import WeightName
+from masrel.agreement.brennan_prediger import brennan_prediger
+from masrel.agreement.cohen import cohen_kappa
+from masrel.agreement.conger import _KERNEL as CONGER_KERNEL
+from masrel.agreement.conger import conger_kappa
+from masrel.agreement.fleiss import fleiss_kappa
+from masrel.agreement.gwet import gwet_ac
+from masrel.agreement.icc import IccForm, icc, robinson_a
+from masrel.agreement.kendall import kendall_w
+from masrel.agreement.krippendorff import _KERNEL as KRIPPENDORFF_KERNEL
+from masrel.agreement.krippendorff import krippendorff_alpha
+from masrel.agreement.light import light_kappa
+from masrel.agreement.percent import percent_agreement
+from masrel.agreement.scott import scott_pi
+from masrel.agreement.two_sessions import pooled_kappa, stratified_kappa
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate
-
-__all__ = ["COEFFICIENTS", "Coefficient", "Property", "coefficient"]
 
 Property = Literal[
     "items in any order",
@@ -129,7 +138,7 @@ _ALL = (
         name="percent_agreement",
         title="Percent agreement",
         function=percent_agreement,
-        kernel=PERCENT_KERNEL,
+        kernel=pooled_kernel(PERCENT),
         lowest=0.0,
         chance_corrected=False,
     ),
@@ -150,7 +159,7 @@ _ALL = (
         name="fleiss_kappa",
         title="Fleiss' κ",
         function=fleiss_kappa,
-        kernel=FLEISS_KERNEL,
+        kernel=pooled_kernel(FLEISS),
     ),
     Coefficient(
         name="light_kappa",
@@ -162,21 +171,21 @@ _ALL = (
         name="scott_pi",
         title="Scott's π",
         function=scott_pi,
-        kernel=SCOTT_KERNEL,
+        kernel=complete_kernel(SCOTT),
         n_raters=(2, 2),
     ),
     Coefficient(
         name="brennan_prediger",
         title="Brennan-Prediger",
         function=brennan_prediger,
-        kernel=BRENNAN_PREDIGER_KERNEL,
+        kernel=pooled_kernel(BRENNAN_PREDIGER),
         properties=_EVERY - {"unused category"},
     ),
     Coefficient(
         name="gwet_ac",
         title="Gwet's AC",
         function=gwet_ac,
-        kernel=GWET_KERNEL,
+        kernel=pooled_kernel(GWET),
         properties=_EVERY - {"unused category"},
     ),
     Coefficient(
@@ -264,7 +273,7 @@ def coefficient(name: str) -> Coefficient:
     Raises
     ------
     ParameterError
-        If there is none of that name; the message lists those there are.
+        If there is no such coefficient; the message lists those that exist.
 
     Examples
     --------

@@ -5,13 +5,11 @@ from collections.abc import Sequence
 from numpy.typing import ArrayLike
 
 from masrel.agreement._counts import count_table
-from masrel.agreement._data import CodedRatings, code_ratings, complete
-from masrel.agreement._kernel import Floats, Kernel
+from masrel.agreement._data import code_ratings, complete
 from masrel.agreement._labels import Label
 from masrel.agreement._pairs import two_raters
-from masrel.agreement._pooled import PooledCoefficient, estimate_pooled
-from masrel.agreement.fleiss import FLEISS_KERNEL, shared_margins
-from masrel.agreement.weights import WeightName
+from masrel.agreement._pooled import SCOTT, estimate_pooled
+from masrel.agreement._weights import WeightName
 from masrel.estimates import Estimate
 
 
@@ -45,7 +43,7 @@ def scott_pi(
     RatingsError
         If the ratings are not such a table or not of two raters.
     ParameterError
-        If an option is none, or the weights do not fit the categories.
+        If an option is invalid, or the weights do not fit the categories.
 
     Warns
     -----
@@ -69,7 +67,7 @@ def scott_pi(
     0.333
     """
     coded = complete(two_raters(code_ratings(ratings, categories), "Scott's pi"))
-    return estimate_pooled(_COEFFICIENT, coded, None, weights, population=population)
+    return estimate_pooled(SCOTT, coded, None, weights, population=population)
 
 
 def scott_pi_from_table(
@@ -111,16 +109,4 @@ def scott_pi_from_table(
     0.333
     """
     counted = count_table(table, categories=categories)
-    return estimate_pooled(_COEFFICIENT, counted, None, weights, population=population)
-
-
-_COEFFICIENT = PooledCoefficient("scott_pi", "Scott's pi", shared_margins)
-
-
-def _features(coded: CodedRatings, v: Floats) -> Floats:
-    features = FLEISS_KERNEL.features(coded, v)
-    features[(coded.codes < 0).any(axis=1)] = 0.0
-    return features
-
-
-SCOTT_KERNEL = Kernel(features=_features, value=FLEISS_KERNEL.value)
+    return estimate_pooled(SCOTT, counted, None, weights, population=population)

@@ -3,10 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from masrel.agreement._kernel import undefined
 from masrel.estimates import Estimate
-
-__all__ = ["Significance", "chi_squared", "p_value"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,9 +19,9 @@ class Significance:
     statistic : float
         The test statistic; ``nan`` when undefined.
     distribution : str
-        Its law under the hypothesis, such as ``"chi-squared"``.
+        Its distribution under the hypothesis, such as ``"chi-squared"``.
     df : tuple of float
-        Degrees of freedom of that law; empty where it has none.
+        Degrees of freedom of it; empty where it has none.
     p_value : float
         Two-sided where there are two sides, within [0, 1].
     n_items : int
@@ -46,8 +43,11 @@ class Significance:
         if self.reason is not None:
             return f"{self.name}: undefined ({self.reason})"
         degrees = ", ".join(f"{df:g}" for df in self.df)
-        law = f"{self.distribution}({degrees})" if degrees else self.distribution
-        return f"{self.name}: {self.statistic:.4g}, {law}, p = {self.p_value:.3g}"
+        of = f"({degrees})" if degrees else ""
+        return (
+            f"{self.name}: {self.statistic:.4g}, {self.distribution}{of}, "
+            f"p = {self.p_value:.3g}"
+        )
 
 
 def p_value(estimate: Estimate) -> float:
@@ -84,32 +84,3 @@ def p_value(estimate: Estimate) -> float:
         return 1.0 if estimate.value == 0.0 else 0.0
     t = abs(estimate.value / estimate.standard_error)
     return min(1.0, 2.0 * float(stdtr(estimate.n_items - 1, -t)))
-
-
-def chi_squared(
-    name: str,
-    hypothesis: str,
-    above: float,
-    below: int,
-    df: int,
-    n_items: int,
-) -> Significance:
-    """Refer a ratio of two ratings' changes to the chi-squared law."""
-    from scipy.special import chdtrc
-
-    if below == 0:  # an empty sum is 0; of no degrees of freedom it says nothing
-        statistic, p = 0.0 if df == 0 else math.nan, math.nan
-        reason = undefined(name, "0/0: no item changed")
-    else:
-        statistic, reason = above / below, None
-        p = float(chdtrc(df, statistic))
-    return Significance(
-        name=name,
-        hypothesis=hypothesis,
-        statistic=statistic,
-        distribution="chi-squared",
-        df=(float(df),),
-        p_value=p,
-        n_items=n_items,
-        reason=reason,
-    )

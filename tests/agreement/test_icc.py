@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from scipy import stats
 
-from masrel.agreement import icc, icc_f_test
-from masrel.agreement.icc import IccForm
+from masrel.agreement import IccForm, icc, icc_f_test
 from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
 
 FORMS = get_args(IccForm)

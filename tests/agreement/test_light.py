@@ -8,8 +8,7 @@ from fractions import Fraction
 import pytest
 from hypothesis import given
 
-from masrel.agreement import cohen_kappa, conger_kappa, light_kappa
-from masrel.agreement.light import Missing
+from masrel.agreement import Deletion, cohen_kappa, conger_kappa, light_kappa
 from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
 from tests.agreement.slopes import delta_error
 from tests.strategies import LABELS, Table, tables
@@ -78,22 +77,23 @@ def test_missing_ratings_listwise_and_pairwise_by_hand() -> None:
     holed: Table = [*SMALL, ["a", "b", None], [None, "a", "b"]]
     assert light_kappa(holed).value == 0.6
     assert light_kappa(holed).n_items == 3
-    found = light_kappa(holed, missing="pairwise")
+    found = light_kappa(holed, deletion="pairwise")
     assert found.value == float((Fraction(1, 5) + Fraction(1, 2) + Fraction(2, 5)) / 3)
     assert found.n_items == 5
 
 
 @pytest.mark.filterwarnings("ignore::masrel.errors.UndefinedStatisticWarning")
-@pytest.mark.parametrize("missing", ["listwise", "pairwise"])
+@pytest.mark.parametrize("deletion", ["listwise", "pairwise"])
 @given(table=tables(n_raters=(2, 4)))
 def test_value_and_error_are_those_of_the_plain_formula(
-    missing: Missing, table: Table
+    deletion: Deletion, table: Table
 ) -> None:
-    found = light_kappa(table, categories=LABELS, missing=missing)
-    least = len(table[0]) if missing == "listwise" else 1
+    found = light_kappa(table, categories=LABELS, deletion=deletion)
+    least = len(table[0]) if deletion == "listwise" else 1
     rows = [r for r in table if sum(g is not None for g in r) >= least]
     expected = plain(rows, [Fraction(1)] * len(rows)) if rows else None
     if expected is None:
+        assert math.isnan(found.value)
         assert found.reason
         return
     assert found.value == float(expected)
@@ -106,6 +106,9 @@ def test_value_and_error_are_those_of_the_plain_formula(
 def test_is_the_mean_of_cohens_kappa(table: Table) -> None:
     pairs = [[[r[g], r[h]] for r in table] for g, h in ((0, 1), (0, 2), (1, 2))]
     if any(len({g for row in pair for g in row}) < 2 for pair in pairs):
+        with pytest.warns(UndefinedStatisticWarning, match="one category"):
+            undefined = light_kappa(table, categories=LABELS)
+        assert math.isnan(undefined.value)
         return
     values = [cohen_kappa(pair, categories=LABELS).value for pair in pairs]
     found = light_kappa(table, categories=LABELS).value
@@ -145,13 +148,13 @@ def test_one_pair_without_a_kappa_is_named_and_none_is_given() -> None:
 def test_a_pair_without_a_common_item_is_named() -> None:
     table: Table = [["a", "a", None], ["b", "b", None], ["a", None, "b"]]
     with pytest.warns(UndefinedStatisticWarning, match="columns 1 and 2"):
-        found = light_kappa(table, missing="pairwise")
+        found = light_kappa(table, deletion="pairwise")
     assert "no item has both ratings" in (found.reason or "")
 
 
 def test_wrong_calls_are_one_sentence() -> None:
-    said = "missing: needs one of listwise, pairwise, got 'omit'"
+    said = "deletion: needs one of listwise, pairwise, got 'omit'"
     with pytest.raises(ParameterError, match=said):
-        light_kappa(SMALL, missing="omit")  # type: ignore[arg-type]
+        light_kappa(SMALL, deletion="omit")  # type: ignore[arg-type]
     with pytest.raises(RatingsError, match="at least two raters, got 1"):
         light_kappa([["a"], ["b"]])

@@ -12,13 +12,13 @@ from scipy import stats
 from statsmodels.stats import contingency_tables as peer
 
 from masrel.agreement import (
+    McnemarKind,
     bhapkar,
     bowker,
     contingency_table,
     mcnemar,
     stuart_maxwell,
 )
-from masrel.agreement.contingency import McnemarKind
 from masrel.errors import (
     CountsError,
     ParameterError,

@@ -13,8 +13,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import masrel.agreement
-from masrel.agreement import COEFFICIENTS, Coefficient, WeightName, declared_weights
-from masrel.agreement.registry import Property
+from masrel.agreement import (
+    COEFFICIENTS,
+    Coefficient,
+    Property,
+    WeightName,
+    declared_weights,
+)
 from masrel.errors import UndefinedStatisticWarning
 from masrel.estimates import Estimate
 from tests.strategies import LABELS, Table, tables
@@ -286,6 +291,37 @@ def test_two_categories_brennan_prediger_is_pabak(table: Table) -> None:
     two = [["0" if g == "0" else "1" for g in row] for row in table]
     found = estimate(COEFFICIENTS["brennan_prediger"], two, ("0", "1"))
     assert math.isclose(found.value, 2 * found.observed - 1, abs_tol=1e-14)
+
+
+@pytest.mark.parametrize(
+    "entry",
+    [pytest.param(e, id=e.name) for e in COEFFICIENTS.values() if e.has_interval],
+)
+def test_an_interval_that_comes_with_an_estimate_holds_it(entry: Coefficient) -> None:
+    # Small tables of few levels, where Satterthwaite's degrees of freedom are few. At
+    # levels far below 0.5 an interval from F need not hold its estimate.
+    rng = random.Random(3)
+    n_intervals = 0
+    for _ in range(600):
+        n_items, n_raters = rng.randint(2, 6), rng.randint(2, 5)
+        levels = rng.choice([2, 3, 9])
+        table = [
+            [rng.randrange(levels) for _ in range(n_raters)] for _ in range(n_items)
+        ]
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UndefinedStatisticWarning)
+            result = entry(table, level=rng.choice([0.5, 0.8, 0.95]))
+        interval = result.interval
+        if interval is None:
+            assert result.reason
+        elif interval.reason is not None:
+            assert math.isnan(interval.low)
+            assert math.isnan(interval.high)
+        else:
+            n_intervals += 1
+            slack = 1e-12 * max(1.0, abs(result.value))
+            assert interval.low - slack <= result.value <= interval.high + slack
+    assert n_intervals > 300
 
 
 def _public(names: Mapping[str, object]) -> set[str]:

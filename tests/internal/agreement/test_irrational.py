@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from masrel.agreement.weights import _sine_squared, _square_root
+from masrel.agreement._weights import _sine_squared, _square_root
 
 ULP = Fraction(1, 10**40)  # the last of 40 decimals
 

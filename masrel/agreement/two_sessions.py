@@ -13,24 +13,19 @@ from masrel.agreement._data import CodedRatings, code_pairs, pairs_of_raters
 from masrel.agreement._kernel import (
     NO_CHANCE,
     NO_PAIR,
-    Floats,
     Influence,
     Integers,
-    Kernel,
-    divide,
     standard_error,
     undefined,
 )
 from masrel.agreement._labels import Label
 from masrel.agreement._pairs import (
-    PAIR_KERNEL,
     PairSlopes,
     PairSums,
     estimate_pairs,
-    pair_features,
     pair_table,
 )
-from masrel.agreement.weights import WeightName, Weights, declared_weights
+from masrel.agreement._weights import WeightName, Weights, declared_weights
 from masrel.estimates import Estimate
 
 
@@ -67,7 +62,7 @@ def stratified_kappa(
     RatingsError
         If the pairs are not such a table.
     ParameterError
-        If the weights are none, or do not fit the categories.
+        If the weights are unknown, or do not fit the categories.
 
     Warns
     -----
@@ -183,7 +178,7 @@ def pooled_kappa(
     RatingsError
         If the pairs are not such a table.
     ParameterError
-        If the weights are none, or do not fit the categories.
+        If the weights are unknown, or do not fit the categories.
 
     Warns
     -----
@@ -241,27 +236,3 @@ def _pooled_influence(
     u = (slopes.influence() * rate)[at].sum(axis=1)
     terms = abs(slopes.observed * (rate / slopes.d_e))[at].sum(axis=1)
     return Influence(u, freq.astype(u.dtype), terms)
-
-
-def _stratified_features(coded: CodedRatings, v: Floats) -> Floats:
-    # (n_items, n_raters (2 + 2 n_categories)): each rater's pair features in turn
-    return np.hstack(pair_features(coded, pairs_of_raters(coded), v))
-
-
-def _stratified_value(sums: Floats, v: Floats) -> Floats:
-    # sums (..., n_raters (2 + 2 n_categories)) -> (...)
-    q = len(v)
-    parts = sums.reshape(*sums.shape[:-1], -1, 2 + 2 * q)
-    n = np.where(parts[..., 1] > 0, parts[..., 1], 1.0)  # no pair adds 0 to both
-    first, second = parts[..., 2 : 2 + q], parts[..., 2 + q :]
-    expected = ((first @ v) * second).sum(axis=-1) / (n * n)
-    return 1.0 - divide((parts[..., 0] / n).sum(axis=-1), expected.sum(axis=-1))
-
-
-def _pooled_features(coded: CodedRatings, v: Floats) -> Floats:
-    # (n_items, 2 + 2 n_categories): sums of an item's pairs, as for Cohen's kappa
-    return np.asarray(np.sum(pair_features(coded, pairs_of_raters(coded), v), axis=0))
-
-
-STRATIFIED_KERNEL = Kernel(features=_stratified_features, value=_stratified_value)
-POOLED_PAIRS_KERNEL = Kernel(features=_pooled_features, value=PAIR_KERNEL.value)
