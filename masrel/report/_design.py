@@ -157,31 +157,28 @@ def _constants(material: Material) -> tuple[Table, ...]:
         if value is not None and value != getattr(elbow, key)
     ]
     caption = "Constants all models share"
+    if single:
+        caption += ", but for those in the table below"
     tables = [
+        ("constants", caption, _CONSTANT_COLUMNS, shared),
+        (
+            "own_constants",
+            "Constants that single models have of their own",
+            (Column(key="model", heading="Model", align="left"), *_CONSTANT_COLUMNS),
+            single,
+        ),
+    ]
+    return tuple(
         Table(
-            name="constants",
-            caption=f"{caption}, but for those in the table below"
-            if single
-            else caption,
-            columns=_CONSTANT_COLUMNS,
-            rows=tuple(shared),
+            name=name,
+            caption=text,
+            columns=columns,
+            rows=tuple(rows),
             data=material.data,
         )
-    ]
-    if single:
-        tables.append(
-            Table(
-                name="own_constants",
-                caption="Constants that single models have of their own",
-                columns=(
-                    Column(key="model", heading="Model", align="left"),
-                    *_CONSTANT_COLUMNS,
-                ),
-                rows=tuple(single),
-                data=material.data,
-            )
-        )
-    return tuple(tables)
+        for name, text, columns, rows in tables
+        if rows
+    )
 
 
 def _constant(key: str, value: float | str) -> tuple[Value, ...]:
