@@ -144,23 +144,28 @@ class DrawnResamples:
 
     def quantile(self, position: float) -> float:
         """Return the quantile at a position, as `AllResamples.quantile` has it."""
-        return self._plain_quantile(position + self._miss(position)[0])
+        miss, _, _ = self._regression(self._up_to_quantile(position), position)
+        return self._plain_quantile(position + miss)
 
     def share_below(self, value: float) -> float:
         """Return the probability of less than a value, and half that of the value."""
         below = self._indicator(value)
         share = float(below.mean())
-        return share - self._regressed(below, share)[0]
+        miss, _, _ = self._regression(below, share)
+        return share - miss
 
     def error(self, position: float, pull: float, value: float) -> float:
         """Return the Monte Carlo error of a quantile.
 
         Its position moves by `pull` with the share of resamples below `value`.
         """
-        miss, rest = self._miss(position)
+        below = self._up_to_quantile(position)
+        miss, slope, hit = self._regression(below, position)
+        rest = below - slope * hit  # what the control does not explain
         if pull:
             below = self._indicator(value)
-            rest = rest - pull * self._regressed(below, float(below.mean()))[1]
+            _, slope, hit = self._regression(below, float(below.mean()))
+            rest -= pull * (below - slope * hit)
         n = self.drawn.size
         error = float(rest.std()) / math.sqrt(n)
         # The slope of the quantile, from twice as far as a plain sample is off.
@@ -185,23 +190,25 @@ class DrawnResamples:
         below = (self.drawn < low).astype(np.float64)
         return np.asarray(0.5 * (below + (self.drawn <= high)), dtype=np.float64)
 
-    def _miss(self, position: float) -> tuple[float, Floats]:
+    def _up_to_quantile(self, position: float) -> Floats:
         below = self.drawn <= self._plain_quantile(position)
-        return self._regressed(below.astype(np.float64), position)
+        return below.astype(np.float64)
 
-    def _regressed(self, below: Floats, position: float) -> tuple[float, Floats]:
-        """Return by how much the share below is off, and its residuals."""
+    def _regression(
+        self, below: Floats, position: float
+    ) -> tuple[float, float, Floats]:
+        """Return by how much the share below is off, the slope β, and H's indicator."""
         if self.control is None or self.scores is None:
-            return 0.0, below
+            return 0.0, 0.0, below
         cut, expected = self.control.cut(position)
         hit = (self.scores <= cut).astype(np.float64)
         share = float(hit.mean())
         variance = share * (1.0 - share)
         if variance == 0.0:
-            return 0.0, below
+            return 0.0, 0.0, hit
         covariance = float(hit @ below) / hit.size - share * float(below.mean())
         slope = covariance / variance
-        return slope * (share - expected), below - slope * hit
+        return slope * (share - expected), slope, hit
 
 
 def _around(value: float) -> tuple[float, float]:
