@@ -112,7 +112,8 @@ def write_recording(recording: Recording, path: Path) -> str:
     path.parent.mkdir(parents=True, exist_ok=True)
     ordered = {name: recording.columns[name] for name in RECORDING_COLUMNS}
     with path.open("wb") as file:
-        np.savez_compressed(file, allow_pickle=False, **ordered)
+        # Floats are never pickled; numpy 2.0 takes `allow_pickle` for a column.
+        np.savez_compressed(file, **ordered)  # type: ignore[arg-type]
     checksum = hashlib.sha256(path.read_bytes()).hexdigest()
     document = {"sha256": checksum, **recording.facts}
     path.with_suffix(".json").write_text(

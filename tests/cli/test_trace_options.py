@@ -326,7 +326,7 @@ def test_a_recording_has_its_own_ends(tmp_path: Path) -> None:
 def test_more_speeds_than_anybody_reads_are_refused() -> None:
     done = run("--model", "HM3", "--speeds-deg-s", 10, 90, 10**9)
     assert done.exit_code == 2
-    assert "1000000000 is not in the range 2<=x<=100000" in done.output
+    assert "1000000000 is not in the range 2<=x<=100000" in done.stderr
 
 
 def test_numbers_that_are_very_long_or_short_stay_apart() -> None:
