@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from masrel.analysis import Speed, Speeds, SpeedSummary
-from masrel.analysis._torque_at_speeds import (
+from masrel.analysis._descriptions import (
     commanded_traces,
     peak_torques,
     stretch_end_deg,

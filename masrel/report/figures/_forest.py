@@ -1,27 +1,27 @@
-"""Estimates with their intervals and distributions, one below the other."""
+"""Estimates with their intervals and distributions, one below the other.
+
+A distribution is a small ridge above its interval. A density is a filled curve.
+Resamples are shares: a value that many of them have is a stem at its place, and all
+others are put together in bars, of one width in a row, so that a point mass is never
+smeared and a stem and a bar of one height are one share.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
+import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.legend_handler import HandlerLine2D
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from numpy.typing import NDArray
 
-from masrel.estimates import Interval
+from masrel.estimates import Distribution, Interval
 from masrel.report._figure_data import Forest, ForestRow
 from masrel.report._tables import percent
-from masrel.report.figures._ridge import (
-    RIDGE_ALPHA,
-    RIDGE_COLOURS,
-    Part,
-    draw_ridge,
-    lowest_shown,
-    parts,
-)
 from masrel.report.figures._style import BLACK, BLUE, DASHES, GREY, ORANGE
 
 # Heights in inches: of a line of text, of a line below it, of a ridge and a heading.
@@ -42,11 +42,23 @@ _INTERVALS: dict[str, dict[str, Any]] = {
 _DOT: dict[str, Any] = {"marker": "o", "color": BLACK, "markersize": 5}
 _ZERO: dict[str, Any] = {"color": GREY, "linewidth": 0.8, "linestyle": DASHES}
 
-_PARTS: dict[Part, str] = {
+# What a ridge is made of, its colour and its name in the legend.
+_Part = Literal["density", "stems", "bars"]
+_PART_COLOURS: dict[_Part, str] = {"density": ORANGE, "stems": BLUE, "bars": BLUE}
+_PART_NAMES: dict[_Part, str] = {
     "density": "posterior density, each to its own height",
     "stems": "resamples of one value, each row to its own height",
     "bars": "resamples together in bars, each row to its own height",
 }
+_RIDGE_ALPHA = 0.35
+
+_WIDTHS = (0.02, 0.01, 0.005, 0.002, 0.001)
+_MIN_BARS = 12  # in the middle of the resamples
+_MIDDLE = (0.005, 0.995)
+_MAX_STEMS = 60  # up to as many values are all shown as stems
+_STEM_SHARE = 0.05  # of the resamples, from which on one value is a stem
+_FAINT = 0.01  # of the greatest height: what is below it needs no room
+_SAME = 1e-9  # values as near as this are one value, computed in another order
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,7 +132,7 @@ def _lowest(rows: Sequence[ForestRow]) -> float:
         if row.interval is not None:
             numbers.append(row.interval.low)
             if row.interval.distribution is not None:
-                numbers.append(lowest_shown(row.interval.distribution))
+                numbers.append(_lowest_shown(row.interval.distribution))
     return min(numbers)
 
 
@@ -163,7 +175,7 @@ def _draw_row(axes: Axes, y: float, row: ForestRow, left: float) -> None:
 def _draw_interval(axes: Axes, y: float, interval: Interval, left: float) -> None:
     if interval.distribution is not None:
         base = y - 0.3 * _LINE
-        draw_ridge(axes, interval.distribution, base=base, top=base - 0.95 * _RIDGE)
+        _draw_ridge(axes, interval.distribution, base=base, top=base - 0.95 * _RIDGE)
     look = _INTERVALS[interval.kind]
     axes.plot([max(interval.low, left), interval.high], [y, y], **look)
     if interval.low < left:
@@ -195,16 +207,100 @@ def _legend_handles(rows: Sequence[ForestRow]) -> list[Artist]:
         label = f"{percent(interval.level)} % {interval.kind} interval"
         handles[label] = Line2D([], [], **_INTERVALS[interval.kind])
         if interval.distribution is not None:
-            for part in parts(interval.distribution):
-                handles[_PARTS[part]] = _part_handle(part)
+            for part in _parts(interval.distribution):
+                handles[_PART_NAMES[part]] = _part_handle(part)
     for label, handle in handles.items():
         handle.set_label(label)
     return list(handles.values())
 
 
-def _part_handle(part: Part) -> Artist:
-    colour = RIDGE_COLOURS[part]
+def _part_handle(part: _Part) -> Artist:
+    colour = _PART_COLOURS[part]
     if part == "stems":
         look: dict[str, Any] = {"marker": "|", "markersize": 9, "markeredgewidth": 1.4}
         return Line2D([], [], color=colour, linestyle="none", **look)
-    return Patch(facecolor=(colour, RIDGE_ALPHA), edgecolor=colour, linewidth=0.8)
+    return Patch(facecolor=(colour, _RIDGE_ALPHA), edgecolor=colour, linewidth=0.8)
+
+
+def _draw_ridge(
+    axes: Axes, distribution: Distribution, *, base: float, top: float
+) -> None:
+    """Draw a distribution between two heights; its own greatest height is the top."""
+    if distribution.continuous:
+        colour, highest = _PART_COLOURS["density"], distribution.weights.max()
+        heights = base + (top - base) * distribution.weights / highest
+        fill: dict[str, Any] = {
+            "color": colour,
+            "alpha": _RIDGE_ALPHA,
+            "linewidth": 0.0,
+        }
+        axes.fill_between(distribution.values, base, heights, **fill)
+        axes.plot(distribution.values, heights, color=colour, linewidth=0.8)
+        return
+    values, shares = _distinct(distribution)
+    single = _is_single(shares)
+    edges, binned = _bars(values[~single], shares[~single])
+    unit = (top - base) / max([*shares[single], *binned])
+    if binned.size:
+        bars: dict[str, Any] = {"baseline": base, "color": _PART_COLOURS["bars"]}
+        heights = base + unit * binned
+        axes.stairs(heights, edges, fill=True, alpha=_RIDGE_ALPHA, **bars)
+        axes.stairs(heights, edges, linewidth=0.8, **bars)
+    stems: dict[str, Any] = {"color": _PART_COLOURS["stems"], "linewidth": 1.4}
+    axes.vlines(values[single], base, base + unit * shares[single], **stems)
+
+
+def _parts(distribution: Distribution) -> tuple[_Part, ...]:
+    """Return what the ridge of a distribution is made of."""
+    if distribution.continuous:
+        return ("density",)
+    single = _is_single(_distinct(distribution)[1])
+    present: dict[_Part, bool] = {"stems": bool(single.any()), "bars": not single.all()}
+    return tuple(part for part, there in present.items() if there)
+
+
+def _lowest_shown(distribution: Distribution) -> float:
+    """Return where a ridge begins to be seen."""
+    values, heights = distribution.values, distribution.weights
+    if not distribution.continuous:
+        values, heights = _distinct(distribution)
+        edges, binned = _bars(values, heights)
+        values, heights = edges[:-1], binned
+    return float(values[heights > _FAINT * heights.max()].min())
+
+
+def _distinct(
+    distribution: Distribution,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    # every value once, with its share of the finite ones: both (n_distinct,)
+    finite = np.isfinite(distribution.values)
+    values, weights = distribution.values[finite], distribution.weights[finite]
+    starts = np.flatnonzero(np.diff(values, prepend=-np.inf) > _SAME)
+    return values[starts], np.add.reduceat(weights, starts)
+
+
+def _is_single(shares: NDArray[np.float64]) -> NDArray[np.bool_]:
+    # which distinct values are stems, in their order
+    return (shares.size <= _MAX_STEMS) | (shares >= _STEM_SHARE)
+
+
+def _bars(
+    values: NDArray[np.float64], shares: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    # (n_bars + 1,), (n_bars,); a value on an edge belongs to the bar below, as 1 does
+    if not values.size:
+        return np.zeros(1), np.zeros(0)
+    width = _width(values, shares)
+    at = np.ceil(values / width - _SAME).astype(np.int64)
+    first = at[0]
+    heights = np.bincount(at - first, weights=shares).astype(np.float64)
+    edges = width * np.arange(first - 1, first + heights.size)
+    return edges, heights
+
+
+def _width(values: NDArray[np.float64], shares: NDArray[np.float64]) -> float:
+    # the widest that shows the shape of what is narrow, too
+    cumulative = shares.cumsum() / shares.sum()
+    low, high = values[np.searchsorted(cumulative, _MIDDLE).clip(0, values.size - 1)]
+    enough = (width for width in _WIDTHS if _MIN_BARS * width <= high - low)
+    return next(enough, _WIDTHS[-1])
