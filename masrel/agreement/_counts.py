@@ -169,12 +169,14 @@ class DistinctItems:
             return self._arrays
         dtype = object if exact else np.float64
         counts, freq = np.array(self.rows, dtype), np.array(self.freq, dtype)
-        sizes = counts.sum(axis=1)
-        # As a rule everybody rated everything.
-        size = sizes[0].item() if not exact and (sizes == sizes[0]).all() else sizes
-        disagreement = ((counts @ (v.fractions if exact else v.floats)) * counts).sum(
-            axis=1
-        )
+        groups = self.sums(v).groups
+        if exact or len(groups) > 1:
+            size = counts.sum(axis=1)
+        else:  # as a rule: everybody rated everything
+            size = float(groups[0].size)
+        # `dot` does what @ does, in half the time for a few items.
+        matrix = v.fractions if exact else v.floats
+        disagreement = (counts.dot(matrix) * counts).sum(axis=1)
         arrays = ItemArrays(counts, freq, size, disagreement)
         if v.numerators is None and not exact:
             self._arrays = arrays
@@ -187,15 +189,24 @@ def sum_groups(
     """Add up items by their number of ratings."""
     # Takes rows (n_distinct, n_categories), freq (n_distinct,)
     groups = []
-    if isinstance(rows, list):
+    if isinstance(rows, list) and isinstance(freq, list):
         sizes = list(map(sum, rows))
         for size in sorted(set(sizes)):
-            same = [i for i, n in enumerate(sizes) if n == size]
-            of, often = [rows[i] for i in same], [freq[i] for i in same]
+            of, often = rows, freq
+            if sizes.count(size) < len(sizes):
+                of = [row for row, n in zip(rows, sizes, strict=True) if n == size]
+                often = [f for f, n in zip(freq, sizes, strict=True) if n == size]
+            n_items = sum(often)
             totals = [sum(map(mul, often, column)) for column in zip(*of, strict=True)]
-            disagreement = sum(map(mul, often, [bilinear(v, row, row) for row in of]))
-            groups.append(SizeGroup(size, sum(often), totals, disagreement))
+            if v.numerators is None:
+                agreeing = [sum(map(mul, row, row)) for row in of]
+                disagreement = n_items * size * size - sum(map(mul, often, agreeing))
+            else:
+                between = [bilinear(v, row, row) for row in of]
+                disagreement = sum(map(mul, often, between))
+            groups.append(SizeGroup(size, n_items, totals, disagreement))
         return groups
+    rows, freq = np.asarray(rows), np.asarray(freq)
     ratings = rows.sum(axis=1)
     for size in np.unique(ratings).tolist():
         same = ratings == size

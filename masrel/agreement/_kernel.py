@@ -82,10 +82,10 @@ def standard_error(
     if n_items < 2:
         return math.nan
     u, freq, terms = influence(False)
-    squares = float(freq @ (u * u))
-    if squares < _CANCELLED**2 * float(freq @ (terms * terms)):
+    squares = float(freq.dot(u * u))
+    if squares < _CANCELLED**2 * float(freq.dot(terms * terms)):
         u, freq, _ = influence(True)
-        squares = float(freq @ (u * u))
+        squares = float(freq.dot(u * u))
     variance = squares / (n_items * (n_items - 1))
     if population is not None:
         variance *= (population - n_items) / population

@@ -80,10 +80,8 @@ class PairSlopes(NamedTuple):
 
     d_o: Any
     d_e: Any
-    # (n_categories + 1, n_categories + 1): of D_o and D_e; the last row and column are
-    # those of missing ratings, -1
-    observed: Array
-    expected: Array
+    observed: Array  # (n_categories, n_categories): of D_o
+    expected: Array  # (n_categories, n_categories): of D_e
 
     @classmethod
     def of(cls, table: Integers, v: Weights, exact: bool) -> "PairSlopes":
@@ -91,19 +89,26 @@ class PairSlopes(NamedTuple):
         # Takes table (n_categories, n_categories)
         freq = table.astype(object if exact else np.float64)
         p = freq * (Fraction(1, freq.sum()) if exact else 1.0 / freq.sum())
-        matrix, q = v.fractions if exact else v.floats, len(table)
-        to_second, to_first = matrix @ p.sum(axis=0), p.sum(axis=1) @ matrix
-        d_o, d_e = (matrix * p).sum(), p.sum(axis=1) @ to_second
-        observed, expected = np.zeros((2, q + 1, q + 1), dtype=freq.dtype)
-        observed[:q, :q] = matrix - d_o
+        matrix, first = v.fractions if exact else v.floats, p.sum(axis=1)
+        to_second, to_first = matrix.dot(p.sum(axis=0)), first.dot(matrix)
+        d_o, d_e = matrix.ravel().dot(p.ravel()), first.dot(to_second)
         # D_e = Σ_kl v_kl p_k. p_.l is bilinear: Σ_m (v_km p_.m + v_ml p_m.) - 2 D_e
-        expected[:q, :q] = to_second[:, None] + to_first - 2 * d_e
-        return cls(d_o, d_e, observed, expected)
+        expected = to_second[:, None] + (to_first - 2 * d_e)
+        return cls(d_o, d_e, matrix - d_o, expected)
 
     def influence(self) -> Array:
         """Return the influence on κ = 1 - D_o/D_e of an item in each cell."""
         moved = self.d_o / self.d_e * self.expected - self.observed
         return np.asarray(moved / self.d_e)
+
+
+def of_pairs(cells: Array, codes: Codes) -> Array:
+    """Return what the cells of a table say of pairs; 0 where a rating is missing."""
+    # cells (n_categories, n_categories), codes (n_rows, 2) -> (n_rows,)
+    q = len(cells)
+    padded = np.zeros((q + 1, q + 1), dtype=cells.dtype)
+    padded[:q, :q] = cells  # missing, -1, is the last
+    return np.asarray(padded[codes[:, 0], codes[:, 1]])
 
 
 def estimate_pairs(

@@ -136,10 +136,14 @@ def estimate_pooled(
             reason = undefined(coefficient.title, NO_CHANCE)
         else:
             value = (d_e * over_o - d_o * over_e) / (d_e * over_o)
-            problem = _Problem(
-                coefficient, counted.items, v, (d_e, over_e), variance == "irrcac"
+            influence = partial(
+                _influence,
+                coefficient,
+                counted.items,
+                v,
+                (d_e, over_e),
+                variance == "irrcac",
             )
-            influence = partial(_influence, problem)
             error = partial(standard_error, influence, sums.n_rated, population)
     return Estimate(
         coefficient=coefficient.name,
@@ -169,20 +173,18 @@ def _expected(
     return constant * scale + factor * bilinear(v, p, p), divisor * scale
 
 
-class _Problem(NamedTuple):
-    # what a standard error is computed from
-    coefficient: PooledCoefficient
-    items: DistinctItems
-    v: Weights
-    expected: tuple[int, int]  # D_e as numerator and denominator
-    irrcac: bool
-
-
-def _influence(problem: _Problem, exact: bool) -> Influence:
+def _influence(
+    coefficient: PooledCoefficient,
+    items: DistinctItems,
+    v: Weights,
+    expected: tuple[int, int],
+    irrcac: bool,
+    exact: bool,
+) -> Influence:
     # With d_i an item's disagreement, s_i = 1 if it has a pair, x_ik its shares and
     # h_k = ∂D_e/∂p_k,
     #   D_e u_i = (D_o/D_e) Σ_k h_k (x_ik - p_k) - (n/n') (d_i - D_o s_i).
-    coefficient, items, v, (d_e, over_e), irrcac = problem
+    d_e, over_e = expected
     divide: Callable[[int, int], Any] = Fraction if exact else truediv
     sums, (counts, freq, size, disagreement) = items.sums(v), items.arrays(v, exact)
     rate, inverse = divide(sums.n_rated, sums.n_usable), divide(over_e, d_e)
@@ -202,9 +204,9 @@ def _influence(problem: _Problem, exact: bool) -> Influence:
         p = np.array([divide(part, sums.total) for part in sums.marginals])
         of_chance = identity_weights(q) if coefficient.nominal else v
         matrix = of_chance.fractions if exact else of_chance.floats
-        slopes = matrix @ p * (2 * divide(factor, divisor) * ratio * inverse)
-        u = u + counts @ slopes / size
-    return Influence(u - freq @ u / sums.n_rated, freq, terms)
+        slopes = matrix.dot(p) * (2 * divide(factor, divisor) * ratio * inverse)
+        u = u + counts.dot(slopes) / size
+    return Influence(u - freq.dot(u) / sums.n_rated, freq, terms)
 
 
 def _features(counts: Floats, v: Floats) -> Floats:

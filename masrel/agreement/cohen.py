@@ -147,7 +147,7 @@ def _estimate(table: Integers, v: Weights, population: int | None) -> Estimate:
 
 def _influence(table: Integers, v: Weights, exact: bool) -> Influence:
     # of the cells of the table
-    slopes, q = PairSlopes.of(table, v, exact), len(table)
-    u, terms = slopes.influence()[:q, :q], slopes.observed[:q, :q] / slopes.d_e
+    slopes = PairSlopes.of(table, v, exact)
+    u, terms = slopes.influence(), slopes.observed / slopes.d_e
     freq = table.astype(u.dtype)
     return Influence(u.ravel(), freq.ravel(), terms.ravel())

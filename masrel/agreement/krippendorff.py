@@ -237,13 +237,10 @@ def _influence(items: DistinctItems, v: Weights, sums: _Sums, exact: bool) -> In
         disagreement = disagreement[~single]
     q = divide((n - 1) * sums.observed, sums.multiple * sums.expected)
     totals = np.array(sums.totals, dtype=object if exact else np.float64)
-    h = (
-        (v.fractions if exact else v.floats)
-        @ totals
-        * (2 * q * divide(w, sums.expected))
-    )
+    matrix = v.fractions if exact else v.floats
+    h = matrix.dot(totals) * (2 * q * divide(w, sums.expected))
     terms = disagreement * (-m * divide((n - 1) * w, sums.expected) / (size - 1))
-    u = counts @ (m * h - m * q * divide(1, n - 1)) + terms
+    u = counts.dot(m * h - m * q * divide(1, n - 1)) + terms
     return Influence(u, freq, terms)
 
 

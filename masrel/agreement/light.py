@@ -24,6 +24,7 @@ from masrel.agreement._labels import Label
 from masrel.agreement._pairs import (
     PairSlopes,
     PairSums,
+    of_pairs,
     pair_table,
 )
 from masrel.agreement._weights import WeightName, Weights, declared_weights
@@ -173,9 +174,9 @@ def _influence(
     u: Array = np.zeros(len(rows), dtype=freq.dtype)
     terms = u.copy()
     for (g, h), table in tables.items():
-        slopes, at = PairSlopes.of(table, v, exact), (rows[:, g], rows[:, h])
+        slopes, pairs = PairSlopes.of(table, v, exact), rows[:, [g, h]]
         often = Fraction(coded.n_items, int(table.sum()) * len(tables))
         rate: Any = often if exact else float(often)
-        u += (slopes.influence() * rate)[at]
-        terms += abs(slopes.observed * (rate / slopes.d_e))[at]
+        u += of_pairs(slopes.influence() * rate, pairs)
+        terms += of_pairs(abs(slopes.observed * (rate / slopes.d_e)), pairs)
     return Influence(u, freq, terms)

@@ -23,6 +23,7 @@ from masrel.agreement._pairs import (
     PairSlopes,
     PairSums,
     estimate_pairs,
+    of_pairs,
     pair_table,
 )
 from masrel.agreement._weights import WeightName, Weights, declared_weights
@@ -141,11 +142,11 @@ def _stratified_influence(
     freq = freq.astype(object if exact else np.float64)
     u, terms = np.zeros((2, len(rows)), dtype=freq.dtype)
     for r, of in slopes.items():
-        at = rows[:, 2 * r], rows[:, 2 * r + 1]
+        pairs = rows[:, 2 * r : 2 * r + 2]
         often = Fraction(coded.n_items, int(tables[r].sum()))
         rate = (often if exact else float(often)) / d_e
-        u += ((ratio * of.expected - of.observed) * rate)[at]
-        terms += abs(of.observed * rate)[at]
+        u += of_pairs((ratio * of.expected - of.observed) * rate, pairs)
+        terms += of_pairs(abs(of.observed * rate), pairs)
     return Influence(u, freq, terms)
 
 
@@ -232,7 +233,9 @@ def _pooled_influence(
     often = Fraction(coded.n_items, int(table.sum()))
     rate = often if exact else float(often)
     rows, freq = distinct_rows(coded.codes, coded.n_categories)
-    at = rows[:, ::2], rows[:, 1::2]
-    u = (slopes.influence() * rate)[at].sum(axis=1)
-    terms = abs(slopes.observed * (rate / slopes.d_e))[at].sum(axis=1)
+    strata = [rows[:, at : at + 2] for at in range(0, rows.shape[1], 2)]
+    moved, observed = slopes.influence() * rate, abs(slopes.observed * rate)
+    u = sum(of_pairs(moved, pairs) for pairs in strata)
+    terms = sum(of_pairs(observed / slopes.d_e, pairs) for pairs in strata)
+    u, terms = np.asarray(u), np.asarray(terms)
     return Influence(u, freq.astype(u.dtype), terms)
