@@ -6,6 +6,7 @@ need no call per resample.
 """
 
 import math
+import sys
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -112,8 +113,10 @@ def check_population(population: int | None, n_items: int) -> None:
 
 
 def undefined(title: str, reason: str) -> str:
-    """Warn that a statistic is undefined, and return why."""
-    warnings.warn(
-        f"{title} is undefined: {reason}", UndefinedStatisticWarning, stacklevel=4
-    )
+    """Warn whoever called this package that a statistic is undefined; return why."""
+    frame, level = sys._getframe(1), 2
+    while frame.f_back and frame.f_globals.get("__package__") == __package__:
+        frame, level = frame.f_back, level + 1
+    message = f"{title} is undefined: {reason}"
+    warnings.warn(message, UndefinedStatisticWarning, stacklevel=level)
     return reason

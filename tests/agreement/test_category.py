@@ -10,6 +10,7 @@ from hypothesis import given
 
 from masrel.agreement import category_kappa, fleiss_kappa, fleiss_null
 from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
+from tests.agreement.undefined import assert_undefined
 from tests.strategies import LABELS, Table, tables
 
 DIAGNOSES = ["depression", "personality", "schizophrenia", "neurosis", "other"]
@@ -82,6 +83,7 @@ def test_a_missing_rating_is_none_of_the_others() -> None:
 def test_fleiss_kappa_is_their_mean_weighed_by_p_times_q(table: Table) -> None:
     grades = [grade for row in table for grade in row]
     if len(set(grades)) < 2:
+        assert_undefined(lambda: fleiss_kappa(table, categories=LABELS))
         return
     shares = {g: grades.count(g) / len(grades) for g in set(grades)}
     weights = {g: p * (1 - p) for g, p in shares.items()}

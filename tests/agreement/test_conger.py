@@ -11,6 +11,7 @@ from hypothesis import given
 from masrel.agreement import cohen_kappa, conger_kappa, fleiss_kappa
 from masrel.errors import ParameterError, UndefinedStatisticWarning
 from tests.agreement.slopes import delta_error
+from tests.agreement.undefined import assert_undefined
 from tests.strategies import LABELS, Table, tables
 
 SMALL: Table = [["a", "a", "a"], ["b", "b", "b"], ["a", "b", "b"]]
@@ -79,9 +80,10 @@ def test_linear_weights_by_hand() -> None:
 @given(tables(n_raters=(2, 4)))
 def test_value_and_error_are_those_of_the_plain_formula(table: Table) -> None:
     rated = [row for row in table if any(g is not None for g in row)]
-    if len(rated) < 2:
-        return
     found = conger_kappa(table, categories=LABELS)
+    if len(rated) < 2:
+        assert math.isnan(found.standard_error)
+        return
     expected = plain(rated, [Fraction(1)] * len(rated))
     if expected is None:
         assert found.reason
@@ -95,6 +97,7 @@ def test_value_and_error_are_those_of_the_plain_formula(table: Table) -> None:
 def test_of_complete_ratings_it_is_never_below_fleiss_kappa(table: Table) -> None:
     # chance between two raters who differ is less than that of both together
     if len({grade for row in table for grade in row}) < 2:
+        assert_undefined(lambda: conger_kappa(table, categories=LABELS))
         return
     conger, fleiss = (
         function(table, categories=LABELS) for function in (conger_kappa, fleiss_kappa)

@@ -17,6 +17,7 @@ from masrel.agreement import (
 )
 from masrel.errors import UndefinedStatisticWarning
 from tests.agreement.slopes import delta_error
+from tests.agreement.undefined import assert_undefined
 from tests.strategies import LABELS, Table, tables
 
 SMALL: Table = [["a", "a"], ["a", "a"], ["a", "b"]]
@@ -106,6 +107,7 @@ def test_value_and_error_are_those_of_the_plain_formula(table: Table) -> None:
     rated = [row for row in table if any(grade is not None for grade in row)]
     expected = plain(rated, [Fraction(1)] * len(rated))
     if expected is None:
+        assert_undefined(lambda: gwet_ac(table, categories=LABELS))
         return
     found = gwet_ac(table, categories=LABELS)
     assert found.value == float(expected)

@@ -15,6 +15,7 @@ from masrel.agreement import (
 )
 from masrel.errors import ParameterError, UndefinedStatisticWarning
 from tests.agreement.slopes import delta_error
+from tests.agreement.undefined import assert_undefined
 from tests.strategies import LABELS, Table, tables
 
 # Krippendorff (2011), four observers of twelve units; the last has a single rating.
@@ -87,7 +88,13 @@ def test_error_is_the_slope_of_the_plain_mean(table: Table) -> None:
             (len(grades), Fraction(alike, pairs) if pairs else Fraction(0))
         )
     rated = [(n > 1, share) for n, share in agreement if n]
-    if len(rated) < 2 or not any(usable for usable, _ in rated):
+    if not any(usable for usable, _ in rated):
+        assert_undefined(lambda: percent_agreement(table, categories=LABELS))
+        return
+    if len(rated) < 2:
+        single = percent_agreement(table, categories=LABELS)
+        assert single.value == float(rated[0][1])
+        assert math.isnan(single.standard_error)
         return
 
     def mean(w: Sequence[Fraction]) -> Fraction:

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from masrel.agreement import icc, kendall_w, robinson_a
 from masrel.errors import RatingsError, UndefinedStatisticWarning
+from tests.agreement.undefined import assert_undefined
 
 Rows = list[list[int]]
 
@@ -63,9 +64,11 @@ def test_shrout_and_fleiss_table_worked_in_whole_numbers() -> None:
 @given(rows)
 def test_is_the_quotient_of_plain_sums(table: Rows) -> None:
     expected = plain(table)
-    if expected is not None:
-        assert robinson_a(table).value == pytest.approx(float(expected), rel=1e-15)
-        assert 0 <= expected <= 1
+    if expected is None:
+        assert_undefined(lambda: robinson_a(table))
+        return
+    assert robinson_a(table).value == pytest.approx(float(expected), rel=1e-15)
+    assert 0 <= expected <= 1
 
 
 @given(rows)
@@ -73,6 +76,7 @@ def test_of_two_raters_it_is_a_correlation(table: Rows) -> None:
     # 1/2 + S_xy/(S_xx + S_yy): Robinson's A of two is (1 + r)/2 with the intraclass r
     two = np.array([row[:2] for row in table], dtype=float)
     if plain([row[:2] for row in table]) is None:
+        assert_undefined(lambda: robinson_a(two))
         return
     (s_xx, s_xy), (_, s_yy) = np.cov(two.T)
     found = robinson_a(two).value
@@ -85,6 +89,7 @@ def test_is_consistency_on_another_scale(table: Rows) -> None:
     # ICC(C,1) = (k A - 1)/(k - 1)
     single = icc(table, form="ICC(C,1)")
     if single.reason is not None:
+        assert math.isnan(single.value)
         return
     k = len(table[0])
     found = robinson_a(table).value
@@ -100,6 +105,7 @@ def test_of_ranks_it_is_kendalls_w(table: Rows) -> None:
     ]
     of_items = [list(row) for row in zip(*ranks, strict=True)]
     if plain(of_items) is None:
+        assert_undefined(lambda: robinson_a(of_items))
         return
     w = kendall_w(table).value
     assert robinson_a(of_items).value == pytest.approx(w, rel=1e-14, abs=1e-15)
@@ -111,6 +117,7 @@ def test_neither_levels_of_raters_nor_units_matter(
 ) -> None:
     expected = plain(table)
     if expected is None:
+        assert_undefined(lambda: robinson_a(table))
         return
     moved = [
         [-4.0 * x + level for x, level in zip(row, levels, strict=False)]

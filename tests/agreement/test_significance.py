@@ -93,9 +93,10 @@ def test_every_tail_has_its_digits(t: float, df: int) -> None:
 def test_of_percent_agreement_it_is_the_t_test_of_a_mean(
     grades: list[tuple[str, str, str]],
 ) -> None:
-    # Every item complete: its agreement is 0, 1/3 or 1, their mean has Student's law.
+    # Every item complete: its agreement is 0, 1/3 or 1, their mean is Student's.
     shares = [((a == b) + (a == c) + (b == c)) / 3 for a, b, c in grades]
-    if len(set(shares)) == 1:
+    if len(set(shares)) == 1:  # a standard error of 0
+        assert p_value(percent_agreement(grades)) == (0.0 if shares[0] else 1.0)
         return
     other = stats.ttest_1samp(shares, 0.0)
     assert p_value(percent_agreement(grades)) == pytest.approx(other.pvalue, rel=1e-9)

@@ -293,6 +293,14 @@ def test_two_categories_brennan_prediger_is_pabak(table: Table) -> None:
     assert math.isclose(found.value, 2 * found.observed - 1, abs_tol=1e-14)
 
 
+@every
+def test_a_warning_points_at_the_line_that_asked(entry: Coefficient) -> None:
+    # one item, and of no two ratings
+    with pytest.warns(UndefinedStatisticWarning) as warned:
+        entry.function(shaped(entry, [["0", None]]), categories=LABELS)
+    assert [warning.filename for warning in warned] == [__file__]
+
+
 @pytest.mark.parametrize(
     "entry",
     [pytest.param(e, id=e.name) for e in COEFFICIENTS.values() if e.has_interval],
