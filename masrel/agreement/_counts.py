@@ -154,6 +154,7 @@ class DistinctItems:
             common = math.lcm(*[group.size for group in groups])
             weighed = [[t * (common // g.size) for t in g.totals] for g in groups]
             marginals = list(map(sum, zip(*weighed, strict=True)))
+            marginals = marginals or [0] * self.n_categories
             total = n_rated * common
         denominator = n_usable * multiple
         sums = SufficientStatistics(

@@ -1,8 +1,6 @@
 """Tables of pairs of two ratings, and kappa as a ratio of their sums."""
 
 import itertools
-import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, NamedTuple
@@ -12,19 +10,15 @@ import numpy as np
 from masrel.agreement._counts import bilinear
 from masrel.agreement._data import CodedRatings, pairs_of_raters
 from masrel.agreement._kernel import (
-    NO_CHANCE,
-    NO_PAIR,
     Array,
     Floats,
     Integers,
     Kernel,
     divide,
-    undefined,
 )
 from masrel.agreement._labels import Codes
 from masrel.agreement._weights import Weights
 from masrel.errors import RatingsError
-from masrel.estimates import Estimate
 
 
 def two_raters(coded: CodedRatings, title: str) -> CodedRatings:
@@ -55,6 +49,7 @@ class PairSums:
     n: int
     observed: int  # Σ_kl v_kl t_kl
     expected: int  # Σ_kl v_kl t_k. t_.l
+    w: int
 
     @classmethod
     def of(cls, table: Integers, v: Weights) -> "PairSums":
@@ -72,7 +67,12 @@ class PairSums:
                 for of_v, row in zip(v.numerators, cells, strict=True)
                 for x, t in zip(of_v, row, strict=True)
             )
-        return cls(n, observed, bilinear(v, first, second))
+        return cls(n, observed, bilinear(v, first, second), v.denominator)
+
+    def ratios(self) -> tuple[tuple[int, int], tuple[int, int]]:
+        """Return D_o and D_e as numerator and denominator."""
+        n, w = self.n, self.w
+        return (self.observed, n * w), (self.expected, n * n * w)
 
 
 class PairSlopes(NamedTuple):
@@ -109,45 +109,6 @@ def of_pairs(cells: Array, codes: Codes) -> Array:
     padded = np.zeros((q + 1, q + 1), dtype=cells.dtype)
     padded[:q, :q] = cells  # missing, -1, is the last
     return np.asarray(padded[codes[:, 0], codes[:, 1]])
-
-
-def estimate_pairs(
-    sums: PairSums,
-    v: Weights,
-    name: str,
-    title: str,
-    error: Callable[[], float],
-    *,
-    n_items: int,
-    n_raters: int,
-) -> Estimate:
-    """Make kappa of a table of pairs, 1 - D_o / D_e, with one division."""
-    n, reason = sums.n, None
-    if n == 0:
-        reason = undefined(title, NO_PAIR)
-    elif v.reason is not None:
-        reason = undefined(title, v.reason)
-    elif sums.expected == 0:
-        reason = undefined(title, NO_CHANCE)
-    value = observed = chance = math.nan
-    if n and v.reason is None:
-        w = v.denominator
-        observed = (n * w - sums.observed) / (n * w)
-        chance = (n * n * w - sums.expected) / (n * n * w)
-    if reason is None:
-        value = (sums.expected - n * sums.observed) / sums.expected
-    return Estimate(
-        coefficient=name,
-        weights=v.name,
-        value=value,
-        standard_error=math.nan if reason else error,
-        observed=observed,
-        chance=chance,
-        n_items=n_items,
-        n_raters=n_raters,
-        n_categories=v.n_categories,
-        reason=reason,
-    )
 
 
 def _features(coded: CodedRatings, v: Floats) -> Floats:

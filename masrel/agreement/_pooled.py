@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike
 
 from masrel.agreement._counts import (
     DistinctItems,
-    SufficientStatistics,
     bilinear,
     count_ratings,
     item_counts,
@@ -121,56 +120,70 @@ def estimate_pooled(
     if variance not in VARIANCES or population is not None:
         check_variance(variance)
         check_population(population, sums.n_rated)
+    p, total = sums.marginals, sums.total
+    q = counted.items.n_categories
+    d_e, factor, over_e = coefficient.chance(q, v.total, v.denominator)
+    if factor:
+        of_chance = identity_weights(q) if coefficient.nominal else v
+        scale = total * total * of_chance.denominator
+        d_e = d_e * scale + factor * bilinear(of_chance, p, p)
+        over_e *= scale
+    irrcac = variance == "irrcac"
+    return ratio_estimate(
+        coefficient.name,
+        coefficient.title,
+        v,
+        (sums.observed, sums.denominator * v.denominator),
+        (d_e, over_e),
+        partial(_influence, coefficient, counted.items, v, (d_e, over_e), irrcac),
+        population,
+        sums.n_rated,
+        counted.n_raters,
+    )
+
+
+def ratio_estimate(
+    name: str,
+    title: str,
+    v: Weights,
+    observed: tuple[int, int],
+    expected: tuple[int, int],
+    influence: Callable[[bool], Influence],
+    population: int | None,
+    n_items: int,
+    n_raters: int,
+    reason: str | None = None,
+) -> Estimate:
+    """Make 1 - D_o / D_e of two fractions, with one division, or say why not."""
+    # observed, expected: D_o and D_e as numerator and denominator, 0/0 without a pair
+    (d_o, over_o), (d_e, over_e) = observed, expected
     value = p_o = p_e = math.nan
     error: float | Callable[[], float] = math.nan
-    reason = None
-    if sums.n_usable == 0:
-        reason = undefined(coefficient.title, NO_PAIR)
+    if over_o == 0:
+        reason = NO_PAIR
     elif v.reason is not None:
-        reason = undefined(coefficient.title, v.reason)
+        reason = v.reason
     else:
-        d_o, over_o = sums.observed, sums.denominator * v.denominator
-        d_e, over_e = _expected(coefficient, sums, v)
         p_o, p_e = (over_o - d_o) / over_o, (over_e - d_e) / over_e
-        if d_e == 0:
-            reason = undefined(coefficient.title, NO_CHANCE)
-        else:
-            value = (d_e * over_o - d_o * over_e) / (d_e * over_o)
-            influence = partial(
-                _influence,
-                coefficient,
-                counted.items,
-                v,
-                (d_e, over_e),
-                variance == "irrcac",
-            )
-            error = partial(standard_error, influence, sums.n_rated, population)
+        if reason is None and d_e == 0:
+            reason = NO_CHANCE
+    if reason is not None:
+        undefined(title, reason)
+    else:
+        value = (d_e * over_o - d_o * over_e) / (d_e * over_o)
+        error = partial(standard_error, influence, n_items, population)
     return Estimate(
-        coefficient=coefficient.name,
+        coefficient=name,
         weights=v.name,
         value=value,
         standard_error=error,
         observed=p_o,
         chance=p_e,
-        n_items=sums.n_rated,
-        n_raters=counted.n_raters,
-        n_categories=counted.items.n_categories,
+        n_items=n_items,
+        n_raters=n_raters,
+        n_categories=v.n_categories,
         reason=reason,
     )
-
-
-def _expected(
-    coefficient: PooledCoefficient, sums: SufficientStatistics, v: Weights
-) -> tuple[int, int]:
-    # D_e as numerator and denominator
-    p, total = sums.marginals, sums.total
-    constant, factor, divisor = coefficient.chance(len(p), v.total, v.denominator)
-    if factor == 0:
-        return constant, divisor
-    if coefficient.nominal:
-        v = identity_weights(len(p))
-    scale = total * total * v.denominator
-    return constant * scale + factor * bilinear(v, p, p), divisor * scale
 
 
 def _influence(

@@ -11,16 +11,15 @@ from masrel.agreement._kernel import (
     Influence,
     Integers,
     check_population,
-    standard_error,
 )
 from masrel.agreement._labels import Label
 from masrel.agreement._pairs import (
     PairSlopes,
     PairSums,
-    estimate_pairs,
     pair_table,
     two_raters,
 )
+from masrel.agreement._pooled import ratio_estimate
 from masrel.agreement._weights import WeightName, Weights, declared_weights
 from masrel.estimates import Estimate
 
@@ -134,12 +133,13 @@ def _estimate(table: Integers, v: Weights, population: int | None) -> Estimate:
     # shape of table: (n_categories, n_categories)
     sums = PairSums.of(table, v)
     check_population(population, sums.n)
-    return estimate_pairs(
-        sums,
-        v,
+    return ratio_estimate(
         "cohen_kappa",
         "Cohen's kappa",
-        partial(standard_error, partial(_influence, table, v), sums.n, population),
+        v,
+        *sums.ratios(),
+        partial(_influence, table, v),
+        population,
         n_items=sums.n,
         n_raters=2 if sums.n else 0,
     )

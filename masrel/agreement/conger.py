@@ -13,8 +13,6 @@ from numpy.typing import ArrayLike
 from masrel.agreement._counts import DistinctItems, bilinear, distinct_rows, item_counts
 from masrel.agreement._data import CodedRatings, code_ratings
 from masrel.agreement._kernel import (
-    NO_CHANCE,
-    NO_PAIR,
     Floats,
     Influence,
     Kernel,
@@ -22,11 +20,10 @@ from masrel.agreement._kernel import (
     check_population,
     check_variance,
     divide,
-    standard_error,
-    undefined,
     weighted_disagreement,
 )
 from masrel.agreement._labels import Label
+from masrel.agreement._pooled import ratio_estimate
 from masrel.agreement._weights import WeightName, Weights, declared_weights
 from masrel.estimates import Estimate
 
@@ -97,40 +94,25 @@ def conger_kappa(
     check_population(population, coded.n_items)
     sums = DistinctItems.of_codes(coded).sums(v)
     margins = _Margins.of(coded, v)
-    reason = None
-    if sums.n_usable == 0:
-        reason = undefined("Conger's kappa", NO_PAIR)
-    elif v.reason is not None:
-        reason = undefined("Conger's kappa", v.reason)
-    elif 0 in margins.n_ratings:
-        column = margins.n_ratings.index(0)
-        reason = undefined("Conger's kappa", f"0/0: no ratings in column {column}")
-    elif margins.numerator == 0:
-        reason = undefined("Conger's kappa", NO_CHANCE)
-    value = p_o = p_e = math.nan
-    error: float | Callable[[], float] = math.nan
-    if sums.n_usable and v.reason is None:
+    reason, influence = None, partial(_influence, coded, v, margins)
+    if 0 in margins.n_ratings:
+        reason = f"0/0: no ratings in column {margins.n_ratings.index(0)}"
+    elif sums.n_usable and margins.numerator:
         d_o, over_o = sums.observed, sums.denominator * v.denominator
         d_e, over_e = margins.numerator, margins.denominator
-        p_o, p_e = (over_o - d_o) / over_o, (over_e - d_e) / over_e
-        if reason is None:
-            value = (d_e * over_o - d_o * over_e) / (d_e * over_o)
-            ratio = Fraction(d_o * over_e, d_e * over_o)
-            rate = Fraction(coded.n_items, sums.n_usable)
-            influence = partial(
-                _influence, coded, v, margins, ratio, rate, variance == "irrcac"
-            )
-            error = partial(standard_error, influence, coded.n_items, population)
-    return Estimate(
-        coefficient="conger_kappa",
-        weights=v.name,
-        value=value,
-        standard_error=error,
-        observed=p_o,
-        chance=p_e,
+        ratio = Fraction(d_o * over_e, d_e * over_o)
+        rate = Fraction(coded.n_items, sums.n_usable)
+        influence = partial(influence, ratio, rate, variance == "irrcac")
+    return ratio_estimate(
+        "conger_kappa",
+        "Conger's kappa",
+        v,
+        (sums.observed, sums.denominator * v.denominator),
+        (margins.numerator, margins.denominator),
+        influence,
+        population,
         n_items=coded.n_items,
         n_raters=coded.n_raters,
-        n_categories=coded.n_categories,
         reason=reason,
     )
 

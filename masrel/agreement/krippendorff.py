@@ -21,18 +21,15 @@ from masrel.agreement._counts import (
 )
 from masrel.agreement._data import CodedRatings
 from masrel.agreement._kernel import (
-    NO_CHANCE,
-    NO_PAIR,
     Floats,
     Influence,
     Kernel,
     check_population,
     divide,
-    standard_error,
-    undefined,
     weighted_disagreement,
 )
 from masrel.agreement._labels import Label
+from masrel.agreement._pooled import ratio_estimate
 from masrel.agreement._weights import (
     WeightName,
     Weights,
@@ -177,51 +174,35 @@ class _Sums(NamedTuple):
 
 
 def _sums(usable: list[SizeGroup], v: Weights) -> _Sums:
-    multiple = math.lcm(*[group.size - 1 for group in usable])
-    observed = sum([g.disagreement * (multiple // (g.size - 1)) for g in usable])
-    totals = usable[0].totals
-    if len(usable) > 1:
+    if len(usable) == 1:  # as a rule: everybody rated everything
+        ((size, n_items, totals, observed),) = usable
+        n_ratings, multiple = n_items * size, size - 1
+    else:
+        multiple = math.lcm(*[group.size - 1 for group in usable])
+        observed = sum(g.disagreement * (multiple // (g.size - 1)) for g in usable)
         totals = list(map(sum, zip(*[g.totals for g in usable], strict=True)))
-    n_items = sum([group.n_items for group in usable])
+        totals = totals or [0] * v.n_categories
+        n_items, n_ratings = sum(group.n_items for group in usable), sum(totals)
     expected = bilinear(v, totals, totals)
-    return _Sums(n_items, sum(totals), multiple, observed, totals, expected)
+    return _Sums(n_items, n_ratings, multiple, observed, totals, expected)
 
 
 def _estimate(counted: CountedRatings, v: Weights, population: int | None) -> Estimate:
     usable = [group for group in counted.items.sums(v).groups if group.size > 1]
-    sums = _sums(usable, v) if usable else None
+    sums = _sums(usable, v)
+    n, w = sums.n_ratings, v.denominator
     if population is not None:
-        check_population(population, 0 if sums is None else sums.n_items)
-    reason = None
-    if sums is None:
-        reason = undefined("Krippendorff's alpha", NO_PAIR)
-    elif v.reason is not None:
-        reason = undefined("Krippendorff's alpha", v.reason)
-    elif sums.expected == 0:
-        reason = undefined("Krippendorff's alpha", NO_CHANCE)
-    value = p_o = p_e = math.nan
-    error: float | Callable[[], float] = math.nan
-    if sums is not None and v.reason is None:
-        n, over = sums.n_ratings, sums.multiple * v.denominator
-        over_e = n * (n - 1) * v.denominator
-        p_o = (n * over - sums.observed) / (n * over)
-        p_e = (over_e - sums.expected) / over_e
-        if reason is None:
-            d_e = sums.expected * sums.multiple
-            value = (d_e - (n - 1) * sums.observed) / d_e
-            influence = partial(_influence, counted.items, v, sums)
-            error = partial(standard_error, influence, sums.n_items, population)
-    return Estimate(
-        coefficient="krippendorff_alpha",
-        weights=v.name,
-        value=value,
-        standard_error=error,
-        observed=p_o,
-        chance=p_e,
-        n_items=0 if sums is None else sums.n_items,
-        n_raters=counted.n_raters,
-        n_categories=counted.items.n_categories,
-        reason=reason,
+        check_population(population, sums.n_items)
+    return ratio_estimate(
+        "krippendorff_alpha",
+        "Krippendorff's alpha",
+        v,
+        (sums.observed, n * sums.multiple * w),
+        (sums.expected, n * (n - 1) * w),
+        partial(_influence, counted.items, v, sums),
+        population,
+        sums.n_items,
+        counted.n_raters,
     )
 
 

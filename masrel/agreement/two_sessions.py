@@ -1,7 +1,6 @@
 """Agreement of raters with themselves: pairs of ratings, rater by rater."""
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
 from functools import partial
 
@@ -11,21 +10,17 @@ from numpy.typing import ArrayLike
 from masrel.agreement._counts import distinct_rows
 from masrel.agreement._data import CodedRatings, code_pairs, pairs_of_raters
 from masrel.agreement._kernel import (
-    NO_CHANCE,
-    NO_PAIR,
     Influence,
     Integers,
-    standard_error,
-    undefined,
 )
 from masrel.agreement._labels import Label
 from masrel.agreement._pairs import (
     PairSlopes,
     PairSums,
-    estimate_pairs,
     of_pairs,
     pair_table,
 )
+from masrel.agreement._pooled import ratio_estimate
 from masrel.agreement._weights import WeightName, Weights, declared_weights
 from masrel.estimates import Estimate
 
@@ -96,32 +91,18 @@ def stratified_kappa(
     d_e = sum(
         [Fraction(s.expected, s.n * s.n * v.denominator) for s in used], Fraction(0)
     )
-    reason = None
-    if not used:
-        reason = undefined("stratified kappa", NO_PAIR)
-    elif v.reason is not None:
-        reason = undefined("stratified kappa", v.reason)
-    elif d_e == 0:
-        reason = undefined("stratified kappa", NO_CHANCE)
-    value = observed = chance = math.nan
-    error: float | Callable[[], float] = math.nan
-    if used and v.reason is None:
-        observed, chance = float(1 - d_o / len(used)), float(1 - d_e / len(used))
-    if reason is None:
-        value = float(1 - d_o / d_e)
-        influence = partial(_stratified_influence, coded, tables, v)
-        error = partial(standard_error, influence, coded.n_items, None)
-    return Estimate(
-        coefficient="stratified_kappa",
-        weights=v.name,
-        value=value,
-        standard_error=error,
-        observed=observed,
-        chance=chance,
+    n_used = max(len(used), 1)
+    mean_o, mean_e = d_o / n_used, d_e / n_used
+    return ratio_estimate(
+        "stratified_kappa",
+        "stratified kappa",
+        v,
+        (mean_o.numerator, mean_o.denominator if used else 0),
+        (mean_e.numerator, mean_e.denominator),
+        partial(_stratified_influence, coded, tables, v),
+        None,
         n_items=coded.n_items,
         n_raters=len(used),
-        n_categories=coded.n_categories,
-        reason=reason,
     )
 
 
@@ -209,17 +190,13 @@ def pooled_kappa(
     v = declared_weights(weights, coded.categories, declared=coded.declared)
     tables = _tables(coded)
     table = np.asarray(sum(tables[1:], tables[0]))
-    return estimate_pairs(
-        PairSums.of(table, v),
-        v,
+    return ratio_estimate(
         "pooled_kappa",
         "pooled kappa",
-        partial(
-            standard_error,
-            partial(_pooled_influence, coded, table, v),
-            coded.n_items,
-            None,
-        ),
+        v,
+        *PairSums.of(table, v).ratios(),
+        partial(_pooled_influence, coded, table, v),
+        None,
         n_items=coded.n_items,
         n_raters=sum(1 for of_rater in tables if of_rater.any()),
     )
