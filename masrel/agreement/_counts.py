@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from masrel.agreement._data import CodedRatings, check_scale, code_ratings
+from masrel.agreement._data import FEW, CodedRatings, check_scale, code_ratings
 from masrel.agreement._labels import Codes, Label, check_categories, label_rows
 from masrel.agreement._weights import Weights
 from masrel.errors import CountsError, ParameterError
@@ -23,7 +23,6 @@ from masrel.errors import CountsError, ParameterError
 Array = NDArray[Any]
 Integers = NDArray[np.int64]
 
-_FEW = 200  # ratings or counts that Python sums about as fast as numpy
 _FEW_PLACES = 1 << 15  # ratings times categories that are counted one by one
 _FEW_ROWS = 1 << 10  # rows for which one call costs less than a few for each rater
 _MAX_KEYS = 1 << 22  # keys that are counted in a table rather than sorted
@@ -95,7 +94,7 @@ class DistinctItems:
             rows, freq = rows[rated], freq[rated]
         q = rows.shape[1]
         max_size = q * int(rows.max(initial=0))
-        if rows.size <= _FEW or max_size**2 * int(freq.sum()) >= 2**62:
+        if rows.size <= FEW or max_size**2 * int(freq.sum()) >= 2**62:
             return cls(list(map(tuple, rows.tolist())), freq.tolist(), q)
         return cls(rows, freq, q)
 
@@ -104,7 +103,7 @@ class DistinctItems:
         """Put equal rows of a table of counts together."""
         # Takes counts (n_items, n_categories)
         base = int(counts.max()) + 1
-        if counts.size > _FEW and base ** counts.shape[1] <= _MAX_KEYS:
+        if counts.size > FEW and base ** counts.shape[1] <= _MAX_KEYS:
             powers = base ** np.arange(counts.shape[1], dtype=np.int64)
             freq = np.bincount(counts @ powers)
             keys = np.flatnonzero(freq)
@@ -114,9 +113,9 @@ class DistinctItems:
     @classmethod
     def of_codes(cls, coded: CodedRatings) -> "DistinctItems":
         """Count the raters of each category, and put equal items together."""
-        codes, q = coded.codes, coded.n_categories
+        codes, q = coded.codes, len(coded.categories)
         n_items, n_raters = codes.shape
-        if codes.size <= _FEW:
+        if codes.size <= FEW:
             return cls.of_counter(Counter(map(tuple, item_counts(coded).tolist())), q)
         # An item is one number: Σ over its raters of (n_raters + 1) to the power code.
         base = n_raters + 1
@@ -239,16 +238,16 @@ def bilinear(v: Weights, x: Sequence[int], y: Sequence[int]) -> int:
 def item_counts(coded: CodedRatings) -> Integers:
     """Count the raters of each category, item by item."""
     # -> (n_items, n_categories)
-    n_items, n_raters = coded.codes.shape
-    if coded.codes.size * coded.n_categories <= _FEW_PLACES:
-        width = coded.n_categories + 1  # code -1 is the first
+    (n_items, n_raters), q = coded.codes.shape, len(coded.categories)
+    if coded.codes.size * q <= _FEW_PLACES:
+        width = q + 1  # code -1 is the first
         places = coded.codes + (width * np.arange(n_items)[:, None] + 1)
         counted = np.bincount(places.ravel(), minlength=width * n_items)
         return np.asarray(counted.reshape(n_items, width)[:, 1:], dtype=np.int64)
-    if coded.n_categories <= n_raters:
-        parts = [(coded.codes == k).sum(axis=1) for k in range(coded.n_categories)]
+    if q <= n_raters:
+        parts = [(coded.codes == k).sum(axis=1) for k in range(q)]
         return np.column_stack(parts)
-    counts = np.zeros((n_items, coded.n_categories), dtype=np.int64)
+    counts = np.zeros((n_items, q), dtype=np.int64)
     every = np.arange(n_items)
     for column in coded.codes.T:
         rated = column >= 0
@@ -265,8 +264,17 @@ def distinct_rows(codes: Codes, n_categories: int) -> tuple[Integers, Integers]:
     if n_keys > 2**62:
         rows, freq = np.unique(codes, axis=0, return_counts=True)
         return rows.astype(np.int64), freq.astype(np.int64)
+    powers = base ** np.arange(n_raters, dtype=np.int64)
     if n_items <= _FEW_ROWS:
-        return _sorted_rows(codes, _row_keys(codes, base))
+        keys = (codes.astype(np.int64) + 1) @ powers
+        order = keys.argsort()
+        ascending = keys[order]
+        is_last = np.ones(n_items, dtype=bool)  # of those with the same key
+        np.not_equal(ascending[1:], ascending[:-1], out=is_last[:-1])
+        (last,) = is_last.nonzero()
+        freq = last + 1
+        freq[1:] -= freq[:-1]  # numpy sees that they overlap
+        return codes[order[last]].astype(np.int64), freq
     if n_keys > min(_MAX_KEYS, 16 * n_items):
         keys, freq = np.unique(_row_keys(codes, base), return_counts=True)
     else:
@@ -274,8 +282,7 @@ def distinct_rows(codes: Codes, n_categories: int) -> tuple[Integers, Integers]:
         table = _table_of_keys(counted, n_keys)
         keys = np.flatnonzero(table)
         freq = table[keys]
-    digits = base ** np.arange(n_raters, dtype=np.int64)
-    return keys[:, None] // digits % base - 1, freq.astype(np.int64)
+    return keys[:, None] // powers % base - 1, freq.astype(np.int64)
 
 
 def _blocks(n_items: int, keys: Callable[[slice], Integers]) -> Iterable[Integers]:
@@ -302,28 +309,13 @@ def _item_keys(codes: Codes, base: int, n_categories: int) -> Integers:
 
 
 def _row_keys(codes: Codes, base: int) -> Integers:
-    # Σ_r (code_r + 1) base^r, of many items by Horner's rule
-    if len(codes) <= _FEW_ROWS:
-        digits = base ** np.arange(codes.shape[1], dtype=np.int64)
-        return np.asarray((codes.astype(np.int64) + 1) @ digits, dtype=np.int64)
+    # Σ_r (code_r + 1) base^r, by Horner's rule
     keys = codes[:, -1].astype(np.int64) + 1
     for column in codes.T[-2::-1]:
         keys *= base
         keys += column
         keys += 1
     return keys
-
-
-def _sorted_rows(codes: Codes, keys: Integers) -> tuple[Integers, Integers]:
-    # distinct rows in the order of their keys, by the last of those that are equal
-    order = keys.argsort()
-    ascending = keys[order]
-    is_last = np.ones(keys.size, dtype=bool)
-    np.not_equal(ascending[1:], ascending[:-1], out=is_last[:-1])
-    (last,) = is_last.nonzero()
-    freq = last + 1
-    freq[1:] -= freq[:-1]  # numpy sees that they overlap
-    return codes[order[last]].astype(np.int64), freq
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -392,9 +384,9 @@ def count_ratings(
             check_scale(ratings.categories, categories)
         return ratings
     few = ratings
-    if type(ratings) is np.ndarray and ratings.ndim == 2 and ratings.size <= _FEW:
+    if type(ratings) is np.ndarray and ratings.ndim == 2 and ratings.size <= FEW:
         few = ratings.tolist()
-    if isinstance(few, list) and len(few) <= _FEW:
+    if isinstance(few, list) and len(few) <= FEW:
         rows, scale = label_rows(few, categories)
         counter = _count_complete(rows, scale)
         if counter is not None:
@@ -420,7 +412,7 @@ def _count_complete(
 ) -> dict[tuple[int, ...], int] | None:
     # few labels of a scale of few, without codes; None if one is missing or no label
     n_raters = len(rows[0])
-    if len(rows) * n_raters > _FEW or len(scale) > n_raters:
+    if len(rows) * n_raters > FEW or len(scale) > n_raters:
         return None
     freq: dict[tuple[int, ...], int] = {}
     try:

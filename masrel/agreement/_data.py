@@ -25,6 +25,9 @@ from masrel.errors import ParameterError, RatingsError
 MISSING = -1
 """Code of a rating that was not given."""
 
+FEW = 200
+"""Ratings, or counts of them, that Python goes through about as fast as numpy."""
+
 _FIRST = 100
 
 
@@ -110,13 +113,36 @@ def code_ratings(
         if categories is not None:
             check_scale(ratings.categories, categories)
         return ratings
-    if not (hasattr(ratings, "to_numpy") or isinstance(ratings, np.ndarray)):
-        return _coded(*_row_codes(ratings, categories), categories is not None)
+    if type(ratings) is np.ndarray and ratings.ndim == 2 and 0 < ratings.size <= FEW:
+        ratings = ratings.tolist()
+    if hasattr(ratings, "to_numpy") or isinstance(ratings, np.ndarray):
+        codes, known, declared = _table_codes(ratings, categories)
+    else:
+        rows, known = label_rows(ratings, categories)
+        declared = categories is not None
+        position: dict[object, int] = {label: code for code, label in enumerate(known)}
+        position[None] = MISSING
+        try:
+            of_rows = [[position[label] for label in row] for row in rows]
+        except (KeyError, TypeError):  # nan, or a label of no category
+            of_rows = [
+                [lookup(label, position, i, j) for j, label in enumerate(row)]
+                for i, row in enumerate(rows)
+            ]
+        codes = np.array(of_rows, dtype=code_type(len(known)))
+    codes.setflags(write=False)
+    return CodedRatings(codes=codes, categories=known, declared=declared)
+
+
+def _table_codes(
+    ratings: Any, categories: Sequence[Label] | None
+) -> tuple[Codes, tuple[Label, ...], bool]:
+    # of an array or a frame: codes, scale, and whether that was declared
     declared = None if categories is None else check_categories(categories)
     if isinstance(ratings, np.ma.MaskedArray):
         ratings = unmasked(ratings)
     if not isinstance(ratings, np.ndarray):  # a DataFrame, without importing pandas
-        return _coded(*frame_codes(ratings, declared))
+        return frame_codes(ratings, declared)
     if ratings.ndim != 2:
         raise RatingsError(
             "ratings: needs two dimensions (items, raters), "
@@ -124,7 +150,7 @@ def code_ratings(
         )
     if 0 in ratings.shape:
         raise RatingsError(NOTHING)
-    return _coded(*array_codes(ratings, declared), declared is not None)
+    return *array_codes(ratings, declared), declared is not None
 
 
 def check_scale(known: tuple[Label, ...], categories: Sequence[Label]) -> None:
@@ -145,33 +171,12 @@ def unmasked(ratings: Any) -> NDArray[Any]:
     return np.asarray(plain)
 
 
-def _coded(codes: Codes, categories: tuple[Label, ...], declared: bool) -> CodedRatings:
-    codes.setflags(write=False)
-    return CodedRatings(codes=codes, categories=categories, declared=declared)
-
-
 def complete(coded: CodedRatings) -> CodedRatings:
     """Keep the items that every rater rated."""
     whole = (coded.codes >= 0).all(axis=1)
     if whole.all():
         return coded
     return replace(coded, codes=coded.codes[whole])
-
-
-def _row_codes(
-    ratings: object, categories: Sequence[Label] | None
-) -> tuple[Codes, tuple[Label, ...]]:
-    rows, declared = label_rows(ratings, categories)
-    position: dict[object, int] = {label: code for code, label in enumerate(declared)}
-    position[None] = MISSING
-    try:
-        codes = [[position[label] for label in row] for row in rows]
-    except (KeyError, TypeError):  # nan, or a label of no category
-        codes = [
-            [lookup(label, position, i, j) for j, label in enumerate(row)]
-            for i, row in enumerate(rows)
-        ]
-    return np.array(codes, dtype=code_type(len(declared))), declared
 
 
 Repeated = Literal["error", "first", "last"]

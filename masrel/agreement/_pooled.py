@@ -222,9 +222,10 @@ def _influence(
     return Influence(u - freq.dot(u) / sums.n_rated, freq, terms)
 
 
-def _features(counts: Floats, v: Floats) -> Floats:
-    # (n_items, n_categories) -> (n_items, 3 + n_categories): disagreement of two of
-    # its ratings, whether it has two, whether it has one, shares of the categories
+def _features(coded: CodedRatings, v: Floats) -> Floats:
+    # (n_items, 3 + n_categories): disagreement of two ratings of an item, whether it
+    # has two, whether it has one, shares of the categories
+    counts = item_counts(coded).astype(np.float64)
     n = counts.sum(axis=1)
     features = np.empty((len(counts), 3 + counts.shape[1]))
     # a single rating, or none, has no disagreement
@@ -237,9 +238,6 @@ def _features(counts: Floats, v: Floats) -> Floats:
 
 def pooled_kernel(coefficient: PooledCoefficient) -> Kernel:
     """Return a coefficient of unnamed raters as a function of sums over items."""
-
-    def features(coded: CodedRatings, v: Floats) -> Floats:
-        return _features(item_counts(coded).astype(np.float64), v)
 
     def value(sums: Floats, v: Floats) -> Floats:
         observed = divide(sums[..., 0], sums[..., 1])
@@ -255,7 +253,7 @@ def pooled_kernel(coefficient: PooledCoefficient) -> Kernel:
         expected = constant / divisor + factor / divisor * between
         return 1.0 - divide(observed, expected)
 
-    return Kernel(features=features, value=value, rater_sums=_resampled_raters)
+    return Kernel(features=_features, value=value, rater_sums=_resampled_raters)
 
 
 def complete_kernel(coefficient: PooledCoefficient) -> Kernel:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from masrel.agreement import (
+    COEFFICIENTS,
     CodedRatings,
     Coefficient,
     Label,
@@ -162,8 +163,8 @@ def pose_problem(
             f"coefficient: {entry.title} is no function of sums over items: there is "
             "no such interval of it"
         )
-    v = declared_weights(weights, coded.categories, declared=coded.declared).as_floats()
-    codes, freq = distinct_rows(coded.codes, coded.n_categories)
+    v = declared_weights(weights, coded.categories, declared=coded.declared).floats
+    codes, freq = distinct_rows(coded.codes, len(coded.categories))
     if (codes[0] < 0).all():  # the first of them, if any, has no rating
         codes, freq = codes[1:], freq[1:]
     patterns = replace(coded, codes=codes)
@@ -192,9 +193,12 @@ def find_entry(statistic: Statistic) -> Coefficient:
     """Return the entry of a coefficient in the register."""
     if isinstance(statistic, Coefficient):
         return statistic
-    if isinstance(statistic, str):
-        return coefficient(statistic)
-    return coefficient(getattr(statistic, "__name__", repr(statistic)))
+    name = statistic
+    if not isinstance(name, str):
+        name = getattr(statistic, "__name__", repr(statistic))
+    if name not in COEFFICIENTS:
+        coefficient(name)  # an error that lists those there are
+    return COEFFICIENTS[name]
 
 
 def _refuse_raters(entry: Coefficient, n_raters: int) -> NoReturn:

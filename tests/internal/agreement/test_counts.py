@@ -203,7 +203,7 @@ def test_items_in_arrays_and_in_integers_give_the_same(
         both = []
         for few, kind in ((0, np.ndarray), (10**9, list)):
             with monkeypatch.context() as patched:
-                patched.setattr(_counts, "_FEW", few)
+                patched.setattr(_counts, "FEW", few)
                 assert isinstance(DistinctItems.of_codes(rows).rows, kind)
                 both.append(COEFFICIENTS[name](rows, weights=weights))  # type: ignore[arg-type]
         in_arrays, exact = both
