@@ -41,7 +41,7 @@ RECORDING_COLUMNS = (
     "phase",  # position in PHASES
 )
 
-Fact = str | int | float | bool | None
+_Fact = str | int | float | bool | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,7 +63,7 @@ class Recording:
     """
 
     columns: Mapping[str, NDArray[np.float64]] = field(compare=False, repr=False)
-    facts: Mapping[str, Fact]
+    facts: Mapping[str, _Fact]
 
     def __post_init__(self) -> None:
         if set(self.columns) != set(RECORDING_COLUMNS):

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from masrel.hess._spool import Columns, read_spool, recorded_columns
-from masrel.recording import PHASES, Fact, Recording
+from masrel.recording import PHASES, Recording, _Fact
 
 _CATCH = PHASES.index("catch")
 
@@ -100,7 +100,7 @@ def cut_off(spool: Path) -> Presented | None:
 
 def as_presented(
     columns: Columns,
-    facts: dict[str, Fact],
+    facts: dict[str, _Fact],
     *,
     speed_threshold: float,
     ended: str,
@@ -131,7 +131,7 @@ def as_presented(
 
 def movement_facts(
     columns: Columns, speed_threshold: float, stopped: bool
-) -> dict[str, Fact]:
+) -> dict[str, _Fact]:
     """Return the phases, the catch and the mean speed of a movement."""
     catch = catch_angle_deg(columns)
     # A stretch that was stopped before the catch has no mean speed of its own.

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from masrel.errors import RecordingError
 from masrel.hess.limits import DeviceLimits
-from masrel.recording import Fact
+from masrel.recording import _Fact
 
 Columns = dict[str, NDArray[np.float64]]
 
@@ -37,7 +37,7 @@ class Spool:
 
     __slots__ = ("_map", "values")
 
-    def __init__(self, path: Path, capacity: int, facts: dict[str, Fact]) -> None:
+    def __init__(self, path: Path, capacity: int, facts: dict[str, _Fact]) -> None:
         header = json.dumps({**facts, "capacity": capacity}).encode()
         n_bytes = _HEADER + _WORD * (1 + _N_COLUMNS * capacity)
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -150,7 +150,7 @@ class Spooled:
     """What a presentation that never ended left."""
 
     columns: NDArray[np.float64]  # (6, n): its samples, as the loop wrote them
-    facts: dict[str, Fact]  # what was known before the first
+    facts: dict[str, _Fact]  # what was known before the first
 
 
 def read_spool(path: Path) -> Spooled | None:
@@ -167,7 +167,7 @@ def read_spool(path: Path) -> Spooled | None:
         ) from error
 
 
-def _spooled(facts: dict[str, Fact], data: bytes) -> Spooled | None:
+def _spooled(facts: dict[str, _Fact], data: bytes) -> Spooled | None:
     # Raises ValueError, KeyError or TypeError where it is no such file.
     if not isinstance(facts, dict):
         raise TypeError(f"no facts but {facts}")

@@ -11,7 +11,7 @@ from masrel.errors import DeviceError
 from masrel.hess.clock import Clock
 from masrel.hess.hand import Hand
 
-State = Literal["new", "open", "closed"]
+_State = Literal["new", "open", "closed"]
 
 
 class Reading(NamedTuple):
@@ -66,7 +66,7 @@ class Device(ABC):
     name: ClassVar[str]
     simulated: ClassVar[bool]
 
-    _state: State = "new"  # on the class, so that `__del__` always finds one
+    _state: _State = "new"  # on the class, so that `__del__` always finds one
 
     @property
     def is_open(self) -> bool:

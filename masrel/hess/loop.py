@@ -18,7 +18,7 @@ from masrel.hess.clock import Clock
 from masrel.hess.controller import Controller
 from masrel.hess.device import Device
 from masrel.hess.limits import DeviceLimits
-from masrel.recording import Fact
+from masrel.recording import _Fact
 
 
 def run_presentation(
@@ -105,7 +105,7 @@ def run_presentation(
     _check(device, controller, limits, rate_hz, max_duration_s, end_angle)
     n_ticks = math.ceil(max_duration_s * rate_hz)
     capacity = n_samples(n_ticks, rate_hz, limits)
-    facts: dict[str, Fact] = {"simulated": device.simulated, "device": device.name}
+    facts: dict[str, _Fact] = {"simulated": device.simulated, "device": device.name}
     facts["rate_hz"] = rate_hz
     with _samples(spool, capacity, facts, controller.speed_threshold) as samples:
         ticks = Ticks(
@@ -170,7 +170,7 @@ def _check(
 
 @contextmanager
 def _samples(
-    spool: Path | None, capacity: int, facts: dict[str, Fact], threshold: float
+    spool: Path | None, capacity: int, facts: dict[str, _Fact], threshold: float
 ) -> Iterator[Samples]:
     # In memory, or in a file that outlives this process
     file = None

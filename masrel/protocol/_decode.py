@@ -32,11 +32,12 @@ def decode_table(
     """Decode a table into the fields of a struct, going on after each problem."""
     decoded = Decoded()
     fields = {info.encode_name: info for info in msgspec.structs.fields(struct)}
+    prefix = f"{at}." if at else ""
     for key in raw:
         if key not in fields:
-            decoded.problems.append(_unknown(_join(at, key), key, fields))
+            decoded.problems.append(_unknown(f"{prefix}{key}", key, fields))
     for key, info in fields.items():
-        where = _join(at, key)
+        where = f"{prefix}{key}"
         if key in raw:
             _decode_value(raw[key], info.type, where, key, decoded)
         elif info.required:
@@ -79,9 +80,14 @@ def _decode_array(
         return
     entries = Decoded()
     for index, item in enumerate(value):
-        before = len(entries.problems)
+        n_before = len(entries.problems)
         _decode_value(item, entry, f"{where}[{index}]", str(index), entries)
-        _name_entry(item, entries.problems, before)
+        name = item.get("id") if isinstance(item, Mapping) else None
+        if isinstance(name, str):
+            # Entries are counted from 0; their id helps to find them in the file.
+            of_item = entries.problems[n_before:]
+            named = [f"{problem} (id {got(name)})" for problem in of_item]
+            entries.problems[n_before:] = named
     into.problems.extend(entries.problems)
     into.values[key] = [entries.values.get(str(i)) for i in range(len(value))]
     # limits on the length of the array, which no entry shows
@@ -90,13 +96,6 @@ def _decode_array(
         (info.min_length or 0) <= len(value) <= (info.max_length or math.inf)
     ):
         into.problems.append(f"{where}: needed {needed(annotation)}, got {got(value)}")
-
-
-def _name_entry(item: object, problems: list[str], start: int) -> None:
-    # Entries are counted from 0; their id helps to find them in the file.
-    name = item.get("id") if isinstance(item, Mapping) else None
-    if isinstance(name, str):
-        problems[start:] = [f"{text} (id {got(name)})" for text in problems[start:]]
 
 
 def _leaf_problem(value: object, annotation: object, where: str) -> str | None:
@@ -146,10 +145,6 @@ def _entry_type(annotation: object) -> object | None:
         entry: object = typing.get_args(annotation)[0]
         return entry
     return None
-
-
-def _join(at: str, key: str) -> str:
-    return f"{at}.{key}" if at else key
 
 
 _IDENTIFIER = (

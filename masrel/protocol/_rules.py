@@ -1,7 +1,7 @@
 """The rules across keys of a protocol, applied to whatever could be decoded."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 from masrel.protocol._decode import got, with_id
@@ -14,10 +14,21 @@ MAX_PRESENTATIONS = 500
 MISSING_MARKS = ("NA",)
 """Marks of a missing rating in a ratings file; no grade may be called that."""
 
+SESSIONS_NEEDED = {"inter-rater": 1, "test-retest": 2}
+"""Kind of an estimate to the number of sessions it is made from."""
+
 
 def broken_rules(values: Values) -> tuple[str, ...]:
     """Check the rules across keys."""
-    return tuple(problem for rule in _RULES for problem in rule(values))
+    return (
+        *_scale(values),
+        *_ids(values),
+        *_references(values),
+        *_schedules(values),
+        *_device(values),
+        *joint_rules(values),
+        *_plan(values),
+    )
 
 
 def _entries(values: Values, key: str) -> list[tuple[int, Values]]:
@@ -25,7 +36,8 @@ def _entries(values: Values, key: str) -> list[tuple[int, Values]]:
     return [(i, e) for i, e in enumerate(values.get(key) or []) if e is not None]
 
 
-def _grades(values: Values) -> Iterator[str]:
+def _scale(values: Values) -> Iterator[str]:
+    # grades that a file of ratings can hold, each once
     grades = (values.get("scale") or {}).get("grades") or []
     for index, grade in enumerate(grades):
         where = f"scale.grades[{index}]"
@@ -46,42 +58,37 @@ def _grades(values: Values) -> Iterator[str]:
 
 
 def _ids(values: Values) -> Iterator[str]:
-    for key in ("models", "raters", "sessions"):
-        yield from _repeated_ids(key, _entries(values, key))
+    # ids that no file system takes for one: to some, R1 and r1 are the same name
+    arrays = {key: _entries(values, key) for key in ("models", "raters", "sessions")}
     analysis = values.get("analysis") or {}
-    yield from _repeated_ids("analysis.estimates", _entries(analysis, "estimates"))
+    arrays["analysis.estimates"] = _entries(analysis, "estimates")
+    for key, entries in arrays.items():
+        first: dict[str, tuple[int, str]] = {}
+        for index, entry in entries:
+            name = entry.get("id")
+            if name is None:
+                continue
+            earlier = first.setdefault(name.casefold(), (index, name))
+            if earlier[0] != index:
+                yield (
+                    f"{key}[{index}].id: needed ids that differ by more than case, "
+                    f"got {got(name)} where {key}[{earlier[0]}] has {got(earlier[1])}"
+                )
 
 
-def _repeated_ids(key: str, entries: list[tuple[int, Values]]) -> Iterator[str]:
-    first: dict[str, tuple[int, str]] = {}
-    for index, entry in entries:
-        name = entry.get("id")
-        if name is None:
-            continue
-        # Some file systems take R1 and r1 for one name.
-        earlier = first.setdefault(name.casefold(), (index, name))
-        if earlier[0] != index:
-            yield (
-                f"{key}[{index}].id: needed ids that differ by more than case, "
-                f"got {got(name)} where {key}[{earlier[0]}] has {got(earlier[1])}"
-            )
-
-
-def _intended(values: Values) -> Iterator[str]:
+def _references(values: Values) -> Iterator[str]:
+    # grades of models that the scale has, raters of sessions that the study has
     grades = (values.get("scale") or {}).get("grades")
-    if not grades or None in grades:
-        return
     for index, model in _entries(values, "models"):
         grade = model.get("intended_grade")
-        if grade is not None and grade not in grades:
+        # With an unusable grade in the scale, none can be said to be unknown.
+        if grades and None not in grades and grade not in (None, *grades):
             yield (
                 f"models[{index}].intended_grade: needed a grade of the scale "
                 f"({', '.join(grades)}), got {got(grade)}{with_id(model)}"
             )
-
-
-def _raters(values: Values) -> Iterator[str]:
-    known = [rater and rater.get("id") for rater in values.get("raters") or []]
+    raters = values.get("raters") or []
+    known: list[Any] = [None if r is None else r.get("id") for r in raters]
     known = list(dict.fromkeys(known))
     for index, session in _entries(values, "sessions"):
         named = session.get("raters") or []
@@ -100,7 +107,7 @@ def _raters(values: Values) -> Iterator[str]:
                 )
 
 
-def _file_names(values: Values) -> Iterator[str]:
+def _schedules(values: Values) -> Iterator[str]:
     # Schedules are SESSION_RATER.csv and SESSION_RATER_sheet.csv.
     first: dict[str, tuple[str, str]] = {}
     for index, session in _entries(values, "sessions"):
@@ -119,9 +126,6 @@ def _file_names(values: Values) -> Iterator[str]:
                         f"sessions[{index}]: needed ids that give each schedule a file "
                         f"of its own, got {name}.csv for {both}"
                     )
-
-
-def _session_size(values: Values) -> Iterator[str]:
     repeats = (values.get("schedule") or {}).get("repeats")
     models = values.get("models") or []
     if repeats and len(models) * repeats > MAX_PRESENTATIONS:
@@ -131,61 +135,37 @@ def _session_size(values: Values) -> Iterator[str]:
         )
 
 
-def _sections(values: Values) -> Iterator[str]:
-    sections = (values.get("report") or {}).get("sections") or []
-    for index, section in enumerate(sections):
-        if section is not None and section in sections[:index]:
-            yield (
-                f"report.sections[{index}]: needed each section once, "
-                f"got {got(section)} again"
-            )
-
-
-def device_rules(values: Values) -> Iterator[str]:
-    """Check the stretch against the range of motion and the device's limits."""
+def _device(values: Values) -> Iterator[str]:
+    # the stretch inside the range of motion and between the device's soft stops
     device, stretch = values.get("device") or {}, values.get("stretch") or {}
-    yield from _stretch(stretch, values.get("elbow") or {})
-    yield from _compensation(device)
-    yield from _soft_stops(device, stretch)
-
-
-def _stretch(stretch: Values, elbow: Values) -> Iterator[str]:
     start, end = stretch.get("start_deg"), stretch.get("end_deg")
-    limit = elbow.get("range_end_deg")
+    range_end = (values.get("elbow") or {}).get("range_end_deg")
     if start is not None and end is not None and start >= end:
         yield (
             f"stretch.start_deg: needed less than stretch.end_deg ({end:g}), "
             f"got {start:g}"
         )
-    if end is not None and limit is not None and end > limit:
+    if end is not None and range_end is not None and end > range_end:
         yield (
-            f"stretch.end_deg: needed at most elbow.range_end_deg ({limit:g}), "
+            f"stretch.end_deg: needed at most elbow.range_end_deg ({range_end:g}), "
             f"got {end:g}"
         )
-
-
-def _compensation(device: Values) -> Iterator[str]:
-    dead_zone = device.get("dead_zone_deg_s")
-    full_speed = device.get("full_speed_deg_s")
-    if dead_zone is not None and full_speed is not None and dead_zone >= full_speed:
+    slow, fast = device.get("dead_zone_deg_s"), device.get("full_speed_deg_s")
+    if slow is not None and fast is not None and slow >= fast:
         yield (
             f"device.dead_zone_deg_s: needed less than device.full_speed_deg_s "
-            f"({full_speed:g}), got {dead_zone:g}"
+            f"({fast:g}), got {slow:g}"
         )
-
-
-def _soft_stops(device: Values, stretch: Values) -> Iterator[str]:
     width = device.get("soft_stop_deg")
     low, high = device.get("lowest_angle_deg"), device.get("highest_angle_deg")
-    start, end = stretch.get("start_deg"), stretch.get("end_deg")
     if width is None:
         return
-    if None not in (low, start) and start < low + width:
+    if low is not None and start is not None and start < low + width:
         yield (
             f"stretch.start_deg: needed at least device.lowest_angle_deg and the soft "
             f"stop beside it ({low:g} + {width:g}), got {start:g}"
         )
-    if None not in (high, end) and end > high - width:
+    if high is not None and end is not None and end > high - width:
         yield (
             f"stretch.end_deg: needed at most device.highest_angle_deg less the soft "
             f"stop before it ({high:g} - {width:g}), got {end:g}"
@@ -195,69 +175,59 @@ def _soft_stops(device: Values, stretch: Values) -> Iterator[str]:
 def joint_rules(values: Values) -> Iterator[str]:
     """Check shared constants, and those of each model, against each other."""
     elbow = values.get("elbow") or {}
-    yield from _smallest_catch_angle(elbow)
-    yield from _catch_rise(elbow, elbow, "elbow")
-    yield from _rest_angle(elbow, values, "elbow")
-    for index, model in enumerate(values.get("models") or []):
-        if model is not None:
-            for problem in _model_joint(model, values, f"models[{index}]"):
-                yield f"{problem}{with_id(model)}"
-
-
-def _model_joint(model: Values, values: Values, where: str) -> Iterator[str]:
-    constants = model.get("constants") or {}
-    overrides = {key: value for key, value in constants.items() if value is not None}
-    joint = {**(values.get("elbow") or {}), **overrides}
-    constant = model.get("catch_angle_constant_deg")  # L of (2)
-    if constant is not None:
-        yield from _catch_angle(constant, joint, f"{where}.catch_angle_constant_deg")
-    yield from _catch_rise(overrides, joint, f"{where}.constants")
-    if "rest_angle_deg" in overrides:
-        yield from _rest_angle(joint, values, f"{where}.constants")
-    elif "stiffness_nm_rad" in overrides:
-        yield from _rest_angle(joint, values, "elbow")
-
-
-def _smallest_catch_angle(elbow: Values) -> Iterator[str]:
-    smallest = elbow.get("smallest_catch_angle_deg")  # θ_L of (6)
-    limit = elbow.get("range_end_deg")
+    smallest, limit = elbow.get("smallest_catch_angle_deg"), elbow.get("range_end_deg")
+    # θ_L of (6)
     if smallest is not None and limit is not None and smallest >= limit:
         yield (
             f"elbow.smallest_catch_angle_deg: needed less than elbow.range_end_deg "
             f"({limit:g}), got {smallest:g}"
         )
+    yield from _constants(elbow, elbow, values, "elbow")
+    for index, model in _entries(values, "models"):
+        where, constants = f"models[{index}]", model.get("constants") or {}
+        overrides = {k: value for k, value in constants.items() if value is not None}
+        joint = {**elbow, **overrides}
+        problems = [
+            *_catch_angle(model.get("catch_angle_constant_deg"), joint, where),
+            *_constants(overrides, joint, values, f"{where}.constants"),
+        ]
+        yield from (f"{problem}{with_id(model)}" for problem in problems)
 
 
-def _catch_angle(constant: float, joint: Values, where: str) -> Iterator[str]:
+def _catch_angle(constant: float | None, joint: Values, where: str) -> Iterator[str]:
+    # constant: L of (2)
     smallest = joint.get("smallest_catch_angle_deg")
     slope, slowest = joint.get("catch_slope_s"), joint.get("slowest_mean_speed_deg_s")
-    if smallest is None:
+    if constant is None or smallest is None:
         return
     if constant <= smallest:
         yield (
-            f"{where}: needed more than elbow.smallest_catch_angle_deg "
-            f"({smallest:g}), got {constant:g}"
+            f"{where}.catch_angle_constant_deg: needed more than "
+            f"elbow.smallest_catch_angle_deg ({smallest:g}), got {constant:g}"
         )
     elif slope is not None and slowest is not None:
         angle = constant - slope * slowest  # first line of (6), the largest of them
         if angle < smallest:
             yield (
-                f"{where}: needed a catch angle at elbow.slowest_mean_speed_deg_s of "
-                f"at least elbow.smallest_catch_angle_deg ({smallest:g}), got "
+                f"{where}.catch_angle_constant_deg: needed a catch angle at "
+                f"elbow.slowest_mean_speed_deg_s of at least "
+                f"elbow.smallest_catch_angle_deg ({smallest:g}), got "
                 f"{constant:g} - {slope:g} * {slowest:g} = {angle:g}"
             )
 
 
-def _catch_rise(constants: Values, joint: Values, where: str) -> Iterator[str]:
+def _constants(
+    constants: Values, joint: Values, values: Values, where: str
+) -> Iterator[str]:
+    # constants: those that stand at `where`; joint: these and all it shares
     rise, peak = constants.get("catch_rise_s"), joint.get("peak_duration_s")
     if rise is not None and peak is not None and rise > peak:
         yield (
             f"{where}.catch_rise_s: needed at most elbow.peak_duration_s ({peak:g}), "
             f"got {rise:g}"
         )
-
-
-def _rest_angle(joint: Values, values: Values, where: str) -> Iterator[str]:
+    if not {"rest_angle_deg", "stiffness_nm_rad"} & constants.keys():
+        return
     # An arm that waits where the stretch starts is held by k·(θ_start - θ_rest) of
     # (1). Where that is as much torque as a frozen encoder is recognized by, no
     # presentation would begin.
@@ -268,27 +238,35 @@ def _rest_angle(joint: Values, values: Values, where: str) -> Iterator[str]:
         return
     torque = stiffness * math.radians(start - rest)
     if abs(torque) > limit:
+        place = where if "rest_angle_deg" in constants else "elbow"
         yield (
-            f"{where}.rest_angle_deg: needed at most device.standing_torque_nm "
+            f"{place}.rest_angle_deg: needed at most device.standing_torque_nm "
             f"({limit:g} N·m) where the stretch starts, got {stiffness:g} N·m/rad "
             f"times {start:g} - {rest:g} deg = {torque:.3g} N·m"
         )
 
 
-SESSIONS_NEEDED = {"inter-rater": 1, "test-retest": 2}
-
-
-def plan_rules(values: Values) -> Iterator[str]:
-    """Check each line of the analysis plan against sessions, raters and models."""
-    plan = (values.get("analysis") or {}).get("estimates") or []
-    for index, line in enumerate(plan):
-        if line is not None:
-            for problem in _plan_line(line, values):
-                yield f"analysis.estimates[{index}].{problem}{with_id(line)}"
+def _plan(values: Values) -> Iterator[str]:
+    # the lines of the analysis plan, and the sections of the report
+    for index, line in _entries(values.get("analysis") or {}, "estimates"):
+        for problem in _plan_line(line, values):
+            yield f"analysis.estimates[{index}].{problem}{with_id(line)}"
+    sections = (values.get("report") or {}).get("sections") or []
+    for index, section in enumerate(sections):
+        if section is not None and section in sections[:index]:
+            yield (
+                f"report.sections[{index}]: needed each section once, "
+                f"got {got(section)} again"
+            )
 
 
 def _plan_line(line: Values, values: Values) -> Iterator[str]:
-    yield from _plan_models(line, values)
+    role = line.get("models")
+    models = values.get("models") or []
+    roles = {None if model is None else model.get("role") for model in models}
+    # With a model whose role is unusable, none can be said to be missing.
+    if role in ("standard", "dummy") and roles and not roles & {None, role}:
+        yield f"models: needed a role that some model has, got {got(role)}"
     kind, named = line.get("kind"), line.get("sessions")
     if kind is None or named is None or None in named:
         return
@@ -296,8 +274,8 @@ def _plan_line(line: Values, values: Values) -> Iterator[str]:
     if len(named) not in SESSIONS_NEEDED.values():
         return  # no line has so many, and the key itself has been refused
     if len(named) != count:
-        words = "exactly one session" if count == 1 else "exactly two sessions"
-        yield f"sessions: needed {words} for {got(kind)}, got {len(named)}"
+        phrase = "exactly one session" if count == 1 else "exactly two sessions"
+        yield f"sessions: needed {phrase} for {got(kind)}, got {len(named)}"
     elif len(set(named)) != len(named):
         yield f"sessions: needed two different sessions, got {got(named[0])} twice"
     yield from _plan_raters(kind, named, values)
@@ -323,26 +301,3 @@ def _plan_raters(kind: str, named: list[str], values: Values) -> Iterator[str]:
         yield "sessions: needed a session of at least two raters, got one of 1"
     if kind == "test-retest" and len(groups) == 2 and not groups[0] & groups[1]:
         yield "sessions: needed two sessions that share a rater, got none in both"
-
-
-def _plan_models(line: Values, values: Values) -> Iterator[str]:
-    models = values.get("models") or []
-    if not models or any(m is None or "role" not in m for m in models):
-        return
-    role = line.get("models")
-    if role in ("standard", "dummy") and role not in {m["role"] for m in models}:
-        yield f"models: needed a role that some model has, got {got(role)}"
-
-
-_RULES: tuple[Callable[[Values], Iterator[str]], ...] = (
-    _grades,
-    _ids,
-    _intended,
-    _raters,
-    _file_names,
-    _session_size,
-    device_rules,
-    joint_rules,
-    plan_rules,
-    _sections,
-)

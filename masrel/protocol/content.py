@@ -114,7 +114,7 @@ def protocol_hash(protocol: Protocol) -> str:
         file do not enter. Of a model file its numbers enter, its name, and whether
         it comes from simulated recordings.
     """
-    return _digest(_plain(protocol))
+    return _content_hash(protocol)
 
 
 def presented_hash(protocol: Protocol) -> str:
@@ -137,14 +137,12 @@ def presented_hash(protocol: Protocol) -> str:
     a rater or wording a title better makes nobody's drawn schedule stale.
     """
     tables = {name: getattr(protocol, name) for name in _PRESENTED}
-    content = _plain({"study": protocol.study.id, **tables})
-    for model in content["models"]:
-        for key in ("file", "simulated"):  # the numbers are what is felt
-            model.pop(key, None)
-    return _digest(content)
+    content = {"study": protocol.study.id, **tables}
+    return _content_hash(content, ignored=("file", "simulated"))  # numbers are felt
 
 
-def _plain(content: object) -> dict[str, Any]:
+def _content_hash(content: object, ignored: tuple[str, ...] = ()) -> str:
+    # ignored: keys of models that do not enter
     plain: dict[str, Any] = msgspec.to_builtins(content)
     elbow = plain["elbow"]
     for model in plain["models"]:
@@ -156,14 +154,10 @@ def _plain(content: object) -> dict[str, Any]:
         if constants:
             model["constants"] = constants
         for key, absent in (("file", None), ("simulated", False)):
-            if model[key] is absent:
+            if model[key] is absent or key in ignored:
                 del model[key]
     for key, default in _LATER.items():
         if elbow[key] == default:
             del elbow[key]
-    return plain
-
-
-def _digest(content: object) -> str:
-    canonical = msgspec.json.encode(content, order="sorted")
+    canonical = msgspec.json.encode(plain, order="sorted")
     return hashlib.sha256(canonical).hexdigest()

@@ -66,21 +66,20 @@ def read_protocol(path: Path) -> Protocol:
     resolved = _resolve_model_files(_read_toml(path), path.parent)
     raw = resolved.raw
     decoded = decode_table(raw, Protocol)
-    problems = [*resolved.problems, *_without_unread(decoded.problems, resolved)]
-    problems += broken_rules(decoded.values)
+    # A model whose file could not be used lacks its keys for that reason alone.
+    unread = tuple(f"models[{index}]." for index in resolved.unread)
+    problems = [
+        *resolved.problems,
+        *(
+            problem
+            for problem in decoded.problems
+            if not (problem.startswith(unread) and ", got none" in problem)
+        ),
+        *broken_rules(decoded.values),
+    ]
     if problems:
         raise ProtocolError(*(f"{path}: {problem}" for problem in problems))
     return msgspec.convert(raw, Protocol)
-
-
-def _without_unread(problems: list[str], resolved: _Resolved) -> list[str]:
-    # A model whose file could not be used lacks its keys for that reason alone.
-    unread = tuple(f"models[{index}]." for index in resolved.unread)
-    return [
-        problem
-        for problem in problems
-        if not (problem.startswith(unread) and ", got none" in problem)
-    ]
 
 
 def _read_toml(path: Path) -> dict[str, object]:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Self
 from masrel.errors import SessionLogError
 
 if TYPE_CHECKING:
-    from masrel.recording import Fact  # loads numpy
+    from masrel.recording import _Fact  # loads numpy
 
 if sys.platform != "win32":
     import fcntl
@@ -49,7 +49,7 @@ class Event:
     line: int
     kind: str
     time_utc: str
-    fields: "Mapping[str, Fact]" = field(hash=False)
+    fields: "Mapping[str, _Fact]" = field(hash=False)
 
 
 def read_log(path: Path) -> tuple[Event, ...]:
@@ -226,7 +226,7 @@ class SessionLog:
         return log
 
     def _take_in(self, torn: bytes, line: int) -> None:
-        facts: dict[str, Fact] = {
+        facts: dict[str, _Fact] = {
             "line": line,
             "n_bytes": len(torn),
             "sha256": _line_hash(torn),
@@ -254,7 +254,7 @@ class SessionLog:
         """Whether events can be appended."""
         return self._descriptor is not None
 
-    def append(self, kind: str, fields: "Mapping[str, Fact]") -> Event:
+    def append(self, kind: str, fields: "Mapping[str, _Fact]") -> Event:
         """Append one event and wait until it is on disk.
 
         Parameters
@@ -336,7 +336,7 @@ def _is_event(path: Path, number: int, line: bytes, previous: str) -> bool:
     return claimed == previous
 
 
-def _check_fact(path: Path, kind: str, name: str, fact: "Fact") -> None:
+def _check_fact(path: Path, kind: str, name: str, fact: "_Fact") -> None:
     if fact is not None and not isinstance(fact, str | int | float):
         raise SessionLogError(
             f"{path}: event {kind!r}: {name} needs text, a number, true, false or "

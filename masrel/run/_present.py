@@ -25,7 +25,7 @@ from masrel.hess import (
 from masrel.hess._stop import stop_on_key, stop_on_signals
 from masrel.hess._watchdog import watched
 from masrel.protocol import Protocol, elbow_parameters
-from masrel.recording import RECORDING_COLUMNS, Fact, Recording, write_recording
+from masrel.recording import RECORDING_COLUMNS, Recording, _Fact, write_recording
 from masrel.run._grade_sources import GradeRequest
 from masrel.run._settings import (
     backend_options,
@@ -173,7 +173,7 @@ def _keep(
 ) -> Outcome:
     # Writes the recording, and removes what was kept while it was made
     presentation, recording = request.presentation, presented.recording
-    facts: dict[str, Fact] = {
+    facts: dict[str, _Fact] = {
         **recording.facts,
         "study": protocol.study.id,
         "rater": request.rater,

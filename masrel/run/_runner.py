@@ -14,7 +14,7 @@ from masrel.errors import (
 )
 from masrel.hess import Clock, EmergencyStop, RealClock, SimulatedClock
 from masrel.protocol import Protocol, StudyPaths, presented_hash, protocol_hash
-from masrel.recording import Fact
+from masrel.recording import _Fact
 from masrel.run._grade_sources import GradeRequest, GradeSource
 from masrel.run._log import SessionLog
 from masrel.run._present import Outcome, present, recover
@@ -95,7 +95,7 @@ class SessionRunner:
     def begin(self, schedule_sha256: str) -> None:
         """Log which session this is; check that it is the same when it is resumed."""
         protocol, schedule = self._protocol, self._schedule
-        same: dict[str, Fact] = {
+        same: dict[str, _Fact] = {
             "format": _FORMAT,
             "study": protocol.study.id,
             "rater": schedule.rater,
@@ -106,7 +106,7 @@ class SessionRunner:
             "grades": self._grades.name,
             "device": protocol.device.backend,
         }
-        provenance: dict[str, Fact] = {
+        provenance: dict[str, _Fact] = {
             "protocol_sha256": protocol_hash(protocol),
             "clock": self._clock,
             "masrel_version": masrel.__version__,
@@ -148,7 +148,7 @@ class SessionRunner:
         )
 
     def _rate(self, presentation: Presentation) -> None:
-        fields: dict[str, Fact] = {
+        fields: dict[str, _Fact] = {
             "code": presentation.code,
             "position": presentation.position,
         }
@@ -227,7 +227,7 @@ class SessionRunner:
     ) -> None:
         fault = outcome.fault
         self._n_faults += fault is not None
-        fields: dict[str, Fact] = {
+        fields: dict[str, _Fact] = {
             "code": request.presentation.code,
             "position": request.presentation.position,
             "attempt": request.attempt,

@@ -9,7 +9,7 @@ from masrel.errors import SessionLogError
 from masrel.run._log import Event
 
 if TYPE_CHECKING:
-    from masrel.recording import Fact  # loads numpy
+    from masrel.recording import _Fact  # loads numpy
 
 EVENTS: dict[str, tuple[str, ...]] = {
     "session": (
@@ -62,7 +62,7 @@ class SessionState:
     """Where a session stands."""
 
     # fields of the event ``session``; empty when there is none yet
-    header: "Mapping[str, Fact]" = field(default_factory=dict)
+    header: "Mapping[str, _Fact]" = field(default_factory=dict)
     # presentations of each code, in order
     presented: dict[str, list[Event]] = field(default_factory=dict)
     # grade of each graded code as the rater gave it
