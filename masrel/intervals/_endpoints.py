@@ -220,12 +220,6 @@ def _around(value: float) -> tuple[float, float]:
 Resamples = AllResamples | DrawnResamples
 
 
-def has_spread(resamples: Resamples) -> bool:
-    """Return whether there are two different values."""
-    values = resamples.values
-    return bool(values.size) and bool(values[0] < values[-1])
-
-
 def distribution_of(resamples: Resamples) -> Distribution:
     """Return the values of resamples with their probabilities."""
     values, weights = resamples.values, resamples.weights
@@ -262,16 +256,19 @@ class EndpointRule:
     error: float = math.nan  # its standard error, where it is studentized
     skew: float = 0.0  # the acceleration of BCa
 
-    def ends(self, resamples: Resamples) -> Ends | None:
-        """Return the ends; None where values are alike, or on one side of BCa's."""
-        if not has_spread(resamples):
-            return None
+    def ends(self, resamples: Resamples) -> Ends | str:
+        """Return the ends, or why there are none."""
+        values = resamples.values
+        if not (values.size and values[0] < values[-1]):
+            return "every resample gives the same value or none, so there is no spread"
         tail = 0.5 * (1.0 - self.level)
         levels, pulls = (tail, 1.0 - tail), (0.0, 0.0)
         if self.kind == "bca":
             share = resamples.share_below(self.value)
             if not 0.0 < share < 1.0:
-                return None
+                return (
+                    "all resamples lie on one side of the estimate, so BCa has no bias"
+                )
             levels = bca_levels(self.level, share, self.skew)
             pulls = self._pulls(share)
         first, last = (resamples.quantile(at) for at in levels)

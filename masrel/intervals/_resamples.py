@@ -178,7 +178,7 @@ def draw_resamples(
 def _error(resamples: DrawnResamples, rule: EndpointRule) -> float:
     """Return that of the end that is less certain; 0 if there is no interval."""
     ends = rule.ends(resamples)
-    return 0.0 if ends is None or ends.errors is None else max(ends.errors)
+    return 0.0 if isinstance(ends, str) or ends.errors is None else max(ends.errors)
 
 
 def _drawn(

@@ -13,9 +13,8 @@ from masrel.agreement._counts import item_counts
 from masrel.errors import ParameterError
 from masrel.estimates import Distribution, Interval
 from masrel.intervals._dirichlet_multinomial import DirichletMultinomial, RhoDensity
-from masrel.intervals._problem import IntervalProblem
+from masrel.intervals._problem import IntervalProblem, recorded_generator
 from masrel.intervals._quadrature import LineDistribution, line_distribution
-from masrel.intervals._seeds import recorded_generator
 
 PriorName = Literal["uniform", "jeffreys"]
 """Prior of ρ: U(0, 1), or Beta(1/2, 1/2), the prior of Jeffreys for a probability."""

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from masrel.agreement._kernel import Floats
 from masrel.errors import ParameterError
 from masrel.estimates import Interval
-from masrel.intervals._problem import IntervalProblem
+from masrel.intervals._problem import IntervalProblem, recorded_generator
 from masrel.intervals._rho import FEW_ITEMS
-from masrel.intervals._seeds import recorded_generator
 from masrel.intervals._table_quadrature import (
     CHANCE_AGREEMENT,
     TablePosterior,

@@ -1,15 +1,14 @@
 """An estimate with the interval that its question and its size call for."""
 
-import dataclasses
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal, TypedDict, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from masrel.agreement import Coefficient, Label
+from masrel.agreement import Label
 from masrel.errors import ParameterError
-from masrel.estimates import Estimate, Interval, Target
+from masrel.estimates import Estimate, Target
 from masrel.intervals._problem import Statistic, find_entry, pose_problem
 from masrel.intervals.analytic import analytic
 from masrel.intervals.bootstrap import bootstrap
@@ -87,23 +86,33 @@ def estimate(
             f"method: needs one of {', '.join(get_args(_Method))}, got {method!r}"
         )
     entry = find_entry(coefficient)
-    if entry.kernel is not None:
+    if entry.kernel is None:
+        result = entry(ratings, categories=categories, weights=weights, level=level)
+    else:
         ratings = entry.code(ratings, categories)  # once, for all that follows
-    result = entry(ratings, categories=categories, weights=weights, level=level)
+        result = entry.function(ratings, categories=categories, weights=weights)
     if method == "auto" and entry.has_interval:
         return result
     options = _Options(
         target=target, categories=categories, weights=weights, level=level
     )
     if method == "auto":
-        interval = _chosen(entry, ratings, options)
+        # Imported here: the other methods load no scipy.
+        from masrel.intervals._choice import choose_interval
+
+        identity = isinstance(weights, str) and weights == "identity"
+        interval = choose_interval(
+            pose_problem(entry, ratings, **options),
+            modelled=identity and entry.name in _RHO_COEFFICIENTS,
+        )
     elif method in ("analytic", "jackknife"):
         without_draws = analytic if method == "analytic" else jackknife
         interval = without_draws(entry, ratings, **options)
     else:
         draws = bootstrap if method == "bootstrap" else posterior
         interval = draws(entry, ratings, rng=rng, **options)
-    return dataclasses.replace(result, interval=interval)
+    # `vars` has the standard error as it is: still to be computed when it is read.
+    return Estimate(**{**vars(result), "interval": interval})
 
 
 class _Options(TypedDict):
@@ -112,15 +121,3 @@ class _Options(TypedDict):
     categories: Sequence[Label] | None
     weights: "WeightName | ArrayLike"
     level: float
-
-
-def _chosen(entry: Coefficient, ratings: object, options: _Options) -> Interval:
-    problem = pose_problem(entry, ratings, **options)
-    weights = options["weights"]
-    identity = isinstance(weights, str) and weights == "identity"
-    # Imported here: the other methods load no scipy.
-    from masrel.intervals._choice import choose_interval
-
-    return choose_interval(
-        problem, modelled=identity and entry.name in _RHO_COEFFICIENTS
-    )

@@ -17,11 +17,15 @@ from masrel.intervals._endpoints import (
     Kind,
     Resamples,
     distribution_of,
-    has_spread,
 )
-from masrel.intervals._problem import IntervalProblem, Statistic, pose_problem
+from masrel.intervals._problem import (
+    IntervalProblem,
+    Statistic,
+    check_rng,
+    pose_problem,
+    recorded_generator,
+)
 from masrel.intervals._resamples import DrawBudget, all_resamples, draw_resamples
-from masrel.intervals._seeds import check_rng, recorded_generator
 from masrel.intervals._units import SamplingUnits, sampling_units
 
 _Exact = Literal["auto"] | bool
@@ -167,15 +171,19 @@ def bootstrap(
     method = f"{kind} bootstrap"
     if clusters is not None:
         method += f" of {units.n} clusters"
-    reason = _why_no_resamples(rule)
+    reason = None
+    if math.isnan(rule.value):
+        reason = "the estimate itself is undefined"
+    elif kind == "studentized" and not rule.error > 0.0:
+        reason = "the estimate has no standard error to studentize by"
     if reason is not None:
         return problem.undefined(reason, method=method, unit=target)
     resamples, seed = _resamples(units, rule, exact, budget, rng)
     if resamples.n_resamples is None:
         method += ", exact"
     ends = rule.ends(resamples)
-    if ends is None:
-        return problem.undefined(_why_no_ends(resamples), method=method, unit=target)
+    if isinstance(ends, str):
+        return problem.undefined(ends, method=method, unit=target)
     notes, distribution = (*units.notes, *resamples.notes), None
     if kind == "studentized":  # ratios to standard errors, no values of the coefficient
         notes += _infinite_ratios(resamples)
@@ -244,20 +252,6 @@ def _resamples(
             return resamples, None
     generator, seed = recorded_generator(rng)
     return draw_resamples(units, statistic, rule, budget, generator), seed
-
-
-def _why_no_resamples(rule: EndpointRule) -> str | None:
-    if math.isnan(rule.value):
-        return "the estimate itself is undefined"
-    if rule.kind == "studentized" and not rule.error > 0.0:
-        return "the estimate has no standard error to studentize by"
-    return None
-
-
-def _why_no_ends(resamples: Resamples) -> str:
-    if not has_spread(resamples):
-        return "every resample gives the same value or none, so there is no spread"
-    return "all resamples lie on one side of the estimate, so BCa has no bias"
 
 
 def _infinite_ratios(resamples: Resamples) -> tuple[str, ...]:
