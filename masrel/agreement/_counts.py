@@ -77,14 +77,6 @@ class DistinctItems:
     _arrays: ItemArrays | None = None
 
     @classmethod
-    def of_counter(
-        cls, counter: dict[tuple[int, ...], int], n_categories: int
-    ) -> "DistinctItems":
-        """Take rows that a dictionary has counted."""
-        counter.pop((0,) * n_categories, None)
-        return cls(list(counter), list(counter.values()), n_categories)
-
-    @classmethod
     def of_arrays(cls, rows: Integers, freq: Integers | None = None) -> "DistinctItems":
         """Take rows in an array, once each unless it is said how often."""
         if freq is None:
@@ -116,7 +108,9 @@ class DistinctItems:
         codes, q = coded.codes, len(coded.categories)
         n_items, n_raters = codes.shape
         if codes.size <= FEW:
-            return cls.of_counter(Counter(map(tuple, item_counts(coded).tolist())), q)
+            counter = Counter(map(tuple, item_counts(coded).tolist()))
+            counter.pop((0,) * q, None)
+            return cls(list(counter), list(counter.values()), q)
         # An item is one number: Σ over its raters of (n_raters + 1) to the power code.
         base = n_raters + 1
         n_keys = base**q
@@ -465,7 +459,7 @@ def count_table(
                 freq[item] = freq.get(item, 0) + n
     return CountedRatings(
         categories=tuple(column_categories(categories, q)),
-        items=DistinctItems.of_counter(freq, q),
+        items=DistinctItems(list(freq), list(freq.values()), q),
         n_raters=2 if freq else 0,
         source=None,
     )
