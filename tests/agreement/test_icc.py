@@ -184,7 +184,7 @@ def test_text_counts_by_rank_and_numbers_by_value() -> None:
 
 def test_items_with_a_missing_rating_are_left_out() -> None:
     holed = [*TABLE_2, [5, None, 5, 5], [float("nan"), 1, 1, 1]]
-    assert icc(holed) == icc(TABLE_2)
+    assert repr(icc(holed)) == repr(icc(TABLE_2))  # its nan are nan
     frame = pd.DataFrame(holed)
     assert icc(frame).value == icc(TABLE_2).value
     assert icc(np.array(holed, dtype=float)).value == icc(TABLE_2).value

@@ -171,7 +171,7 @@ def test_only_the_order_within_a_rater_matters(table: Rows) -> None:
 def test_items_with_a_missing_rating_are_left_out() -> None:
     whole = [[1, 1, 2], [2, 3, 1], [3, 2, 3]]
     holed = [whole[0], [9, None, 0], *whole[1:], [float("nan"), 1, 1]]
-    assert kendall_w(holed) == kendall_w(whole)
+    assert repr(kendall_w(holed)) == repr(kendall_w(whole))  # its nan are nan
     assert kendall_w_test(holed) == kendall_w_test(whole)
     for table in (np.array(holed, dtype=float), pd.DataFrame(holed)):
         assert kendall_w(table).value == kendall_w(whole).value
