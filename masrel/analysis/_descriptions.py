@@ -1,4 +1,4 @@
-"""Descriptions of ratings: grades as intended and in person, speeds and torque."""
+"""Descriptions of ratings: grades as intended and in person, and speeds."""
 
 import math
 import statistics
@@ -13,20 +13,35 @@ from masrel.analysis._results import (
     Speeds,
     SpeedSummary,
 )
-from masrel.elbow import ConstantSpeed, ElbowParameters, Trace, peak_torque, trace
 from masrel.errors import RatingsError
-from masrel.protocol import Protocol, elbow_parameters
+from masrel.protocol import Protocol
 from masrel.ratings import InPerson, InPersonRow, Ratings
 
 
-def intended_agreement(protocol: Protocol, ratings: Ratings) -> IntendedAgreement:
+def intended_agreement(
+    protocol: Protocol, ratings: Ratings, session: str | None
+) -> IntendedAgreement:
     """Return how many raters gave each standard model its intended grade."""
-    # The session is the first of the protocol that has ratings.
     # [1] Park, H.-S., Kim, J., Damiano, D. L. (2012). Development of a Haptic Elbow
     # Spasticity Simulator (HESS). IEEE TNSRE, 20(3), 361-370, section IV.B.
     # https://doi.org/10.1109/TNSRE.2012.2195330
-    session = _first_session(protocol, ratings)
-    models = () if session is None else _by_model(protocol, ratings, session)
+    table = ratings.table[ratings.table["session"] == session]
+    models = []
+    for model in protocol.models if session is not None else ():
+        if model.role != "standard" or model.intended_grade is None:
+            continue
+        rows = (table["model"] == model.id) & table["grade"].notna()
+        grades = table.loc[rows, "grade"].tolist()
+        n_agree = grades.count(model.intended_grade)
+        models.append(
+            ModelAgreement(
+                model=model.id,
+                intended_grade=model.intended_grade,
+                n_ratings=len(grades),
+                n_agree=n_agree,
+                percent=100.0 * n_agree / len(grades) if grades else math.nan,
+            )
+        )
     percents = [row.percent for row in models if row.n_ratings]
     reason = None
     if session is None:
@@ -39,51 +54,23 @@ def intended_agreement(protocol: Protocol, ratings: Ratings) -> IntendedAgreemen
         reason = "one model has no standard deviation over models"
     return IntendedAgreement(
         session=session if models else None,
-        models=models,
+        models=tuple(models),
         mean=statistics.fmean(percents) if percents else math.nan,
         sd=statistics.stdev(percents) if len(percents) > 1 else math.nan,
         reason=reason,
     )
 
 
-def _by_model(
-    protocol: Protocol, ratings: Ratings, session: str
-) -> tuple[ModelAgreement, ...]:
-    table = ratings.table
-    models = []
-    for model in protocol.models:
-        if model.role != "standard" or model.intended_grade is None:
-            continue
-        rows = (table["session"] == session) & (table["model"] == model.id)
-        grades = table.loc[rows & table["grade"].notna(), "grade"].tolist()
-        n_agree = grades.count(model.intended_grade)
-        models.append(
-            ModelAgreement(
-                model=model.id,
-                intended_grade=model.intended_grade,
-                n_ratings=len(grades),
-                n_agree=n_agree,
-                percent=100.0 * n_agree / len(grades) if grades else math.nan,
-            )
-        )
-    return tuple(models)
-
-
-def _first_session(protocol: Protocol, ratings: Ratings) -> str | None:
-    present = set(ratings.table["session"])
-    return next((s.id for s in protocol.sessions if s.id in present), None)
-
-
 def in_person_agreement(
-    protocol: Protocol, ratings: Ratings, in_person: InPerson | None
+    ratings: Ratings, in_person: InPerson | None, session: str | None
 ) -> InPersonAgreement:
     """Return pairs of grades given in person and the same rater's haptic grades."""
-    session, reason = _first_session(protocol, ratings), None
+    reason = None
     entries: list[tuple[InPersonRow, str | None]] = []
     if in_person is None:
         reason = "no grades given in person belong to these ratings"
     else:
-        entries = _entries(in_person, _haptic_grades(ratings, session))
+        entries = _entries(in_person, ratings, session)
     pairs = tuple(
         InPersonPair(
             rater=row.rater,
@@ -106,21 +93,17 @@ def in_person_agreement(
     )
 
 
-def _haptic_grades(ratings: Ratings, session: str | None) -> dict[tuple[str, str], str]:
-    # by rater and model, in one session
+def _entries(
+    in_person: InPerson, ratings: Ratings, session: str | None
+) -> list[tuple[InPersonRow, str | None]]:
+    # Every in-person entry with its haptic grade: the one printed beside it in the
+    # same file, or, where the file has none, the one in the ratings.
     table = ratings.table
     graded = table[(table["session"] == session) & table["grade"].notna()]
     # Last to first: of repeated presentations the first one counts.
     graded = graded.sort_values("repeat", ascending=False, kind="stable")
     keys = zip(graded["rater"], graded["model"], strict=True)
-    return dict(zip(keys, graded["grade"], strict=True))
-
-
-def _entries(
-    in_person: InPerson, haptic: dict[tuple[str, str], str]
-) -> list[tuple[InPersonRow, str | None]]:
-    # Every in-person entry with its haptic grade: the one printed beside it in the
-    # same file, or, where the file has none, the one in the ratings.
+    haptic = dict(zip(keys, graded["grade"], strict=True))
     rows = in_person.rows
     printed = {row.source_table for row in rows if row.haptic_grade is not None}
     if not printed:
@@ -183,49 +166,3 @@ def _summaries(
         for session, name in present
         for speeds in [groups[session, name]]
     )
-
-
-def stretch_end_deg(protocol: Protocol) -> float:
-    """Return where a stretch ends at the latest, deg."""
-    return min(protocol.stretch.end_deg, protocol.elbow.range_end_deg)
-
-
-def peak_torques(
-    protocol: Protocol, speeds: Sequence[Speed]
-) -> dict[tuple[str, str], float]:
-    """Return by model and rater the largest peak of the exact law, N·m."""
-    peaks: dict[tuple[str, str], float] = {}
-    for speed, joint, motion in _stretches(protocol, speeds):
-        key = (speed.model, speed.rater)
-        peak = peak_torque(joint, motion)
-        peaks[key] = max(peak, peaks.get(key, peak))
-    return peaks
-
-
-def commanded_traces(protocol: Protocol, speeds: Sequence[Speed]) -> list[Trace]:
-    """Return what the controller commands in each stretch, at the device's rate."""
-    rate_hz = protocol.device.rate_hz
-    return [
-        trace(joint, motion, rate_hz=rate_hz)
-        for _, joint, motion in _stretches(protocol, speeds)
-    ]
-
-
-def _stretches(
-    protocol: Protocol, speeds: Sequence[Speed]
-) -> list[tuple[Speed, ElbowParameters, ConstantSpeed]]:
-    # each at constant speed from the start to the end of the range
-    start = math.radians(protocol.stretch.start_deg)
-    end = math.radians(stretch_end_deg(protocol))
-    models = dict.fromkeys(speed.model for speed in speeds)
-    joints = {model: elbow_parameters(protocol, model) for model in models}
-    return [
-        (
-            speed,
-            joints[speed.model],
-            ConstantSpeed(
-                start=start, end=end, speed=math.radians(speed.mean_speed_deg_s)
-            ),
-        )
-        for speed in speeds
-    ]

@@ -64,6 +64,9 @@ def analyze(
     """
     _check_known(protocol, ratings)
     sections = set(protocol.report.sections)
+    # descriptions of grades speak of the first session that has ratings
+    present = set(ratings.table["session"])
+    session = next((s.id for s in protocol.sessions if s.id in present), None)
     return Analysis(
         study=protocol.study.id,
         level=protocol.analysis.level,
@@ -71,10 +74,12 @@ def analyze(
             _estimate(line, protocol, ratings) for line in protocol.analysis.estimates
         ),
         intended=(
-            intended_agreement(protocol, ratings) if "intended" in sections else None
+            intended_agreement(protocol, ratings, session)
+            if "intended" in sections
+            else None
         ),
         in_person=(
-            in_person_agreement(protocol, ratings, in_person)
+            in_person_agreement(ratings, in_person, session)
             if "in-person" in sections
             else None
         ),

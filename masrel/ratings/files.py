@@ -164,7 +164,7 @@ def read_ratings(
 def _long_cells(
     rows: _CsvRows, columns: _LongColumns, problems: list[_Problem]
 ) -> list[_Cell]:
-    extra = {
+    extra: dict[str, int] = {
         name: rows.header.index(name)
         for name in ("repeat", "mean_speed_deg_s", "source")
         if name in rows.header
@@ -174,7 +174,7 @@ def _long_cells(
     for row in rows.rows:
         texts = {name: row.cells[position] for name, position in extra.items()}
         grade = row.cells[columns.grade]
-        speed = texts.get("mean_speed_deg_s", "")
+        repeat, speed, source = _extra_values(texts, row.line, problems)
         cells.append(
             _Cell(
                 line=row.line,
@@ -183,9 +183,9 @@ def _long_cells(
                 rater=row.cells[columns.rater],
                 model=row.cells[columns.item],
                 grade=None if grade in _MISSING else grade,
-                repeat=_repeat(texts.get("repeat", "1"), row.line, problems),
-                mean_speed_deg_s=_speed(speed, row.line, problems),
-                source=_source(texts.get("source", "foreign"), row.line, problems),
+                repeat=repeat,
+                mean_speed_deg_s=speed,
+                source=source,
             )
         )
         for role in ("item", "rater"):
@@ -211,33 +211,31 @@ def _wide_cells(rows: _CsvRows, columns: _WideColumns) -> list[_Cell]:
     ]
 
 
-def _repeat(text: str, line: int, problems: list[_Problem]) -> int:
+def _extra_values(
+    texts: Mapping[str, str], line: int, problems: list[_Problem]
+) -> tuple[int, float, str]:
+    # repeat, mean speed and source of one row, from the columns a file may lack
+    text, repeat = texts.get("repeat", "1"), 1
     if text.isascii() and text.isdigit() and int(text) >= 1:
-        return int(text)
-    problems.append((line, "repeat", f"needed a whole number from 1, got {text!r}"))
-    return 1
-
-
-def _speed(text: str, line: int, problems: list[_Problem]) -> float:
-    if text in _MISSING:
-        return math.nan
-    try:
-        speed = float(text)
-    except ValueError:
-        speed = math.nan
-    if not 0 <= speed < math.inf:
+        repeat = int(text)
+    else:
+        problems.append((line, "repeat", f"needed a whole number from 1, got {text!r}"))
+    text, speed = texts.get("mean_speed_deg_s", ""), math.nan
+    if text not in _MISSING:
+        try:
+            speed = float(text)
+        except ValueError:
+            speed = math.nan
+        if not 0 <= speed < math.inf:
+            problems.append(
+                (line, "mean_speed_deg_s", f"needed a speed of 0 or more, got {text!r}")
+            )
+    source = texts.get("source", "foreign")
+    if source not in SOURCES:
         problems.append(
-            (line, "mean_speed_deg_s", f"needed a speed of 0 or more, got {text!r}")
+            (line, "source", f"needed one of {', '.join(SOURCES)}, got {source!r}")
         )
-    return speed
-
-
-def _source(text: str, line: int, problems: list[_Problem]) -> str:
-    if text not in SOURCES:
-        problems.append(
-            (line, "source", f"needed one of {', '.join(SOURCES)}, got {text!r}")
-        )
-    return text
+    return repeat, speed, source
 
 
 def _check_cells(

@@ -104,21 +104,19 @@ def read_in_person(path: Path | str) -> InPerson:
                 f"{cell['source_table']!r}, line {first} has one already"
             )
             problems.append((row.line, None, message))
-        graded.append(_in_person_row(row.line, cell))
+        in_person, haptic = cell["in_person_grade"], cell["haptic_grade"]
+        graded.append(
+            InPersonRow(
+                line=row.line,
+                source_table=cell["source_table"],
+                rater=cell["rater"],
+                subject=cell["subject"],
+                model=cell["model"],
+                in_person_grade=None if in_person in _MISSING else in_person,
+                haptic_grade=None if haptic in _MISSING else haptic,
+                note=cell["note"],
+            )
+        )
     if problems:
         raise _refusal(rows.path, problems)
     return InPerson(rows=tuple(graded), source_path=rows.path)
-
-
-def _in_person_row(line: int, cell: dict[str, str]) -> InPersonRow:
-    in_person, haptic = cell["in_person_grade"], cell["haptic_grade"]
-    return InPersonRow(
-        line=line,
-        source_table=cell["source_table"],
-        rater=cell["rater"],
-        subject=cell["subject"],
-        model=cell["model"],
-        in_person_grade=None if in_person in _MISSING else in_person,
-        haptic_grade=None if haptic in _MISSING else haptic,
-        note=cell["note"],
-    )

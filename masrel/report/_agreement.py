@@ -149,49 +149,40 @@ def estimate_table(
     """Return a table of estimates."""
     # On a page an interval is one column, marked with a letter; a note below says what
     # each letter means: level, method, and of whom the interval speaks.
-    texts = (_interval_note(row.interval) for row in rows if row.interval is not None)
-    n = len(_LETTERS)
-    marks = {
-        text: _LETTERS[i % n] * (i // n + 1)  # a, b, ..., z, aa, bb, ...
-        for i, text in enumerate(dict.fromkeys(texts))
-    }
-    cells = tuple(_cells(row, marks) for row in rows)
-    notes = [f"{mark} {text}." for text, mark in marks.items()]
-    notes += [
-        f"{row.name}: {remark.rstrip('.')}." for row in rows for remark in _remarks(row)
-    ]
+    marks: dict[str, str] = {}
+    cells, remarks = [], []
+    for row in rows:
+        interval, mark = row.interval, ""
+        # what a reader must know before relying on it
+        texts = [row.reason, None if row.estimate is None else row.estimate.reason]
+        if interval is not None:
+            note = f"{interval_name(interval)}; speaks of {TARGETS[interval.target]}"
+            nth, again = len(marks) % len(_LETTERS), len(marks) // len(_LETTERS)
+            mark = marks.setdefault(note, _LETTERS[nth] * (again + 1))  # a, ..., z, aa
+            texts += [*interval.notes, interval.reason]
+            if interval.n_undefined:
+                texts.append(f"undefined on {interval.n_undefined} resamples")
+        cells.append(_cells(row, mark))
+        once = dict.fromkeys(text for text in texts if text)
+        remarks += [f"{row.name}: {text.rstrip('.')}." for text in once]
+    notes = [*(f"{mark} {note}." for note, mark in marks.items()), *remarks]
     if any(row.estimate is not None for row in rows):
         notes.append(_AGREEMENTS)
-    word = [column.key for column in _COLUMNS].index("strength")
-    if any(row[word] is not None for row in cells):
+    strengths = [column.key for column in _COLUMNS].index("strength")
+    if any(row[strengths] is not None for row in cells):
         notes.append(_LANDIS_KOCH)
     return Table(
         name=name,
         caption=caption,
         columns=_COLUMNS,
-        rows=cells,
+        rows=tuple(cells),
         notes=tuple(notes),
         data=data,
     )
 
 
-def _interval_note(interval: Interval) -> str:
-    return f"{interval_name(interval)}; speaks of {TARGETS[interval.target]}"
-
-
-def _remarks(row: EstimateRow) -> list[str]:
-    # what a reader must know before relying on it, each once
-    remarks = [row.reason]
-    if row.estimate is not None:
-        remarks.append(row.estimate.reason)
-    if row.interval is not None:
-        remarks += [*row.interval.notes, row.interval.reason]
-        if row.interval.n_undefined:
-            remarks.append(f"undefined on {row.interval.n_undefined} resamples")
-    return list(dict.fromkeys(text for text in remarks if text))
-
-
-def _cells(row: EstimateRow, marks: dict[str, str]) -> tuple[Value, ...]:
+def _cells(row: EstimateRow, mark: str) -> tuple[Value, ...]:
+    # mark: the letter of its interval
     estimate, interval = row.estimate, row.interval
     head = (row.name, row.coefficient)
     if estimate is None:
@@ -199,7 +190,6 @@ def _cells(row: EstimateRow, marks: dict[str, str]) -> tuple[Value, ...]:
         return (*head, *data, None, NOT_THERE, *[None] * 7, row.reason)
     ends: tuple[Value, ...] = (None,) * 5
     if interval is not None:
-        mark = marks[_interval_note(interval)]
         ends = (
             f"{interval_text(interval.low, interval.high)} {mark}",
             interval.low,
@@ -229,10 +219,19 @@ def _cells(row: EstimateRow, marks: dict[str, str]) -> tuple[Value, ...]:
 def _forest(
     material: Material, rows: Sequence[EstimateRow], name: str, caption: str
 ) -> Drawing:
-    lines = [
-        forest_row(f"{row.coefficient}, {row.name}", row.estimate, detail=_detail(row))
-        for row in rows
-    ]
+    lines = []
+    for row in rows:
+        # how much it rests on, and what its interval speaks of
+        estimate, interval = row.estimate, row.interval
+        detail = f"{row.models} models, {row.sessions}"
+        if estimate is not None:
+            raters = "twice" if row.single else counted(estimate.n_raters, "rater")
+            detail = f"{counted(estimate.n_items, 'model')}, {raters}"
+        if interval is not None:
+            looks = (interval.kind, aside(interval), TARGETS[interval.target])
+            detail += f"; {', '.join(text for text in looks if text)}"
+        label = f"{row.coefficient}, {row.name}"
+        lines.append(forest_row(label, estimate, detail=detail))
     texts = "; ".join(f"{line.label}: {line.text}" for line in lines)
     return Drawing(
         name=name,
@@ -244,15 +243,3 @@ def _forest(
         content=Forest(rows=tuple(lines), axis_label="agreement (1 is perfect)"),
         stamp=material.stamp,
     )
-
-
-def _detail(row: EstimateRow) -> str:
-    # how much it rests on, and what its interval speaks of
-    if row.estimate is None:
-        return f"{row.models} models, {row.sessions}"
-    raters = "twice" if row.single else counted(row.estimate.n_raters, "rater")
-    size = f"{counted(row.estimate.n_items, 'model')}, {raters}"
-    if row.interval is None:
-        return size
-    texts = (row.interval.kind, aside(row.interval), TARGETS[row.interval.target])
-    return f"{size}; {', '.join(text for text in texts if text)}"

@@ -1,5 +1,9 @@
 """Section `design`: what was presented to whom, with the constants of the joints."""
 
+from typing import Any
+
+import msgspec
+
 from masrel.report._material import Material, Paragraph, Section
 from masrel.report._tables import (
     Column,
@@ -7,7 +11,6 @@ from masrel.report._tables import (
     Value,
     as_entered,
     counted,
-    entered_decimals,
 )
 
 _PARAMETERS = (
@@ -17,8 +20,8 @@ _PARAMETERS = (
     ("catch_travel_deg", "D (deg)"),
 )
 
-# Keys of ``[elbow]`` whose value is a number: symbol and meaning.
-_NUMBERS = {
+# Constants of a joint and of its stretch: symbol and meaning.
+_CONSTANTS = {
     "inertia_kg_m2": ("m", "inertia (kg·m²)"),
     "damping_nms_rad": ("b", "damping (N·m·s/rad)"),
     "stiffness_nm_rad": ("k", "stiffness (N·m/rad)"),
@@ -30,14 +33,13 @@ _NUMBERS = {
     "smallest_catch_angle_deg": ("θ_L", "smallest catch angle (deg)"),
     "rest_angle_deg": ("θ_rest", "angle without elastic torque (deg)"),
     "catch_rise_s": ("ΔT_rise", "rise of the catch to its peak (s)"),
-}
-
-# Keys whose value is the name of a variant: symbol and meaning.
-_VARIANTS = {
+    "start_deg": ("θ_start", "start of a stretch (deg)"),
+    "range_end_deg": ("θ_end", "end of the range of motion (deg)"),
     "post_catch": ("τ post-catch", "reading of the torque after the catch"),
     "residual_reading": ("Q", "reading of Q"),
 }
 
+# The constants that are no numbers but the name of a variant.
 _VARIANT_NAMES = {
     "continuous": "continuous: from the residual torque on",
     "additive": "additive: to the torque of pre-catch",
@@ -95,9 +97,21 @@ def _models(material: Material) -> Table:
     parameters = [
         [float(getattr(model, key)) for model in models] for key, _ in _PARAMETERS
     ]
+    # as many decimals as the number with most was entered with
+    decimals = [
+        max(len(as_entered(value).partition(".")[2]) for value in values)
+        for values in parameters
+    ]
+    shared = material.protocol.elbow.residual_reading
+    readings = {model.constants.residual_reading or shared for model in models}
+    meaning_of_q = "share of the peak of the catch, as each model reads it (see below)"
+    if readings == {"residual"}:
+        meaning_of_q = "residual over peak torque of the catch"
+    elif readings == {"decrease"}:
+        meaning_of_q = "decrease after the peak of the catch over the rise to it"
     notes = [
         "L: catch angle constant; H: catch torque per stretching speed; Q: "
-        f"{_meaning_of_q(material)}; D: angle travelled during the catch."
+        f"{meaning_of_q}; D: angle travelled during the catch."
     ]
     simulated = ", ".join(model.id for model in models if model.simulated)
     if simulated:
@@ -110,8 +124,8 @@ def _models(material: Material) -> Table:
             Column(key="role", heading="Role", align="left"),
             Column(key="intended_grade", heading="Intended grade", align="center"),
             *(
-                Column(key=key, heading=heading, digits=entered_decimals(values))
-                for (key, heading), values in zip(_PARAMETERS, parameters, strict=True)
+                Column(key=key, heading=heading, digits=digits)
+                for (key, heading), digits in zip(_PARAMETERS, decimals, strict=True)
             ),
         ),
         rows=tuple(
@@ -123,68 +137,46 @@ def _models(material: Material) -> Table:
     )
 
 
-def _meaning_of_q(material: Material) -> str:
-    protocol = material.protocol
-    shared = protocol.elbow.residual_reading
-    readings = {m.constants.residual_reading or shared for m in protocol.models}
-    if readings == {"residual"}:
-        return "residual over peak torque of the catch"
-    if readings == {"decrease"}:
-        return "decrease after the peak of the catch over the rise to it"
-    return "share of the peak of the catch, as each model reads it (see below)"
-
-
-def _constants(material: Material) -> tuple[Table, ...]:
+def _constants(material: Material) -> list[Table]:
     # those all models share, and, where there are any, those of single models
     protocol = material.protocol
-    elbow, stretch = protocol.elbow, protocol.stretch
-    numbers = [key for key in _NUMBERS if getattr(elbow, key) != _DEFAULTS.get(key, "")]
-    shared: list[tuple[Value, ...]] = [
-        *(_constant(key, getattr(elbow, key)) for key in numbers),
-        ("θ_start", "start of a stretch (deg)", float(stretch.start_deg)),
-        ("θ_end", "end of the range of motion (deg)", float(elbow.range_end_deg)),
-        *(
-            _constant(key, getattr(elbow, key))
-            for key in _VARIANTS
-            if getattr(elbow, key) != _DEFAULTS[key]
-        ),
-    ]
-    single = [
-        (model.id, *_constant(key, value))
-        for model in protocol.models
-        for key in model.constants.__struct_fields__
-        for value in [getattr(model.constants, key)]
-        if value is not None and value != getattr(elbow, key)
-    ]
+    values: dict[str, Any] = {"start_deg": protocol.stretch.start_deg}
+    values |= msgspec.structs.asdict(protocol.elbow)
+    shared: list[tuple[Value, ...]] = []
+    for key, names in _CONSTANTS.items():
+        value = values[key]
+        if value != _DEFAULTS.get(key, ""):
+            shared.append((*names, _VARIANT_NAMES.get(value) or float(value)))
+    single: list[tuple[Value, ...]] = []
+    for model in protocol.models:
+        for key, value in msgspec.structs.asdict(model.constants).items():
+            if value is not None and value != values[key]:
+                shown = _VARIANT_NAMES.get(value) or float(value)
+                single.append((model.id, *_CONSTANTS[key], shown))
     caption = "Constants all models share"
     if single:
         caption += ", but for those in the table below"
     tables = [
-        ("constants", caption, _CONSTANT_COLUMNS, shared),
-        (
-            "own_constants",
-            "Constants that single models have of their own",
-            (Column(key="model", heading="Model", align="left"), *_CONSTANT_COLUMNS),
-            single,
-        ),
-    ]
-    return tuple(
         Table(
-            name=name,
-            caption=text,
-            columns=columns,
-            rows=tuple(rows),
+            name="constants",
+            caption=caption,
+            columns=_CONSTANT_COLUMNS,
+            rows=tuple(shared),
             data=material.data,
         )
-        for name, text, columns, rows in tables
-        if rows
-    )
-
-
-def _constant(key: str, value: float | str) -> tuple[Value, ...]:
-    if key in _VARIANTS:
-        return (*_VARIANTS[key], _VARIANT_NAMES[str(value)])
-    return (*_NUMBERS[key], float(value))
+    ]
+    if single:
+        by_model = Column(key="model", heading="Model", align="left")
+        tables.append(
+            Table(
+                name="own_constants",
+                caption="Constants that single models have of their own",
+                columns=(by_model, *_CONSTANT_COLUMNS),
+                rows=tuple(single),
+                data=material.data,
+            )
+        )
+    return tables
 
 
 def _sessions(material: Material) -> Table:

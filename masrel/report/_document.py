@@ -109,8 +109,7 @@ def write_report(
     material = gather(protocol, ratings, analysis, in_person)
     sections = [SECTIONS[name](material) for name in protocol.report.sections]
     destination.mkdir(parents=True, exist_ok=True)
-    tables = _write_tables(sections, destination / "tables")
-    figures, uris = _write_figures(sections, destination / "figures", progress)
+    tables, figures, uris = _write_blocks(sections, destination, progress)
     for name, page in _pages(material, sections, uris).items():
         (destination / name).write_text(page, encoding="utf-8", newline="\n")
     if progress is not None:
@@ -118,44 +117,38 @@ def write_report(
     return ReportFiles(
         html=destination / "report.html",
         markdown=destination / "report.md",
-        tables=tables,
-        figures=figures,
+        tables=tuple(tables),
+        figures=tuple(figures),
     )
 
 
-def _write_tables(sections: Sequence[Section], folder: Path) -> tuple[Path, ...]:
-    paths = []
-    for table in (block for section in sections for block in section.blocks):
-        if isinstance(table, Table):
-            folder.mkdir(exist_ok=True)
-            path = folder / f"{table.name}.csv"
-            path.write_text(as_csv(table), encoding="utf-8", newline="\n")
-            paths.append(path)
-    return tuple(paths)
+def _write_blocks(
+    sections: Sequence[Section], destination: Path, progress: Progress | None
+) -> tuple[list[Path], list[Path], dict[str, str]]:
+    # the files of tables and of figures, and by name of each figure its picture to be
+    # held inside the page
+    tables, figures = [], []
+    uris: dict[str, str] = {}
+    for block in (block for section in sections for block in section.blocks):
+        if isinstance(block, Table):
+            tables.append(destination / "tables" / f"{block.name}.csv")
+            tables[-1].parent.mkdir(exist_ok=True)
+            tables[-1].write_text(as_csv(block), encoding="utf-8", newline="\n")
+        elif isinstance(block, Drawing):
+            # Imported here: a report without figures loads nothing that draws.
+            from masrel.report.figures import draw
 
-
-def _write_figures(
-    sections: Sequence[Section], folder: Path, progress: Progress | None
-) -> tuple[tuple[Path, ...], dict[str, str]]:
-    # the files, and by name of the drawing its picture to be held inside the page
-    paths, uris = [], {}
-    for drawing in (block for section in sections for block in section.blocks):
-        if not isinstance(drawing, Drawing):
-            continue
-        # Imported here: a report without figures loads nothing that draws.
-        from masrel.report.figures import draw
-
-        files = draw(drawing.content, stamp=drawing.stamp)
-        folder.mkdir(exist_ok=True)
-        for form, picture in files.items():
-            paths.append(folder / f"{drawing.name}.{form}")
-            paths[-1].write_bytes(picture)
-        # An image of its own, not inline: ids inside two SVGs would collide.
-        encoded = base64.b64encode(files["svg"]).decode("ascii")
-        uris[drawing.name] = f"data:image/svg+xml;base64,{encoded}"
-        if progress is not None:
-            progress(drawing.name)
-    return tuple(paths), uris
+            pictures = draw(block.content, stamp=block.stamp)
+            for form, picture in pictures.items():
+                figures.append(destination / "figures" / f"{block.name}.{form}")
+                figures[-1].parent.mkdir(exist_ok=True)
+                figures[-1].write_bytes(picture)
+            # An image of its own, not inline: ids inside two SVGs would collide.
+            encoded = base64.b64encode(pictures["svg"]).decode("ascii")
+            uris[block.name] = f"data:image/svg+xml;base64,{encoded}"
+            if progress is not None:
+                progress(block.name)
+    return tables, figures, uris
 
 
 def _pages(

@@ -2,7 +2,6 @@
 
 from collections import Counter
 
-from masrel.analysis import InPersonAgreement
 from masrel.report._figure_data import GradeGrid
 from masrel.report._material import (
     Drawing,
@@ -11,18 +10,14 @@ from masrel.report._material import (
     Section,
     absent_section,
 )
-from masrel.report._tables import Column, Table, counted, number
+from masrel.report._tables import Column, Table, Value, counted, number
 
 
 def grades_section(material: Material) -> Section:
     """Show every grade of every session, as a grid of models by raters."""
     blocks: list[Paragraph | Table | Drawing] = []
     for session in material.sessions:
-        grid = _grid(material, session)
-        blocks += [
-            _grid_table(material, session, grid),
-            _grid_drawing(material, session, grid),
-        ]
+        blocks += _grid_blocks(material, session, _grid(material, session))
     if not blocks:
         blocks.append(Paragraph(text="These data hold no ratings.", absent=True))
     return Section(name="grades", title="Grades", blocks=tuple(blocks))
@@ -51,10 +46,23 @@ def _grid(material: Material, session: str) -> GradeGrid:
     )
 
 
-def _grid_table(material: Material, session: str, grid: GradeGrid) -> Table:
-    n_missing = sum(not cell for row in grid.grades for cell in row)
-    notes = [f"{counted(n_missing, 'rating')} missing, shown as –."]
-    return Table(
+def _grid_blocks(
+    material: Material, session: str, grid: GradeGrid
+) -> tuple[Table, Drawing]:
+    table_rows: list[tuple[Value, ...]] = []
+    listed, n_missing = [], 0
+    by_model = zip(grid.models, grid.intended, grid.grades, strict=True)
+    for model, intended, cells in by_model:
+        table_rows.append(
+            (model, intended, *(", ".join(grades) or None for grades in cells))
+        )
+        n_missing += sum(not grades for grades in cells)
+        counts = Counter(grade for grades in cells for grade in grades)
+        text = ", ".join(f"{n} of grade {grade}" for grade, n in counts.items())
+        aim = "" if intended is None else f" (intended {intended})"
+        listed.append(f"{model}{aim}: {text or 'no grades'}")
+    notes = (f"{counted(n_missing, 'rating')} missing, shown as –.",)
+    table = Table(
         name=f"grades_{session}",
         caption=f"Grades of session {session}: models by raters",
         columns=(
@@ -62,36 +70,21 @@ def _grid_table(material: Material, session: str, grid: GradeGrid) -> Table:
             Column(key="intended_grade", heading="Intended", align="center"),
             *(Column(key=name, heading=name, align="center") for name in grid.raters),
         ),
-        rows=tuple(
-            (model, intended, *(", ".join(cell) or None for cell in row))
-            for model, intended, row in zip(
-                grid.models, grid.intended, grid.grades, strict=True
-            )
-        ),
-        notes=tuple(notes if n_missing else ()),
+        rows=tuple(table_rows),
+        notes=notes if n_missing else (),
         data=material.data,
     )
-
-
-def _grid_drawing(material: Material, session: str, grid: GradeGrid) -> Drawing:
     caption = f"Grades of session {session}. Darker is a higher grade"
     if any(intended is not None for intended in grid.intended):
         caption += "; a frame marks a grade other than the intended one"
-    rows = []
-    for model, intended, cells in zip(
-        grid.models, grid.intended, grid.grades, strict=True
-    ):
-        counts = Counter(grade for cell in cells for grade in cell)
-        listed = ", ".join(f"{n} of grade {grade}" for grade, n in counts.items())
-        aim = "" if intended is None else f" (intended {intended})"
-        rows.append(f"{model}{aim}: {listed or 'no grades'}")
-    return Drawing(
+    drawing = Drawing(
         name=f"grades_{session}",
         caption=f"{caption}.",
-        alt=f"Grid of grades. {'; '.join(rows)}.",
+        alt=f"Grid of grades. {'; '.join(listed)}.",
         content=grid,
         stamp=material.stamp,
     )
+    return table, drawing
 
 
 def intended_section(material: Material) -> Section:
@@ -135,11 +128,6 @@ def in_person_section(material: Material) -> Section:
     text = f"{result.n_equal} of {result.n_pairs} pairs are equal ({percent} %)."
     if result.n_unpaired:
         text += f" Entries that lack one of the two grades: {result.n_unpaired}."
-    blocks = (Paragraph(text=text), _pairs(material, result))
-    return Section(name="in-person", title=title, blocks=blocks)
-
-
-def _pairs(material: Material, result: InPersonAgreement) -> Table:
     entries = () if material.in_person is None else material.in_person.rows
     notes = (
         f"{row.rater}, {row.model} (subject {row.subject}, source table "
@@ -147,7 +135,7 @@ def _pairs(material: Material, result: InPersonAgreement) -> Table:
         for row in entries
         if row.note
     )
-    return Table(
+    table = Table(
         name="in_person",
         caption=(
             "Grade of the patient in person and of the model built from that patient, "
@@ -168,3 +156,4 @@ def _pairs(material: Material, result: InPersonAgreement) -> Table:
         notes=tuple(dict.fromkeys(notes)),
         data=material.data,
     )
+    return Section(name="in-person", title=title, blocks=(Paragraph(text=text), table))

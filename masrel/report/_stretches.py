@@ -1,15 +1,14 @@
 """Sections `speeds` and `traces`: how fast raters stretched, and the torque it made."""
 
+import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from masrel.analysis import Speed, Speeds, SpeedSummary
-from masrel.analysis._descriptions import (
-    commanded_traces,
-    peak_torques,
-    stretch_end_deg,
-)
+from masrel.elbow import ConstantSpeed, Trace, peak_torque, trace
+from masrel.protocol import Protocol, elbow_parameters
 from masrel.report._figure_data import (
     SpeedColumn,
     SpeedDots,
@@ -23,7 +22,14 @@ from masrel.report._material import (
     Section,
     absent_section,
 )
-from masrel.report._tables import Column, Table, as_entered, number, whole_or_tenths
+from masrel.report._tables import (
+    Column,
+    Table,
+    Value,
+    as_entered,
+    number,
+    whole_or_tenths,
+)
 
 _PANELS_PER_FIGURE = 4
 
@@ -117,9 +123,16 @@ def _speed_drawing(material: Material, speeds: Speeds) -> Drawing:
     )
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Stretch:
+    speed: Speed  # whose it is, and how fast
+    trace: Trace  # what the controller commands, at the device's rate
+    peak: float  # the largest torque of the exact law, N·m
+
+
 def traces_section(material: Material) -> Section:
     """Show the torque each model makes at each rater's mean speed."""
-    speeds = material.analysis.speeds
+    speeds, protocol = material.analysis.speeds, material.protocol
     title = "Torque traces"
     if speeds is None or not speeds.values:
         return absent_section("traces", title, speeds.reason if speeds else None)
@@ -127,56 +140,86 @@ def traces_section(material: Material) -> Section:
     if not moved:
         return absent_section("traces", title, f"every speed is {_TOO_SLOW}")
     session = next(s for s in material.sessions if s in {v.session for v in moved})
+    end_deg = min(protocol.stretch.end_deg, protocol.elbow.range_end_deg)
     values = [value for value in moved if value.session == session]
-    n_still = sum(v.session == session for v in speeds.values) - len(values)
-    stretched = {value.model for value in values}
-    models = [m.id for m in material.protocol.models if m.id in stretched]
-    drawings = [
-        _trace_drawing(material, values, models, first)
-        for first in range(0, len(models), _PANELS_PER_FIGURE)
-    ]
-    return Section(
-        name="traces",
-        title=title,
-        blocks=(
-            Paragraph(text=_about_traces(material, session, n_still)),
-            *drawings,
-            _peak_table(material, values, models, session),
-        ),
-    )
-
-
-def _about_traces(material: Material, session: str, n_still: int) -> str:
+    stretches = _stretches(protocol, values, end_deg)
     kind = {
         "published": "published mean speeds",
         "simulated": "mean speeds of the simulated hands",
     }.get(material.data, "recorded mean speeds")
-    protocol = material.protocol
     text = (
         "These traces are reconstructions, not measurements: each model is stretched "
         f"at constant speed from {as_entered(protocol.stretch.start_deg)}° to "
-        f"{as_entered(stretch_end_deg(protocol))}°, at the {kind} of session "
+        f"{as_entered(end_deg)}°, at the {kind} of session "
         f"{session}, one line a rater. Torque resists extension; the arm's own inertia "
         "is not in it. Torque and phases are what the control law sends at "
         f"{as_entered(protocol.device.rate_hz)} Hz."
     )
+    n_still = sum(v.session == session for v in speeds.values) - len(values)
     if n_still:
         text += f" Speeds {_TOO_SLOW}, which are not drawn: {n_still}."
-    return text
+    drawings = [
+        _trace_drawing(material, stretches[first : first + _PANELS_PER_FIGURE], nth)
+        for nth, first in enumerate(
+            range(0, len(stretches), _PANELS_PER_FIGURE), start=1
+        )
+    ]
+    table = _peak_table(material, stretches, session)
+    return Section(
+        name="traces",
+        title=title,
+        blocks=(Paragraph(text=text), *drawings, table),
+    )
+
+
+def _stretches(
+    protocol: Protocol, speeds: Sequence[Speed], end_deg: float
+) -> list[tuple[str, list[_Stretch]]]:
+    # by model, in the protocol's order: each at constant speed over the whole range
+    start, end = math.radians(protocol.stretch.start_deg), math.radians(end_deg)
+    stretches = []
+    for model in protocol.models:
+        of_model = [speed for speed in speeds if speed.model == model.id]
+        if not of_model:
+            continue
+        joint = elbow_parameters(protocol, model.id)
+        made = []
+        for speed in of_model:
+            motion = ConstantSpeed(
+                start=start, end=end, speed=math.radians(speed.mean_speed_deg_s)
+            )
+            commanded = trace(joint, motion, rate_hz=protocol.device.rate_hz)
+            peak = peak_torque(joint, motion)
+            made.append(_Stretch(speed=speed, trace=commanded, peak=peak))
+        stretches.append((model.id, made))
+    return stretches
 
 
 def _trace_drawing(
-    material: Material, values: Sequence[Speed], models: Sequence[str], first: int
+    material: Material, stretches: Sequence[tuple[str, list[_Stretch]]], nth: int
 ) -> Drawing:
-    # the models of one figure, from the `first` on
-    models = models[first : first + _PANELS_PER_FIGURE]
-    panels = [
-        _panel(material, model, [value for value in values if value.model == model])
-        for model in models
-    ]
-    listed = ", ".join(models)
+    # of the models of the nth figure
+    intended = {m.id: m.intended_grade for m in material.protocol.models}
+    panels = []
+    for model, made in stretches:
+        speeds = [stretch.speed.mean_speed_deg_s for stretch in made]
+        digits = whole_or_tenths(speeds)
+        slowest, fastest = number(min(speeds), digits), number(max(speeds), digits)
+        grade = ""
+        if intended[model] is not None:
+            grade = f" ({material.protocol.scale.name} {intended[model]})"
+        traces = [stretch.trace for stretch in made]
+        panels.append(
+            TracePanel(
+                title=f"{model}{grade}\n{slowest} to {fastest} deg/s",
+                stretches=tuple(
+                    (t.time, np.degrees(t.angle), t.torque, t.phase) for t in traces
+                ),
+            )
+        )
+    listed = ", ".join(model for model, _ in stretches)
     return Drawing(
-        name=f"traces_{first // _PANELS_PER_FIGURE + 1}",
+        name=f"traces_{nth}",
         caption=(
             f"Reconstructed torque (top) and angle (bottom) of {listed} at every "
             "rater's mean speed. Thin grey: before the catch; thick: catch; dashed: "
@@ -192,36 +235,24 @@ def _trace_drawing(
     )
 
 
-def _panel(material: Material, model: str, values: Sequence[Speed]) -> TracePanel:
-    protocol = material.protocol
-    intended = {m.id: m.intended_grade for m in protocol.models}[model]
-    speeds = [value.mean_speed_deg_s for value in values]
-    digits = whole_or_tenths(speeds)
-    slowest, fastest = number(min(speeds), digits), number(max(speeds), digits)
-    grade = "" if intended is None else f" ({protocol.scale.name} {intended})"
-    return TracePanel(
-        title=f"{model}{grade}\n{slowest} to {fastest} deg/s",
-        stretches=tuple(
-            (made.time, np.degrees(made.angle), made.torque, made.phase)
-            for made in commanded_traces(protocol, values)
-        ),
-    )
-
-
 def _peak_table(
-    material: Material, values: Sequence[Speed], models: Sequence[str], session: str
+    material: Material, stretches: Sequence[tuple[str, list[_Stretch]]], session: str
 ) -> Table:
-    present = {value.rater for value in values}
+    present = {stretch.speed.rater for _, made in stretches for stretch in made}
     raters = [rater for rater in material.raters if rater in present]
-    peaks = peak_torques(material.protocol, values)
     notes = ["Computed from the exact events of the motion, not from the samples."]
-    if len(peaks) < len(values):
+    rows: list[tuple[Value, ...]] = []
+    has_repeats = False
+    for model, made in stretches:
+        peaks: dict[str, float] = {}
+        for stretch in made:
+            rater = stretch.speed.rater
+            peaks[rater] = max(stretch.peak, peaks.get(rater, stretch.peak))
+        has_repeats = has_repeats or len(peaks) < len(made)
+        of_raters = [peaks.get(rater) for rater in raters]
+        rows.append((model, *of_raters, min(peaks.values()), max(peaks.values())))
+    if has_repeats:
         notes.append("Of repeated presentations the largest peak is given.")
-    rows = []
-    for model in models:
-        of_raters = [peaks.get((model, rater)) for rater in raters]
-        known = [peak for peak in of_raters if peak is not None]
-        rows.append((model, *of_raters, min(known), max(known)))
     return Table(
         name="peak_torque",
         caption=(

@@ -103,12 +103,6 @@ def percent(share: float) -> str:
     return f"{(Decimal(repr(float(share))) * 100).normalize():f}"
 
 
-def entered_decimals(values: Sequence[float]) -> int:
-    """Return the decimals with which a column of chosen numbers loses nothing."""
-    written = (as_entered(value).partition(".")[2] for value in values)
-    return max(map(len, written), default=0)
-
-
 def whole_or_tenths(values: Sequence[float]) -> int:
     """Return the decimals a column of measurements needs: 0 if all are whole."""
     known = [value for value in values if math.isfinite(value)]

@@ -19,7 +19,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from masrel.estimates import Distribution, Interval
+from masrel.estimates import Distribution
 from masrel.report._figure_data import Forest, ForestRow
 from masrel.report._tables import percent
 from masrel.report.figures._style import BLACK, BLUE, DASHES, GREY, ORANGE
@@ -51,6 +51,12 @@ _PART_NAMES: dict[_Part, str] = {
     "bars": "resamples together in bars, each row to its own height",
 }
 _RIDGE_ALPHA = 0.35
+_STEM_MARK: dict[str, Any] = {  # in the legend
+    "linestyle": "none",
+    "marker": "|",
+    "markersize": 9,
+    "markeredgewidth": 1.4,
+}
 
 _WIDTHS = (0.02, 0.01, 0.005, 0.002, 0.001)
 _MIN_BARS = 12  # in the middle of the resamples
@@ -151,8 +157,16 @@ def _draw_zeros(axes: Axes, places: Sequence[_Placed]) -> None:
 
 
 def _draw_row(axes: Axes, y: float, row: ForestRow, left: float) -> None:
-    if row.interval is not None:
-        _draw_interval(axes, y, row.interval, left)
+    interval = row.interval
+    if interval is not None:
+        if interval.distribution is not None:
+            base, top = y - 0.3 * _LINE, y - 0.3 * _LINE - 0.95 * _RIDGE
+            _draw_ridge(axes, interval.distribution, base=base, top=top)
+        look = _INTERVALS[interval.kind]
+        axes.plot([max(interval.low, left), interval.high], [y, y], **look)
+        if interval.low < left:
+            arrow = {"marker": "<", "markersize": 7, "color": look["color"]}
+            axes.plot([left], [y], clip_on=False, **arrow)
     if row.value is not None:
         inside = min(max(row.value, left), _RIGHT)
         marker = "o" if inside == row.value else "<" if row.value < left else ">"
@@ -170,17 +184,6 @@ def _draw_row(axes: Axes, y: float, row: ForestRow, left: float) -> None:
         color=GREY if row.value is None else BLACK,
         style="italic" if row.value is None else "normal",
     )
-
-
-def _draw_interval(axes: Axes, y: float, interval: Interval, left: float) -> None:
-    if interval.distribution is not None:
-        base = y - 0.3 * _LINE
-        _draw_ridge(axes, interval.distribution, base=base, top=base - 0.95 * _RIDGE)
-    look = _INTERVALS[interval.kind]
-    axes.plot([max(interval.low, left), interval.high], [y, y], **look)
-    if interval.low < left:
-        arrow = {"marker": "<", "markersize": 7, "color": look["color"]}
-        axes.plot([left], [y], clip_on=False, **arrow)
 
 
 def _at_left(
@@ -208,18 +211,19 @@ def _legend_handles(rows: Sequence[ForestRow]) -> list[Artist]:
         handles[label] = Line2D([], [], **_INTERVALS[interval.kind])
         if interval.distribution is not None:
             for part in _parts(interval.distribution):
-                handles[_PART_NAMES[part]] = _part_handle(part)
+                colour = _PART_COLOURS[part]
+                handles[_PART_NAMES[part]] = (
+                    Line2D([], [], color=colour, **_STEM_MARK)
+                    if part == "stems"
+                    else Patch(
+                        facecolor=(colour, _RIDGE_ALPHA),
+                        edgecolor=colour,
+                        linewidth=0.8,
+                    )
+                )
     for label, handle in handles.items():
         handle.set_label(label)
     return list(handles.values())
-
-
-def _part_handle(part: _Part) -> Artist:
-    colour = _PART_COLOURS[part]
-    if part == "stems":
-        look: dict[str, Any] = {"marker": "|", "markersize": 9, "markeredgewidth": 1.4}
-        return Line2D([], [], color=colour, linestyle="none", **look)
-    return Patch(facecolor=(colour, _RIDGE_ALPHA), edgecolor=colour, linewidth=0.8)
 
 
 def _draw_ridge(

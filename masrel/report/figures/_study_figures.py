@@ -11,13 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
-from masrel.report._figure_data import (
-    GradeGrid,
-    SpeedColumn,
-    SpeedDots,
-    TraceColumns,
-    TracePanel,
-)
+from masrel.report._figure_data import GradeGrid, SpeedDots, TraceColumns
 from masrel.report.figures._style import (
     BLACK,
     BLUE,
@@ -83,10 +77,13 @@ def _cell(
         left = x - 0.44 + part * width
         shade = _SHADES(scale.index(grade) / max(len(scale) - 1, 1))
         differs = intended is not None and grade != intended
-        _box(axes, left, y, width, facecolor=shade, edgecolor="none")
+        corner = (left, y - 0.42)
+        axes.add_patch(
+            Rectangle(corner, width, 0.84, facecolor=shade, edgecolor="none")
+        )
         if differs:
-            look = {"facecolor": "none", "edgecolor": VERMILLION, "linewidth": 2.2}
-            _box(axes, left, y, width, **look)
+            frame: dict[str, Any] = {"edgecolor": VERMILLION, "linewidth": 2.2}
+            axes.add_patch(Rectangle(corner, width, 0.84, facecolor="none", **frame))
         # relative luminance (ITU-R BT.709) decides black or white letters
         luminance = float(np.dot(shade[:3], (0.2126, 0.7152, 0.0722)))
         axes.text(
@@ -98,12 +95,6 @@ def _cell(
             color=BLACK if luminance > 0.45 else "white",
             weight="bold" if differs else "normal",
         )
-
-
-def _box(axes: Axes, left: float, y: float, width: float, **look: object) -> None:
-    box = Rectangle((left, y - 0.42), width, 0.84)
-    box.set(**look)
-    axes.add_patch(box)
 
 
 def speed_figure(dots: SpeedDots) -> Figure:
@@ -135,11 +126,20 @@ def speed_figure(dots: SpeedDots) -> Figure:
 def _speed_row(
     axes: Axes, dots: SpeedDots, models: Sequence[str], sessions: Sequence[str]
 ) -> None:
+    width = 0.76 / len(sessions)
     for column in dots.columns:
-        if column.model in models:
-            session = sessions.index(column.session)
-            centre = models.index(column.model)
-            _speed_column(axes, column, centre, session, len(sessions))
+        if column.model not in models:
+            continue
+        session = sessions.index(column.session)
+        middle = models.index(column.model) - 0.38 + width * (session + 0.5)
+        marker, colour = _SESSION_LOOKS[session % len(_SESSION_LOOKS)]
+        n_raters = len(column.speeds)
+        for rater, speeds in enumerate(column.speeds):
+            place = middle + 0.9 * width * ((rater + 0.5) / n_raters - 0.5)
+            places = [place] * len(speeds)
+            axes.plot(places, speeds, marker, color=colour, markersize=5, alpha=0.9)
+        ends = [middle - 0.45 * width, middle + 0.45 * width]
+        axes.plot(ends, [column.mean, column.mean], color=BLACK, linewidth=1.6)
     axes.axhline(dots.slowest, color=GREY, linewidth=0.8, linestyle=DASHES)
     axes.annotate(
         r"$\nu_L$",
@@ -155,21 +155,6 @@ def _speed_row(
     axes.grid(axis="y")
 
 
-def _speed_column(
-    axes: Axes, column: SpeedColumn, centre: int, session: int, n_sessions: int
-) -> None:
-    marker, colour = _SESSION_LOOKS[session % len(_SESSION_LOOKS)]
-    width = 0.76 / n_sessions
-    middle = centre - 0.38 + width * (session + 0.5)
-    n_raters = len(column.speeds)
-    for rater, speeds in enumerate(column.speeds):
-        place = middle + 0.9 * width * ((rater + 0.5) / n_raters - 0.5)
-        places = [place] * len(speeds)
-        axes.plot(places, speeds, marker, color=colour, markersize=5, alpha=0.9)
-    ends = [middle - 0.45 * width, middle + 0.45 * width]
-    axes.plot(ends, [column.mean, column.mean], color=BLACK, linewidth=1.6)
-
-
 def trace_figure(columns: TraceColumns) -> Figure:
     """Return torque and angle against time, one column a model."""
     n_panels = len(columns.panels)
@@ -182,8 +167,14 @@ def trace_figure(columns: TraceColumns) -> Figure:
         squeeze=False,
         height_ratios=(1.5, 1.0),
     )
-    for column, panel in enumerate(columns.panels):
-        _trace_panel(grid[0, column], grid[1, column], panel)
+    for (top, bottom), panel in zip(grid.T, columns.panels, strict=True):
+        for time, angle, torque, phase in panel.stretches:
+            _by_phase(top, time, torque, phase)
+            _by_phase(bottom, time, angle, phase)
+        top.set_title(panel.title)
+        top.grid(axis="y")
+        bottom.grid(axis="y")
+        bottom.set_xlabel("time (s)")
     # Limits come last: set before the last stretch they would cut it off.
     grid[0, 0].set_xlim(left=0)
     grid[0, 0].set_ylim(bottom=min(0.0, grid[0, 0].get_ylim()[0]))
@@ -201,16 +192,6 @@ def trace_figure(columns: TraceColumns) -> Figure:
         handlelength=3.0,
     )
     return figure
-
-
-def _trace_panel(torque_axes: Axes, angle_axes: Axes, panel: TracePanel) -> None:
-    for time, angle, torque, phase in panel.stretches:
-        _by_phase(torque_axes, time, torque, phase)
-        _by_phase(angle_axes, time, angle, phase)
-    torque_axes.set_title(panel.title)
-    torque_axes.grid(axis="y")
-    angle_axes.grid(axis="y")
-    angle_axes.set_xlabel("time (s)")
 
 
 def _by_phase(

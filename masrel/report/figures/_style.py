@@ -61,23 +61,6 @@ def house_style() -> Iterator[None]:
         yield
 
 
-def put_stamp(figure: Figure, stamp: str) -> None:
-    """Say at the top of a figure where its data come from."""
-    if not stamp:
-        return
-    loud = stamp.isupper()
-    # 7 pt letters are about 0.054 in wide; a long source goes on two lines
-    n_letters = int(figure.get_figwidth() / 0.054) - 2
-    figure.suptitle(
-        textwrap.fill(stamp, n_letters),
-        x=0.995,
-        ha="right",
-        fontsize=9.5 if loud else 7,
-        color=VERMILLION if loud else GREY,
-        weight="bold" if loud else "normal",
-    )
-
-
 def file_of(figure: Figure, form: data.Form) -> bytes:
     """Return one file of a figure, without a time of day."""
     file = io.BytesIO()
@@ -116,7 +99,18 @@ def draw(
     """
     with house_style():
         figure = _figure(content)
-        put_stamp(figure, stamp)
+        if stamp:
+            is_loud = stamp.isupper()
+            # 7 pt letters are about 0.054 in wide; a long source goes on two lines
+            n_letters = int(figure.get_figwidth() / 0.054) - 2
+            figure.suptitle(
+                textwrap.fill(stamp, n_letters),
+                x=0.995,
+                ha="right",
+                fontsize=9.5 if is_loud else 7,
+                color=VERMILLION if is_loud else GREY,
+                weight="bold" if is_loud else "normal",
+            )
         return {form: file_of(figure, form) for form in forms}
 
 

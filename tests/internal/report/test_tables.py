@@ -17,7 +17,6 @@ from masrel.report._tables import (
     as_text,
     cell_text,
     counted,
-    entered_decimals,
     fixed_or_significant,
     interval_text,
     number,
@@ -112,7 +111,6 @@ def test_a_number_somebody_chose_keeps_its_digits() -> None:
     ]
     assert as_entered(math.nan) == "undefined"
     assert cell_text(146.0, None) == "146"
-    assert entered_decimals([130.0, 125.5, 0.125]) == 3
 
 
 def test_a_level_is_not_rounded_to_certainty() -> None:
