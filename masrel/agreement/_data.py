@@ -26,6 +26,7 @@ MISSING = -1
 """Code of a rating that was not given."""
 
 FEW = 200
+_FEW_LABELS = 64  # up to here a list of labels is coded faster than an array
 """Ratings, or counts of them, that Python goes through about as fast as numpy."""
 
 _FIRST = 100
@@ -113,7 +114,11 @@ def code_ratings(
         if categories is not None:
             check_scale(ratings.categories, categories)
         return ratings
-    if type(ratings) is np.ndarray and ratings.ndim == 2 and 0 < ratings.size <= FEW:
+    if (
+        type(ratings) is np.ndarray
+        and ratings.ndim == 2
+        and 0 < ratings.size <= _FEW_LABELS
+    ):
         ratings = ratings.tolist()
     if hasattr(ratings, "to_numpy") or isinstance(ratings, np.ndarray):
         codes, known, declared = _table_codes(ratings, categories)

@@ -270,19 +270,22 @@ def _reason(
 
 @dataclass(frozen=True, slots=True)
 class _Anova:
-    # sums of squares of [1] times (n k)²: items, raters, residual, and within items
+    # mean squares of [1], of items, raters, residual, and within items; sums of squares
+    # are times (n k)²
     n: int
     k: int
+    items: float
+    raters: float
+    residual: float
+    within: float
     ss_items: float
-    ss_raters: float
     ss_residual: float
-    ss_within: float
 
     @classmethod
     def of(cls, values: NDArray[np.float64]) -> "_Anova":
         n, k = values.shape
         if n < 2 or k < 2:
-            return cls(n, k, math.nan, math.nan, math.nan, math.nan)
+            return cls(n, k, *[math.nan] * 6)
         # Deviations times n k, which are whole, and so exact, for whole ratings; from
         # the first rating, so that a common offset of all costs no digits.
         x = values - values[0, 0]
@@ -291,33 +294,19 @@ class _Anova:
         rows, columns = n * of_items - total, k * of_raters - total
         within = n * (k * x - of_items)
         residual = within - columns
+        ss_items = float(k * (rows**2).sum())
+        ss_residual = float((residual**2).sum())
+        scale = float(n * k) ** 2
         return cls(
             n,
             k,
-            float(k * (rows**2).sum()),
-            float(n * (columns**2).sum()),
-            float((residual**2).sum()),
-            float((within**2).sum()),
+            ss_items / (scale * (n - 1)),
+            float(n * (columns**2).sum()) / (scale * (k - 1)),
+            ss_residual / (scale * ((n - 1) * (k - 1))),
+            float((within**2).sum()) / (scale * (n * (k - 1))),
+            ss_items,
+            ss_residual,
         )
-
-    def _mean(self, squares: float, df: float) -> float:
-        return squares / (float(self.n * self.k) ** 2 * df) if df > 0 else math.nan
-
-    @property
-    def items(self) -> float:
-        return self._mean(self.ss_items, self.n - 1)
-
-    @property
-    def raters(self) -> float:
-        return self._mean(self.ss_raters, self.k - 1)
-
-    @property
-    def residual(self) -> float:
-        return self._mean(self.ss_residual, (self.n - 1) * (self.k - 1))
-
-    @property
-    def within(self) -> float:
-        return self._mean(self.ss_within, self.n * (self.k - 1))
 
     def error(self, form: str) -> float:
         return self.within if form.startswith("ICC(1") else self.residual
