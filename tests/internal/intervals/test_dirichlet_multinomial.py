@@ -11,7 +11,7 @@ from scipy.special import betaln
 from masrel.agreement import code_ratings
 from masrel.agreement._counts import item_counts
 from masrel.intervals._dirichlet_multinomial import DirichletMultinomial, RhoDensity
-from tests.intervals.test_sampled_posterior import (
+from tests.internal.intervals.test_sampled_posterior import (
     TWO,
     brief,  # noqa: F401 - a fixture
     exact_ends,
