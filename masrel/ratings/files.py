@@ -382,16 +382,13 @@ def _find_columns(
     # is wide: the item is the column the caller named, else one whose name is
     # recognized, else the first; every other column but the session is a rater.
     positions = {role: _find(rows, role, names) for role in _NAMES}
-    if positions["rater"] is not None or positions["grade"] is not None:
-        return _long_columns(rows, positions)
-    item, session = positions["item"] or 0, positions["session"]
-    raters = tuple(p for p in range(len(rows.header)) if p not in (item, session))
-    if not raters:
-        raise _error(rows, "needed a column for a rater, got none")
-    return _WideColumns(item=item, raters=raters, session=session)
-
-
-def _long_columns(rows: _CsvRows, positions: Mapping[str, int | None]) -> _LongColumns:
+    session = positions["session"]
+    if positions["rater"] is None and positions["grade"] is None:
+        item = positions["item"] or 0
+        raters = tuple(p for p in range(len(rows.header)) if p not in (item, session))
+        if not raters:
+            raise _error(rows, "needed a column for a rater, got none")
+        return _WideColumns(item=item, raters=raters, session=session)
     required = {}
     for role in ("item", "rater", "grade"):
         position = positions[role]
@@ -402,9 +399,7 @@ def _long_columns(rows: _CsvRows, positions: Mapping[str, int | None]) -> _LongC
                 f"got {', '.join(rows.header)}; say which it is",
             )
         required[role] = position
-    used = [*required.values()]
-    if (session := positions["session"]) is not None:
-        used.append(session)
+    used = [*required.values(), *([] if session is None else [session])]
     if len(set(used)) < len(used):
         raise _error(
             rows,

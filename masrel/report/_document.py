@@ -109,8 +109,8 @@ def write_report(
     material = gather(protocol, ratings, analysis, in_person)
     sections = [SECTIONS[name](material) for name in protocol.report.sections]
     destination.mkdir(parents=True, exist_ok=True)
-    tables, figures, uris = _write_blocks(sections, destination, progress)
-    for name, page in _pages(material, sections, uris).items():
+    shown, tables, figures = _write_blocks(sections, destination, progress)
+    for name, page in _pages(material, shown).items():
         (destination / name).write_text(page, encoding="utf-8", newline="\n")
     if progress is not None:
         progress("pages")
@@ -124,35 +124,44 @@ def write_report(
 
 def _write_blocks(
     sections: Sequence[Section], destination: Path, progress: Progress | None
-) -> tuple[list[Path], list[Path], dict[str, str]]:
-    # the files of tables and of figures, and by name of each figure its picture to be
-    # held inside the page
+) -> tuple[list[dict[str, object]], list[Path], list[Path]]:
+    # what templates show, every block with its number among those of its kind; and the
+    # files of tables and of figures
+    shown: list[dict[str, object]] = []
     tables, figures = [], []
-    uris: dict[str, str] = {}
-    for block in (block for section in sections for block in section.blocks):
-        if isinstance(block, Table):
-            tables.append(destination / "tables" / f"{block.name}.csv")
-            tables[-1].parent.mkdir(exist_ok=True)
-            tables[-1].write_text(as_csv(block), encoding="utf-8", newline="\n")
-        elif isinstance(block, Drawing):
-            # Imported here: a report without figures loads nothing that draws.
-            from masrel.report.figures import draw
+    numbers: Counter[str] = Counter()
+    for section in sections:
+        blocks = []
+        for block in section.blocks:
+            kind = _KINDS[type(block)]
+            numbers[kind] += 1
+            entry = {"kind": kind, "number": numbers[kind], "content": block}
+            blocks.append(entry)
+            if isinstance(block, Table):
+                entry["columns"], entry["rows"] = page_cells(block)
+                tables.append(destination / "tables" / f"{block.name}.csv")
+                tables[-1].parent.mkdir(exist_ok=True)
+                tables[-1].write_text(as_csv(block), encoding="utf-8", newline="\n")
+            elif isinstance(block, Drawing):
+                # Imported here: a report without figures loads nothing that draws.
+                from masrel.report.figures import draw
 
-            pictures = draw(block.content, stamp=block.stamp)
-            for form, picture in pictures.items():
-                figures.append(destination / "figures" / f"{block.name}.{form}")
-                figures[-1].parent.mkdir(exist_ok=True)
-                figures[-1].write_bytes(picture)
-            # An image of its own, not inline: ids inside two SVGs would collide.
-            encoded = base64.b64encode(pictures["svg"]).decode("ascii")
-            uris[block.name] = f"data:image/svg+xml;base64,{encoded}"
-            if progress is not None:
-                progress(block.name)
-    return tables, figures, uris
+                pictures = draw(block.content, stamp=block.stamp)
+                for form, picture in pictures.items():
+                    figures.append(destination / "figures" / f"{block.name}.{form}")
+                    figures[-1].parent.mkdir(exist_ok=True)
+                    figures[-1].write_bytes(picture)
+                # An image of its own, not inline: ids inside two SVGs would collide.
+                encoded = base64.b64encode(pictures["svg"]).decode("ascii")
+                entry["uri"] = f"data:image/svg+xml;base64,{encoded}"
+                if progress is not None:
+                    progress(block.name)
+        shown.append({"name": section.name, "title": section.title, "blocks": blocks})
+    return shown, tables, figures
 
 
 def _pages(
-    material: Material, sections: Sequence[Section], uris: Mapping[str, str]
+    material: Material, sections: Sequence[Mapping[str, object]]
 ) -> dict[str, str]:
     # Imported here: a section's tables alone load no templates.
     from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
@@ -171,7 +180,7 @@ def _pages(
         "simulated": material.ratings.simulated,
         "banner": _BANNER,
         "provenance": material.provenance,
-        "sections": _numbered(sections, uris),
+        "sections": sections,
         "inputs": [
             (f"SHA-256 of the {name.removesuffix('_sha256').replace('_', '-')}", digest)
             for name, digest in analysis.inputs.items()
@@ -181,27 +190,6 @@ def _pages(
     }
     names = ("report.html", "report.md")
     return {name: environment.get_template(name).render(context) for name in names}
-
-
-def _numbered(
-    sections: Sequence[Section], uris: Mapping[str, str]
-) -> list[dict[str, object]]:
-    # what templates show: every block with its number among those of its kind
-    numbers: Counter[str] = Counter()
-    placed: list[dict[str, object]] = []
-    for section in sections:
-        blocks = []
-        for block in section.blocks:
-            kind = _KINDS[type(block)]
-            numbers[kind] += 1
-            shown = {"kind": kind, "number": numbers[kind], "content": block}
-            if isinstance(block, Table):
-                shown["columns"], shown["rows"] = page_cells(block)
-            elif isinstance(block, Drawing):
-                shown["uri"] = uris[block.name]
-            blocks.append(shown)
-        placed.append({"name": section.name, "title": section.title, "blocks": blocks})
-    return placed
 
 
 def _symbols(text: str) -> str:

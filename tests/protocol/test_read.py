@@ -435,6 +435,17 @@ def test_a_wrong_id_makes_no_reference_to_it_unknown(tmp_path: Path) -> None:
     assert keys == ["raters[1].id"]
 
 
+def test_a_rater_without_any_usable_key_hides_no_other_problem(tmp_path: Path) -> None:
+    document = changed("raters", 0, to={"id": 1, "note": 1})
+    document["scale"]["name"] = ""
+    problems = problems_of(document, tmp_path)
+    assert [problem.partition(":")[0] for problem in problems] == [
+        "scale.name",
+        "raters[0].id",
+        "raters[0].note",
+    ]
+
+
 @pytest.mark.parametrize(
     ("content", "message"),
     [
