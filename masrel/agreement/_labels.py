@@ -42,9 +42,12 @@ def check_categories(categories: Sequence[Label]) -> tuple[Label, ...]:
     )
     if not declared:
         raise RatingsError("categories: needs a sequence of at least one label, got ()")
-    if any(is_missing(label) for label in declared):
-        raise RatingsError("categories: a missing value cannot be a category")
-    _one_kind(declared, "categories")
+    kinds = set(map(type, declared))
+    has_nan = kinds == {float} and any(label != label for label in declared)
+    if has_nan or kinds not in (*_PLAIN, {float}):  # those need no more care
+        if any(is_missing(label) for label in declared):
+            raise RatingsError("categories: a missing value cannot be a category")
+        _one_kind(declared, "categories")
     if len(set(declared)) < len(declared):
         repeated = [label for i, label in enumerate(declared) if label in declared[:i]]
         raise RatingsError(f"categories: each label once, repeated: {repeated}")

@@ -13,7 +13,7 @@ _KINDS = ("auto", "analytic", "jackknife", "bootstrap", "posterior")
 class _Options(TypedDict):
     # what every method takes
     target: Target
-    categories: Sequence[Label]
+    categories: Sequence[Label] | None
     weights: WeightName
     level: float
 
@@ -24,7 +24,7 @@ def planned_interval(
     ratings: object,
     *,
     target: Target,
-    categories: Sequence[Label],
+    categories: Sequence[Label] | None = None,
     weights: WeightName = "identity",
     level: float,
     n_resamples: int,

@@ -52,21 +52,7 @@ class ColumnOptions:
     item: str | None
     rater: str | None
     grade: str | None
-    categories: str | None  # every grade of the scale in order, separated by commas
-
-    def read(self, file: Path) -> "Ratings":
-        """Return the ratings of a file."""
-        from masrel.ratings import read_ratings
-
-        return read_ratings(
-            file,
-            item=self.item,
-            rater=self.rater,
-            grade=self.grade,
-            categories=None
-            if self.categories is None
-            else split_commas(self.categories),
-        )
+    categories: list[str] | None  # every grade of the scale in order
 
 
 column_options = grouped(
@@ -76,7 +62,10 @@ column_options = grouped(
     click.option("--rater", help="Column of the raters (long format)."),
     click.option("--grade", help="Column of the grades (long format)."),
     click.option(
-        "--categories", help="Every grade of the scale in order, such as 0,1,1+,2,3,4."
+        "--categories",
+        type=split_commas,
+        metavar="TEXT",
+        help="Every grade of the scale in order, such as 0,1,1+,2,3,4.",
     ),
 )
 

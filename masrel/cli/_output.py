@@ -104,7 +104,16 @@ def write_output(
     if output.prints_json:
         echo_notes(notes)
     else:  # first: a disk that is full then loses no result
-        print_text(text(), csv=output.csv, latex=output.latex)
+        table = text()
+        if isinstance(table, str):
+            click.echo(table)
+        else:
+            from masrel.report._tables import as_csv, as_latex, as_text
+
+            render = as_csv if output.csv else as_latex if output.latex else as_text
+            click.echo(render(table).rstrip("\n"))
+            if output.csv:
+                echo_notes(table.notes)
     if output.json_file is not None:
         write_json(document(), output.json_file)
     if figure is not None and output.figure is not None:
@@ -128,19 +137,6 @@ def write_json(document: dict[str, object], file: Path) -> None:
     except OSError as error:
         error.filename = str(file)  # a full disk does not say which file it was
         raise
-
-
-def print_text(table: "Table | str", *, csv: bool, latex: bool = False) -> None:
-    """Print a table in one of its forms, or a text as it is."""
-    if isinstance(table, str):
-        click.echo(table)
-        return
-    from masrel.report._tables import as_csv, as_latex, as_text
-
-    form = as_csv if csv else as_latex if latex else as_text
-    click.echo(form(table).rstrip("\n"))
-    if csv:
-        echo_notes(table.notes)
 
 
 def echo_notes(notes: tuple[str, ...]) -> None:

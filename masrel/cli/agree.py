@@ -1,7 +1,7 @@
 """``masrel agree``: agreement of any CSV file of ratings, no study needed."""
 
 import warnings
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,7 +16,7 @@ from masrel.cli._options import (
 )
 from masrel.cli._output import OutputOptions, output_options, write_output
 from masrel.errors import MasrelError, MasrelWarning, ParameterError, RatingsError
-from masrel.estimates import Interval, Target, as_document
+from masrel.estimates import Estimate, Interval, Target, as_document
 
 if TYPE_CHECKING:
     from masrel.agreement import BandScale, Coefficient, CountedRatings, WeightName
@@ -116,7 +116,9 @@ def agree(
         raise ParameterError(
             "--figure: shows intervals, so it needs --target raters, items or both"
         )
-    ratings = columns.read(file)
+    from masrel.ratings import read_ratings
+
+    ratings = read_ratings(file, **asdict(columns))
     notes = scale_notes(ratings, options.weights)
     rows = _estimate(ratings, options, by, file)
     from masrel.report._agreement_table import agreement_forest, agreement_table
@@ -168,8 +170,8 @@ def _estimate_session(
     from masrel.report._agreement_table import AgreementRow
 
     matrix = rating_matrix(ratings, session=session)
-    values = ratings.scale.values
-    counted = count_ratings(ratings.scale.weigh(matrix.grades), values)
+    scale = ratings.scale
+    counted = count_ratings(scale.weigh(matrix.grades), scale.values)
     is_named = options.coefficients is not None
     names = (
         _USUAL if options.coefficients is None else split_commas(options.coefficients)
@@ -184,17 +186,14 @@ def _estimate_session(
             title += f", {weights}"
         elif weights != options.weights and not takes_all:
             notes.append("unweighted, there are no weights for it")
-        estimate = entry(
-            counted, categories=values, weights=weights, level=options.level
-        )
+        estimate = entry(counted, weights=weights, level=options.level)
         # An interval that a coefficient comes with is not computed a second time.
         is_done = entry.has_interval and (options.interval == "auto" or takes_all)
         if options.target is not None and not is_done:
             try:
-                interval = _interval(
-                    entry, counted, values, weights, options.target, options
-                )
-                estimate = replace(estimate, interval=interval)
+                interval = _interval(entry, counted, weights, options.target, options)
+                # `vars` has the standard error as it is: uncomputed until it is read
+                estimate = Estimate(**{**vars(estimate), "interval": interval})
             except MasrelError as error:
                 if is_named and not takes_all:
                     raise  # just these were named: each must have the interval
@@ -208,6 +207,27 @@ def _estimate_session(
     if not takes_all and refused and len(refused) == len(rows):
         raise refused[0]
     return rows
+
+
+def _interval(
+    entry: "Coefficient",
+    counted: "CountedRatings",
+    weights: "WeightName",
+    target: Target,
+    options: _EstimateOptions,
+) -> Interval | None:
+    from masrel.analysis._planned_interval import planned_interval
+
+    return planned_interval(
+        options.interval,
+        entry.name,
+        counted,
+        target=target,
+        weights=weights,
+        level=options.level,
+        n_resamples=options.n_resamples,
+        seed=options.seed,
+    )
 
 
 def _entries(names: list[str], n_raters: int) -> list["Coefficient"]:
@@ -227,29 +247,6 @@ def _entries(names: list[str], n_raters: int) -> list["Coefficient"]:
                 "sessions; masrel analyze computes it from a study's plan"
             )
     return entries
-
-
-def _interval(
-    entry: "Coefficient",
-    counted: "CountedRatings",
-    values: tuple[float, ...],
-    weights: "WeightName",
-    target: Target,
-    options: _EstimateOptions,
-) -> Interval | None:
-    from masrel.analysis._planned_interval import planned_interval
-
-    return planned_interval(
-        options.interval,
-        entry.name,
-        counted,
-        target=target,
-        categories=values,
-        weights=weights,
-        level=options.level,
-        n_resamples=options.n_resamples,
-        seed=options.seed,
-    )
 
 
 def _document(rows: "list[AgreementRow]", by: str | None) -> dict[str, object]:

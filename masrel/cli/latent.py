@@ -1,5 +1,6 @@
 """``masrel latent``: raters' biases and noises, items and thresholds on one scale."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -56,7 +57,9 @@ def latent(
     output.check_files()
     if seed < 0:
         raise ParameterError(f"--seed: needs at least 0, got {seed}")
-    ratings = columns.read(file)
+    from masrel.ratings import read_ratings
+
+    ratings = read_ratings(file, **asdict(columns))
     notes = _scale_notes(ratings)
     result = _sample(
         ratings,

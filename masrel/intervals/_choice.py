@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from masrel.agreement._counts import item_counts
 from masrel.estimates import Interval
-from masrel.intervals._problem import IntervalProblem
+from masrel.intervals._problem import IntervalProblem, on_logit
 from masrel.intervals._rho import (
     DEFAULT_PRIOR,
     RhoPosterior,
@@ -21,7 +21,6 @@ from masrel.intervals._rho import (
     lower_bound_of_rho,
 )
 from masrel.intervals._two_raters import applies_to, default_table_interval
-from masrel.intervals.analytic import _on_logit
 from masrel.intervals.jackknife import (
     _excess_of_raters,
     _interval_around_estimate,
@@ -54,7 +53,8 @@ def _choose(problem: IntervalProblem, modelled: bool) -> tuple[Interval, str]:
     if modelled and target == "items" and _is_small(problem):
         why = f"few items ({n_items}) and raters, where it covers best"
         return default_rho_interval(problem, *_default_posterior(problem)), why
-    tabular = not modelled and target == "items" and applies_to(problem)
+    of_two = target == "items" and problem.coded.codes.shape[1] == 2
+    tabular = of_two and not modelled and applies_to(problem)
     if tabular and n_items < _FEW:
         why = f"few items ({n_items}), where it covers best"
         return default_table_interval(problem), why
@@ -164,7 +164,7 @@ def _around(
         ratings_per_item = float(_n_ratings(problem)) / problem.n_items
         if ratings_per_item > 1.0:
             lowest = -1.0 / (ratings_per_item - 1.0)
-    low, high = _on_logit(problem.value, half, lowest)
+    low, high = on_logit(problem.value, half, lowest)
     if math.isnan(low):  # at the least value there is
         low, high = problem.value - half, problem.value + half
     return problem.confidence(

@@ -237,6 +237,25 @@ def warn_small(count: int, minimum: int, what: str) -> tuple[str, ...]:
     return (note,)
 
 
+def on_logit(value: float, half: float, lowest: float) -> tuple[float, float]:
+    """Return ends that are symmetric on the logit of the place between lowest and 1."""
+    # The error is divided by the slope of the logit, and the ends are taken back, so
+    # that they stay inside.
+    if not lowest < value < 1.0:
+        return math.nan, math.nan
+    width = 1.0 - lowest
+    share = (value - lowest) / width
+    half /= width * share * (1.0 - share)
+    middle = math.log(share / (1.0 - share))
+    ends = (middle - half, middle + half)
+    # the inverse, from the side on which the exponential is small
+    low, high = (
+        1.0 / (1.0 + math.exp(-x)) if x >= 0.0 else math.exp(x) / (1.0 + math.exp(x))
+        for x in ends
+    )
+    return lowest + width * low, lowest + width * high
+
+
 def recorded_generator(
     rng: np.random.Generator | int | None,
 ) -> tuple[np.random.Generator, int | None]:

@@ -13,6 +13,7 @@ from masrel.estimates import Estimate, Interval, Target
 from masrel.intervals._problem import (
     IntervalProblem,
     Statistic,
+    on_logit,
     pose_problem,
     warn_small,
 )
@@ -150,31 +151,8 @@ def _ends(
         quantile = problem.student_t(estimate.n_items - 1)
     value, half = estimate.value, quantile * estimate.standard_error
     if distribution == "logit":
-        return _on_logit(value, half, problem.entry.lowest)
+        return on_logit(value, half, problem.entry.lowest)
     if distribution == "fisher":
         # artanh x is half the logit of (x + 1)/2, so that both give the same ends
-        return _on_logit(value, half, -1.0)
+        return on_logit(value, half, -1.0)
     return value - half, value + half
-
-
-def _on_logit(value: float, half: float, lowest: float) -> tuple[float, float]:
-    """Return ends that are symmetric on the logit of the place between lowest and 1."""
-    # The error is divided by the slope of the logit, and the ends are taken back, so
-    # that they stay inside.
-    if not lowest < value < 1.0:
-        return math.nan, math.nan
-    width = 1.0 - lowest
-    share = (value - lowest) / width
-    half /= width * share * (1.0 - share)
-    middle = math.log(share / (1.0 - share))
-    return (
-        lowest + width * _inverse_logit(middle - half),
-        lowest + width * _inverse_logit(middle + half),
-    )
-
-
-def _inverse_logit(x: float) -> float:
-    # from the side on which the exponential is small
-    if x >= 0.0:
-        return 1.0 / (1.0 + math.exp(-x))
-    return math.exp(x) / (1.0 + math.exp(x))

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Literal, TypedDict, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from masrel.agreement import Label
+from masrel.agreement import CountedRatings, Label
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Target
 from masrel.intervals._problem import Statistic, find_entry, pose_problem
@@ -89,7 +89,8 @@ def estimate(
     if entry.kernel is None:
         result = entry(ratings, categories=categories, weights=weights, level=level)
     else:
-        ratings = entry.code(ratings, categories)  # once, for all that follows
+        if not isinstance(ratings, CountedRatings):
+            ratings = entry.code(ratings, categories)  # once, for all that follows
         result = entry.function(ratings, categories=categories, weights=weights)
     if method == "auto" and entry.has_interval:
         return result

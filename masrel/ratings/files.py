@@ -286,7 +286,21 @@ def _read_rows(path: Path) -> _CsvRows:
     """Read a CSV file as text, without guessing any type."""
     # A byte order mark, either line ending, blank lines, and blanks around cells do
     # not matter.
-    records = _records(path, _text(path))
+    if not path.is_file():
+        raise RatingsError(f"{path}: no such file")
+    data = path.read_bytes()
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise RatingsError(
+            f"{path}: line {line}: needed UTF-8 text, got the byte "
+            f"0x{data[error.start]:02x}; save the file as UTF-8"
+        ) from error
+    if "\0" in text:
+        line = text.count("\n", 0, text.index("\0")) + 1
+        raise RatingsError(f"{path}: line {line}: needed text, got a zero byte")
+    records = _records(path, text)
     if not records:
         raise RatingsError(f"{path}: needed a header and rows, the file has none")
     header_line, header = records[0]
@@ -305,24 +319,6 @@ def _read_rows(path: Path) -> _CsvRows:
         header_line=header_line,
         rows=tuple(_CsvRow(line=line, cells=cells) for line, cells in records[1:]),
     )
-
-
-def _text(path: Path) -> str:
-    if not path.is_file():
-        raise RatingsError(f"{path}: no such file")
-    data = path.read_bytes()
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
-        raise RatingsError(
-            f"{path}: line {line}: needed UTF-8 text, got the byte "
-            f"0x{data[error.start]:02x}; save the file as UTF-8"
-        ) from error
-    if "\0" in text:
-        line = text.count("\n", 0, text.index("\0")) + 1
-        raise RatingsError(f"{path}: line {line}: needed text, got a zero byte")
-    return text
 
 
 def _records(path: Path, text: str) -> list[tuple[int, tuple[str, ...]]]:

@@ -106,7 +106,14 @@ def _notes(
     # A note names its rows, unless it holds for every interval.
     rows_of: dict[str, list[AgreementRow]] = {}
     for row in rows:
-        for text in _row_notes(row):
+        estimate, interval = row.estimate, row.estimate.interval
+        texts = [] if estimate.reason is None else [f"undefined: {estimate.reason}"]
+        texts += row.notes
+        if interval is not None:
+            texts += [_interval_note(interval), *interval.notes]
+            if interval.reason not in (None, estimate.reason):
+                texts.append(f"no interval: {interval.reason}")
+        for text in texts:
             rows_of.setdefault(text, []).append(row)
     with_interval = [row for row in rows if row.estimate.interval is not None]
     notes = ["SE: delta method, items as the sample."]
@@ -121,18 +128,6 @@ def _notes(
             "95 %, normal law around the estimate; the words are conventions."
         )
     return tuple(notes)
-
-
-def _row_notes(row: AgreementRow) -> list[str]:
-    estimate, interval = row.estimate, row.estimate.interval
-    notes = [] if estimate.reason is None else [f"undefined: {estimate.reason}"]
-    notes += row.notes
-    if interval is not None:
-        notes.append(_interval_note(interval))
-        notes += interval.notes
-        if interval.reason not in (None, estimate.reason):
-            notes.append(f"no interval: {interval.reason}")
-    return notes
 
 
 def _interval_note(interval: Interval) -> str:
