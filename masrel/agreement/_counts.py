@@ -374,7 +374,7 @@ def count_ratings(
     True
     """
     if isinstance(ratings, CountedRatings):
-        if categories is not None:
+        if categories is not None and categories is not ratings.categories:
             check_scale(ratings.categories, categories)
         return ratings
     few = ratings

@@ -186,7 +186,12 @@ def _estimate_session(
             title += f", {weights}"
         elif weights != options.weights and not takes_all:
             notes.append("unweighted, there are no weights for it")
-        estimate = entry(counted, weights=weights, level=options.level)
+        estimate = entry(
+            counted,
+            categories=counted.categories,
+            weights=weights,
+            level=options.level,
+        )
         # An interval that a coefficient comes with is not computed a second time.
         is_done = entry.has_interval and (options.interval == "auto" or takes_all)
         if options.target is not None and not is_done:

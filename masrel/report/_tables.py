@@ -58,6 +58,11 @@ class Table:
     # where the data come from: "simulated", "published", "recorded" or "foreign"
     data: str
 
+    @property
+    def simulated(self) -> bool:
+        """Whether any of its data are simulated."""
+        return "simulated" in self.data
+
 
 def number(value: float | None, digits: int) -> str:
     """Return a number as shown: rounded, with a true minus sign."""
@@ -180,9 +185,7 @@ def aligned(
 
 
 def _caption(table: Table) -> str:
-    return (
-        f"{SIMULATED}. {table.caption}" if "simulated" in table.data else table.caption
-    )
+    return f"{SIMULATED}. {table.caption}" if table.simulated else table.caption
 
 
 def as_latex(table: Table) -> str:
