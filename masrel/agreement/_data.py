@@ -26,10 +26,10 @@ MISSING = -1
 """Code of a rating that was not given."""
 
 FEW = 200
-_FEW_LABELS = 64  # up to here a list of labels is coded faster than an array
 """Ratings, or counts of them, that Python goes through about as fast as numpy."""
 
-_FIRST = 100
+_FEW_LABELS = 64  # up to here a list of labels is coded faster than an array
+_FIRST = 100  # items that as a rule show every rater
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
