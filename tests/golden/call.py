@@ -129,5 +129,7 @@ def masrel(*arguments: object) -> dict:
 
 def without_paths(text: str) -> str:
     """A text in which the folders of this machine have names."""
-    here = str(Path.cwd())
-    return text.replace(str(STUDIES), "STUDIES").replace(here, "FOLDER")
+    for path, name in ((str(STUDIES), "STUDIES"), (str(Path.cwd()), "FOLDER")):
+        for shown in (path, path.replace("_", r"\_")):  # as it is, and in LaTeX
+            text = text.replace(shown, name)
+    return text

@@ -5,10 +5,10 @@ import hashlib
 import io
 import json
 import re
-import shutil
 from functools import partial
 from pathlib import Path
 
+from masrel.protocol import copy_template
 from tests.golden.call import STUDIES, Case, Stream, folder, masrel, without_paths
 
 PUBLISHED = STUDIES / "hess2012" / "ratings" / "published.csv"
@@ -150,7 +150,8 @@ def _published() -> dict:
 
 def _copied(here: Path) -> Path:
     # what is computed of a study is written into it
-    return Path(shutil.copytree(STUDIES / "hess2012", here / "study"))
+    copy_template("hess2012", here / "study")
+    return here / "study"
 
 
 def _only(text: str, raters: tuple[str, ...]) -> str:
