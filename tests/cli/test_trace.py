@@ -47,7 +47,7 @@ def stretch(model: str, speed: float, *more: str | Path) -> dict:
 
 
 def test_hm3_at_92_deg_s_by_hand() -> None:
-    # The numbers are derived in tests/elbow/test_events.py and test_torque.py.
+    # The numbers are derived in tests/internal/elbow/test_events.py and test_torque.py.
     document = stretch("HM3", 92)
     assert list(document) == KEYS
     assert document["model"] == "HM3"

@@ -172,7 +172,7 @@ def test_a_page_shows_the_numbers_of_the_csv_rounded(
     for path, (_, *shown) in zip(files.tables, page_of(files).tables, strict=True):
         head, *rows = csv_rows(path)
         if path.stem in ("agreement", "test_retest"):
-            continue  # other columns; tests/report/test_estimate_table.py
+            continue  # other columns; tests/internal/report/test_estimate_table.py
         for exact, page in zip(rows, shown, strict=True):
             for value, cell in zip(exact[:-1], page, strict=True):
                 n_compared += 1

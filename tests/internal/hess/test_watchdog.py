@@ -140,7 +140,7 @@ def test_a_watchdog_that_is_never_ready_is_refused(monkeypatch) -> None:
     begun = time.monotonic()
     with (
         pytest.raises(DeviceError, match="watchdog: needs a process that is ready"),
-        Watchdog(IdleCommand("tests.hess.test_watchdog", ()), 0.05),
+        Watchdog(IdleCommand(__name__, ()), 0.05),
     ):
         pass
     assert time.monotonic() - begun < 10.0  # and it was not left behind
