@@ -153,7 +153,7 @@ def write_page(
     text += [
         "",
         "A standard error is computed when it is read. In the smallest studies three "
-        "of them cost as much as the estimates.",
+        "of them cost more than the estimates.",
         "",
         "### Error against time",
         "",
