@@ -88,7 +88,8 @@ class PairSlopes(NamedTuple):
         """Return the slopes at a table that is not empty, in floats or fractions."""
         # Takes table (n_categories, n_categories)
         freq = table.astype(object if exact else np.float64)
-        p = freq * (Fraction(1, freq.sum()) if exact else 1.0 / freq.sum())
+        # divided, so that the share of a cell that has all pairs is exactly 1
+        p = freq / (Fraction(freq.sum()) if exact else freq.sum())
         matrix, first = v.fractions if exact else v.floats, p.sum(axis=1)
         to_second, to_first = matrix.dot(p.sum(axis=0)), first.dot(matrix)
         d_o, d_e = matrix.ravel().dot(p.ravel()), first.dot(to_second)

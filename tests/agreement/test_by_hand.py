@@ -3,6 +3,7 @@
 import math
 from fractions import Fraction
 
+import numpy as np
 import pytest
 
 from masrel.agreement import (
@@ -10,6 +11,7 @@ from masrel.agreement import (
     cohen_kappa_from_table,
     fleiss_kappa,
     fleiss_kappa_from_counts,
+    light_kappa,
     percent_agreement,
     percent_agreement_from_counts,
     stratified_kappa,
@@ -198,3 +200,13 @@ def test_cohens_kappa_refuses_more_than_two_raters() -> None:
 def test_what_are_no_pairs_is_refused(pairs: object, said: str) -> None:
     with pytest.raises(RatingsError, match=said):
         stratified_kappa(pairs, categories=["a", "b"])
+
+
+@pytest.mark.parametrize("n", [10, 49, 100_008])  # n · (1/n) is not 1 for each
+def test_raters_who_never_waver_and_never_agree_have_an_error_of_exactly_0(
+    n: int,
+) -> None:
+    # Every item is (a, b): D_o = 1, D_e = 1 · 1, κ = 0; no item differs from the mean.
+    for function in (cohen_kappa, light_kappa):
+        kappa = function(np.array([["a", "b"]] * n))
+        assert (kappa.value, kappa.standard_error) == (0.0, 0.0)
