@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from masrel.errors import ParameterError
 
@@ -20,6 +20,8 @@ class Scale:
     grades : tuple of str
         Every grade a rater may give, least first. Grades are text: "1" and "1+"
         are names, not numbers.
+    values : tuple of float
+        What the grades weigh: their values if all are numbers, else 1, 2, 3, ...
 
     Raises
     ------
@@ -28,12 +30,15 @@ class Scale:
 
     Examples
     --------
-    >>> MODIFIED_ASHWORTH.code("1+")
-    2
+    >>> MODIFIED_ASHWORTH.code("1+"), MODIFIED_ASHWORTH.values
+    (2, (1.0, 2.0, 3.0, 4.0, 5.0, 6.0))
+    >>> Scale(name="pain", grades=("0", "2.5", "10")).values
+    (0.0, 2.5, 10.0)
     """
 
     name: str
     grades: tuple[str, ...]
+    values: tuple[float, ...] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if not self.grades:
@@ -48,25 +53,15 @@ class Scale:
             raise ParameterError(
                 f"scale {self.name!r}: grades must differ, repeated: {repeated}"
             )
-
-    @property
-    def values(self) -> tuple[float, ...]:
-        """What the grades weigh: their values if all are numbers, else 1, 2, 3, ...
-
-        Examples
-        --------
-        >>> Scale(name="pain", grades=("0", "2.5", "10")).values
-        (0.0, 2.5, 10.0)
-        >>> MODIFIED_ASHWORTH.values
-        (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
-        """
+        ranks = tuple(float(rank) for rank in range(1, len(self.grades) + 1))
         try:
             numbers = tuple(float(grade) for grade in self.grades)
         except ValueError:
-            return tuple(float(rank) for rank in range(1, len(self.grades) + 1))
-        distinct = len(set(numbers)) == len(numbers)
-        distinct = distinct and all(map(math.isfinite, numbers))
-        return numbers if distinct else tuple(map(float, range(1, len(numbers) + 1)))
+            numbers = ranks
+        are_values = len(set(numbers)) == len(ranks) and all(
+            map(math.isfinite, numbers)
+        )
+        object.__setattr__(self, "values", numbers if are_values else ranks)
 
     def weigh(self, rows: Iterable[Iterable[str | None]]) -> list[list[float | None]]:
         """Replace grades by their values.

@@ -1,7 +1,10 @@
-"""Options that several verbs have, each group as one argument of the verb."""
+"""Options that several verbs have, as one argument each, and what verbs print."""
 
+import json
 import math
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from functools import wraps
 from pathlib import Path
@@ -9,15 +12,22 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from masrel.errors import ParameterError, RatingsError
+from masrel.errors import MasrelWarning, ParameterError, RatingsError
 from masrel.scales import MODIFIED_ASHWORTH
 
 if TYPE_CHECKING:
     from masrel.protocol import Protocol, StudyPaths
     from masrel.ratings import InPerson, Ratings
+    from masrel.report._figure_data import Content, Form
+    from masrel.report._tables import Table
 
 Command = Callable[..., None]
 Decorator = Callable[[Command], Command]
+
+STDOUT = Path("-")
+"""What a file is called that is printed."""
+
+_FORMS: dict[str, "Form"] = {".png": "png", ".svg": "svg", ".pdf": "pdf"}
 
 
 def grouped(name: str, group: type, *options: Callable[..., Any]) -> Decorator:
@@ -140,3 +150,157 @@ def _default_ratings(paths: "StudyPaths") -> Path:
         f"{paths.published_file.name} in {paths.ratings_file.parent}; "
         "`masrel ratings STUDY` makes the first from session logs"
     )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OutputOptions:
+    """What is written and printed; a verb offers some of these options."""
+
+    json_file: Path | None = None  # where JSON goes; "-" is the screen
+    figure: Path | None = None  # where a figure goes
+    # csv, latex: in which form the table is printed; as text when neither
+    csv: bool = False
+    latex: bool = False
+    quiet: bool = False  # whether there is no progress bar
+
+    def __post_init__(self) -> None:
+        forms = {
+            "--json -": self.json_file == STDOUT,
+            "--csv": self.csv,
+            "--latex": self.latex,
+        }
+        printed = [option for option, is_printed in forms.items() if is_printed]
+        if len(printed) > 1:
+            raise ParameterError(
+                f"{' and '.join(printed)} want the same stdout: choose one"
+            )
+
+    def check_files(self) -> None:
+        """Refuse files that cannot be written, before anything is computed for them."""
+        if self.json_file is not None:
+            check_folder("--json", self.json_file)
+        if self.figure is not None:
+            check_folder("--figure", self.figure)
+            figure_form(self.figure)
+
+    @property
+    def hides_progress(self) -> bool | None:
+        """What ``tqdm`` takes: True hides a bar, None shows it at a terminal alone."""
+        return self.quiet or None
+
+
+def output_options(
+    *,
+    json: str | None = None,
+    figure: str | None = None,
+    csv: str | None = None,
+    latex: str | None = None,
+    quiet: str | None = None,
+) -> Decorator:
+    """Return the options with these helps, as one argument `output` of a command."""
+    path = click.Path(path_type=Path, dir_okay=False)
+    json_path = click.Path(path_type=Path, allow_dash=True)
+    options = [
+        (json, click.option("--json", "json_file", type=json_path, help=json)),
+        (figure, click.option("--figure", type=path, help=figure)),
+        (csv, click.option("--csv", is_flag=True, help=csv)),
+        (latex, click.option("--latex", is_flag=True, help=latex)),
+        (quiet, click.option("--quiet", is_flag=True, help=quiet)),
+    ]
+    offered = [option for text, option in options if text is not None]
+    return grouped("output", OutputOptions, *offered)
+
+
+def check_folder(option: str, file: Path) -> None:
+    """Refuse a file whose folder is not there."""
+    if file != STDOUT and not file.parent.is_dir():
+        raise ParameterError(
+            f"{option}: needs a folder that exists, got {file}: there is no folder "
+            f"{file.parent}"
+        )
+
+
+def write_output(
+    output: OutputOptions,
+    *,
+    document: Callable[[], dict[str, object]],
+    text: "Callable[[], Table | str]",
+    figure: "Callable[[], Content] | None" = None,
+    stamp: str = "",
+    notes: tuple[str, ...] = (),
+) -> None:
+    """Write and print a result in the forms that were chosen, and make no other."""
+    # stamp: what the figure says of its data; notes: those of a table, which JSON has
+    # no place for
+    if output.json_file == STDOUT:
+        echo_notes(notes)
+    else:  # first: a disk that is full then loses no result
+        table = text()
+        if isinstance(table, str):
+            click.echo(table)
+        else:
+            from masrel.report._tables import as_csv, as_latex, as_text
+
+            render = as_csv if output.csv else as_latex if output.latex else as_text
+            click.echo(render(table).rstrip("\n"))
+            if output.csv:
+                echo_notes(table.notes)
+    if output.json_file is not None:
+        write_json(document(), output.json_file)
+    if figure is not None and output.figure is not None:
+        # Imported here: a table loads nothing that draws.
+        from masrel.report.figures import draw
+
+        form = figure_form(output.figure)
+        files = draw(figure(), stamp=stamp, forms=(form,))
+        output.figure.write_bytes(files[form])
+        click.echo(f"figure: {output.figure}", err=True)
+
+
+def write_json(document: dict[str, object], file: Path) -> None:
+    """Write a document, or print it where the file is "-"."""
+    text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
+    if file == STDOUT:
+        click.echo(text)
+        return
+    try:
+        file.write_text(text + "\n", encoding="utf-8", newline="\n")
+    except OSError as error:
+        error.filename = str(file)  # a full disk does not say which file it was
+        raise
+
+
+def echo_notes(notes: tuple[str, ...]) -> None:
+    """Print notes on stderr, one a line."""
+    click.echo("".join(f"{note}\n" for note in notes), err=True, nl=False)
+
+
+@contextmanager
+def warnings_as_notes() -> Iterator[None]:
+    """Show warnings of masrel as notes, each once; leave all others as they are."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        try:
+            yield
+        finally:
+            messages = {str(w.message): None for w in caught if _is_ours(w)}
+            echo_notes(tuple(f"note: {message}" for message in messages))
+    for warning in caught:
+        if not _is_ours(warning):
+            warnings.warn_explicit(
+                warning.message, warning.category, warning.filename, warning.lineno
+            )
+
+
+def _is_ours(warning: warnings.WarningMessage) -> bool:
+    return issubclass(warning.category, MasrelWarning)
+
+
+def figure_form(file: Path) -> "Form":
+    """Return the form of a figure, which its name ends in."""
+    form = _FORMS.get(file.suffix.lower())
+    if form is None:
+        raise ParameterError(
+            f"--figure: needs a name that ends in .png, .svg or .pdf, got {file}"
+        )
+    return form

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from tqdm import tqdm
 
-from masrel.cli._output import OutputOptions, output_options, write_output
+from masrel.cli._options import STDOUT, OutputOptions, output_options, write_output
 from masrel.hess import Clock, RealClock, SimulatedClock, SimulatedHand
 from masrel.hess.puck import PuckOptions, read_property_table
 
@@ -104,7 +104,7 @@ class PuckSession:
     @contextmanager
     def progress(self, total: int) -> Iterator[Callable[[], None]]:
         """Show a bar of steps on a terminal."""
-        hidden = self.output.prints_json or self.output.hides_progress
+        hidden = self.output.json_file == STDOUT or self.output.hides_progress
         with tqdm(total=total, unit="", leave=False, disable=hidden) as bar:
 
             def step() -> None:

@@ -9,12 +9,14 @@ import click
 
 from masrel.cli._options import (
     ColumnOptions,
+    OutputOptions,
     column_options,
     grouped,
+    output_options,
     scale_notes,
     split_commas,
+    write_output,
 )
-from masrel.cli._output import OutputOptions, output_options, write_output
 from masrel.errors import MasrelError, MasrelWarning, ParameterError, RatingsError
 from masrel.estimates import Estimate, Interval, Target, as_document
 

@@ -6,10 +6,13 @@ from typing import TYPE_CHECKING
 
 import click
 
-from masrel.cli._options import StudyData, ratings_option, read_study
-from masrel.cli._output import (
+from masrel.cli._options import (
+    STDOUT,
     OutputOptions,
+    StudyData,
     output_options,
+    ratings_option,
+    read_study,
     warnings_as_notes,
     write_json,
 )
@@ -37,8 +40,8 @@ def analyze(study: Path, ratings_file: Path | None, output: OutputOptions) -> No
         analysis = library.analyze(
             data.protocol, data.ratings, in_person=data.in_person
         )
-    if output.prints_json:
-        write_json(library.as_analysis_document(analysis), Path("-"))
+    if output.json_file == STDOUT:
+        write_json(library.as_analysis_document(analysis), STDOUT)
         return
     destination = output.json_file or data.paths.analysis_file
     library.write_analysis(analysis, destination)

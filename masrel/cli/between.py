@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 import masrel
-from masrel.cli._output import OutputOptions, output_options, write_output
+from masrel.cli._options import OutputOptions, output_options, write_output
 from masrel.errors import ParameterError
 
 if TYPE_CHECKING:

@@ -6,8 +6,7 @@ from pathlib import Path
 import click
 from tqdm import tqdm
 
-from masrel.cli._options import read_study
-from masrel.cli._output import OutputOptions, output_options
+from masrel.cli._options import OutputOptions, output_options, read_study
 from masrel.errors import MasrelWarning, ParameterError
 from masrel.protocol import StudyPaths, copy_template, read_protocol
 

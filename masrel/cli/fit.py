@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
-from masrel.cli._output import (
+from masrel.cli._options import (
     OutputOptions,
     output_options,
     warnings_as_notes,

@@ -5,10 +5,12 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
-from masrel.cli._options import ratings_option, read_study, split_commas
-from masrel.cli._output import (
+from masrel.cli._options import (
     OutputOptions,
     output_options,
+    ratings_option,
+    read_study,
+    split_commas,
     warnings_as_notes,
     write_output,
 )

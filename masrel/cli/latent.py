@@ -6,8 +6,14 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
-from masrel.cli._options import ColumnOptions, column_options, scale_notes
-from masrel.cli._output import OutputOptions, output_options, write_output
+from masrel.cli._options import (
+    ColumnOptions,
+    OutputOptions,
+    column_options,
+    output_options,
+    scale_notes,
+    write_output,
+)
 from masrel.errors import ParameterError, RatingsError
 
 if TYPE_CHECKING:

@@ -5,8 +5,13 @@ from pathlib import Path
 import click
 from tqdm import tqdm
 
-from masrel.cli._options import ratings_option, read_study
-from masrel.cli._output import OutputOptions, output_options, warnings_as_notes
+from masrel.cli._options import (
+    OutputOptions,
+    output_options,
+    ratings_option,
+    read_study,
+    warnings_as_notes,
+)
 
 
 @click.command("report")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Literal
 import click
 from tqdm import tqdm
 
-from masrel.cli._output import OutputOptions, output_options, warnings_as_notes
+from masrel.cli._options import OutputOptions, output_options, warnings_as_notes
 from masrel.protocol import Protocol, StudyPaths, read_protocol, scale_of
 
 if TYPE_CHECKING:

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any, TextIO
 import click
 from tqdm import tqdm
 
-from masrel.cli._options import grouped
-from masrel.cli._output import (
+from masrel.cli._options import (
     OutputOptions,
     check_folder,
     figure_form,
+    grouped,
     output_options,
     write_output,
 )

@@ -59,15 +59,21 @@ class Table:
     data: str
 
     @property
-    def simulated(self) -> bool:
-        """Whether any of its data are simulated."""
-        return "simulated" in self.data
+    def labelled_caption(self) -> str:
+        """The caption, after the label of simulated data where any are."""
+        is_simulated = "simulated" in self.data
+        return f"{SIMULATED}. {self.caption}" if is_simulated else self.caption
 
 
-def number(value: float | None, digits: int) -> str:
+def number(value: Value, digits: int | None) -> str:
     """Return a number as shown: rounded, with a true minus sign."""
+    # Text and whole numbers are shown as they are.
     if value is None:
         return ABSENT
+    if not isinstance(value, float):
+        return str(value)
+    if digits is None:
+        return as_entered(value)
     if math.isinf(value):
         return "∞" if value > 0.0 else "−∞"
     if math.isnan(value):
@@ -121,19 +127,10 @@ def counted(count: int, noun: str) -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
-def cell_text(value: Value, digits: int | None) -> str:
-    """Return a value as it is shown in a cell."""
-    if value is None:
-        return ABSENT
-    if not isinstance(value, float):
-        return str(value)
-    return as_entered(value) if digits is None else number(value, digits)
-
-
 def page_cells(table: Table) -> tuple[list[Column], list[list[str]]]:
     """Return the columns of a page or a screen, and every row as shown in them."""
     places = [(i, c) for i, c in enumerate(table.columns) if c.where != "csv"]
-    rows = [[cell_text(row[i], c.digits) for i, c in places] for row in table.rows]
+    rows = [[number(row[i], c.digits) for i, c in places] for row in table.rows]
     return [column for _, column in places], rows
 
 
@@ -157,7 +154,7 @@ def as_text(table: Table) -> str:
     columns, body = page_cells(table)
     head = [column.heading for column in columns]
     lines = aligned([head, *body], [column.align for column in columns], rule=True)
-    return "\n".join([_caption(table), *lines, *table.notes])
+    return "\n".join([table.labelled_caption, *lines, *table.notes])
 
 
 def aligned(
@@ -184,10 +181,6 @@ def aligned(
     return lines
 
 
-def _caption(table: Table) -> str:
-    return f"{SIMULATED}. {table.caption}" if table.simulated else table.caption
-
-
 def as_latex(table: Table) -> str:
     r"""Return a table as LaTeX that needs the package `booktabs` and no other."""
     columns, body = page_cells(table)
@@ -195,7 +188,7 @@ def as_latex(table: Table) -> str:
     lines = [
         r"\begin{table}",
         r"\centering",
-        rf"\caption{{{_latex_text(_caption(table))}}}",
+        rf"\caption{{{_latex_text(table.labelled_caption)}}}",
         rf"\begin{{tabular}}{{{letters}}}",
         r"\toprule",
         _latex_line([column.heading for column in columns]),

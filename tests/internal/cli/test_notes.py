@@ -4,7 +4,7 @@ import warnings
 
 import pytest
 
-from masrel.cli._output import warnings_as_notes
+from masrel.cli._options import warnings_as_notes
 from masrel.errors import SmallSampleWarning
 
 

@@ -15,7 +15,6 @@ from masrel.report._tables import (
     as_entered,
     as_latex,
     as_text,
-    cell_text,
     counted,
     fixed_or_significant,
     interval_text,
@@ -52,8 +51,8 @@ def test_a_negative_number_has_a_true_minus_and_zero_has_none() -> None:
 
 
 def test_undefined_and_absent_are_told_apart() -> None:
-    assert cell_text(math.nan, 1) == "undefined"
-    assert cell_text(None, 1) == "–"
+    assert number(math.nan, 1) == "undefined"
+    assert number(None, 1) == "–"
     assert interval_text(math.nan, 0.5) == "[undefined]"
     assert interval_text(-math.inf, 0.5) == "[−∞, 0.500]"  # an end without a bound
 
@@ -110,7 +109,7 @@ def test_a_number_somebody_chose_keeps_its_digits() -> None:
         "0.30000000000000004",
     ]
     assert as_entered(math.nan) == "undefined"
-    assert cell_text(146.0, None) == "146"
+    assert number(146.0, None) == "146"
 
 
 def test_a_level_is_not_rounded_to_certainty() -> None:
