@@ -5,7 +5,7 @@ flexing faster than ν_th. Within a run each event is the first sample of a comp
 and each phase one evaluation of its law.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,14 +62,18 @@ def sampled_columns(
     >>> torque.round(3).tolist(), phase.tolist()
     ([0.252, 0.315], [0, 0])
     """
-    columns = _Columns(parameters, start_angle, time, angle, velocity)
-    threshold = parameters.speed_threshold
+    p, threshold = parameters, parameters.speed_threshold
+    rest = start_angle if p.rest_angle is None else p.rest_angle
+    # (1) without m·θ̈, in the order of operations of SampledJoint
+    torque = p.damping * velocity + p.stiffness * (angle - rest)
+    phase = np.zeros(time.size, dtype=np.int8)
+    columns = _Columns(parameters, time, angle, velocity, torque, phase)
     speed = (velocity >= threshold).astype(np.int8) - (velocity <= -threshold)
     starts = np.flatnonzero(np.diff(speed, prepend=np.int8(2)))
     ends = np.append(starts, time.size)[1:].tolist()
     for start, end in zip(starts.tolist(), ends, strict=True):
         columns.run(int(speed[start]), start, end)
-    return columns.torque, columns.phase
+    return torque, phase
 
 
 @dataclass(slots=True)
@@ -77,23 +81,18 @@ class _Columns:
     """The state machine of `SampledJoint`, led from run to run."""
 
     parameters: ElbowParameters
-    start_angle: float
     time: Floats
     angle: Floats
     velocity: Floats
-    torque: Floats = field(init=False)
-    phase: NDArray[np.int8] = field(init=False)
+    torque: Floats  # that of pre-catch everywhere at first
+    phase: NDArray[np.int8]
     now: int = PRE_CATCH
     is_armed: bool = True
     catch: int = 0  # sample of the last catch
     post: int = 0  # and of the post-catch after it
-
-    def __post_init__(self) -> None:
-        p = self.parameters
-        rest = self.start_angle if p.rest_angle is None else p.rest_angle
-        # (1) without m·θ̈, in the order of operations of SampledJoint
-        self.torque = p.damping * self.velocity + p.stiffness * (self.angle - rest)
-        self.phase = np.zeros(self.time.size, dtype=np.int8)
+    # τ_pre_end and H·v_c of (3), of the last catch
+    pre_end: float = 0.0
+    rise: float = 0.0
 
     def run(self, speed: int, start: int, end: int) -> None:
         """Go through samples that are all fast (1), slow (0) or flexing (-1)."""
@@ -113,12 +112,18 @@ class _Columns:
         for low in range(onset + 1, end, _BLOCK):
             block = slice(low, min(low + _BLOCK, end))
             mean = (angle[block] - angle[onset]) / (time[block] - time[onset])
-            caught = angle[block] > _catch_angles(p, mean)
+            # ElbowParameters.catch_angle, operation by operation
+            slowed = np.maximum(mean, p.slowest_mean_speed)
+            line = p.catch_angle_constant - p.catch_slope * slowed
+            fast = mean > p.fastest_mean_speed
+            caught = angle[block] > np.where(fast, p.smallest_catch_angle, line)
             caught &= self.velocity[block] > p.speed_threshold
             if caught.any():
-                self.now, self.is_armed = CATCH, False
-                self.catch = low + int(caught.argmax())
-                self._on_in_catch(self.catch, end, is_slow=False)
+                catch = low + int(caught.argmax())
+                self.now, self.is_armed, self.catch = CATCH, False, catch
+                self.pre_end = float(self.torque[catch])
+                self.rise = p.catch_torque_constant * float(self.velocity[catch])
+                self._on_in_catch(catch, end, is_slow=False)
                 return
 
     def _on_in_catch(self, start: int, end: int, *, is_slow: bool) -> None:
@@ -140,7 +145,7 @@ class _Columns:
     def _catch(self, start: int, end: int) -> None:
         p, own = self.parameters, slice(start, end)
         since = self.time[own] - self.time[self.catch]
-        pre_end, rise = self._levels()
+        pre_end, rise = self.pre_end, self.rise
         share = p.residual_share
         levels = np.where(
             since < p.peak_duration, pre_end + rise, pre_end + share * rise
@@ -154,27 +159,10 @@ class _Columns:
 
     def _post_catch(self, start: int, end: int) -> None:
         p, own = self.parameters, slice(start, end)
-        pre_end, rise = self._levels()
-        residual = p.residual_share * rise
+        residual = p.residual_share * self.rise
         climb = p.post_catch_stiffness * (self.angle[own] - self.angle[self.post])
         if p.post_catch == "additive":  # (5) as Table III's footnote reads it
             self.torque[own] = self.torque[own] + residual + climb
         else:
-            self.torque[own] = pre_end + residual + climb  # (5), continuous
+            self.torque[own] = self.pre_end + residual + climb  # (5), continuous
         self.phase[own] = POST_CATCH
-
-    def _levels(self) -> tuple[float, float]:
-        # τ_pre_end and H·v_c of (3)
-        p = self.parameters
-        rest = self.start_angle if p.rest_angle is None else p.rest_angle
-        angle, speed = float(self.angle[self.catch]), float(self.velocity[self.catch])
-        pre_end = p.damping * speed + p.stiffness * (angle - rest)
-        return pre_end, p.catch_torque_constant * speed
-
-
-def _catch_angles(parameters: ElbowParameters, mean_speed: Floats) -> Floats:
-    # ElbowParameters.catch_angle, operation by operation
-    slowed = np.maximum(mean_speed, parameters.slowest_mean_speed)
-    angles = parameters.catch_angle_constant - parameters.catch_slope * slowed
-    fast = mean_speed > parameters.fastest_mean_speed
-    return np.where(fast, parameters.smallest_catch_angle, angles)

@@ -238,12 +238,13 @@ class _Walk:
 _HALF = Decimal("0.5")
 
 _ROUNDING = Decimal("1e-40")
-# Of ν_th: a speed as near as that is ν_th, but for rounding of 50 digits.
+# Of ν_th, and rad of the end of range: what is as near as that is the same, but for
+# rounding of 50 digits.
 
 
 def _share_in_range(piece: Piece, limit: Decimal) -> Decimal:
     # the joint goes no further than the end of its range
-    if sum(max(c, ZERO) for c in piece.angle) <= limit:
+    if sum(max(c, ZERO) for c in piece.angle) - limit <= _ROUNDING:
         return ONE
     beyond = (piece.angle[0] - limit, *piece.angle[1:])
     for low, high in pairwise(cuts((beyond,), ZERO, ONE)):

@@ -5,6 +5,7 @@ https://doi.org/10.1109/TNSRE.2012.2195330, equations (1)-(6) and Table III.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -17,6 +18,40 @@ PostCatch = Literal["continuous", "additive"]
 
 ResidualReading = Literal["residual", "decrease"]
 """What Q is a share of the rise for: the residual (section II), or the decrease."""
+
+
+# What is needed, in words, whether a value meets it, and of which parameters.
+_RANGES: tuple[tuple[str, Callable[[float], bool], tuple[str, ...]], ...] = (
+    (
+        "(0, 180] degrees, got {} (SI units)",
+        lambda angle: 0.0 < angle <= math.pi,
+        ("catch_angle_constant", "catch_travel", "range_end"),
+    ),
+    (
+        "more than 0, got {} (SI units)",
+        lambda value: value > 0.0,
+        ("catch_slope", "peak_duration", "speed_threshold"),
+    ),
+    ("[0, 1), got {}", lambda share: 0.0 <= share < 1.0, ("residual_ratio",)),
+    (
+        "0 or more, got {}",
+        lambda value: value >= 0.0,
+        (
+            "catch_torque_constant",
+            "inertia",
+            "damping",
+            "stiffness",
+            "post_catch_stiffness",
+            "slowest_mean_speed",
+            "smallest_catch_angle",
+        ),
+    ),
+)
+
+_READINGS = {
+    "post_catch": ("continuous", "additive"),
+    "residual_reading": ("residual", "decrease"),
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,49 +131,22 @@ class ElbowParameters:
             value = getattr(self, name)
             if isinstance(value, int | float) and not math.isfinite(value):
                 raise ParameterError(f"{name}: needs a finite number, got {value}")
-        for name in ("catch_angle_constant", "catch_travel", "range_end"):
-            self._require(name, 0.0, math.pi, "(0, 180] degrees")
-        for name in ("catch_slope", "peak_duration", "speed_threshold"):
-            self._require(name, 0.0, math.inf, "more than 0")
-        if not 0.0 <= self.residual_ratio < 1.0:
-            raise ParameterError(
-                f"residual_ratio: needs [0, 1), got {self.residual_ratio}"
-            )
-        for name in (
-            "catch_torque_constant",
-            "inertia",
-            "damping",
-            "stiffness",
-            "post_catch_stiffness",
-            "slowest_mean_speed",
-            "smallest_catch_angle",
-        ):
-            if getattr(self, name) < 0.0:
+        for needed, is_met, names in _RANGES:
+            for name in names:
+                value = getattr(self, name)
+                if not is_met(value):
+                    raise ParameterError(f"{name}: needs {needed.format(value)}")
+        for name, (one, other) in _READINGS.items():
+            value = getattr(self, name)
+            if value not in (one, other):
                 raise ParameterError(
-                    f"{name}: needs 0 or more, got {getattr(self, name)}"
+                    f'{name}: needs "{one}" or "{other}", got {value!r}'
                 )
-        self._check_readings()
-
-    def _check_readings(self) -> None:
-        if self.post_catch not in ("continuous", "additive"):
-            raise ParameterError(
-                f'post_catch: needs "continuous" or "additive", got {self.post_catch!r}'
-            )
-        if self.residual_reading not in ("residual", "decrease"):
-            raise ParameterError(
-                'residual_reading: needs "residual" or "decrease", '
-                f"got {self.residual_reading!r}"
-            )
         if not 0.0 <= self.catch_rise <= self.peak_duration:
             raise ParameterError(
                 f"catch_rise: needs 0 to peak_duration, {self.peak_duration:g} s, "
                 f"got {self.catch_rise:g} s"
             )
-
-    def _require(self, name: str, low: float, high: float, words: str) -> None:
-        value = getattr(self, name)
-        if not low < value <= high:
-            raise ParameterError(f"{name}: needs {words}, got {value} (SI units)")
 
     @property
     def fastest_mean_speed(self) -> float:

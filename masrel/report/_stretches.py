@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from masrel.analysis import Speed, Speeds, SpeedSummary
-from masrel.elbow import ConstantSpeed, Trace, peak_torque, trace
+from masrel.elbow import ConstantSpeed, Trace, evaluate, trace
 from masrel.protocol import Protocol, elbow_parameters
 from masrel.report._figure_data import (
     SpeedColumn,
@@ -183,14 +183,23 @@ def _stretches(
         if not of_model:
             continue
         joint = elbow_parameters(protocol, model.id)
-        made = []
-        for speed in of_model:
-            motion = ConstantSpeed(
+        motions = [
+            ConstantSpeed(
                 start=start, end=end, speed=math.radians(speed.mean_speed_deg_s)
             )
-            commanded = trace(joint, motion, rate_hz=protocol.device.rate_hz)
-            peak = peak_torque(joint, motion)
-            made.append(_Stretch(speed=speed, trace=commanded, peak=peak))
+            for speed in of_model
+        ]
+        peaks = evaluate(joint, motions, ["peak_torque"]).column("peak_torque")
+        made = [
+            _Stretch(
+                speed=speed,
+                trace=trace(joint, motion, rate_hz=protocol.device.rate_hz),
+                peak=peak,
+            )
+            for speed, motion, peak in zip(
+                of_model, motions, peaks.tolist(), strict=True
+            )
+        ]
         stretches.append((model.id, made))
     return stretches
 

@@ -15,9 +15,8 @@ from masrel.elbow.motion import Floats, Motion
 from masrel.elbow.parameters import ElbowParameters
 from masrel.elbow.scenes.course import Courses, nearest
 from masrel.elbow.scenes.effort import Efforts
-from masrel.elbow.scenes.kinds import KINDS, courses_of, efforts_of, motions_of
-from masrel.elbow.scenes.pairs import check_starts, paired
-from masrel.elbow.scenes.table import Joints, joints_of
+from masrel.elbow.scenes.kinds import KINDS
+from masrel.elbow.scenes.table import Joints, joints_of, motions_of, paired
 from masrel.errors import ParameterError
 
 __all__ = [
@@ -144,7 +143,6 @@ def evaluate(
     if chunk < 1:
         raise ParameterError(f"chunk: needs 1 or more, got {chunk}")
     joints, moves = paired(parameters, motions)
-    check_starts(joints, moves, np.arange(len(moves)))
     asked = tuple(outputs)
     values = np.empty((len(moves), len(asked)))
     n_alone = 0
@@ -182,8 +180,8 @@ def _together(
 ) -> tuple[Floats, np.ndarray]:
     # the outputs, and in which scenes they are not to be had so
     joints = joints_of(own)
-    motions = motions_of(kind, stretches)
-    courses = courses_of(kind, joints, motions)
+    motions = motions_of(stretches, KINDS[kind].speed)
+    courses = KINDS[kind].courses(joints, motions)
     alone = courses.is_doubtful.copy()
     values = np.empty((len(own), len(outputs)))
     efforts = None
@@ -192,7 +190,7 @@ def _together(
             values[:, i] = _event(name, joints, courses)
             continue
         if efforts is None:
-            efforts = efforts_of(kind, joints, motions, courses)
+            efforts = Efforts(joints, motions, courses, KINDS[kind].path(motions))
         values[:, i], unknown = _effort(name, efforts)
         alone |= unknown
     return values, alone

@@ -1,4 +1,4 @@
-"""Many stretches at constant speed: every event in closed form.
+"""Many stretches at constant speed: events and efforts in closed form.
 
 Source: Park, Kim and Damiano (2012), IEEE TNSRE 20(3), 361-370,
 https://doi.org/10.1109/TNSRE.2012.2195330, equations (2), (4) and (6).
@@ -7,11 +7,12 @@ https://doi.org/10.1109/TNSRE.2012.2195330, equations (2), (4) and (6).
 import numpy as np
 
 from masrel.elbow.motion import Floats
-from masrel.elbow.scenes.course import Courses, Flags, Motions
-from masrel.elbow.scenes.table import Joints
+from masrel.elbow.scenes.course import Courses, Flags
+from masrel.elbow.scenes.effort import Path
+from masrel.elbow.scenes.table import Joints, Motions
 from masrel.elbow.scenes.twofold import Twofold
 
-__all__ = ["constant_courses", "constant_ends"]
+__all__ = ["constant_courses", "constant_ends", "constant_path"]
 
 _NEAR = 1e-24
 # rad: two angles as near as that are left to 50 digits
@@ -87,3 +88,28 @@ def constant_ends(joints: Joints, motions: Motions) -> tuple[Floats, Flags]:
     """
     way = Twofold.difference(np.minimum(motions.end, joints.range_end), motions.start)
     return (way / motions.speed).high, np.zeros(motions.speed.shape, dtype=np.bool_)
+
+
+def constant_path(motions: Motions) -> Path:
+    """Return the functions of stretches at constant speed.
+
+    Parameters
+    ----------
+    motions : Motions
+        The stretches.
+
+    Returns
+    -------
+    Path
+        Their functions.
+    """
+    speed = motions.speed
+    return Path(
+        travel=lambda t: speed * t,
+        velocity=lambda t: speed + 0.0 * t,
+        acceleration=lambda t: 0.0 * t,
+        is_steady=True,
+        travel_integral=lambda t: 0.5 * speed * t * t,
+        square_integral=lambda t: speed * speed * t,
+        turning=lambda k, _: np.full(k.shape, np.inf),
+    )

@@ -9,43 +9,9 @@ from numpy.typing import NDArray
 from masrel.elbow.motion import Floats
 from masrel.elbow.scenes.twofold import Twofold
 
-__all__ = ["Courses", "Flags", "Motions", "nearest"]
+__all__ = ["Courses", "Flags", "nearest"]
 
 Flags = NDArray[np.bool_]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Motions:
-    """Stretches of one kind, each column of shape (n_scenes,).
-
-    Attributes
-    ----------
-    start, end : ndarray
-        rad.
-    speed : ndarray
-        The mean speed, rad/s.
-    """
-
-    start: Floats
-    end: Floats
-    speed: Floats
-
-    def rows(self, which: NDArray[np.intp]) -> "Motions":
-        """Return some of the stretches.
-
-        Parameters
-        ----------
-        which : ndarray of int
-            Their rows.
-
-        Returns
-        -------
-        Motions
-            Those.
-        """
-        return Motions(
-            start=self.start[which], end=self.end[which], speed=self.speed[which]
-        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,22 +1,57 @@
 """Peak torque, residual, work and impulse of many stretches, in closed form.
 
-In: where the events are. Every law is linear in angle, speed and acceleration, and
-every motion a polynomial, so that a phase's integral is known at both of its ends.
+In: where the events are, and the motions as functions of time. Every law is linear in
+angle, speed and acceleration, and every motion a polynomial, so that a phase's integral
+is known at both of its ends.
 
 Source: Park, Kim and Damiano (2012), IEEE TNSRE 20(3), 361-370,
 https://doi.org/10.1109/TNSRE.2012.2195330, equations (1), (3) and (5).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from masrel.elbow.motion import Floats
-from masrel.elbow.scenes.course import Courses, Flags, Motions
-from masrel.elbow.scenes.path import Path
-from masrel.elbow.scenes.table import Joints
+from masrel.elbow.scenes.course import Courses, Flags
+from masrel.elbow.scenes.table import Joints, Motions
 
-__all__ = ["Efforts"]
+__all__ = ["Efforts", "Path"]
+
+_Law = Callable[[Floats], Floats]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Path:
+    """A kind of motion as functions of time, for one column of times.
+
+    Attributes
+    ----------
+    travel : callable
+        Angle gone since the start, rad.
+    velocity : callable
+        rad/s.
+    acceleration : callable
+        rad/s².
+    is_steady : bool
+        Whether the velocity is constant.
+    travel_integral : callable
+        ∫ travel dt from the start, rad s.
+    square_integral : callable
+        ∫ velocity² dt from the start, rad²/s.
+    turning : callable
+        From a stiffness and a damping, the time before which stiffness · travel +
+        damping · velocity rises and after which it falls, s.
+    """
+
+    travel: _Law
+    velocity: _Law
+    acceleration: _Law
+    is_steady: bool
+    travel_integral: _Law
+    square_integral: _Law
+    turning: Callable[[Floats, Floats], Floats]
 
 
 class Efforts:

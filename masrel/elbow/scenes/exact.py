@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from masrel.elbow.motion import Floats, Motion
 from masrel.elbow.motions import ConstantSpeed, MinimumJerk
-from masrel.elbow.scenes.course import Courses, Flags, Motions
+from masrel.elbow.scenes.course import Courses, Flags
 from masrel.elbow.scenes.effort import Efforts
+from masrel.elbow.scenes.table import Motions
 
 __all__ = ["ExactRows"]
 

@@ -3,10 +3,9 @@
 import numpy as np
 
 from masrel.elbow.motion import Floats
-from masrel.elbow.scenes.course import Motions
 from masrel.elbow.scenes.rows import ConstantRows, QuinticRows, Work
 from masrel.elbow.scenes.samples import PhaseSamples
-from masrel.elbow.scenes.table import Joints
+from masrel.elbow.scenes.table import Joints, Motions
 
 __all__ = ["BLOCK", "Fill"]
 

@@ -7,8 +7,7 @@ https://doi.org/10.1109/TNSRE.2012.2195330, equation (2).
 import numpy as np
 
 from masrel.elbow.motion import Floats
-from masrel.elbow.scenes.course import Motions
-from masrel.elbow.scenes.table import Joints
+from masrel.elbow.scenes.table import Joints, Motions
 
 __all__ = ["catch_lines", "horner", "slopes", "zeros_of"]
 

@@ -10,14 +10,15 @@ import numpy as np
 
 from masrel.elbow.motion import Floats
 from masrel.elbow.scenes.bernstein import sign_changes
-from masrel.elbow.scenes.course import Courses, Flags, Motions
+from masrel.elbow.scenes.course import Courses, Flags
 from masrel.elbow.scenes.digits import DIGITS_32, Digits
+from masrel.elbow.scenes.effort import Path
 from masrel.elbow.scenes.line import catch_lines, horner, slopes, zeros_of
-from masrel.elbow.scenes.table import Joints
+from masrel.elbow.scenes.table import Joints, Motions
 from masrel.elbow.scenes.twofold import Twofold
 from masrel.elbow.scenes.way import mean_share, places_of, way_share
 
-__all__ = ["quintic_courses", "quintic_ends"]
+__all__ = ["quintic_courses", "quintic_ends", "quintic_path"]
 
 
 def quintic_courses(
@@ -211,3 +212,67 @@ class _Quintics:
         )
         gone = self.way.take(rows) * way_share(place)
         return base + gone + mean * number.product(slope, self.motions.speed[rows])
+
+
+def quintic_path(motions: Motions) -> Path:
+    """Return the functions of minimum-jerk stretches.
+
+    Parameters
+    ----------
+    motions : Motions
+        The stretches.
+
+    Returns
+    -------
+    Path
+        Their functions.
+    """
+    # in shares x of the duration the way is P(x) = 10x³ - 15x⁴ + 6x⁵
+    way, speed = motions.end - motions.start, motions.speed
+    total = way / speed
+    return Path(
+        travel=lambda t: way * _way(t / total),
+        velocity=lambda t: speed * _pace(t / total),
+        acceleration=lambda t: speed / total * _gain(t / total),
+        is_steady=False,
+        travel_integral=lambda t: total * way * _way_integral(t / total),
+        square_integral=lambda t: way * speed * _square_integral(t / total),
+        turning=lambda k, b: total * _turn(k, 2.0 * b / total),
+    )
+
+
+def _way(x: Floats) -> Floats:
+    return x * x * x * (10.0 + x * (6.0 * x - 15.0))  # P
+
+
+def _pace(x: Floats) -> Floats:
+    rest = x * (1.0 - x)
+    return 30.0 * rest * rest  # P'
+
+
+def _gain(x: Floats) -> Floats:
+    return 60.0 * x * (1.0 - x) * (1.0 - 2.0 * x)  # P''
+
+
+def _way_integral(x: Floats) -> Floats:
+    power = x * x * x * x
+    return power * (2.5 + x * (x - 3.0))
+
+
+def _square_integral(x: Floats) -> Floats:
+    # 900 ∫ x⁴ (1 - x)⁴
+    power = x * x * x * x * x
+    inner = 900 / 5 + x * (-600.0 + x * (5400 / 7 + x * (-450.0 + x * 100.0)))
+    return np.asarray(power * inner)
+
+
+def _turn(k: Floats, c: Floats) -> Floats:
+    # k x (1 - x) + c (1 - 2x) = 0, without cancellation
+    root = np.sqrt(k * k + 4.0 * c * c)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        x = np.where(
+            k > 2.0 * c,
+            (k - 2.0 * c + root) / (2.0 * k),
+            2.0 * c / (2.0 * c - k + root),
+        )
+    return np.where(root > 0.0, x, 0.5)

@@ -7,9 +7,9 @@ import numpy as np
 from masrel.elbow.motion import Floats, Motion
 from masrel.elbow.motions import ConstantSpeed, MinimumJerk
 from masrel.elbow.scenes.constant import constant_ends
-from masrel.elbow.scenes.course import Motions
 from masrel.elbow.scenes.quintic import quintic_ends
 from masrel.elbow.scenes.samples import Kinematics
+from masrel.elbow.scenes.table import Motions
 
 __all__ = ["LAWS", "ConstantRows", "QuinticRows", "Work"]
 

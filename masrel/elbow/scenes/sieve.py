@@ -6,10 +6,10 @@ asked again in 32 digits.
 
 import numpy as np
 
-from masrel.elbow.scenes.course import Courses, Flags, Motions
+from masrel.elbow.scenes.course import Courses, Flags
 from masrel.elbow.scenes.digits import DIGITS_16
 from masrel.elbow.scenes.quintic import quintic_courses
-from masrel.elbow.scenes.table import Joints
+from masrel.elbow.scenes.table import Joints, Motions
 from masrel.elbow.scenes.twofold import Twofold
 
 __all__ = ["quintic_courses_for_samples"]

@@ -1,4 +1,4 @@
-"""Scenes as columns: one array a parameter, one row a scene."""
+"""Scenes as columns: every scene its joint and its motion, and one row."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -8,10 +8,11 @@ from operator import attrgetter
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.elbow.motion import Floats
+from masrel.elbow.motion import Floats, Motion
 from masrel.elbow.parameters import ElbowParameters
+from masrel.errors import ParameterError
 
-__all__ = ["Joints", "joints_of"]
+__all__ = ["Joints", "Motions", "joints_of", "motions_of", "paired"]
 
 _NEAR = 1e-12
 # rad
@@ -34,6 +35,50 @@ _NUMBERS = (
     "catch_rise",
 )
 _read = attrgetter(*_NUMBERS)
+
+
+def paired(
+    parameters: ElbowParameters | Sequence[ElbowParameters],
+    motions: Motion | Sequence[Motion],
+) -> tuple[Sequence[ElbowParameters], Sequence[Motion]]:
+    """Give every scene its joint and its motion, which starts within its range.
+
+    Parameters
+    ----------
+    parameters : ElbowParameters or sequence of ElbowParameters
+        The joints, one a scene; or one for all.
+    motions : Motion or sequence of Motion
+        The motions, one a scene; or one for all.
+
+    Returns
+    -------
+    tuple of two sequences, each of length n_scenes
+        Joints and motions.
+
+    Raises
+    ------
+    ParameterError
+        If their numbers do not fit, or a motion starts at or beyond the end of range;
+        the message says which.
+    """
+    joints = [parameters] if isinstance(parameters, ElbowParameters) else parameters
+    moves = motions if isinstance(motions, Sequence) else [motions]
+    n = max(len(joints), len(moves)) if joints and moves else 0
+    if len(joints) not in (1, n) or len(moves) not in (1, n) or n == 0:
+        raise ParameterError(
+            "parameters, motions: need as many joints as motions, or one of either, "
+            f"got {len(joints)} and {len(moves)}"
+        )
+    joints = joints if len(joints) == n else [joints[0]] * n
+    moves = moves if len(moves) == n else [moves[0]] * n
+    for i, (joint, motion) in enumerate(zip(joints, moves, strict=True)):
+        if motion.start >= joint.range_end:
+            raise ParameterError(
+                f"motions[{i}].start: needs less than the end of range, "
+                f"{np.degrees(joint.range_end):g} degrees, got "
+                f"{np.degrees(motion.start):g} degrees"
+            )
+    return joints, moves
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -119,3 +164,57 @@ def joints_of(parameters: Sequence[ElbowParameters]) -> Joints:
         rest_angle=np.array(rests)[index],
         is_additive=np.array([p.post_catch == "additive" for p in distinct])[index],
     )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Motions:
+    """Stretches of one kind, each column of shape (n_scenes,).
+
+    Attributes
+    ----------
+    start, end : ndarray
+        rad.
+    speed : ndarray
+        The mean speed, rad/s.
+    """
+
+    start: Floats
+    end: Floats
+    speed: Floats
+
+    def rows(self, which: NDArray[np.intp]) -> "Motions":
+        """Return some of the stretches.
+
+        Parameters
+        ----------
+        which : ndarray of int
+            Their rows.
+
+        Returns
+        -------
+        Motions
+            Those.
+        """
+        return Motions(
+            start=self.start[which], end=self.end[which], speed=self.speed[which]
+        )
+
+
+def motions_of(stretches: Sequence[Motion], speed: str) -> Motions:
+    """Put motions of one kind into columns.
+
+    Parameters
+    ----------
+    stretches : sequence of Motion
+        The motions.
+    speed : str
+        Their attribute that is the mean speed.
+
+    Returns
+    -------
+    Motions
+        Their columns.
+    """
+    read = attrgetter("start", "end", speed)
+    start, end, mean = np.array([read(one) for one in stretches], dtype=np.float64).T
+    return Motions(start=start, end=end, speed=mean)

@@ -14,14 +14,20 @@ from masrel.elbow.course import end_time
 from masrel.elbow.events import events
 from masrel.elbow.motion import Floats, Motion
 from masrel.elbow.parameters import ElbowParameters
-from masrel.elbow.scenes.course import Courses, Motions
+from masrel.elbow.scenes.course import Courses
+from masrel.elbow.scenes.effort import Efforts
 from masrel.elbow.scenes.exact import ExactRows
 from masrel.elbow.scenes.fill import BLOCK, Fill
-from masrel.elbow.scenes.kinds import courses_for_samples, efforts_of, motions_of
-from masrel.elbow.scenes.pairs import check_starts, paired
+from masrel.elbow.scenes.kinds import KINDS
 from masrel.elbow.scenes.rows import LAWS
 from masrel.elbow.scenes.samples import phase_samples
-from masrel.elbow.scenes.table import Joints, joints_of
+from masrel.elbow.scenes.table import (
+    Joints,
+    Motions,
+    joints_of,
+    motions_of,
+    paired,
+)
 from masrel.elbow.torque import torque
 from masrel.elbow.trace import trace
 from masrel.errors import ParameterError
@@ -153,14 +159,15 @@ class _Group:
         reading: Reading,
     ) -> "_Group":
         own, stretches = ([each[i] for i in rows.tolist()] for each in scenes)
-        check_starts(own, stretches, rows)
         columns, motions, courses = None, None, None
         alone = np.ones(rows.size, dtype=np.bool_)
         ends = np.empty(rows.size)
         if kind in LAWS:
-            columns, motions = joints_of(own), motions_of(kind, stretches)
+            columns = joints_of(own)
+            motions = motions_of(stretches, KINDS[kind].speed)
             if reading == "exact":
-                courses = courses_for_samples(kind, columns, motions, rate_hz)
+                found = KINDS[kind].courses_for_samples
+                courses = found(columns, motions, rate_hz)
                 ends, alone = courses.end.high.copy(), courses.is_doubtful
             else:
                 ends, alone = LAWS[kind].ends(columns, motions)
@@ -177,7 +184,8 @@ class _Group:
             return self._fill_sampled(out, self.joints, self.motions)
         columns = (self.motions, self.courses)
         with np.errstate(all="ignore"):  # doubtful scenes may hold anything
-            efforts = efforts_of(self.kind, self.joints, *columns)
+            path = KINDS[self.kind].path(self.motions)
+            efforts = Efforts(self.joints, *columns, path)
             exact = ExactRows(
                 self.kind, *columns, efforts, self.n_samples, self.rate_hz
             )

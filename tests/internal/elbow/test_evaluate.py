@@ -24,7 +24,7 @@ from masrel.elbow import (
     scenes,
     work,
 )
-from masrel.elbow.scenes import EFFORTS, EVENTS, batch, kinds
+from masrel.elbow.scenes import EFFORTS, EVENTS, batch
 from masrel.elbow.scenes.twofold import Twofold
 from masrel.errors import ParameterError
 from tests.elbow.scenes import KINDS, corner_cases, random_scene
@@ -157,7 +157,7 @@ def test_memory_is_that_of_a_chunk() -> None:
 
 def test_only_what_is_asked_is_computed() -> None:
     motions = [minimum_jerk(80.0), minimum_jerk(90.0)]
-    with counted(kinds, "Efforts") as n_efforts:
+    with counted(batch, "Efforts") as n_efforts:
         evaluate(HM3, motions, EVENTS)
         assert n_efforts == [0]
         evaluate(HM3, motions, ["peak_torque", "work"])

@@ -10,10 +10,9 @@ from masrel.elbow import STANDARD_MODELS, MinimumJerk, events, torque_traces
 from masrel.elbow.scenes import sieve
 from masrel.elbow.scenes.course import nearest
 from masrel.elbow.scenes.digits import DIGITS_16
-from masrel.elbow.scenes.kinds import motions_of
 from masrel.elbow.scenes.quintic import quintic_courses
 from masrel.elbow.scenes.sieve import quintic_courses_for_samples
-from masrel.elbow.scenes.table import joints_of
+from masrel.elbow.scenes.table import joints_of, motions_of
 from tests.elbow.scenes import random_scene
 from tests.elbow.stretches import counted, minimum_jerk, table_v
 
@@ -28,7 +27,7 @@ TIMES = {
 
 def columns(scenes):
     joints, motions = zip(*scenes, strict=True)
-    return joints_of(joints), motions_of(MinimumJerk, motions)
+    return joints_of(joints), motions_of(motions, "mean_speed")
 
 
 @pytest.mark.parametrize("wide", [False, True])
