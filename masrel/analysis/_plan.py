@@ -1,6 +1,5 @@
 """Compute what a study's plan asks for, line by line, and nothing else."""
 
-import dataclasses
 import hashlib
 
 import masrel
@@ -10,7 +9,6 @@ from masrel.analysis._descriptions import (
     intended_agreement,
     stretching_speeds,
 )
-from masrel.analysis._planned_interval import planned_interval
 from masrel.analysis._results import Analysis, PlannedEstimate, RaterEstimate
 from masrel.errors import CountsError, ParameterError, ProtocolError, RatingsError
 from masrel.estimates import Estimate
@@ -179,18 +177,12 @@ def _inter_rater(
         reason = f"session {session} has one rater; agreement needs two"
         return PlannedEstimate(line=line, reason=reason)
     grades = scale.weigh(matrix.grades)
-    estimate = coefficient(line.coefficient)(
-        grades,
-        categories=scale.values,
-        weights=line.weights,
-        level=protocol.analysis.level,
-    )
     return PlannedEstimate(
         line=line,
         items=matrix.items,
         raters=matrix.raters,
         n_missing=matrix.n_missing,
-        estimate=_with_interval(estimate, line, protocol, grades, line.id),
+        estimate=_compute(line, protocol, grades, line.id),
     )
 
 
@@ -224,14 +216,12 @@ def _over_raters(
 ) -> tuple[Estimate, tuple[RaterEstimate, ...]]:
     scale = scale_of(protocol)
     weighed = [scale.weigh(of_rater) for of_rater in pairs.pairs]
-    estimate = coefficient(line.coefficient)(
-        weighed, categories=scale.values, weights=line.weights
-    )
+    estimate = _compute(line, protocol, weighed, line.id)
     by_rater = [
         cohen_kappa(of_rater, categories=scale.values, weights=line.weights)
         for of_rater in weighed
     ]
-    return _with_interval(estimate, line, protocol, weighed, line.id), tuple(
+    return estimate, tuple(
         RaterEstimate(rater=rater, estimate=of_rater)
         for rater, of_rater in zip(pairs.raters, by_rater, strict=True)
     )
@@ -242,40 +232,37 @@ def _each_rater(
 ) -> tuple[None, tuple[RaterEstimate, ...]]:
     scale, by_rater = scale_of(protocol), []
     for rater, grades in zip(pairs.raters, pairs.pairs, strict=True):
-        weighed = scale.weigh(grades)
-        estimate = coefficient(line.coefficient)(
-            weighed,
-            categories=scale.values,
-            weights=line.weights,
-            level=protocol.analysis.level,
-        )
         purpose = f"{line.id}/{rater}"
-        estimate = _with_interval(estimate, line, protocol, weighed, purpose)
+        estimate = _compute(line, protocol, scale.weigh(grades), purpose)
         by_rater.append(RaterEstimate(rater=rater, estimate=estimate))
     return None, tuple(by_rater)
 
 
-def _with_interval(
-    estimate: Estimate,
-    line: EstimatePlan,
-    protocol: Protocol,
-    ratings: object,
-    purpose: str,
+def _compute(
+    line: EstimatePlan, protocol: Protocol, ratings: object, purpose: str
 ) -> Estimate:
+    # the coefficient of a line, with the interval it asks for
+    categories, level = scale_of(protocol).values, protocol.analysis.level
+    if line.interval == "none":
+        return coefficient(line.coefficient)(
+            ratings, categories=categories, weights=line.weights, level=level
+        )
+    # Imported here: a coefficient alone loads no interval.
+    from masrel import intervals
+
     # The seed is the purpose's own, derived from the study's: a line more in a plan
     # moves no other line's numbers. It fits a signed integer of 64 bits, as other
     # readers of the JSON have them.
     root = f"{protocol.analysis.seed}/{purpose}"
     digest = hashlib.sha256(root.encode()).digest()
-    interval = planned_interval(
-        line.interval,
+    return intervals.estimate(
         line.coefficient,
         ratings,
         target=line.target,
-        categories=scale_of(protocol).values,
+        method=line.interval,
+        categories=categories,
         weights=line.weights,
-        level=protocol.analysis.level,
+        level=level,
         n_resamples=protocol.analysis.n_resamples,
-        seed=int.from_bytes(digest[:8], "big") >> 1,
+        rng=int.from_bytes(digest[:8], "big") >> 1,
     )
-    return dataclasses.replace(estimate, interval=interval or estimate.interval)

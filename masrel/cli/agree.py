@@ -3,7 +3,7 @@
 import warnings
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import click
 
@@ -18,10 +18,10 @@ from masrel.cli._options import (
     write_output,
 )
 from masrel.errors import MasrelError, MasrelWarning, ParameterError, RatingsError
-from masrel.estimates import Estimate, Interval, Target, as_document
+from masrel.estimates import Target, as_document
 
 if TYPE_CHECKING:
-    from masrel.agreement import BandScale, Coefficient, CountedRatings, WeightName
+    from masrel.agreement import BandScale, Coefficient, WeightName
     from masrel.ratings import Ratings
     from masrel.report._agreement_table import AgreementRow
 
@@ -40,7 +40,8 @@ class _EstimateOptions:
     coefficients: str | None  # names, separated by commas, or "all"; None for `_USUAL`
     weights: "WeightName"  # for coefficients that take any; checked where they are made
     target: Target | None  # what a new study would draw anew; no interval when None
-    interval: str  # kind of interval; "auto" chooses one
+    # kind of interval; "auto" chooses one
+    interval: Literal["auto", "analytic", "jackknife", "bootstrap", "posterior"]
     level: float
     # n_resamples, seed: for intervals that draw
     n_resamples: int
@@ -188,24 +189,36 @@ def _estimate_session(
             title += f", {weights}"
         elif weights != options.weights and not takes_all:
             notes.append("unweighted, there are no weights for it")
-        estimate = entry(
-            counted,
-            categories=counted.categories,
-            weights=weights,
-            level=options.level,
-        )
         # An interval that a coefficient comes with is not computed a second time.
         is_done = entry.has_interval and (options.interval == "auto" or takes_all)
+        estimate = None
         if options.target is not None and not is_done:
+            from masrel import intervals
+
             try:
-                interval = _interval(entry, counted, weights, options.target, options)
-                # `vars` has the standard error as it is: uncomputed until it is read
-                estimate = Estimate(**{**vars(estimate), "interval": interval})
+                estimate = intervals.estimate(
+                    entry,
+                    counted,
+                    target=options.target,
+                    method=options.interval,
+                    categories=counted.categories,
+                    weights=weights,
+                    level=options.level,
+                    n_resamples=options.n_resamples,
+                    rng=options.seed,
+                )
             except MasrelError as error:
                 if is_named and not takes_all:
                     raise  # just these were named: each must have the interval
                 refused.append(error)
                 notes.append(f"no interval: {error}")
+        if estimate is None:
+            estimate = entry(
+                counted,
+                categories=counted.categories,
+                weights=weights,
+                level=options.level,
+            )
         rows.append(
             AgreementRow(
                 session=session, title=title, estimate=estimate, notes=tuple(notes)
@@ -214,27 +227,6 @@ def _estimate_session(
     if not takes_all and refused and len(refused) == len(rows):
         raise refused[0]
     return rows
-
-
-def _interval(
-    entry: "Coefficient",
-    counted: "CountedRatings",
-    weights: "WeightName",
-    target: Target,
-    options: _EstimateOptions,
-) -> Interval | None:
-    from masrel.analysis._planned_interval import planned_interval
-
-    return planned_interval(
-        options.interval,
-        entry.name,
-        counted,
-        target=target,
-        weights=weights,
-        level=options.level,
-        n_resamples=options.n_resamples,
-        seed=options.seed,
-    )
 
 
 def _entries(names: list[str], n_raters: int) -> list["Coefficient"]:

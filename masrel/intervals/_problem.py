@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from masrel.agreement import (
-    COEFFICIENTS,
     CodedRatings,
     Coefficient,
     Label,
@@ -145,7 +144,7 @@ def pose_problem(
     level: float,
 ) -> IntervalProblem:
     """Check a question and prepare its data."""
-    entry = find_entry(statistic)
+    entry = coefficient(statistic)
     if target not in get_args(Target):
         raise ParameterError(
             f"target: needs one of {', '.join(get_args(Target))}, got {target!r}"
@@ -187,18 +186,6 @@ def pose_problem(
         target=target,
         level=level,
     )
-
-
-def find_entry(statistic: Statistic) -> Coefficient:
-    """Return the entry of a coefficient in the register."""
-    if isinstance(statistic, Coefficient):
-        return statistic
-    name = statistic
-    if not isinstance(name, str):
-        name = getattr(statistic, "__name__", repr(statistic))
-    if name not in COEFFICIENTS:
-        coefficient(name)  # an error that lists those there are
-    return COEFFICIENTS[name]
 
 
 def _refuse_raters(entry: Coefficient, n_raters: int) -> NoReturn:

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Literal, TypedDict, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from masrel.agreement import CountedRatings, Label
+from masrel.agreement import CountedRatings, Label, registry
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Target
-from masrel.intervals._problem import Statistic, find_entry, pose_problem
+from masrel.intervals._problem import Statistic, pose_problem
 from masrel.intervals.analytic import analytic
 from masrel.intervals.bootstrap import bootstrap
 from masrel.intervals.jackknife import jackknife
@@ -31,6 +31,7 @@ def estimate(
     categories: Sequence[Label] | None = None,
     weights: "WeightName | ArrayLike" = "identity",
     level: float = 0.95,
+    n_resamples: int = 10_000,
     rng: np.random.Generator | int | None = None,
 ) -> Estimate:
     """Estimate a coefficient with an interval that answers a stated question.
@@ -52,6 +53,8 @@ def estimate(
         How much two categories agree; see `declared_weights`.
     level : float, optional
         Nominal level.
+    n_resamples : int, optional
+        Resamples of a bootstrap, where they are drawn.
     rng : Generator or int, optional
         Where randomness comes from, for methods that draw.
 
@@ -85,13 +88,14 @@ def estimate(
         raise ParameterError(
             f"method: needs one of {', '.join(get_args(_Method))}, got {method!r}"
         )
-    entry = find_entry(coefficient)
+    entry = registry.coefficient(coefficient)
     if entry.kernel is None:
         result = entry(ratings, categories=categories, weights=weights, level=level)
     else:
         if not isinstance(ratings, CountedRatings):
             ratings = entry.code(ratings, categories)  # once, for all that follows
         result = entry.function(ratings, categories=categories, weights=weights)
+        categories = None  # the ratings have them by now
     if method == "auto" and entry.has_interval:
         return result
     options = _Options(
@@ -106,12 +110,16 @@ def estimate(
             pose_problem(entry, ratings, **options),
             modelled=identity and entry.name in _RHO_COEFFICIENTS,
         )
-    elif method in ("analytic", "jackknife"):
-        without_draws = analytic if method == "analytic" else jackknife
-        interval = without_draws(entry, ratings, **options)
+    elif method == "analytic":
+        interval = analytic(entry, ratings, **options)
+    elif method == "jackknife":
+        interval = jackknife(entry, ratings, **options)
+    elif method == "bootstrap":
+        interval = bootstrap(
+            entry, ratings, n_resamples=n_resamples, rng=rng, **options
+        )
     else:
-        draws = bootstrap if method == "bootstrap" else posterior
-        interval = draws(entry, ratings, rng=rng, **options)
+        interval = posterior(entry, ratings, rng=rng, **options)
     # `vars` has the standard error as it is: still to be computed when it is read.
     return Estimate(**{**vars(result), "interval": interval})
 

@@ -3,10 +3,12 @@
 import itertools
 import warnings
 from fractions import Fraction
+from typing import Any
 
 import msgspec
 import pytest
 
+from masrel import intervals
 from masrel.agreement import COEFFICIENTS
 from masrel.analysis import analyze
 from masrel.errors import (
@@ -15,6 +17,8 @@ from masrel.errors import (
     RatingsError,
     UndefinedStatisticWarning,
 )
+from masrel.estimates import Estimate
+from masrel.intervals import estimate
 from masrel.protocol import EstimatePlan, ScaleDefinition, scale_of
 from masrel.ratings import Ratings, ratings_from_rows
 from tests.analysis.studies import of_session, plan, protocol_with, ratings, table_v
@@ -167,3 +171,20 @@ def test_a_scale_of_numbers_weighs_by_value(kind: str) -> None:
     estimate = found.estimate or found.by_rater[0].estimate
     # D_o = (1 + 0 + 0 + 10)/40; D_e = [2 (2·1 + 2·10) + (2·0 + 2·9) + (2·9 + 2·0)]/160
     assert estimate.value == float(1 - Fraction(11, 40) / Fraction(80, 160))
+
+
+def test_every_line_has_a_seed_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    seeds = []
+
+    def record(*arguments: Any, rng: int, **options: Any) -> Estimate:
+        seeds.append(rng)
+        return estimate(*arguments, rng=rng, **options)
+
+    monkeypatch.setattr(intervals, "estimate", record)
+    first, second = (plan(id=name, interval="jackknife") for name in "ab")
+    analyze(protocol_with(first, second), table_v())
+    analyze(protocol_with(second), table_v())
+    assert seeds[0] != seeds[1]
+    assert seeds[1] == seeds[2]
+    # fits a signed integer of 64 bits, as other readers of the JSON have them
+    assert all(0 <= seed < 2**63 for seed in seeds)

@@ -242,6 +242,20 @@ def test_a_method_by_name_is_that_method(method: str) -> None:
     )
 
 
+def test_a_bootstrap_draws_as_many_resamples_as_it_is_told() -> None:
+    ratings = np.random.default_rng(1).integers(0, 4, (60, 4))
+    found = estimate(
+        "fleiss_kappa",
+        ratings,
+        target="items",
+        method="bootstrap",
+        n_resamples=200,
+        rng=1,
+    )
+    assert found.interval is not None
+    assert found.interval.n_resamples == 200
+
+
 def test_a_coefficient_with_its_own_interval_keeps_it() -> None:
     numbers = [[int(grade == LABELS[0]) for grade in row] for row in MEDIUM]
     found: Estimate = estimate("icc_1", numbers, target="items", level=0.9)
