@@ -3,6 +3,7 @@
 import datetime
 import json
 import math
+import sys
 import typing
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -30,7 +31,12 @@ def decode_table(
     raw: Mapping[str, object], struct: type[msgspec.Struct], at: str = ""
 ) -> Decoded:
     """Decode a table into the fields of a struct, going on after each problem."""
-    decoded = Decoded()
+    try:
+        whole = msgspec.convert(raw, struct)
+    except msgspec.ValidationError:  # of the first problem alone: look key by key
+        decoded = Decoded()
+    else:
+        return Decoded(values=msgspec.to_builtins(whole))
     fields = {info.encode_name: info for info in msgspec.structs.fields(struct)}
     prefix = f"{at}." if at else ""
     for key in raw:
@@ -99,14 +105,12 @@ def _decode_array(
 
 
 def _leaf_problem(value: object, annotation: object, where: str) -> str | None:
-    # TOML has inf and nan; no key of a protocol does
-    if not isinstance(value, float) or math.isfinite(value):
-        try:
-            msgspec.convert(value, annotation)
-        except msgspec.ValidationError:
-            pass
-        else:
-            return None
+    try:
+        msgspec.convert(value, annotation)
+    except msgspec.ValidationError:
+        pass
+    else:
+        return None
     info = inspect.type_info(annotation)
     options = info.values if isinstance(info, inspect.LiteralType) else ()
     hint = _closest(value, [str(option) for option in options])
@@ -189,7 +193,11 @@ def _range(info: inspect.FloatType | inspect.IntType) -> str:
         ("at most", info.le),
     )
     form = "d" if isinstance(info, inspect.IntType) else "g"  # exact: up to 2**63
-    phrases = [f"{word} {limit:{form}}" for word, limit in limits if limit is not None]
+    phrases = [
+        f"{word} {limit:{form}}"
+        for word, limit in limits
+        if limit not in (None, sys.float_info.max)  # that one is all finite numbers
+    ]
     return " " + " and ".join(phrases) if phrases else ""
 
 

@@ -4,6 +4,7 @@ Every field has its unit in its name, its range in its type, and its meaning in
 ``docs/protocol.md``.
 """
 
+import sys
 from typing import Annotated, Literal
 
 import msgspec
@@ -12,12 +13,15 @@ from msgspec import Meta
 from masrel.elbow.parameters import PostCatch, ResidualReading
 from masrel.estimates import Target
 
+# TOML has inf and nan, no key of a protocol does: every float here has its limits.
+_LARGEST = sys.float_info.max
+
 _Identifier = Annotated[str, Meta(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,31}\Z")]
 _Text = Annotated[str, Meta(min_length=1)]
 _Angle = Annotated[float, Meta(gt=0, le=180)]
 _RestAngle = Annotated[float, Meta(ge=0, le=180)]
-_Positive = Annotated[float, Meta(gt=0)]
-_NonNegative = Annotated[float, Meta(ge=0)]
+_Positive = Annotated[float, Meta(gt=0, le=_LARGEST)]
+_NonNegative = Annotated[float, Meta(ge=0, le=_LARGEST)]
 
 
 class _Table(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

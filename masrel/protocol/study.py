@@ -41,24 +41,19 @@ class StudyPaths:
         return self.root / "sessions"
 
     @property
-    def ratings(self) -> Path:
-        """The folder of ratings tables."""
-        return self.root / "ratings"
-
-    @property
     def ratings_file(self) -> Path:
         """The table of ratings made from the session logs."""
-        return self.ratings / "ratings.csv"
+        return self.root / "ratings" / "ratings.csv"
 
     @property
     def published_file(self) -> Path:
         """Ratings published elsewhere, when the study has some."""
-        return self.ratings / "published.csv"
+        return self.root / "ratings" / "published.csv"
 
     @property
     def in_person_file(self) -> Path:
         """Grades given in person to the subjects behind the models."""
-        return self.ratings / "in_person.csv"
+        return self.root / "ratings" / "in_person.csv"
 
     @property
     def analysis_file(self) -> Path:
