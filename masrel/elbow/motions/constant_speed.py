@@ -7,7 +7,7 @@ from decimal import Decimal
 import numpy as np
 
 from masrel.elbow.motion import Floats
-from masrel.elbow.motions.checks import check_angles, check_positive
+from masrel.elbow.motions.checks import check_stretch
 from masrel.elbow.piece import Piece
 
 __all__ = ["ConstantSpeed"]
@@ -41,8 +41,7 @@ class ConstantSpeed:
     speed: float
 
     def __post_init__(self) -> None:
-        check_angles(self.start, self.end)
-        check_positive(self.speed, "speed", "deg/s")
+        check_stretch(self.start, self.end, speed=self.speed)
 
     @property
     def duration(self) -> float:

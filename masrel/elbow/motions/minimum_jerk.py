@@ -7,7 +7,7 @@ from decimal import Decimal
 import numpy as np
 
 from masrel.elbow.motion import Floats
-from masrel.elbow.motions.checks import check_angles, check_positive
+from masrel.elbow.motions.checks import check_stretch
 from masrel.elbow.piece import Piece
 from masrel.elbow.polynomial import ZERO
 
@@ -48,8 +48,7 @@ class MinimumJerk:
     mean_speed: float
 
     def __post_init__(self) -> None:
-        check_angles(self.start, self.end)
-        check_positive(self.mean_speed, "mean_speed", "deg/s")
+        check_stretch(self.start, self.end, mean_speed=self.mean_speed)
 
     @property
     def duration(self) -> float:

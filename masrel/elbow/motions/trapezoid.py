@@ -7,7 +7,7 @@ from decimal import Decimal
 import numpy as np
 
 from masrel.elbow.motion import Floats
-from masrel.elbow.motions.checks import check_angles, check_positive
+from masrel.elbow.motions.checks import check_stretch
 from masrel.elbow.piece import Piece
 from masrel.elbow.polynomial import ZERO
 from masrel.errors import ParameterError
@@ -48,9 +48,12 @@ class Trapezoid:
     acceleration_rate: float
 
     def __post_init__(self) -> None:
-        check_angles(self.start, self.end)
-        check_positive(self.speed, "speed", "deg/s")
-        check_positive(self.acceleration_rate, "acceleration_rate", "deg/s²")
+        check_stretch(
+            self.start,
+            self.end,
+            speed=self.speed,
+            acceleration_rate=self.acceleration_rate,
+        )
         travel = Decimal(self.end) - Decimal(self.start)
         if Decimal(self.speed) ** 2 > travel * Decimal(self.acceleration_rate):
             least = np.degrees(self.speed**2 / (self.end - self.start))

@@ -74,11 +74,19 @@ class Efforts:
     ) -> None:
         self.joints, self.path = joints, path
         end = courses.end.high
-        self.times = _Times.of(joints, courses)
+        catch = np.where(courses.catches, courses.catch.high, end)
+        catch_end = np.where(courses.leaves, courses.catch_end.high, end)
+        self.times = _Times(
+            catch=catch,
+            peak_end=np.minimum(catch + joints.peak_duration, catch_end),
+            catch_end=catch_end,
+            post_end=np.where(courses.slows, courses.post_end.high, end),
+            leaves=courses.leaves,
+            slows=courses.slows,
+        )
         rest = joints.rest_angle
         # angle above θ_rest at the start
         self.offset = np.where(np.isnan(rest), 0.0, motions.start - rest)
-        catch = self.times.catch
         self.pre_end = self._pre(catch)
         self.rise = joints.catch_torque_constant * courses.catch_speed.high
         self.caught: Flags = courses.catches
@@ -141,16 +149,13 @@ class Efforts:
         extra = np.where(j.is_additive, j.stiffness, 0.0)
         damping = np.where(j.is_additive, j.damping, 0.0)
         turn = self.path.turning(j.post_catch_stiffness + extra, damping)
-        top = self._post(np.clip(turn, t.catch_end, t.post_end))
+        place = np.clip(turn, t.catch_end, t.post_end)
+        gone = self.path.travel(place) - self.path.travel(t.catch_end)
+        base = np.where(j.is_additive, self._pre(place), self.pre_end)
+        residual = j.residual_share * self.rise
+        top = base + residual + j.post_catch_stiffness * gone  # (5)
         lasts = t.leaves & (t.post_end > t.catch_end)
         return np.where(lasts, np.maximum(largest, top), largest)
-
-    def _post(self, t: Floats) -> Floats:
-        j, path = self.joints, self.path
-        residual = j.residual_share * self.rise
-        gone = path.travel(t) - path.travel(self.times.catch_end)
-        base = np.where(j.is_additive, self._pre(t), self.pre_end)
-        return np.asarray(base + residual + j.post_catch_stiffness * gone)  # (5)
 
     @property
     def work(self) -> Floats:
@@ -223,18 +228,3 @@ class _Times:
     post_end: Floats
     leaves: Flags
     slows: Flags
-
-    @classmethod
-    def of(cls, joints: Joints, courses: Courses) -> "_Times":
-        end = courses.end.high
-        catch = np.where(courses.catches, courses.catch.high, end)
-        catch_end = np.where(courses.leaves, courses.catch_end.high, end)
-        post_end = np.where(courses.slows, courses.post_end.high, end)
-        return cls(
-            catch=catch,
-            peak_end=np.minimum(catch + joints.peak_duration, catch_end),
-            catch_end=catch_end,
-            post_end=post_end,
-            leaves=courses.leaves,
-            slows=courses.slows,
-        )
