@@ -42,7 +42,7 @@ def test_only_slow_trials_have_figures_too() -> None:
 def test_the_table_has_a_row_a_parameter_and_its_interval(found: ElbowFit) -> None:
     table = fit_table(found)
     assert [row[0] for row in table.rows] == "b k L α H Q D k_post".split()
-    assert table.simulated
+    assert table.data == "simulated"
     by_symbol = {row[0]: row for row in table.rows}
     value = float(str(by_symbol["L"][2]))
     degrees = np.degrees(found["catch_angle_constant"].value)
