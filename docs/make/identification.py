@@ -39,13 +39,13 @@ CASES = (
 
 def figures() -> None:
     """Draw the page's figures."""
-    found = fit(study(STANDARD_MODELS["HM3"], seed=5, n_slow=4, scatter=HALF))
+    fitted = fit(study(STANDARD_MODELS["HM3"], seed=5, n_slow=4, scatter=HALF))
     stamp = "SIMULATED DATA"
     views: dict[str, JointFitView | FrictionView] = {
-        "fit_slow": JointFitView(fit=found, view="slow"),
-        "fit_catches": JointFitView(fit=found, view="catches"),
-        "fit_trials": JointFitView(fit=found, view="fast"),
-        "fit_residuals": JointFitView(fit=found, view="residuals"),
+        "fit_slow": JointFitView(fit=fitted, view="slow"),
+        "fit_catches": JointFitView(fit=fitted, view="catches"),
+        "fit_trials": JointFitView(fit=fitted, view="fast"),
+        "fit_residuals": JointFitView(fit=fitted, view="residuals"),
         "fit_friction": FrictionView(fit=fit_friction([backdriven(1)])),
     }
     for name, view in views.items():

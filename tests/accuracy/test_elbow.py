@@ -31,12 +31,12 @@ def test_the_section_has_a_row_for_every_kind_and_case(text: str) -> None:
 
 def test_the_section_is_kept_where_it_stands(text: str, tmp_path: Path) -> None:
     page = tmp_path / "accuracy.md"
-    assert elbow.kept(page) == ""
+    assert elbow.written_section(page) == ""
     page.write_text("# Accuracy\n\nOther things.\n", encoding="utf-8")
-    assert elbow.kept(page) == ""
+    assert elbow.written_section(page) == ""
     page.write_text("# Accuracy\n\nOther things.\n" + text, encoding="utf-8")
-    assert elbow.kept(page) == text
+    assert elbow.written_section(page) == text
 
 
 def test_the_page_holds_the_section() -> None:
-    assert "python -m docs.make.accuracy.elbow" in elbow.kept(elbow.PAGE)
+    assert "python -m docs.make.accuracy.elbow" in elbow.written_section(elbow.PAGE)

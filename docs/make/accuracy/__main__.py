@@ -79,20 +79,20 @@ class Line:
         return self.true.value if what == "value" else self.true.standard_error
 
 
-def off(found: float | None, true: Any) -> Off:
+def off(number: float | None, true: Any) -> Off:
     """Compare a number with the exact one, None where that is undefined."""
-    if found is None:
+    if number is None:
         return Off(note="not offered")
-    if true is None or math.isnan(found):
-        return Off(note="nan" if math.isnan(found) else f"gives {found:.3g}")
+    if true is None or math.isnan(number):
+        return Off(note="nan" if math.isnan(number) else f"gives {number:.3g}")
     if true == 0:
-        return Off(absolute=abs(found))
+        return Off(absolute=abs(number))
     if isinstance(true, mpmath.mpf):
-        units = float(abs(found - true)) / math.ulp(float(true))
+        units = float(abs(number - true)) / math.ulp(float(true))
     else:
-        units = units_off(found, true)
+        units = units_off(number, true)
         true = mpmath.mpf(true.numerator) / true.denominator
-    return Off(units, relative(found, true))
+    return Off(units, relative(number, true))
 
 
 def compare(case: Case, coefficient: str, weights: str, packages: list[str]) -> Line:
@@ -158,7 +158,9 @@ def main() -> None:
     versions["Python"] = platform.python_version()
     draw(lines, DOCS / "figures" / "accuracy.png")
     path = DOCS / "accuracy.md"  # its last section is written by elbow.py
-    path.write_text(page(lines, versions) + elbow.kept(path), encoding="utf-8")
+    path.write_text(
+        page(lines, versions) + elbow.written_section(path), encoding="utf-8"
+    )
 
 
 if __name__ == "__main__":

@@ -27,14 +27,14 @@ _TEMPLATE = Path(__file__).with_name("elbow_template.md")
 
 def solved(kind: str, *, wide: bool, n_seeds: int, bar: tqdm) -> list[Errors]:
     """Errors of random scenes; one that starts beyond its range is none."""
-    found = []
+    solutions = []
     for seed in range(n_seeds):
         rng = np.random.default_rng([seed, KINDS.index(kind), wide])
         joint, motion = random_scene(rng, kind, wide=wide)
         if motion.start < joint.range_end:
-            found.append(errors(joint, motion, rng))
+            solutions.append(errors(joint, motion, rng))
         bar.update()
-    return found
+    return solutions
 
 
 def section(
@@ -42,15 +42,15 @@ def section(
 ) -> str:
     """Write the section in Markdown."""
     rows = [
-        [kind, "wide" if wide else "study", *_counts(found), *_largest(found)]
-        for (kind, wide), found in random.items()
+        [kind, "wide" if wide else "study", *_counts(solutions), *_largest(solutions)]
+        for (kind, wide), solutions in random.items()
     ]
     head = ["motion", "scenes", "number", "with a catch", "time, s", "ulp", "torque"]
     corner_rows = [
-        [name, " → ".join(found.phases), *_largest([found])]
-        for name, found in corners.items()
+        [name, " → ".join(solution.phases), *_largest([solution])]
+        for name, solution in corners.items()
     ]
-    every = [one for found in random.values() for one in found]
+    every = [one for solutions in random.values() for one in solutions]
     n_off = sum(not one.holds for one in [*every, *corners.values()])
     corner_head = ["case", "phases", "time, s", "ulp", "torque"]
     return string.Template(_TEMPLATE.read_text(encoding="utf-8")).substitute(
@@ -62,19 +62,19 @@ def section(
     )
 
 
-def _counts(found: Sequence[Errors]) -> list[str]:
-    return [str(len(found)), str(sum("catch" in one.phases for one in found))]
+def _counts(solutions: Sequence[Errors]) -> list[str]:
+    return [str(len(solutions)), str(sum("catch" in one.phases for one in solutions))]
 
 
-def _largest(found: Sequence[Errors]) -> list[str]:
+def _largest(solutions: Sequence[Errors]) -> list[str]:
     return [
-        cells.power(max(one.time_s for one in found)),
-        f"{max(one.time_ulp for one in found):.2f}",
-        cells.power(max(one.torque for one in found)),
+        cells.power(max(one.time_s for one in solutions)),
+        f"{max(one.time_ulp for one in solutions):.2f}",
+        cells.power(max(one.torque for one in solutions)),
     ]
 
 
-def kept(page: Path) -> str:
+def written_section(page: Path) -> str:
     """Return the section as it stands at the end of a page, or nothing."""
     text = page.read_text(encoding="utf-8") if page.exists() else ""
     start = text.find(HEADING)
@@ -99,7 +99,7 @@ def main() -> None:
     if any(math.isnan(one.torque) for one in corners.values()):
         raise SystemExit("a torque is undefined")
     text = PAGE.read_text(encoding="utf-8")
-    before = text.removesuffix(kept(PAGE)).rstrip("\n") + "\n"
+    before = text.removesuffix(written_section(PAGE)).rstrip("\n") + "\n"
     PAGE.write_text(before + section(random, corners), encoding="utf-8")
 
 

@@ -49,7 +49,7 @@ def draw(lines: "Sequence[Line]", path: Path) -> None:
 def _scatter(
     axes: Axes, lines: "Sequence[Line]", groups: list[str], package: str, title: str
 ) -> None:
-    spread = random.Random(package)  # the same in every run
+    jitter = random.Random(package)  # the same in every run
     row = (PACKAGES.index(package) - 2) * 0.16
     x, y = [], []
     for line in lines:
@@ -58,7 +58,7 @@ def _scatter(
             continue
         if off.is_offered and off.is_comparable and not off.is_unasked:
             x.append(_place(off))
-            y.append(groups.index(line.case.group) + row + spread.uniform(-0.05, 0.05))
+            y.append(groups.index(line.case.group) + row + jitter.uniform(-0.05, 0.05))
     colour, marker = LOOKS[package]
     axes.scatter(
         x, y, 9, color=colour, marker=marker, alpha=0.7, linewidths=0, label=package
@@ -68,8 +68,8 @@ def _scatter(
 def _place(off: "Off") -> float:
     if off.note:
         return _NONE
-    found = off.relative if off.absolute is None else off.absolute
-    return max(found, _LEAST)
+    error = off.relative if off.absolute is None else off.absolute
+    return max(error, _LEAST)
 
 
 def _frame(axes: Axes, title: str, n_groups: int) -> None:

@@ -185,10 +185,10 @@ def _of_group(lines: Lines) -> str:
 
 def _alike(lines: Lines) -> "dict[tuple[str, str], list[Line]]":
     # a case's lines of one coefficient, with all weights or all metrics
-    found: dict[tuple[str, str], list[Line]] = {}
+    rows: dict[tuple[str, str], list[Line]] = {}
     for line in lines:
         several, title = len(line.case.weights) > 1, _title(line)
         if several and line.weights in METRICS:
             title += ", metrics"
-        found.setdefault((line.case.name, title), []).append(line)
-    return found
+        rows.setdefault((line.case.name, title), []).append(line)
+    return rows

@@ -57,13 +57,13 @@ def offers_errors(package: str, name: str) -> bool:
 
 def installed(names: list[str]) -> dict[str, str]:
     """Return the versions of those packages that there are."""
-    found = {}
+    versions = {}
     for name in names:
         try:
-            found[name] = metadata.version(name)
+            versions[name] = metadata.version(name)
         except metadata.PackageNotFoundError:
             continue
-    return found
+    return versions
 
 
 def _statsmodels(case: Case, name: str, weights: str) -> Answer:
@@ -73,8 +73,8 @@ def _statsmodels(case: Case, name: str, weights: str) -> Answer:
         how = {}
         if weights != "identity":
             how = {"wt": weights, "weights": np.array(case.scale)}
-        found = cohens_kappa(_table(case), **how)
-        return Answer(float(found.kappa), float(found.std_kappa), over_n=True)
+        result = cohens_kappa(_table(case), **how)
+        return Answer(float(result.kappa), float(result.std_kappa), over_n=True)
     methods = {"fleiss_kappa": "fleiss", "brennan_prediger": "uniform"}
     if weights != "identity" or name not in methods:
         raise NotOfferedError
@@ -90,14 +90,14 @@ def _scikit_learn(case: Case, name: str, weights: str) -> Answer:
         raise NotOfferedError
     cells = _table(case)
     first, second = np.indices(cells.shape).reshape(2, -1)
-    found = cohen_kappa_score(
+    kappa = cohen_kappa_score(
         first,
         second,
         labels=list(range(len(case.scale))),
         weights=None if weights == "identity" else weights,
         sample_weight=cells.ravel(),
     )
-    return Answer(float(found))
+    return Answer(float(kappa))
 
 
 def _krippendorff(case: Case, name: str, weights: str) -> Answer:
@@ -106,12 +106,12 @@ def _krippendorff(case: Case, name: str, weights: str) -> Answer:
     level = METRICS.get(weights, "nominal")
     if name != "krippendorff_alpha" or weights not in ("identity", *METRICS):
         raise NotOfferedError
-    found = krippendorff.alpha(
+    alpha = krippendorff.alpha(
         value_counts=_counts(case).astype(np.float64),  # its integers overflow
         value_domain=np.array(case.scale, dtype=np.float64),
         level_of_measurement=level,
     )
-    return Answer(float(found))
+    return Answer(float(alpha))
 
 
 _OF_RATINGS = {
@@ -164,10 +164,10 @@ def _irrcac_of_table(case: Case, name: str, weights: str) -> Answer:
 
 
 def _of_dict(
-    found: dict[str, Any], name: str, *, over_n: bool = False, single: bool = False
+    result: dict[str, Any], name: str, *, over_n: bool = False, single: bool = False
 ) -> Answer:
     value, error = (
-        np.asarray(found["est"][key]).item() for key in ("coefficient_value", "se")
+        np.asarray(result["est"][key]).item() for key in ("coefficient_value", "se")
     )
     # of alpha it leaves out what the n - 1 ratings move; single ratings it counts as
     # items of no agreement
@@ -180,9 +180,9 @@ def _table(case: Case) -> NDArray[np.int64]:
     if case.table:
         return np.array(case.table)
     cells = np.zeros((len(case.scale),) * 2, dtype=np.int64)
-    for row, times in case.rows:
+    for row, freq in case.rows:
         if None not in row:
-            cells[row] += times
+            cells[row] += freq
     return cells
 
 
@@ -190,14 +190,14 @@ def _counts(case: Case) -> NDArray[np.int64]:
     # raters per item and category, a row for each item
     if case.counts:
         return np.array(case.counts)
-    times = [item.times for item in case.items]
-    if sum(times) > _MOST_ROWS:
+    freq = [item.times for item in case.items]
+    if sum(freq) > _MOST_ROWS:
         raise NoAnswerError("a row per item")
-    rows = np.zeros((len(times), len(case.scale)), dtype=np.int64)
+    rows = np.zeros((len(freq), len(case.scale)), dtype=np.int64)
     for at, item in enumerate(case.items):
         for code, n in item.counts.items():
             rows[at, code] = n
-    return np.repeat(rows, times, axis=0)
+    return np.repeat(rows, freq, axis=0)
 
 
 def _labels(case: Case) -> NDArray[Any]:
@@ -209,8 +209,8 @@ def _labels(case: Case) -> NDArray[Any]:
     if case.rows:
         return case.labels()
     pairs = np.array([item.raters for item in case.items], dtype=np.intp)
-    times = [item.times for item in case.items]
-    return np.repeat(np.array(case.scale)[pairs], times, axis=0)
+    freq = [item.times for item in case.items]
+    return np.repeat(np.array(case.scale)[pairs], freq, axis=0)
 
 
 PACKAGES: dict[str, Callable[[Case, str, str], Answer]] = {

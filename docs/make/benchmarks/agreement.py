@@ -48,8 +48,8 @@ def three(ratings: object) -> list[float]:
 def three_with_errors(ratings: object) -> list[tuple[float, float]]:
     """Fleiss' kappa, AC1 and alpha, each with its standard error."""
     counted = count_ratings(ratings)
-    found = [function(counted) for function in THREE]
-    return [(estimate.value, estimate.standard_error) for estimate in found]
+    estimates = [function(counted) for function in THREE]
+    return [(estimate.value, estimate.standard_error) for estimate in estimates]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -156,10 +156,10 @@ def memory(quick: bool) -> dict[str, float]:
     """Most megabytes at once, beside the input itself."""
     n = 100_000 if quick else 10_000_000
     codes: Codes = made(np.random.default_rng(3), n, 3)
-    found = {"masrel": peak_megabytes(lambda: three_with_errors(codes))}
-    found["statsmodels"] = peak_megabytes(lambda: PEERS["statsmodels"](codes))
-    print(found, flush=True)
-    return found
+    megabytes = {"masrel": peak_megabytes(lambda: three_with_errors(codes))}
+    megabytes["statsmodels"] = peak_megabytes(lambda: PEERS["statsmodels"](codes))
+    print(megabytes, flush=True)
+    return megabytes
 
 
 def exact_fleiss(codes: Codes) -> Fraction:
@@ -177,7 +177,7 @@ def exact_fleiss(codes: Codes) -> Fraction:
 def errors(quick: bool) -> list[tuple[str, int, float, float]]:
     """Package, items, seconds and error on ratings nearly all in one category."""
     rng = np.random.default_rng(4)
-    found = []
+    points = []
     for n in (
         (100, 1_000, 10_000) if quick else (100, 1_000, 10_000, 100_000, 1_000_000)
     ):
@@ -191,8 +191,8 @@ def errors(quick: bool) -> list[tuple[str, int, float, float]]:
         times = side_by_side(works, turns=3)
         for name, work in works.items():
             off = abs(Fraction(work()) - exact)
-            found.append((name, n, times[name].median, float(off)))
-    return found
+            points.append((name, n, times[name].median, float(off)))
+    return points
 
 
 def main() -> None:

@@ -225,17 +225,18 @@ def lateness(seconds: float) -> dict[str, NDArray[np.float64]]:
     missed = dict.fromkeys(loops, 0)
     for _ in range(max(1, round(seconds / SEGMENT_S))):
         for name, run in loops.items():
-            found, n_missed = run(min(seconds, SEGMENT_S))
-            late[name] += found
+            late_ns, n_missed = run(min(seconds, SEGMENT_S))
+            late[name] += late_ns
             missed[name] += n_missed
     with real_time() as granted:
         print(f"granted: {granted}")
     print(f"{'lateness, µs':20}     p50     p99   p99.9     max   missed of")
     for name in loops:
-        found = np.array(late[name]) / 1e3
-        cells = " ".join(f"{v:7.0f}" for v in np.percentile(found, [50, 99, 99.9, 100]))
-        print(f"{name:20} {cells} {missed[name]:8} {found.size}")
-    return {name: np.array(found) / 1e3 for name, found in late.items()}
+        late_us = np.array(late[name]) / 1e3
+        quantiles = np.percentile(late_us, [50, 99, 99.9, 100])
+        cells = " ".join(f"{v:7.0f}" for v in quantiles)
+        print(f"{name:20} {cells} {missed[name]:8} {late_us.size}")
+    return {name: np.array(late_ns) / 1e3 for name, late_ns in late.items()}
 
 
 def main() -> None:

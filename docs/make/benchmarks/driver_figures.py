@@ -48,12 +48,12 @@ def _figure(width: float = 5.6, height: float = 3.6) -> Figure:
 
 
 def draw_integrators(
-    found: Mapping[str, list[tuple[float, float, float]]], path: Path
+    integrators: Mapping[str, list[tuple[float, float, float]]], path: Path
 ) -> None:
     """Draw the processor time of a simulated second against the largest error."""
     figure = _figure()
     axes = figure.add_subplot()
-    for name, points in found.items():
+    for name, points in integrators.items():
         colour, marker, line = STYLES[name]
         axes.loglog(
             [seconds for _, seconds, _ in points],
@@ -64,7 +64,7 @@ def draw_integrators(
             markersize=5,
             label=name,
         )
-    for setting, seconds, error in found["exact step"]:
+    for setting, seconds, error in integrators["exact step"]:
         if setting == 0.0005:
             axes.annotate(
                 "as shipped: 0.5 ms",
@@ -83,12 +83,12 @@ def draw_integrators(
     figure.savefig(path)
 
 
-def draw_lateness(found: Mapping[str, NDArray[np.float64]], path: Path) -> None:
+def draw_lateness(loops: Mapping[str, NDArray[np.float64]], path: Path) -> None:
     """Draw the share of ticks that are later than a time."""
     figure = _figure()
     axes = figure.add_subplot()
     styles = ((BLUE, "-"), (BLACK, "--"), (GREY, ":"))
-    for (name, late), (colour, line) in zip(found.items(), styles, strict=True):
+    for (name, late), (colour, line) in zip(loops.items(), styles, strict=True):
         ordered = np.sort(np.maximum(late, 1.0))
         share = 1.0 - np.arange(ordered.size) / ordered.size
         axes.loglog(ordered, share, color=colour, linestyle=line, label=name)

@@ -88,10 +88,10 @@ def step_all(joints: Sequence[ElbowParameters], motions: Sequence[Motion]) -> No
         step(joint, motion, 1000.0)
 
 
-def ratio(timings: dict[str, Timing], slow: str, fast: str, times: float) -> str:
+def ratio(timings: dict[str, Timing], slow: str, fast: str, factor: float) -> str:
     """How often the fast goes into the slow, turn by turn, times a factor."""
     every = [
-        times * a / b
+        factor * a / b
         for a, b in zip(timings[slow].seconds, timings[fast].seconds, strict=True)
     ]
     low, middle, high = np.quantile(every, [0.25, 0.5, 0.75])
@@ -102,7 +102,7 @@ def many_scenes(kind: str, turns: int) -> str:
     """Events and peak torque of 10 000 scenes beside the plain loop over some."""
     joints, motions = scenes(kind, N_SCENES)
     outputs = (*EVENTS, "peak_torque")
-    found = side_by_side(
+    timings = side_by_side(
         {
             "step": lambda: step_all(joints[:N_STEPPED], motions[:N_STEPPED]),
             "together": lambda: evaluate(joints, motions, outputs),
@@ -113,9 +113,9 @@ def many_scenes(kind: str, turns: int) -> str:
     alone = evaluate(joints, motions, outputs).n_alone
     scaled = N_SCENES / N_STEPPED
     return (
-        f"| {kind} | {1e3 * found['together'].median:.0f} ms "
-        f"| {scaled * found['step'].median:.1f} s "
-        f"| {ratio(found, 'step', 'together', scaled)} | {alone} |"
+        f"| {kind} | {1e3 * timings['together'].median:.0f} ms "
+        f"| {scaled * timings['step'].median:.1f} s "
+        f"| {ratio(timings, 'step', 'together', scaled)} | {alone} |"
     )
 
 
@@ -127,7 +127,7 @@ def many_traces(kind: str, turns: int) -> str:
     if not made.shape == sampled.shape == (N_TRACES, N_SAMPLES):
         raise SystemExit(f"traces of shapes {made.shape} and {sampled.shape}")
     out = np.empty_like(made)
-    found = side_by_side(
+    timings = side_by_side(
         {
             "multiply": lambda: np.multiply(made, 2.0, out=out),
             "sampled": lambda: torque_traces(joints, motions, reading="sampled"),
@@ -139,9 +139,9 @@ def many_traces(kind: str, turns: int) -> str:
     )
     scaled = N_TRACES / N_STEPPED
     return "\n".join(
-        f"| {kind} | {reading} | {1e3 * found[reading].median:.1f} ms "
-        f"| {ratio(found, reading, 'multiply', 1.0)} "
-        f"| {ratio(found, 'step', reading, scaled)} |"
+        f"| {kind} | {reading} | {1e3 * timings[reading].median:.1f} ms "
+        f"| {ratio(timings, reading, 'multiply', 1.0)} "
+        f"| {ratio(timings, 'step', reading, scaled)} |"
         for reading in ("exact", "sampled")
     )
 
@@ -173,8 +173,8 @@ def work_against_error(turns: int) -> list[Point]:
     with mp.workdps(50):
         for motion in motions:
             (true,) = solved(joint, motion).stretches
-            for key, (found, _) in ways.items():
-                catch, end = found(joint, motion)
+            for key, (find_events, _) in ways.items():
+                catch, end = find_events(joint, motion)
                 off = float(max(abs(catch - true.catch), abs(end - true.catch_end)))
                 errors[key] = max(errors[key], off)
 
@@ -182,7 +182,10 @@ def work_against_error(turns: int) -> list[Point]:
         return lambda: [way(joint, motion) for motion in motions]
 
     timed = side_by_side(
-        {" ".join(key): over(timed or found) for key, (found, timed) in ways.items()},
+        {
+            " ".join(key): over(timed or find_events)
+            for key, (find_events, timed) in ways.items()
+        },
         turns=turns,
         clock=time.process_time,
     )
@@ -202,8 +205,8 @@ Way = Callable[[ElbowParameters, Motion], tuple[float, float]]
 
 
 def _exact(joint: ElbowParameters, motion: Motion) -> tuple[float, float]:
-    found = events(joint, motion)
-    return found.catch, found.catch_end
+    result = events(joint, motion)
+    return result.catch, result.catch_end
 
 
 def _exact_and_peak(joint: ElbowParameters, motion: Motion) -> tuple[float, float]:
@@ -211,12 +214,12 @@ def _exact_and_peak(joint: ElbowParameters, motion: Motion) -> tuple[float, floa
 
 
 def _sampled(rate_hz: float) -> Way:
-    def found(joint: ElbowParameters, motion: Motion) -> tuple[float, float]:
+    def find_events(joint: ElbowParameters, motion: Motion) -> tuple[float, float]:
         made = trace(joint, motion, rate_hz=rate_hz)
         catch, end = (made.time[np.argmax(made.phase == code)] for code in (1, 2))
         return float(catch), float(end)
 
-    return found
+    return find_events
 
 
 def _stepped(rate_hz: float) -> Way:
@@ -224,11 +227,11 @@ def _stepped(rate_hz: float) -> Way:
 
 
 def _integrated(rtol: float) -> Way:
-    def found(joint: ElbowParameters, motion: Motion) -> tuple[float, float]:
+    def find_events(joint: ElbowParameters, motion: Motion) -> tuple[float, float]:
         ode = Ode(joint, motion, rtol=rtol, max_step=np.inf, method="RK45")
         return ode.found.get("catch", np.nan), ode.found.get("catch_end", np.nan)
 
-    return found
+    return find_events
 
 
 def approach() -> tuple[list[float], dict[str, np.ndarray]]:
@@ -238,13 +241,13 @@ def approach() -> tuple[list[float], dict[str, np.ndarray]]:
     late: dict[str, list[list[float]]] = {"catch": [], "catch end": []}
     for speed in np.linspace(70.0, 130.0, 9):
         motion = reach(float(speed))
-        found = events(joint, motion)
+        true = events(joint, motion)
         rows: dict[str, list[float]] = {"catch": [], "catch end": []}
         for rate in rates:
             made = trace(joint, motion, rate_hz=rate)
             for code, name, exact in (
-                (1, "catch", found.catch),
-                (2, "catch end", found.catch_end),
+                (1, "catch", true.catch),
+                (2, "catch end", true.catch_end),
             ):
                 rows[name].append(
                     float(made.time[np.argmax(made.phase == code)]) - exact

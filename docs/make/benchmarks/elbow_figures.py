@@ -37,13 +37,13 @@ def draw_work(points: Sequence["Point"]) -> None:
         figure = Figure(figsize=(5.6, 3.6))
         axes = figure.subplots()
         for way, (label, colour, marker, size) in _WAYS.items():
-            own = [point for point in points if point.way == way]
-            x = [1e3 * point.seconds for point in own]
-            y = [max(point.error_s, 1e-17) for point in own]
+            of_way = [point for point in points if point.way == way]
+            x = [1e3 * point.seconds for point in of_way]
+            y = [max(point.error_s, 1e-17) for point in of_way]
             axes.loglog(x, y, marker=marker, color=colour, markersize=size, lw=0.8,
                         label=label)  # fmt: skip
             if way in ("stepped", "solve_ivp"):
-                for point, at, height in zip(own, x, y, strict=True):
+                for point, at, height in zip(of_way, x, y, strict=True):
                     axes.annotate(
                         point.setting, (at, height), xytext=(6, 4), fontsize=6.5,
                         textcoords="offset points", color=colour,

@@ -41,14 +41,14 @@ def draw_times(lines: "Sequence[Line]", path: Path) -> None:
     figure = _figure()
     axes = figure.add_subplot()
     for name, colour in COLOURS.items():
-        found = [
+        of_package = [
             (_ratings(line.name), line.times[name].median)
             for line in lines
             if name in line.times
         ]
-        if found:
+        if of_package:
             label = name.replace("masrel", "masrel, three coefficients")
-            x, y = zip(*found, strict=True)
+            x, y = zip(*of_package, strict=True)
             axes.loglog(x, y, marker=MARKERS[name], color=colour, label=label)
     axes.set_xlabel("ratings")
     axes.set_ylabel("time (s)")
@@ -63,9 +63,11 @@ def draw_errors(points: Sequence[tuple[str, int, float, float]], path: Path) -> 
     axes = figure.add_subplot()
     floor = 1e-17
     for name, colour in COLOURS.items():
-        found = [(s, max(off, floor), n) for who, n, s, off in points if who == name]
-        if found:
-            x, y, items = zip(*found, strict=True)
+        of_package = [
+            (s, max(off, floor), n) for who, n, s, off in points if who == name
+        ]
+        if of_package:
+            x, y, items = zip(*of_package, strict=True)
             axes.loglog(x, y, MARKERS[name], color=colour, label=name, alpha=0.9)
             for i, (at, off, n) in enumerate(zip(x, y, items, strict=True)):
                 axes.annotate(
@@ -90,8 +92,8 @@ def _ratings(name: str) -> int:
 
 def slope(lines: "Sequence[Line]") -> float:
     """Return the steepest of our slopes from 10 000 items on, with errors."""
-    found = [(_ratings(x.name), x.times[OURS[1]].median) for x in lines]
-    large = np.log([pair for pair in found if pair[0] >= 50_000])
+    points = [(_ratings(x.name), x.times[OURS[1]].median) for x in lines]
+    large = np.log([pair for pair in points if pair[0] >= 50_000])
     return float((np.diff(large[:, 1]) / np.diff(large[:, 0])).max())
 
 
@@ -182,10 +184,10 @@ def _with_errors(lines: "Sequence[Line]") -> str:
 def _seconds(line: "Line", name: str) -> str:
     if name not in line.times:
         return "–"
-    found = line.times[name]
+    timing = line.times[name]
     units = (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6))
-    unit, scale = next((u for u in units if found.median >= u[1]), units[-1])
-    return f"{found.median / scale:.3g} {unit} ± {100 * found.spread:.0f} %"
+    unit, scale = next((u for u in units if timing.median >= u[1]), units[-1])
+    return f"{timing.median / scale:.3g} {unit} ± {100 * timing.spread:.0f} %"
 
 
 def _ratio(line: "Line") -> str:

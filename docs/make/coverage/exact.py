@@ -44,9 +44,9 @@ def _quantiles(key: Key, n_items: int, tails: tuple[float, ...]) -> tuple[float,
 def _logs(key: Key) -> Floats:
     # logarithms of the coefficients of A^t
     total = np.ones(1, dtype=np.longdouble)
-    for times in key:
-        if times[0]:
-            total = np.convolve(total, _moments(times))
+    for powers in key:
+        if powers[0]:
+            total = np.convolve(total, _moments(powers))
     with np.errstate(divide="ignore"):
         logs = np.log(total).astype(np.float64)
     return np.asarray(logs - gammaln(len(key) + np.arange(total.size)))
@@ -66,22 +66,24 @@ def _log_density(logs: Floats, logit: Floats, n_raters: int, n_items: int) -> Fl
 
 
 @lru_cache(maxsize=100_000)
-def _moments(times: tuple[int, ...]) -> NDArray[np.longdouble]:
-    # coefficients of Π_j (x + j)^times[j], each times Γ(1 + t)
-    found = np.zeros(times[0] + 1, dtype=np.longdouble)
-    found[-1] = 1.0
-    for depth, power in enumerate(times[1:], start=1):
-        found = np.convolve(found, _power(depth, power))
-    return found * _factorials(found.size)
+def _moments(powers: tuple[int, ...]) -> NDArray[np.longdouble]:
+    # coefficients of Π_j (x + j)^powers[j], each times Γ(1 + t)
+    polynomial = np.zeros(powers[0] + 1, dtype=np.longdouble)
+    polynomial[-1] = 1.0
+    for depth, power in enumerate(powers[1:], start=1):
+        polynomial = np.convolve(polynomial, _power(depth, power))
+    return polynomial * _factorials(polynomial.size)
 
 
 @lru_cache(maxsize=20_000)
 def _power(depth: int, power: int) -> NDArray[np.longdouble]:
     # ascending coefficients of (x + depth)^power
-    found = np.ones(1, dtype=np.longdouble)
+    polynomial = np.ones(1, dtype=np.longdouble)
     for _ in range(power):
-        found = np.convolve(found, np.array([depth, 1.0], dtype=np.longdouble))
-    return found
+        polynomial = np.convolve(
+            polynomial, np.array([depth, 1.0], dtype=np.longdouble)
+        )
+    return polynomial
 
 
 @lru_cache(maxsize=4_000)

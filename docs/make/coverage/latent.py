@@ -89,9 +89,9 @@ class LatentTrait:
         total = np.zeros((size, nodes.size, len(self.shares)))
         with_itself = np.zeros((size, nodes.size))
         for bias in biases.T:
-            own = self.grades(nodes + bias[:, None], scale)
-            total += own
-            with_itself += (own**2).sum(axis=-1)
+            of_rater = self.grades(nodes + bias[:, None], scale)
+            total += of_rater
+            with_itself += (of_rater**2).sum(axis=-1)
         agree = ((total**2).sum(axis=-1) - with_itself) / (r * (r - 1)) @ weights
         shares = np.einsum("q,sqk->sk", weights, total) / r
         return np.asarray(1.0 - (1.0 - agree) / (1.0 - (shares**2).sum(axis=-1)))

@@ -34,9 +34,9 @@ class DirichletMultinomial:
         underflows where a is 0.01.
         """
         shape = np.array(self.shares) * (1.0 / self.kappa - 1.0)
-        wanted = (size, n_items, shape.size)
-        logs = np.log(rng.gamma(shape + 1.0, size=wanted))
-        logs += np.log1p(-rng.random(wanted)) / shape
+        dimensions = (size, n_items, shape.size)
+        logs = np.log(rng.gamma(shape + 1.0, size=dimensions))
+        logs += np.log1p(-rng.random(dimensions)) / shape
         ratios = np.exp(logs - logs.max(axis=-1, keepdims=True))
         return np.asarray(ratios / ratios.sum(axis=-1, keepdims=True))
 

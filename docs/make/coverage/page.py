@@ -51,9 +51,9 @@ def _seen(cells: Cells) -> str:
     for target in TARGETS:
         of_target = [cell for cell in cells if cell.target == target]
         for name in METHODS[target]:
-            found = [cell.methods[name] for cell in of_target]
-            shares = [counted.coverage for counted in found]
-            width = sum(counted.width for counted in found) / len(found)
+            of_method = [cell.methods[name] for cell in of_target]
+            shares = [counted.coverage for counted in of_method]
+            width = sum(counted.width for counted in of_method) / len(of_method)
             inside = sum(map(is_within, shares))
             ends = f"{100 * min(shares):.0f}", f"{100 * max(shares):.0f}"
             rows.append([target, name, *ends, f"{inside}", f"{width:.2f}"])
@@ -65,12 +65,12 @@ def _of_default(cells: Cells) -> str:
     rows = []
     for target, model, design in _groups():
         row = [_cell(cells, target, model, design, kappa) for kappa in KAPPAS]
-        found = [cell.methods[DEFAULT] for cell in row]
+        defaults = [cell.methods[DEFAULT] for cell in row]
         covers = [
             f"{marked(of)} ± {100 * cell.error(of.coverage):.1f}"
-            for of, cell in zip(found, row, strict=True)
+            for of, cell in zip(defaults, row, strict=True)
         ]
-        widths = [f"{of.width:.2f}" for of in found]
+        widths = [f"{of.width:.2f}" for of in defaults]
         rows.append([target, model, design, *covers, *widths])
     kappas = [f"κ {kappa:g}" for kappa in KAPPAS]
     head = [
@@ -117,8 +117,8 @@ def _of_others(cells: Cells) -> str:
         here = [cell for cell in cells if cell.target == target]
         rows = []
         for model, design in dict.fromkeys((c.model, str(c.design)) for c in here):
-            found = [_cell(here, target, model, design, kappa) for kappa in KAPPAS]
-            shown = [_triple(found, name) for name in (DEFAULT, *compared)]
+            row = [_cell(here, target, model, design, kappa) for kappa in KAPPAS]
+            shown = [_triple(row, name) for name in (DEFAULT, *compared)]
             rows.append([model, design, *shown])
         head = ["model", "items × raters", DEFAULT, *compared]
         tables += [f"### {_TITLES[target]}", markdown_table(head, rows, n_text=2)]
@@ -135,14 +135,14 @@ def _of_target(cells: Cells) -> Iterator[str]:
         for model in MODELS:
             rows = []
             for name in METHODS[target]:
-                found = [
+                by_design = [
                     [_cell(cells, target, model, str(d), k) for k in KAPPAS]
                     for d in DESIGNS
                 ]
-                covers = [_triple(of_design, name) for of_design in found]
+                covers = [_triple(of_design, name) for of_design in by_design]
                 widths = [
                     " / ".join(f"{cell.methods[name].width:.2f}" for cell in of_design)
-                    for of_design in found
+                    for of_design in by_design
                 ]
                 rows.append([name, *covers, *widths])
             designs = [str(design) for design in DESIGNS]
@@ -159,10 +159,8 @@ def _groups() -> Iterator[tuple[str, str, str]]:
 
 
 def _cell(cells: Cells, target: str, model: str, design: str, kappa: float) -> Cell:
-    wanted = target, model, design, kappa
-    return next(
-        c for c in cells if (c.target, c.model, str(c.design), c.kappa) == wanted
-    )
+    key = target, model, design, kappa
+    return next(c for c in cells if (c.target, c.model, str(c.design), c.kappa) == key)
 
 
 def marked(counted: Counted) -> str:

@@ -89,11 +89,11 @@ def simulate(
     """Count a cell."""
     case = draw_case(target, model, design, kappa, size)
     truth = case.studies.truth
-    found = {}
+    methods = {}
     for name, method in METHODS[target].items():
         bounds = method(case)
         width = np.where(bounds.exist, bounds.high - bounds.low, np.nan)
-        found[name] = Counted(
+        methods[name] = Counted(
             coverage=float(bounds.cover(truth).mean()),
             width=float(np.nanmean(width)),
             answered=float(bounds.exist.mean()),
@@ -104,7 +104,7 @@ def simulate(
         design=design,
         kappa=kappa,
         n_studies=size,
-        methods=found,
+        methods=methods,
         spreadless=float(1.0 - (case.spread.error > 0.0).mean()),
         single=float(np.isnan(case.value).mean()),
         truth=float(np.nanmean(truth)),

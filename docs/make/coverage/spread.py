@@ -50,8 +50,10 @@ def spread_of(studies: Studies) -> Spread:
     """Compute it in slices that fit into the cache of a processor."""
     weight = studies.codes.size * studies.n_categories
     parts = np.array_split(studies.codes, -(-weight // 1_000_000))
-    found = [_spread(part, studies.n_categories) for part in parts]
-    joined = {f: np.concatenate([getattr(part, f) for part in found]) for f in _FIELDS}
+    computed = [_spread(part, studies.n_categories) for part in parts]
+    joined = {
+        f: np.concatenate([getattr(part, f) for part in computed]) for f in _FIELDS
+    }
     return Spread(**joined)
 
 
@@ -71,14 +73,14 @@ def _spread(codes: Codes, n_categories: int) -> Spread:
     raters = _kappa(left, totals[:, None] - of_rater, n, r - 1)
     both = left[:, None] - pairs[:, :, None] + 2.0 * partners
     rest = (totals[:, None] - counts)[:, :, None] - of_rater[:, None] + chosen
-    own = _kappa(both, rest, n - 1, r - 1) - items[:, :, None] - raters[:, None]
-    own = own + value[:, None, None]
+    of_cell = _kappa(both, rest, n - 1, r - 1) - items[:, :, None] - raters[:, None]
+    of_cell = of_cell + value[:, None, None]
     return Spread(
         value=value,
         error=_delta(value, pairs, counts),
         without_item=items,
         without_rater=raters,
-        of_cells=(n - 1) * (r - 1) / (n * r) * (own**2).sum(axis=(1, 2)),
+        of_cells=(n - 1) * (r - 1) / (n * r) * (of_cell**2).sum(axis=(1, 2)),
     )
 
 
@@ -100,6 +102,6 @@ def _delta(value: Floats, pairs: Floats, counts: Floats) -> Floats:
     chance = (shares**2).sum(axis=-1)[:, None]
     towards = np.einsum("sik,sk->si", counts, shares) / r
     with np.errstate(divide="ignore", invalid="ignore"):
-        own = (pairs / (r * (r - 1)) - chance) / (1.0 - chance)
-        own -= 2.0 * (1.0 - value[:, None]) * (towards - chance) / (1.0 - chance)
-    return np.asarray(own.std(axis=1, ddof=1) / np.sqrt(n))
+        influence = (pairs / (r * (r - 1)) - chance) / (1.0 - chance)
+        influence -= 2.0 * (1.0 - value[:, None]) * (towards - chance) / (1.0 - chance)
+    return np.asarray(influence.std(axis=1, ddof=1) / np.sqrt(n))

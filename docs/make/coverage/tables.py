@@ -21,8 +21,8 @@ def quasi(kappa: float, n_grades: int) -> Floats:
     """Pairs that agree with a chance of kappa, and by accident else."""
     first = np.array(SHARES[n_grades])
     second = first * np.linspace(1.2, 0.8, n_grades)
-    apart = np.outer(first, second / second.sum())
-    return kappa * np.diag(first) + (1.0 - kappa) * apart
+    accident = np.outer(first, second / second.sum())
+    return kappa * np.diag(first) + (1.0 - kappa) * accident
 
 
 def latent(kappa: float, n_grades: int) -> Floats:
@@ -113,10 +113,10 @@ class Tables:
         """The variance over items; ``nan`` where one left out leaves no estimate."""
         q = self.counts.shape[-1]
         left = self.counts[:, None] - np.eye(q * q).reshape(1, q * q, q, q)
-        times = self.counts.reshape(-1, q * q)
-        found = np.where(times > 0.0, self.formula(np.maximum(left, 0.0)), 0.0)
-        mean = (times * found).sum(axis=1, keepdims=True) / self.n_items
-        squares = (times * (found - mean) ** 2).sum(axis=1)
+        freq = self.counts.reshape(-1, q * q)
+        without_one = np.where(freq > 0.0, self.formula(np.maximum(left, 0.0)), 0.0)
+        mean = (freq * without_one).sum(axis=1, keepdims=True) / self.n_items
+        squares = (freq * (without_one - mean) ** 2).sum(axis=1)
         return (self.n_items - 1) / self.n_items * squares
 
     def posterior(self, prior: Floats) -> Bounds:

@@ -83,21 +83,21 @@ def intervals(tables: Tables) -> dict[str, Bounds]:
 def count(question: Question, size: int) -> dict[str, Counted]:
     """Count a cell."""
     tables, truth = draw(question, size)
-    found = {}
+    methods = {}
     for name, bounds in intervals(tables).items():
         width = np.where(bounds.exist, bounds.high - bounds.low, np.nan)
-        found[name] = Counted(
+        methods[name] = Counted(
             coverage=float(bounds.cover(np.full(size, truth)).mean()),
             width=float(np.nanmean(width)),
             answered=float(bounds.exist.mean()),
         )
-    return found
+    return methods
 
 
 def page(cells: dict[Question, dict[str, Counted]], size: int) -> str:
     """Write the page in Markdown."""
     text = _TEMPLATE.read_text(encoding="utf-8")
-    shares = [found["default"].coverage for found in cells.values()]
+    shares = [of_cell["default"].coverage for of_cell in cells.values()]
     return Template(text).substitute(
         n_studies=f"{size:,}".replace(",", " "),
         few=FEW,
@@ -115,10 +115,12 @@ def _tables(cells: dict[Question, dict[str, Counted]]) -> Iterator[str]:
         for question in cells:
             if question.coefficient != coefficient or question.kappa != KAPPAS[0]:
                 continue
-            found = [cells[question._replace(kappa=kappa)] for kappa in KAPPAS]
-            covers = [" / ".join(marked(c[name]) for c in found) for name in METHODS]
+            of_kappas = [cells[question._replace(kappa=kappa)] for kappa in KAPPAS]
+            covers = [
+                " / ".join(marked(c[name]) for c in of_kappas) for name in METHODS
+            ]
             widths = [
-                " / ".join(f"{c[name].width:.2f}" for c in found)
+                " / ".join(f"{c[name].width:.2f}" for c in of_kappas)
                 for name in ("default", "posterior")
             ]
             place = [question.model, str(question.n_grades), str(question.n_items)]
