@@ -19,7 +19,7 @@ https://doi.org/10.1214/aos/1176342871
 """
 
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -43,14 +43,6 @@ _MAX_LOG_TILT = 160.0  # either way: beyond any posterior that floats can hold
 _NATS = 45.0  # what is left out is below exp(-40) of the density's largest value
 _MAX_NEWTON = 12  # steps; the method is quadratic,
 _CLOSE = 1e-9  # so that after a step as small as that, of x, the next changes nothing
-
-
-class Bulk(NamedTuple):
-    """Where the posterior of ρ is not negligible."""
-
-    logits: Floats  # (n,): of ρ, ascending
-    log_tilts: Floats  # (n,): log λ at each
-    mode: float  # about the logit of the highest density
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -156,122 +148,179 @@ class DirichletMultinomial:
         share = 1.0 / (x[..., None] + depth)
         return x, x * (self.powers * share).sum(axis=-1)
 
-    def bulk(self) -> Bulk:
-        """Narrow a grid of tilts until a dozen of them lie where the density does."""
-        # The largest term of the density's logarithm is the density up to a slowly
-        # varying factor.
-        a, a_total = self.prior[: len(self.powers)], float(self.prior.sum())
-        depth = np.arange(self.sizes.size)
+
+class RhoDensity:
+    """The log-density of logit ρ, constants left out."""
+
+    def __init__(self, model: DirichletMultinomial) -> None:
+        # The bulk of the density is found by narrowing a grid of tilts until a dozen of
+        # them lie there: the largest term of the density's logarithm is the density up
+        # to a slowly varying factor.
+        self._model = model
+        a, a_total = model.prior[: len(model.powers)], float(model.prior.sum())
+        depth = np.arange(model.sizes.size)
         grid = np.linspace(_MAX_LOG_TILT, -_MAX_LOG_TILT, 65)
         for _ in range(30):
             tilt = np.exp(grid)
-            x, t = self.saddle(tilt)
+            x, t = model.saddle(tilt)
             total = t.sum(axis=1)
             logits = -np.log(tilt) - np.log(a_total + total)
-            terms = (self.powers * np.log(x[..., None] + depth)).sum(axis=-1)
+            terms = (model.powers * np.log(x[..., None] + depth)).sum(axis=-1)
             terms += gammaln(a + t) - t * np.log(x)
             density = terms.sum(axis=1) - gammaln(a_total + total) - total * logits
-            density += self.log_cofactor(logits)
+            density += model.log_cofactor(logits)
             best = int(density.argmax())
             high = np.flatnonzero(density > density[best] - _NATS)
             first, last = max(high[0] - 1, 0), min(high[-1] + 1, grid.size - 1)
             if high.size >= 12:
-                inside = slice(first, last + 1)
-                return Bulk(logits[inside], grid[inside], float(logits[best]))
+                # (n,): where the density is not negligible, and log λ there
+                self.logits = logits[first : last + 1]
+                self._log_tilts = grid[first : last + 1]
+                self._expansions = [self._expand(float(logits[best]))]
+                return
             grid = np.linspace(grid[first], grid[last], 33)
         raise ConvergenceError("the posterior is too narrow to be found")
 
+    def __call__(self, logit: Floats) -> Floats:
+        """Return the log-density at logits of ρ, (n,)."""
+        out = np.empty(logit.size)
+        left = np.arange(logit.size)
+        n_tried = 0
+        while left.size:
+            is_new = n_tried == len(self._expansions)
+            if is_new:
+                middle = float(logit[left[left.size // 2]])
+                self._expansions.append(self._expand(middle))
+            log_tilt, powers, at_tilt, complete = self._expansions[n_tried]
+            n_tried += 1
+            terms = at_tilt + np.multiply.outer(-logit[left] - log_tilt, powers)
+            total = log_sum_exp(terms)
+            # Coefficients are log-concave: beyond an edge the terms only get smaller.
+            lowest = complete[0] | (terms[:, 0] < total + _NEGLIGIBLE)
+            highest = complete[1] | (terms[:, -1] < total + _NEGLIGIBLE)
+            right = lowest & highest  # nothing that is needed was dropped
+            if is_new and not right.any():
+                raise ConvergenceError(
+                    "the exact posterior needs terms that floats cannot hold; "
+                    'method="emcee" samples it'
+                )
+            out[left[right]] = total[right]
+            left = left[~right]
+        return out + self._model.log_cofactor(logit)
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Powers:
+    def _expand(self, logit: float) -> "Expansion":
+        # the polynomial in A, tilted to where the density of such a logit comes from
+        model = self._model
+        log_tilt = float(np.interp(logit, self.logits, self._log_tilts))
+        x, _ = model.saddle(np.exp([log_tilt]))
+        product = Powers(0, np.ones(1), 0.0)
+        for exponents, a, at in zip(model.powers, model.prior, x[0], strict=False):
+            category = tilted(exponents, float(a), float(at), log_tilt)
+            product = multiply(product, category, TRIMMED)
+        kept = np.flatnonzero(product.values > _KEPT)
+        values = product.values[kept[0] : kept[-1] + 1]
+        t = product.first + np.arange(kept[0], kept[-1] + 1, dtype=np.float64)
+        log = np.log(values) + product.scale
+        return Expansion(
+            log_tilt=log_tilt,
+            powers=t,
+            terms=log - gammaln(float(model.prior.sum()) + t),
+            complete=(
+                bool(t[0] == model.powers[:, 0].sum()),
+                bool(t[-1] == model.powers.sum()),
+            ),
+        )
+
+
+class Expansion(NamedTuple):
+    """The polynomial in A at one tilt: the logarithm of each term at A = λ."""
+
+    log_tilt: float
+    powers: Floats  # t, (n_terms,)
+    terms: Floats  # (n_terms,)
+    complete: tuple[bool, bool]  # whether no power is dropped below, and above
+
+
+class Powers(NamedTuple):
     """Coefficients of consecutive powers, as value times exp(scale)."""
 
     first: int  # the lowest power
-    values: Floats = field(compare=False, repr=False)  # (n_powers,): positive
-    scale: float = 0.0  # logarithm of what all are to be multiplied by
-
-    def trimmed(self, share: float) -> "Powers":
-        """Drop both ends as far as they are below a share of the largest."""
-        high = np.flatnonzero(self.values > share * self.values.max())
-        return Powers(
-            first=self.first + int(high[0]),
-            values=self.values[high[0] : high[-1] + 1],
-            scale=self.scale,
-        )
-
-    def multiply(self, other: "Powers") -> "Powers":
-        """Multiply two polynomials."""
-        values = np.convolve(self.values, other.values)
-        largest = float(values.max())
-        return Powers(
-            first=self.first + other.first,
-            values=values / largest,
-            scale=self.scale + other.scale + float(np.log(largest)),
-        )
+    values: Floats  # (n_powers,): positive
+    scale: float  # logarithm of what all are to be multiplied by
 
 
-@dataclass(frozen=True)
-class Category:
-    """One category's coefficients times the moments Γ(a + t) / Γ(a) of its share."""
-
-    powers: Floats  # (n_depths,): N_j
-    a: float  # the parameter of its share
-
-    def tilted(self, x: float, log_tilt: float) -> Powers:
-        """Return the coefficients of λ^t, the constant Γ(a) left out."""
-        by_mass = self._sum_of_binomials(x)
-        t = by_mass.first + np.arange(by_mass.values.size)
-        log = np.log(by_mass.values) - t * np.log(x)
-        result = self._with_moments(by_mass.first, by_mass.scale + log, log_tilt)
-        # The moments rise faster than any tilt: they may need what was dropped.
-        inside = by_mass.values[result.first - by_mass.first :][: result.values.size]
-        lacks_low = t[0] > self.powers[0] and inside[0] < _RIGHT
-        lacks_high = t[-1] < self.powers.sum() and inside[-1] < _RIGHT
-        if lacks_low or lacks_high:
-            log = self._log_coefficients
-            result = self._with_moments(int(self.powers[0]), log, log_tilt)
-        return result
-
-    def _with_moments(self, first: int, log: Floats, log_tilt: float) -> Powers:
+def tilted(
+    exponents: Floats, a: float, x: float, log_tilt: float, *, exact: bool = False
+) -> Powers:
+    """Return one category's coefficients times Γ(a + t) λ^t, the moments tilted."""
+    # exponents (n_depths,): N_j of Π_j (x + j)^N_j
+    if exact:
+        first, log = int(exponents[0]), log_coefficients(tuple(exponents.tolist()))
         t = first + np.arange(log.size)
-        log = log + gammaln(self.a + t) + t * log_tilt
-        largest = float(log.max())
-        values = np.exp(log - largest)
-        return Powers(first=first, values=values, scale=largest).trimmed(TRIMMED)
+    else:
+        first, mass, scale = sum_of_binomials(exponents, x)
+        t = first + np.arange(mass.size)
+        log = scale + (np.log(mass) - t * np.log(x))
+    log = log + gammaln(a + t) + t * log_tilt
+    largest = float(log.max())
+    values = np.exp(log - largest)
+    low, high = np.flatnonzero(values > TRIMMED)[[0, -1]].tolist()
+    if not exact:
+        # The moments rise faster than any tilt: they may need what was dropped.
+        lacks_low = t[0] > exponents[0] and mass[low] < _RIGHT
+        lacks_high = t[-1] < exponents.sum() and mass[high] < _RIGHT
+        if lacks_low or lacks_high:
+            return tilted(exponents, a, x, log_tilt, exact=True)
+    return Powers(first + low, values[low : high + 1], largest)
 
-    def _sum_of_binomials(self, x: float) -> Powers:
-        # Divided by its value at x, Π_j (x + j)^N_j is the distribution of a sum of
-        # binomials with probabilities x / (x + j).
-        value = float(self.powers @ np.log(x + np.arange(self.powers.size)))
-        result = Powers(first=int(self.powers[0]), values=np.ones(1), scale=value)
-        nats = -np.log(_DROPPED)
-        for j, n in enumerate(self.powers.tolist()):
-            if not (j and n):
-                continue
-            p, q = x / (x + j), j / (x + j)
-            # only as far out as Bernstein's inequality says matters
-            reach = nats / 3.0 + np.sqrt(nats**2 / 9.0 + 2.0 * nats * n * p * q)
-            low, high = max(0, int(n * p - reach)), min(int(n), int(n * p + reach) + 1)
-            k = np.arange(low, high + 1)
-            log = gammaln(n + 1.0) - gammaln(k + 1.0) - gammaln(n - k + 1.0)
-            log += xlogy(k, p) + xlogy(n - k, q)
-            binomial = Powers(first=low, values=np.exp(log))
-            result = result.multiply(binomial).trimmed(_DROPPED)
-        return result
 
-    @cached_property
-    def _log_coefficients(self) -> Floats:
-        # factor by factor in logarithms, which drops nothing
-        if self.powers[1:].sum() > _MAX_FACTORS:
-            raise ConvergenceError(
-                f"the exact posterior needs {self.powers.sum():.0f} ratings in one "
-                'category multiplied out in logarithms; method="emcee" samples it'
-            )
-        log = np.zeros(1)
-        for j, n in enumerate(self.powers.tolist()):
-            for _ in range(int(n) if j else 0):
-                log = log_convolve(np.array([np.log(j), 0.0]), log)  # times x + j
-        return log
+def sum_of_binomials(exponents: Floats, x: float) -> Powers:
+    """Return the terms of Π_j (x + j)^N_j at x, by power, as shares of their sum."""
+    # They are the distribution of a sum of binomials with probabilities x / (x + j).
+    value = float(exponents @ np.log(x + np.arange(exponents.size)))
+    result = Powers(int(exponents[0]), np.ones(1), value)
+    nats = -np.log(_DROPPED)
+    for j, n in enumerate(exponents.tolist()):
+        if not (j and n):
+            continue
+        p, q = x / (x + j), j / (x + j)
+        # only as far out as Bernstein's inequality says matters
+        reach = nats / 3.0 + np.sqrt(nats**2 / 9.0 + 2.0 * nats * n * p * q)
+        low, high = max(0, int(n * p - reach)), min(int(n), int(n * p + reach) + 1)
+        k = np.arange(low, high + 1)
+        log = gammaln(n + 1.0) - gammaln(k + 1.0) - gammaln(n - k + 1.0)
+        log += xlogy(k, p) + xlogy(n - k, q)
+        result = multiply(result, Powers(low, np.exp(log), 0.0), _DROPPED)
+    return result
+
+
+def multiply(left: Powers, right: Powers, dropped: float) -> Powers:
+    """Multiply two polynomials, and drop both ends below a share of the largest."""
+    values = np.convolve(left.values, right.values)
+    largest = float(values.max())
+    values = values / largest
+    high = np.flatnonzero(values > dropped)
+    return Powers(
+        first=left.first + right.first + int(high[0]),
+        values=values[high[0] : high[-1] + 1],
+        scale=left.scale + right.scale + float(np.log(largest)),
+    )
+
+
+@lru_cache(maxsize=32)
+def log_coefficients(exponents: tuple[float, ...]) -> Floats:
+    """Return the logarithms of all coefficients of Π_j (x + j)^N_j."""
+    # factor by factor in logarithms, which drops nothing, and takes long
+    if sum(exponents[1:]) > _MAX_FACTORS:
+        raise ConvergenceError(
+            f"the exact posterior needs {sum(exponents):.0f} ratings in one "
+            'category multiplied out in logarithms; method="emcee" samples it'
+        )
+    log = np.zeros(1)
+    for j, n in enumerate(exponents):
+        for _ in range(int(n) if j else 0):
+            log = log_convolve(np.array([np.log(j), 0.0]), log)  # times x + j
+    return log
 
 
 def log_convolve(short: Floats, long: Floats) -> Floats:
@@ -281,74 +330,3 @@ def log_convolve(short: Floats, long: Floats) -> Floats:
         reached = slice(j, j + long.size)
         product[reached] = np.logaddexp(product[reached], log + long)
     return product
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Expansion:
-    """The polynomial in A at one tilt: the logarithm of each term at A = λ."""
-
-    log_tilt: float
-    powers: Floats = field(compare=False, repr=False)  # t, (n_terms,)
-    terms: Floats = field(compare=False, repr=False)  # (n_terms,)
-    complete: tuple[bool, bool]  # whether no power is dropped below, and above
-
-    def log_sum(self, logit: Floats) -> tuple[Floats, NDArray[np.bool_]]:
-        """Return the log of the polynomial, and where nothing it needs is dropped."""
-        terms = self.terms + np.multiply.outer(-logit - self.log_tilt, self.powers)
-        total = log_sum_exp(terms)
-        # Coefficients are log-concave: beyond an edge the terms only get smaller.
-        lowest = self.complete[0] | (terms[:, 0] < total + _NEGLIGIBLE)
-        highest = self.complete[1] | (terms[:, -1] < total + _NEGLIGIBLE)
-        return total, lowest & highest
-
-
-class RhoDensity:
-    """The log-density of logit ρ, constants left out."""
-
-    def __init__(self, model: DirichletMultinomial) -> None:
-        self._model = model
-        self.bulk = model.bulk()
-        a = model.prior[: len(model.powers)].tolist()
-        self._categories = [Category(*of) for of in zip(model.powers, a, strict=True)]
-        self._expansions = [self._expand(self.bulk.mode)]
-
-    def __call__(self, logit: Floats) -> Floats:
-        """Return the log-density at logits of ρ, (n,)."""
-        out = np.empty(logit.size)
-        left = np.arange(logit.size)
-        known = iter(tuple(self._expansions))
-        while left.size:
-            expansion = next(known, None)
-            fresh = expansion is None
-            if expansion is None:
-                expansion = self._expand(float(logit[left[left.size // 2]]))
-                self._expansions.append(expansion)
-            total, right = expansion.log_sum(logit[left])
-            if fresh and not right.any():
-                raise ConvergenceError(
-                    "the exact posterior needs terms that floats cannot hold; "
-                    'method="emcee" samples it'
-                )
-            out[left[right]] = total[right]
-            left = left[~right]
-        return out + self._model.log_cofactor(logit)
-
-    def _expand(self, logit: float) -> _Expansion:
-        model, bulk = self._model, self.bulk
-        log_tilt = float(np.interp(logit, bulk.logits, bulk.log_tilts))
-        x, _ = model.saddle(np.exp([log_tilt]))
-        product = Powers(first=0, values=np.ones(1))
-        for category, at in zip(self._categories, x[0].tolist(), strict=True):
-            product = product.multiply(category.tilted(at, log_tilt)).trimmed(TRIMMED)
-        product = product.trimmed(_KEPT)
-        t = product.first + np.arange(product.values.size, dtype=np.float64)
-        log = np.log(product.values) + product.scale
-        return _Expansion(
-            log_tilt=log_tilt,
-            powers=t,
-            terms=log - gammaln(float(model.prior.sum()) + t),
-            complete=(
-                bool(t[0] == model.powers[:, 0].sum()),
-                bool(t[-1] == model.powers.sum()),
-            ),
-        )

@@ -94,7 +94,7 @@ class RhoPosterior:
             )
         )
         tail = 0.5 * (1.0 - level)
-        first, last = density.bulk.logits[[0, -1]].tolist()
+        first, last = density.logits[[0, -1]].tolist()
         logit, ends = line_distribution(density, first, last, (tail, 1.0 - tail))
         low, high = expit(ends).tolist()
         return cls(prior=prior, low=low, high=high, logit=logit, log_density=density)

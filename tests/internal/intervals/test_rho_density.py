@@ -9,8 +9,10 @@ from masrel.errors import ConvergenceError
 from masrel.intervals import _dirichlet_multinomial
 from masrel.intervals._dirichlet_multinomial import (
     TRIMMED,
-    Category,
     DirichletMultinomial,
+    Powers,
+    log_coefficients,
+    tilted,
 )
 
 
@@ -24,10 +26,11 @@ def stirling(n: int) -> list[int]:
     return row
 
 
-def of_one_item(n: int) -> tuple[Category, DirichletMultinomial]:
+def of_one_item(n: int, log_tilt: float) -> Powers:
     """One item whose n ratings are all in one category: every N_j is 1."""
     model = DirichletMultinomial.of_counts(np.array([[n, 0]]))
-    return Category(model.powers[0], 1.0), model
+    x, _ = model.saddle(np.exp([log_tilt]))
+    return tilted(model.powers[0], 1.0, float(x[0, 0]), log_tilt)
 
 
 @pytest.mark.parametrize("n", [5, 40, 700])
@@ -35,9 +38,7 @@ def of_one_item(n: int) -> tuple[Category, DirichletMultinomial]:
 def test_every_coefficient_is_the_integer_times_its_moment(
     n: int, log_tilt: float
 ) -> None:
-    category, model = of_one_item(n)
-    x, _ = model.saddle(np.exp([log_tilt]))
-    result = category.tilted(float(x[0, 0]), log_tilt)
+    result = of_one_item(n, log_tilt)
     # Γ(1 + t) = t!
     exact = np.array(
         [
@@ -57,11 +58,10 @@ def test_what_floats_drop_is_multiplied_out_in_logarithms(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     # At this tilt the moments still need powers whose probability is below 1e-230.
-    category, model = of_one_item(700)
-    x, _ = model.saddle(np.exp([-2.0]))
-    category.tilted(float(x[0, 0]), -2.0)
-    assert "_log_coefficients" in vars(category)
+    log_coefficients.cache_clear()
+    of_one_item(700, -2.0)
+    assert log_coefficients.cache_info().currsize == 1
+    log_coefficients.cache_clear()
     monkeypatch.setattr(_dirichlet_multinomial, "_MAX_FACTORS", 500)
-    again, _ = of_one_item(700)
     with pytest.raises(ConvergenceError, match='"emcee" samples it'):
-        again.tilted(float(x[0, 0]), -2.0)
+        of_one_item(700, -2.0)
