@@ -191,8 +191,9 @@ def _together(
             continue
         if efforts is None:
             efforts = Efforts(joints, motions, courses, KINDS[kind].path(motions))
-        values[:, i], unknown = _effort(name, efforts)
-        alone |= unknown
+        with np.errstate(all="ignore"):  # doubtful scenes may hold anything
+            values[:, i] = getattr(efforts, name)
+            alone |= efforts.unknown(name)
     return values, alone
 
 
@@ -213,17 +214,6 @@ def _event(name: str, joints: Joints, courses: Courses) -> Floats:
         "end": (c.end, np.ones_like(c.moves)),
     }
     return nearest(*columns[name])
-
-
-def _effort(name: str, efforts: Efforts) -> tuple[Floats, np.ndarray]:
-    with np.errstate(all="ignore"):  # doubtful scenes may hold anything
-        if name == "peak_torque":
-            return efforts.peak, efforts.unknown_peak
-        if name == "work":
-            return efforts.work, efforts.unknown_work
-        if name == "impulse":
-            return efforts.impulse, efforts.unknown_impulse
-        return efforts.residual, np.zeros_like(efforts.caught)
 
 
 def _alone(

@@ -100,36 +100,24 @@ class Efforts:
         )
 
     @property
-    def residual(self) -> Floats:
+    def residual_torque(self) -> Floats:
         """Torque after the peak, N·m; nan without a catch."""
         level = self.pre_end + self.joints.residual_share * self.rise
         return np.where(self.caught, level, np.nan)
 
-    @property
-    def _is_cut(self) -> Flags:
+    def unknown(self, output: str) -> Flags:
+        """Return where an output needs more than closed forms."""
+        joints, times = self.joints, self.times
+        is_smooth = self.caught & (joints.catch_rise > 0.0)
+        if output == "residual_torque":
+            return np.zeros_like(self.caught)
+        if output == "work" and not self.path.is_steady:
+            return is_smooth
         # a smoothed onset that the catch does not outlast
-        rise_end = self.times.catch + self.joints.catch_rise
-        cut = self.caught & (rise_end >= self.times.catch_end)
-        return np.asarray(cut & (self.joints.catch_rise > 0.0))
-
-    @property
-    def unknown_peak(self) -> Flags:
-        """Where the peak needs more than closed forms."""
-        if self.path.is_steady:
-            return self._is_cut
-        return np.asarray(self._is_cut | (self.joints.inertia > 0.0))
-
-    @property
-    def unknown_work(self) -> Flags:
-        """Where the work needs more than closed forms."""
-        if self.path.is_steady:
-            return self._is_cut
-        return np.asarray(self.caught & (self.joints.catch_rise > 0.0))
-
-    @property
-    def unknown_impulse(self) -> Flags:
-        """Where the impulse needs more than closed forms."""
-        return self._is_cut
+        is_cut = is_smooth & (times.catch + joints.catch_rise >= times.catch_end)
+        if output == "peak_torque" and not self.path.is_steady:
+            return is_cut | (joints.inertia > 0.0)
+        return is_cut
 
     @property
     def _missing(self) -> Floats:
@@ -137,7 +125,7 @@ class Efforts:
         return np.where(self.caught, 0.5 * self.rise * self.joints.catch_rise, 0.0)
 
     @property
-    def peak(self) -> Floats:
+    def peak_torque(self) -> Floats:
         """Largest torque, N·m."""
         t, j = self.times, self.joints
         turn = self.path.turning(j.stiffness, j.damping)

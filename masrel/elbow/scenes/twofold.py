@@ -110,7 +110,7 @@ class Twofold:
     __rmul__ = __mul__
 
     def __truediv__(self, other: Operand) -> "Twofold":
-        b = _twofold(other)
+        b = other if isinstance(other, Twofold) else Twofold(other)
         first = self.high / b.high
         left = self - b * first
         second = left.high / b.high
@@ -118,8 +118,8 @@ class Twofold:
         s, e = _quick(first, second)
         return Twofold(*_quick(s, e + left.high / b.high))
 
-    def __rtruediv__(self, other: Operand) -> "Twofold":
-        return _twofold(other) / self
+    def __rtruediv__(self, other: Floats | float) -> "Twofold":
+        return Twofold(other) / self
 
     def sqrt(self) -> "Twofold":
         """Return the square roots.
@@ -181,10 +181,6 @@ class Twofold:
             What stands there from now on.
         """
         self.high[rows], self.low[rows] = others.high, others.low
-
-
-def _twofold(value: Operand) -> Twofold:
-    return value if isinstance(value, Twofold) else Twofold(value)
 
 
 def _sum(a: Floats, b: Floats) -> tuple[Floats, Floats]:
