@@ -182,6 +182,7 @@ def _constants(material: Material) -> list[Table]:
 def _sessions(material: Material) -> Table:
     protocol, table = material.protocol, material.ratings.table
     graded = table[table["grade"].notna()]
+    rated = set(graded["model"])
     rows, absent = [], []
     for session in protocol.sessions:
         n_raters = len(session.raters)
@@ -192,7 +193,12 @@ def _sessions(material: Material) -> Table:
         rows.append((session.id, n_raters, names, n_planned, n_given, note))
         if n_given == 0:
             absent.append(session.id)
-    notes = [f"No ratings in these data: session {', '.join(absent)}."]
+    notes = []
+    if absent:
+        notes.append(f"No ratings in these data: session {', '.join(absent)}.")
+    unrated = [model.id for model in protocol.models if model.id not in rated]
+    if unrated and rated:
+        notes.append(f"Models without ratings in these data: {', '.join(unrated)}.")
     return Table(
         name="sessions",
         caption="Sessions, their raters, and the ratings there are",
@@ -205,6 +211,6 @@ def _sessions(material: Material) -> Table:
             Column(key="note", heading="Note", align="left"),
         ),
         rows=tuple(rows),
-        notes=tuple(notes if absent else ()),
+        notes=tuple(notes),
         data=material.data,
     )

@@ -41,6 +41,12 @@ SECTIONS: dict[str, Callable[[Material], Section]] = {
 
 _BANNER = "SIMULATED DATA – no person gave these grades"
 
+_INPUTS = {
+    "protocol_sha256": "protocol",
+    "ratings_sha256": "ratings",
+    "in_person_sha256": "grades given in person",
+}
+
 _KINDS = {Paragraph: "paragraph", Table: "table", Drawing: "figure"}
 
 # Symbols of the model as they are written in plain text: an index after "_".
@@ -182,7 +188,7 @@ def _pages(
         "provenance": material.provenance,
         "sections": sections,
         "inputs": [
-            (f"SHA-256 of the {name.removesuffix('_sha256').replace('_', '-')}", digest)
+            (f"SHA-256 of the {_INPUTS[name]}", digest)
             for name, digest in analysis.inputs.items()
         ],
         "style": style.read_text(encoding="utf-8"),

@@ -249,7 +249,10 @@ def _peak_table(
 ) -> Table:
     present = {stretch.speed.rater for _, made in stretches for stretch in made}
     raters = [rater for rater in material.raters if rater in present]
-    notes = ["Computed from the exact events of the motion, not from the samples."]
+    notes = [
+        "The largest torque of all phases, be it in the catch or at the end of the "
+        "stretch, computed from the exact events of the motion, not from the samples."
+    ]
     rows: list[tuple[Value, ...]] = []
     has_repeats = False
     for model, made in stretches:

@@ -209,7 +209,7 @@ def test_every_section_can_be_asked_for(published: ReportFiles) -> None:
 def test_the_inputs_are_named_on_the_page(published: ReportFiles) -> None:
     for path in (published.html, published.markdown):
         text = path.read_text(encoding="utf-8")
-        for name in ("protocol", "ratings", "in-person"):
+        for name in ("protocol", "ratings", "grades given in person"):
             assert re.search(rf"SHA-256 of the {name}\W+.*[0-9a-f]{{64}}", text)
 
 

@@ -78,6 +78,17 @@ def test_counts_are_in_the_singular_and_plural() -> None:
     assert "16 haptic models (4 standard, 12 dummy), 8 raters, 2 sessions" in first
 
 
+def test_sessions_and_models_without_ratings_are_named() -> None:
+    (section,) = build_sections(material(table_v(), "design"))
+    *_, sessions = section.blocks
+    assert isinstance(sessions, Table)
+    dummies = ", ".join(f"D{n:02}" for n in range(1, 13))
+    assert sessions.notes == (
+        "No ratings in these data: session retest.",
+        f"Models without ratings in these data: {dummies}.",
+    )
+
+
 def test_a_model_without_an_intended_grade_is_shown_as_such() -> None:
     rows = ratings(*of_session("test", R1=("1",)), ("test", "R1", "D01", "2"))
     (section,) = build_sections(material(rows, "grades"))
