@@ -8,9 +8,6 @@ coefficients of two raters on that of their table.
 import math
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from masrel.agreement._counts import item_counts
 from masrel.estimates import Interval
 from masrel.intervals._problem import IntervalProblem, on_logit
@@ -31,29 +28,26 @@ from masrel.intervals.jackknife import (
 _FEW = 10  # items, and raters, below which a posterior covers best
 _SEVERAL = 30  # items, below which a jackknife alone ends too low
 _ACCIDENT = 0.003  # of (1 - κ) / ratings: a variance below it is no information
-_OTHERS = {"items": "items", "raters": "raters", "both": "items and raters"}
 
 
-def choose_interval(problem: IntervalProblem, *, modelled: bool) -> Interval:
-    """Compute the interval that covers best, with a note of what it is and why."""
+def choose_interval(
+    problem: IntervalProblem, *, modelled: bool
+) -> tuple[Interval, str]:
+    """Compute the interval that covers best, and say what it is and why."""
     # modelled: whether the Dirichlet-multinomial model answers for the coefficient
-    interval, why = _choose(problem, modelled)
-    note = f"chosen for other {_OTHERS[problem.target]}: {why}"
-    return replace(interval, target=problem.target, notes=(note, *interval.notes))
-
-
-def _choose(problem: IntervalProblem, modelled: bool) -> tuple[Interval, str]:
     target, n_items = problem.target, problem.n_items
+    n_raters = problem.coded.codes.shape[1]
     if problem.entry.shape == "pairs":
         why = "items leave with the pairs of all their raters"
         return _interval_around_estimate(problem, _jackknife_variance(problem)), why
     if n_items == 0:
         why = "nobody rated anything"
         return _interval_around_estimate(problem, _jackknife_variance(problem)), why
-    if modelled and target == "items" and _is_small(problem):
+    is_small = n_items < _FEW and n_raters < _FEW
+    if modelled and target == "items" and is_small:
         why = f"few items ({n_items}) and raters, where it covers best"
-        return default_rho_interval(problem, *_default_posterior(problem)), why
-    of_two = target == "items" and problem.coded.codes.shape[1] == 2
+        return default_rho_interval(problem), why
+    of_two = target == "items" and n_raters == 2
     tabular = of_two and not modelled and applies_to(problem)
     if tabular and n_items < _FEW:
         why = f"few items ({n_items}), where it covers best"
@@ -64,14 +58,14 @@ def _choose(problem: IntervalProblem, modelled: bool) -> tuple[Interval, str]:
     if target == "raters":
         why = "raters left out, one at a time"
         return _interval_around_estimate(problem, jackknifed), why
-    if target == "items":
-        return _other_items(problem, modelled, jackknifed)
-    return _other_items_and_raters(problem, modelled, jackknifed)
-
-
-def _is_small(problem: IntervalProblem) -> bool:
-    """Return whether items and raters are both few."""
-    return problem.n_items < _FEW and problem.coded.codes.shape[1] < _FEW
+    if target == "both":
+        return _other_items_and_raters(problem, modelled, is_small, jackknifed)
+    half = problem.student_t(n_items - 1) * math.sqrt(jackknifed.variance)
+    method = f"item jackknife, t({n_items - 1}) on the logit"
+    interval = _around(problem, modelled, half, method, jackknifed.notes)
+    if modelled and n_items < _SEVERAL:
+        interval = _lift(problem, interval)
+    return interval, "items left out, on a scale without ends"
 
 
 def _n_ratings(problem: IntervalProblem) -> int:
@@ -81,14 +75,6 @@ def _n_ratings(problem: IntervalProblem) -> int:
 def _accident(problem: IntervalProblem) -> float:
     """Return the variance of an accident of few disagreements."""
     return _ACCIDENT * (1.0 - problem.value) / _n_ratings(problem)
-
-
-def _default_posterior(
-    problem: IntervalProblem,
-) -> tuple[NDArray[np.int64], RhoPosterior]:
-    """Return raters per item and category, and the posterior they give."""
-    counts = item_counts(problem.coded)
-    return counts, RhoPosterior.of(counts, DEFAULT_PRIOR, problem.level)
 
 
 def _without_spread(
@@ -102,27 +88,16 @@ def _without_spread(
         return default_table_interval(problem), why
     if modelled:
         why = "the ratings hardly disagree, so that a model must say what that can hide"
-        return lower_bound_of_rho(problem, *_default_posterior(problem)), why
+        return lower_bound_of_rho(problem), why
     why = "the spread of the units left out"
     return _interval_around_estimate(problem, jackknifed), why
 
 
-def _other_items(
-    problem: IntervalProblem, modelled: bool, jackknifed: _JackknifeVariance
-) -> tuple[Interval, str]:
-    df = problem.n_items - 1
-    half = problem.student_t(df) * math.sqrt(jackknifed.variance)
-    method = f"item jackknife, t({df}) on the logit"
-    interval = _around(problem, modelled, half, method, jackknifed.notes)
-    if modelled and problem.n_items < _SEVERAL:
-        _, posterior = _default_posterior(problem)
-        interval = _lift(interval, posterior.high)
-    return interval, "items left out, on a scale without ends"
-
-
-def _lift(interval: Interval, high: float) -> Interval:
+def _lift(problem: IntervalProblem, interval: Interval) -> Interval:
     # An estimate of few items is skewed: low where its error is low, too. The posterior
     # knows, but trusts many raters too much where κ is low; halfway covers with either.
+    counts = item_counts(problem.coded)
+    high = RhoPosterior.of(counts, DEFAULT_PRIOR, problem.level).high
     if not high > interval.high:
         return interval
     note = (
@@ -135,13 +110,16 @@ def _lift(interval: Interval, high: float) -> Interval:
 
 
 def _other_items_and_raters(
-    problem: IntervalProblem, modelled: bool, jackknifed: _JackknifeVariance
+    problem: IntervalProblem,
+    modelled: bool,
+    is_small: bool,
+    jackknifed: _JackknifeVariance,
 ) -> tuple[Interval, str]:
     t_raters = problem.student_t(problem.coded.codes.shape[1] - 1)
     excess = t_raters**2 * _excess_of_raters(problem)
-    if modelled and _is_small(problem):
+    if modelled and is_small:
         why = "few items and raters; raters add what they differ by"
-        return default_rho_interval(problem, *_default_posterior(problem), excess), why
+        return default_rho_interval(problem, excess), why
     items = _jackknife_variance(replace(problem, target="items")).variance
     half = math.sqrt(problem.student_t(problem.n_items - 1) ** 2 * items + excess)
     method = "two-way jackknife, t on the logit"

@@ -147,18 +147,15 @@ def prior_notes(
     )
 
 
-def default_rho_interval(
-    problem: IntervalProblem,
-    counts: NDArray[np.int64],
-    posterior: RhoPosterior,
-    excess: float = 0.0,
-) -> Interval:
+def default_rho_interval(problem: IntervalProblem, excess: float = 0.0) -> Interval:
     """Compute an interval that holds the estimate, and what raters differ by."""
     # `excess` is the squared half-width that raters add
     if not problem.value < 1.0:  # perfect, or undefined: one category
-        return lower_bound_of_rho(problem, counts, posterior)
+        return lower_bound_of_rho(problem)
+    counts = item_counts(problem.coded)
+    posterior = RhoPosterior.of(counts, DEFAULT_PRIOR, problem.level)
     low, high = posterior.low, posterior.high
-    notes = prior_notes(counts, posterior.prior, problem.level, low, high)
+    notes = prior_notes(counts, DEFAULT_PRIOR, problem.level, low, high)
     method = "Dirichlet-multinomial posterior, exact"
     if excess:
         method += ", and the spread of raters"
@@ -178,11 +175,14 @@ def default_rho_interval(
     )
 
 
-def lower_bound_of_rho(
-    problem: IntervalProblem, counts: NDArray[np.int64], posterior: RhoPosterior
-) -> Interval:
+def lower_bound_of_rho(problem: IntervalProblem) -> Interval:
     """Compute the interval of all that is above a lower quantile."""
-    share, prior = 1.0 - problem.level, posterior.prior
+    counts, prior, share = (
+        item_counts(problem.coded),
+        DEFAULT_PRIOR,
+        1.0 - problem.level,
+    )
+    posterior = RhoPosterior.of(counts, prior, problem.level)
     low = posterior.quantile(share)
     others = [
         (RhoPosterior.of(counts, other, problem.level).quantile(share), other)

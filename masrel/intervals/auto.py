@@ -1,6 +1,7 @@
 """An estimate with the interval that its question and its size call for."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Literal, TypedDict, get_args
 
 import numpy as np
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 
 _Method = Literal["auto", "analytic", "jackknife", "bootstrap", "posterior"]
 """Kinds of intervals; "auto" chooses one by target and size."""
+
+_OTHERS = {"items": "items", "raters": "raters", "both": "items and raters"}
 
 
 def estimate(
@@ -106,10 +109,12 @@ def estimate(
         from masrel.intervals._choice import choose_interval
 
         identity = isinstance(weights, str) and weights == "identity"
-        interval = choose_interval(
+        interval, why = choose_interval(
             pose_problem(entry, ratings, **options),
             modelled=identity and entry.name in _RHO_COEFFICIENTS,
         )
+        note = f"chosen for other {_OTHERS[target]}: {why}"
+        interval = replace(interval, target=target, notes=(note, *interval.notes))
     elif method == "analytic":
         interval = analytic(entry, ratings, **options)
     elif method == "jackknife":

@@ -16,7 +16,7 @@ from masrel.intervals._problem import (
     pose_problem,
     warn_small,
 )
-from masrel.intervals.jackknife import _variance_of, _without_item
+from masrel.intervals.jackknife import _variance_of
 
 _Design = Literal["dependent", "independent"]
 """Whether both sets of ratings are of the same items, row by row."""
@@ -156,7 +156,12 @@ def _dependent(one: IntervalProblem, other: IntervalProblem) -> tuple[float, flo
 def _independent(one: IntervalProblem, other: IntervalProblem) -> tuple[float, float]:
     """Return the sum of both jackknife variances and Satterthwaite's degrees [2]_."""
     parts = [
-        (_variance_of(*_without_item(problem)), problem.n_items - 1)
+        (
+            _variance_of(
+                problem.values_without(problem.sums, problem.rows), problem.freq
+            ),
+            problem.n_items - 1,
+        )
         for problem in (one, other)
     ]
     variance = sum(part for part, _ in parts)

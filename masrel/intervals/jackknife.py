@@ -143,7 +143,8 @@ def _jackknife_variance(problem: IntervalProblem) -> _JackknifeVariance:
     units = _UNITS[problem.target]
     for unit in units:
         if unit == "items":
-            replicates, freq = _without_item(problem)
+            freq = problem.freq
+            replicates = problem.values_without(problem.sums, problem.rows)
         else:
             replicates, freq = _without_rater(problem)
         if np.isnan(replicates).any():
@@ -167,16 +168,11 @@ def _variance_of(replicates: Floats, freq: Integers) -> float:
     """Return (n - 1)/n Σ (θ_i - mean)² of estimates with one left out [1]_."""
     # Takes replicates (n_distinct,), freq (n_distinct,)
     n = int(freq.sum())
+    if n < 2:  # nothing is left
+        return math.nan
     moved = replicates - replicates[0]  # so that no change at all is exactly 0
     deviations = moved - freq @ moved / n
     return float((n - 1) / n * (freq @ deviations**2))
-
-
-def _without_item(problem: IntervalProblem) -> tuple[Floats, Integers]:
-    """Return the estimate without an item of each pattern, and how many there are."""
-    if problem.n_items < 2:
-        return np.full(1, np.nan), np.ones(1, dtype=np.int64)
-    return problem.values_without(problem.sums, problem.rows), problem.freq
 
 
 def _without_rater(problem: IntervalProblem) -> tuple[Floats, Integers]:
