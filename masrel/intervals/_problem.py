@@ -60,6 +60,8 @@ class IntervalProblem:
 
     def values_without(self, sums: Floats, rows: Floats) -> Floats:
         """Return the coefficient for sums less each row of features, (n_rows,)."""
+        if not len(rows):
+            return np.empty(0)
         if len(rows) <= _BLOCK:
             return self.kernel.value(sums - rows, self.v)
         return np.concatenate(
