@@ -42,6 +42,8 @@ _INTERVALS: dict[str, dict[str, Any]] = {
 _DOT: dict[str, Any] = {"marker": "o", "color": BLACK, "markersize": 5}
 _ZERO: dict[str, Any] = {"color": GREY, "linewidth": 0.8, "linestyle": DASHES}
 
+_Floats = NDArray[np.float64]
+
 # What a ridge is made of, its colour and its name in the legend.
 _Part = Literal["density", "stems", "bars"]
 _PART_COLOURS: dict[_Part, str] = {"density": ORANGE, "stems": BLUE, "bars": BLUE}
@@ -68,9 +70,17 @@ _SAME = 1e-9  # values as near as this are one value, computed in another order
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class _Ridge:
+    # places (of bars their edges) and heights of each part, all heights in one unit
+    parts: dict[_Part, tuple[_Floats, _Floats]]
+    lowest: float  # where it begins to be seen
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class _Placed:
     # a row, and how many inches from the top its parts are
     row: ForestRow
+    ridge: _Ridge | None  # above its interval
     top: float
     line: float  # where its interval is
     bottom: float
@@ -81,17 +91,17 @@ def forest_figure(forest: Forest) -> Figure:
     """Return a forest of estimates."""
     places = _placed(forest.rows)
     bottom = places[-1].bottom + 0.05
-    handles = _legend_handles(forest.rows)
+    handles = _legend_handles(places)
     figure = Figure(figsize=(7.2, bottom + 0.6 + 0.17 * len(handles)))
     axes = figure.add_subplot()
-    left = max(_lowest(forest.rows), _LEFT) - 0.05
+    left = max(_lowest(places), _LEFT) - 0.05
     axes.set_xlim(left, _RIGHT)
     axes.set_ylim(bottom, 0.0)
     _draw_zeros(axes, places)
     for place in places:
         if place.heading is not None:
             _at_left(axes, place.heading, place.row.group, weight="bold")
-        _draw_row(axes, place.line, place.row, left)
+        _draw_row(axes, place, left)
     axes.set_yticks([])
     axes.spines["left"].set_visible(False)
     axes.grid(axis="x")
@@ -120,25 +130,31 @@ def _placed(rows: Sequence[ForestRow]) -> list[_Placed]:
             bottom += _GROUP
         group = row.group
         text = _LINE + (_DETAIL if row.detail else 0.0)
-        has_ridge = row.interval is not None and row.interval.distribution is not None
-        bottom += text + (_RIDGE if has_ridge else 0.0)
-        line = bottom - 0.5 * text
+        shown = None if row.interval is None else row.interval.distribution
+        bottom += text + (0.0 if shown is None else _RIDGE)
         places.append(
-            _Placed(row=row, top=top, line=line, bottom=bottom, heading=heading)
+            _Placed(
+                row=row,
+                ridge=None if shown is None else _ridge(shown),
+                top=top,
+                line=bottom - 0.5 * text,
+                bottom=bottom,
+                heading=heading,
+            )
         )
     return places
 
 
-def _lowest(rows: Sequence[ForestRow]) -> float:
+def _lowest(places: Sequence[_Placed]) -> float:
     # the lowest of 0 and all that rows show
     numbers = [0.0]
-    for row in rows:
-        if row.value is not None:
-            numbers.append(row.value)
-        if row.interval is not None:
-            numbers.append(row.interval.low)
-            if row.interval.distribution is not None:
-                numbers.append(_lowest_shown(row.interval.distribution))
+    for place in places:
+        if place.row.value is not None:
+            numbers.append(place.row.value)
+        if place.row.interval is not None:
+            numbers.append(place.row.interval.low)
+        if place.ridge is not None:
+            numbers.append(place.ridge.lowest)
     return min(numbers)
 
 
@@ -156,12 +172,12 @@ def _draw_zeros(axes: Axes, places: Sequence[_Placed]) -> None:
         axes.plot([0.0, 0.0], [start, end], **_ZERO, zorder=1.0)
 
 
-def _draw_row(axes: Axes, y: float, row: ForestRow, left: float) -> None:
-    interval = row.interval
+def _draw_row(axes: Axes, place: _Placed, left: float) -> None:
+    row, y, interval = place.row, place.line, place.row.interval
+    if place.ridge is not None:
+        base, top = y - 0.3 * _LINE, y - 0.3 * _LINE - 0.95 * _RIDGE
+        _draw_ridge(axes, place.ridge, base=base, top=top)
     if interval is not None:
-        if interval.distribution is not None:
-            base, top = y - 0.3 * _LINE, y - 0.3 * _LINE - 0.95 * _RIDGE
-            _draw_ridge(axes, interval.distribution, base=base, top=top)
         look = _INTERVALS[interval.kind]
         axes.plot([max(interval.low, left), interval.high], [y, y], **look)
         if interval.low < left:
@@ -201,81 +217,69 @@ def _at_left(
     )
 
 
-def _legend_handles(rows: Sequence[ForestRow]) -> list[Artist]:
+def _legend_handles(places: Sequence[_Placed]) -> list[Artist]:
     # what the legend explains, each mark once
     handles: dict[str, Artist] = {}
-    if any(row.value is not None for row in rows):
+    if any(place.row.value is not None for place in places):
         handles["estimate"] = Line2D([], [], linestyle="none", **_DOT)
-    for interval in (row.interval for row in rows if row.interval is not None):
-        label = f"{percent(interval.level)} % {interval.kind} interval"
-        handles[label] = Line2D([], [], **_INTERVALS[interval.kind])
-        if interval.distribution is not None:
-            for part in _parts(interval.distribution):
-                colour = _PART_COLOURS[part]
-                handles[_PART_NAMES[part]] = (
-                    Line2D([], [], color=colour, **_STEM_MARK)
-                    if part == "stems"
-                    else Patch(
-                        facecolor=(colour, _RIDGE_ALPHA),
-                        edgecolor=colour,
-                        linewidth=0.8,
-                    )
+    for place in places:
+        if place.row.interval is not None:
+            interval = place.row.interval
+            label = f"{percent(interval.level)} % {interval.kind} interval"
+            handles[label] = Line2D([], [], **_INTERVALS[interval.kind])
+        for part in () if place.ridge is None else place.ridge.parts:
+            colour = _PART_COLOURS[part]
+            handles[_PART_NAMES[part]] = (
+                Line2D([], [], color=colour, **_STEM_MARK)
+                if part == "stems"
+                else Patch(
+                    facecolor=(colour, _RIDGE_ALPHA), edgecolor=colour, linewidth=0.8
                 )
+            )
     for label, handle in handles.items():
         handle.set_label(label)
     return list(handles.values())
 
 
-def _draw_ridge(
-    axes: Axes, distribution: Distribution, *, base: float, top: float
-) -> None:
-    """Draw a distribution between two heights; its own greatest height is the top."""
+def _draw_ridge(axes: Axes, ridge: _Ridge, *, base: float, top: float) -> None:
+    """Draw a ridge between two heights; its own greatest height is the top."""
+    highest = max(heights.max() for _, heights in ridge.parts.values())
+    # stems come last: they stand in front of bars
+    for part, (places, heights) in reversed(ridge.parts.items()):
+        colour, tops = _PART_COLOURS[part], base + (top - base) * heights / highest
+        line: dict[str, Any] = {"color": colour, "linewidth": 0.8}
+        face: dict[str, Any] = {"color": colour, "alpha": _RIDGE_ALPHA}
+        if part == "density":
+            axes.fill_between(places, base, tops, linewidth=0.0, **face)
+            axes.plot(places, tops, **line)
+        elif part == "stems":
+            axes.vlines(places, base, tops, color=colour, linewidth=1.4)
+        else:
+            axes.stairs(tops, places, baseline=base, fill=True, **face)
+            axes.stairs(tops, places, baseline=base, **line)
+
+
+def _ridge(distribution: Distribution) -> _Ridge:
+    """Return what is drawn of a distribution."""
     if distribution.continuous:
-        colour, highest = _PART_COLOURS["density"], distribution.weights.max()
-        heights = base + (top - base) * distribution.weights / highest
-        fill: dict[str, Any] = {
-            "color": colour,
-            "alpha": _RIDGE_ALPHA,
-            "linewidth": 0.0,
-        }
-        axes.fill_between(distribution.values, base, heights, **fill)
-        axes.plot(distribution.values, heights, color=colour, linewidth=0.8)
-        return
+        values, heights = distribution.values, distribution.weights
+        visible = values[heights > _FAINT * heights.max()]
+        return _Ridge(parts={"density": (values, heights)}, lowest=float(visible.min()))
     values, shares = _distinct(distribution)
-    single = _is_single(shares)
-    edges, binned = _bars(values[~single], shares[~single])
-    unit = (top - base) / max([*shares[single], *binned])
-    if binned.size:
-        bars: dict[str, Any] = {"baseline": base, "color": _PART_COLOURS["bars"]}
-        heights = base + unit * binned
-        axes.stairs(heights, edges, fill=True, alpha=_RIDGE_ALPHA, **bars)
-        axes.stairs(heights, edges, linewidth=0.8, **bars)
-    stems: dict[str, Any] = {"color": _PART_COLOURS["stems"], "linewidth": 1.4}
-    axes.vlines(values[single], base, base + unit * shares[single], **stems)
-
-
-def _parts(distribution: Distribution) -> tuple[_Part, ...]:
-    """Return what the ridge of a distribution is made of."""
-    if distribution.continuous:
-        return ("density",)
-    single = _is_single(_distinct(distribution)[1])
-    present: dict[_Part, bool] = {"stems": bool(single.any()), "bars": not single.all()}
-    return tuple(part for part, there in present.items() if there)
-
-
-def _lowest_shown(distribution: Distribution) -> float:
-    """Return where a ridge begins to be seen."""
-    values, heights = distribution.values, distribution.weights
-    if not distribution.continuous:
-        values, heights = _distinct(distribution)
-        edges, binned = _bars(values, heights)
-        values, heights = edges[:-1], binned
-    return float(values[heights > _FAINT * heights.max()].min())
+    single = (shares.size <= _MAX_STEMS) | (shares >= _STEM_SHARE)
+    parts: dict[_Part, tuple[_Floats, _Floats]] = {}
+    if single.any():
+        parts["stems"] = values[single], shares[single]
+    if not single.all():
+        parts["bars"] = _bars(values[~single], shares[~single])
+    edges, heights = _bars(values, shares)  # as if there were no stems
+    visible = edges[:-1][heights > _FAINT * heights.max()]
+    return _Ridge(parts=parts, lowest=float(visible.min()))
 
 
 def _distinct(
     distribution: Distribution,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[_Floats, _Floats]:
     # every value once, with its share of the finite ones: both (n_distinct,)
     finite = np.isfinite(distribution.values)
     values, weights = distribution.values[finite], distribution.weights[finite]
@@ -283,17 +287,8 @@ def _distinct(
     return values[starts], np.add.reduceat(weights, starts)
 
 
-def _is_single(shares: NDArray[np.float64]) -> NDArray[np.bool_]:
-    # which distinct values are stems, in their order
-    return (shares.size <= _MAX_STEMS) | (shares >= _STEM_SHARE)
-
-
-def _bars(
-    values: NDArray[np.float64], shares: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _bars(values: _Floats, shares: _Floats) -> tuple[_Floats, _Floats]:
     # (n_bars + 1,), (n_bars,); a value on an edge belongs to the bar below, as 1 does
-    if not values.size:
-        return np.zeros(1), np.zeros(0)
     width = _width(values, shares)
     at = np.ceil(values / width - _SAME).astype(np.int64)
     first = at[0]
@@ -302,7 +297,7 @@ def _bars(
     return edges, heights
 
 
-def _width(values: NDArray[np.float64], shares: NDArray[np.float64]) -> float:
+def _width(values: _Floats, shares: _Floats) -> float:
     # the widest that shows the shape of what is narrow, too
     cumulative = shares.cumsum() / shares.sum()
     low, high = values[np.searchsorted(cumulative, _MIDDLE).clip(0, values.size - 1)]
