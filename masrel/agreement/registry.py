@@ -257,13 +257,13 @@ COEFFICIENTS: dict[str, Coefficient] = {entry.name: entry for entry in _ALL}
 """Name to coefficient."""
 
 
-def coefficient(name: str | Callable[..., Estimate]) -> Coefficient:
-    """Look a coefficient up by its name or its function.
+def coefficient(name: str) -> Coefficient:
+    """Look a coefficient up by name.
 
     Parameters
     ----------
-    name : str or callable
-        Its name in the register, or its public function.
+    name : str
+        Its name in the register.
 
     Returns
     -------
@@ -279,13 +279,7 @@ def coefficient(name: str | Callable[..., Estimate]) -> Coefficient:
     --------
     >>> coefficient("fleiss_kappa").title
     "Fleiss' κ"
-    >>> coefficient(fleiss_kappa) is coefficient("fleiss_kappa")
-    True
     """
-    if isinstance(name, Coefficient):
-        return name
-    if not isinstance(name, str):
-        name = getattr(name, "__name__", repr(name))
     if name not in COEFFICIENTS:
         raise ParameterError(
             f"coefficient: needs one of {', '.join(COEFFICIENTS)}, got {name!r}"

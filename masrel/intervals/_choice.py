@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from masrel.agreement._counts import item_counts
 from masrel.estimates import Interval
-from masrel.intervals._problem import IntervalProblem, on_logit
+from masrel.intervals._problem import IntervalProblem
 from masrel.intervals._rho import (
     DEFAULT_PRIOR,
     RhoPosterior,
@@ -43,8 +43,8 @@ def choose_interval(
     if n_items == 0:
         why = "nobody rated anything"
         return _interval_around_estimate(problem, _jackknife_variance(problem)), why
-    is_small = n_items < _FEW and n_raters < _FEW
-    if modelled and target == "items" and is_small:
+    is_small = modelled and n_items < _FEW and n_raters < _FEW
+    if target == "items" and is_small:
         why = f"few items ({n_items}) and raters, where it covers best"
         return default_rho_interval(problem), why
     of_two = target == "items" and n_raters == 2
@@ -53,28 +53,32 @@ def choose_interval(
         why = f"few items ({n_items}), where it covers best"
         return default_table_interval(problem), why
     jackknifed = _jackknife_variance(problem)
-    if not jackknifed.variance > (_accident(problem) if modelled else 0.0):
+    n_ratings = int(problem.freq @ (problem.patterns.codes >= 0).sum(axis=1))
+    # an accident of few disagreements gives as much
+    accident = _ACCIDENT * (1.0 - problem.value) / n_ratings if modelled else 0.0
+    if not jackknifed.variance > accident:
         return _without_spread(problem, modelled, tabular, jackknifed)
     if target == "raters":
         why = "raters left out, one at a time"
         return _interval_around_estimate(problem, jackknifed), why
+    lowest, per_item = problem.entry.lowest, n_ratings / n_items
+    if modelled and per_item > 1.0:
+        # An intraclass correlation of r raters is at least -1/(r - 1): its logit is
+        # Fisher's transformation, ln[(1 + (r - 1) κ) / (1 - κ)].
+        lowest = -1.0 / (per_item - 1.0)
     if target == "both":
-        return _other_items_and_raters(problem, modelled, is_small, jackknifed)
-    half = problem.student_t(n_items - 1) * math.sqrt(jackknifed.variance)
-    method = f"item jackknife, t({n_items - 1}) on the logit"
-    interval = _around(problem, modelled, half, method, jackknifed.notes)
+        return _other_items_and_raters(problem, is_small, lowest, jackknifed.notes)
+    interval = problem.around(
+        problem.value,
+        problem.student_t(n_items - 1) * math.sqrt(jackknifed.variance),
+        lowest=lowest,
+        method=f"item jackknife, t({n_items - 1}) on the logit",
+        unit="items",
+        notes=jackknifed.notes,
+    )
     if modelled and n_items < _SEVERAL:
         interval = _lift(problem, interval)
     return interval, "items left out, on a scale without ends"
-
-
-def _n_ratings(problem: IntervalProblem) -> int:
-    return int(problem.freq @ (problem.patterns.codes >= 0).sum(axis=1))
-
-
-def _accident(problem: IntervalProblem) -> float:
-    """Return the variance of an accident of few disagreements."""
-    return _ACCIDENT * (1.0 - problem.value) / _n_ratings(problem)
 
 
 def _without_spread(
@@ -111,40 +115,22 @@ def _lift(problem: IntervalProblem, interval: Interval) -> Interval:
 
 def _other_items_and_raters(
     problem: IntervalProblem,
-    modelled: bool,
     is_small: bool,
-    jackknifed: _JackknifeVariance,
+    lowest: float,
+    notes: tuple[str, ...],
 ) -> tuple[Interval, str]:
     t_raters = problem.student_t(problem.coded.codes.shape[1] - 1)
     excess = t_raters**2 * _excess_of_raters(problem)
-    if modelled and is_small:
+    if is_small:
         why = "few items and raters; raters add what they differ by"
         return default_rho_interval(problem, excess), why
     items = _jackknife_variance(replace(problem, target="items")).variance
-    half = math.sqrt(problem.student_t(problem.n_items - 1) ** 2 * items + excess)
-    method = "two-way jackknife, t on the logit"
-    why = "items left out, and what raters differ by beyond single ratings"
-    return _around(problem, modelled, half, method, jackknifed.notes), why
-
-
-def _around(
-    problem: IntervalProblem,
-    modelled: bool,
-    half: float,
-    method: str,
-    notes: tuple[str, ...],
-) -> Interval:
-    """Return the interval that is symmetric on a scale without ends."""
-    lowest = problem.entry.lowest
-    if modelled:
-        # An intraclass correlation of r raters is at least -1/(r - 1): its logit is
-        # Fisher's transformation, ln[(1 + (r - 1) κ) / (1 - κ)].
-        ratings_per_item = float(_n_ratings(problem)) / problem.n_items
-        if ratings_per_item > 1.0:
-            lowest = -1.0 / (ratings_per_item - 1.0)
-    low, high = on_logit(problem.value, half, lowest)
-    if math.isnan(low):  # at the least value there is
-        low, high = problem.value - half, problem.value + half
-    return problem.confidence(
-        low, high, method=method, unit=problem.target, notes=notes
+    interval = problem.around(
+        problem.value,
+        math.sqrt(problem.student_t(problem.n_items - 1) ** 2 * items + excess),
+        lowest=lowest,
+        method="two-way jackknife, t on the logit",
+        unit="both",
+        notes=notes,
     )
+    return interval, "items left out, and what raters differ by beyond single ratings"

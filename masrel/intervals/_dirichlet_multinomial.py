@@ -217,9 +217,9 @@ class RhoDensity:
         for exponents, a, at in zip(model.powers, model.prior, x[0], strict=False):
             category = tilted(exponents, float(a), float(at), log_tilt)
             product = multiply(product, category, TRIMMED)
-        kept = np.flatnonzero(product.values > _KEPT)
-        values = product.values[kept[0] : kept[-1] + 1]
-        t = product.first + np.arange(kept[0], kept[-1] + 1, dtype=np.float64)
+        large = np.flatnonzero(product.values > _KEPT)
+        values = product.values[large[0] : large[-1] + 1]
+        t = product.first + np.arange(large[0], large[-1] + 1, dtype=np.float64)
         log = np.log(values) + product.scale
         return Expansion(
             log_tilt=log_tilt,

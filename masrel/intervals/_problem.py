@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from masrel.agreement import (
+    COEFFICIENTS,
     CodedRatings,
     Coefficient,
     Label,
@@ -93,6 +94,38 @@ class IntervalProblem:
 
         return float(stdtrit(df, 0.5 + 0.5 * self.level))
 
+    def around(
+        self,
+        value: float,
+        half: float,
+        *,
+        lowest: float | None = None,
+        method: str,
+        unit: Unit | None,
+        notes: Sequence[str] = (),
+    ) -> Interval:
+        """Return an interval that is symmetric around a value, or is so on a logit.
+
+        The logit is that of the place between `lowest` and 1; at either end itself
+        there is none.
+        """
+        low, high = value - half, value + half
+        if lowest is not None and lowest < value < 1.0:
+            # The error is divided by the slope of the logit, and the ends are taken
+            # back, so that they stay inside.
+            width = 1.0 - lowest
+            share = (value - lowest) / width
+            half /= width * share * (1.0 - share)
+            middle = math.log(share / (1.0 - share))
+            # the inverse, from the side on which the exponential is small
+            low, high = (
+                lowest + width * (1.0 / (1.0 + math.exp(-x)))
+                if x >= 0.0
+                else lowest + width * (math.exp(x) / (1.0 + math.exp(x)))
+                for x in (middle - half, middle + half)
+            )
+        return self.confidence(low, high, method=method, unit=unit, notes=notes)
+
     def confidence(
         self,
         low: float,
@@ -146,7 +179,7 @@ def pose_problem(
     level: float,
 ) -> IntervalProblem:
     """Check a question and prepare its data."""
-    entry = coefficient(statistic)
+    entry = statistic if isinstance(statistic, Coefficient) else find_entry(statistic)
     if target not in get_args(Target):
         raise ParameterError(
             f"target: needs one of {', '.join(get_args(Target))}, got {target!r}"
@@ -190,6 +223,16 @@ def pose_problem(
     )
 
 
+def find_entry(statistic: str | Callable[..., Estimate]) -> Coefficient:
+    """Return the entry of a name or a public function in the register."""
+    name = statistic
+    if not isinstance(name, str):
+        name = getattr(statistic, "__name__", repr(statistic))
+    if name not in COEFFICIENTS:
+        coefficient(name)  # an error that lists those there are
+    return COEFFICIENTS[name]
+
+
 def _refuse_raters(entry: Coefficient, n_raters: int) -> NoReturn:
     fewest, most = entry.n_raters
     needed = f"{fewest}" if most == fewest else f"at least {fewest}"
@@ -224,25 +267,6 @@ def warn_small(count: int, minimum: int, what: str) -> tuple[str, ...]:
     # called by what a method calls: the warning points to who called the method
     warnings.warn(note, SmallSampleWarning, stacklevel=4)
     return (note,)
-
-
-def on_logit(value: float, half: float, lowest: float) -> tuple[float, float]:
-    """Return ends that are symmetric on the logit of the place between lowest and 1."""
-    # The error is divided by the slope of the logit, and the ends are taken back, so
-    # that they stay inside.
-    if not lowest < value < 1.0:
-        return math.nan, math.nan
-    width = 1.0 - lowest
-    share = (value - lowest) / width
-    half /= width * share * (1.0 - share)
-    middle = math.log(share / (1.0 - share))
-    ends = (middle - half, middle + half)
-    # the inverse, from the side on which the exponential is small
-    low, high = (
-        1.0 / (1.0 + math.exp(-x)) if x >= 0.0 else math.exp(x) / (1.0 + math.exp(x))
-        for x in ends
-    )
-    return lowest + width * low, lowest + width * high
 
 
 def recorded_generator(

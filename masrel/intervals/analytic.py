@@ -13,7 +13,6 @@ from masrel.estimates import Estimate, Interval, Target
 from masrel.intervals._problem import (
     IntervalProblem,
     Statistic,
-    on_logit,
     pose_problem,
     warn_small,
 )
@@ -121,11 +120,23 @@ def _interval_around_estimate(
     if reason is not None:
         return problem.undefined(reason, method=method, unit=None)
     notes = warn_small(estimate.n_items, 10, "items")
-    low, high = _ends(problem, estimate, distribution)
-    if math.isnan(low):
-        reason = "the estimate is not inside the ends of the parameter space"
-        return problem.undefined(reason, method=method, unit=None)
-    return problem.confidence(low, high, method=method, unit=None, notes=notes)
+    lowest = None
+    if distribution in ("logit", "fisher"):
+        # artanh x is half the logit of (x + 1)/2, so that both give the same ends
+        lowest = problem.entry.lowest if distribution == "logit" else -1.0
+        if not lowest < estimate.value < 1.0:
+            reason = "the estimate is not inside the ends of the parameter space"
+            return problem.undefined(reason, method=method, unit=None)
+    if distribution == "normal":
+        from scipy.special import ndtri  # loaded only when an interval needs it
+
+        quantile = float(ndtri(0.5 + 0.5 * problem.level))
+    else:
+        quantile = problem.student_t(estimate.n_items - 1)
+    half = quantile * estimate.standard_error
+    return problem.around(
+        estimate.value, half, lowest=lowest, method=method, unit=None, notes=notes
+    )
 
 
 def _why_undefined(estimate: Estimate) -> str | None:
@@ -138,21 +149,3 @@ def _why_undefined(estimate: Estimate) -> str | None:
         "the standard error is 0: every item agrees alike, which does not mean that "
         "there is no uncertainty"
     )
-
-
-def _ends(
-    problem: IntervalProblem, estimate: Estimate, distribution: _Distribution
-) -> tuple[float, float]:
-    if distribution == "normal":
-        from scipy.special import ndtri  # loaded only when an interval needs it
-
-        quantile = float(ndtri(0.5 + 0.5 * problem.level))
-    else:
-        quantile = problem.student_t(estimate.n_items - 1)
-    value, half = estimate.value, quantile * estimate.standard_error
-    if distribution == "logit":
-        return on_logit(value, half, problem.entry.lowest)
-    if distribution == "fisher":
-        # artanh x is half the logit of (x + 1)/2, so that both give the same ends
-        return on_logit(value, half, -1.0)
-    return value - half, value + half

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Literal, TypedDict, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from masrel.agreement import CountedRatings, Label, registry
+from masrel.agreement import Coefficient, CountedRatings, Label
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Target
-from masrel.intervals._problem import Statistic, pose_problem
+from masrel.intervals._problem import Statistic, find_entry, pose_problem
 from masrel.intervals.analytic import analytic
 from masrel.intervals.bootstrap import bootstrap
 from masrel.intervals.jackknife import jackknife
@@ -91,7 +91,9 @@ def estimate(
         raise ParameterError(
             f"method: needs one of {', '.join(get_args(_Method))}, got {method!r}"
         )
-    entry = registry.coefficient(coefficient)
+    entry = (
+        coefficient if isinstance(coefficient, Coefficient) else find_entry(coefficient)
+    )
     if entry.kernel is None:
         result = entry(ratings, categories=categories, weights=weights, level=level)
     else:

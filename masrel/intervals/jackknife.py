@@ -114,9 +114,9 @@ def _interval_around_estimate(
         )
     half = problem.student_t(jackknifed.df) * math.sqrt(jackknifed.variance)
     t = "t" if target == "both" else f"t({jackknifed.df:g})"
-    return problem.confidence(
-        problem.value - half,
-        problem.value + half,
+    return problem.around(
+        problem.value,
+        half,
         method=f"{unit} jackknife, {t}",
         unit=target,
         notes=jackknifed.notes,
