@@ -127,35 +127,31 @@ class _Columns:
                 return
 
     def _on_in_catch(self, start: int, end: int, *, is_slow: bool) -> None:
-        # the sample of the catch itself has travelled nothing yet
+        p, post = self.parameters, end
         for low in range(start, end, _BLOCK):
             block = slice(low, min(low + _BLOCK, end))
-            travelled = self.angle[block] - self.angle[self.catch]
-            beyond = travelled > self.parameters.catch_travel  # (4)
+            # the sample of the catch itself has travelled nothing yet
+            beyond = self.angle[block] - self.angle[self.catch] > p.catch_travel  # (4)
             if beyond.any():
-                self.post = low + int(beyond.argmax())
-                self._catch(start, self.post)
-                # below ν_th post-catch lasts for the sample that began it
-                last = self.post + 1 if is_slow else end
-                self._post_catch(self.post, last)
-                self.now = POST_CATCH if last == end else PRE_CATCH
-                return
-        self._catch(start, end)
-
-    def _catch(self, start: int, end: int) -> None:
-        p, own = self.parameters, slice(start, end)
+                post = low + int(beyond.argmax())
+                break
+        own = slice(start, post)
         since = self.time[own] - self.time[self.catch]
-        pre_end, rise = self.pre_end, self.rise
-        share = p.residual_share
-        levels = np.where(
-            since < p.peak_duration, pre_end + rise, pre_end + share * rise
-        )
+        peak = self.pre_end + self.rise
+        residual = self.pre_end + p.residual_share * self.rise
+        levels = np.where(since < p.peak_duration, peak, residual)  # (3)
         smooth = since < p.catch_rise
         if smooth.any():
             y = since[smooth] / p.catch_rise
-            levels[smooth] = pre_end + rise * (y * y * (3.0 - 2.0 * y))
+            levels[smooth] = self.pre_end + self.rise * (y * y * (3.0 - 2.0 * y))
         self.torque[own] = levels
         self.phase[own] = CATCH
+        if post < end:
+            # below ν_th post-catch lasts for the sample that began it
+            last = post + 1 if is_slow else end
+            self.post = post
+            self._post_catch(post, last)
+            self.now = POST_CATCH if last == end else PRE_CATCH
 
     def _post_catch(self, start: int, end: int) -> None:
         p, own = self.parameters, slice(start, end)

@@ -8,6 +8,8 @@ smeared and a stem and a bar of one height are one share.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
+from operator import attrgetter
 from typing import Any, Literal
 
 import numpy as np
@@ -97,7 +99,11 @@ def forest_figure(forest: Forest) -> Figure:
     left = max(_lowest(places), _LEFT) - 0.05
     axes.set_xlim(left, _RIGHT)
     axes.set_ylim(bottom, 0.0)
-    _draw_zeros(axes, places)
+    # where rows next to each other have a zero: one line for all of them
+    for has_zero, group in groupby(places, key=attrgetter("row.has_zero")):
+        if has_zero:
+            run = list(group)
+            axes.plot([0.0, 0.0], [run[0].top, run[-1].bottom], **_ZERO, zorder=1.0)
     for place in places:
         if place.heading is not None:
             _at_left(axes, place.heading, place.row.group, weight="bold")
@@ -156,20 +162,6 @@ def _lowest(places: Sequence[_Placed]) -> float:
         if place.ridge is not None:
             numbers.append(place.ridge.lowest)
     return min(numbers)
-
-
-def _draw_zeros(axes: Axes, places: Sequence[_Placed]) -> None:
-    # where rows next to each other have a zero: one line for all of them
-    lines: list[tuple[float, float]] = []
-    for place in places:
-        if not place.row.has_zero:
-            continue
-        start = place.top
-        if lines and lines[-1][1] == start:
-            start = lines.pop()[0]
-        lines.append((start, place.bottom))
-    for start, end in lines:
-        axes.plot([0.0, 0.0], [start, end], **_ZERO, zorder=1.0)
 
 
 def _draw_row(axes: Axes, place: _Placed, left: float) -> None:
