@@ -19,6 +19,8 @@ from masrel.errors import ConvergenceError
 
 SETTLED = 1e-7
 """Halving the step moves a quantile less: its own error is about the square."""
+TOLERANCE = 1e-12
+"""How far off a point is solved for, or relative to it where that is more."""
 NEGLIGIBLE = 1e-18
 """Weight of a node that is dropped, relative to the largest."""
 
@@ -38,24 +40,12 @@ class LineDistribution:
     step: float  # distance of two points
     log_total: float  # logarithm of the integral that the density was divided by
 
-    def probability(self, point: float) -> float:
-        """Return the probability of at most a point."""
-        return self._at(point)[0]
-
-    def quantile(self, share: float, start: float | None = None) -> float:
-        """Return the point below which a share lies."""
-        if start is None:
-            first = int(np.searchsorted(self.masses.cumsum(), share))
-            start = float(self.points[min(first, self.points.size - 1)])
-        bounds = float(self.points[0]), float(self.points[-1])
-        return solve_quantile(self._at, share, start, bounds, 1e-12)
-
-    def _at(self, point: float) -> tuple[float, float]:
-        # probability of at most a point, and the density there, never below 0
+    def at(self, point: float) -> tuple[float, float]:
+        """Return the probability of at most a point, and the density there."""
         away = point - self.points
         probability = float(self.masses @ integrated_sinc(away, self.step))
         density = float(self.masses @ np.sinc(away / self.step)) / self.step
-        return probability, max(density, 0.0)
+        return probability, max(density, 0.0)  # rounding can bring it below 0
 
 
 def integrated_sinc(away: Floats, step: float) -> Floats:
@@ -85,8 +75,12 @@ def line_distribution(
             step=step,
             log_total=float(log.max() + np.log(total * step)),
         )
-        starts: Sequence[float | None] = before or [None] * len(shares)
-        after = [result.quantile(p, at) for p, at in zip(shares, starts, strict=True)]
+        near = result.masses.cumsum().searchsorted(shares).clip(max=points.size - 1)
+        starts = before or points[near].tolist()
+        after = [
+            solve_quantile(result.at, share, start, (low, high), TOLERANCE)
+            for share, start in zip(shares, starts, strict=True)
+        ]
         if before and np.allclose(after, before, rtol=0.0, atol=SETTLED):
             if max(result.masses[0], result.masses[-1]) > _MAX_TAIL:
                 raise ConvergenceError("the posterior reaches beyond its quadrature")

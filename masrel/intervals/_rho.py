@@ -14,7 +14,12 @@ from masrel.errors import ParameterError
 from masrel.estimates import Distribution, Interval
 from masrel.intervals._dirichlet_multinomial import DirichletMultinomial, RhoDensity
 from masrel.intervals._problem import IntervalProblem, recorded_generator
-from masrel.intervals._quadrature import LineDistribution, line_distribution
+from masrel.intervals._quadrature import (
+    TOLERANCE,
+    LineDistribution,
+    line_distribution,
+    solve_quantile,
+)
 
 PriorName = Literal["uniform", "jeffreys"]
 """Prior of ρ: U(0, 1), or Beta(1/2, 1/2), the prior of Jeffreys for a probability."""
@@ -101,7 +106,12 @@ class RhoPosterior:
 
     def quantile(self, share: float) -> float:
         """Return a quantile of ρ."""
-        return float(expit(self.logit.quantile(share)))
+        points = self.logit.points.tolist()
+        near = min(int(self.logit.masses.cumsum().searchsorted(share)), len(points) - 1)
+        ends = points[0], points[-1]
+        return float(
+            expit(solve_quantile(self.logit.at, share, points[near], ends, TOLERANCE))
+        )
 
     def distribution(self) -> Distribution:
         """Return the density of ρ at points between its outermost quantiles."""

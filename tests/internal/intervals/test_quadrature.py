@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.special import betainc
+from scipy.special import betainc, logit
 
 from masrel.agreement import code_ratings
 from masrel.agreement._counts import item_counts
@@ -14,12 +14,12 @@ from tests.intervals.data import SCALE, TABLE_V
 
 def test_probabilities_rise_and_are_those_of_quantiles() -> None:
     counts = item_counts(code_ratings(TABLE_V, SCALE))
-    result = RhoPosterior.of(counts, DEFAULT_PRIOR, 0.95).logit
+    posterior = RhoPosterior.of(counts, DEFAULT_PRIOR, 0.95)
     shares = [1e-6, 0.025, 0.3, 0.5, 0.9, 1.0 - 1e-6]
-    points = [result.quantile(share) for share in shares]
-    again = [result.probability(point) for point in points]
+    points = [logit(posterior.quantile(share)) for share in shares]
+    again = [posterior.logit.at(point)[0] for point in points]
     assert again == pytest.approx(shares, abs=1e-12)
-    grid = [result.probability(point) for point in np.linspace(-20.0, 12.0, 400)]
+    grid = [posterior.logit.at(point)[0] for point in np.linspace(-20.0, 12.0, 400)]
     assert (np.diff(grid) > -1e-14).all()
 
 

@@ -172,7 +172,7 @@ def test_ranks_of_what_made_the_data_are_uniform(n_raters: int, n_items: int) ->
             for a, b in np.moveaxis(study, 2, 1)
         ]
         result = _Posterior.of(tables, (0.5,), DEFAULT_PRIOR)
-        below.append(result.mean.probability(float(special.logit(m))))
+        below.append(result.mean.at(float(special.logit(m)))[0])
     assert stats.kstest(below, "uniform").pvalue > 1e-4
 
 
