@@ -48,8 +48,8 @@ class Scale:
                 raise ParameterError(
                     f"scale {self.name!r}: grades must be text, got {grade!r}"
                 )
-        repeated = sorted({g for g in self.grades if self.grades.count(g) > 1})
-        if repeated:
+        if len(set(self.grades)) < len(self.grades):
+            repeated = sorted({g for g in self.grades if self.grades.count(g) > 1})
             raise ParameterError(
                 f"scale {self.name!r}: grades must differ, repeated: {repeated}"
             )

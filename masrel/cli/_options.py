@@ -1,7 +1,6 @@
 """Options that several verbs have, as one argument each, and what verbs print."""
 
 import json
-import math
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -13,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from masrel.errors import MasrelWarning, ParameterError, RatingsError
-from masrel.scales import MODIFIED_ASHWORTH
 
 if TYPE_CHECKING:
     from masrel.protocol import Protocol, StudyPaths
@@ -55,57 +53,6 @@ def split_commas(text: str) -> list[str]:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ColumnOptions:
-    """Columns of a file in long format, and its scale; None where it has to tell."""
-
-    # item, rater, grade: names of columns
-    item: str | None
-    rater: str | None
-    grade: str | None
-    categories: list[str] | None  # every grade of the scale in order
-
-
-column_options = grouped(
-    "columns",
-    ColumnOptions,
-    click.option("--item", help="Column of the rated items (long format)."),
-    click.option("--rater", help="Column of the raters (long format)."),
-    click.option("--grade", help="Column of the grades (long format)."),
-    click.option(
-        "--categories",
-        type=split_commas,
-        metavar="TEXT",
-        help="Every grade of the scale in order, such as 0,1,1+,2,3,4.",
-    ),
-)
-
-
-def scale_notes(ratings: "Ratings", weights: str) -> tuple[str, ...]:
-    """Return what to say of a scale that nobody declared, or refuse its weights."""
-    scale, grades = ratings.scale, ", ".join(ratings.scale.grades)
-    if scale == MODIFIED_ASHWORTH:
-        return (
-            f"The scale is the Modified Ashworth Scale, {grades}, told by its grade "
-            "1+; --categories declares another.",
-        )
-    if weights == "identity" or scale.name != "observed":
-        return ()
-    if not all(map(_is_number, scale.grades)):
-        raise ParameterError(
-            f"--weights {weights}: needs --categories with every grade of the scale in "
-            f"order, the grades met are text: {grades}"
-        )
-    return (f"The scale is the grades met, {grades}; --categories declares another.",)
-
-
-def _is_number(grade: str) -> bool:
-    try:
-        return math.isfinite(float(grade))
-    except ValueError:
-        return False
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class StudyData:
     """A study read from its folder."""
 
@@ -127,12 +74,12 @@ ratings_option = click.option(
 def read_study(root: Path, ratings_file: Path | None) -> StudyData:
     """Return a study's protocol and its ratings, by default those in its folder."""
     from masrel.protocol import StudyPaths, read_protocol, scale_of
-    from masrel.ratings import read_in_person, read_ratings
+    from masrel.ratings import read_in_person, read_study_ratings
 
     paths = StudyPaths(root)
     protocol = read_protocol(paths.protocol)
     source = ratings_file or _default_ratings(paths)
-    ratings = read_ratings(source, scale=scale_of(protocol))
+    ratings = read_study_ratings(source, scale=scale_of(protocol))
     in_person = None
     if paths.in_person_file.is_file() and not ratings.simulated:
         in_person = read_in_person(paths.in_person_file)

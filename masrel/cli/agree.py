@@ -1,28 +1,32 @@
 """``masrel agree``: agreement of any CSV file of ratings, no study needed."""
 
 import warnings
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import click
 
 from masrel.cli._options import (
-    ColumnOptions,
     OutputOptions,
-    column_options,
     grouped,
     output_options,
-    scale_notes,
     split_commas,
     write_output,
+)
+from masrel.cli._reading import (
+    ReadingOptions,
+    read_file,
+    reading_options,
+    table_options,
+    what_was_read,
 )
 from masrel.errors import MasrelError, MasrelWarning, ParameterError, RatingsError
 from masrel.estimates import Target, as_document
 
 if TYPE_CHECKING:
     from masrel.agreement import BandScale, Coefficient, WeightName
-    from masrel.ratings import Ratings
+    from masrel.ratings import RatingsFile, RatingsPart
     from masrel.report._agreement_table import AgreementRow
 
 _USUAL = ["percent_agreement", "fleiss_kappa"]
@@ -91,9 +95,14 @@ _estimate_options = grouped(
 
 @click.command("agree")
 @click.argument("file", type=click.Path(path_type=Path))
-@column_options
+@grouped(
+    "reading",
+    ReadingOptions,
+    *reading_options,
+    *table_options,
+    click.option("--by", metavar="COL", help="Estimate each group of this column."),
+)
 @_estimate_options
-@click.option("--by", type=click.Choice(["session"]), help="Estimate each session.")
 @output_options(
     json="Write the estimates here; - prints them, and nothing else, on stdout.",
     figure="Draw the intervals into this .png, .svg or .pdf; needs --target.",
@@ -102,9 +111,8 @@ _estimate_options = grouped(
 )
 def agree(
     file: Path,
-    columns: ColumnOptions,
+    reading: ReadingOptions,
     options: _EstimateOptions,
-    by: str | None,
     output: OutputOptions,
 ) -> None:
     """Estimate the agreement of the raters in FILE.
@@ -119,17 +127,16 @@ def agree(
         raise ParameterError(
             "--figure: shows intervals, so it needs --target raters, items or both"
         )
-    from masrel.ratings import read_ratings
-
-    ratings = read_ratings(file, **asdict(columns))
-    notes = scale_notes(ratings, options.weights)
-    rows = _estimate(ratings, options, by, file)
+    ratings = read_file(file, reading)
+    by = reading.by
+    notes = (*what_was_read(ratings), *(f"warning: {w}" for w in ratings.warnings))
+    rows = _estimate(ratings, options, file)
     from masrel.report._agreement_table import agreement_forest, agreement_table
     from masrel.report._tables import SIMULATED
 
     write_output(
         output,
-        document=lambda: _document(rows, by),
+        document=lambda: {**_document(rows, by), "read": ratings.read},
         text=lambda: agreement_table(
             rows,
             caption=f"Agreement of the raters in {file}",
@@ -147,34 +154,30 @@ def agree(
 
 
 def _estimate(
-    ratings: "Ratings", options: _EstimateOptions, by: str | None, file: Path
+    ratings: "RatingsFile", options: _EstimateOptions, file: Path
 ) -> "list[AgreementRow]":
-    sessions = list(dict.fromkeys(ratings.table["session"]))
-    if by is None and len(sessions) > 1:
+    sessions = list(dict.fromkeys(str(part.session) for part in ratings.parts))
+    if len(sessions) > 1:
         raise RatingsError(
             f"{file}: holds {len(sessions)} sessions ({', '.join(sessions)}), so that "
-            "raters graded the same item more than once; --by session estimates each"
+            "raters graded the same item more than once; "
+            f"--by {ratings.read['session']} estimates each"
         )
     with warnings.catch_warnings():
         # Every note is in the result, and so below the table or in the JSON.
         warnings.simplefilter("ignore", MasrelWarning)
         return [
             row
-            for session in sessions
-            for row in _estimate_session(ratings, session, options)
+            for part in ratings.parts
+            for row in _estimate_session(ratings, part, options)
         ]
 
 
 def _estimate_session(
-    ratings: "Ratings", session: str, options: _EstimateOptions
+    ratings: "RatingsFile", part: "RatingsPart", options: _EstimateOptions
 ) -> "list[AgreementRow]":
-    from masrel.agreement import count_ratings
-    from masrel.ratings import rating_matrix
     from masrel.report._agreement_table import AgreementRow
 
-    matrix = rating_matrix(ratings, session=session)
-    scale = ratings.scale
-    counted = count_ratings(scale.weigh(matrix.grades), scale.values)
     is_named = options.coefficients is not None
     names = (
         _USUAL if options.coefficients is None else split_commas(options.coefficients)
@@ -182,8 +185,9 @@ def _estimate_session(
     takes_all = names == ["all"]
     rows: list[AgreementRow] = []
     refused: list[MasrelError] = []
-    for entry in _entries(names, len(matrix.raters)):
+    for entry in _entries(names, options.weights, ratings, part):
         title, notes = entry.title, []
+        counted = part.ratings if entry.kernel is None else part.counted
         weights: WeightName = options.weights if entry.weighted else "identity"
         if weights != "identity":
             title += f", {weights}"
@@ -221,7 +225,10 @@ def _estimate_session(
             )
         rows.append(
             AgreementRow(
-                session=session, title=title, estimate=estimate, notes=tuple(notes)
+                session=part.group or "",
+                title=title,
+                estimate=estimate,
+                notes=tuple(notes),
             )
         )
     if not takes_all and refused and len(refused) == len(rows):
@@ -229,9 +236,21 @@ def _estimate_session(
     return rows
 
 
-def _entries(names: list[str], n_raters: int) -> list["Coefficient"]:
+_NEED_ORDER = ("icc", "kendall_w", "robinson_a")
+"""How names of coefficients begin that are of values or of ranks."""
+
+
+def _entries(
+    names: list[str], weights: str, ratings: "RatingsFile", part: "RatingsPart"
+) -> list["Coefficient"]:
     from masrel.agreement import COEFFICIENTS, coefficient
 
+    n_raters = len(part.raters) or ratings.read["n_raters"]
+    if weights != "identity" and not ratings.is_ordered:
+        raise ParameterError(
+            f"--weights {weights}: needs --categories with every grade of the scale in "
+            f"order, the grades met are text: {', '.join(ratings.scale.grades)}"
+        )
     if names == ["all"]:
         return [
             entry
@@ -240,6 +259,12 @@ def _entries(names: list[str], n_raters: int) -> list["Coefficient"]:
         ]
     entries = [coefficient(name) for name in names]
     for entry in entries:
+        if entry.name.startswith(_NEED_ORDER) and not ratings.is_ordered:
+            raise ParameterError(
+                f"--coefficients: {entry.name} needs grades that are numbers, or "
+                "--categories with every grade in order, got text: "
+                f"{', '.join(ratings.scale.grades[:6])}"
+            )
         if entry.shape == "pairs":
             raise ParameterError(
                 f"--coefficients: {entry.name} takes each rater's grades of two "

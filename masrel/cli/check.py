@@ -60,11 +60,11 @@ def _ratings_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
     files = [f for f in (study.ratings_file, study.published_file) if f.is_file()]
     if not files:
         return
-    from masrel.ratings import read_ratings  # loads pandas
+    from masrel.ratings import read_study_ratings  # loads pandas
 
     for path in files:
         try:
-            read_ratings(path, scale=scale_of(protocol))
+            read_study_ratings(path, scale=scale_of(protocol))
         except MasrelError as error:
             yield str(error)
 

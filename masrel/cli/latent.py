@@ -1,24 +1,27 @@
 """``masrel latent``: raters' biases and noises, items and thresholds on one scale."""
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import click
 
 from masrel.cli._options import (
-    ColumnOptions,
     OutputOptions,
-    column_options,
+    grouped,
     output_options,
-    scale_notes,
     write_output,
+)
+from masrel.cli._reading import (
+    ReadingOptions,
+    read_file,
+    reading_options,
+    what_was_read,
 )
 from masrel.errors import ParameterError, RatingsError
 
 if TYPE_CHECKING:
     from masrel.intervals import LatentTrait
-    from masrel.ratings import Ratings
+    from masrel.ratings import RatingsFile, RatingsPart
 
 
 @click.command("latent")
@@ -29,8 +32,8 @@ if TYPE_CHECKING:
     required=True,
     help="Whether kappa speaks of these items, or of new ones like them.",
 )
-@column_options
-@click.option("--session", help="Which session, if the file holds more than one.")
+@grouped("reading", ReadingOptions, *reading_options)
+@click.option("--only", metavar="SESSION", help="Which session, of several.")
 @click.option("--level", default=0.95, show_default=True, help="Level of intervals.")
 @click.option("--seed", default=0, show_default=True, help="Seed of the sampler.")
 @click.option(
@@ -47,8 +50,8 @@ if TYPE_CHECKING:
 def latent(
     file: Path,
     items: Literal["fixed", "random"],
-    columns: ColumnOptions,
-    session: str | None,
+    reading: ReadingOptions,
+    only: str | None,
     level: float,
     seed: int,
     one_prior: bool,
@@ -63,13 +66,16 @@ def latent(
     output.check_files()
     if seed < 0:
         raise ParameterError(f"--seed: needs at least 0, got {seed}")
-    from masrel.ratings import read_ratings
-
-    ratings = read_ratings(file, **asdict(columns))
-    notes = _scale_notes(ratings)
+    ratings = read_file(file, reading)
+    if not ratings.is_ordered:
+        raise ParameterError(
+            "--categories: the model needs every grade of the scale in order, the "
+            f"grades met are text: {', '.join(ratings.scale.grades[:6])}"
+        )
+    notes = (*what_was_read(ratings), *(f"warning: {w}" for w in ratings.warnings))
     result = _sample(
         ratings,
-        _only_session(ratings, file, session),
+        _part(ratings, file, only),
         items=items,
         level=level,
         seed=seed,
@@ -99,34 +105,23 @@ def latent(
     )
 
 
-def _scale_notes(ratings: "Ratings") -> tuple[str, ...]:
-    # as of agree, but that the model needs an order whatever the weights
-    try:
-        return scale_notes(ratings, "linear")
-    except ParameterError as error:
-        raise ParameterError(
-            "--categories: the model needs every grade of the scale in order, the "
-            f"grades met are text: {', '.join(ratings.scale.grades)}"
-        ) from error
-
-
-def _only_session(ratings: "Ratings", file: Path, session: str | None) -> str:
-    sessions = list(dict.fromkeys(ratings.table["session"]))
-    if session is None and len(sessions) == 1:
-        return str(sessions[0])
-    if session in sessions:
-        return str(session)
-    known = ", ".join(sessions)
+def _part(ratings: "RatingsFile", file: Path, session: str | None) -> "RatingsPart":
+    parts = {str(part.session): part for part in ratings.parts}
+    if session is None and len(parts) == 1:
+        return ratings.parts[0]
+    if session in parts:
+        return parts[session]
+    known = ", ".join(parts)
     if session is None:
         raise RatingsError(
-            f"{file}: holds {len(sessions)} sessions ({known}); --session chooses one"
+            f"{file}: holds {len(parts)} sessions ({known}); --only chooses one"
         )
-    raise RatingsError(f"{file}: holds no session {session}, but {known}")
+    raise RatingsError(f"{file}: --only: holds no session {session}, but {known}")
 
 
 def _sample(
-    ratings: "Ratings",
-    session: str,
+    ratings: "RatingsFile",
+    part: "RatingsPart",
     *,
     items: Literal["fixed", "random"],
     level: float,
@@ -134,14 +129,16 @@ def _sample(
     compare: bool,
     hides_progress: bool | None,
 ) -> "LatentTrait":
+    import numpy as np
     import pandas as pd
     from tqdm import tqdm
 
+    from masrel.agreement import code_ratings
     from masrel.intervals import latent_trait
-    from masrel.ratings import rating_matrix
 
-    matrix = rating_matrix(ratings, session=session)
-    table = pd.DataFrame(matrix.grades, index=matrix.items, columns=matrix.raters)
+    codes = code_ratings(part.ratings).codes
+    grades = np.array([*ratings.scale.grades, None], dtype=object)[codes]
+    table = pd.DataFrame(grades, index=part.items, columns=part.raters, dtype=object)
     # nothing is shown of a call that is refused at once
     with tqdm(
         desc="sampling", unit=" steps", delay=0.01, disable=hides_progress

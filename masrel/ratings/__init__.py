@@ -1,16 +1,18 @@
 """Tables of ratings: where they come from, and how statistics take them.
 
-In: session logs, or any CSV file of ratings. Out: a checked table, the item by
-rater matrix of one session, and the pairs of two.
+In: session logs, a study's table, or any file of ratings. Out: a checked table, the
+item by rater matrix of one session, and the pairs of two.
 """
 
 import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from masrel.ratings.files import read_ratings
+    from masrel.ratings._parts import RatingsPart, Repeated
     from masrel.ratings.in_person import InPerson, InPersonRow, read_in_person
     from masrel.ratings.logs import ratings_from_logs
+    from masrel.ratings.reader import RatingsFile, read_ratings
+    from masrel.ratings.study_file import read_study_ratings
     from masrel.ratings.table import (
         DEFAULT_SESSION,
         RATING_COLUMNS,
@@ -33,6 +35,9 @@ __all__ = [
     "InPersonRow",
     "RatingMatrix",
     "Ratings",
+    "RatingsFile",
+    "RatingsPart",
+    "Repeated",
     "RetestPairs",
     "rating_matrix",
     "ratings_from_logs",
@@ -40,14 +45,17 @@ __all__ = [
     "ratings_hash",
     "read_in_person",
     "read_ratings",
+    "read_study_ratings",
     "retest_pairs",
     "write_ratings",
 ]
 
 _HOMES = {
-    "files": ("read_ratings",),
     "in_person": ("InPerson", "InPersonRow", "read_in_person"),
     "logs": ("ratings_from_logs",),
+    "_parts": ("RatingsPart", "Repeated"),
+    "reader": ("RatingsFile", "read_ratings"),
+    "study_file": ("read_study_ratings",),
 }
 """Module to the names in it; all other names are of `table`."""
 

@@ -92,7 +92,7 @@ class _Cell:
     source: str = "foreign"
 
 
-def read_ratings(
+def read_study_ratings(
     path: Path | str,
     *,
     scale: Scale | None = None,

@@ -1,0 +1,203 @@
+"""The options of verbs that read any file of ratings, and what they say of it."""
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from masrel.cli._options import split_commas
+from masrel.errors import ParameterError
+
+if TYPE_CHECKING:
+    from masrel.ratings import RatingsFile, Repeated
+
+_SHOWN = 12  # raters that are named
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadingOptions:
+    """What the caller says of a file; None and () are for the file to tell."""
+
+    item: tuple[str, ...]
+    rater: str | None
+    grade: str | None
+    raters: tuple[str, ...]
+    ignore: tuple[str, ...]
+    no_item: bool
+    no_header: bool
+    session: str | None
+    by: str | None = None
+    repeated: "Repeated"
+    categories: list[str] | None
+    missing: tuple[str, ...]
+    decimal: str
+    delimiter: str
+    encoding: str | None
+    sheet: str | None
+    transpose: bool
+    counts: bool = False
+    table: bool = False
+    source: str | None
+
+
+def _codes(texts: tuple[str, ...]) -> list[str]:
+    return [code for text in texts for code in split_commas(text)]
+
+
+def read_file(file: Path, options: ReadingOptions) -> "RatingsFile":
+    """Read a file of ratings as the options say."""
+    from masrel.ratings import read_ratings
+
+    arguments = asdict(options)
+    names = {"auto": None, "tab": "\t", "\\t": "\t", "space": " ", "blanks": " "}
+    delimiter = names.get(options.delimiter, options.delimiter)
+    if delimiter is not None and len(delimiter) != 1:
+        raise ParameterError(
+            f"--delimiter: needed auto, one letter, tab or blanks, got {delimiter!r}"
+        )
+    if len(options.decimal) != 1 or options.decimal in "+-0123456789eE":
+        raise ParameterError(
+            f"--decimal: needed one letter such as a comma, got {options.decimal!r}"
+        )
+    arguments |= {"delimiter": delimiter, "missing": _codes(options.missing)}
+    return read_ratings(file, **arguments)
+
+
+reading_options = [
+    click.option(
+        "--item",
+        multiple=True,
+        metavar="COL",
+        help="Column of the items; A,B for several.",
+    ),
+    click.option(
+        "--rater", metavar="COL", help="Column of the raters (one row a rating)."
+    ),
+    click.option(
+        "--grade", metavar="COL", help="Column of the grades (one row a rating)."
+    ),
+    click.option(
+        "--raters",
+        multiple=True,
+        metavar="COL,…",
+        help="Columns that are raters (one row an item).",
+    ),
+    click.option(
+        "--ignore", multiple=True, metavar="COL,…", help="Columns that are left aside."
+    ),
+    click.option("--no-item", is_flag=True, help="No column names the items."),
+    click.option(
+        "--no-header", is_flag=True, help="No line of names; columns are 1, 2, 3 …"
+    ),
+    click.option("--session", metavar="COL", help="Column of the sessions."),
+    click.option(
+        "--repeated",
+        type=click.Choice(["error", "first", "last", "mean"]),
+        default="error",
+        show_default=True,
+        help="What becomes of a second grade of an item by a rater.",
+    ),
+    click.option(
+        "--categories",
+        type=split_commas,
+        metavar="GRADE,…",
+        help="Every grade of the scale in order, such as 0,1,1+,2,3,4.",
+    ),
+    click.option(
+        "--missing",
+        multiple=True,
+        metavar="CODE,…",
+        help="Cells that are missing grades, beside empty ones and NA.",
+    ),
+    click.option(
+        "--decimal", default=".", metavar="CHAR", help="Decimal mark of numbers."
+    ),
+    click.option(
+        "--delimiter",
+        default="auto",
+        show_default=True,
+        metavar="CHAR",
+        help="Separator of cells; tab and blanks by name.",
+    ),
+    click.option(
+        "--encoding",
+        metavar="NAME",
+        help="Encoding of text, such as latin-1; UTF-8 or what its mark says.",
+    ),
+    click.option("--sheet", metavar="NAME", help="Sheet of a workbook."),
+    click.option(
+        "--transpose", is_flag=True, help="A row is a rater, a column an item."
+    ),
+    click.option(
+        "--from",
+        "source",
+        metavar="TOOL",
+        help="Export of label-studio, doccano, prodigy or inception.",
+    ),
+]
+"""Options of verbs that read a file of ratings."""
+
+table_options = [
+    click.option(
+        "--counts",
+        is_flag=True,
+        help="Items by categories: how many raters chose each.",
+    ),
+    click.option(
+        "--table",
+        is_flag=True,
+        help="A contingency table of two raters, the first in rows.",
+    ),
+]
+"""Options of verbs that need not know who rated what."""
+
+
+def what_was_read(file: "RatingsFile") -> list[str]:
+    """Return the lines that say what was read, above a table."""
+    read = file.read
+    form = [read["format"], read.get("delimiter"), read.get("encoding")]
+    if read.get("sheet"):
+        form.append(f"sheet {read['sheet']}")
+    names = read["raters"]
+    raters = ", ".join(names[:_SHOWN])
+    if len(names) > _SHOWN:
+        raters += f" and {len(names) - _SHOWN} more"
+    items = f" named by {' and '.join(map(repr, read['item']))}" if read["item"] else ""
+    counts = f"{read['n_items']} items{items}, {read['n_raters']} raters"
+    first = f"Read {', '.join(filter(None, form))}: {counts}"
+    return [first + (f" ({raters})." if raters else "."), " ".join(_of_grades(file))]
+
+
+def _of_grades(file: "RatingsFile") -> list[str]:
+    read, scale = file.read, file.scale
+    grades = list(read["grades"].items())
+    listed = ", ".join(f"{grade} ×{n}" for grade, n in grades[:_SHOWN])
+    if len(grades) > _SHOWN:
+        listed = f"{len(grades)} from {grades[0][0]} to {grades[-1][0]}"
+    parts = [f"Grades: {listed}."]
+    if read["n_missing"]:
+        codes = ", ".join(f"{c or 'empty'} ×{n}" for c, n in read["missing"].items())
+        parts.append(f"Missing: {codes or read['n_missing']}.")
+    if read["n_repeated"]:
+        parts.append(f"Repeated: {read['n_repeated']}, {read['repeated']} taken.")
+    if read["dropped"]:
+        rows = ", ".join(f"{n} {why}" for why, n in read["dropped"].items())
+        parts.append(f"Rows left out: {rows}.")
+    merged = {g: s for g, s in read["merged"].items() if len(s) > 1}
+    if merged:
+        same = "; ".join(
+            f"{' = '.join(spellings)}" for spellings in list(merged.values())[:_SHOWN]
+        )
+        parts.append(f"The same grade: {same}.")
+    if scale.name == "MAS":
+        parts.append(
+            f"Scale: the Modified Ashworth Scale, {', '.join(scale.grades)}, told by "
+            "its grade 1+; --categories declares another."
+        )
+    elif scale.name == "observed":
+        parts.append(
+            "Scale: the grades met (AC and Brennan-Prediger depend on it; --categories "
+            "declares another)."
+        )
+    return parts

@@ -1,0 +1,322 @@
+"""What a cell of a foreign table means: which grade it is, or that there is none.
+
+Every text that occurs is looked at once. Two texts are one grade only where that cannot
+be wrong, and each time it is noted; whatever else looks alike is warned of.
+"""
+
+import math
+import re
+import unicodedata
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from decimal import Decimal
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from masrel.errors import RatingsError
+from masrel.scales import MODIFIED_ASHWORTH, Scale
+
+USUAL_MISSING = ("", "NA")
+"""Cells that stand for a missing grade unless the scale has them."""
+
+_LOOKS_MISSING = frozenset(
+    "n/a na nan null none nil <na> nat n.a. n.a #n/a #na #null! #value! #div/0! #ref! "
+    ". .. - -- --- – — ? ?? missing".split()
+) | {"not rated"}
+
+# Whole numbers that programs write for "missing", where they lie far from the others.
+_CODES = frozenset(
+    sign * int(digit * n) for digit in "789" for n in range(1, 6) for sign in (1, -1)
+) | {-1, 999999, -999999}
+
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_NUMBER_BEGINS = frozenset("+-.0123456789")
+_DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+", re.ASCII)
+_INVISIBLE = re.compile("[\u200b-\u200f\u2060\ufeff\u00ad]")
+_SHOWN = 6  # texts that a message lists
+_MIN_MEASURED = 10  # numbers from which a column is one of measurements
+_MAX_STRAY = 0.05  # part of them that may be no numbers by mistake
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GradeOptions:
+    """What a caller says of the grades."""
+
+    categories: tuple[str, ...] | None = None  # every grade of the scale in order
+    missing: tuple[str, ...] = ()  # codes of missing grades beside the usual ones
+    decimal: str = "."
+
+
+@dataclass(slots=True, kw_only=True)
+class Grades:
+    """The texts of a table's cells as grades."""
+
+    scale: Scale
+    codes: NDArray[np.int64]  # (n_texts,): place in the scale, -1 where missing
+    merged: dict[str, list[str]] = field(default_factory=dict)  # grade to its spellings
+    missing: dict[str, int] = field(default_factory=dict)  # code to number of cells
+    warnings: list[str] = field(default_factory=list)
+
+    @property
+    def is_ordered(self) -> bool:
+        """Whether the order of the scale is more than that of the alphabet."""
+        return self.scale.name != "observed" or all(map(is_number, self.scale.grades))
+
+
+def coded_texts(cells: NDArray[np.object_]) -> tuple[NDArray[np.int64], list[str]]:
+    """Return the texts of cells and where each occurs; blanks around them go."""
+    # (n,) -> (n,) places in the texts
+    codes, uniques = pd.factorize(cells)
+    texts = [_plain(text) for text in uniques]
+    place: dict[str, int] = {}
+    places = [place.setdefault(text, len(place)) for text in texts]
+    if len(place) < len(texts):
+        codes = np.array(places, dtype=np.int64)[codes]
+    return np.asarray(codes, dtype=np.int64), list(place)
+
+
+def _plain(text: str) -> str:
+    # One letter may be written in two ways that are the same by Unicode's own rule.
+    text = text.strip()
+    return text if text.isascii() else unicodedata.normalize("NFC", text).strip()
+
+
+def is_number(text: str) -> bool:
+    """Return whether a text is a finite decimal number in ASCII."""
+    return bool(_NUMBER.fullmatch(text)) and math.isfinite(float(text))
+
+
+def read_grades(
+    texts: Sequence[str],
+    freq: NDArray[np.int64],
+    options: GradeOptions,
+    where: Callable[[int], str],
+) -> Grades:
+    """Decide which grade each text is; `where` says where a text first stands."""
+    # freq (n_texts,): how many cells have each
+    declared = options.categories or ()
+    missing = dict.fromkeys(_missing_codes(texts, options), 0)
+    as_number = {text: _decimal_point(text, options.decimal) for text in texts}
+    places = [i for i, text in enumerate(texts) if text not in missing and freq[i]]
+    grades = Grades(
+        scale=MODIFIED_ASHWORTH, codes=np.full(len(texts), -1, dtype=np.int64)
+    )
+    for text, n in zip(texts, freq.tolist(), strict=True):
+        if text in missing and n:
+            grades.missing[text] = int(n)
+    met = {texts[i]: int(freq[i]) for i in places}
+    if not met:
+        raise RatingsError("needed at least one grade, got none")
+    first = {texts[i]: i for i in places}
+
+    def stands(text: str) -> str:
+        return where(first[text])
+
+    if declared:
+        grades.scale = Scale(name="declared", grades=declared)
+        grade_of = _declared_grades(met, declared, as_number, stands)
+    else:
+        _refuse_doubtful(met, options, stands)
+        grade_of = _observed_grades(met, as_number, stands)
+        grades.scale = _observed_scale(list(dict.fromkeys(grade_of.values())))
+        grades.warnings += _alike(met, grade_of)
+        grades.warnings += _sentinels(grades.scale, met, grade_of)
+        grades.warnings += _stray(met, stands)
+    place = {grade: code for code, grade in enumerate(grades.scale.grades)}
+    spellings: dict[str, list[str]] = {}
+    for i in places:
+        grade = grade_of[texts[i]]
+        grades.codes[i] = place[grade]
+        spellings.setdefault(grade, []).append(texts[i])
+    grades.merged = {g: s for g, s in spellings.items() if len(s) > 1 or s != [g]}
+    return grades
+
+
+def _missing_codes(texts: Sequence[str], options: GradeOptions) -> list[str]:
+    # texts that stand for a missing grade; numbers among the codes by their value
+    declared = options.categories or ()
+    codes = {c for c in USUAL_MISSING if c not in declared} | set(options.missing)
+    numbers = {Decimal(code) for code in options.missing if is_number(code)}
+    return [
+        text
+        for text in texts
+        if text in codes or (numbers and is_number(text) and Decimal(text) in numbers)
+    ]
+
+
+def _decimal_point(text: str, decimal: str) -> str | None:
+    # the number as Python writes it, or None
+    if decimal != ".":
+        text = text.replace(decimal, ".") if "." not in text else ""
+    return text if is_number(text) else None
+
+
+def _shown(texts: Sequence[str]) -> str:
+    shown = ", ".join(map(repr, texts[:_SHOWN]))
+    n_more = len(texts) - _SHOWN
+    return shown + (f" and {n_more} more" if n_more > 0 else "")
+
+
+def _declared_grades(
+    met: Mapping[str, int],
+    declared: Sequence[str],
+    as_number: Mapping[str, str | None],
+    stands: Callable[[str], str],
+) -> dict[str, str]:
+    # text to the category it is: the same text, else the same number
+    is_numeric = all(map(is_number, declared))
+    numbers = {Decimal(c): c for c in declared} if is_numeric else {}
+    grade_of: dict[str, str] = {}
+    wrong: list[str] = []
+    for text in met:
+        number = as_number[text]
+        turned = f"{text[1:]}+"  # clinicians write +1 for 1+
+        if text in declared:
+            grade_of[text] = text
+        elif text.startswith("+") and turned in declared:
+            grade_of[text] = turned
+        elif number is not None and Decimal(number) in numbers:
+            grade_of[text] = numbers[Decimal(number)]
+        else:
+            wrong.append(text)
+    if wrong:
+        likely = [t for t in wrong if _looks_missing(t)]
+        hint = f"; {_missing_option(likely)} if it is missing" if likely else ""
+        raise RatingsError(
+            f"{stands(wrong[0])}: needed one of {', '.join(declared)}, got "
+            f"{_shown(wrong)}{hint}"
+        )
+    return grade_of
+
+
+def _refuse_doubtful(
+    met: Mapping[str, int], options: GradeOptions, stands: Callable[[str], str]
+) -> None:
+    likely = [text for text in met if _looks_missing(text)]
+    if likely:
+        raise RatingsError(
+            f"{stands(likely[0])}: {_shown(likely)} looks like a missing grade: "
+            f"{_missing_option(likely)} counts it as one, --categories with it in the "
+            "scale as a grade"
+        )
+    commas = [text for text in met if _DECIMAL_COMMA.fullmatch(text)]
+    rest = [t for t in met if t not in commas and not is_number(t)]
+    if commas and not rest and options.decimal == ".":
+        raise RatingsError(
+            f"{stands(commas[0])}: {_shown(commas)} looks like a number with a decimal "
+            "comma: --decimal , reads it so, --categories makes it text"
+        )
+
+
+def _looks_missing(text: str) -> bool:
+    return text.casefold() in _LOOKS_MISSING
+
+
+def _missing_option(codes: Sequence[str]) -> str:
+    import shlex
+
+    return f"--missing {shlex.quote(','.join(codes))}"
+
+
+def _observed_grades(
+    met: Mapping[str, int],
+    as_number: Mapping[str, str | None],
+    stands: Callable[[str], str],
+) -> dict[str, str]:
+    # text to grade where nobody declared a scale
+    plus = [t for t in met if t.startswith("+") and as_number[t] is not None]
+    plain = [t for t in met if t[0].isdigit() and _positive(as_number[t])]
+    if plus and plain:
+        raise RatingsError(
+            f"{stands(plus[0])}: {_shown(plus)} beside plain numbers such as "
+            f"{plain[0]!r} may be that number or the grade '{plus[0][1:]}+': "
+            "--categories with the scale in order tells"
+        )
+    if any(as_number[text] is None for text in met):
+        return {text: text for text in met}
+    shortest: dict[Decimal, str] = {}
+    for text in sorted(met, key=lambda t: (len(t), t)):
+        shortest.setdefault(Decimal(str(as_number[text])), str(as_number[text]))
+    return {text: shortest[Decimal(str(as_number[text]))] for text in met}
+
+
+def _positive(number: str | None) -> bool:
+    return number is not None and float(number) > 0
+
+
+def _observed_scale(grades: Sequence[str]) -> Scale:
+    if all(map(is_number, grades)):
+        return Scale(name="observed", grades=tuple(sorted(grades, key=Decimal)))
+    # No other scale has a grade 1+: its order is known, and its other grades.
+    if "1+" in grades and set(grades) <= set(MODIFIED_ASHWORTH.grades):
+        return MODIFIED_ASHWORTH
+    return Scale(name="observed", grades=tuple(sorted(grades)))
+
+
+def normal_form(text: str) -> str:
+    """Return what texts have in common that a reader takes for the same."""
+    if not text.isascii():
+        text = _INVISIBLE.sub("", unicodedata.normalize("NFKC", text))
+    plain = " ".join(text.casefold().split())
+    if plain[:1] in _NUMBER_BEGINS and is_number(plain):
+        return str(Decimal(plain).normalize())
+    return plain
+
+
+def alike_texts(texts: Sequence[str]) -> list[list[str]]:
+    """Return the texts that differ by spelling alone, together."""
+    groups: dict[str, list[str]] = {}
+    for text in texts:
+        groups.setdefault(normal_form(text), []).append(text)
+    return [group for group in groups.values() if len(group) > 1]
+
+
+def _alike(met: Mapping[str, int], grade_of: Mapping[str, str]) -> list[str]:
+    grades: dict[str, int] = {}
+    for text, n in met.items():
+        grades[grade_of[text]] = grades.get(grade_of[text], 0) + n
+    return [
+        "grades that differ by spelling alone are counted as different: "
+        + ", ".join(f"{text!r} ({grades[text]} times)" for text in group)
+        for group in alike_texts(list(grades))
+    ]
+
+
+def _sentinels(
+    scale: Scale, met: Mapping[str, int], grade_of: Mapping[str, str]
+) -> list[str]:
+    # numbers such as 99 and -9 that lie far from all others
+    if scale.name != "observed" or not all(map(is_number, scale.grades)):
+        return []
+    warnings = []
+    for end in (0, -1):
+        rest = [float(g) for g in scale.grades if g != scale.grades[end]]
+        grade = scale.grades[end]
+        value = float(grade)
+        if len(rest) < 2 or not value.is_integer() or int(value) not in _CODES:
+            continue
+        gap = min(abs(value - other) for other in rest)
+        is_odd = value < 0 <= min(rest)  # the only number below 0
+        if gap >= max(rest) - min(rest) + 1 or is_odd:
+            n = sum(count for text, count in met.items() if grade_of[text] == grade)
+            warnings.append(
+                f"{grade} ({n} times) lies far from the other grades; if it stands for "
+                f"a missing one, --missing {grade}"
+            )
+    return warnings
+
+
+def _stray(met: Mapping[str, int], stands: Callable[[str], str]) -> list[str]:
+    # the cell or two that make text of a column of measurements
+    numbers = [text for text in met if is_number(text)]
+    others = [text for text in met if not is_number(text)]
+    n_stray = sum(met[text] for text in others)
+    few = n_stray <= _MAX_STRAY * sum(met.values())
+    if not others or len(numbers) < _MIN_MEASURED or not few:
+        return []
+    return [
+        f"{_shown(others)} ({stands(others[0])}) is no number, so that all grades are "
+        f"text; if it stands for a missing one, {_missing_option(others)}"
+    ]

@@ -1,0 +1,250 @@
+"""Which column of a sheet is what: named by the caller, else by its usual name."""
+
+import difflib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from masrel.errors import ParameterError, RatingsError
+from masrel.ratings._sheets import Sheet
+
+Kind = Literal["long", "wide", "counts", "table"]
+
+USUAL_NAMES = {
+    "item": (
+        *("item", "item_id", "model", "subject", "subject_id", "patient", "patient_id"),
+        *("case", "unit", "task", "task_id", "document", "video"),
+    ),
+    "rater": (
+        *("rater", "rater_id", "annotator", "annotator_id", "coder", "coder_id"),
+        *("judge", "observer", "worker", "worker_id", "assessor", "reviewer"),
+    ),
+    "grade": ("grade", "rating", "score", "label"),
+    "session": ("session",),
+}
+"""Names that are recognized, letter case aside."""
+
+STUDY_COLUMNS = ("session", "rater", "model", "repeat", "grade")
+"""Columns of a table that `masrel ratings` writes; it has others, too."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LayoutOptions:
+    """What a caller says of the columns; None and () are for the file to tell."""
+
+    # a name each; several for an item that several columns name together
+    item: tuple[str, ...] = ()
+    rater: str | None = None
+    grade: str | None = None
+    session: str | None = None
+    by: str | None = None
+    raters: tuple[str, ...] = ()  # the raters of a wide table
+    ignore: tuple[str, ...] = ()  # columns that are left aside
+    no_item: bool = False  # whether every column is a rater, or a category
+    counts: bool = False  # whether it is a table of items by categories
+    table: bool = False  # whether it is a contingency table of two raters
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Layout:
+    """Positions of columns."""
+
+    kind: Kind
+    item: tuple[int, ...]  # none where rows are items without names
+    raters: tuple[int, ...] = ()  # of a wide table; categories of a table of counts
+    # rater, grade: of a long table
+    rater: int | None = None
+    grade: int | None = None
+    session: int | None = None
+    by: int | None = None
+    # whether the item is the first column because nothing else was said of it
+    is_item_guessed: bool = False
+
+
+def find_layout(sheet: Sheet, options: LayoutOptions) -> Layout:
+    """Decide which column is what, or say which option would."""
+    options = _resolved(sheet, options)
+    header = sheet.header
+    position = {name: place for place, name in enumerate(header)}
+    taken = {position[name] for name in options.ignore}
+    by = None if options.by is None else position[options.by]
+    session = _role(sheet, "session", options.session, taken)
+    taken |= {place for place in (by, session) if place is not None}
+    if options.counts or options.table:
+        kind: Kind = "counts" if options.counts else "table"
+        return _wide(sheet, kind, options, taken, session=None, by=by)
+    is_wide = bool(options.raters) or options.no_item
+    if not is_wide:
+        columns = _long(sheet, options, taken)
+        if columns is not None:
+            item, rater, grade = columns
+            return Layout(
+                kind="long",
+                item=item,
+                rater=rater,
+                grade=grade,
+                session=session,
+                by=by,
+            )
+    return _wide(sheet, "wide", options, taken, session=session, by=by)
+
+
+def resolve_names(option: str, values: Sequence[str], sheet: Sheet) -> tuple[str, ...]:
+    """Return the columns that an option names, between commas or one a value."""
+    names: list[str] = []
+    for value in values:
+        parts = value.split(",")
+        while parts:
+            # the longest name first: names of columns may hold commas
+            for n in range(len(parts), 0, -1):
+                name = ",".join(parts[:n]).strip()
+                if name in sheet.header:
+                    break
+            else:
+                raise unknown_column(sheet, option, parts[0].strip())
+            names.append(name)
+            parts = parts[n:]
+    return tuple(names)
+
+
+def unknown_column(sheet: Sheet, option: str, name: str) -> RatingsError:
+    """Return the error of a column that is not there."""
+    near = difflib.get_close_matches(name, sheet.header, n=1)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    return sheet.error(f"{option}: there is no column {name!r}, {_listed(sheet)}{hint}")
+
+
+def _listed(sheet: Sheet) -> str:
+    shown = ", ".join(repr(name) for name in sheet.header[:12])
+    n_more = len(sheet.header) - 12
+    return f"but {shown}" + (f" and {n_more} more" if n_more > 0 else "")
+
+
+def _resolved(sheet: Sheet, options: LayoutOptions) -> LayoutOptions:
+    # the options with every name checked
+    if options.counts and options.table:
+        raise ParameterError("--counts, --table: needed one of them, got both")
+    if options.raters and (options.rater or options.grade):
+        raise ParameterError(
+            "--raters names the columns of a wide table, --rater and --grade those of "
+            "a long one: needed one kind, got both"
+        )
+    if options.no_item and options.item:
+        raise ParameterError("--item, --no-item: needed one of them, got both")
+    for role in ("rater", "grade", "session", "by"):
+        name: str | None = getattr(options, role)
+        if name is not None and name not in sheet.header:
+            raise unknown_column(sheet, f"--{role}", name)
+    return replace(
+        options,
+        item=resolve_names("--item", options.item, sheet),
+        raters=resolve_names("--raters", options.raters, sheet),
+        ignore=resolve_names("--ignore", options.ignore, sheet),
+    )
+
+
+def _role(sheet: Sheet, role: str, name: str | None, taken: set[int]) -> int | None:
+    # the column of a role: the one that is named, else the one with a usual name
+    if name is not None:
+        return sheet.header.index(name)
+    usual = USUAL_NAMES[role]
+    places = [
+        place
+        for place, column in enumerate(sheet.header)
+        if column.casefold() in usual and place not in taken
+    ]
+    if len(places) > 1:
+        names = " and ".join(sheet.header[place] for place in places)
+        raise sheet.error(
+            f"{sheet.line_of(0)}: needed one column for the {role}, got {names}: "
+            f"--{role} chooses one, --ignore leaves a column aside"
+        )
+    return places[0] if places else None
+
+
+def _long(
+    sheet: Sheet, options: LayoutOptions, taken: set[int]
+) -> tuple[tuple[int, ...], int, int] | None:
+    # item, rater and grade, or None where the table is not long
+    header = sheet.header
+    named = {header.index(name) for name in options.item}
+    named |= {
+        header.index(name)
+        for name in (options.rater, options.grade)
+        if name is not None
+    }
+    rater = _role(sheet, "rater", options.rater, taken | named)
+    grade = _role(sheet, "grade", options.grade, taken | named)
+    if rater is None and grade is None:
+        return None
+    item = tuple(header.index(name) for name in options.item)
+    if not item and set(STUDY_COLUMNS) <= set(header):
+        item = (header.index("model"), header.index("repeat"))
+    if not item:
+        used = taken | {place for place in (rater, grade) if place is not None}
+        place = _role(sheet, "item", None, used)
+        item = () if place is None else (place,)
+    roles = {"item": item[0] if item else None, "rater": rater, "grade": grade}
+    missing = [role for role, place in roles.items() if place is None]
+    used = taken | set(item) | {p for p in roles.values() if p is not None}
+    left = [place for place in range(len(header)) if place not in used]
+    if len(missing) == 1 and len(left) == 1:
+        roles[missing[0]] = left[0]
+        item = item or (left[0],)
+        missing = []
+    if missing:
+        known = ", ".join(
+            f"the {role} is {header[place]!r}"
+            for role, place in roles.items()
+            if place is not None
+        )
+        options_needed = " and ".join(f"--{role}" for role in missing)
+        raise sheet.error(
+            f"{sheet.line_of(0)}: looks like one row a rating ({known}): needs "
+            f"{options_needed}, {_listed(sheet)}; if its columns are raters, --raters "
+            "names them"
+        )
+    rater, grade = roles["rater"], roles["grade"]
+    if rater is None or grade is None or len({*item, rater, grade}) < len(item) + 2:
+        raise sheet.error(
+            "needed different columns for item, rater and grade, got "
+            + ", ".join(header[p] for p in (*item, rater, grade) if p is not None)
+        )
+    return item, rater, grade
+
+
+def _wide(
+    sheet: Sheet,
+    kind: Kind,
+    options: LayoutOptions,
+    taken: set[int],
+    *,
+    session: int | None,
+    by: int | None,
+) -> Layout:
+    header = sheet.header
+    raters = tuple(header.index(name) for name in options.raters)
+    item = tuple(header.index(name) for name in options.item)
+    is_guessed = False
+    if not item and not options.no_item:
+        place = (
+            None if kind == "table" else _role(sheet, "item", None, {*taken, *raters})
+        )
+        free = [p for p in range(len(header)) if p not in taken and p not in raters]
+        if place is None and free:
+            place, is_guessed = free[0], True
+        item = () if place is None else (place,)
+    if not raters:
+        used = taken | set(item)
+        raters = tuple(p for p in range(len(header)) if p not in used)
+    if not raters:
+        what = {"wide": "a rater", "counts": "a category", "table": "a category"}[kind]
+        raise sheet.error(f"{sheet.line_of(0)}: needed a column for {what}, got none")
+    return Layout(
+        kind=kind,
+        item=item,
+        raters=raters,
+        session=session,
+        by=by,
+        is_item_guessed=is_guessed,
+    )

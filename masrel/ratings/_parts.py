@@ -1,0 +1,238 @@
+"""Ratings one by one, put together item by rater: repeats, groups, many raters."""
+
+from dataclasses import dataclass, field
+from functools import cached_property, partial
+from typing import Literal
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from masrel.agreement import CodedRatings, CountedRatings, count_ratings
+from masrel.agreement._counts import DistinctItems
+from masrel.agreement._labels import code_type
+from masrel.errors import RatingsError
+from masrel.ratings._grades import coded_texts, is_number
+from masrel.ratings._layout import Layout
+from masrel.ratings._sheets import Sheet
+from masrel.scales import Scale
+
+Repeated = Literal["error", "first", "last", "mean"]
+"""What becomes of a second grade of an item by the same rater."""
+
+Codes = NDArray[np.int64]
+
+_MAX_DENSE = 20_000_000  # places, items by raters, that are always kept one by one
+_MAX_SPARSE = 8  # places a rating beyond which only counts are kept
+_MAX_COUNTS = 200_000_000  # places, items by categories, of counts
+
+
+@dataclass(frozen=True, kw_only=True)
+class RatingsPart:
+    """The ratings of one group and session of a file.
+
+    Attributes
+    ----------
+    group : str or None
+        What the column of groups says of them; None where there is none.
+    session : str or None
+        Their session; None where the file has no such column.
+    items, raters : tuple of str
+        Names, in the order in which they are met; raters without a name have none.
+    ratings : CodedRatings or CountedRatings
+        The ratings on the values of the scale, item by rater; counted where only
+        counts are known, or kept because items and raters are many.
+    """
+
+    group: str | None
+    session: str | None
+    items: tuple[str, ...] = field(repr=False)
+    raters: tuple[str, ...] = field(repr=False)
+    ratings: CodedRatings | CountedRatings = field(repr=False)
+
+    @cached_property
+    def counted(self) -> CountedRatings:
+        """The ratings, counted once for several coefficients."""
+        return count_ratings(self.ratings)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Triples:
+    """Ratings as places in lists of names, one entry a rating."""
+
+    # (n_ratings,) each; a grade of -1 is missing; row: of the sheet
+    item: Codes
+    rater: Codes
+    grade: Codes
+    row: Codes
+    item_names: list[str]
+    rater_names: list[str]
+
+    def __getitem__(self, chosen: NDArray[np.bool_] | Codes) -> "Triples":
+        return Triples(
+            item=self.item[chosen],
+            rater=self.rater[chosen],
+            grade=self.grade[chosen],
+            row=self.row[chosen],
+            item_names=self.item_names,
+            rater_names=self.rater_names,
+        )
+
+
+def part_codes(
+    sheet: Sheet, layout: Layout, rows: Codes
+) -> tuple[Codes, list[tuple[str | None, str | None]]]:
+    """Return the part of every rating, and the group and session of every part."""
+    session = None if layout.session == layout.by else layout.session
+    columns: list[tuple[Codes, list[str | None]]] = []
+    for place in (layout.by, session):
+        if place is None:
+            columns.append((np.zeros(len(sheet.cells), dtype=np.int64), [None]))
+            continue
+        codes, texts = coded_texts(sheet.column(place))
+        empty = [k for k, text in enumerate(texts) if not text]
+        if empty:
+            row = int(np.argmax(codes == empty[0]))
+            raise sheet.error(
+                f"{sheet.where(row)}, column {sheet.header[place]!r}: needed a value"
+            )
+        columns.append((codes, list(texts)))
+    (of_group, groups), (of_session, sessions) = columns
+    key = of_group * len(sessions) + of_session
+    codes, met = pd.factorize(key)
+    n = len(sessions)
+    names = [(groups[k // n], sessions[k % n]) for k in met.tolist()]
+    return np.asarray(codes, dtype=np.int64)[rows], names
+
+
+def without_repeats(
+    sheet: Sheet,
+    layout: Layout,
+    triples: Triples,
+    parts: Codes,
+    scale: Scale,
+    repeated: Repeated,
+) -> tuple[Triples, Codes, Scale, int]:
+    """Keep one rating of each item by each rater; say how many others there were."""
+    n_items, n_raters = len(triples.item_names), len(triples.rater_names)
+    key = (parts * n_items + triples.item) * n_raters + triples.rater
+    n_keys = (int(parts.max(initial=0)) + 1) * n_items * n_raters
+    if n_keys <= max(_MAX_DENSE, _MAX_SPARSE * len(key)):
+        is_unique = int(np.bincount(key).max(initial=0)) <= 1
+        if is_unique:
+            return triples, parts, scale, 0
+    keys, first, of_key, freq = np.unique(
+        key, return_index=True, return_inverse=True, return_counts=True
+    )
+    n_repeated = len(key) - len(keys)
+    if not n_repeated:
+        return triples, parts, scale, 0
+    if repeated == "error":
+        raise _repeats(sheet, layout, triples, key, int(first[np.argmax(freq > 1)]))
+    if repeated == "last":
+        first = len(key) - 1 - np.unique(key[::-1], return_index=True)[1]
+    chosen = np.sort(first)
+    if repeated == "mean":
+        triples, scale = _means(sheet, triples, of_key, len(keys), scale)
+    return triples[chosen], parts[chosen], scale, n_repeated
+
+
+def _repeats(
+    sheet: Sheet, layout: Layout, triples: Triples, key: Codes, first: int
+) -> RatingsError:
+    # the error of a rating that is there twice, with what may tell the two apart
+    second = first + 1 + int(np.argmax(key[first + 1 :] == key[first]))
+    lines = " and ".join(sheet.where(int(triples.row[k])) for k in (first, second))
+    item, rater = (
+        triples.item_names[triples.item[first]],
+        triples.rater_names[triples.rater[first]],
+    )
+    used = {*layout.item, *layout.raters, layout.rater, layout.grade, layout.by}
+    apart = []
+    for place, name in enumerate(sheet.header):
+        if place not in {*used, layout.session}:
+            codes, texts = coded_texts(sheet.column(place))
+            full = key * len(texts) + codes[triples.row]
+            if 1 < len(texts) < len(sheet.cells) and len(np.unique(full)) == len(key):
+                apart.append(name)
+    hint = f" (--by {apart[0]!r} would)" if apart else ""
+    guess = ", --no-item says that no column names items" * layout.is_item_guessed
+    return sheet.error(
+        f"{lines}: {rater!r} graded {item!r} more than once: --by or --session names a "
+        f"column that tells such ratings apart{hint}, --repeated first, last or mean "
+        f"keeps one{guess}"
+    )
+
+
+def _means(
+    sheet: Sheet, triples: Triples, of_key: Codes, n_keys: int, scale: Scale
+) -> tuple[Triples, Scale]:
+    if scale.name != "observed" or not all(map(is_number, scale.grades)):
+        raise sheet.error(
+            "--repeated mean: needs grades that are numbers without a declared scale, "
+            f"got {', '.join(scale.grades[:6])}"
+        )
+    values = np.array(scale.values)
+    rated = triples.grade >= 0
+    total = np.bincount(
+        of_key[rated], weights=values[triples.grade[rated]], minlength=n_keys
+    )
+    n_grades = np.bincount(of_key[rated], minlength=n_keys)
+    mean = np.divide(total, n_grades, out=np.full(n_keys, np.nan), where=n_grades > 0)
+    met = np.unique(mean[n_grades > 0])
+    codes = np.where(n_grades > 0, np.searchsorted(met, mean), -1)
+    grades = tuple(f"{x:.0f}" if x.is_integer() else repr(x) for x in met.tolist())
+    averaged = Triples(
+        item=triples.item,
+        rater=triples.rater,
+        grade=codes[of_key],
+        row=triples.row,
+        item_names=triples.item_names,
+        rater_names=triples.rater_names,
+    )
+    return averaged, Scale(name="observed", grades=grades)
+
+
+def put_together(
+    triples: Triples, scale: Scale, names: tuple[str | None, str | None]
+) -> RatingsPart:
+    """Arrange the ratings of one part item by rater."""
+    item, items = _names_met(triples.item, triples.item_names)
+    rater, raters = _names_met(triples.rater, triples.rater_names)
+    shape, q = (len(items), len(raters)), len(scale.grades)
+    dense = partial(_dense, item, rater, triples.grade, shape, scale)
+    n_places = shape[0] * shape[1]
+    ratings: CodedRatings | CountedRatings
+    if (
+        n_places <= max(_MAX_DENSE, _MAX_SPARSE * len(item))
+        or shape[0] * q > _MAX_COUNTS
+    ):
+        ratings = dense()
+    else:
+        rated = triples.grade >= 0
+        keys = item[rated] * q + triples.grade[rated]
+        counts = np.bincount(keys, minlength=shape[0] * q).reshape(shape[0], q)
+        ratings = CountedRatings(
+            categories=scale.values,
+            items=DistinctItems.of_counts(counts),
+            n_raters=len(np.unique(rater[rated])),
+            source=dense,  # only if a coefficient needs to know who rated what
+        )
+    return RatingsPart(
+        group=names[0], session=names[1], items=items, raters=raters, ratings=ratings
+    )
+
+
+def _names_met(codes: Codes, names: list[str]) -> tuple[Codes, tuple[str, ...]]:
+    # codes of the names that occur, in the order in which they do
+    met, places = pd.factorize(codes)
+    return np.asarray(met, dtype=np.int64), tuple(names[place] for place in places)
+
+
+def _dense(
+    item: Codes, rater: Codes, grade: Codes, shape: tuple[int, int], scale: Scale
+) -> CodedRatings:
+    codes = np.full(shape, -1, dtype=code_type(len(scale.grades)))
+    codes[item, rater] = grade
+    codes.setflags(write=False)
+    return CodedRatings(codes=codes, categories=scale.values)

@@ -1,0 +1,460 @@
+"""A file of any format as columns of text: what its cells say, not what they mean.
+
+In: a path, "-" or a pipe, and what the caller says of its format. Out: a `Sheet`.
+"""
+
+import codecs
+import csv
+import gzip
+import hashlib
+import io
+import lzma
+import re
+import sys
+import zipfile
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from masrel.errors import ParameterError, RatingsError
+
+_SNIFFED = 1 << 16  # letters that the separator is found in
+_MANY_COLUMNS = 1000
+_RECORDS = 20  # records that the separator is found in
+_BLANKS = " "  # any number of blanks or tabs, as R's write.table writes
+_DELIMITERS = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", " ": "blanks"}
+_BOMS = (
+    (codecs.BOM_UTF8, "utf-8"),
+    (codecs.BOM_UTF32_LE, "utf-32"),
+    (codecs.BOM_UTF32_BE, "utf-32"),
+    (codecs.BOM_UTF16_LE, "utf-16"),
+    (codecs.BOM_UTF16_BE, "utf-16"),
+)
+
+TEXT_FORMATS = {".csv": "CSV", ".tsv": "TSV", ".txt": "text", ".dat": "text"}
+_TYPED_FORMATS = (
+    *(".xlsx", ".xlsm", ".xls", ".ods", ".parquet", ".feather", ".json", ".jsonl"),
+    *(".sav", ".zsav", ".por", ".dta", ".sas7bdat", ".xpt"),
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SheetOptions:
+    """What a caller says of a file's format; None is for the file to tell."""
+
+    delimiter: str | None = None
+    encoding: str | None = None
+    sheet: str | None = None  # of a workbook
+    no_header: bool = False  # whether the first line is a row like the others
+    transpose: bool = False  # whether raters are rows
+    source: str | None = None  # program whose export it is
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sheet:
+    """A file as text, row by row and column by column."""
+
+    name: str  # the file, as the caller calls it
+    sha256: str  # of its bytes
+    header: tuple[str, ...]  # names of the columns, all different
+    # cells as text, one column each, numbered as the header; the index is the number
+    # of the record in the file, from 0
+    cells: pd.DataFrame = field(repr=False)
+    facts: dict[str, str | None]  # format, and delimiter, encoding or sheet
+    dropped: dict[str, int]  # why rows are left out, and how many
+    has_header: bool = True
+    is_simulated: bool = False  # whether a comment at its head says so
+    line_of: Callable[[int], str]  # number of a record to where it stands
+
+    def where(self, row: int) -> str:
+        """Return where a row of `cells`, from 0, stands in the file."""
+        return self.line_of(int(self.cells.index[row]))
+
+    def column(self, position: int) -> NDArray[np.object_]:
+        """Return the cells of a column."""
+        cells: NDArray[np.object_] = self.cells[position].to_numpy(dtype=object)
+        return cells
+
+    def error(self, message: str) -> RatingsError:
+        """Return the error of this file with a message."""
+        return RatingsError(f"{self.name}: {message}")
+
+
+def read_sheet(path: Path | str, options: SheetOptions) -> Sheet:
+    """Read a file of any format as text."""
+    name, data = str(path), _bytes_of(path)
+    if not data:
+        raise RatingsError(f"{name}: needed a header and rows, the file is empty")
+    sha256 = hashlib.sha256(data).hexdigest()
+    inner, data = _unpacked(name, data)
+    ending = Path(inner).suffix.lower()
+    if options.source is not None or ending in _TYPED_FORMATS:
+        from masrel.ratings._typed_files import read_typed
+
+        records, facts = read_typed(name, ending, data, options)
+        line_of: Callable[[int], str] = _row_number
+        simulated = False
+    else:
+        text = _decoded(name, data, options.encoding)
+        kind = TEXT_FORMATS.get(ending, "text")
+        records, facts, line_of, simulated = _text_records(name, text, kind, options)
+    if options.transpose:
+        records, line_of = records.T.reset_index(drop=True), _column_number
+    sheet = _with_header(name, sha256, records, facts, options, line_of)
+    return replace(sheet, is_simulated=simulated)
+
+
+def _bytes_of(path: Path | str) -> bytes:
+    if str(path) == "-":
+        return sys.stdin.buffer.read()
+    path = Path(path)
+    if path.is_dir():
+        raise RatingsError(f"{path}: needed a file, got a folder")
+    if not path.exists():
+        raise RatingsError(f"{path}: no such file")
+    return path.read_bytes()
+
+
+def _unpacked(name: str, data: bytes) -> tuple[str, bytes]:
+    # what is in a packed file, by its ending: the name without it, and the bytes
+    stem, ending = name.removesuffix(Path(name).suffix), Path(name).suffix.lower()
+    try:
+        if ending == ".gz":
+            return stem, gzip.decompress(data)
+        if ending == ".xz":
+            return stem, lzma.decompress(data)
+        if ending == ".zip":
+            with zipfile.ZipFile(io.BytesIO(data)) as packed:
+                members = [m for m in packed.namelist() if not m.endswith("/")]
+                if len(members) != 1:
+                    raise RatingsError(
+                        f"{name}: needed one file in it, got {len(members)}: "
+                        f"{', '.join(members[:5])}"
+                    )
+                return members[0], packed.read(members[0])
+    except (OSError, EOFError, lzma.LZMAError, zipfile.BadZipFile) as error:
+        raise RatingsError(f"{name}: is damaged, or no {ending} file") from error
+    return name, data
+
+
+def _decoded(name: str, data: bytes, encoding: str | None) -> str:
+    marked = next((e for bom, e in _BOMS if data.startswith(bom)), None)
+    encoding = encoding or marked or "utf-8"
+    try:
+        text = data.decode("utf-8-sig" if encoding == "utf-8" else encoding)
+    except LookupError as error:
+        raise ParameterError(
+            f"--encoding: there is none called {encoding!r}"
+        ) from error
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        likely = "utf-16" if 0 in data[:100] else "cp1252 or latin-1"
+        raise RatingsError(
+            f"{name}: line {line}: needed {encoding} text, got the byte "
+            f"0x{data[error.start]:02x}; --encoding {likely} may be right"
+        ) from error
+    if "\0" in text:
+        line = text.count("\n", 0, text.index("\0")) + 1
+        hint = "; --encoding utf-16 may be right" if 0 in data[:4] else ""
+        raise RatingsError(f"{name}: line {line}: needed text, got a zero byte{hint}")
+    return text.removeprefix("\ufeff")
+
+
+def _text_records(
+    name: str, text: str, kind: str, options: SheetOptions
+) -> tuple[pd.DataFrame, dict[str, str | None], Callable[[int], str], bool]:
+    # -> records with the header as the first, what the format is, where records are,
+    # whether a comment labels them simulated
+    declared = re.match(r"sep=(.)\r?\n", text)
+    start = declared.end() if declared else 0
+    delimiter = options.delimiter or (declared.group(1) if declared else None)
+    comments, start = _comments(name, text, start, delimiter)
+    body = text[start:]
+    if not body.strip():
+        raise RatingsError(f"{name}: needed a header and rows, the file has none")
+    delimiter = delimiter or _delimiter_of(name, body)
+    n_before = text.count("\n", 0, start)
+    lines = _Lines(name, body, delimiter, n_before)
+    records = lines.frame()
+    facts: dict[str, str | None] = {
+        "format": kind,
+        "delimiter": _DELIMITERS.get(delimiter, delimiter),
+        "encoding": options.encoding or "utf-8",
+    }
+    simulated = any("SIMULATED" in comment for comment in comments)
+    return records, facts, lines.line_of, simulated
+
+
+def _comments(
+    name: str, text: str, start: int, delimiter: str | None
+) -> tuple[list[str], int]:
+    # Lines at the head that begin with "#" are comments; one with as many cells as
+    # the line below it may be the header.
+    comments: list[str] = []
+    starts: list[int] = []
+    while text.startswith("#", start) or (comments and _is_blank(text, start)):
+        end = text.find("\n", start)
+        line = text[start:] if end < 0 else text[start:end]
+        if line.strip():
+            comments.append(line.rstrip("\r"))
+            starts.append(start)
+        if end < 0:
+            start = len(text)
+            break
+        start = end + 1
+    if not comments or start >= len(text):
+        return comments, start
+    below = text[start:].split("\n", 1)[0].rstrip("\r")
+    for candidate in [delimiter] if delimiter else [",", ";", "\t", "|"]:
+        n_cells = _n_cells(comments[-1], candidate)
+        if 1 < n_cells == _n_cells(below, candidate):
+            if re.match(r"#\s+[^\s,;|]", comments[-1]) and candidate != "\t":
+                raise RatingsError(
+                    f"{name}: line {text.count(chr(10), 0, starts[-1]) + 1}: begins "
+                    "with # and has as many cells as the line below: take the # away "
+                    "if it is the header, or the line if it is a comment"
+                )
+            return comments[:-1], starts[-1]
+    return comments, start
+
+
+def _is_blank(text: str, start: int) -> bool:
+    end = text.find("\n", start)
+    return end >= 0 and not text[start:end].strip()
+
+
+def _n_cells(line: str, delimiter: str) -> int:
+    return len(next(_rows(line, delimiter), []))
+
+
+def _rows(text: str, delimiter: str) -> Iterator[list[str]]:
+    # records as lists of cells, blank ones too
+    if delimiter == _BLANKS:
+        for line in text.splitlines():
+            yield re.findall(r'"(?:[^"]|"")*"|\S+', line)
+    else:
+        lines = io.StringIO(text, newline="")
+        blanks = delimiter != "\t"
+        yield from csv.reader(lines, delimiter=delimiter, skipinitialspace=blanks)
+
+
+def _delimiter_of(name: str, body: str) -> str:
+    head = _head(body)
+    n_fields = {}
+    for delimiter in _DELIMITERS:
+        records = _first_records(head, delimiter)
+        n_fields[delimiter] = [len(record) for record in records]
+    consistent = [d for d, n in n_fields.items() if _is_table(n)]
+    marked = [d for d in consistent if d != _BLANKS] or consistent
+    if len(marked) > 1:
+        names = " and ".join(_DELIMITERS[d] for d in marked)
+        raise RatingsError(
+            f"{name}: line 1: needed one separator, {names} both make columns; "
+            "--delimiter chooses"
+        )
+    if marked:
+        return marked[0]
+    several = [d for d, n in n_fields.items() if n and n[0] > 1 and d != _BLANKS]
+    if not several:
+        first = next(iter(_first_records(head, ",")), [""])
+        raise RatingsError(
+            f"{name}: line 1: needed columns, got one, {first[0].strip()!r}; "
+            "--delimiter names the separator"
+        )
+    return max(several, key=lambda d: n_fields[d][0])
+
+
+def _head(body: str) -> str:
+    # whole lines, three at least, from which the separator can be seen
+    if len(body) <= _SNIFFED:
+        return body
+    end = body.rfind("\n", 0, _SNIFFED)
+    if body.count("\n", 0, max(end, 0)) < 3:
+        end = -1
+        for _ in range(3):
+            end = body.find("\n", end + 1)
+            if end < 0:
+                return body
+    return body[: end + 1]
+
+
+def _first_records(head: str, delimiter: str) -> list[list[str]]:
+    records = []
+    try:
+        for record in _rows(head, delimiter):
+            if any(cell.strip() for cell in record):
+                records.append(record)
+            if len(records) == _RECORDS:
+                break
+    except csv.Error:
+        return []
+    return records
+
+
+def _is_table(n_fields: Sequence[int]) -> bool:
+    # as many cells in every record, or one more below a header without row names
+    if not n_fields or len(set(n_fields[1:])) > 1:
+        return False
+    below = n_fields[1] if len(n_fields) > 1 else n_fields[0]
+    return below > 1 and below - n_fields[0] in (0, 1)
+
+
+class _Lines:
+    """Where the records of a text are, looked up only for a message."""
+
+    def __init__(self, name: str, body: str, delimiter: str, n_before: int) -> None:
+        self._name, self._body, self._delimiter = name, body, delimiter
+        self._n_before = n_before
+        first = [len(r) for r in _first_records(_head(body), delimiter)] or [0]
+        # R's write.table has no name above its row names
+        self.has_row_names = len(first) > 1 and set(first[1:]) == {first[0] + 1}
+        self.width = first[0] + self.has_row_names
+
+    def _records(self) -> Iterator[tuple[int, list[str]]]:
+        # -> line where it begins, cells; records of blank lines are left out
+        lines = io.StringIO(self._body, newline="")
+        if self._delimiter == _BLANKS:
+            for number, record in enumerate(_rows(self._body, _BLANKS), start=1):
+                if record:
+                    yield number + self._n_before, record
+            return
+        blanks = self._delimiter != "\t"
+        reader = csv.reader(lines, delimiter=self._delimiter, skipinitialspace=blanks)
+        begins = 1
+        for record in reader:
+            if record and (len(record) > 1 or record[0].strip()):
+                yield begins + self._n_before, record
+            begins = reader.line_num + 1
+
+    def line_of(self, number: int) -> str:
+        """Return the line of a record."""
+        for place, (line, _) in enumerate(self._records()):
+            if place == number:
+                return f"line {line}"
+        return "the end"
+
+    def frame(self) -> pd.DataFrame:
+        """Return the records as cells of text, that of the names first."""
+        if self.width > _MANY_COLUMNS:  # pandas takes its time for every column
+            rows = [record for _, record in self._records()]
+            self._check_widths()
+            if self.has_row_names:
+                rows[0] = [*rows[0], ""]
+            return pd.DataFrame(np.array(rows, dtype=object), dtype=object)
+        try:
+            frame = pd.read_csv(
+                io.BytesIO(self._body.encode()),
+                header=None,
+                names=range(self.width),
+                sep=r"\s+" if self._delimiter == _BLANKS else self._delimiter,
+                dtype=object,
+                na_filter=False,
+                skipinitialspace=self._delimiter != "\t",
+                low_memory=False,
+            )
+        except pd.errors.ParserError as error:
+            self._check_widths()
+            raise RatingsError(
+                f"{self._name}: a quote that is opened is not closed ({error})"
+            ) from error
+        # pandas fills a short record up in silence, so that its last cell is empty
+        last = frame[self.width - 1].to_numpy(dtype=object)
+        if (last[int(self.has_row_names) :] == "").any():
+            self._check_widths()
+        return frame
+
+    def _check_widths(self) -> None:
+        # refuse the first record that has another number of cells
+        for place, (line, record) in enumerate(self._records()):
+            if len(record) != self.width and (place or not self.has_row_names):
+                raise RatingsError(
+                    f"{self._name}: line {line}: needed {self.width} cells, as the "
+                    f"first line has, got {len(record)}: {', '.join(record)[:60]}"
+                )
+
+
+def _row_number(number: int) -> str:
+    return f"row {number + 1}"
+
+
+def _column_number(number: int) -> str:
+    return f"column {number + 1}"
+
+
+def _with_header(
+    name: str,
+    sha256: str,
+    records: pd.DataFrame,
+    facts: dict[str, str | None],
+    options: SheetOptions,
+    line_of: Callable[[int], str],
+) -> Sheet:
+    if options.no_header:
+        header = tuple(str(n) for n in range(1, records.shape[1] + 1))
+    else:
+        header = _names(records)
+        records = records.iloc[1:]
+    blank = _blank_rows(records)
+    dropped = {"blank": int(blank.sum())} if blank.any() else {}
+    records = records[~blank] if blank.any() else records
+    # a separator at the end of every line makes a column without name and cells
+    if header and not header[-1] and (records.iloc[:, -1] == "").all():
+        header, records = header[:-1], records.iloc[:, :-1]
+    _check_names(name, header, line_of)
+    records.columns = pd.RangeIndex(len(header))
+    return Sheet(
+        name=name,
+        sha256=sha256,
+        header=header,
+        cells=records,
+        facts=facts,
+        dropped=dropped,
+        has_header=not options.no_header,
+        line_of=line_of,
+    )
+
+
+def _names(records: pd.DataFrame) -> tuple[str, ...]:
+    cells: list[Any] = records.iloc[0].tolist()
+    names = [str(cell).strip() for cell in cells]
+    if len(names) > 1 and not names[-1] and len(records) > 1:
+        # R's write.table: names of all columns but that of the row names, which is
+        # the first; pandas then has put the names one place to the left
+        if not (records.iloc[1:, -1] == "").all():
+            names = ["", *names[:-1]]
+    return tuple(names)
+
+
+def _check_names(
+    name: str, header: tuple[str, ...], line_of: Callable[[int], str]
+) -> None:
+    seen: set[str] = set()
+    for position, cell in enumerate(header):
+        if not cell and position:  # the first may be R's or pandas' row names
+            raise RatingsError(
+                f"{name}: {line_of(0)}: needed a name for column {position + 1}, got "
+                "none; --no-header if this line is a row like the others"
+            )
+        if cell in seen:
+            raise RatingsError(
+                f"{name}: {line_of(0)}: needed different names of columns, "
+                f"{cell!r} is there twice; --no-header if this line is a row like "
+                "the others"
+            )
+        seen.add(cell)
+
+
+def _blank_rows(records: pd.DataFrame) -> NDArray[np.bool_]:
+    # rows of nothing but blanks
+    blank = np.zeros(len(records), dtype=bool)
+    if not len(records):
+        return blank
+    places = np.flatnonzero(records.iloc[:, 0].to_numpy(dtype=object) == "")
+    cells = records.iloc[places].to_numpy(dtype=object)
+    blank[places] = [not any(cell.strip() for cell in row) for row in cells]
+    return blank

@@ -1,0 +1,500 @@
+"""Any file of ratings, in whatever shape its program left it, as ratings.
+
+In: a path and what the caller says of it. Out: a `RatingsFile` with what was read. The
+stages: `_sheets` (bytes to cells of text), `_layout` (which column is what), `_grades`
+(which grade a text is), `_doubts` (what looks like something else), `_parts` (ratings
+put together item by rater).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from masrel.agreement import CodedRatings, CountedRatings
+from masrel.agreement._counts import count_table, take_counts
+from masrel.errors import ParameterError, RatingsError
+from masrel.ratings._doubts import (
+    doubt_columns,
+    doubt_long,
+    doubt_names,
+    without_second_header,
+)
+from masrel.ratings._grades import (
+    USUAL_MISSING,
+    GradeOptions,
+    Grades,
+    coded_texts,
+    is_number,
+    read_grades,
+)
+from masrel.ratings._layout import Layout, LayoutOptions, find_layout
+from masrel.ratings._parts import (
+    Codes,
+    RatingsPart,
+    Repeated,
+    Triples,
+    part_codes,
+    put_together,
+    without_repeats,
+)
+from masrel.ratings._sheets import Sheet, SheetOptions, read_sheet
+from masrel.scales import Scale
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RatingsFile:
+    """A file of ratings, and what was read of it.
+
+    Attributes
+    ----------
+    parts : tuple of RatingsPart
+        The ratings; one part unless groups or sessions are told apart.
+    scale : Scale
+        Its grades in order: declared, or those met.
+    is_ordered : bool
+        Whether that order is more than the alphabet's.
+    read : dict
+        What was read, ready for JSON: format, columns, grades, missing ones, scale.
+    warnings : tuple of str
+        What may have been read wrongly, and which option would tell.
+    simulated : bool
+        Whether any rating is simulated.
+    """
+
+    parts: tuple[RatingsPart, ...]
+    scale: Scale
+    is_ordered: bool
+    read: dict[str, Any] = field(repr=False)
+    warnings: tuple[str, ...]
+    simulated: bool
+
+
+def read_ratings(
+    path: Path | str,
+    *,
+    item: str | Sequence[str] = (),
+    rater: str | None = None,
+    grade: str | None = None,
+    raters: Sequence[str] = (),
+    ignore: Sequence[str] = (),
+    no_item: bool = False,
+    no_header: bool = False,
+    session: str | None = None,
+    by: str | None = None,
+    repeated: Repeated = "error",
+    categories: Sequence[str] | None = None,
+    missing: Sequence[str] = (),
+    decimal: str = ".",
+    delimiter: str | None = None,
+    encoding: str | None = None,
+    sheet: str | None = None,
+    transpose: bool = False,
+    counts: bool = False,
+    table: bool = False,
+    source: str | None = None,
+) -> RatingsFile:
+    r"""Read any file of ratings, or say in one sentence which option would.
+
+    Parameters
+    ----------
+    path : Path or str
+        The file; "-" is standard input. Text, workbooks, Parquet, Feather, JSON,
+        SPSS, Stata and SAS, packed or not; ``docs/ratings.md`` has every shape.
+    item : str or sequence of str, optional
+        Column of the items; several name an item together.
+    rater, grade : str, optional
+        Columns of a long table, one row a rating.
+    raters, ignore : sequence of str, optional
+        Columns of a wide table that are raters, and columns that are left aside.
+    no_item, no_header : bool, optional
+        Whether no column names the items; whether the first line is a row.
+    session, by : str, optional
+        Columns of the sessions, and of groups that are told apart.
+    repeated : {"error", "first", "last", "mean"}, optional
+        What becomes of a second grade of an item by the same rater.
+    categories : sequence of str, optional
+        Every grade of the scale, in order; the grades met unless given.
+    missing : sequence of str, optional
+        Cells that stand for a missing grade, beside empty ones and NA.
+    decimal, delimiter, encoding, sheet : str, optional
+        Decimal mark, separator of cells, encoding, and sheet of a workbook.
+    transpose : bool, optional
+        Whether a row is a rater and a column an item.
+    counts, table : bool, optional
+        Whether it is a table of counts, items by categories, or a contingency table
+        of two raters, the first of them in the rows.
+    source : str, optional
+        The annotation tool whose export it is.
+
+    Returns
+    -------
+    RatingsFile
+        The ratings, and what was read.
+
+    Raises
+    ------
+    RatingsError
+        If the file is no table of ratings, or could be more than one.
+    ParameterError
+        If options contradict each other, or `categories` are no scale.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "wide.csv"
+    ...     _ = path.write_text("patient;Kim;Lee\nA;1;1+\nB;2;NA\n")
+    ...     file = read_ratings(path)
+    >>> file.scale.name, file.read["raters"], file.read["n_missing"]
+    ('MAS', ['Kim', 'Lee'], 1)
+    """
+    form = SheetOptions(
+        delimiter=delimiter,
+        encoding=encoding,
+        sheet=sheet,
+        no_header=no_header,
+        transpose=transpose,
+        source=source,
+    )
+    columns = LayoutOptions(
+        item=(item,) if isinstance(item, str) else tuple(item),
+        rater=rater,
+        grade=grade,
+        session=session,
+        by=by,
+        raters=tuple(raters),
+        ignore=tuple(ignore),
+        no_item=no_item,
+        counts=counts,
+        table=table,
+    )
+    options = GradeOptions(
+        categories=None if categories is None else tuple(categories),
+        missing=tuple(missing),
+        decimal=decimal,
+    )
+    cells, warnings = without_second_header(read_sheet(path, form))
+    if not len(cells.cells):
+        raise cells.error("needed rows of ratings below the names, got none")
+    layout = find_layout(cells, columns)
+    if layout.kind in ("counts", "table"):
+        return _counted(cells, layout, options, warnings)
+    return _rated(cells, layout, options, repeated, warnings)
+
+
+def _rated(
+    sheet: Sheet,
+    layout: Layout,
+    options: GradeOptions,
+    repeated: Repeated,
+    warnings: list[str],
+) -> RatingsFile:
+    # of a long or a wide table
+    read = _long if layout.kind == "long" else _wide
+    triples, grades, doubts = read(sheet, layout, options)
+    n_missing = int((triples.grade < 0).sum())
+    part_of, names = part_codes(sheet, layout, triples.row)
+    triples, part_of, scale, n_repeated = without_repeats(
+        sheet, layout, triples, part_of, grades.scale, repeated
+    )
+    rated = triples.grade[triples.grade >= 0]
+    freq = np.bincount(rated, minlength=len(scale.grades))
+    record = _record(sheet, layout, options, grades, scale, freq)
+    parts = [
+        put_together(triples if len(names) == 1 else triples[part_of == k], scale, name)
+        for k, name in enumerate(names)
+    ]
+    record |= {
+        "raters": triples.rater_names,
+        "n_items": len(triples.item_names),
+        "n_raters": len(triples.rater_names),
+        "n_ratings": len(rated),
+        "n_missing": n_missing,
+        "n_repeated": n_repeated,
+        "repeated": repeated if n_repeated else None,
+    }
+    return _file(sheet, parts, scale, grades, record, [*warnings, *doubts])
+
+
+def _grades_of(
+    sheet: Sheet,
+    cells: NDArray[np.object_],
+    n_columns: int,
+    options: GradeOptions,
+) -> tuple[Codes, Grades]:
+    # (n_rows * n_columns,) cells row by row -> the place of each in the scale
+    codes, texts = coded_texts(cells)
+    freq = np.bincount(codes, minlength=len(texts))
+
+    def where(text: int) -> str:
+        return sheet.where(int(np.argmax(codes == text)) // n_columns)
+
+    try:
+        grades = read_grades(texts, freq, options, where)
+    except RatingsError as error:
+        raise sheet.error(str(error)) from None
+    return grades.codes[codes], grades
+
+
+def _long(
+    sheet: Sheet, layout: Layout, options: GradeOptions
+) -> tuple[Triples, Grades, list[str]]:
+    if layout.rater is None or layout.grade is None:
+        raise ParameterError("a long table needs columns for the rater and the grade")
+    item, items = _named(sheet, "item", layout.item)
+    rater, raters = _named(sheet, "rater", (layout.rater,))
+    grade, grades = _grades_of(sheet, sheet.column(layout.grade), 1, options)
+    triples = Triples(
+        item=item,
+        rater=rater,
+        grade=grade,
+        row=np.arange(len(item)),
+        item_names=items,
+        rater_names=raters,
+    )
+    doubts = doubt_long(sheet, layout, item, rater)
+    doubts += doubt_names("raters", raters) + doubt_names("items", items)
+    return triples, grades, doubts
+
+
+def _named(sheet: Sheet, role: str, places: tuple[int, ...]) -> tuple[Codes, list[str]]:
+    # what items or raters are called, by one column or several together
+    codes, names = coded_texts(sheet.column(places[0]))
+    _refuse_unnamed(sheet, role, places[0], codes, names)
+    for place in places[1:]:
+        more, texts = coded_texts(sheet.column(place))
+        _refuse_unnamed(sheet, role, place, more, texts)
+        joint = codes * len(texts) + more
+        met, codes = np.unique(joint, return_inverse=True)
+        names = [f"{names[k // len(texts)]} {texts[k % len(texts)]}" for k in met]
+    return np.asarray(codes, dtype=np.int64), names
+
+
+def _refuse_unnamed(
+    sheet: Sheet, role: str, place: int, codes: Codes, names: list[str]
+) -> None:
+    for code, name in enumerate(names):
+        if name in USUAL_MISSING:
+            row = int(np.argmax(codes == code))
+            raise sheet.error(
+                f"{sheet.where(row)}, column {sheet.header[place]!r}: needed the "
+                f"{role}, got {name!r}"
+            )
+
+
+def _wide(
+    sheet: Sheet, layout: Layout, options: GradeOptions
+) -> tuple[Triples, Grades, list[str]]:
+    n_rows, n_raters = len(sheet.cells), len(layout.raters)
+    places = list(layout.raters)
+    cells = sheet.cells[places].to_numpy(dtype=object).ravel()
+    grade, grades = _grades_of(sheet, cells, n_raters, options)
+    doubts = doubt_columns(sheet, layout, grade.reshape(n_rows, n_raters), grades.scale)
+    if layout.item:
+        of_row, items = _named(sheet, "item", layout.item)
+    else:
+        of_row, items = np.arange(n_rows), [str(n) for n in range(1, n_rows + 1)]
+    raters = [sheet.header[place] for place in places]
+    triples = Triples(
+        item=np.repeat(of_row, n_raters),
+        rater=np.tile(np.arange(n_raters), n_rows),
+        grade=grade,
+        row=np.repeat(np.arange(n_rows), n_raters),
+        item_names=items,
+        rater_names=raters,
+    )
+    unrated = (grade.reshape(n_rows, n_raters) < 0).all(axis=0)
+    doubts += [f"{raters[k]!r} has no grade" for k in np.flatnonzero(unrated)[:6]]
+    doubts += doubt_names("raters", raters) + doubt_names("items", items)
+    return triples, grades, doubts
+
+
+def _counted(
+    sheet: Sheet, layout: Layout, options: GradeOptions, warnings: list[str]
+) -> RatingsFile:
+    # of a table of counts, or a contingency table
+    names = [sheet.header[place] for place in layout.raters]
+    table = _whole_numbers(sheet, layout)
+    order = _order_of(sheet, names, options)
+    scale = Scale(
+        name="observed" if options.categories is None else "declared",
+        grades=tuple(names[k] for k in order),
+    )
+    grades = Grades(scale=scale, codes=np.arange(len(names)))
+    part_of, parts_named = part_codes(sheet, layout, np.arange(len(table)))
+    n_raters = 2
+    if layout.kind == "table":
+        rows = _table_rows(sheet, layout, names)
+        table = table[np.ix_([rows.index(names[k]) for k in order], order)]
+        parts = [_table_part(table, scale)]
+        freq = table.sum(axis=0) + table.sum(axis=1)
+        n_items = int(table.sum())
+    else:
+        table = table[:, order]
+        parts = [
+            _counts_part(table[part_of == k], scale, name)
+            for k, name in enumerate(parts_named)
+        ]
+        freq, n_items = table.sum(axis=0), int((table.sum(axis=1) > 0).sum())
+        n_raters = int(table.sum(axis=1).max(initial=0))
+    record = _record(sheet, layout, options, grades, scale, freq)
+    record |= {
+        "raters": [],
+        "n_items": n_items,
+        "n_raters": n_raters,
+        "n_ratings": int(freq.sum()),
+        "n_missing": None,
+        "n_repeated": 0,
+        "repeated": None,
+    }
+    return _file(sheet, parts, scale, grades, record, warnings)
+
+
+def _whole_numbers(sheet: Sheet, layout: Layout) -> NDArray[np.int64]:
+    # -> (n_rows, n_categories)
+    cells = sheet.cells[list(layout.raters)].to_numpy(dtype=object)
+    codes, texts = coded_texts(cells.ravel())
+    values = []
+    for code, text in enumerate(texts):
+        number = float(text) if is_number(text) else -1.0
+        if text and not (number >= 0 and number.is_integer() and number < 2**53):
+            row = int(np.argmax(codes == code)) // cells.shape[1]
+            raise sheet.error(
+                f"{sheet.where(row)}: --{layout.kind} needs whole numbers from 0, got "
+                f"{text!r}"
+            )
+        values.append(int(number) if text else 0)
+    return np.array(values, dtype=np.int64)[codes].reshape(cells.shape)
+
+
+def _order_of(sheet: Sheet, names: list[str], options: GradeOptions) -> list[int]:
+    # places of the categories in the order of the scale
+    if options.categories is not None:
+        if set(options.categories) != set(names):
+            raise sheet.error(
+                f"--categories: needed those of the columns, {', '.join(names)}, in "
+                f"order, got {', '.join(options.categories)}"
+            )
+        return [names.index(category) for category in options.categories]
+    if all(map(is_number, names)):
+        return sorted(range(len(names)), key=lambda k: float(names[k]))
+    return list(range(len(names)))
+
+
+def _table_rows(sheet: Sheet, layout: Layout, names: list[str]) -> list[str]:
+    # the categories of the rows of a contingency table
+    if len(sheet.cells) != len(names):
+        raise sheet.error(
+            f"--table: needed as many rows as categories, {len(names)}, got "
+            f"{len(sheet.cells)}"
+        )
+    if not layout.item:
+        return names
+    rows = [str(cell).strip() for cell in sheet.column(layout.item[0])]
+    if set(rows) != set(names):
+        raise sheet.error(
+            f"--table: needed rows and columns of the same categories, got "
+            f"{', '.join(rows)} and {', '.join(names)}"
+        )
+    return rows
+
+
+def _table_part(table: NDArray[np.int64], scale: Scale) -> RatingsPart:
+    q = len(scale.grades)
+    counted = count_table(table, categories=scale.values)
+
+    def pairs() -> CodedRatings:
+        codes = np.repeat(np.indices((q, q)).reshape(2, -1).T, table.ravel(), axis=0)
+        return CodedRatings(codes=codes, categories=scale.values)
+
+    ratings = CountedRatings(
+        categories=counted.categories,
+        items=counted.items,
+        n_raters=counted.n_raters,
+        source=pairs,
+    )
+    return RatingsPart(
+        group=None, session=None, items=(), raters=("rows", "columns"), ratings=ratings
+    )
+
+
+def _counts_part(
+    table: NDArray[np.int64], scale: Scale, name: tuple[str | None, str | None]
+) -> RatingsPart:
+    ratings = take_counts(table, scale.values)
+    return RatingsPart(
+        group=name[0], session=name[1], items=(), raters=(), ratings=ratings
+    )
+
+
+def _record(
+    sheet: Sheet,
+    layout: Layout,
+    options: GradeOptions,
+    grades: Grades,
+    scale: Scale,
+    freq: NDArray[np.int64],
+) -> dict[str, Any]:
+    # what was read, as far as every kind of table has it
+    names = [sheet.header[place] for place in layout.item]
+    used = {*layout.item, *layout.raters, layout.rater, layout.grade}
+    used |= {layout.session, layout.by}
+    counted = zip(scale.grades, freq.tolist(), strict=True)
+    return {
+        **sheet.facts,
+        "layout": layout.kind,
+        "item": names,
+        "rater": _name(sheet, layout.rater),
+        "grade": _name(sheet, layout.grade),
+        "session": _name(sheet, layout.session),
+        "by": _name(sheet, layout.by),
+        "ignored": [n for p, n in enumerate(sheet.header) if p not in used],
+        "grades": {grade: n for grade, n in counted if n},
+        "missing": grades.missing,
+        "merged": grades.merged,
+        "dropped": sheet.dropped,
+        "scale": {
+            "name": scale.name,
+            "grades": list(scale.grades),
+            "declared": options.categories is not None,
+        },
+    }
+
+
+def _name(sheet: Sheet, place: int | None) -> str | None:
+    return None if place is None else sheet.header[place]
+
+
+def _file(
+    sheet: Sheet,
+    parts: Sequence[RatingsPart],
+    scale: Scale,
+    grades: Grades,
+    record: dict[str, Any],
+    warnings: Sequence[str],
+) -> RatingsFile:
+    messages = (*warnings, *grades.warnings)
+    return RatingsFile(
+        parts=tuple(parts),
+        scale=scale,
+        is_ordered=grades.is_ordered or scale is not grades.scale,
+        read={
+            "file": sheet.name,
+            "sha256": sheet.sha256,
+            **record,
+            "warnings": list(messages),
+        },
+        warnings=messages,
+        simulated=_is_simulated(sheet),
+    )
+
+
+def _is_simulated(sheet: Sheet) -> bool:
+    if sheet.is_simulated or "source" not in sheet.header:
+        return sheet.is_simulated
+    sources = sheet.column(sheet.header.index("source"))
+    return bool((sources == "simulated").any())
