@@ -79,7 +79,7 @@ def read_study(root: Path, ratings_file: Path | None) -> StudyData:
     paths = StudyPaths(root)
     protocol = read_protocol(paths.protocol)
     source = ratings_file or _default_ratings(paths)
-    ratings = read_study_ratings(source, scale=scale_of(protocol))
+    ratings = read_study_ratings(source, scale_of(protocol))
     in_person = None
     if paths.in_person_file.is_file() and not ratings.simulated:
         in_person = read_in_person(paths.in_person_file)

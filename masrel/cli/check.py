@@ -64,7 +64,7 @@ def _ratings_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
 
     for path in files:
         try:
-            read_study_ratings(path, scale=scale_of(protocol))
+            read_study_ratings(path, scale_of(protocol))
         except MasrelError as error:
             yield str(error)
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from masrel.errors import RatingsError
-from masrel.ratings.files import _MISSING, _Problem, _read_rows, _refusal
+from masrel.ratings.study_file import _MISSING, _Problem, _read_rows, _refusal
 
 _IN_PERSON_COLUMNS = (
     "source_table",  # where the row is printed

@@ -1,14 +1,13 @@
-"""Reading any CSV file of ratings as text: its rows, its columns, its ratings."""
+"""Reading a study's table of ratings: one row a rating, every cell checked."""
 
 import csv
 import io
 import math
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from masrel.errors import ParameterError, RatingsError
+from masrel.errors import RatingsError
 from masrel.ratings.table import (
     DEFAULT_SESSION,
     RATING_COLUMNS,
@@ -16,22 +15,20 @@ from masrel.ratings.table import (
     Ratings,
     _assemble,
 )
-from masrel.scales import MODIFIED_ASHWORTH, Scale
+from masrel.scales import Scale
 
 _MISSING = ("", "NA")
 """Cells that stand for a missing value; nothing else does."""
 
 _MAX_PROBLEMS = 20
 
-_LOOKS_MISSING = frozenset({"n/a", "na", "nan", "null", "none", ".", "-", "?"})
-
 _NAMES = {
-    "item": ("item", "model", "subject"),
+    "model": ("model", "item", "subject"),
     "rater": ("rater",),
     "grade": ("grade", "rating", "score"),
     "session": ("session",),
 }
-"""Names that are recognized, letter case aside."""
+"""Names of columns that are recognized, letter case aside."""
 
 
 _Problem = tuple[int, str | None, str]
@@ -58,26 +55,6 @@ class _CsvRows:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _LongColumns:
-    """Columns of a long table: one row a rating."""
-
-    # item, rater, grade: their positions
-    item: int
-    rater: int
-    grade: int
-    session: int | None  # position of the session, if there is one
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _WideColumns:
-    """Columns of a wide table: one row an item, one column a rater."""
-
-    item: int  # position of the item
-    raters: tuple[int, ...]  # positions of the raters
-    session: int | None  # position of the session, if there is one
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class _Cell:
     """One rating as it is in the file: the columns of a table, and where it stands."""
 
@@ -86,129 +63,93 @@ class _Cell:
     session: str
     rater: str
     model: str
-    repeat: int = 1
+    repeat: int
     grade: str | None
-    mean_speed_deg_s: float = math.nan
-    source: str = "foreign"
+    mean_speed_deg_s: float
+    source: str
 
 
-def read_study_ratings(
-    path: Path | str,
-    *,
-    scale: Scale | None = None,
-    item: str | None = None,
-    rater: str | None = None,
-    grade: str | None = None,
-    session: str | None = None,
-    categories: Sequence[str] | None = None,
-) -> Ratings:
-    r"""Read a long or wide CSV file of ratings, everything as text.
+def read_study_ratings(path: Path | str, scale: Scale) -> Ratings:
+    r"""Read a study's table of ratings, one row a rating, everything as text.
 
     Parameters
     ----------
     path : Path or str
-        The file; ``docs/ratings.md`` says what is accepted.
-    scale : Scale, optional
+        A CSV file with columns `rater`, `model` (or `item`) and `grade`;
+        ``docs/ratings.md`` has the others. Any other file is for `read_ratings`.
+    scale : Scale
         The grades a rater may give.
-    item, rater, grade, session : str, optional
-        Names of columns, where the file's own names do not say it.
-    categories : sequence of str, optional
-        The grades a rater may give, in order, instead of `scale`. With neither, the
-        scale is the grades found, by value when all are numbers, else as text; with
-        a grade 1+ it is the Modified Ashworth Scale.
 
     Returns
     -------
     Ratings
-        The table, rows in the order of the file, a wide one row by row.
+        The table, rows in the order of the file.
 
     Raises
     ------
     RatingsError
         If the file is not a table of ratings. The message lists up to 20 problems,
         each with file, line, column, what was needed and what came.
-    ParameterError
-        If both `scale` and `categories` are given, or `categories` are no scale.
 
     Examples
     --------
     >>> import tempfile
+    >>> from masrel.scales import MODIFIED_ASHWORTH
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     path = Path(folder) / "wide.csv"
-    ...     _ = path.write_text("patient,Kim,Lee\nA,1,1+\nB,2,NA\n")
-    ...     ratings = read_ratings(path, categories=["1", "1+", "2"])
+    ...     path = Path(folder) / "ratings.csv"
+    ...     _ = path.write_text("rater,model,grade\nR1,HM2,1+\nR2,HM2,NA\n")
+    ...     ratings = read_study_ratings(path, MODIFIED_ASHWORTH)
     >>> ratings.table["grade"].tolist()
-    ['1', '1+', '2', None]
+    ['1+', None]
     """
-    if scale is not None and categories is not None:
-        raise ParameterError("scale, categories: needed one of them, got both")
-    if categories is not None:
-        scale = Scale(name="declared", grades=tuple(categories))
     rows = _read_rows(Path(path))
-    names = {"item": item, "rater": rater, "grade": grade, "session": session}
-    columns = _find_columns(rows, names)
+    places = {role: _find(rows, role) for role in _NAMES}
+    for role in ("rater", "model", "grade"):
+        if places[role] is None:
+            raise _error(
+                rows,
+                f"needed a column for the {role} named {' or '.join(_NAMES[role])}, "
+                f"got {', '.join(rows.header)}; masrel agree reads other tables",
+            )
     problems: list[_Problem] = []
-    if isinstance(columns, _LongColumns):
-        cells = _long_cells(rows, columns, problems)
-    else:
-        cells = _wide_cells(rows, columns)
+    cells = _long_cells(rows, places, problems)
     _check_cells(cells, scale, problems)
     if problems:
         raise _refusal(rows.path, problems)
-    if scale is None:
-        scale = _observed_scale(rows, cells)
     values = {n: [getattr(cell, n) for cell in cells] for n in RATING_COLUMNS}
     return _assemble(values, scale, rows.path)
 
 
 def _long_cells(
-    rows: _CsvRows, columns: _LongColumns, problems: list[_Problem]
+    rows: _CsvRows, places: Mapping[str, int | None], problems: list[_Problem]
 ) -> list[_Cell]:
-    extra: dict[str, int] = {
-        name: rows.header.index(name)
-        for name in ("repeat", "mean_speed_deg_s", "source")
-        if name in rows.header
-    }
-    at = columns.session
+    columns = {role: place for role, place in places.items() if place is not None}
+    for name in ("repeat", "mean_speed_deg_s", "source"):
+        if name in rows.header:
+            columns[name] = rows.header.index(name)
     cells = []
     for row in rows.rows:
-        texts = {name: row.cells[position] for name, position in extra.items()}
-        grade = row.cells[columns.grade]
+        texts = {role: row.cells[place] for role, place in columns.items()}
         repeat, speed, source = _extra_values(texts, row.line, problems)
         cells.append(
             _Cell(
                 line=row.line,
-                column=rows.header[columns.grade],
-                session=DEFAULT_SESSION if at is None else row.cells[at],
-                rater=row.cells[columns.rater],
-                model=row.cells[columns.item],
-                grade=None if grade in _MISSING else grade,
+                column=rows.header[columns["grade"]],
+                session=texts.get("session", DEFAULT_SESSION),
+                rater=texts["rater"],
+                model=texts["model"],
+                grade=None if texts["grade"] in _MISSING else texts["grade"],
                 repeat=repeat,
                 mean_speed_deg_s=speed,
                 source=source,
             )
         )
-        for role in ("item", "rater"):
-            position = getattr(columns, role)
-            if row.cells[position] in _MISSING:
-                problems.append((row.line, rows.header[position], f"needed the {role}"))
+        for role in ("model", "rater"):
+            if texts[role] in _MISSING:
+                problems.append(
+                    (row.line, rows.header[columns[role]], f"needed the {role}")
+                )
     return cells
-
-
-def _wide_cells(rows: _CsvRows, columns: _WideColumns) -> list[_Cell]:
-    at = columns.session
-    return [
-        _Cell(
-            line=row.line,
-            column=rows.header[position],
-            session=DEFAULT_SESSION if at is None else row.cells[at],
-            rater=rows.header[position],
-            model=row.cells[columns.item],
-            grade=None if row.cells[position] in _MISSING else row.cells[position],
-        )
-        for row in rows.rows
-        for position in columns.raters
-    ]
 
 
 def _extra_values(
@@ -238,15 +179,11 @@ def _extra_values(
     return repeat, speed, source
 
 
-def _check_cells(
-    cells: list[_Cell], scale: Scale | None, problems: list[_Problem]
-) -> None:
-    kind = "a grade" if scale is None else f"one of {', '.join(scale.grades)}"
-    hint = "; name the categories if it is a grade" if scale is None else ""
+def _check_cells(cells: list[_Cell], scale: Scale, problems: list[_Problem]) -> None:
     first_lines: dict[tuple[str, str, str, int], int] = {}
     for cell in cells:
-        if not cell.model or not cell.session:
-            problems.append((cell.line, None, "needed an item and a session, got none"))
+        if not cell.session:
+            problems.append((cell.line, None, "needed a session, got none"))
             continue
         key = (cell.session, cell.rater, cell.model, cell.repeat)
         first = first_lines.setdefault(key, cell.line)
@@ -256,30 +193,12 @@ def _check_cells(
                 f"{cell.session!r}, line {first} has one already"
             )
             problems.append((cell.line, cell.column, message))
-        if cell.grade is None:
-            continue
-        looks_missing = cell.grade.casefold() in _LOOKS_MISSING
-        if looks_missing if scale is None else cell.grade not in scale.grades:
+        if cell.grade is not None and cell.grade not in scale.grades:
             message = (
-                f"needed {kind}, or an empty cell or NA when missing, "
-                f"got {cell.grade!r}{hint}"
+                f"needed one of {', '.join(scale.grades)}, or an empty cell or NA when "
+                f"missing, got {cell.grade!r}"
             )
             problems.append((cell.line, cell.column, message))
-
-
-def _observed_scale(rows: _CsvRows, cells: list[_Cell]) -> Scale:
-    grades = sorted({cell.grade for cell in cells if cell.grade is not None})
-    if not grades:
-        problem = (rows.header_line, None, "needed at least one grade, got none")
-        raise _refusal(rows.path, [problem])
-    try:
-        values = {grade: float(grade) for grade in grades}
-    except ValueError:
-        # No other scale has a grade 1+: its order is known, and its other grades.
-        if "1+" in grades and set(grades) <= set(MODIFIED_ASHWORTH.grades):
-            return MODIFIED_ASHWORTH
-        return Scale(name="observed", grades=tuple(grades))
-    return Scale(name="observed", grades=tuple(sorted(grades, key=values.__getitem__)))
 
 
 def _read_rows(path: Path) -> _CsvRows:
@@ -349,12 +268,9 @@ def _records(path: Path, text: str) -> list[tuple[int, tuple[str, ...]]]:
 
 def _check_header(path: Path, line: int, header: tuple[str, ...]) -> None:
     if len(header) == 1:
-        other = re.search(r"[;\t|]", header[0])
-        got = f"one column {header[0]!r}"
-        if other:
-            got = f"{other.group()!r} as separator"
         raise RatingsError(
-            f"{path}: line {line}: needed columns separated by commas, got {got}"
+            f"{path}: line {line}: needed columns separated by commas, got one, "
+            f"{header[0]!r}"
         )
     problems: list[_Problem] = []
     for position, name in enumerate(header, start=1):
@@ -368,67 +284,16 @@ def _check_header(path: Path, line: int, header: tuple[str, ...]) -> None:
         raise _refusal(path, problems)
 
 
-def _find_columns(
-    rows: _CsvRows, names: Mapping[str, str | None]
-) -> _LongColumns | _WideColumns:
-    """Decide whether a table is long or wide, and which column is what."""
-    # names: role to the column the caller named for it, or None.
-    # A table with a column for the rater or for the grade, named by the caller or by a
-    # name that is recognized, is long and needs item, rater and grade. Any other table
-    # is wide: the item is the column the caller named, else one whose name is
-    # recognized, else the first; every other column but the session is a rater.
-    positions = {role: _find(rows, role, names) for role in _NAMES}
-    session = positions["session"]
-    if positions["rater"] is None and positions["grade"] is None:
-        item = positions["item"] or 0
-        raters = tuple(p for p in range(len(rows.header)) if p not in (item, session))
-        if not raters:
-            raise _error(rows, "needed a column for a rater, got none")
-        return _WideColumns(item=item, raters=raters, session=session)
-    required = {}
-    for role in ("item", "rater", "grade"):
-        position = positions[role]
-        if position is None:
-            raise _error(
-                rows,
-                f"needed a column for the {role} named {' or '.join(_NAMES[role])}, "
-                f"got {', '.join(rows.header)}; say which it is",
-            )
-        required[role] = position
-    used = [*required.values(), *([] if session is None else [session])]
-    if len(set(used)) < len(used):
-        raise _error(
-            rows,
-            "needed different columns for item, rater, grade and session, got "
-            + ", ".join(rows.header[p] for p in used),
-        )
-    return _LongColumns(**required, session=session)
-
-
-def _find(rows: _CsvRows, role: str, names: Mapping[str, str | None]) -> int | None:
-    name = names[role]
-    if name is not None:
-        if name not in rows.header:
-            raise _error(
-                rows,
-                f"needed a column {name!r} for the {role}, got "
-                + ", ".join(rows.header),
-            )
-        return rows.header.index(name)
-    # a column the caller named for another role is no candidate for this one
-    taken = names.values()
-    candidates = [
-        column
-        for column in rows.header
-        if column.casefold() in _NAMES[role] and column not in taken
+def _find(rows: _CsvRows, role: str) -> int | None:
+    places = [
+        place
+        for place, column in enumerate(rows.header)
+        if column.casefold() in _NAMES[role]
     ]
-    if len(candidates) > 1:
-        raise _error(
-            rows,
-            f"needed one column for the {role}, got {' and '.join(candidates)}; say "
-            "which it is",
-        )
-    return rows.header.index(candidates[0]) if candidates else None
+    if len(places) > 1:
+        names = " and ".join(rows.header[place] for place in places)
+        raise _error(rows, f"needed one column for the {role}, got {names}")
+    return places[0] if places else None
 
 
 def _error(rows: _CsvRows, message: str) -> RatingsError:

@@ -7,7 +7,7 @@ import msgspec
 
 from masrel.protocol import EstimatePlan, Protocol, read_protocol, scale_of
 from masrel.ratings import InPerson, Ratings, ratings_from_rows, read_in_person
-from masrel.ratings import read_ratings as read
+from masrel.ratings import read_study_ratings as read
 
 STUDY = Path(__file__).parents[2] / "studies/hess2012"
 PUBLISHED = STUDY / "ratings/published.csv"
@@ -22,7 +22,7 @@ def hess2012() -> Protocol:
 
 
 def table_v() -> Ratings:
-    return read(PUBLISHED, scale=scale_of(hess2012()))
+    return read(PUBLISHED, scale_of(hess2012()))
 
 
 def in_person() -> InPerson:

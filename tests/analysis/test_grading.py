@@ -12,7 +12,7 @@ from scipy.optimize import minimize
 from masrel.analysis import GradeRegression, grade_regression
 from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
 from masrel.protocol import Protocol, read_protocol, scale_of
-from masrel.ratings import Ratings, ratings_from_rows, read_ratings
+from masrel.ratings import Ratings, ratings_from_rows, read_study_ratings
 from tests.protocol.documents import VALID, write
 
 STUDY = Path(__file__).parents[2] / "studies" / "hess2012"
@@ -129,8 +129,8 @@ def test_what_was_put_in_is_covered_and_the_rest_is_not_found(tmp_path: Path) ->
 
 def published() -> tuple[Protocol, Ratings]:
     protocol = read_protocol(STUDY / "protocol.toml")
-    ratings = read_ratings(
-        STUDY / "ratings" / "published.csv", scale=scale_of(protocol)
+    ratings = read_study_ratings(
+        STUDY / "ratings" / "published.csv", scale_of(protocol)
     )
     return protocol, ratings
 

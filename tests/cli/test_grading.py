@@ -7,7 +7,7 @@ import pytest
 
 from masrel.analysis import grade_regression
 from masrel.protocol import read_protocol, scale_of
-from masrel.ratings import read_ratings
+from masrel.ratings import read_study_ratings
 from tests.cli.process import Caller
 
 STUDY = Path(__file__).parents[2] / "studies/hess2012"
@@ -16,7 +16,7 @@ STUDY = Path(__file__).parents[2] / "studies/hess2012"
 def test_json_is_one_document_with_every_digit(masrel: Caller, tmp_path: Path) -> None:
     protocol = read_protocol(STUDY / "protocol.toml")
     file = STUDY / "ratings" / "published.csv"
-    ratings = read_ratings(file, scale=scale_of(protocol))
+    ratings = read_study_ratings(file, scale_of(protocol))
     found = grade_regression(protocol, ratings, predictors=("H", "speed"), level=0.9)
     asked = ("grading", STUDY, "--on", "H, speed", "--level", 0.9, "--json")
     done = masrel(*asked, "-")

@@ -13,7 +13,7 @@ from masrel.ratings import (
     ratings_from_rows,
     ratings_hash,
     read_in_person,
-    read_ratings,
+    read_study_ratings,
     write_ratings,
 )
 from masrel.scales import MODIFIED_ASHWORTH
@@ -50,7 +50,7 @@ def test_written_and_read_back_nothing_has_changed(
     path = tmp_path / "ratings" / "ratings.csv"
     write_ratings(ratings, path)
     first = path.read_bytes()
-    again = read_ratings(path, scale=MODIFIED_ASHWORTH)
+    again = read_study_ratings(path, MODIFIED_ASHWORTH)
     # Exact: a float's repr reads back as the same float.
     assert again.table.equals(ratings.table)
     assert again.simulated == ratings.simulated
