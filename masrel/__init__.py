@@ -1,4 +1,4 @@
-"""Reliability studies on a haptic simulator of elbow spasticity.
+"""Agreement of ratings, and studies on a haptic simulator of elbow spasticity.
 
 The flow, each stage handing the next a file that a person can open::
 

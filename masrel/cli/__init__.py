@@ -19,23 +19,34 @@ from masrel.errors import (
 
 __all__ = ["main"]
 
-VERBS = {
-    "init": "Make a new study from a template.",
-    "check": "Validate a study and say every error.",
-    "schedule": "Draw the schedules of a study, once.",
-    "run": "Present a schedule's models and record every grade.",
-    "ratings": "Turn session logs into the table of ratings.",
-    "analyze": "Compute the agreement tables a study asks for.",
-    "report": "Write the report of a study.",
-    "agree": "Agreement of any CSV file of ratings, no study needed.",
-    "latent": "Biases and noises of raters of any CSV file, items on one scale.",
-    "trace": "Torque trace of one stretch of one model.",
-    "fit": "Identify a joint, or a device's friction, from recordings.",
-    "between": "Models between models: dummies that hide a study's standards.",
-    "grading": "Regress grades on the models' parameters and the speed.",
-    "device": "Bring a Puck up on its CAN bus: probe, check, zero, friction.",
-    "demo": "The whole flow on the simulated device.",
+GROUPS = {
+    "Ratings you have": {
+        "agree": "Agreement of the raters in any file, no study needed.",
+        "latent": "Biases and noises of the raters in any file, items on one scale.",
+    },
+    "A study": {
+        "init": "Make a new study from a template.",
+        "check": "Validate a study and say every error.",
+        "schedule": "Draw the schedules of a study, once.",
+        "between": "Models between models: dummies that hide a study's standards.",
+        "demo": "The whole flow on the simulated device.",
+    },
+    "Its conduct": {
+        "run": "Present a schedule's models and record every grade.",
+        "ratings": "Turn session logs into the table of ratings.",
+        "analyze": "Compute the agreement tables a study asks for.",
+        "grading": "Regress grades on the models' parameters and the speed.",
+        "report": "Write the report of a study.",
+    },
+    "The joint and the device": {
+        "trace": "Torque trace of one stretch of one model.",
+        "fit": "Identify a joint, or a device's friction, from recordings.",
+        "device": "Bring a Puck up on its CAN bus: probe, check, zero, friction.",
+    },
 }
+"""Verbs with their summaries, as --help shows them."""
+
+VERBS = {verb: text for verbs in GROUPS.values() for verb, text in verbs.items()}
 """Verb to summary. The verb ``x`` is the command ``x`` of ``masrel.cli.x``."""
 
 
@@ -58,14 +69,18 @@ class _Verbs(click.Group):
         formatter: click.HelpFormatter,
     ) -> None:
         # Summaries are listed here so that --help imports no verb.
-        with formatter.section("Commands"):
-            formatter.write_dl(list(VERBS.items()))
+        for title, verbs in GROUPS.items():
+            with formatter.section(title):
+                formatter.write_dl(list(verbs.items()))
 
 
 @click.group(cls=_Verbs, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(masrel.__version__, prog_name="masrel")
 def cli() -> None:
-    """Reliability studies on a haptic simulator of elbow spasticity."""
+    """Agreement of any file of ratings, and studies on a simulator of spasticity.
+
+    To begin, with a file of ratings: masrel agree FILE --target items
+    """
 
 
 def main() -> None:
