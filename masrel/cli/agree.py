@@ -1,110 +1,56 @@
 """``masrel agree``: agreement of any CSV file of ratings, no study needed."""
 
-import warnings
+import hashlib
+import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import click
 
+from masrel.cli._agreement_output import WithArguments, order_notes, write_agreement
+from masrel.cli._agreement_rows import (
+    EstimateOptions,
+    estimate_options,
+    estimate_rows,
+)
 from masrel.cli._options import (
     ColumnOptions,
     OutputOptions,
     column_options,
-    grouped,
     output_options,
     scale_notes,
-    split_commas,
-    write_output,
 )
-from masrel.errors import MasrelError, MasrelWarning, ParameterError, RatingsError
-from masrel.estimates import Target, as_document
+from masrel.errors import ParameterError, RatingsError
 
 if TYPE_CHECKING:
-    from masrel.agreement import BandScale, Coefficient, WeightName
+    from masrel.agreement import CountedRatings
     from masrel.ratings import Ratings
     from masrel.report._agreement_table import AgreementRow
-
-_USUAL = ["percent_agreement", "fleiss_kappa"]
-
-_NO_INTERVAL = (
-    "no interval: say what a new study would draw anew, with --target raters, items "
-    "or both"
-)
+    from masrel.scales import Scale
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _EstimateOptions:
-    """What is estimated of every session."""
-
-    coefficients: str | None  # names, separated by commas, or "all"; None for `_USUAL`
-    weights: "WeightName"  # for coefficients that take any; checked where they are made
-    target: Target | None  # what a new study would draw anew; no interval when None
-    # kind of interval; "auto" chooses one
-    interval: Literal["auto", "analytic", "jackknife", "bootstrap", "posterior"]
-    level: float
-    # n_resamples, seed: for intervals that draw
-    n_resamples: int
-    seed: int
-    words: "BandScale | None"  # whose words for values
-
-
-_estimate_options = grouped(
-    "options",
-    _EstimateOptions,
-    click.option(
-        "--coefficients",
-        show_default=",".join(_USUAL),
-        help="Names of coefficients, separated by commas, or all.",
-    ),
-    click.option(
-        "--weights",
-        default="identity",
-        show_default=True,
-        help="identity, linear, quadratic, ordinal, radical, ratio, circular or "
-        "bipolar.",
-    ),
-    click.option(
-        "--target",
-        type=click.Choice(["items", "raters", "both"]),
-        help="What a new study would draw anew; no interval without it.",
-    ),
-    click.option(
-        "--interval",
-        type=click.Choice(["auto", "analytic", "jackknife", "bootstrap", "posterior"]),
-        default="auto",
-        show_default=True,
-        help="Kind of interval; auto chooses by target and size.",
-    ),
-    click.option(
-        "--level", default=0.95, show_default=True, help="Level of intervals."
-    ),
-    click.option("--resamples", "n_resamples", default=10_000, show_default=True),
-    click.option("--seed", default=0, show_default=True, help="Seed of resampling."),
-    click.option(
-        "--words",
-        type=click.Choice(["landis_koch", "altman", "fleiss", "cicchetti"]),
-        help="Name the best band that the true value reaches with 95 % probability.",
-    ),
-)
-
-
-@click.command("agree")
+@click.command("agree", cls=WithArguments)
 @click.argument("file", type=click.Path(path_type=Path))
 @column_options
-@_estimate_options
+@estimate_options
 @click.option("--by", type=click.Choice(["session"]), help="Estimate each session.")
+@click.option(
+    "--explain", is_flag=True, help="Say in notes what every interval promises."
+)
 @output_options(
-    json="Write the estimates here; - prints them, and nothing else, on stdout.",
+    json="Write a record of all here; - prints it, and nothing else, on stdout.",
     figure="Draw the intervals into this .png, .svg or .pdf; needs --target.",
     csv="Print every digit as CSV.",
     latex="Print a LaTeX table.",
+    sentence="Print a sentence for a paper instead of the table, one an estimate.",
 )
 def agree(
     file: Path,
     columns: ColumnOptions,
-    options: _EstimateOptions,
+    options: EstimateOptions,
     by: str | None,
+    explain: bool,
     output: OutputOptions,
 ) -> None:
     """Estimate the agreement of the raters in FILE.
@@ -113,9 +59,8 @@ def agree(
     named) or one row an item and one column a rater. Missing grades are empty or NA.
     Grades that are all numbers weigh by value, others by their place in the scale.
     """
-    target = options.target
     output.check_files()
-    if output.figure is not None and target is None:
+    if output.figure is not None and options.target is None:
         raise ParameterError(
             "--figure: shows intervals, so it needs --target raters, items or both"
         )
@@ -123,134 +68,65 @@ def agree(
 
     ratings = read_ratings(file, **asdict(columns))
     notes = scale_notes(ratings, options.weights)
-    rows = _estimate(ratings, options, by, file)
-    from masrel.report._agreement_table import agreement_forest, agreement_table
-    from masrel.report._tables import SIMULATED
-
-    write_output(
+    is_ordered = _has_order(ratings.scale)
+    write_agreement(
+        _estimate(ratings, options, by, file, is_ordered),
         output,
-        document=lambda: _document(rows, by),
-        text=lambda: agreement_table(
-            rows,
-            caption=f"Agreement of the raters in {file}",
-            by=by,
-            bands=options.words,
-            notes=notes,
-            data="simulated" if ratings.simulated else "foreign",
-        ),
-        figure=None if target is None else lambda: agreement_forest(rows, target),
-        stamp=SIMULATED if ratings.simulated else "",
-        notes=notes,
+        file=file,
+        sha256=hashlib.sha256(file.read_bytes()).hexdigest(),
+        scale=ratings.scale,
+        options=options,
+        by=by,
+        read={},
+        notes=(*notes, *order_notes(is_ordered, options)),
+        explain=explain,
+        simulated=ratings.simulated,
     )
-    if target is None:
-        click.echo(_NO_INTERVAL, err=True)
+
+
+def _has_order(scale: "Scale") -> bool:
+    """Return whether grades have an order: a declared one, or as numbers."""
+    if scale.name != "observed":
+        return True
+    try:
+        return all(math.isfinite(float(grade)) for grade in scale.grades)
+    except ValueError:
+        return False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Part:
+    # of one session
+    ratings: "CountedRatings"
+    counted: "CountedRatings"
 
 
 def _estimate(
-    ratings: "Ratings", options: _EstimateOptions, by: str | None, file: Path
+    ratings: "Ratings",
+    options: EstimateOptions,
+    by: str | None,
+    file: Path,
+    is_ordered: bool,
 ) -> "list[AgreementRow]":
+    from masrel.agreement import count_ratings
+    from masrel.ratings import rating_matrix
+
     sessions = list(dict.fromkeys(ratings.table["session"]))
     if by is None and len(sessions) > 1:
         raise RatingsError(
             f"{file}: holds {len(sessions)} sessions ({', '.join(sessions)}), so that "
             "raters graded the same item more than once; --by session estimates each"
         )
-    with warnings.catch_warnings():
-        # Every note is in the result, and so below the table or in the JSON.
-        warnings.simplefilter("ignore", MasrelWarning)
-        return [
-            row
-            for session in sessions
-            for row in _estimate_session(ratings, session, options)
-        ]
-
-
-def _estimate_session(
-    ratings: "Ratings", session: str, options: _EstimateOptions
-) -> "list[AgreementRow]":
-    from masrel.agreement import count_ratings
-    from masrel.ratings import rating_matrix
-    from masrel.report._agreement_table import AgreementRow
-
-    matrix = rating_matrix(ratings, session=session)
-    scale = ratings.scale
-    counted = count_ratings(scale.weigh(matrix.grades), scale.values)
-    is_named = options.coefficients is not None
-    names = (
-        _USUAL if options.coefficients is None else split_commas(options.coefficients)
-    )
-    takes_all = names == ["all"]
-    rows: list[AgreementRow] = []
-    refused: list[MasrelError] = []
-    for entry in _entries(names, len(matrix.raters)):
-        title, notes = entry.title, []
-        weights: WeightName = options.weights if entry.weighted else "identity"
-        if weights != "identity":
-            title += f", {weights}"
-        elif weights != options.weights and not takes_all:
-            notes.append("unweighted, there are no weights for it")
-        # An interval that a coefficient comes with is not computed a second time.
-        is_done = entry.has_interval and (options.interval == "auto" or takes_all)
-        estimate = None
-        if options.target is not None and not is_done:
-            from masrel import intervals
-
-            try:
-                estimate = intervals.estimate(
-                    entry,
-                    counted,
-                    target=options.target,
-                    method=options.interval,
-                    categories=counted.categories,
-                    weights=weights,
-                    level=options.level,
-                    n_resamples=options.n_resamples,
-                    rng=options.seed,
-                )
-            except MasrelError as error:
-                if is_named and not takes_all:
-                    raise  # just these were named: each must have the interval
-                refused.append(error)
-                notes.append(f"no interval: {error}")
-        if estimate is None:
-            estimate = entry(
-                counted,
-                categories=counted.categories,
-                weights=weights,
-                level=options.level,
-            )
-        rows.append(
-            AgreementRow(
-                session=session, title=title, estimate=estimate, notes=tuple(notes)
-            )
+    rows, scale = [], ratings.scale
+    for session in sessions:
+        matrix = rating_matrix(ratings, session=session)
+        counted = count_ratings(scale.weigh(matrix.grades), scale.values)
+        rows += estimate_rows(
+            _Part(ratings=counted, counted=counted),
+            group=session,
+            n_raters=len(matrix.raters),
+            scale=scale,
+            is_ordered=is_ordered,
+            options=options,
         )
-    if not takes_all and refused and len(refused) == len(rows):
-        raise refused[0]
     return rows
-
-
-def _entries(names: list[str], n_raters: int) -> list["Coefficient"]:
-    from masrel.agreement import COEFFICIENTS, coefficient
-
-    if names == ["all"]:
-        return [
-            entry
-            for entry in COEFFICIENTS.values()
-            if entry.shape == "ratings" and n_raters <= (entry.n_raters[1] or n_raters)
-        ]
-    entries = [coefficient(name) for name in names]
-    for entry in entries:
-        if entry.shape == "pairs":
-            raise ParameterError(
-                f"--coefficients: {entry.name} takes each rater's grades of two "
-                "sessions; masrel analyze computes it from a study's plan"
-            )
-    return entries
-
-
-def _document(rows: "list[AgreementRow]", by: str | None) -> dict[str, object]:
-    documents = [
-        {**({} if by is None else {by: row.session}), **as_document(row.estimate)}
-        for row in rows
-    ]
-    return {"estimates": documents}

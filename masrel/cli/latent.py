@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     "--items",
     type=click.Choice(["fixed", "random"]),
     required=True,
-    help="Whether kappa speaks of these items, or of new ones like them.",
+    help="Whether kappa is for these items, or for new ones like them.",
 )
 @column_options
 @click.option("--session", help="Which session, if the file holds more than one.")
