@@ -21,7 +21,7 @@ __all__ = [
 ]
 
 Target = Literal["items", "raters", "both"]
-"""What a new study would draw anew: the population an interval speaks of."""
+"""What a new study would draw anew: the population an interval generalises to."""
 
 Unit = Literal["items", "raters", "both"]
 """What is resampled or left out."""
@@ -64,7 +64,7 @@ class Interval:
     method : str
         How it was computed, in words.
     target : {"items", "raters", "both"}
-        The population it speaks of.
+        The population it generalises to.
     unit : {"items", "raters", "both"} or None
         What was resampled or left out; None when nothing was.
     n_resamples : int or None

@@ -190,6 +190,13 @@ def benchmark(
     ParameterError
         If the scale is unknown, or the level is not within (0, 1).
 
+    Notes
+    -----
+    Items are the sample and their number is large: the law is normal, as of `bands`.
+    An interval knows better: the word that the true value reaches with 95 % by it is
+    the `strength` of the lower end of that interval at level 0.9, or of a one-sided
+    bound at 0.95.
+
     Examples
     --------
     >>> from masrel.agreement import cohen_kappa_from_table

@@ -18,6 +18,16 @@ from masrel.estimates import Estimate, Interval
 IccForm = Literal["ICC(1)", "ICC(1,k)", "ICC(C,1)", "ICC(C,k)", "ICC(A,1)", "ICC(A,k)"]
 """One-way; consistency and absolute agreement; of one rating and of the mean of k."""
 
+_NAMES: dict[IccForm, str] = {
+    "ICC(1)": "icc_1",
+    "ICC(1,k)": "icc_1k",
+    "ICC(C,1)": "icc_c1",
+    "ICC(C,k)": "icc_ck",
+    "ICC(A,1)": "icc_a1",
+    "ICC(A,k)": "icc_ak",
+}
+"""Form to its name in the register."""
+
 
 def icc(
     ratings: object,
@@ -44,10 +54,10 @@ def icc(
     Returns
     -------
     Estimate
-        The coefficient; `weights` names the form. The interval, from the F
-        distribution, speaks of other items and, for absolute agreement and one-way
-        forms, of other raters too. There is no delta-method error; observed and
-        chance agreement do not exist.
+        The coefficient, named after its form: ``"icc_a1"`` is ICC(A,1). The interval,
+        from the F distribution, generalises to other items and, for absolute
+        agreement and one-way forms, to other raters too. There is no delta-method
+        error; observed and chance agreement do not exist.
 
     Raises
     ------
@@ -97,8 +107,8 @@ def icc(
         interval = _interval(anova, form, level)
     n_items, n_raters = values.shape
     return Estimate(
-        coefficient="icc",
-        weights=form,
+        coefficient=_NAMES[form],
+        weights="identity",
         value=value,
         standard_error=math.nan,
         interval=interval,

@@ -33,7 +33,8 @@ from masrel.agreement.conger import _KERNEL as CONGER_KERNEL
 from masrel.agreement.conger import conger_kappa
 from masrel.agreement.fleiss import fleiss_kappa
 from masrel.agreement.gwet import gwet_ac
-from masrel.agreement.icc import IccForm, icc, robinson_a
+from masrel.agreement.icc import _NAMES as ICC_NAMES
+from masrel.agreement.icc import icc, robinson_a
 from masrel.agreement.kendall import kendall_w
 from masrel.agreement.krippendorff import _KERNEL as KRIPPENDORFF_KERNEL
 from masrel.agreement.krippendorff import krippendorff_alpha
@@ -94,6 +95,8 @@ class Coefficient:
         Whether it comes with an interval, and takes its level.
     code : callable
         Ratings and categories to the codes its kernel takes.
+    needs_order : bool
+        Whether grades without an order have no such coefficient, whatever the weights.
     """
 
     name: str
@@ -109,6 +112,11 @@ class Coefficient:
     weighted: bool = True
     has_interval: bool = False
     code: Callable[..., CodedRatings] = code_ratings
+
+    @property
+    def needs_order(self) -> bool:
+        """Whether grades without an order have none, whatever the weights."""
+        return "categories in any order" not in self.properties
 
     def __call__(
         self,
@@ -245,11 +253,7 @@ _ALL = (
             weighted=False,
             has_interval=True,
         )
-        for name, form in zip(
-            ("icc_1", "icc_1k", "icc_c1", "icc_ck", "icc_a1", "icc_ak"),
-            get_args(IccForm),
-            strict=True,
-        )
+        for form, name in ICC_NAMES.items()
     ),
 )
 
@@ -273,7 +277,8 @@ def coefficient(name: str) -> Coefficient:
     Raises
     ------
     ParameterError
-        If there is no such coefficient; the message lists those that exist.
+        If there is no such coefficient; the message lists those that exist, and the
+        one that was probably meant.
 
     Examples
     --------
@@ -281,7 +286,21 @@ def coefficient(name: str) -> Coefficient:
     "Fleiss' κ"
     """
     if name not in COEFFICIENTS:
+        meant = _meant_by(name)
         raise ParameterError(
             f"coefficient: needs one of {', '.join(COEFFICIENTS)}, got {name!r}"
+            + ("" if meant is None else f"; did you mean {meant}?")
         )
     return COEFFICIENTS[name]
+
+
+def _meant_by(name: str) -> str | None:
+    """Return the one name that an unknown name is a word or a misspelling of."""
+    import difflib  # loaded only for an error
+
+    typed = name.strip().lower().replace(" ", "_").replace("-", "_").replace("'", "")
+    parts = [known for known in COEFFICIENTS if typed in known.split("_")]
+    if parts:
+        return parts[0] if len(parts) == 1 else None
+    near = difflib.get_close_matches(typed, COEFFICIENTS, n=1, cutoff=0.75)
+    return near[0] if near else None

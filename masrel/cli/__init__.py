@@ -6,6 +6,7 @@ go to stderr as sentences; a traceback is a bug.
 
 import importlib
 import sys
+from typing import NoReturn
 
 import click
 
@@ -56,8 +57,10 @@ class _Verbs(click.Group):
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's signature
         return list(VERBS)
 
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002 - click's signature
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in VERBS:
+            if not ctx.resilient_parsing:  # as it is where a shell completes names
+                _refuse_verb(ctx, cmd_name)
             return None
         module = importlib.import_module(f"masrel.cli.{cmd_name}")
         command: click.Command = getattr(module, cmd_name)
@@ -72,6 +75,14 @@ class _Verbs(click.Group):
         for title, verbs in GROUPS.items():
             with formatter.section(title):
                 formatter.write_dl(list(verbs.items()))
+
+
+def _refuse_verb(ctx: click.Context, name: str) -> NoReturn:
+    from difflib import get_close_matches  # loaded only for an error
+
+    near = get_close_matches(name, VERBS, n=1)
+    hint = f" Did you mean '{near[0]}'?" if near else ""
+    ctx.fail(f"No such command '{name}'.{hint}")
 
 
 @click.group(cls=_Verbs, context_settings={"help_option_names": ["-h", "--help"]})

@@ -108,6 +108,7 @@ class OutputOptions:
     # csv, latex: in which form the table is printed; as text when neither
     csv: bool = False
     latex: bool = False
+    sentence: bool = False  # whether sentences are printed instead of a table
     quiet: bool = False  # whether there is no progress bar
 
     def __post_init__(self) -> None:
@@ -115,6 +116,7 @@ class OutputOptions:
             "--json -": self.json_file == STDOUT,
             "--csv": self.csv,
             "--latex": self.latex,
+            "--sentence": self.sentence,
         }
         printed = [option for option, is_printed in forms.items() if is_printed]
         if len(printed) > 1:
@@ -142,6 +144,7 @@ def output_options(
     figure: str | None = None,
     csv: str | None = None,
     latex: str | None = None,
+    sentence: str | None = None,
     quiet: str | None = None,
 ) -> Decorator:
     """Return the options with these helps, as one argument `output` of a command."""
@@ -152,6 +155,7 @@ def output_options(
         (figure, click.option("--figure", type=path, help=figure)),
         (csv, click.option("--csv", is_flag=True, help=csv)),
         (latex, click.option("--latex", is_flag=True, help=latex)),
+        (sentence, click.option("--sentence", is_flag=True, help=sentence)),
         (quiet, click.option("--quiet", is_flag=True, help=quiet)),
     ]
     offered = [option for text, option in options if text is not None]
@@ -175,10 +179,11 @@ def write_output(
     figure: "Callable[[], Content] | None" = None,
     stamp: str = "",
     notes: tuple[str, ...] = (),
+    width: int | None = None,
 ) -> None:
     """Write and print a result in the forms that were chosen, and make no other."""
-    # stamp: what the figure says of its data; notes: those of a table, which JSON has
-    # no place for
+    # stamp: what the figure says of its data; notes: those of a table, which are on
+    # stderr where JSON is printed; width: to which those of a text are wrapped
     if output.json_file == STDOUT:
         echo_notes(notes)
     else:  # first: a disk that is full then loses no result
@@ -188,10 +193,15 @@ def write_output(
         else:
             from masrel.report._tables import as_csv, as_latex, as_text
 
-            render = as_csv if output.csv else as_latex if output.latex else as_text
-            click.echo(render(table).rstrip("\n"))
             if output.csv:
-                echo_notes(table.notes)
+                shown = as_csv(table)
+            elif output.latex:
+                shown = as_latex(table)
+            else:
+                shown = as_text(table, width=width)
+            click.echo(shown.rstrip("\n"))
+            if output.csv:
+                echo_notes((*table.read, *table.notes))
     if output.json_file is not None:
         write_json(document(), output.json_file)
     if figure is not None and output.figure is not None:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     "--items",
     type=click.Choice(["fixed", "random"]),
     required=True,
-    help="Whether kappa speaks of these items, or of new ones like them.",
+    help="Whether kappa is for these items, or for new ones like them.",
 )
 @grouped("reading", ReadingOptions, *reading_options)
 @click.option("--only", metavar="SESSION", help="Which session, of several.")

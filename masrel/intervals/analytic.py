@@ -103,7 +103,7 @@ def analytic(
     )
     if target != "items":
         raise ParameterError(
-            'target: the delta method speaks of other items only, so "items"; for '
+            'target: the delta method generalises to other items only, so "items"; for '
             f'other raters use the jackknife; got "{target}"'
         )
     with warnings.catch_warnings():

@@ -54,7 +54,7 @@ def difference(
     -------
     Estimate
         First less second, with its jackknife standard error over items and its
-        interval by Student's t, which speaks of other items: n - 1 degrees for the
+        interval by Student's t, which generalises to other items: n - 1 degrees for the
         same items, Satterthwaite's for independent ones. `observed` and `chance` are
         differences, too.
 

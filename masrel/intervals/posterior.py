@@ -162,7 +162,7 @@ def _check_options(problem: IntervalProblem, model: _Model, method: _Method) -> 
             raise ParameterError(f"{name}: needs one of {known}, got {value!r}")
     if problem.target != "items":
         raise ParameterError(
-            "target: a posterior speaks of other items, so "
+            "target: a posterior generalises to other items, so "
             f'"items"; for other raters use the jackknife; got "{problem.target}"'
         )
 

@@ -52,7 +52,7 @@ _COLUMNS = (
     Column(key="low", heading="Low", digits=3, where="csv"),
     Column(key="high", heading="High", digits=3, where="csv"),
     Column(key="interval", heading="Interval", where="csv"),
-    Column(key="target", heading="Speaks of", where="csv"),
+    Column(key="target", heading="Generalises to", where="csv"),
     Column(key="strength", heading="Strength", align="left"),
     Column(key="observed", heading="p_o", digits=3),
     Column(key="chance", heading="p_e", digits=3),
@@ -148,7 +148,7 @@ def estimate_table(
 ) -> Table:
     """Return a table of estimates."""
     # On a page an interval is one column, marked with a letter; a note below says what
-    # each letter means: level, method, and of whom the interval speaks.
+    # each letter means: level, method, and what the interval generalises to.
     marks: dict[str, str] = {}
     cells, remarks = [], []
     for row in rows:
@@ -156,7 +156,9 @@ def estimate_table(
         # what a reader must know before relying on it
         texts = [row.reason, None if row.estimate is None else row.estimate.reason]
         if interval is not None:
-            note = f"{interval_name(interval)}; speaks of {TARGETS[interval.target]}"
+            note = (
+                f"{interval_name(interval)}; generalises to {TARGETS[interval.target]}"
+            )
             nth, again = len(marks) % len(_LETTERS), len(marks) // len(_LETTERS)
             mark = marks.setdefault(note, _LETTERS[nth] * (again + 1))  # a, ..., z, aa
             texts += [*interval.notes, interval.reason]
@@ -221,7 +223,7 @@ def _forest(
 ) -> Drawing:
     lines = []
     for row in rows:
-        # how much it rests on, and what its interval speaks of
+        # how much it rests on, and what its interval is for
         estimate, interval = row.estimate, row.interval
         detail = f"{row.models} models, {row.sessions}"
         if estimate is not None:

@@ -1,19 +1,23 @@
-"""The table and the figure of the agreement in a file of ratings."""
+"""The agreement in a file of ratings: its table, its figure and its record."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from masrel.agreement import COEFFICIENTS, BandScale, benchmark
-from masrel.estimates import Estimate, Interval, Target
+import masrel
+from masrel.agreement import COEFFICIENTS, BandScale, benchmark, strength
+from masrel.estimates import Estimate, Interval, Target, as_document
 from masrel.report._estimate_words import (
     aside,
     forest_row,
+    is_bound,
     origin,
     promise,
+    sentence,
 )
 from masrel.report._figure_data import Forest, ForestRow
-from masrel.report._tables import Column, Table, Value, percent
+from masrel.report._tables import SIMULATED, Column, Table, Value, percent
+from masrel.scales import Scale
 
 _POPULATIONS = {"items": "items", "raters": "raters", "both": "items and raters"}
 
@@ -24,17 +28,41 @@ _SOURCES = {
     "cicchetti": "Cicchetti and Sparrow (1981)",
 }
 
+_COLUMNS = (
+    Column(key="coefficient", heading="Coefficient", where="csv"),
+    Column(key="title", heading="Coefficient", align="left"),
+    Column(key="weights", heading="Weights", where="csv"),
+    Column(key="value", heading="Value", digits=3),
+    Column(key="standard_error", heading="SE", digits=3),
+    Column(key="low", heading="Low", digits=3),
+    Column(key="high", heading="High", digits=3),
+    Column(key="level", heading="Level", where="csv"),
+    Column(key="method", heading="Method", where="csv"),
+    Column(key="target", heading="Target", where="csv"),
+    Column(key="n_items", heading="Items"),
+    Column(key="n_raters", heading="Raters"),
+)
+
+_CHOSEN = "chosen for other "
+"""Start of the note that says why an interval was chosen."""
+
+_PRIORS = (", so the prior weighs: ", " rests on the prior, too: ")
+"""Where a note goes on with the interval under another prior."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AgreementRow:
     """One estimate, and what to say of it that is not in it."""
 
-    # session, title: of what, and which coefficient
-    session: str
+    # group, title: of what (such as a session), and which coefficient
+    group: str
     title: str
     estimate: Estimate
     # what it lacks of what was requested, and what was assumed
     notes: tuple[str, ...] = ()
+    # what the true value reaches with 95 % by its interval; None if there is none, or
+    # no word is to be named
+    lower_bound: float | None = None
 
 
 def agreement_table(
@@ -43,119 +71,265 @@ def agreement_table(
     caption: str,
     by: str | None = None,
     bands: BandScale | None = None,
+    read: tuple[str, ...] = (),
     notes: tuple[str, ...] = (),
+    explain: bool = False,
+    in_sentences: bool = False,
     data: str = "foreign",
 ) -> Table:
-    """Return the table of estimates, with every interval explained in the notes."""
-    # by: heading of the column that names the sessions, if there is one;
-    # bands: whose words for values; notes: what to say of the ratings
-    columns = [
-        Column(key="coefficient", heading="Coefficient", align="left"),
-        Column(key="value", heading="Value", digits=3),
-        Column(key="standard_error", heading="SE", digits=3),
-        Column(key="low", heading="Low", digits=3),
-        Column(key="high", heading="High", digits=3),
-        Column(key="n_items", heading="Items"),
-        Column(key="n_raters", heading="Raters"),
-    ]
+    """Return the table of estimates, with what intervals are in the notes."""
+    # by: heading of the column that names the groups, if there is one;
+    # bands: whose words for values; read, notes: what to say of the ratings;
+    # explain: whether notes say what an interval promises and why it was chosen;
+    # in_sentences: whether the notes are for `agreement_sentences`
+    columns = list(_COLUMNS)
     cells = [_cells(row) for row in rows]
-    if by is not None:
-        columns.insert(0, Column(key=by, heading=by.title(), align="left"))
-        cells = [(row.session, *rest) for row, rest in zip(rows, cells, strict=True)]
     if bands is not None:
         columns.append(Column(key="words", heading="At least", align="left"))
-        words = [_band(row.estimate, bands) for row in rows]
+        words = [_word(row, bands) for row in rows]
         cells = [(*rest, word) for rest, word in zip(cells, words, strict=True)]
+    if by is not None:
+        key = group_key(by)
+        columns.insert(
+            0, Column(key=key, heading=by[:1].upper() + by[1:], align="left")
+        )
+        cells = [(row.group, *rest) for row, rest in zip(rows, cells, strict=True)]
     return Table(
         name="agreement",
         caption=caption,
         columns=tuple(columns),
         rows=tuple(cells),
-        notes=(*notes, *_notes(rows, by, bands)),
+        read=read,
+        notes=(
+            *notes,
+            *_errors_note(rows, in_sentences),
+            *_notes(rows, explain),
+            *_words_note(rows, bands),
+        ),
         data=data,
     )
 
 
 def _cells(row: AgreementRow) -> tuple[Value, ...]:
     estimate, interval = row.estimate, row.estimate.interval
-    # observed agreement is nan where the statistic has none, and so no error
-    has_error = not math.isnan(estimate.observed) or estimate.reason is not None
+    ends: tuple[Value, ...] = (None,) * 5
+    if interval is not None:
+        method = interval.method
+        ends = (interval.low, interval.high, interval.level, method, interval.target)
     return (
+        estimate.coefficient,
         row.title,
+        estimate.weights,
         estimate.value,
-        estimate.standard_error if has_error else None,
-        None if interval is None else interval.low,
-        None if interval is None else interval.high,
+        estimate.standard_error if _has_error(estimate) else None,
+        *ends,
         estimate.n_items,
         estimate.n_raters,
     )
 
 
-def _band(estimate: Estimate, bands: BandScale) -> str | None:
-    word = benchmark(estimate, scale=bands)
-    entry = COEFFICIENTS.get(estimate.coefficient)
-    if entry is None or not entry.chance_corrected or math.isnan(estimate.value):
+def _has_error(estimate: Estimate) -> bool:
+    # observed agreement is nan where the statistic has none, and so no error
+    return not math.isnan(estimate.observed) or estimate.reason is not None
+
+
+def _word(row: AgreementRow, bands: BandScale) -> str | None:
+    """Return the best word that the true value reaches with 95 % probability."""
+    estimate = row.estimate
+    entry = COEFFICIENTS[estimate.coefficient]
+    if not entry.chance_corrected or math.isnan(estimate.value):
         return None
-    return word
+    if row.lower_bound is not None:
+        return strength(row.lower_bound, scale=bands)
+    return benchmark(estimate, scale=bands)
 
 
-def _notes(
-    rows: Sequence[AgreementRow], by: str | None, bands: BandScale | None
-) -> tuple[str, ...]:
+def _errors_note(rows: Sequence[AgreementRow], in_sentences: bool) -> tuple[str, ...]:
+    # a sentence has the standard error only where there is no interval
+    shown = [
+        row
+        for row in rows
+        if not math.isnan(row.estimate.standard_error)
+        and not (in_sentences and row.estimate.interval is not None)
+    ]
+    return ("SE: delta method, items as the sample.",) if shown else ()
+
+
+def _notes(rows: Sequence[AgreementRow], explain: bool) -> tuple[str, ...]:
     # How each interval was made, what to know of it, and why a value is undefined.
-    # A note names its rows, unless it holds for every interval.
+    # A note names its rows, unless it holds for all that it could be of.
     rows_of: dict[str, list[AgreementRow]] = {}
     for row in rows:
-        estimate, interval = row.estimate, row.estimate.interval
-        texts = [] if estimate.reason is None else [f"undefined: {estimate.reason}"]
-        texts += row.notes
-        if interval is not None:
-            texts += [_interval_note(interval), *interval.notes]
-            if interval.reason not in (None, estimate.reason):
-                texts.append(f"no interval: {interval.reason}")
-        for text in texts:
+        for text in _texts(row, explain):
             rows_of.setdefault(text, []).append(row)
     with_interval = [row for row in rows if row.estimate.interval is not None]
-    notes = ["SE: delta method, items as the sample."]
+    notes = []
     for text, subset in rows_of.items():
-        every = len(subset) > 1 and subset == with_interval
-        names = "" if every else f"{'; '.join(_names(subset, rows, by))}: "
+        is_of_all = subset == with_interval or len(subset) == len(rows)
+        names = "" if is_of_all else f"{'; '.join(_names(subset, rows))}: "
         notes.append(f"{names}{text}.")
-    if bands is not None:
-        notes.append(
-            "At least: the best word of "
-            f"{_SOURCES[bands]} that the true value earns with a probability of "
-            "95 %, normal law around the estimate; the words are conventions."
-        )
     return tuple(notes)
 
 
-def _interval_note(interval: Interval) -> str:
-    name = f"{percent(interval.level)} % {interval.kind} interval, {interval.method}"
-    population = f"it speaks of other {_POPULATIONS[interval.target]}"
-    if math.isnan(interval.low):
-        return f"{name}; {population}"
+def _texts(row: AgreementRow, explain: bool) -> list[str]:
+    # what there is to say of one row, without the end of the sentence
+    estimate, interval = row.estimate, row.estimate.interval
+    texts = [] if estimate.reason is None else [f"undefined: {estimate.reason}"]
+    texts += row.notes
+    if interval is None:
+        return texts
+    if interval.reason is None:
+        texts.append(_interval_note(interval, explain))
+    elif interval.reason != estimate.reason:
+        texts.append(f"no interval ({interval.method}): {interval.reason}")
+    brief = filter(None, map(_brief, interval.notes))
+    return [*texts, *(interval.notes if explain else brief)]
+
+
+def _brief(note: str) -> str:
+    """Return a note of an interval without what only `--explain` shows."""
+    if note.startswith(_CHOSEN):
+        return ""
+    for words in _PRIORS:
+        before, words_there, _ = note.partition(words)
+        if words_there:
+            return f"{before}{words.removesuffix(': ')} (--explain says by how much)"
+    return note
+
+
+def _interval_note(interval: Interval, explain: bool) -> str:
+    kind = "CI"
+    if interval.kind == "credible":
+        kind = "credible bound" if is_bound(interval) else "credible interval"
+    name = f"{percent(interval.level)} % {kind}, {interval.method}"
+    to = f"generalises to other {_POPULATIONS[interval.target]} like these"
+    if not explain:
+        return f"{name}: {to}"
     promised = promise(interval, "item")
-    return f"{name}{origin(interval, 'item')}; {population}: {promised}"
+    return f"{name}{origin(interval, 'item')}: {to}: {promised}"
 
 
-def _names(
-    subset: Sequence[AgreementRow], rows: Sequence[AgreementRow], by: str | None
-) -> list[str]:
-    # the coefficients, with the sessions where a note does not hold for all of them
+def _words_note(
+    rows: Sequence[AgreementRow], bands: BandScale | None
+) -> tuple[str, ...]:
+    if bands is None:
+        return ()
+    named = [row for row in rows if _word(row, bands) is not None]
+    laws = []
+    if any(row.lower_bound is not None for row in named):
+        laws.append("its interval (one-sided)")
+    if any(row.lower_bound is None for row in named):
+        none = " where there is none" if laws else ""
+        laws.append(f"a normal law around the estimate{none}")
+    by = f", by {', or by '.join(laws)}" if laws else ""
+    return (
+        f"At least: the best word of {_SOURCES[bands]} that the true value reaches "
+        f"with 95 % probability{by}; the words are conventions.",
+    )
+
+
+def _names(subset: Sequence[AgreementRow], rows: Sequence[AgreementRow]) -> list[str]:
+    # the coefficients, with the groups where a note does not hold for all of them
     names = []
     for title in dict.fromkeys(row.title for row in subset):
-        every = [row.session for row in rows if row.title == title]
-        sessions = [row.session for row in subset if row.title == title]
-        in_part = by is not None and sessions != every
-        names.append(f"{title} ({', '.join(sessions)})" if in_part else title)
+        every = [row.group for row in rows if row.title == title]
+        groups = [row.group for row in subset if row.title == title]
+        names.append(title if groups == every else f"{title} ({', '.join(groups)})")
     return names
+
+
+def agreement_sentences(
+    rows: Sequence[AgreementRow],
+    *,
+    by: str | None = None,
+    bands: BandScale | None = None,
+    data: str = "foreign",
+) -> str:
+    """Return a sentence for every estimate, one a line."""
+    stamp = f"{SIMULATED}. " if data == "simulated" else ""
+    heads = [
+        "" if by is None else f"{by[:1].upper()}{by[1:]} {row.group}: " for row in rows
+    ]
+    return "\n".join(
+        f"{stamp}{head}{sentence(row.estimate, word=_reached(row, bands))}"
+        for head, row in zip(heads, rows, strict=True)
+    )
+
+
+def _reached(row: AgreementRow, bands: BandScale | None) -> str:
+    word = None if bands is None else _word(row, bands)
+    if bands is None or word in (None, "undefined"):
+        return ""
+    return f"at least {word} after {_SOURCES[bands]}"
+
+
+def agreement_record(
+    rows: Sequence[AgreementRow],
+    *,
+    file: str,
+    sha256: str | None,
+    options: Mapping[str, object],
+    scale: Scale,
+    read: Mapping[str, object],
+    notes: tuple[str, ...] = (),
+    by: str | None = None,
+    bands: BandScale | None = None,
+) -> dict[str, object]:
+    """Return all that made the estimates, and them, as plain values for JSON."""
+    # read: of what was read, plain already; the others as of `agreement_table`
+    estimates = []
+    for row in rows:
+        group = {} if by is None else {group_key(by): row.group}
+        word = {} if bands is None else {"word": _word(row, bands)}
+        estimate = as_document(row.estimate)
+        why = [*row.notes, *_why_null(row.estimate)]
+        estimates.append({**group, **estimate, **word, "notes": why})
+    return {
+        "masrel": masrel.__version__,
+        "file": file,
+        "sha256": sha256,
+        "options": dict(options),
+        "scale": {
+            "name": scale.name,
+            "grades": list(scale.grades),
+            "values": list(scale.values),
+        },
+        "read": dict(read),
+        "notes": list(notes),
+        "estimates": estimates,
+    }
+
+
+def group_key(by: str) -> str:
+    """Return what groups are called in a CSV and a record, unlike all else there."""
+    fields = set(Estimate.__dataclass_fields__) | set(Interval.__dataclass_fields__)
+    return f"group_{by}" if by in fields | {"title", "word", "words", "data"} else by
+
+
+def _why_null(estimate: Estimate) -> list[str]:
+    # why a number of a record is null, where neither `reason` says it
+    why, interval = [], estimate.interval
+    if math.isnan(estimate.standard_error) and estimate.reason is None:
+        title = COEFFICIENTS[estimate.coefficient].title
+        why.append(
+            "standard_error: null, one item has none"
+            if _has_error(estimate)
+            else f"standard_error, observed, chance: null, {title} has none"
+        )
+    if interval is not None:
+        ends = (("low", interval.low), ("high", interval.high))
+        why += [
+            f"interval.{name}: null, there is no bound"
+            for name, end in ends
+            if math.isinf(end)
+        ]
+    return why
 
 
 def agreement_forest(rows: Sequence[AgreementRow], target: Target) -> Forest:
     """Return what a figure shows: the estimates and their intervals."""
     population = _POPULATIONS[target]
-    several = len({row.session for row in rows}) > 1
+    several = len({row.group for row in rows}) > 1
     return Forest(
         rows=tuple(_forest_row(row, target, has_group=several) for row in rows),
         axis_label=f"agreement (1 is perfect); intervals for other {population}",
@@ -174,5 +348,5 @@ def _forest_row(row: AgreementRow, target: Target, *, has_group: bool) -> Forest
         row.title,
         row.estimate,
         detail=", ".join(filter(None, details)),
-        group=row.session if has_group else "",
+        group=row.group if has_group else "",
     )

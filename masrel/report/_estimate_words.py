@@ -6,7 +6,7 @@ from typing import Literal
 from masrel.agreement import COEFFICIENTS
 from masrel.estimates import Estimate, Interval
 from masrel.report._figure_data import ForestRow
-from masrel.report._tables import UNDEFINED, interval_text, number, percent
+from masrel.report._tables import UNDEFINED, counted, interval_text, number, percent
 
 Noun = Literal["model", "item"]
 """What is rated: a haptic model in a study, any item elsewhere."""
@@ -16,7 +16,7 @@ TARGETS = {
     "items": "other models",
     "both": "other raters and models",
 }
-"""Target of an interval to what it speaks of."""
+"""Target of an interval to what it generalises to."""
 
 _POPULATIONS = {
     "raters": "the same {}s were put to other raters like these",
@@ -59,8 +59,7 @@ def forest_row(
         if interval is not None and not math.isfinite(interval.high - interval.low):
             interval = None
         # 0 is what chance gives of an ICC and a κ; not of a share, nor of an order
-        entry = COEFFICIENTS.get(estimate.coefficient)  # None: a form of the ICC
-        has_zero = entry is None or entry.chance_corrected
+        has_zero = COEFFICIENTS[estimate.coefficient].chance_corrected
     return ForestRow(
         label=label,
         detail=detail,
@@ -99,8 +98,8 @@ def promise(interval: Interval, noun: Noun) -> str:
         premises = "these ratings and the prior"
     elif interval.method.startswith("Dirichlet-multinomial"):  # it knows of no rater
         premises = "these ratings, the prior and raters who differ by chance alone"
-    is_bound = interval.method.endswith(_ONE_SIDED)
-    where = "above the lower end" if is_bound else "inside"
+    is_one_sided = interval.method.endswith(_ONE_SIDED)
+    where = "above the lower end" if is_one_sided else "inside"
     return (
         f"given {premises}, the value that would be found if {population}, "
         f"without end, lies {where} with probability {level}"
@@ -122,6 +121,11 @@ def origin(interval: Interval, noun: Noun) -> str:
     return f" (from leaving out one {one} at a time)"
 
 
+def is_bound(interval: Interval) -> bool:
+    """Return whether only the lower end is a bound, at the whole level."""
+    return interval.method.endswith(_ONE_SIDED)
+
+
 def aside(interval: Interval) -> str:
     """Return in few words how the ends differ from quantiles of the distribution."""
     if interval.method.endswith(_ONE_SIDED):
@@ -129,3 +133,42 @@ def aside(interval: Interval) -> str:
     if interval.method.endswith(_WIDENED):
         return "posterior, wider by the spread of raters"
     return ""
+
+
+def sentence(estimate: Estimate, *, word: str = "") -> str:
+    """Return an estimate of items as a sentence for a paper, in the style of APA."""
+    # word: the one that it earns, and whose it is
+    entry = COEFFICIENTS[estimate.coefficient]
+    name = entry.title
+    if entry.weighted and estimate.weights != "identity":
+        name = f"{name} ({estimate.weights} weights)"
+    sizes = (counted(estimate.n_items, "item"), counted(estimate.n_raters, "rater"))
+    if estimate.reason is not None:
+        return f"{name} is undefined ({estimate.reason}), {', '.join(sizes)}."
+    parts = (f"{name} = {_apa(estimate.value)}", *_uncertainty(estimate), word, *sizes)
+    return f"{', '.join(filter(None, parts))}."
+
+
+def _uncertainty(estimate: Estimate) -> list[str]:
+    # the interval, or why there is none and the standard error in its place
+    interval, error = estimate.interval, estimate.standard_error
+    errors = [] if math.isnan(error) else [f"SE = {_apa(error)}"]
+    if interval is None:
+        return errors
+    name = f"{percent(interval.level)} % {_SHORT_KINDS[interval.kind]}"
+    if interval.reason is not None:
+        return [*errors, f"no {name} ({interval.reason})"]
+    method = interval.method.split(",")[0]
+    if is_bound(interval):
+        name = f"{percent(interval.level)} % {interval.kind} lower bound"
+        return [f"{name} {_apa(interval.low)} ({method})"]
+    return [f"{name} [{_apa(interval.low)}, {_apa(interval.high)}] ({method})"]
+
+
+_SHORT_KINDS = {"confidence": "CI", "credible": "credible interval"}
+
+
+def _apa(value: float) -> str:
+    # two decimals, no 0 before the point: none of the coefficients can exceed 1
+    text = number(value, 2)
+    return text.removeprefix("0") if value >= 0.0 else text.replace("−0.", "−.")

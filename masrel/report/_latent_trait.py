@@ -99,7 +99,7 @@ def _notes(result: "LatentTrait") -> Iterator[str]:
 
 
 def _meanings(result: "LatentTrait") -> Iterator[str]:
-    # what the numbers speak of, and their unit
+    # what the numbers are about, and their unit
     interval = result.kappa.interval
     if interval is not None:
         whom = "these items" if interval.target == "raters" else "new items like these"

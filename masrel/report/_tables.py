@@ -8,6 +8,7 @@ CSV keeps every digit.
 import csv
 import io
 import math
+import textwrap
 import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -55,6 +56,7 @@ class Table:
     # values as computed: text, numbers, ``nan`` for undefined, None for absent
     rows: tuple[tuple[Value, ...], ...]
     notes: tuple[str, ...] = ()  # what the reader must know, below the table
+    read: tuple[str, ...] = ()  # what was read for it, above the table
     # where the data come from: "simulated", "published", "recorded" or "foreign"
     data: str
 
@@ -149,12 +151,30 @@ def as_csv(table: Table) -> str:
     return out.getvalue()
 
 
-def as_text(table: Table) -> str:
-    """Return a table for a screen of fixed-width letters."""
+def as_text(table: Table, *, width: int | None = None) -> str:
+    """Return a table for a screen of fixed-width letters, its notes wrapped."""
     columns, body = page_cells(table)
     head = [column.heading for column in columns]
     lines = aligned([head, *body], [column.align for column in columns], rule=True)
-    return "\n".join([table.labelled_caption, *lines, *table.notes])
+    notes = wrapped(table.notes, width)
+    return "\n".join([table.labelled_caption, *table.read, *lines, *notes])
+
+
+def wrapped(notes: Sequence[str], width: int | None) -> list[str]:
+    """Return notes as lines of a width, those that go on indented; None is no width."""
+    if width is None:
+        return list(notes)
+    lines = [
+        textwrap.wrap(
+            note,
+            width,
+            subsequent_indent="  ",
+            break_long_words=False,
+            break_on_hyphens=False,
+        )
+        for note in notes
+    ]
+    return [line for note in lines for line in note]
 
 
 def aligned(
@@ -182,13 +202,19 @@ def aligned(
 
 
 def as_latex(table: Table) -> str:
-    r"""Return a table as LaTeX that needs the package `booktabs` and no other."""
+    r"""Return a table as LaTeX that needs the package `booktabs` and no other.
+
+    What was read stands above it in comments.
+    """
     columns, body = page_cells(table)
     letters = "".join({"left": "l", "center": "c"}.get(c.align, "r") for c in columns)
     lines = [
+        r"% needs \usepackage{booktabs}",
+        *(f"% {line}" for line in "\n".join(table.read).splitlines()),
         r"\begin{table}",
         r"\centering",
         rf"\caption{{{_latex_text(table.labelled_caption)}}}",
+        rf"\label{{tab:{table.name}}}",
         rf"\begin{{tabular}}{{{letters}}}",
         r"\toprule",
         _latex_line([column.heading for column in columns]),
@@ -203,6 +229,8 @@ def as_latex(table: Table) -> str:
     return "\n".join([*lines, r"\end{table}"]) + "\n"
 
 
+_APART = "\N{ZERO WIDTH SPACE}"
+
 _LATEX_ESCAPES = str.maketrans(
     {
         "\\": r"\textbackslash{}",
@@ -215,11 +243,17 @@ _LATEX_ESCAPES = str.maketrans(
         "}": r"\}",
         "~": r"\textasciitilde{}",
         "^": r"\textasciicircum{}",
+        _APART: "{}",
         "−": "$-$",
         "–": "--",
+        "∞": r"$\infty$",
+        "≥": r"$\geq$",
+        "≤": r"$\leq$",
+        "×": r"$\times$",
+        "α": r"$\alpha$",
         "κ": r"$\kappa$",
         "π": r"$\pi$",
-        "α": r"$\alpha$",
+        "ρ": r"$\rho$",
     }
 )
 
@@ -229,4 +263,5 @@ def _latex_line(cells: list[str]) -> str:
 
 
 def _latex_text(text: str) -> str:
-    return text.translate(_LATEX_ESCAPES)
+    # of an option's two hyphens TeX would make a dash
+    return text.replace("--", f"-{_APART}-").translate(_LATEX_ESCAPES)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from scipy import stats
 
-from masrel.agreement import IccForm, icc, icc_f_test
+from masrel.agreement import COEFFICIENTS, IccForm, icc, icc_f_test
 from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
 
 FORMS = get_args(IccForm)
@@ -64,7 +64,8 @@ def test_shrout_and_fleiss_worked_in_whole_numbers() -> None:
         found = icc(TABLE_2, form=form)  # type: ignore[arg-type]
         assert found.value == pytest.approx(value, rel=1e-14)
         assert (found.n_items, found.n_raters) == (6, 4)
-        assert found.weights == form
+        assert found.weights == "identity"
+        assert COEFFICIENTS[found.coefficient].title == form
 
 
 def test_intervals_from_the_quantiles_of_f() -> None:

@@ -88,7 +88,8 @@ def test_check_finds_a_coefficient_there_is_none_of(study: Path) -> None:
     (problem, _) = errors.splitlines()
     assert problem.startswith(f"{protocol}: analysis.estimates[0].coefficient: need")
     assert "fleiss_kappa" in problem
-    assert problem.endswith("got 'flies_kappa' (id \"kappa\")")
+    assert "got 'flies_kappa'; did you mean fleiss_kappa?" in problem
+    assert problem.endswith('(id "kappa")')
 
 
 def test_check_finds_stale_schedules_and_wrong_ratings_at_once(study: Path) -> None:

@@ -1,8 +1,6 @@
 """What docs/driver.md says is what the driver does."""
 
 import re
-import subprocess
-import sys
 from math import degrees
 from pathlib import Path
 
@@ -23,18 +21,6 @@ def row(first: str) -> list[str]:
     # Cells of the table row that begins with a word
     line = next(line for line in PAGE.splitlines() if line.startswith(f"| {first} |"))
     return [cell.strip() for cell in line.strip("|").split("|")]
-
-
-def test_the_examples_print_what_the_page_says() -> None:
-    # One after the other: the second goes on with the first
-    code = "\n".join(part.split("```")[0] for part in PAGE.split("```python\n")[1:])
-    printed = "".join(part.split("```")[0] for part in PAGE.split("```text\n")[1:])
-    done = subprocess.run(
-        [sys.executable, "-X", "utf8", "-c", code],
-        capture_output=True,
-        check=True,
-    )
-    assert done.stdout.decode("utf-8") == printed
 
 
 def test_the_devices_are_those_that_the_page_names() -> None:

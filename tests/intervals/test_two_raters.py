@@ -386,7 +386,7 @@ def test_of_two_raters_others_than_fleiss_kappa_have_the_table_by_default() -> N
         ({"model": "auto", "coefficient": "gwet_ac", "raters": 3}, "got gwet_ac by 3"),
         ({"method": "emcee"}, "and no sampler"),
         ({"prior": "jeffreys"}, 'has one prior, .* got prior="jeffreys"'),
-        ({"target": "raters"}, "a posterior speaks of other items"),
+        ({"target": "raters"}, "a posterior generalises to other items"),
         ({"concentration": -1.0}, "concentration: needs a positive number, got -1.0"),
         ({"n_draws": 50}, "n_draws: needs at least 100, got 50"),
         ({"level": 2.0}, r"level: needs \(0, 1\), got 2"),

@@ -5,19 +5,21 @@ import subprocess
 import sys
 from pathlib import Path
 
+from docs.make.pages import read
 from masrel.run import SessionLog
 
 PAGE = Path(__file__).parents[2] / "docs" / "session_log.md"
 
 
 def verified(folder: Path) -> subprocess.CompletedProcess[str]:
-    code = PAGE.read_text(encoding="utf-8").split("```python\n")[1].split("```")[0]
+    blocks = read(PAGE.read_text(encoding="utf-8"))
+    (code,) = ["\n".join(block.lines) for block in blocks if block.language == "python"]
     command = [sys.executable, "-I", "-S", "-c", code]
     return subprocess.run(command, cwd=folder, capture_output=True, text=True)
 
 
 def test_the_documented_lines_find_a_change(tmp_path: Path) -> None:
-    path = tmp_path / "sessions" / "test_R1.jsonl"
+    path = tmp_path / "pilot" / "sessions" / "test_R1.jsonl"
     with SessionLog.open(path) as log:
         for code in "ABC":
             log.append("grade", {"code": code, "grade": "1+"})

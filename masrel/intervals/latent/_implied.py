@@ -21,7 +21,7 @@ from masrel.agreement._labels import Codes
 from masrel.intervals.latent._coordinates import Traits
 
 Items = Literal["fixed", "random"]
-"""Whether kappa speaks of these items, or of new ones of their population."""
+"""Whether kappa is for these items, or for new ones of their population."""
 
 _NOISES = np.linspace(-5.5, 5.5, 23)  # trapezoid sum over a rater's w
 _STEPS = 30  # points on either side of the centre of a tanh-sinh quadrature

@@ -140,7 +140,7 @@ def latent_trait(
     ratings : nested sequence, array_like or DataFrame, shape (n_items, n_raters)
         Labels or numbers; None and ``nan`` are missing.
     items : {"fixed", "random"}
-        Whether kappa speaks of new raters on these items, or of new raters on new
+        Whether kappa is for new raters on these items, or for new raters on new
         items of the same population.
     categories : sequence of str, int or float, optional
         The declared scale in order; numbers need none. Categories nobody used count.
@@ -296,7 +296,7 @@ class _Question:
 
     ratings: _Ratings  # the data
     items: Items  # which kappa
-    target: Target  # the population it speaks of
+    target: Target  # the population it generalises to
     level: float  # level of the intervals
     # n_steps, max_steps: steps of every chain at first, and where it gives up
     n_steps: int

@@ -98,7 +98,9 @@ def test_the_page_has_the_interval_in_one_column_explained_below() -> None:
     ]
     text = as_text(table)
     assert "[0.320, 0.933] ᵃ" in text
-    assert "ᵃ 95 % confidence, rater jackknife, t(7); speaks of other raters." in text
+    assert (
+        "ᵃ 95 % confidence, rater jackknife, t(7); generalises to other raters." in text
+    )
 
 
 def test_intervals_made_alike_share_a_mark() -> None:

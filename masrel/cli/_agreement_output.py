@@ -1,0 +1,140 @@
+"""How `masrel agree` shows what it estimated, and what it says of it."""
+
+import shlex
+import shutil
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from masrel.cli._agreement_rows import EstimateOptions
+from masrel.cli._options import OutputOptions, echo_notes, write_output
+
+if TYPE_CHECKING:
+    from masrel.report._agreement_table import AgreementRow
+    from masrel.scales import Scale
+
+
+_WIDTHS = (88, 100)
+"""Width of notes where there is no terminal, and the largest in one."""
+
+ARGUMENTS = "masrel.arguments"
+"""Where the context of a command keeps its arguments as they were typed."""
+
+
+class WithArguments(click.Command):
+    """A command that keeps its arguments as they were typed."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Keep the arguments before they are taken apart."""
+        ctx.meta[ARGUMENTS] = tuple(args)
+        return super().parse_args(ctx, args)
+
+
+def write_agreement(
+    rows: "Sequence[AgreementRow]",
+    output: OutputOptions,
+    *,
+    file: Path,
+    sha256: str | None,
+    scale: "Scale",
+    options: EstimateOptions,
+    by: str | None,
+    read: Mapping[str, object],
+    read_lines: tuple[str, ...] = (),
+    notes: tuple[str, ...] = (),
+    explain: bool = False,
+    simulated: bool = False,
+) -> None:
+    """Print and write estimates in the forms that were chosen."""
+    # read: what was read, as plain values for JSON, and read_lines for a screen
+    from masrel.report import _agreement_table as shown
+    from masrel.report._tables import SIMULATED
+
+    target, bands = options.target, options.words
+    data = "simulated" if simulated else "foreign"
+    table = shown.agreement_table(
+        rows,
+        caption=f"Agreement of the raters in {file}",
+        by=by,
+        bands=bands,
+        read=read_lines,
+        notes=notes,
+        explain=explain,
+        in_sentences=output.sentence,
+        data=data,
+    )
+    write_output(
+        output,
+        document=lambda: shown.agreement_record(
+            rows,
+            file=str(file),
+            sha256=sha256,
+            options={**options.record(), "by": by},
+            scale=scale,
+            read=read,
+            notes=notes,
+            by=by,
+            bands=bands,
+        ),
+        text=lambda: (
+            shown.agreement_sentences(rows, by=by, bands=bands, data=data)
+            if output.sentence
+            else table
+        ),
+        figure=None if target is None else lambda: shown.agreement_forest(rows, target),
+        stamp=SIMULATED if simulated else "",
+        notes=(*read_lines, *notes),
+        width=_screen_width(),
+    )
+    if output.sentence:
+        echo_notes((*read_lines, *table.notes))
+    offer = _interval_offer(rows, options)
+    if offer is not None:
+        click.echo(offer, err=True)
+
+
+def _screen_width() -> int:
+    """Return how wide notes are printed."""
+    elsewhere, most = _WIDTHS
+    if not sys.stdout.isatty():
+        return elsewhere
+    return min(shutil.get_terminal_size((elsewhere, 24)).columns, most)
+
+
+def order_notes(is_ordered: bool, options: EstimateOptions) -> tuple[str, ...]:
+    """Return what is left out of all coefficients because grades have no order."""
+    if is_ordered or not options.takes_all:
+        return ()
+    return (
+        "Left out: the six forms of ICC, Kendall's W and Robinson's A, which need "
+        "grades that are numbers or --categories with every grade in order.",
+    )
+
+
+def _interval_offer(
+    rows: "Sequence[AgreementRow]", options: EstimateOptions
+) -> str | None:
+    """Return the command that gives an interval, where there is none."""
+    from masrel.agreement import COEFFICIENTS
+
+    entries = [COEFFICIENTS[row.estimate.coefficient] for row in rows]
+    can = [
+        entry.kernel is not None and row.estimate.reason is None
+        for entry, row in zip(entries, rows, strict=True)
+    ]
+    if options.target is not None or not any(can):
+        return None
+    more, but = ["--target", "items"], ""
+    without = [e for e in entries if e.kernel is None and not e.has_interval]
+    if without and not options.takes_all:  # named, they would be refused
+        others = (entry.name for entry in entries if entry not in without)
+        more = ["--coefficients", ",".join(dict.fromkeys(others)), *more]
+        but = f" (without {', '.join(dict.fromkeys(e.title for e in without))})"
+    arguments = click.get_current_context().meta[ARGUMENTS]
+    # what follows a -- is no option
+    parts = [*more, *arguments] if "--" in arguments else [*arguments, *more]
+    command = shlex.join(["masrel", "agree", *parts])
+    return f"no interval; for other items like these{but}: {command}"

@@ -1,0 +1,289 @@
+"""What `masrel agree` estimates: which coefficients, with which interval and bound."""
+
+import math
+import warnings
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, Protocol
+
+import click
+
+from masrel.cli._options import grouped, split_commas
+from masrel.errors import MasrelError, MasrelWarning, ParameterError
+from masrel.estimates import Estimate, Target
+
+if TYPE_CHECKING:
+    from masrel.agreement import (
+        BandScale,
+        CodedRatings,
+        Coefficient,
+        CountedRatings,
+        WeightName,
+    )
+    from masrel.report._agreement_table import AgreementRow
+    from masrel.scales import Scale
+
+_USUAL = ["percent_agreement", "fleiss_kappa"]
+
+_SURE = 0.95
+"""Probability with which the true value reaches the word that is named."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EstimateOptions:
+    """What is estimated of every part of the ratings."""
+
+    coefficients: list[str] | None  # names, or "all" alone; None for `_USUAL`
+    weights: "WeightName"  # for coefficients that take any; checked where they are made
+    target: Target | None  # what a new study would draw anew; no interval when None
+    interval: Literal["auto", "analytic", "jackknife", "bootstrap", "posterior"]
+    level: float
+    # n_resamples, seed: for intervals that draw
+    n_resamples: int
+    seed: int
+    words: "BandScale | None"  # whose words for values
+
+    @property
+    def takes_all(self) -> bool:
+        """Whether all coefficients are estimated that fit."""
+        return self.coefficients == ["all"]
+
+    def record(self) -> dict[str, object]:
+        """Return every option that decides a number."""
+        return {
+            "coefficients": self.coefficients or _USUAL,
+            "weights": self.weights,
+            "target": self.target,
+            "interval": self.interval,
+            "level": self.level,
+            "resamples": self.n_resamples,
+            "seed": self.seed,
+            "words": self.words,
+        }
+
+
+def _list_register(
+    context: click.Context, _: click.Parameter, value: list[str] | None
+) -> list[str] | None:
+    # "list" needs no file: it is seen before the file is missed
+    if value == ["list"] and not context.resilient_parsing:
+        click.echo(_register())
+        context.exit()
+    return value
+
+
+estimate_options = grouped(
+    "options",
+    EstimateOptions,
+    click.option(
+        "--coefficients",
+        metavar="NAMES",
+        show_default=",".join(_USUAL),
+        type=split_commas,
+        is_eager=True,
+        callback=_list_register,
+        help="Names of coefficients, separated by commas; all that fit; or list, which "
+        "prints them and ends.",
+    ),
+    click.option(
+        "--weights",
+        default="identity",
+        show_default=True,
+        help="identity, linear, quadratic, ordinal, radical, ratio, circular or "
+        "bipolar.",
+    ),
+    click.option(
+        "--target",
+        type=click.Choice(["items", "raters", "both"]),
+        help="What a new study would draw anew; no interval without it.",
+    ),
+    click.option(
+        "--interval",
+        type=click.Choice(["auto", "analytic", "jackknife", "bootstrap", "posterior"]),
+        default="auto",
+        show_default=True,
+        help="Kind of interval; auto chooses by target and size.",
+    ),
+    click.option(
+        "--level", default=0.95, show_default=True, help="Level of intervals."
+    ),
+    click.option("--resamples", "n_resamples", default=10_000, show_default=True),
+    click.option("--seed", default=0, show_default=True, help="Seed of resampling."),
+    click.option(
+        "--words",
+        type=click.Choice(["landis_koch", "altman", "fleiss", "cicchetti"]),
+        help="Name the best band that the true value reaches with 95 % probability.",
+    ),
+)
+
+
+def _register() -> str:
+    from masrel.agreement import COEFFICIENTS
+    from masrel.report._tables import aligned
+
+    lines = [("name", "title", "raters", "weights")]
+    for entry in COEFFICIENTS.values():
+        fewest, most = entry.n_raters
+        raters = str(fewest) if most == fewest else f"{fewest} or more"
+        if entry.shape == "pairs":
+            raters += ", each twice (masrel analyze)"
+        weights = "any" if entry.weighted else "none"
+        lines.append((entry.name, entry.title, raters, weights))
+    return "\n".join(aligned(lines, ["left"] * 4, rule=True))
+
+
+class Part(Protocol):
+    """Ratings that are estimated together."""
+
+    @property
+    def ratings(self) -> "CodedRatings | CountedRatings":
+        """What coefficients of numbers and ranks take."""
+
+    @property
+    def counted(self) -> "CountedRatings":
+        """What all others take."""
+
+
+def estimate_rows(
+    part: Part,
+    *,
+    group: str,
+    n_raters: int,
+    scale: "Scale",
+    is_ordered: bool,
+    options: EstimateOptions,
+) -> "list[AgreementRow]":
+    """Estimate one part of the ratings, every coefficient as a row."""
+    # is_ordered: whether the order of the grades is more than the alphabet's
+    rows, refused = [], []
+    with warnings.catch_warnings():
+        # Every note is in the result, and so below the table or in the JSON.
+        warnings.simplefilter("ignore", MasrelWarning)
+        for entry in _entries(options, n_raters, scale, is_ordered):
+            ratings = part.ratings if entry.kernel is None else part.counted
+            row, refusal = _row(entry, ratings, group, options)
+            rows.append(row)
+            refused += [] if refusal is None else [refusal]
+    if not options.takes_all and refused and len(refused) == len(rows):
+        raise refused[0]
+    return rows
+
+
+def _row(
+    entry: "Coefficient",
+    ratings: "CodedRatings | CountedRatings",
+    group: str,
+    options: EstimateOptions,
+) -> "tuple[AgreementRow, MasrelError | None]":
+    """Return the row of a coefficient, and why it has no interval if it should."""
+    from masrel.report._agreement_table import AgreementRow
+
+    title, notes, refusal = entry.title, [], None
+    if entry.weighted and options.weights != "identity":
+        title += f", {options.weights}"
+    elif options.weights != "identity" and not options.takes_all:
+        notes.append("unweighted, there are no weights for it")
+    has_target = options.target is not None
+    try:
+        estimate = _estimate(entry, ratings, options, options.level, has_target)
+    except MasrelError as error:
+        if not has_target or not (options.coefficients is None or options.takes_all):
+            raise  # just these were named: each must have the interval
+        none = "it is no function of sums over items" if entry.kernel is None else error
+        notes.append(f"no interval: {none}")
+        refusal, has_target = error, False
+        estimate = _estimate(entry, ratings, options, options.level, has_target)
+    bound = None
+    if options.words and entry.chance_corrected and estimate.interval is not None:
+        bound = _lower_bound(entry, ratings, options, estimate, has_target)
+    row = AgreementRow(
+        group=group,
+        title=title,
+        estimate=estimate,
+        notes=tuple(notes),
+        lower_bound=bound,
+    )
+    return row, refusal
+
+
+def _estimate(
+    entry: "Coefficient",
+    ratings: "CodedRatings | CountedRatings",
+    options: EstimateOptions,
+    level: float,
+    has_target: bool,
+) -> Estimate:
+    """Return the coefficient, with the interval that answers for the target."""
+    weights: WeightName = options.weights if entry.weighted else "identity"
+    # An interval that a coefficient comes with is not computed a second time.
+    is_done = entry.has_interval and (options.interval == "auto" or options.takes_all)
+    if options.target is None or not has_target or is_done:
+        return entry(
+            ratings, categories=ratings.categories, weights=weights, level=level
+        )
+    from masrel import intervals
+
+    return intervals.estimate(
+        entry,
+        ratings,
+        target=options.target,
+        method=options.interval,
+        categories=ratings.categories,
+        weights=weights,
+        level=level,
+        n_resamples=options.n_resamples,
+        rng=options.seed,
+    )
+
+
+def _lower_bound(
+    entry: "Coefficient",
+    ratings: "CodedRatings | CountedRatings",
+    options: EstimateOptions,
+    estimate: Estimate,
+    has_target: bool,
+) -> float:
+    """Return what the true value reaches with 95 %, by the interval of its estimate."""
+    from masrel.report._estimate_words import is_bound
+
+    interval = estimate.interval
+    if interval is None or interval.reason is not None:
+        return math.nan
+    # the lower end of an interval leaves out half of what is outside, a bound all
+    level = _SURE if is_bound(interval) else round(2.0 * _SURE - 1.0, 12)
+    if level != options.level:
+        interval = _estimate(entry, ratings, options, level, has_target).interval
+    return math.nan if interval is None else interval.low
+
+
+def _entries(
+    options: EstimateOptions, n_raters: int, scale: "Scale", is_ordered: bool
+) -> list["Coefficient"]:
+    from masrel.agreement import COEFFICIENTS, coefficient
+
+    if options.weights != "identity" and not is_ordered:
+        raise ParameterError(
+            f"--weights {options.weights}: needs --categories with every grade of the "
+            f"scale in order, the grades met are text: {', '.join(scale.grades)}"
+        )
+    if options.takes_all:
+        return [
+            entry
+            for entry in COEFFICIENTS.values()
+            if entry.shape == "ratings"
+            and n_raters <= (entry.n_raters[1] or n_raters)
+            and (is_ordered or not entry.needs_order)
+        ]
+    entries = [coefficient(name) for name in options.coefficients or _USUAL]
+    for entry in entries:
+        if entry.shape == "pairs":
+            raise ParameterError(
+                f"--coefficients: {entry.name} takes each rater's grades of two "
+                "sessions; masrel analyze computes it from a study's plan"
+            )
+        if entry.needs_order and not is_ordered:
+            raise ParameterError(
+                f"{entry.name}: needs grades that are numbers or --categories with "
+                "every grade in order, the grades met are text: "
+                f"{', '.join(scale.grades)}"
+            )
+    return entries

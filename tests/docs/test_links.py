@@ -1,0 +1,44 @@
+"""Every link of a page leads somewhere."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from docs.make.pages import ROOT, pages
+
+PAGES = {str(page.relative_to(ROOT)): page for page in pages()}
+
+
+def prose(page: Path) -> str:
+    return re.sub(r"```.*?```", "", page.read_text("utf-8"), flags=re.DOTALL)
+
+
+def links(page: Path) -> list[tuple[str, str]]:
+    """Return the file and the heading that each link of a page is to."""
+    return re.findall(r"\]\((?!https?://)([^)#]*)#?([^)]*)\)", prose(page))
+
+
+def anchors(page: Path) -> set[str]:
+    """Return what the headings of a page are called in links, as GitHub has it."""
+    headings = re.findall(r"^#+ (.*)$", prose(page), flags=re.MULTILINE)
+    plain = [re.sub(r"[^\w\- ]", "", heading.lower()) for heading in headings]
+    return {heading.replace(" ", "-") for heading in plain}
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_every_file_and_heading_that_a_page_points_to_is_there(name: str) -> None:
+    page = PAGES[name]
+    broken = [
+        f"{file}#{heading}"
+        for file, heading in links(page)
+        if not (target := (page.parent / file if file else page)).exists()
+        or (heading and heading not in anchors(target))
+    ]
+    assert broken == []
+
+
+def test_links_are_seen() -> None:
+    names = {file for file, _ in links(PAGES["README.md"])}
+    assert {"docs/tutorial.md", "docs/figures/traces.png", "LICENSE"} <= names
+    assert ("agreement.md", "which-coefficient") in links(PAGES["docs/tutorial.md"])

@@ -1,0 +1,221 @@
+"""What the pages show is what their code and commands print today.
+
+A page is a test case. ``python -m docs.make.pages PAGE`` writes what it prints now.
+"""
+
+import ast
+import difflib
+import tomllib
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from docs.make.pages import ROOT, Block, PageError, pages, read, renewed
+from masrel.protocol import DeviceSettings, Model
+from tests.architecture.test_names import DIALECT, PREFIXES, bound
+from tests.protocol.documents import VALID
+
+PAGES = {str(page.relative_to(ROOT)): page for page in pages()}
+TEXTS = {name: page.read_text(encoding="utf-8") for name, page in PAGES.items()}
+BLOCKS = [block for name, text in TEXTS.items() for block in read(text, name)]
+
+# The latent-trait model takes half a minute.
+SLOW = {"docs/latent_trait.md"}
+
+# Every block that is not run, and why. A new one has to be entered here.
+NOT_RUN = [
+    ("README.md", "installs masrel; .ci/run runs it"),
+    ("README.md", "installs masrel; .ci/run runs it"),
+    ("CONTRIBUTING.md", "installs masrel and runs the tests"),
+    ("docs/accuracy.md", "takes minutes"),
+    ("docs/accuracy.md", "takes minutes"),
+    ("docs/coverage.md", "takes minutes"),
+    ("docs/coverage_two_raters.md", "takes minutes"),
+    ("docs/hardware.md", "needs a CAN bus"),
+    ("docs/hardware.md", "needs a CAN bus"),
+    ("docs/hardware.md", "needs a CAN bus"),
+    ("docs/hardware.md", "needs a CAN bus"),
+    ("docs/hardware.md", "needs a CAN bus"),
+]
+
+# What a piece of a protocol may be, and what it leaves out.
+PIECES = {
+    "device": (DeviceSettings, {}),
+    "models": (Model, VALID["models"][0]),
+}
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[pytest.mark.slow] if name in SLOW else [])
+        for name in PAGES
+    ],
+)
+def test_a_page_shows_what_it_prints(name: str) -> None:
+    page, now = TEXTS[name], renewed(TEXTS[name], name)
+    if page != now:
+        changes = difflib.unified_diff(
+            page.splitlines(), now.splitlines(), name, "printed now", lineterm=""
+        )
+        hint = f"If that is right: python -m docs.make.pages {name}"
+        pytest.fail("\n".join([*changes, "", hint]), pytrace=False)
+
+
+def test_blocks_that_are_not_run_are_those_of_the_list() -> None:
+    assert [(block.page, block.exempt) for block in BLOCKS if block.exempt] == NOT_RUN
+
+
+def test_names_in_examples_are_the_words_of_the_field() -> None:
+    names = [
+        f"{block.page}:{block.number + line}: {name}"
+        for block in BLOCKS
+        if block.language == "python"
+        for name, line in bound(ast.parse("\n".join(block.lines)))
+        if name in DIALECT or name.startswith(PREFIXES)
+    ]
+    assert names == []
+
+
+@pytest.mark.parametrize(
+    "block",
+    [block for block in BLOCKS if block.language == "toml"],
+    ids=lambda block: f"{block.page}-{block.number}",
+)
+def test_a_piece_of_a_protocol_has_keys_and_values_that_it_may(block: Block) -> None:
+    for table, content in tomllib.loads("\n".join(block.lines)).items():
+        kind, rest = PIECES[table]
+        for entry in content if isinstance(content, list) else [content]:
+            msgspec.convert(rest | entry, kind)
+
+
+# The reader sees what it has to see
+
+
+def page(*blocks: str) -> str:
+    return "\n\n".join(["# A page", *blocks]) + "\n"
+
+
+def python(*lines: str) -> str:
+    return "\n".join(["```python", *lines, "```"])
+
+
+def console(*lines: str) -> str:
+    return "\n".join(["```", *lines, "```"])
+
+
+@pytest.mark.parametrize(
+    ("stale", "right"),
+    [
+        (["print(1 / 4)  # prints 0.26"], ["print(1 / 4)  # prints 0.25"]),
+        (["print(1)"], ["print(1)", "# prints 1"]),
+        (["print(1)", "# prints 1", "# prints 2"], ["print(1)", "# prints 1"]),
+        (["x = 1  # prints 1"], ["x = 1"]),
+        (["print()", "# prints 1"], ["print()", "# prints"]),
+    ],
+)
+def test_a_comment_of_what_is_printed_is_renewed(
+    stale: list[str], right: list[str]
+) -> None:
+    assert renewed(page(python(*stale))) == page(python(*right))
+    assert renewed(page(python(*right))) == page(python(*right))
+
+
+def test_three_dots_stand_for_anything_that_is_printed() -> None:
+    example = page(python("print(id(object()))  # prints ..."))
+    assert renewed(example) == example
+
+
+def test_blocks_of_a_page_go_on_with_each_other() -> None:
+    text = page(python("x = 4"), python("print(x)"), "prints", "```text\n3\n```")
+    assert renewed(text) == text.replace("\n3\n", "\n4\n")
+
+
+def test_an_error_of_an_example_names_its_line_of_the_page() -> None:
+    with pytest.raises(ZeroDivisionError) as caught:
+        renewed(page(python("x = 1", "x / 0")), "a.md")
+    last = caught.traceback[-1]
+    assert (Path(last.path).name, last.lineno + 1) == ("a.md", 5)
+
+
+def test_a_warning_of_an_example_is_an_error() -> None:
+    with pytest.raises(UserWarning, match="odd"):
+        renewed(page(python("import warnings", "warnings.warn('odd')")))
+
+
+def test_a_command_reads_the_file_that_the_page_shows() -> None:
+    text = page("In `r.csv`:", console("item,Kim,Lee", "A,1,2"))
+    text += "\n" + console("$ masrel agree r.csv --item place", "ratings")
+    (line,) = set(renewed(text).splitlines()) - set(text.splitlines())
+    assert line.startswith("masrel: r.csv: ")
+
+
+@pytest.mark.parametrize(
+    ("shown", "right"),
+    [
+        (["a", "..."], ["a", "..."]),
+        (["...", "c"], ["...", "c"]),
+        (["a", "b", "...", "c"], ["a", "b", "...", "c"]),
+        (["x", "...", "c"], ["a", "...", "c"]),
+        (["a", "...", "x"], ["a", "...", "c"]),
+        (["..."], ["..."]),
+        ([], ["a", "b", "c"]),
+        (["a", "c"], ["a", "b", "c"]),
+    ],
+)
+def test_three_dots_stand_for_lines_of_output(
+    shown: list[str], right: list[str]
+) -> None:
+    command = "$ python -c \"print('a', 'b', 'c', sep='\\n')\""
+    assert renewed(page(console(command, *shown))) == page(console(command, *right))
+
+
+def test_a_command_may_take_two_lines_and_its_errors_are_output() -> None:
+    program = "import sys; print(1, flush=True); print(2, file=sys.stderr)"
+    lines = ["$ python -c \\", f"'{program}'"]
+    assert renewed(page(console(*lines))) == page(console(*lines, "1", "2"))
+
+
+def test_what_is_typed_is_seen_at_the_prompt() -> None:
+    commands = "$ masrel init pilot", "$ masrel schedule pilot"
+    run = "$ masrel run pilot --rater R1 --session test --clock simulated"
+    text = page(console(*commands), "<!-- typed: stop -->\n" + console(run))
+    assert "stop to stop: stop\nmasrel: session test of R1 was stopped" in renewed(text)
+
+
+def test_nothing_is_left_of_a_page_that_was_run() -> None:
+    before = Path.cwd()
+    renewed(page(python("open('left.txt', 'w').close()")))
+    assert Path.cwd() == before
+    assert not Path("left.txt").exists()
+
+
+@pytest.mark.parametrize(
+    "block",
+    [
+        "```sh\nmasrel device probe\n```",
+        "```\nmasrel device probe\n```",
+        "```\npython -m docs.make.pages\n```",
+        "```text\n.venv/bin/python -m pytest\n```",
+        "```\nfirst\n$ masrel check pilot\n```",
+        "```py\nprint(1)\n```",
+        "```python slow\nprint(1)\n```",
+        "```\n>>> 1 + 1\n```",
+        "- a list\n  ```python\n  print(1)\n  ```",
+        "~~~python\nprint(1)\n~~~",
+        "```python\nprint(1)",
+        "<!-- not run: -->\n```sh\nmasrel device probe\n```",
+        "<!-- a remark -->\n```sh\nmasrel device probe\n```",
+    ],
+)
+def test_what_is_neither_run_nor_marked_is_refused(block: str) -> None:
+    with pytest.raises(PageError, match="needs"):
+        read(page(block))
+
+
+def test_a_block_that_is_marked_is_not_run() -> None:
+    (block,) = read(page("<!-- not run: moves -->\n```sh\nmasrel device probe\n```"))
+    assert block.exempt == "moves"
+    text = page("<!-- not run: moves -->\n" + python("print(1)"))
+    assert renewed(text) == text
