@@ -25,6 +25,7 @@ from masrel.agreement.contingency import (
     kappa_max,
     mcnemar,
     prevalence_index,
+    specific_agreement,
     stuart_maxwell,
 )
 from masrel.agreement.fleiss import fleiss_kappa, fleiss_kappa_from_counts
@@ -40,7 +41,7 @@ from masrel.agreement.light import Deletion, light_kappa
 from masrel.agreement.percent import percent_agreement, percent_agreement_from_counts
 from masrel.agreement.registry import COEFFICIENTS, Coefficient, Property, coefficient
 from masrel.agreement.scott import scott_pi, scott_pi_from_table
-from masrel.agreement.significance import Significance, p_value
+from masrel.agreement.significance import Significance, holm, p_value
 from masrel.agreement.two_sessions import pooled_kappa, stratified_kappa
 
 __all__ = [
@@ -82,6 +83,7 @@ __all__ = [
     "fleiss_null",
     "gwet_ac",
     "gwet_ac_from_counts",
+    "holm",
     "icc",
     "icc_f_test",
     "kappa_max",
@@ -99,6 +101,7 @@ __all__ = [
     "robinson_a",
     "scott_pi",
     "scott_pi_from_table",
+    "specific_agreement",
     "stratified_kappa",
     "strength",
     "stuart_maxwell",

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement._counts import item_counts
+from masrel.agreement._counts import count_ratings, item_counts
 from masrel.agreement._data import code_ratings
 from masrel.agreement._kernel import undefined
 from masrel.agreement._labels import Label
@@ -28,7 +28,7 @@ def category_kappa(
     Parameters
     ----------
     ratings : nested sequence, array_like or DataFrame, shape (n_items, n_raters)
-        Labels or numbers; None and ``nan`` are missing.
+        Labels or numbers; None and ``nan`` are missing. Counted ratings will do.
     category : str, int or float
         One of the categories.
     categories : sequence of str, int or float, optional
@@ -67,20 +67,25 @@ def category_kappa(
     >>> category_kappa(ratings, "c").value
     1.0
     """
-    coded = code_ratings(ratings, categories)
-    if category not in coded.categories:
+    ratings = count_ratings(ratings, categories)
+    if category not in ratings.categories:
         raise ParameterError(
-            f"category: needs one of {', '.join(map(repr, coded.categories))}, "
+            f"category: needs one of {', '.join(map(repr, ratings.categories))}, "
             f"got {category!r}"
         )
-    counts = item_counts(coded)
-    chosen = counts[:, coded.categories.index(category)]
+    coded, items = ratings.coded, ratings.items
+    if coded is None:  # counts are enough
+        rows = np.array(items.rows, dtype=np.int64).reshape(-1, items.n_categories)
+        counts = np.repeat(rows, np.array(items.freq, dtype=np.int64), axis=0)
+    else:
+        counts = item_counts(coded)
+    chosen = counts[:, ratings.categories.index(category)]
     two = np.column_stack([chosen, counts.sum(axis=1) - chosen])
     return replace(
         fleiss_kappa_from_counts(two),
         coefficient="category_kappa",
         weights=str(category),
-        n_raters=coded.n_raters,
+        n_raters=ratings.n_raters,
     )
 
 

@@ -445,6 +445,50 @@ def kappa_max(table: ArrayLike) -> float:
     return float((n * agreeing - by_chance) / (n * n - by_chance))
 
 
+def specific_agreement(table: ArrayLike) -> tuple[float, ...]:
+    """Return for each category how often a rating of it meets the same of the other.
+
+    Parameters
+    ----------
+    table : array_like of int, shape (n_categories, n_categories)
+        Items per category of the first (rows) and second rater (columns).
+
+    Returns
+    -------
+    tuple of float, length n_categories
+        2 t_kk / (t_k. + t_.k), within [0, 1]; ``nan`` for a category that nobody used.
+        Of two categories, negative and positive agreement.
+
+    Raises
+    ------
+    CountsError
+        If it is not a square table of counts.
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        If nobody used a category.
+
+    References
+    ----------
+    .. [1] Cicchetti, D. V., Feinstein, A. R. (1990). High agreement but low kappa: II.
+       Resolving the paradoxes. Journal of Clinical Epidemiology, 43(6), 551-558.
+       https://doi.org/10.1016/0895-4356(90)90159-M
+
+    Examples
+    --------
+    >>> specific_agreement([[20, 5], [5, 10]])
+    (0.8, 0.6666666666666666)
+    """
+    cells: list[list[int]] = check_table(table).tolist()
+    columns = zip(*cells, strict=True)
+    used = [sum(row) + sum(column) for row, column in zip(cells, columns, strict=True)]
+    if not all(used):
+        unused = used.index(0) + 1
+        undefined(f"specific agreement on category {unused}", "0/0: nobody used it")
+    return tuple(2 * cells[k][k] / n if n else math.nan for k, n in enumerate(used))
+
+
 def _two_by_two(table: ArrayLike) -> list[list[int]]:
     cells = check_table(table)
     if cells.shape != (2, 2):

@@ -1,8 +1,10 @@
 """The result of a test of a hypothesis, and p-values of estimates."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+from masrel.errors import ParameterError
 from masrel.estimates import Estimate
 
 
@@ -84,3 +86,49 @@ def p_value(estimate: Estimate) -> float:
         return 1.0 if estimate.value == 0.0 else 0.0
     t = abs(estimate.value / estimate.standard_error)
     return min(1.0, 2.0 * float(stdtr(estimate.n_items - 1, -t)))
+
+
+def holm(p_values: Sequence[float]) -> list[float]:
+    """Return p-values of several hypotheses, adjusted by Holm's method.
+
+    Parameters
+    ----------
+    p_values : sequence of float, shape (n_tests,)
+        The p-values of the family; ``nan`` where a test is undefined, which then
+        counts for none of them.
+
+    Returns
+    -------
+    list of float, shape (n_tests,)
+        In the same order, ``nan`` where there was none: the hypotheses of those at
+        most α can be rejected with a probability of at most α to reject a true one,
+        however the tests depend on each other.
+
+    Raises
+    ------
+    ParameterError
+        If a p-value is outside [0, 1].
+
+    References
+    ----------
+    .. [1] Holm, S. (1979). A simple sequentially rejective multiple test procedure.
+       Scandinavian Journal of Statistics, 6(2), 65-70.
+       https://www.jstor.org/stable/4615733
+
+    Examples
+    --------
+    Three times the least, twice the next, and once the largest; none is less than one
+    before it:
+
+    >>> holm([0.03, 0.01, 0.02])
+    [0.04, 0.03, 0.04]
+    """
+    for place, p in enumerate(p_values):
+        if not (math.isnan(p) or 0.0 <= p <= 1.0):
+            raise ParameterError(f"p_values: place {place}: needs [0, 1], got {p}")
+    known = [place for place, p in enumerate(p_values) if not math.isnan(p)]
+    adjusted, least = [math.nan] * len(p_values), 0.0
+    for rank, place in enumerate(sorted(known, key=p_values.__getitem__)):
+        least = max(least, min(1.0, (len(known) - rank) * p_values[place]))
+        adjusted[place] = least
+    return adjusted

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from masrel.intervals.analytic import analytic
 from masrel.intervals.auto import estimate
 from masrel.intervals.bootstrap import bootstrap
-from masrel.intervals.difference import difference
+from masrel.intervals.difference import difference, difference_test
 from masrel.intervals.jackknife import jackknife
 from masrel.intervals.posterior import posterior
 from masrel.intervals.quantity import Quantity
@@ -30,6 +30,7 @@ __all__ = [
     "analytic",
     "bootstrap",
     "difference",
+    "difference_test",
     "estimate",
     "jackknife",
     "latent_trait",

@@ -1,14 +1,20 @@
 """The difference of two coefficients: of the same items, or of independent ones."""
 
 import math
+import warnings
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from masrel.agreement import Label, WeightName
-from masrel.errors import ParameterError, RatingsError
+from masrel.agreement import Label, Significance, WeightName
+from masrel.errors import (
+    ParameterError,
+    RatingsError,
+    UndefinedStatisticWarning,
+)
 from masrel.estimates import Estimate, Interval
 from masrel.intervals._problem import (
     IntervalProblem,
@@ -75,7 +81,9 @@ def difference(
     Notes
     -----
     Leaving one item out of both sets of ratings at once keeps what they have in
-    common; comparing two intervals by eye would not.
+    common; comparing two intervals by eye would not. The raters are taken as they
+    are, whether both sets have the same or each has its own. `difference_test` has
+    the p-value.
 
     References
     ----------
@@ -93,6 +101,130 @@ def difference(
     >>> round(estimate.value, 3), round(estimate.interval.low, 3)
     (0.467, 0.08)
     """
+    compared = _compare(coefficient, first, second, design, categories, weights, level)
+    one, other = compared.one, compared.other
+    return Estimate(
+        coefficient=f"difference of {one.coefficient}",
+        weights=one.weights,
+        value=compared.value,
+        standard_error=math.sqrt(compared.variance),
+        interval=_interval(compared),
+        observed=one.observed - other.observed,
+        chance=one.chance - other.chance,
+        n_items=min(one.n_items, other.n_items),
+        n_raters=min(one.n_raters, other.n_raters),
+        n_categories=one.n_categories,
+        reason=one.reason or other.reason,
+    )
+
+
+def difference_test(
+    coefficient: Statistic,
+    first: object,
+    second: object,
+    *,
+    design: _Design,
+    categories: Sequence[Label] | None = None,
+    weights: "WeightName | ArrayLike" = "identity",
+) -> Significance:
+    """Test whether a coefficient is the same of some ratings as of others.
+
+    Parameters
+    ----------
+    coefficient : str or callable
+        Name of a coefficient, or its public function.
+    first, second : nested sequence, array_like or DataFrame
+        What the coefficient takes.
+    design : {"dependent", "independent"}
+        Same items in the same order, or other items; see `difference`.
+    categories : sequence, optional
+        The declared scale in order; should be given, so that both have the same.
+    weights : str or array_like, optional
+        How much two categories agree; see `declared_weights`.
+
+    Returns
+    -------
+    Significance
+        The difference over its jackknife standard error, with the two-sided p-value
+        of Student's t by which `difference` makes its interval: an interval of level
+        1 - p ends at 0. `n_items` are those of the smaller set.
+
+    Raises
+    ------
+    ParameterError
+        If an option is invalid, or the coefficient has no such interval.
+    RatingsError
+        If the ratings do not fit the coefficient, or not each other.
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        If an estimate is undefined, or is with one item left out, or leaving out any
+        item leaves the difference as it is.
+
+    References
+    ----------
+    .. [1] Gwet, K. L. (2016). Testing the difference of correlated agreement
+       coefficients for statistical significance. Educational and Psychological
+       Measurement, 76(4), 609-637. https://doi.org/10.1177/0013164415596420
+
+    Examples
+    --------
+    >>> before = [["a", "b"], ["b", "b"], ["a", "a"], ["b", "a"]] * 5
+    >>> after = [["a", "a"], ["b", "b"], ["a", "a"], ["b", "a"]] * 5
+    >>> print(difference_test("fleiss_kappa", after, before, design="dependent"))
+    difference_test: 2.527, t(19), p = 0.0205
+    """
+    # an interval has a level, a test has none: any will do
+    compared = _compare(coefficient, first, second, design, categories, weights, 0.5)
+    statistic = p = math.nan
+    if compared.reason is not None:
+        warnings.warn(
+            f"the test of a difference is undefined: {compared.reason}",
+            UndefinedStatisticWarning,
+            stacklevel=2,
+        )
+    else:
+        from scipy.special import stdtr  # loaded only when a p-value is needed
+
+        statistic = compared.value / math.sqrt(compared.variance)
+        p = min(1.0, 2.0 * float(stdtr(compared.df, -abs(statistic))))
+    return Significance(
+        name="difference_test",
+        hypothesis="both coefficients are the same",
+        statistic=statistic,
+        distribution="t",
+        df=(compared.df,),
+        p_value=p,
+        n_items=min(compared.one.n_items, compared.other.n_items),
+        reason=compared.reason,
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Compared:
+    """Two estimates, and how their difference varies."""
+
+    problems: list[IntervalProblem]
+    # one, other: the coefficient of both sets of ratings
+    one: Estimate
+    other: Estimate
+    value: float  # the first less the second
+    variance: float
+    df: float
+    reason: str | None  # why the variance makes neither interval nor test, or None
+
+
+def _compare(
+    coefficient: Statistic,
+    first: object,
+    second: object,
+    design: _Design,
+    categories: Sequence[Label] | None,
+    weights: "WeightName | ArrayLike",
+    level: float,
+) -> _Compared:
+    """Check both sets of ratings, and estimate their difference and its variance."""
     if design not in get_args(_Design):
         raise ParameterError(
             f"design: needs one of {', '.join(get_args(_Design))}, got {design!r}"
@@ -111,18 +243,18 @@ def difference(
     variance_of = _dependent if design == "dependent" else _independent
     variance, df = variance_of(*problems)
     one, other = (problem.entry(problem.coded, weights=weights) for problem in problems)
-    value, reason = one.value - other.value, one.reason or other.reason
-    return Estimate(
-        coefficient=f"difference of {one.coefficient}",
-        weights=one.weights,
-        value=value,
-        standard_error=math.sqrt(variance),
-        interval=_interval(problems, value, reason, variance, df),
-        observed=one.observed - other.observed,
-        chance=one.chance - other.chance,
-        n_items=min(one.n_items, other.n_items),
-        n_raters=min(one.n_raters, other.n_raters),
-        n_categories=one.n_categories,
+    reason = one.reason or other.reason
+    if reason is None and math.isnan(variance):
+        reason = "with one item left out an estimate is undefined"
+    elif reason is None and variance == 0.0:
+        reason = "leaving out any item leaves the difference as it is"
+    return _Compared(
+        problems=problems,
+        one=one,
+        other=other,
+        value=one.value - other.value,
+        variance=variance,
+        df=df,
         reason=reason,
     )
 
@@ -170,22 +302,13 @@ def _independent(one: IntervalProblem, other: IntervalProblem) -> tuple[float, f
     return variance, variance**2 / sum(part**2 / max(df, 1) for part, df in parts)
 
 
-def _interval(
-    problems: list[IntervalProblem],
-    value: float,
-    reason: str | None,
-    variance: float,
-    df: float,
-) -> Interval:
+def _interval(compared: _Compared) -> Interval:
     method = "item jackknife of the difference, t"
+    problems, value = compared.problems, compared.value
     smaller = min(problems, key=lambda problem: problem.n_items)
-    if reason is None and math.isnan(variance):
-        reason = "with one item left out an estimate is undefined"
-    elif reason is None and variance == 0.0:
-        reason = "leaving out any item leaves the difference as it is"
-    if reason is not None:
-        return smaller.undefined(reason, method=method, unit="items")
-    half = smaller.student_t(df) * math.sqrt(variance)
+    if compared.reason is not None:
+        return smaller.undefined(compared.reason, method=method, unit="items")
+    half = smaller.student_t(compared.df) * math.sqrt(compared.variance)
     notes = warn_small(smaller.n_items, 10, "items")
     width = 1.0 - min(problem.min_value for problem in problems)  # of its space
     if value - half < -width or value + half > width:

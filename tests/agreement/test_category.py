@@ -8,7 +8,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from masrel.agreement import category_kappa, fleiss_kappa, fleiss_null
+from masrel.agreement import (
+    CountedRatings,
+    category_kappa,
+    count_ratings,
+    fleiss_kappa,
+    fleiss_null,
+)
 from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
 from tests.agreement.undefined import assert_undefined
 from tests.strategies import LABELS, Table, tables
@@ -76,6 +82,19 @@ def test_a_missing_rating_is_none_of_the_others() -> None:
     found = category_kappa(holed, "a")
     assert found.value == 13 / 40
     assert (found.n_items, found.n_raters) == (3, 3)
+
+
+def test_counts_are_enough() -> None:
+    counted = count_ratings(RATINGS, DIAGNOSES)
+    counts = CountedRatings(
+        categories=counted.categories, items=counted.items, n_raters=6, source=None
+    )
+    for diagnosis in DIAGNOSES:
+        found = category_kappa(counts, diagnosis)
+        expected = category_kappa(RATINGS, diagnosis)
+        assert found.value == expected.value
+        assert found.standard_error == pytest.approx(expected.standard_error, rel=1e-13)
+        assert (found.n_items, found.n_raters) == (30, 6)
 
 
 @pytest.mark.filterwarnings("ignore::masrel.errors.UndefinedStatisticWarning")

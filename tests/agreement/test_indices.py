@@ -16,6 +16,7 @@ from masrel.agreement import (
     kappa_max,
     percent_agreement,
     prevalence_index,
+    specific_agreement,
 )
 from masrel.errors import CountsError, UndefinedStatisticWarning
 from tests.agreement.undefined import assert_undefined
@@ -189,3 +190,28 @@ def test_indices_are_of_two_categories(function) -> None:  # type: ignore[no-unt
 def test_what_is_no_table_of_counts_is_refused(function, table, said) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(CountsError, match=said):
         function(table)
+
+
+def test_specific_agreement_of_a_published_table() -> None:
+    # Cicchetti and Feinstein (1990), [[40, 9], [6, 45]]: 80/95 and 90/105
+    assert specific_agreement([[40, 9], [6, 45]]) == (80 / 95, 90 / 105)
+
+
+@given(squares())
+def test_specific_agreements_average_to_percent_agreement(cells: Cells) -> None:
+    # each weighed by how often it was used: Σ 2 t_kk / Σ (t_k. + t_.k) = p_o
+    first, second = margins(cells)
+    used = [r + c for r, c in zip(first, second, strict=True)]
+    if not all(used):
+        assert_some_undefined(cells, used)
+        return
+    found = specific_agreement(cells)
+    mean = sum(n * share for n, share in zip(used, found, strict=True)) / sum(used)
+    expected = percent_agreement(count_table(cells)).value
+    assert mean == pytest.approx(expected, rel=1e-12, abs=1e-14)
+
+
+def assert_some_undefined(cells: Cells, used: list[int]) -> None:
+    with pytest.warns(UndefinedStatisticWarning, match="nobody used it"):
+        found = specific_agreement(cells)
+    assert [math.isnan(share) for share in found] == [n == 0 for n in used]

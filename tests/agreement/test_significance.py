@@ -13,12 +13,13 @@ from masrel.agreement import (
     Significance,
     cohen_kappa_from_table,
     fleiss_kappa,
+    holm,
     icc,
     kendall_w,
     p_value,
     percent_agreement,
 )
-from masrel.errors import UndefinedStatisticWarning
+from masrel.errors import ParameterError, UndefinedStatisticWarning
 from masrel.estimates import Estimate
 
 
@@ -171,3 +172,45 @@ def test_a_test_is_no_interval_and_cannot_be_changed() -> None:
     assert str(found) == "bowker: 3.25, chi-squared(2), p = 0.197"
     with pytest.raises(dataclasses.FrozenInstanceError):
         found.p_value = 0.04  # type: ignore[misc]
+
+
+def test_holm_of_five_tests_by_hand() -> None:
+    # Ascending .005 .01 .03 .04 .6, times 5 4 3 2 1: .025 .04 .09 .08 .6, of which the
+    # fourth is less than the third before it.
+    assert holm([0.04, 0.01, 0.6, 0.005, 0.03]) == pytest.approx(
+        [0.09, 0.04, 0.6, 0.025, 0.09], rel=1e-15
+    )
+
+
+def test_holm_of_ties_of_nothing_and_of_p_values_beyond_1() -> None:
+    assert holm([]) == []
+    assert holm([0.2]) == [0.2]
+    assert holm([0.5, 0.5, 0.6]) == [1.0, 1.0, 1.0]
+    assert holm([0.02, 0.02]) == [0.04, 0.04]
+
+
+def test_holm_does_not_count_what_is_undefined() -> None:
+    # two tests are left: .01 and .04 times 2 and 1
+    first, none, last = holm([0.04, math.nan, 0.01])
+    assert math.isnan(none)
+    assert (first, last) == (0.04, 0.02)
+
+
+def test_holm_takes_probabilities() -> None:
+    with pytest.raises(ParameterError, match=r"place 1: needs \[0, 1\], got 1.5"):
+        holm([0.1, 1.5])
+
+
+@given(st.lists(st.floats(0, 1), min_size=1, max_size=8))
+def test_holm_rejects_what_the_procedure_rejects(p_values: list[float]) -> None:
+    # Holm (1979): in ascending order compare with α/n, α/(n - 1), ...; the first that
+    # is larger, and all after it, stay.
+    for level in (0.01, 0.05, 0.3):
+        order = sorted(range(len(p_values)), key=p_values.__getitem__)
+        rejected: set[int] = set()
+        for rank, place in enumerate(order):
+            if (len(order) - rank) * p_values[place] > level:
+                break
+            rejected.add(place)
+        found = {k for k, p in enumerate(holm(p_values)) if p <= level}
+        assert found == rejected

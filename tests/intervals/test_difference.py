@@ -6,6 +6,8 @@ from typing import Literal
 
 import numpy as np
 import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
 from scipy import stats
 
 from masrel.agreement import COEFFICIENTS, cohen_kappa, fleiss_kappa
@@ -16,7 +18,7 @@ from masrel.errors import (
     UndefinedStatisticWarning,
 )
 from masrel.estimates import Estimate
-from masrel.intervals import difference, jackknife
+from masrel.intervals import difference, difference_test, jackknife
 from tests.intervals.data import dirichlet_multinomial
 
 Design = Literal["dependent", "independent"]
@@ -60,6 +62,77 @@ def test_two_independent_kappas_by_hand() -> None:
     # 2/3 - 1 and 4/9 - 1/2
     assert found.observed == pytest.approx(-1 / 3, rel=1e-15)
     assert found.chance == pytest.approx(-1 / 18, rel=1e-14)
+
+
+def test_the_test_of_two_independent_kappas_by_hand() -> None:
+    # The same: -3/5 over 2/3 is t = -9/10 with 2 degrees, of which P(|T| ≥ t) is
+    # 1 - t/√(2 + t²): 1 - 0.9/√2.81.
+    first = [["a", "a"], ["b", "b"], ["a", "b"]]
+    second = [["a", "a"], ["b", "b"], ["a", "a"], ["b", "b"]]
+    found = difference_test("cohen_kappa", first, second, design="independent")
+    assert found.statistic == pytest.approx(-0.9, rel=1e-14)
+    assert found.df == pytest.approx((2.0,), rel=1e-14)
+    assert found.p_value == pytest.approx(1 - 0.9 / math.sqrt(2.81), rel=1e-12)
+    assert (found.name, found.distribution, found.n_items) == (
+        "difference_test",
+        "t",
+        3,
+    )
+    assert found.reason is None
+
+
+def test_of_percent_agreement_the_test_is_a_paired_or_welchs_t_test() -> None:
+    first, second = two(25)
+    paired = stats.ttest_rel(shares(first), shares(second))
+    found = difference_test("percent_agreement", first, second, design="dependent")
+    assert found.p_value == pytest.approx(paired.pvalue, rel=1e-9)
+    assert found.df == (24.0,)
+    welch = stats.ttest_ind(shares(first), shares(second[:15]), equal_var=False)
+    found = difference_test(
+        "percent_agreement", first, second[:15], design="independent"
+    )
+    assert found.p_value == pytest.approx(welch.pvalue, rel=1e-9)
+    assert found.df == pytest.approx((welch.df,), rel=1e-9)
+
+
+@pytest.mark.filterwarnings("ignore::masrel.errors.MasrelWarning")
+@given(
+    rows=st.lists(st.tuples(*[st.integers(0, 2)] * 4), min_size=4, max_size=12),
+    design=st.sampled_from(["dependent", "independent"]),
+    name=st.sampled_from(["fleiss_kappa", "gwet_ac", "percent_agreement"]),
+)
+def test_p_is_one_less_the_level_of_the_interval_that_ends_at_0(
+    rows: list[tuple[int, ...]], design: Design, name: str
+) -> None:
+    first, second = ([row[at : at + 2] for row in rows] for at in (0, 2))
+    test = difference_test(name, first, second, design=design, categories=CATEGORIES)
+    assume(test.reason is None and 1e-6 < test.p_value < 1 - 1e-6)
+    found = difference(
+        name,
+        first,
+        second,
+        design=design,
+        categories=CATEGORIES,
+        level=1 - test.p_value,
+    )
+    assert found.interval is not None
+    nearer = min(found.interval.low, found.interval.high, key=abs)
+    assert nearer == pytest.approx(0.0, abs=1e-9)
+    for level, holds in ((0.95, test.p_value > 0.05), (0.5, test.p_value > 0.5)):
+        interval = difference(
+            name, first, second, design=design, categories=CATEGORIES, level=level
+        ).interval
+        assert interval is not None
+        assert (interval.low < 0.0 < interval.high) == holds
+
+
+def test_a_test_without_spread_is_undefined_as_its_interval_is() -> None:
+    first, _ = two(20)
+    with pytest.warns(UndefinedStatisticWarning, match="leaves the difference as it"):
+        found = difference_test("fleiss_kappa", first, first, design="dependent")
+    assert math.isnan(found.p_value)
+    assert math.isnan(found.statistic)
+    assert found.reason == "leaving out any item leaves the difference as it is"
 
 
 def test_of_percent_agreement_of_the_same_items_it_is_the_paired_t_test() -> None:
@@ -281,6 +354,8 @@ def test_design_has_no_default_and_is_checked() -> None:
         difference("fleiss_kappa", first, second)  # type: ignore[call-arg]
     with pytest.raises(ParameterError, match="design: needs one of dependent"):
         difference("fleiss_kappa", first, second, design="paired")  # type: ignore[arg-type]
+    with pytest.raises(ParameterError, match="design: needs one of dependent"):
+        difference_test("fleiss_kappa", first, second, design="paired")  # type: ignore[arg-type]
     with pytest.raises(ParameterError, match="no function of sums"):
         difference("kendall_w", first, second, design="dependent")
 
