@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement._counts import count_ratings, item_counts
+from masrel.agreement._counts import CountedRatings, count_ratings, item_counts
 from masrel.agreement._data import code_ratings
 from masrel.agreement._kernel import undefined
 from masrel.agreement._labels import Label
@@ -67,25 +67,26 @@ def category_kappa(
     >>> category_kappa(ratings, "c").value
     1.0
     """
-    ratings = count_ratings(ratings, categories)
-    if category not in ratings.categories:
-        raise ParameterError(
-            f"category: needs one of {', '.join(map(repr, ratings.categories))}, "
-            f"got {category!r}"
-        )
-    coded, items = ratings.coded, ratings.items
-    if coded is None:  # counts are enough
-        rows = np.array(items.rows, dtype=np.int64).reshape(-1, items.n_categories)
-        counts = np.repeat(rows, np.array(items.freq, dtype=np.int64), axis=0)
+    if isinstance(ratings, CountedRatings):  # counts are enough
+        counted = count_ratings(ratings, categories)
+        scale, n_raters = counted.categories, counted.n_raters
+        counts = np.array(counted.items.rows, dtype=np.int64).reshape(-1, len(scale))
+        counts = counts.repeat(np.array(counted.items.freq, dtype=np.int64), axis=0)
     else:
+        coded = code_ratings(ratings, categories)
+        scale, n_raters = coded.categories, coded.n_raters
         counts = item_counts(coded)
-    chosen = counts[:, ratings.categories.index(category)]
+    if category not in scale:
+        raise ParameterError(
+            f"category: needs one of {', '.join(map(repr, scale))}, got {category!r}"
+        )
+    chosen = counts[:, scale.index(category)]
     two = np.column_stack([chosen, counts.sum(axis=1) - chosen])
     return replace(
         fleiss_kappa_from_counts(two),
         coefficient="category_kappa",
         weights=str(category),
-        n_raters=ratings.n_raters,
+        n_raters=n_raters,
     )
 
 
