@@ -66,6 +66,12 @@ class _Verbs(click.Group):
         command: click.Command = getattr(module, cmd_name)
         return command
 
+    def invoke(self, ctx: click.Context) -> object:
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:  # click would say "Aborted!"
+            _fail("stopped by Ctrl-C", 1)
+
     def format_commands(
         self,
         ctx: click.Context,  # noqa: ARG002 - click's signature
@@ -102,11 +108,13 @@ def main() -> None:
         _fail(error, 1)
     except MasrelError as error:
         _fail(error, 2)
+    except MemoryError as error:
+        _fail(f"needs more memory than there is. {error}".rstrip(". "), 1)
     except OSError as error:
         where = "" if error.filename is None else f"{error.filename}: "
         _fail(f"{where}{error.strerror or error}", 2)
 
 
-def _fail(error: object, code: int) -> None:
+def _fail(error: object, code: int) -> NoReturn:
     click.echo(f"masrel: {error}", err=True)
     sys.exit(code)

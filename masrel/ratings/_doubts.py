@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.ratings._grades import alike_texts, is_number
+from masrel.ratings._grades import alike_texts, is_number, normal_form
 from masrel.ratings._layout import Layout
 from masrel.ratings._sheets import Sheet
 from masrel.scales import Scale
@@ -19,10 +19,17 @@ _NO_RATER = re.compile(
     r"diagnosis|side|text|email|n|count|unnamed: \d+)",
     re.IGNORECASE,
 )
-# Parts of names of columns that name items.
+# Names of columns that name items: a word of these, in any case.
 _ITEM_NAME = re.compile(
-    r"|#|no\.?|nr\.?|.*(id|item|subject|patient|person|case|row|index|unit|record|"
-    r"target|stimulus|image|document|sample|name|file|model|video|task).*",
+    r"|#|(.*[^a-z])?(id|no|nr|num|key|code|name|participants?|[a-z]*(item|subject|patient|"
+    r"person|case|row|index|unit|record|target|stimulus|image|document|sample|file|model|"
+    r"video|task|label)(s|id|no|nr|name|code)?)([^a-z].*)?",
+    re.IGNORECASE,
+)
+# Names of rows that summarize the others.
+_SUMMARY = re.compile(
+    r"(grand )?(total|sum|mean|average|avg|median|sd|s\.d\.|std|min|max|n|count|all)s?"
+    r"|[Σσ]|kappa|agreement",
     re.IGNORECASE,
 )
 _MAX_COMPARED = 2000  # columns that are compared with all others
@@ -53,7 +60,8 @@ def doubt_columns(
     # codes (n_items, n_raters): places in the scale, -1 where missing
     names = [sheet.header[place] for place in layout.raters]
     _refuse_contingency(sheet, layout, names)
-    warnings = _first_column(sheet, layout, scale)
+    warnings = _first_line(sheet, layout, names, scale)
+    warnings += _first_column(sheet, layout, scale)
     odd = _unlike(codes, scale) if len(names) <= _MAX_COMPARED else set()
     named = {k for k, name in enumerate(names) if _NO_RATER.fullmatch(name)}
     nonsense = sorted(odd & named)
@@ -77,7 +85,11 @@ def doubt_columns(
             f"no grade in common with the other columns: {', '.join(map(repr, alone))}"
             f"; if it is no rater, --ignore {_option(alone)}"
         )
-    return [*warnings, *_looks_counted(codes, scale), *_second_header(sheet, codes)]
+    return [
+        *warnings,
+        *_looks_counted(codes, scale),
+        *_second_header(sheet, codes, scale),
+    ]
 
 
 def _option(names: Sequence[str]) -> str:
@@ -97,6 +109,31 @@ def _refuse_contingency(sheet: Sheet, layout: Layout, names: Sequence[str]) -> N
         )
 
 
+def _first_line(
+    sheet: Sheet, layout: Layout, names: Sequence[str], scale: Scale
+) -> list[str]:
+    # names that are grades, and more names than rows
+    is_named = all(_ITEM_NAME.fullmatch(sheet.header[place]) for place in layout.item)
+    if not sheet.has_header or sheet.is_transposed:
+        return []
+    values = set(map(normal_form, scale.grades))
+    warnings = []
+    if {normal_form(name) for name in names} <= values and not (
+        layout.item and is_named
+    ):
+        warnings.append(
+            f"the names of the columns, {', '.join(map(repr, names[:_SHOWN]))}, are "
+            "grades: --no-header if the first line is a row like the others, --counts "
+            "if cells are numbers of raters"
+        )
+    if layout.is_item_guessed and len(names) > 2 * len(sheet.cells):
+        warnings.append(
+            f"{len(names)} columns count as raters of {len(sheet.cells)} items: "
+            "--transpose if a row is a rater"
+        )
+    return warnings
+
+
 def _first_column(sheet: Sheet, layout: Layout, scale: Scale) -> list[str]:
     # The first column is the item because nothing else was: it may be a rater.
     if not layout.is_item_guessed:
@@ -106,11 +143,11 @@ def _first_column(sheet: Sheet, layout: Layout, scale: Scale) -> list[str]:
     cells = [str(cell).strip() for cell in sheet.column(place)]
     distinct = set(cells)
     numbers = {float(g) for g in scale.grades if is_number(g)}
-    in_scale = all(
-        c in scale.grades or (is_number(c) and float(c) in numbers) for c in distinct
-    )
-    if not in_scale:
-        return []
+    ends = (min(numbers, default=0.0), max(numbers, default=0.0) + 1)
+    n_in_scale = sum(c in scale.grades or _is_among(c, numbers) for c in distinct)
+    n_near = sum(is_number(c) and ends[0] <= float(c) <= ends[1] for c in distinct)
+    if len(distinct) < len(cells) and n_in_scale < len(distinct):
+        return []  # refused as repeated
     choices = (
         f"--no-item if it is a rater, --item {_option([name])} if it names the items"
     )
@@ -119,9 +156,13 @@ def _first_column(sheet: Sheet, layout: Layout, scale: Scale) -> list[str]:
             f"{sheet.line_of(0)}: the first column, {name!r}, holds grades like the "
             f"others: {choices}"
         )
-    if _ITEM_NAME.fullmatch(name):
+    if max(n_in_scale, n_near) < len(distinct) / 2 or _ITEM_NAME.fullmatch(name):
         return []
     return [f"the first column, {name!r}, is taken for the names of items: {choices}"]
+
+
+def _is_among(text: str, numbers: set[float]) -> bool:
+    return is_number(text) and float(text) in numbers
 
 
 def _unlike(codes: NDArray[np.int64], scale: Scale) -> set[int]:
@@ -156,24 +197,31 @@ def _unlike(codes: NDArray[np.int64], scale: Scale) -> set[int]:
 
 
 def _looks_counted(codes: NDArray[np.int64], scale: Scale) -> list[str]:
-    # whole numbers whose sum is the same in every row, 0 among them
+    # Whole numbers whose sum is the same in every row, or in most and nowhere above
+    # what one of them is alone, as where all raters agree.
     if not all(map(is_number, scale.grades)) or len(codes) < 3 or codes.shape[1] < 2:
         return []
-    values = np.array(scale.values)
-    if (codes < 0).any() or (values < 0).any() or (values % 1 != 0).any():
+    values = np.array([*scale.values, 0.0])  # a missing count, at -1, is 0
+    if (values < 0).any() or (values % 1 != 0).any():
         return []
     sums = values[codes].sum(axis=1)
-    if sums[0] < 2 or (sums != sums[0]).any() or 0 not in values:
+    total = sums.max()
+    has_zeros = 0 in scale.values or bool((codes < 0).any())
+    is_most = values.max() == total and (sums == total).mean() >= 1 / 2
+    if total < 2 or not has_zeros or not ((sums == total).all() or is_most):
         return []
+    are = "every row sums" if sums.min() == total else "most rows sum"
     return [
-        f"every row sums to {sums[0]:g}, so that this may be a table of counts, items "
-        "by categories: --counts reads it as one"
+        f"{are} to {total:g}, so that this may be a table of counts, items by "
+        "categories: --counts reads it as one"
     ]
 
 
-def _second_header(sheet: Sheet, codes: NDArray[np.int64]) -> list[str]:
+def _second_header(sheet: Sheet, codes: NDArray[np.int64], scale: Scale) -> list[str]:
     # a first row whose grades occur nowhere else, while those of the others do
     if len(codes) < 4 or not sheet.has_header or (codes[0] < 0).all():
+        return []
+    if all(map(is_number, scale.grades)):
         return []
     first, rest = np.unique(codes[0][codes[0] >= 0]), codes[1:]
     if np.isin(first, rest).any() or len(np.unique(rest)) > rest.size / 2:
@@ -207,9 +255,53 @@ def doubt_long(
 
 
 def doubt_names(kind: str, names: Sequence[str]) -> list[str]:
-    """Warn of names that differ by spelling alone."""
-    return [
+    """Warn of names that differ by spelling alone, and of what is seldom a name."""
+    warnings = [
         f"{kind} that differ by spelling alone are counted as different: "
         + ", ".join(map(repr, group))
         for group in alike_texts(names)[:_SHOWN]
     ]
+    if kind == "items":
+        odd = [name for name in names if _is_no_item(name)]
+        if 0 < len(odd) < len(names) / 2:
+            warnings.append(
+                f"{', '.join(map(repr, odd[:_SHOWN]))} counts as an item: if it is a "
+                "comment, or sums up other rows, delete it"
+            )
+    return warnings
+
+
+def _is_no_item(name: str) -> bool:
+    return name[:1] == "#" or (len(name) < 14 and bool(_SUMMARY.fullmatch(name)))
+
+
+def doubt_counts(sheet: Sheet, layout: Layout, table: NDArray[np.int64]) -> list[str]:
+    """Refuse or warn of a table of counts that has sums, or no column of items."""
+    # of a table (n_rows, n_categories)
+    names = [sheet.header[place] for place in layout.raters]
+    for k, name in enumerate(names):
+        is_sum = (2 * table[:, k] == table.sum(axis=1)).all() and table[:, k].any()
+        if is_sum and (len(names) > 2 or _SUMMARY.fullmatch(name)):
+            raise sheet.error(
+                f"{name!r} is the sum of the other columns: --ignore {_option([name])} "
+                "leaves it aside"
+            )
+    if len(table) > 2 and (2 * table[-1] == table.sum(axis=0)).all() and table.any():
+        raise sheet.error(
+            f"{sheet.where(len(table) - 1)}: is the sum of the rows above: delete it"
+        )
+    warnings = doubt_names("categories", names)
+    if layout.kind == "counts" and layout.item:
+        cells = [str(cell).strip() for cell in sheet.column(layout.item[0])]
+        name = sheet.header[layout.item[0]]
+        are_counts = all(cell.isdecimal() for cell in cells)
+        if layout.is_item_guessed and are_counts and not _ITEM_NAME.fullmatch(name):
+            warnings.append(
+                f"the first column, {name!r}, is taken for the names of items: "
+                "--no-item if it is a category"
+            )
+        elif len(set(cells)) < len(cells) and layout.by is None:
+            warnings.append(
+                f"{name!r} names items more than once: each row counts as an item"
+            )
+    return warnings

@@ -8,36 +8,39 @@ import math
 import re
 import unicodedata
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from decimal import Decimal
+from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from masrel.errors import RatingsError
+from masrel.errors import ParameterError, RatingsError
 from masrel.scales import MODIFIED_ASHWORTH, Scale
 
 USUAL_MISSING = ("", "NA")
 """Cells that stand for a missing grade unless the scale has them."""
-
-_LOOKS_MISSING = frozenset(
-    "n/a na nan null none nil <na> nat n.a. n.a #n/a #na #null! #value! #div/0! #ref! "
-    ". .. - -- --- – — ? ?? missing".split()
-) | {"not rated"}
 
 # Whole numbers that programs write for "missing", where they lie far from the others.
 _CODES = frozenset(
     sign * int(digit * n) for digit in "789" for n in range(1, 6) for sign in (1, -1)
 ) | {-1, 999999, -999999}
 
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,5})?", re.ASCII)
 _NUMBER_BEGINS = frozenset("+-.0123456789")
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+", re.ASCII)
+_HALF_GRADE = re.compile(r"\d+([+-]+|[A-Za-z])")  # 1+, 4-, 2a: numbers, more or less
 _INVISIBLE = re.compile("[\u200b-\u200f\u2060\ufeff\u00ad]")
+_NEEDS_CARE = re.compile(r"[\s'\"`=,.:;!]")
+# Dashes, and Cyrillic and Greek letters that look like Latin ones.
+_LOOK_ALIKE = str.maketrans(
+    "‐‑‒–—―−‘’“”авекмнорстухіαικνορτυχ", "-------''\"\"abekmhopctyxiaikvoptux"
+)
 _SHOWN = 6  # texts that a message lists
-_MIN_MEASURED = 10  # numbers from which a column is one of measurements
-_MAX_STRAY = 0.05  # part of them that may be no numbers by mistake
+_LONGEST = 60  # letters of a text that it shows
+_SCALE = 10  # widest span of grades of a scale, rather than of measurements
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,6 +99,7 @@ def read_grades(
 ) -> Grades:
     """Decide which grade each text is; `where` says where a text first stands."""
     # freq (n_texts,): how many cells have each
+    options = _checked(options)
     declared = options.categories or ()
     missing = dict.fromkeys(_missing_codes(texts, options), 0)
     as_number = {text: _decimal_point(text, options.decimal) for text in texts}
@@ -121,9 +125,7 @@ def read_grades(
         _refuse_doubtful(met, options, stands)
         grade_of = _observed_grades(met, as_number, stands)
         grades.scale = _observed_scale(list(dict.fromkeys(grade_of.values())))
-        grades.warnings += _alike(met, grade_of)
-        grades.warnings += _sentinels(grades.scale, met, grade_of)
-        grades.warnings += _stray(met, stands)
+        grades.warnings += _doubts_of_grades(met, grade_of, as_number, stands)
     place = {grade: code for code, grade in enumerate(grades.scale.grades)}
     spellings: dict[str, list[str]] = {}
     for i in places:
@@ -132,6 +134,24 @@ def read_grades(
         spellings.setdefault(grade, []).append(texts[i])
     grades.merged = {g: s for g, s in spellings.items() if len(s) > 1 or s != [g]}
     return grades
+
+
+def _checked(options: GradeOptions) -> GradeOptions:
+    # categories and codes as cells are: without blanks around them, by one Unicode form
+    declared = options.categories and tuple(map(_plain, options.categories))
+    codes = tuple(map(_plain, options.missing))
+    for grade in declared or ():
+        if not grade or (declared or ()).count(grade) > 1:
+            raise ParameterError(
+                f"--categories: needed every grade once, got {grade!r} in "
+                f"{', '.join(declared or ())}"
+            )
+    both = [code for code in codes if declared and code in declared]
+    if both:
+        raise ParameterError(
+            f"--categories, --missing: {both[0]!r} is a grade or missing, not both"
+        )
+    return replace(options, categories=declared, missing=codes)
 
 
 def _missing_codes(texts: Sequence[str], options: GradeOptions) -> list[str]:
@@ -154,7 +174,7 @@ def _decimal_point(text: str, decimal: str) -> str | None:
 
 
 def _shown(texts: Sequence[str]) -> str:
-    shown = ", ".join(map(repr, texts[:_SHOWN]))
+    shown = ", ".join(repr(text[:_LONGEST]) for text in texts[:_SHOWN])
     n_more = len(texts) - _SHOWN
     return shown + (f" and {n_more} more" if n_more > 0 else "")
 
@@ -168,6 +188,8 @@ def _declared_grades(
     # text to the category it is: the same text, else the same number
     is_numeric = all(map(is_number, declared))
     numbers = {Decimal(c): c for c in declared} if is_numeric else {}
+    if len(numbers) < len(declared):  # 1 and 1.0 are two grades: 01 is neither
+        numbers = {}
     grade_of: dict[str, str] = {}
     wrong: list[str] = []
     for text in met:
@@ -201,6 +223,12 @@ def _refuse_doubtful(
             f"{_missing_option(likely)} counts it as one, --categories with it in the "
             "scale as a grade"
         )
+    broken = [text for text in met if "\n" in text or "\r" in text]
+    if broken:
+        raise RatingsError(
+            f"{stands(broken[0])}: needed a grade on one line, got "
+            f"{_shown(broken[:1])}: a quote may be opened and not closed"
+        )
     commas = [text for text in met if _DECIMAL_COMMA.fullmatch(text)]
     rest = [t for t in met if t not in commas and not is_number(t)]
     if commas and not rest and options.decimal == ".":
@@ -210,8 +238,22 @@ def _refuse_doubtful(
         )
 
 
+_LOOKS_MISSING = (
+    "n/a na nan -nan null none nil nat n.a n/d n.d n.r <na> <null> (null) (blank) "
+    "(empty) #n/a #na #null! #value! #div/0! #ref! #name? #num! 1.#qnan 1.#ind -1.#ind "
+    "\\n . - -- --- ? ?? missing blank undefined unrated notrated norating notassessed "
+    "notapplicable notavailable"
+)
+
+
+@cache
+def _missing_forms() -> frozenset[str]:
+    # normal forms of what is a missing grade unless somebody says otherwise
+    return frozenset(["", *map(normal_form, _LOOKS_MISSING.split())])
+
+
 def _looks_missing(text: str) -> bool:
-    return text.casefold() in _LOOKS_MISSING
+    return normal_form(text) in _missing_forms()
 
 
 def _missing_option(codes: Sequence[str]) -> str:
@@ -227,11 +269,12 @@ def _observed_grades(
 ) -> dict[str, str]:
     # text to grade where nobody declared a scale
     plus = [t for t in met if t.startswith("+") and as_number[t] is not None]
-    plain = [t for t in met if t[0].isdigit() and _positive(as_number[t])]
-    if plus and plain:
+    others = [t for t in met if t[0].isdigit() and _positive(as_number[t])]
+    others += [t for t in met if f"+{t[:-1]}" in plus and t.endswith("+")]
+    if plus and others:
         raise RatingsError(
-            f"{stands(plus[0])}: {_shown(plus)} beside plain numbers such as "
-            f"{plain[0]!r} may be that number or the grade '{plus[0][1:]}+': "
+            f"{stands(plus[0])}: {_shown(plus)} beside grades such as "
+            f"{others[0]!r} may be that number or the grade '{plus[0][1:]}+': "
             "--categories with the scale in order tells"
         )
     if any(as_number[text] is None for text in met):
@@ -257,9 +300,16 @@ def _observed_scale(grades: Sequence[str]) -> Scale:
 
 def normal_form(text: str) -> str:
     """Return what texts have in common that a reader takes for the same."""
-    if not text.isascii():
-        text = _INVISIBLE.sub("", unicodedata.normalize("NFKC", text))
-    plain = " ".join(text.casefold().split())
+    plain = text.casefold()
+    if not plain.isascii():
+        plain = _INVISIBLE.sub("", unicodedata.normalize("NFKC", plain))
+        plain = plain.casefold().translate(_LOOK_ALIKE)
+        plain = "".join(str(unicodedata.decimal(c, c)) for c in plain)
+    if _NEEDS_CARE.search(plain):
+        plain = "".join(plain.split()).strip("'\"`=")
+        if _DECIMAL_COMMA.fullmatch(plain):
+            plain = plain.replace(",", ".")
+        plain = plain.rstrip(".,:;!") or plain[:1]
     if plain[:1] in _NUMBER_BEGINS and is_number(plain):
         return str(Decimal(plain).normalize())
     return plain
@@ -273,50 +323,96 @@ def alike_texts(texts: Sequence[str]) -> list[list[str]]:
     return [group for group in groups.values() if len(group) > 1]
 
 
-def _alike(met: Mapping[str, int], grade_of: Mapping[str, str]) -> list[str]:
-    grades: dict[str, int] = {}
-    for text, n in met.items():
-        grades[grade_of[text]] = grades.get(grade_of[text], 0) + n
-    return [
-        "grades that differ by spelling alone are counted as different: "
-        + ", ".join(f"{text!r} ({grades[text]} times)" for text in group)
-        for group in alike_texts(list(grades))
-    ]
-
-
-def _sentinels(
-    scale: Scale, met: Mapping[str, int], grade_of: Mapping[str, str]
+def _doubts_of_grades(
+    met: Mapping[str, int],
+    grade_of: Mapping[str, str],
+    as_number: Mapping[str, str | None],
+    stands: Callable[[str], str],
 ) -> list[str]:
-    # numbers such as 99 and -9 that lie far from all others
-    if scale.name != "observed" or not all(map(is_number, scale.grades)):
-        return []
+    # what looks wrong in a scale that nobody declared
+    freq: dict[str, int] = {}
+    for text, n in met.items():
+        freq[grade_of[text]] = freq.get(grade_of[text], 0) + n
+    warnings = [
+        "grades that differ by spelling alone are counted as different: "
+        + ", ".join(f"{text!r} ({freq[text]} times)" for text in group)
+        for group in alike_texts(list(freq))
+    ]
+    numbers = [text for text in met if as_number[text] is not None]
+    others = [text for text in met if as_number[text] is None]
+    if not others:
+        warnings += _same_floats(list(freq))
+    if all(map(_HALF_GRADE.fullmatch, others)):
+        return warnings + _far_codes([g for g in freq if is_number(g)], freq)
+    return warnings + _stray(numbers, others, met, stands)
+
+
+def _same_floats(grades: Sequence[str]) -> list[str]:
+    # numbers that differ beyond the digits of a float
+    by_value: dict[float, str] = {}
+    for grade in grades:
+        other = by_value.setdefault(float(grade), grade)
+        if other != grade:
+            return [
+                f"{other} and {grade} are too near to be told apart as numbers, so "
+                "that grades weigh by their place in the scale"
+            ]
+    return []
+
+
+def _far_codes(grades: Sequence[str], freq: Mapping[str, int]) -> list[str]:
+    # numbers such as 99 and -9 that lie far from all others, at either end
     warnings = []
-    for end in (0, -1):
-        rest = [float(g) for g in scale.grades if g != scale.grades[end]]
-        grade = scale.grades[end]
-        value = float(grade)
-        if len(rest) < 2 or not value.is_integer() or int(value) not in _CODES:
-            continue
-        gap = min(abs(value - other) for other in rest)
-        is_odd = value < 0 <= min(rest)  # the only number below 0
-        if gap >= max(rest) - min(rest) + 1 or is_odd:
-            n = sum(count for text, count in met.items() if grade_of[text] == grade)
-            warnings.append(
-                f"{grade} ({n} times) lies far from the other grades; if it stands for "
-                f"a missing one, --missing {grade}"
-            )
+    for is_top in (False, True):
+        order = sorted(grades, key=Decimal, reverse=is_top)
+        values = [abs(float(grade) - float(order[-1])) for grade in order]
+        codes = 0
+        while codes < len(order) - 2 and _is_code(order[codes]):
+            codes += 1
+        for n_far in range(1, codes + 1):
+            gap, rest = values[n_far - 1] - values[n_far], values[n_far:]
+            step = max((a - b for a, b in pairwise(rest)), default=0)
+            is_odd = not is_top and float(order[n_far - 1]) < 0 <= float(order[n_far])
+            is_off_scale = rest[0] <= _SCALE and gap > max(2 * step, 2)
+            if is_odd or is_off_scale or gap >= rest[0] + 1:
+                far = sorted(order[:n_far], key=Decimal)
+                named = ", ".join(f"{g} ({freq[g]} times)" for g in far)
+                warnings.append(
+                    f"{named}: far from the other grades; if missing ones are meant, "
+                    f"{_missing_option(far)}"
+                )
+                break
     return warnings
 
 
-def _stray(met: Mapping[str, int], stands: Callable[[str], str]) -> list[str]:
-    # the cell or two that make text of a column of measurements
-    numbers = [text for text in met if is_number(text)]
-    others = [text for text in met if not is_number(text)]
-    n_stray = sum(met[text] for text in others)
-    few = n_stray <= _MAX_STRAY * sum(met.values())
-    if not others or len(numbers) < _MIN_MEASURED or not few:
-        return []
-    return [
-        f"{_shown(others)} ({stands(others[0])}) is no number, so that all grades are "
-        f"text; if it stands for a missing one, {_missing_option(others)}"
-    ]
+def _is_code(grade: str) -> bool:
+    value = float(grade)
+    return value.is_integer() and int(value) in _CODES
+
+
+def _stray(
+    numbers: Sequence[str],
+    others: Sequence[str],
+    met: Mapping[str, int],
+    stands: Callable[[str], str],
+) -> list[str]:
+    # the few texts among numbers, or codes such as 99 among texts
+    n_numbers, n_others = (sum(map(met.__getitem__, t)) for t in (numbers, others))
+    if len(numbers) > 1 and n_others <= n_numbers:
+        forms = set(map(normal_form, numbers))  # those are named already
+        strays = [
+            text
+            for text in others
+            if not _HALF_GRADE.fullmatch(text) and normal_form(text) not in forms
+        ]
+        return strays and [
+            f"no number: {_shown(strays)} ({stands(strays[0])}), so that all grades "
+            f"are text; if that is missing, {_missing_option(strays)}"
+        ]
+    codes = [text for text in numbers if is_number(text) and _is_code(text)]
+    if codes and len(numbers) < len(others) and n_numbers < n_others:
+        return [
+            f"a number among grades that are text: {_shown(codes)} "
+            f"({stands(codes[0])}); if that is missing, {_missing_option(codes)}"
+        ]
+    return []

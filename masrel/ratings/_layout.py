@@ -74,6 +74,8 @@ def find_layout(sheet: Sheet, options: LayoutOptions) -> Layout:
         kind: Kind = "counts" if options.counts else "table"
         return _wide(sheet, kind, options, taken, session=None, by=by)
     is_wide = bool(options.raters) or options.no_item
+    # the corner of a transposed table names its rows, which are now its columns
+    is_wide |= sheet.is_transposed and not (options.rater or options.grade)
     if not is_wide:
         columns = _long(sheet, options, taken)
         if columns is not None:
@@ -135,12 +137,34 @@ def _resolved(sheet: Sheet, options: LayoutOptions) -> LayoutOptions:
         name: str | None = getattr(options, role)
         if name is not None and name not in sheet.header:
             raise unknown_column(sheet, f"--{role}", name)
-    return replace(
+    options = replace(
         options,
         item=resolve_names("--item", options.item, sheet),
         raters=resolve_names("--raters", options.raters, sheet),
         ignore=resolve_names("--ignore", options.ignore, sheet),
     )
+    _refuse_two_roles(sheet, options)
+    return options
+
+
+def _refuse_two_roles(sheet: Sheet, options: LayoutOptions) -> None:
+    # a column that is named twice; groups may be sessions, or part of the items' names
+    named = [(name, "--raters") for name in options.raters]
+    named += [(name, "--ignore") for name in options.ignore]
+    named += [(name, "--item") for name in options.item]
+    for role in ("rater", "grade", "session", "by"):
+        name: str | None = getattr(options, role)
+        if name is not None:
+            named.append((name, f"--{role}"))
+    allowed = {"--item", "--session", "--by", "--rater"}
+    first: dict[str, str] = {}
+    for name, option in named:
+        other = first.setdefault(name, option)
+        if (name, option) == (name, other) and named.count((name, option)) == 1:
+            continue
+        if not ("--by" in (option, other) and {option, other} <= allowed):
+            both = option if other == option else f"{other}, {option}"
+            raise sheet.error(f"{both}: needed each column once, got {name!r} twice")
 
 
 def _role(sheet: Sheet, role: str, name: str | None, taken: set[int]) -> int | None:
@@ -202,7 +226,7 @@ def _long(
         raise sheet.error(
             f"{sheet.line_of(0)}: looks like one row a rating ({known}): needs "
             f"{options_needed}, {_listed(sheet)}; if its columns are raters, --raters "
-            "names them"
+            "names them, if they are items, --transpose"
         )
     rater, grade = roles["rater"], roles["grade"]
     if rater is None or grade is None or len({*item, rater, grade}) < len(item) + 2:

@@ -129,9 +129,10 @@ def without_repeats(
         return triples, parts, scale, 0
     if repeated == "error":
         raise _repeats(sheet, layout, triples, key, int(first[np.argmax(freq > 1)]))
-    if repeated == "last":
-        first = len(key) - 1 - np.unique(key[::-1], return_index=True)[1]
-    chosen = np.sort(first)
+    # grades before missing ones, so that none is lost to an empty cell
+    order = np.arange(len(key))[:: -1 if repeated == "last" else 1]
+    order = order[np.argsort(triples.grade[order] < 0, kind="stable")]
+    chosen = np.sort(order[np.unique(key[order], return_index=True)[1]])
     if repeated == "mean":
         triples, scale = _means(sheet, triples, of_key, len(keys), scale)
     return triples[chosen], parts[chosen], scale, n_repeated
@@ -156,7 +157,11 @@ def _repeats(
             if 1 < len(texts) < len(sheet.cells) and len(np.unique(full)) == len(key):
                 apart.append(name)
     hint = f" (--by {apart[0]!r} would)" if apart else ""
-    guess = ", --no-item says that no column names items" * layout.is_item_guessed
+    if layout.kind == "wide":
+        guess = ", --rater and --grade name the columns of one row a rating"
+    else:
+        guess = ""
+    guess += ", --no-item says that no column names items" * layout.is_item_guessed
     return sheet.error(
         f"{lines}: {rater!r} graded {item!r} more than once: --by or --session names a "
         f"column that tells such ratings apart{hint}, --repeated first, last or mean "

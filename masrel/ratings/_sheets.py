@@ -12,10 +12,10 @@ import lzma
 import re
 import sys
 import zipfile
+import zlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -35,6 +35,22 @@ _BOMS = (
     (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
+
+_PACKED = {b"\x1f\x8b": ".gz", b"\xfd7zXZ\0": ".xz"}
+"""How packed files begin."""
+
+_MARKS = {
+    b"PK\x03\x04": ".xlsx, .ods or .zip",
+    b"\xd0\xcf\x11\xe0": ".xls",
+    b"PAR1": ".parquet",
+    b"ARROW1": ".feather",
+    b"$FL": ".sav or .zsav",
+    b"<stata_dta>": ".dta",
+    b"BZh": ".bz2, which is not read",
+    b"(\xb5/\xfd": ".zst, which is not read",
+    b"%PDF": ".pdf, which is not read",
+}
+"""How files begin that are no text, and what their names end in."""
 
 TEXT_FORMATS = {".csv": "CSV", ".tsv": "TSV", ".txt": "text", ".dat": "text"}
 _TYPED_FORMATS = (
@@ -68,6 +84,7 @@ class Sheet:
     facts: dict[str, str | None]  # format, and delimiter, encoding or sheet
     dropped: dict[str, int]  # why rows are left out, and how many
     has_header: bool = True
+    is_transposed: bool = False  # whether rows and columns are exchanged
     is_simulated: bool = False  # whether a comment at its head says so
     line_of: Callable[[int], str]  # number of a record to where it stands
 
@@ -106,7 +123,7 @@ def read_sheet(path: Path | str, options: SheetOptions) -> Sheet:
     if options.transpose:
         records, line_of = records.T.reset_index(drop=True), _column_number
     sheet = _with_header(name, sha256, records, facts, options, line_of)
-    return replace(sheet, is_simulated=simulated)
+    return replace(sheet, is_simulated=simulated, is_transposed=options.transpose)
 
 
 def _bytes_of(path: Path | str) -> bytes:
@@ -123,40 +140,51 @@ def _bytes_of(path: Path | str) -> bytes:
 def _unpacked(name: str, data: bytes) -> tuple[str, bytes]:
     # what is in a packed file, by its ending: the name without it, and the bytes
     stem, ending = name.removesuffix(Path(name).suffix), Path(name).suffix.lower()
+    packed = next((e for mark, e in _PACKED.items() if data.startswith(mark)), None)
+    ending = packed or ending  # a pipe has no ending
+    stem = stem if name.lower().endswith(ending) else name
     try:
         if ending == ".gz":
             return stem, gzip.decompress(data)
         if ending == ".xz":
             return stem, lzma.decompress(data)
         if ending == ".zip":
-            with zipfile.ZipFile(io.BytesIO(data)) as packed:
-                members = [m for m in packed.namelist() if not m.endswith("/")]
+            with zipfile.ZipFile(io.BytesIO(data)) as archive:
+                members = [m for m in archive.namelist() if not m.endswith("/")]
                 if len(members) != 1:
                     raise RatingsError(
                         f"{name}: needed one file in it, got {len(members)}: "
                         f"{', '.join(members[:5])}"
                     )
-                return members[0], packed.read(members[0])
-    except (OSError, EOFError, lzma.LZMAError, zipfile.BadZipFile) as error:
-        raise RatingsError(f"{name}: is damaged, or no {ending} file") from error
+                return members[0], archive.read(members[0])
+    except (
+        *(OSError, EOFError, zlib.error, lzma.LZMAError, zipfile.BadZipFile),
+        *(RuntimeError, NotImplementedError),  # encrypted, packed in another way
+    ) as error:
+        raise RatingsError(
+            f"{name}: is damaged, or no {ending} file ({error})"
+        ) from error
     return name, data
 
 
 def _decoded(name: str, data: bytes, encoding: str | None) -> str:
     marked = next((e for bom, e in _BOMS if data.startswith(bom)), None)
     encoding = encoding or marked or "utf-8"
+    for mark, ending in _MARKS.items():
+        if data.startswith(mark):
+            raise RatingsError(f"{name}: needed text, got a file of the kind {ending}")
     try:
         text = data.decode("utf-8-sig" if encoding == "utf-8" else encoding)
-    except LookupError as error:
-        raise ParameterError(
-            f"--encoding: there is none called {encoding!r}"
-        ) from error
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         likely = "utf-16" if 0 in data[:100] else "cp1252 or latin-1"
         raise RatingsError(
             f"{name}: line {line}: needed {encoding} text, got the byte "
             f"0x{data[error.start]:02x}; --encoding {likely} may be right"
+        ) from error
+    except (LookupError, ValueError) as error:
+        raise ParameterError(
+            f"--encoding: there is none called {encoding!r}"
         ) from error
     if "\0" in text:
         line = text.count("\n", 0, text.index("\0")) + 1
@@ -170,7 +198,7 @@ def _text_records(
 ) -> tuple[pd.DataFrame, dict[str, str | None], Callable[[int], str], bool]:
     # -> records with the header as the first, what the format is, where records are,
     # whether a comment labels them simulated
-    declared = re.match(r"sep=(.)\r?\n", text)
+    declared = re.match(r'"?sep=(.)"?(\r\n|\n|\r)', text, re.IGNORECASE)
     start = declared.end() if declared else 0
     delimiter = options.delimiter or (declared.group(1) if declared else None)
     comments, start = _comments(name, text, start, delimiter)
@@ -180,6 +208,14 @@ def _text_records(
     delimiter = delimiter or _delimiter_of(name, body)
     n_before = text.count("\n", 0, start)
     lines = _Lines(name, body, delimiter, n_before)
+    if lines.width < 2:
+        first = body.splitlines()[0]
+        raise RatingsError(
+            f"{name}: line {n_before + 1}: needed cells with the separator "
+            f"{_DELIMITERS.get(delimiter, repr(delimiter))}, got {first.strip()[:60]!r}"
+        )
+    if not options.no_header:
+        lines.refuse_second_header()
     records = lines.frame()
     facts: dict[str, str | None] = {
         "format": kind,
@@ -235,12 +271,17 @@ def _n_cells(line: str, delimiter: str) -> int:
 def _rows(text: str, delimiter: str) -> Iterator[list[str]]:
     # records as lists of cells, blank ones too
     if delimiter == _BLANKS:
-        for line in text.splitlines():
-            yield re.findall(r'"(?:[^"]|"")*"|\S+', line)
+        for line in re.split(r"\r\n|\n|\r", text):
+            yield re.findall(r'"(?:[^"]|"")*"|[^ \t]+', line)
     else:
         lines = io.StringIO(text, newline="")
         blanks = delimiter != "\t"
+        _allow_long_cells(text)
         yield from csv.reader(lines, delimiter=delimiter, skipinitialspace=blanks)
+
+
+def _allow_long_cells(text: str) -> None:
+    csv.field_size_limit(max(csv.field_size_limit(), len(text)))
 
 
 def _delimiter_of(name: str, body: str) -> str:
@@ -326,8 +367,9 @@ class _Lines:
         blanks = self._delimiter != "\t"
         reader = csv.reader(lines, delimiter=self._delimiter, skipinitialspace=blanks)
         begins = 1
+        _allow_long_cells(self._body)
         for record in reader:
-            if record and (len(record) > 1 or record[0].strip()):
+            if record and (len(record) > 1 or record[0].strip(" \t")):
                 yield begins + self._n_before, record
             begins = reader.line_num + 1
 
@@ -338,6 +380,21 @@ class _Lines:
                 return f"line {line}"
         return "the end"
 
+    def refuse_second_header(self) -> None:
+        """Refuse files put one below the other, names and all."""
+        first = self._body.split("\n", 1)[0].rstrip("\r")
+        place = self._body.find(f"\n{first}", len(first)) + 1
+        if place and self._body[place + len(first) : place + len(first) + 1] in (
+            "",
+            "\r",
+            "\n",
+        ):
+            line = self._n_before + self._body.count("\n", 0, place) + 1
+            raise RatingsError(
+                f"{self._name}: line {line}: holds the names of the columns once more: "
+                "delete it"
+            )
+
     def frame(self) -> pd.DataFrame:
         """Return the records as cells of text, that of the names first."""
         if self.width > _MANY_COLUMNS:  # pandas takes its time for every column
@@ -345,7 +402,7 @@ class _Lines:
             self._check_widths()
             if self.has_row_names:
                 rows[0] = [*rows[0], ""]
-            return pd.DataFrame(np.array(rows, dtype=object), dtype=object)
+            return self._named(pd.DataFrame(np.array(rows, dtype=object), dtype=object))
         try:
             frame = pd.read_csv(
                 io.BytesIO(self._body.encode()),
@@ -364,17 +421,35 @@ class _Lines:
             ) from error
         # pandas fills a short record up in silence, so that its last cell is empty
         last = frame[self.width - 1].to_numpy(dtype=object)
-        if (last[int(self.has_row_names) :] == "").any():
+        may_be_short = (last[int(self.has_row_names) :] == "").any()
+        if may_be_short and not self._is_plainly_full(len(frame)):
             self._check_widths()
+        return self._named(frame)
+
+    def _is_plainly_full(self, n_records: int) -> bool:
+        # whether counting separators shows that no record is short, as none is long
+        n_separators = n_records * (self.width - 1) - self.has_row_names
+        return (
+            self._delimiter != _BLANKS
+            and '"' not in self._body
+            and self._body.count(self._delimiter) == n_separators
+        )
+
+    def _named(self, frame: pd.DataFrame) -> pd.DataFrame:
+        # the names above their columns: that of the row names is empty, and first
+        last = frame.iloc[:, -1].to_numpy(dtype=object)
+        if self.has_row_names and not (last[1:] == "").all():
+            frame.iloc[0] = ["", *frame.iloc[0].tolist()[:-1]]
         return frame
 
     def _check_widths(self) -> None:
         # refuse the first record that has another number of cells
         for place, (line, record) in enumerate(self._records()):
             if len(record) != self.width and (place or not self.has_row_names):
+                shown = ", ".join(record)[:60]
                 raise RatingsError(
                     f"{self._name}: line {line}: needed {self.width} cells, as the "
-                    f"first line has, got {len(record)}: {', '.join(record)[:60]}"
+                    f"first line has, got {len(record)}: {shown!r}"
                 )
 
 
@@ -397,7 +472,7 @@ def _with_header(
     if options.no_header:
         header = tuple(str(n) for n in range(1, records.shape[1] + 1))
     else:
-        header = _names(records)
+        header = tuple(str(cell).strip() for cell in records.iloc[0].tolist())
         records = records.iloc[1:]
     blank = _blank_rows(records)
     dropped = {"blank": int(blank.sum())} if blank.any() else {}
@@ -417,17 +492,6 @@ def _with_header(
         has_header=not options.no_header,
         line_of=line_of,
     )
-
-
-def _names(records: pd.DataFrame) -> tuple[str, ...]:
-    cells: list[Any] = records.iloc[0].tolist()
-    names = [str(cell).strip() for cell in cells]
-    if len(names) > 1 and not names[-1] and len(records) > 1:
-        # R's write.table: names of all columns but that of the row names, which is
-        # the first; pandas then has put the names one place to the left
-        if not (records.iloc[1:, -1] == "").all():
-            names = ["", *names[:-1]]
-    return tuple(names)
 
 
 def _check_names(
@@ -454,7 +518,9 @@ def _blank_rows(records: pd.DataFrame) -> NDArray[np.bool_]:
     blank = np.zeros(len(records), dtype=bool)
     if not len(records):
         return blank
-    places = np.flatnonzero(records.iloc[:, 0].to_numpy(dtype=object) == "")
+    places = np.flatnonzero(records.iloc[:, -1].to_numpy(dtype=object) == "")
+    first = records.iloc[:, 0].to_numpy(dtype=object)[places]
+    places = places[[not cell.strip() for cell in first]]
     cells = records.iloc[places].to_numpy(dtype=object)
     blank[places] = [not any(cell.strip() for cell in row) for row in cells]
     return blank

@@ -19,6 +19,7 @@ from masrel.agreement._counts import count_table, take_counts
 from masrel.errors import ParameterError, RatingsError
 from masrel.ratings._doubts import (
     doubt_columns,
+    doubt_counts,
     doubt_long,
     doubt_names,
     without_second_header,
@@ -198,6 +199,7 @@ def _rated(
     triples, grades, doubts = read(sheet, layout, options)
     n_missing = int((triples.grade < 0).sum())
     part_of, names = part_codes(sheet, layout, triples.row)
+    doubts += doubt_names("groups", sorted({group or "" for group, _ in names}))
     triples, part_of, scale, n_repeated = without_repeats(
         sheet, layout, triples, part_of, grades.scale, repeated
     )
@@ -319,6 +321,9 @@ def _counted(
     # of a table of counts, or a contingency table
     names = [sheet.header[place] for place in layout.raters]
     table = _whole_numbers(sheet, layout)
+    warnings = [*warnings, *doubt_counts(sheet, layout, table)]
+    if not table.any():
+        raise sheet.error(f"--{layout.kind}: needed at least one rating, got none")
     order = _order_of(sheet, names, options)
     scale = Scale(
         name="observed" if options.categories is None else "declared",
@@ -326,6 +331,7 @@ def _counted(
     )
     grades = Grades(scale=scale, codes=np.arange(len(names)))
     part_of, parts_named = part_codes(sheet, layout, np.arange(len(table)))
+    warnings += doubt_names("groups", sorted({group or "" for group, _ in parts_named}))
     n_raters = 2
     if layout.kind == "table":
         rows = _table_rows(sheet, layout, names)
@@ -390,7 +396,7 @@ def _table_rows(sheet: Sheet, layout: Layout, names: list[str]) -> list[str]:
     if len(sheet.cells) != len(names):
         raise sheet.error(
             f"--table: needed as many rows as categories, {len(names)}, got "
-            f"{len(sheet.cells)}"
+            f"{len(sheet.cells)}; --no-item if no column names the rows"
         )
     if not layout.item:
         return names
@@ -398,7 +404,7 @@ def _table_rows(sheet: Sheet, layout: Layout, names: list[str]) -> list[str]:
     if set(rows) != set(names):
         raise sheet.error(
             f"--table: needed rows and columns of the same categories, got "
-            f"{', '.join(rows)} and {', '.join(names)}"
+            f"{', '.join(map(repr, rows))} and {', '.join(map(repr, names))}"
         )
     return rows
 
