@@ -15,7 +15,9 @@ import zipfile
 import zlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -69,6 +71,7 @@ class SheetOptions:
     no_header: bool = False  # whether the first line is a row like the others
     transpose: bool = False  # whether raters are rows
     source: str | None = None  # program whose export it is
+    grade: str | None = None  # of such an export: the field that is the grade
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,7 +84,8 @@ class Sheet:
     # cells as text, one column each, numbered as the header; the index is the number
     # of the record in the file, from 0
     cells: pd.DataFrame = field(repr=False)
-    facts: dict[str, str | None]  # format, and delimiter, encoding or sheet
+    # format; delimiter, encoding or sheet; what codes are called
+    facts: dict[str, Any]
     dropped: dict[str, int]  # why rows are left out, and how many
     has_header: bool = True
     is_transposed: bool = False  # whether rows and columns are exchanged
@@ -108,14 +112,16 @@ def read_sheet(path: Path | str, options: SheetOptions) -> Sheet:
     if not data:
         raise RatingsError(f"{name}: needed a header and rows, the file is empty")
     sha256 = hashlib.sha256(data).hexdigest()
-    inner, data = _unpacked(name, data)
+    inner, data = _unpacked(name, data, is_export=options.source is not None)
     ending = Path(inner).suffix.lower()
+    left_out: dict[str, int] = {}
     if options.source is not None or ending in _TYPED_FORMATS:
         from masrel.ratings._typed_files import read_typed
 
-        records, facts = read_typed(name, ending, data, options)
-        line_of: Callable[[int], str] = _row_number
-        simulated = False
+        records, facts, left_out = read_typed(name, ending, data, options)
+        first = int(records.index[0])
+        line_of: Callable[[int], str] = partial(_row_number, first)
+        records, simulated = records.reset_index(drop=True), False
     else:
         text = _decoded(name, data, options.encoding)
         kind = TEXT_FORMATS.get(ending, "text")
@@ -123,7 +129,12 @@ def read_sheet(path: Path | str, options: SheetOptions) -> Sheet:
     if options.transpose:
         records, line_of = records.T.reset_index(drop=True), _column_number
     sheet = _with_header(name, sha256, records, facts, options, line_of)
-    return replace(sheet, is_simulated=simulated, is_transposed=options.transpose)
+    return replace(
+        sheet,
+        is_simulated=simulated,
+        is_transposed=options.transpose,
+        dropped={**left_out, **sheet.dropped},
+    )
 
 
 def _bytes_of(path: Path | str) -> bytes:
@@ -137,7 +148,7 @@ def _bytes_of(path: Path | str) -> bytes:
     return path.read_bytes()
 
 
-def _unpacked(name: str, data: bytes) -> tuple[str, bytes]:
+def _unpacked(name: str, data: bytes, *, is_export: bool) -> tuple[str, bytes]:
     # what is in a packed file, by its ending: the name without it, and the bytes
     stem, ending = name.removesuffix(Path(name).suffix), Path(name).suffix.lower()
     packed = next((e for mark, e in _PACKED.items() if data.startswith(mark)), None)
@@ -151,6 +162,8 @@ def _unpacked(name: str, data: bytes) -> tuple[str, bytes]:
         if ending == ".zip":
             with zipfile.ZipFile(io.BytesIO(data)) as archive:
                 members = [m for m in archive.namelist() if not m.endswith("/")]
+                if len(members) > 1 and is_export:  # such as a file of each annotator
+                    return f"{stem}.zip", data
                 if len(members) != 1:
                     raise RatingsError(
                         f"{name}: needed one file in it, got {len(members)}: "
@@ -195,7 +208,7 @@ def _decoded(name: str, data: bytes, encoding: str | None) -> str:
 
 def _text_records(
     name: str, text: str, kind: str, options: SheetOptions
-) -> tuple[pd.DataFrame, dict[str, str | None], Callable[[int], str], bool]:
+) -> tuple[pd.DataFrame, dict[str, Any], Callable[[int], str], bool]:
     # -> records with the header as the first, what the format is, where records are,
     # whether a comment labels them simulated
     declared = re.match(r'"?sep=(.)"?(\r\n|\n|\r)', text, re.IGNORECASE)
@@ -217,7 +230,7 @@ def _text_records(
     if not options.no_header:
         lines.refuse_second_header()
     records = lines.frame()
-    facts: dict[str, str | None] = {
+    facts: dict[str, Any] = {
         "format": kind,
         "delimiter": _DELIMITERS.get(delimiter, delimiter),
         "encoding": options.encoding or "utf-8",
@@ -453,8 +466,8 @@ class _Lines:
                 )
 
 
-def _row_number(number: int) -> str:
-    return f"row {number + 1}"
+def _row_number(first: int, number: int) -> str:
+    return f"row {first + number + 1}"
 
 
 def _column_number(number: int) -> str:
@@ -465,7 +478,7 @@ def _with_header(
     name: str,
     sha256: str,
     records: pd.DataFrame,
-    facts: dict[str, str | None],
+    facts: dict[str, Any],
     options: SheetOptions,
     line_of: Callable[[int], str],
 ) -> Sheet:

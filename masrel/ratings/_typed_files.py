@@ -1,21 +1,28 @@
 """Files whose cells have types (workbooks, Parquet, JSON, SPSS …) as cells of text."""
 
+import csv
 import io
 import json
 import math
 import tempfile
+import zipfile
 from collections.abc import Callable
+from datetime import date, datetime
+from decimal import Decimal
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
-from masrel.errors import ParameterError, RatingsError
+from masrel.errors import RatingsError
 from masrel.ratings._sheets import SheetOptions
 
 _WORKBOOKS = (".xlsx", ".xlsm", ".xls", ".ods")
+_ARROW = {".parquet": "pyarrow.parquet", ".feather": "pyarrow.feather"}
 _PYREADSTAT = {
     ".sav": "read_sav",
     ".zsav": "read_sav",
@@ -27,85 +34,170 @@ _PYREADSTAT = {
 
 
 def read_typed(
-    name: str, ending: str, data: bytes, options: SheetOptions
-) -> tuple[pd.DataFrame, dict[str, str | None]]:
-    """Return the records of a file, names first, and what its format is."""
-    facts: dict[str, str | None] = {"format": ending.removeprefix(".")}
+    name: str, suffix: str, data: bytes, options: SheetOptions
+) -> tuple[pd.DataFrame, dict[str, Any], dict[str, int]]:
+    """Return the records of a file, names first, its facts, and what it leaves out."""
+    # the index of the records is where they stand in the file, from 0
+    facts: dict[str, Any] = {"format": suffix.removeprefix(".")}
     if options.source is not None:
         from masrel.ratings._exports import read_export
 
-        frame = read_export(name, options.source, _json_values(name, ending, data))
-        facts = {"format": f"{options.source} export"}
-    elif ending in _WORKBOOKS:
-        frame, facts["sheet"] = _workbook(name, data, options)
-    elif ending in (".json", ".jsonl"):
-        frame = _objects(name, _json_values(name, ending, data))
-    elif ending in (".parquet", ".feather"):
-        _require(name, "pyarrow")
-        read = pd.read_parquet if ending == ".parquet" else pd.read_feather
-        frame = _read(name, ending, lambda: read(io.BytesIO(data)))
-        if frame.index.name is not None:
-            frame = frame.reset_index()
+        files = _json_files(name, suffix, data)
+        export = read_export(name, options.source, files, options.grade)
+        return _records(name, export.frame), export.facts, export.dropped
+    if suffix in _WORKBOOKS:
+        records, facts["sheet"] = _workbook(name, suffix, data, options)
+        return records, facts, {}
+    if suffix in (".json", ".jsonl"):
+        frame = _objects(name, _json_values(name, suffix, data))
+    elif suffix in _ARROW:
+        frame = _arrow(name, suffix, data)
     else:
-        frame = _statistical(name, ending, data)
-    return _records(frame, is_sheet=ending in _WORKBOOKS), facts
+        frame, labels = _statistical(name, suffix, data, options.encoding)
+        if labels:
+            facts["labels"] = labels
+    return _records(name, frame), facts, {}
 
 
-def _require(name: str, module: str) -> None:
-    if find_spec(module) is None:
+def _library(name: str, module: str) -> Any:
+    # a library that not everybody needs
+    if find_spec(module.partition(".")[0]) is None:
         raise RatingsError(
-            f"{name}: reading it needs {module}: pip install 'masrel[files]'"
+            f"{name}: reading it needs {module.partition('.')[0]}: "
+            "pip install 'masrel[files]'"
         )
+    return import_module(module)
 
 
-def _read(name: str, ending: str, read: Callable[[], Any]) -> Any:
+def _read(
+    name: str, suffix: str, read: Callable[[], Any], *errors: type[Exception]
+) -> Any:
     # Readers of these formats raise what they like for bytes that are not theirs.
+    kinds: tuple[type[Exception], ...] = (ValueError, TypeError, KeyError, *errors)
+    kinds += (OSError, RuntimeError)
     try:
         return read()
-    except (ValueError, OSError, KeyError, RuntimeError, TypeError) as error:
-        first = (str(error).strip().splitlines() or ["no reason"])[0]
-        raise RatingsError(f"{name}: is no {ending} file ({first})") from error
+    except kinds as error:
+        lines = str(error).strip().splitlines() or [type(error).__name__]
+        raise RatingsError(
+            f"{name}: is damaged, or no {suffix} file ({lines[0][:200].rstrip('. ')})"
+        ) from error
 
 
 def _workbook(
-    name: str, data: bytes, options: SheetOptions
+    name: str, suffix: str, data: bytes, options: SheetOptions
 ) -> tuple[pd.DataFrame, str]:
-    _require(name, "python_calamine")
+    calamine = _library(name, "python_calamine")
     book = _read(
-        name, "workbook", lambda: pd.ExcelFile(io.BytesIO(data), engine="calamine")
+        name,
+        suffix,
+        lambda: calamine.CalamineWorkbook.from_filelike(io.BytesIO(data)),
+        calamine.CalamineError,
     )
-    sheets = [str(sheet) for sheet in book.sheet_names]
-    sheet = options.sheet or (sheets[0] if len(sheets) == 1 else None)
-    if sheet is None or sheet not in sheets:
-        got = "" if sheet is None else f", got {sheet!r}"
-        raise RatingsError(
-            f"{name}: needs --sheet with one of its sheets, {', '.join(sheets)}{got}"
-        )
-    frame: pd.DataFrame = book.parse(
-        sheet, header=None, dtype=object, keep_default_na=False, na_values=[]
-    )
-    if frame.empty:
+    sheet, cells = _sheet_of(name, suffix, book, options.sheet, calamine.CalamineError)
+    if cells is None:
         raise RatingsError(f"{name}: sheet {sheet}: needed a header and rows, got none")
-    return frame, sheet
+    rows = cells.to_python(skip_empty_area=True)
+    texts = _cell_texts(f"{name}: sheet {sheet}", pd.DataFrame(rows, dtype=object))
+    first = cells.start[0]  # rows above the table are blank
+    records = pd.DataFrame(
+        texts, dtype=object, index=pd.RangeIndex(first, first + len(rows))
+    )
+    # a column without name and cells is a space between others
+    records = records.loc[:, (records != "").any(axis=0)]
+    return records.set_axis(range(records.shape[1]), axis=1), sheet
 
 
-def _json_values(name: str, ending: str, data: bytes) -> list[Any]:
+def _sheet_of(
+    name: str, suffix: str, book: Any, chosen: str | None, error: type[Exception]
+) -> tuple[str, Any]:
+    # -> the sheet that is meant, and its cells or None where it has none
+    names = list(map(str, book.sheet_names))
+
+    def cells_of(sheet: str) -> Any:
+        cells = _read(name, suffix, lambda: book.get_sheet_by_name(sheet), error)
+        return cells if cells.start is not None else None
+
+    if chosen is not None:
+        if chosen not in names:
+            raise RatingsError(
+                f"{name}: --sheet: there is no sheet {chosen!r}, but {', '.join(names)}"
+            )
+        return chosen, cells_of(chosen)
+    filled = {sheet: cells for sheet in names if (cells := cells_of(sheet)) is not None}
+    if len(filled) > 1:
+        raise RatingsError(
+            f"{name}: needs --sheet with one of its sheets, {', '.join(filled)}"
+        )
+    return next(iter(filled.items()), (", ".join(names), None))
+
+
+def _json_files(name: str, suffix: str, data: bytes) -> dict[str, list[Any]]:
+    # values of an export by the name of the file in it; "" where it is one file
+    if suffix != ".zip":
+        return {"": _json_values(name, suffix, data)}
+    with zipfile.ZipFile(io.BytesIO(data)) as packed:
+        members = [m for m in packed.namelist() if not m.endswith("/")]
+        return {
+            Path(member).stem: _json_values(
+                f"{name}: {member}", Path(member).suffix.lower(), packed.read(member)
+            )
+            for member in members
+        }
+
+
+def _json_values(name: str, suffix: str, data: bytes) -> list[Any]:
+    # values of JSON, of JSON lines whatever the name ends with, or rows of a CSV file
     try:
         text = data.decode("utf-8-sig")
-        if ending == ".jsonl":
-            return [json.loads(line) for line in text.splitlines() if line.strip()]
-        values = json.loads(text)
     except UnicodeDecodeError as error:
-        raise RatingsError(f"{name}: needed JSON in UTF-8 ({error})") from error
-    except json.JSONDecodeError as error:
-        raise RatingsError(
-            f"{name}: is no JSON: line {error.lineno}: {error.msg}"
-        ) from error
-    return values if isinstance(values, list) else [values]
+        raise RatingsError(f"{name}: needed text in UTF-8 ({error})") from error
+    if suffix == ".csv":
+        return list(csv.DictReader(io.StringIO(text, newline="")))
+    if suffix != ".jsonl":
+        try:
+            values = _parsed(name, text)
+        except json.JSONDecodeError as error:
+            if not error.msg.startswith("Extra data"):
+                raise RatingsError(
+                    f"{name}: line {error.lineno}: is no JSON: {error.msg}"
+                ) from error
+        else:
+            return values if isinstance(values, list) else [values]
+    values = []
+    for number, line in enumerate(text.split("\n"), start=1):
+        try:
+            if line.strip():
+                values.append(_parsed(f"{name}: line {number}", line))
+        except json.JSONDecodeError as error:
+            raise RatingsError(
+                f"{name}: line {number}: is no JSON: {error.msg}"
+            ) from error
+    return values
+
+
+def _parsed(name: str, text: str) -> Any:
+    def pairs(items: list[tuple[str, Any]]) -> dict[str, Any]:
+        value = dict(items)
+        if len(value) < len(items):  # the json module would keep the last in silence
+            keys = [key for key, _ in items]
+            double = next(key for key in keys if keys.count(key) > 1)
+            raise RatingsError(
+                f"{name}: needed different keys in an object, {double!r} is there twice"
+            )
+        return value
+
+    return json.loads(text, object_pairs_hook=pairs)
 
 
 def _objects(name: str, values: list[Any]) -> pd.DataFrame:
-    # a list of objects, one a row
+    # a list of objects, one a row; or one object of columns, as pandas and R write
+    if len(values) == 1 and isinstance(values[0], dict):
+        columns = list(values[0].values())
+        if all(isinstance(c, dict) and c.keys() == columns[0].keys() for c in columns):
+            return pd.DataFrame(values[0], dtype=object).reset_index(drop=True)
+        if all(isinstance(c, list) and len(c) == len(columns[0]) for c in columns):
+            return pd.DataFrame(values[0], dtype=object)
     if not values or not all(isinstance(value, dict) for value in values):
         raise RatingsError(
             f"{name}: needed a JSON list of objects, one a row; --from reads exports "
@@ -121,53 +213,95 @@ def _objects(name: str, values: list[Any]) -> pd.DataFrame:
     return pd.DataFrame(values, dtype=object)
 
 
-def _statistical(name: str, ending: str, data: bytes) -> pd.DataFrame:
-    if ending not in _PYREADSTAT:
-        raise ParameterError(f"--from: does not read {ending} files")
-    _require(name, "pyreadstat")
-    import pyreadstat
+def _arrow(name: str, suffix: str, data: bytes) -> pd.DataFrame:
+    library = _library(name, _ARROW[suffix])
 
-    read = getattr(pyreadstat, _PYREADSTAT[ending])
+    def read() -> pd.DataFrame:
+        table = library.read_table(io.BytesIO(data))
+        # whole numbers beside missing ones stay whole, however many digits they have
+        frame: pd.DataFrame = table.to_pandas(integer_object_nulls=True)
+        return frame
+
+    frame: pd.DataFrame = _read(name, suffix, read)
+    if isinstance(frame.index, pd.RangeIndex) and frame.index.name is None:
+        return frame
+    names = [str(name or "") for name in frame.index.names]  # of rows, as items have
+    return frame.reset_index(names=names, allow_duplicates=True)
+
+
+def _statistical(
+    name: str, suffix: str, data: bytes, encoding: str | None
+) -> tuple[pd.DataFrame, dict[str, dict[str, str]]]:
+    # -> the table, and what its codes are called, column by column
+    library = _library(name, "pyreadstat")
+    read = getattr(library, _PYREADSTAT[suffix])
     with tempfile.TemporaryDirectory() as folder:  # it reads no bytes, but files
-        file = Path(folder) / f"data{ending}"
+        file = Path(folder) / f"data{suffix}"
         file.write_bytes(data)
-        try:
-            frame, _ = read(str(file))
-        except (pyreadstat.ReadstatError, pyreadstat.PyreadstatError) as error:
-            raise RatingsError(f"{name}: is no {ending} file ({error})") from error
-    table: pd.DataFrame = frame
-    return table
-
-
-def _records(frame: pd.DataFrame, *, is_sheet: bool) -> pd.DataFrame:
-    # cells as text, the names of the columns as the first row
-    columns = [_texts(frame.iloc[:, k]) for k in range(frame.shape[1])]
-    rows = np.empty((len(frame), frame.shape[1]), dtype=object)
-    for position, column in enumerate(columns):
-        rows[:, position] = column
-    if not is_sheet:  # a workbook has its names in its first row
-        rows = np.vstack(
-            [np.array([list(map(str, frame.columns))], dtype=object), rows]
+        frame, about = _read(
+            name,
+            suffix,
+            lambda: read(str(file), encoding=encoding),
+            library.ReadstatError,
+            library.PyreadstatError,
         )
-    return pd.DataFrame(rows, dtype=object)
+    labels = {
+        str(column): {_text(code): str(label) for code, label in codes.items()}
+        for column, codes in about.variable_value_labels.items()
+    }
+    return frame, labels
 
 
-def _texts(column: "pd.Series[Any]") -> Any:
+def _records(name: str, frame: pd.DataFrame) -> pd.DataFrame:
+    # cells as text, the names of the columns as the first row
+    header = np.array([list(map(str, frame.columns))], dtype=object)
+    return pd.DataFrame(np.vstack([header, _cell_texts(name, frame)]), dtype=object)
+
+
+def _cell_texts(name: str, frame: pd.DataFrame) -> NDArray[np.object_]:
+    # -> (n_rows, n_columns)
+    texts = np.empty(frame.shape, dtype=object)
+    for place in range(frame.shape[1]):
+        column = frame.iloc[:, place]
+        where = f"{name}: column {str(frame.columns[place])!r}"
+        texts[:, place] = _texts(where, column)
+    return texts
+
+
+def _texts(where: str, column: "pd.Series[Any]") -> NDArray[np.object_]:
+    # (n_rows,) of anything -> (n_rows,) of text, empty where a value is missing
+    if column.dtype == object:
+        kinds = set(map(type, column))
+        nested = {list, dict, set, np.ndarray} & kinds
+        if nested:
+            raise RatingsError(
+                f"{where}: needed text or numbers, got a {nested.pop().__name__}"
+            )
+        if {bool, np.bool_} & kinds and len(kinds) > 1:
+            # True equals 1 in Python, and is another grade
+            is_missing = column.isna().to_numpy()
+            cells = [
+                "" if m else _text(v) for m, v in zip(is_missing, column, strict=True)
+            ]
+            return np.array(cells, dtype=object)
     # every value that occurs is written once
-    codes, values = pd.factorize(column.astype(object), use_na_sentinel=True)
+    codes, values = pd.factorize(column, use_na_sentinel=True)
     texts = np.array([*map(_text, values), ""], dtype=object)
-    return texts[codes]  # a missing value is -1, the empty text
+    column_texts: NDArray[np.object_] = texts[codes]  # -1, a missing value, is the last
+    return column_texts
 
 
-def _text(value: object) -> str:
-    # 1.0 of a column of numbers is the grade 1
+def _text(value: Any) -> str:
+    # 1.0 of a column of numbers is the grade 1; other floats have their shortest digits
     if isinstance(value, bool | np.bool_):
         return str(value).lower()
-    if isinstance(value, float | np.floating):
-        number = float(value)
-        if math.isfinite(number) and number.is_integer() and abs(number) < 2**53:
-            return str(int(number))
-        return repr(number)
+    if isinstance(value, float | np.floating | Decimal):
+        is_whole = math.isfinite(value) and value == int(value)
+        return str(int(value)) if is_whole and abs(int(value)) < 2**53 else str(value)
+    if isinstance(value, datetime) and value.timetz() != datetime.min.timetz():
+        return value.isoformat()
+    if isinstance(value, date):
+        return date(value.year, value.month, value.day).isoformat()
     if isinstance(value, bytes):
-        return value.decode("utf-8", "replace")
+        return value.decode("utf-8", "backslashreplace")
     return str(value)

@@ -160,6 +160,7 @@ def read_ratings(
         no_header=no_header,
         transpose=transpose,
         source=source,
+        grade=grade if source is not None else None,
     )
     columns = LayoutOptions(
         item=(item,) if isinstance(item, str) else tuple(item),
