@@ -37,7 +37,7 @@ class _Ratings:
         return RatingsError(f"{self.name}: {message}")
 
     def add(self, item: Any, rater: Any, grade: Any, text: Any) -> None:
-        where = f"item {item}" if item is not None else f"annotation {len(self.rows)}"
+        where = f"annotation {len(self.rows) + 1}" if item is None else f"item {item}"
         for role, value in (("item", item), ("annotator", rater)):
             if value is None or value == "":
                 raise self.error(f"{where}: needed its {role}, got none")

@@ -18,7 +18,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from masrel.errors import RatingsError
+from masrel.errors import ParameterError, RatingsError
 from masrel.ratings._sheets import SheetOptions
 
 _WORKBOOKS = (".xlsx", ".xlsm", ".xls", ".ods")
@@ -31,6 +31,7 @@ _PYREADSTAT = {
     ".sas7bdat": "read_sas7bdat",
     ".xpt": "read_xport",
 }
+_ENCODED = (".sav", ".zsav", ".dta", ".sas7bdat", ".xpt")  # pyreadstat takes theirs
 
 
 def read_typed(
@@ -39,6 +40,12 @@ def read_typed(
     """Return the records of a file, names first, its facts, and what it leaves out."""
     # the index of the records is where they stand in the file, from 0
     facts: dict[str, Any] = {"format": suffix.removeprefix(".")}
+    if options.encoding is not None and suffix not in _ENCODED:
+        raise ParameterError(
+            f"--encoding: needed a file of text, got {facts['format']}, whose is known"
+        )
+    if options.sheet is not None and suffix not in _WORKBOOKS:
+        raise ParameterError(f"--sheet: needed a workbook, got {facts['format']}")
     if options.source is not None:
         from masrel.ratings._exports import read_export
 
@@ -235,13 +242,18 @@ def _statistical(
     # -> the table, and what its codes are called, column by column
     library = _library(name, "pyreadstat")
     read = getattr(library, _PYREADSTAT[suffix])
+    text = {} if encoding is None else {"encoding": encoding}
+    if suffix == ".xpt" and len(data) % 80:
+        raise RatingsError(
+            f"{name}: is damaged, or no .xpt file (needed lines of 80 bytes)"
+        )
     with tempfile.TemporaryDirectory() as folder:  # it reads no bytes, but files
         file = Path(folder) / f"data{suffix}"
         file.write_bytes(data)
         frame, about = _read(
             name,
             suffix,
-            lambda: read(str(file), encoding=encoding),
+            lambda: read(str(file), **text),
             library.ReadstatError,
             library.PyreadstatError,
         )
@@ -286,7 +298,9 @@ def _texts(where: str, column: "pd.Series[Any]") -> NDArray[np.object_]:
             return np.array(cells, dtype=object)
     # every value that occurs is written once
     codes, values = pd.factorize(column, use_na_sentinel=True)
-    texts = np.array([*map(_text, values), ""], dtype=object)
+    # numpy's floats know their precision
+    each: Any = values.to_numpy() if values.dtype.kind == "f" else values
+    texts = np.array([*map(_text, each), ""], dtype=object)
     column_texts: NDArray[np.object_] = texts[codes]  # -1, a missing value, is the last
     return column_texts
 
