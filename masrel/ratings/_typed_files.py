@@ -141,7 +141,7 @@ def _sheet_of(
 
 def _json_files(name: str, suffix: str, data: bytes) -> dict[str, list[Any]]:
     # values of an export by the name of the file in it; "" where it is one file
-    if suffix != ".zip":
+    if not data.startswith(b"PK\3\4"):  # a pipe has no name that says .zip
         return {"": _json_values(name, suffix, data)}
     with zipfile.ZipFile(io.BytesIO(data)) as packed:
         members = [m for m in packed.namelist() if not m.endswith("/")]
