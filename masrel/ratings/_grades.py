@@ -138,20 +138,19 @@ def read_grades(
 
 def _checked(options: GradeOptions) -> GradeOptions:
     # categories and codes as cells are: without blanks around them, by one Unicode form
-    declared = options.categories and tuple(map(_plain, options.categories))
+    declared = tuple(map(_plain, options.categories or ()))
     codes = tuple(map(_plain, options.missing))
-    for grade in declared or ():
-        if not grade or (declared or ()).count(grade) > 1:
+    again = [grade for grade in dict.fromkeys(declared) if declared.count(grade) > 1]
+    if again or "" in declared:
+        what = f"repeated: {again}" if again else "got none between two commas"
+        raise ParameterError(f"--categories: needed every grade once, {what}")
+    numbers = {Decimal(grade) for grade in declared if is_number(grade)}
+    for code in codes:
+        if code in declared or (is_number(code) and Decimal(code) in numbers):
             raise ParameterError(
-                f"--categories: needed every grade once, got {grade!r} in "
-                f"{', '.join(declared or ())}"
+                f"--categories, --missing: {code!r} is a grade or missing, not both"
             )
-    both = [code for code in codes if declared and code in declared]
-    if both:
-        raise ParameterError(
-            f"--categories, --missing: {both[0]!r} is a grade or missing, not both"
-        )
-    return replace(options, categories=declared, missing=codes)
+    return replace(options, categories=declared or None, missing=codes)
 
 
 def _missing_codes(texts: Sequence[str], options: GradeOptions) -> list[str]:

@@ -395,17 +395,15 @@ class _Lines:
 
     def refuse_second_header(self) -> None:
         """Refuse files put one below the other, names and all."""
-        first = self._body.split("\n", 1)[0].rstrip("\r")
+        header = re.search(r"[^\r\n]*\S[^\r\n]*", self._body)
+        first = header.group() if header else ""
         place = self._body.find(f"\n{first}", len(first)) + 1
-        if place and self._body[place + len(first) : place + len(first) + 1] in (
-            "",
-            "\r",
-            "\n",
-        ):
+        end = place + len(first)
+        if place and self._body[end : end + 1] in ("", "\r", "\n"):
             line = self._n_before + self._body.count("\n", 0, place) + 1
             raise RatingsError(
                 f"{self._name}: line {line}: holds the names of the columns once more: "
-                "delete it"
+                "delete it; --no-header if the first line is a row like the others"
             )
 
     def frame(self) -> pd.DataFrame:

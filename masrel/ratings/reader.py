@@ -226,7 +226,7 @@ def _rated(
 def _grades_of(
     sheet: Sheet,
     cells: NDArray[np.object_],
-    n_columns: int,
+    columns: Sequence[int],
     options: GradeOptions,
 ) -> tuple[Codes, Grades]:
     # (n_rows * n_columns,) cells row by row -> the place of each in the scale
@@ -234,7 +234,8 @@ def _grades_of(
     freq = np.bincount(codes, minlength=len(texts))
 
     def where(text: int) -> str:
-        return sheet.where(int(np.argmax(codes == text)) // n_columns)
+        row, column = divmod(int(np.argmax(codes == text)), len(columns))
+        return f"{sheet.where(row)}, column {sheet.header[columns[column]]!r}"
 
     try:
         grades = read_grades(texts, freq, options, where)
@@ -250,7 +251,9 @@ def _long(
         raise ParameterError("a long table needs columns for the rater and the grade")
     item, items = _named(sheet, "item", layout.item)
     rater, raters = _named(sheet, "rater", (layout.rater,))
-    grade, grades = _grades_of(sheet, sheet.column(layout.grade), 1, options)
+    grade, grades = _grades_of(
+        sheet, sheet.column(layout.grade), [layout.grade], options
+    )
     triples = Triples(
         item=item,
         rater=rater,
@@ -295,7 +298,7 @@ def _wide(
     n_rows, n_raters = len(sheet.cells), len(layout.raters)
     places = list(layout.raters)
     cells = sheet.cells[places].to_numpy(dtype=object).ravel()
-    grade, grades = _grades_of(sheet, cells, n_raters, options)
+    grade, grades = _grades_of(sheet, cells, places, options)
     doubts = doubt_columns(sheet, layout, grade.reshape(n_rows, n_raters), grades.scale)
     if layout.item:
         of_row, items = _named(sheet, "item", layout.item)
