@@ -110,7 +110,7 @@ ODD_NUMBER = (
     *("I", "l", "O", "Ⅰ", "one", "x", "X", "*", "/", "_", "ND", "unknown", "n", "z"),
     *("true", "TRUE", "yes", "2020-01-01", "1:30", "😀", ".a", ".z", "inf", "-inf"),
     *("Infinity", "1e999", "-1e999", "1e-99999999999999999999", "0e99999999999999"),
-    *("1" * 400, "1\u0301", "1j", "1 2", "1;2", "1,,", "1.0000000000000000000000001"),
+    *("1" * 400, "1\u0301", "1 2", "1;2", "1,,", "1.0000000000000000000000001"),
     *("9", "8", "7", "99", "88", "77", "999", "9999", "-1", "-9", "-99", "-999", "9.0"),
     *("999999", "-7", "-8", "-88"),
 )
@@ -123,7 +123,6 @@ ODD_TEXT = (
         "mi\u200bld",
         "m\u0456ld",
         "ｍｉｌｄ",
-        "«mild",
         "mild!",
     ),
     *("99", "-9", "999", "9", "-1", "mil d", "=mild", "`mild", "mild,"),
@@ -727,8 +726,9 @@ def test_row_names_beside_many_columns(tmp_path: Path) -> None:
     header, rows = wide(4, 1500).split("\n", 1)
     data = header.removeprefix("item,") + "\n" + rows
     table = [[(i + j) % 3 for j in range(1500)] for i in range(4)]
-    kind, _, values = outcome(tmp_path, data)
-    assert (kind, values) == ("right", values_of(table))
+    kind, message, values = outcome(tmp_path, data)
+    assert (kind, values) == ("warned", values_of(table))
+    assert "1500 columns count as raters of 4 items" in message
 
 
 def test_a_folder_and_a_file_that_is_not_there(tmp_path: Path) -> None:
