@@ -4,6 +4,7 @@ import shlex
 import shutil
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +15,7 @@ from masrel.cli._options import OutputOptions, echo_notes, write_output
 
 if TYPE_CHECKING:
     from masrel.report._agreement_table import AgreementRow
+    from masrel.report._further_tables import FurtherTable
     from masrel.scales import Scale
 
 
@@ -47,9 +49,11 @@ def write_agreement(
     notes: tuple[str, ...] = (),
     explain: bool = False,
     simulated: bool = False,
+    further: "Sequence[FurtherTable]" = (),
 ) -> None:
     """Print and write estimates in the forms that were chosen."""
-    # read: what was read, as plain values for JSON, and read_lines for a screen
+    # read: what was read, as plain values for JSON, and read_lines for a screen;
+    # further: tables below that of the estimates, or in its place if there are none
     from masrel.report import _agreement_table as shown
     from masrel.report._tables import SIMULATED
 
@@ -66,30 +70,41 @@ def write_agreement(
         in_sentences=output.sentence,
         data=data,
     )
+    more = [other.table for other in further]
+    if more and not rows:
+        first, *more = more
+        table = replace(first, read=read_lines, notes=(*notes, *first.notes))
+    drawn = rows or [row for other in further for row in other.rows]
     write_output(
         output,
-        document=lambda: shown.agreement_record(
-            rows,
-            file=str(file),
-            sha256=sha256,
-            options={**options.record(), "by": by},
-            scale=scale,
-            read=read,
-            notes=notes,
-            by=by,
-            bands=bands,
-        ),
+        document=lambda: {
+            **shown.agreement_record(
+                rows,
+                file=str(file),
+                sha256=sha256,
+                options={**options.record(), "by": by},
+                scale=scale,
+                read=read,
+                notes=notes,
+                by=by,
+                bands=bands,
+            ),
+            **{other.key: other.documents for other in further},
+        },
         text=lambda: (
             shown.agreement_sentences(rows, by=by, bands=bands, data=data)
-            if output.sentence
+            if output.sentence and rows
             else table
         ),
-        figure=None if target is None else lambda: shown.agreement_forest(rows, target),
+        figure=None
+        if target is None
+        else lambda: shown.agreement_forest(drawn, target),
         stamp=SIMULATED if simulated else "",
         notes=(*read_lines, *notes),
+        more=more,
         width=_screen_width(),
     )
-    if output.sentence:
+    if output.sentence and rows:
         echo_notes((*read_lines, *table.notes))
     offer = _interval_offer(rows, options)
     if offer is not None:

@@ -125,7 +125,7 @@ def _register() -> str:
         fewest, most = entry.n_raters
         raters = str(fewest) if most == fewest else f"{fewest} or more"
         if entry.shape == "pairs":
-            raters += ", each twice (masrel analyze)"
+            raters += ", each twice (--retest)"
         weights = "any" if entry.weighted else "none"
         lines.append((entry.name, entry.title, raters, weights))
     return "\n".join(aligned(lines, ["left"] * 4, rule=True))
@@ -158,7 +158,7 @@ def estimate_rows(
     with warnings.catch_warnings():
         # Every note is in the result, and so below the table or in the JSON.
         warnings.simplefilter("ignore", MasrelWarning)
-        for entry in _entries(options, n_raters, scale, is_ordered):
+        for entry in entries(options, n_raters, scale, is_ordered):
             ratings = part.ratings if entry.kernel is None else part.counted
             row, refusal = _row(entry, ratings, group, options)
             rows.append(row)
@@ -255,16 +255,22 @@ def _lower_bound(
     return math.nan if interval is None else interval.low
 
 
-def _entries(
-    options: EstimateOptions, n_raters: int, scale: "Scale", is_ordered: bool
-) -> list["Coefficient"]:
-    from masrel.agreement import COEFFICIENTS, coefficient
-
+def check_order(options: EstimateOptions, scale: "Scale", is_ordered: bool) -> None:
+    """Refuse weights of grades without an order."""
     if options.weights != "identity" and not is_ordered:
         raise ParameterError(
             f"--weights {options.weights}: needs --categories with every grade of the "
             f"scale in order, the grades met are text: {', '.join(scale.grades)}"
         )
+
+
+def entries(
+    options: EstimateOptions, n_raters: int, scale: "Scale", is_ordered: bool
+) -> list["Coefficient"]:
+    """Return the coefficients that are estimated, or refuse those that do not fit."""
+    from masrel.agreement import COEFFICIENTS, coefficient
+
+    check_order(options, scale, is_ordered)
     if options.takes_all:
         return [
             entry
@@ -273,12 +279,12 @@ def _entries(
             and n_raters <= (entry.n_raters[1] or n_raters)
             and (is_ordered or not entry.needs_order)
         ]
-    entries = [coefficient(name) for name in options.coefficients or _USUAL]
-    for entry in entries:
+    chosen = [coefficient(name) for name in options.coefficients or _USUAL]
+    for entry in chosen:
         if entry.shape == "pairs":
             raise ParameterError(
                 f"--coefficients: {entry.name} takes each rater's grades of two "
-                "sessions; masrel analyze computes it from a study's plan"
+                "sessions: --session COL --retest computes it"
             )
         if entry.needs_order and not is_ordered:
             raise ParameterError(
@@ -286,4 +292,4 @@ def _entries(
                 "every grade in order, the grades met are text: "
                 f"{', '.join(scale.grades)}"
             )
-    return entries
+    return chosen

@@ -2,7 +2,7 @@
 
 import json
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from functools import wraps
@@ -179,29 +179,24 @@ def write_output(
     figure: "Callable[[], Content] | None" = None,
     stamp: str = "",
     notes: tuple[str, ...] = (),
+    more: "Sequence[Table]" = (),
     width: int | None = None,
 ) -> None:
     """Write and print a result in the forms that were chosen, and make no other."""
     # stamp: what the figure says of its data; notes: those of a table, which are on
-    # stderr where JSON is printed; width: to which those of a text are wrapped
+    # stderr where JSON is printed; more: tables below the first; width: to which notes
+    # of a text are wrapped
     if output.json_file == STDOUT:
         echo_notes(notes)
     else:  # first: a disk that is full then loses no result
-        table = text()
-        if isinstance(table, str):
-            click.echo(table)
+        first = text()
+        if isinstance(first, str):
+            click.echo(first)
         else:
-            from masrel.report._tables import as_csv, as_latex, as_text
-
-            if output.csv:
-                shown = as_csv(table)
-            elif output.latex:
-                shown = as_latex(table)
-            else:
-                shown = as_text(table, width=width)
-            click.echo(shown.rstrip("\n"))
-            if output.csv:
-                echo_notes((*table.read, *table.notes))
+            _print_table(first, output, width)
+        for table in more:
+            click.echo()
+            _print_table(table, output, width)
     if output.json_file is not None:
         write_json(document(), output.json_file)
     if figure is not None and output.figure is not None:
@@ -212,6 +207,20 @@ def write_output(
         files = draw(figure(), stamp=stamp, forms=(form,))
         output.figure.write_bytes(files[form])
         click.echo(f"figure: {output.figure}", err=True)
+
+
+def _print_table(table: "Table", output: OutputOptions, width: int | None) -> None:
+    from masrel.report._tables import as_csv, as_latex, as_text
+
+    if output.csv:
+        shown = as_csv(table)
+    elif output.latex:
+        shown = as_latex(table)
+    else:
+        shown = as_text(table, width=width)
+    click.echo(shown.rstrip("\n"))
+    if output.csv:
+        echo_notes((*table.read, *table.notes))
 
 
 def write_json(document: dict[str, object], file: Path) -> None:

@@ -11,6 +11,7 @@ from masrel.cli._agreement_rows import (
     estimate_options,
     estimate_rows,
 )
+from masrel.cli._further import FurtherOptions, further_options, further_tables
 from masrel.cli._options import OutputOptions, grouped, output_options
 from masrel.cli._reading import (
     ReadingOptions,
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
     click.option("--by", metavar="COL", help="Estimate each group of this column."),
 )
 @estimate_options
+@further_options
 @click.option(
     "--explain", is_flag=True, help="Say in notes what every interval promises."
 )
@@ -50,6 +52,7 @@ def agree(
     file: Path,
     reading: ReadingOptions,
     options: EstimateOptions,
+    further: FurtherOptions,
     explain: bool,
     output: OutputOptions,
 ) -> None:
@@ -61,31 +64,37 @@ def agree(
     read in two ways is refused with the option that decides.
     """
     output.check_files()
+    options = further.checked(options, reading.by)
     if output.figure is not None and options.target is None:
         raise ParameterError(
             "--figure: shows intervals, so it needs --target raters, items or both"
         )
     ratings = read_file(file, reading)
     warnings = tuple(f"warning: {text}" for text in ratings.warnings)
+    by, groups = _groups(ratings, further, file)
     write_agreement(
-        _estimate(ratings, options, file),
+        _estimate(ratings, groups, further.between_raters(ratings, options)),
         output,
         file=file,
         sha256=ratings.read["sha256"],
         scale=ratings.scale,
         options=options,
-        by=reading.by,
+        by=by,
         read=ratings.read,
         read_lines=tuple(what_was_read(ratings)),
         notes=(*warnings, *order_notes(ratings.is_ordered, options)),
         explain=explain,
         simulated=ratings.simulated,
+        further=further_tables(ratings, further, options, explain=explain),
     )
 
 
-def _estimate(
-    ratings: "RatingsFile", options: EstimateOptions, file: Path
-) -> "list[AgreementRow]":
+def _groups(
+    ratings: "RatingsFile", further: FurtherOptions, file: Path
+) -> tuple[str | None, list[str]]:
+    # what tells parts apart, and what each is called
+    if further.retest:
+        return further.part_labels(ratings)
     sessions = list(dict.fromkeys(str(part.session) for part in ratings.parts))
     if len(sessions) > 1:
         raise RatingsError(
@@ -93,12 +102,20 @@ def _estimate(
             "raters graded the same item more than once; "
             f"--by {ratings.read['session']} estimates each"
         )
+    return ratings.read["by"], [part.group or "" for part in ratings.parts]
+
+
+def _estimate(
+    ratings: "RatingsFile", groups: list[str], options: EstimateOptions | None
+) -> "list[AgreementRow]":
+    if options is None:
+        return []
     return [
         row
-        for part in ratings.parts
+        for part, group in zip(ratings.parts, groups, strict=True)
         for row in estimate_rows(
             part,
-            group=part.group or "",
+            group=group,
             n_raters=len(part.raters) or ratings.read["n_raters"],
             scale=ratings.scale,
             is_ordered=ratings.is_ordered,

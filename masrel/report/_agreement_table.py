@@ -277,13 +277,6 @@ def agreement_record(
 ) -> dict[str, object]:
     """Return all that made the estimates, and them, as plain values for JSON."""
     # read: of what was read, plain already; the others as of `agreement_table`
-    estimates = []
-    for row in rows:
-        group = {} if by is None else {group_key(by): row.group}
-        word = {} if bands is None else {"word": _word(row, bands)}
-        estimate = as_document(row.estimate)
-        why = [*row.notes, *_why_null(row.estimate)]
-        estimates.append({**group, **estimate, **word, "notes": why})
     return {
         "masrel": masrel.__version__,
         "file": file,
@@ -296,8 +289,25 @@ def agreement_record(
         },
         "read": dict(read),
         "notes": list(notes),
-        "estimates": estimates,
+        "estimates": estimate_documents(rows, by=by, bands=bands),
     }
+
+
+def estimate_documents(
+    rows: Sequence[AgreementRow],
+    *,
+    by: str | None = None,
+    bands: BandScale | None = None,
+) -> list[dict[str, object]]:
+    """Return every estimate with what is to be said of it, as plain values."""
+    documents = []
+    for row in rows:
+        group = {} if by is None else {group_key(by): row.group}
+        word = {} if bands is None else {"word": _word(row, bands)}
+        estimate = as_document(row.estimate)
+        why = [*row.notes, *_why_null(row.estimate)]
+        documents.append({**group, **estimate, **word, "notes": why})
+    return documents
 
 
 def group_key(by: str) -> str:
@@ -310,12 +320,11 @@ def _why_null(estimate: Estimate) -> list[str]:
     # why a number of a record is null, where neither `reason` says it
     why, interval = [], estimate.interval
     if math.isnan(estimate.standard_error) and estimate.reason is None:
-        title = COEFFICIENTS[estimate.coefficient].title
-        why.append(
-            "standard_error: null, one item has none"
-            if _has_error(estimate)
-            else f"standard_error, observed, chance: null, {title} has none"
-        )
+        if _has_error(estimate):
+            why.append("standard_error: null, one item has none")
+        else:
+            title = COEFFICIENTS[estimate.coefficient].title
+            why.append(f"standard_error, observed, chance: null, {title} has none")
     if interval is not None:
         ends = (("low", interval.low), ("high", interval.high))
         why += [

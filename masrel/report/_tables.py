@@ -124,6 +124,11 @@ def interval_text(low: float, high: float, digits: int = 3) -> str:
     return f"[{number(low, digits)}, {number(high, digits)}]"
 
 
+def p_text(p: float) -> str:
+    """Return a p-value as shown: three decimals, or below the least that they show."""
+    return "<0.001" if p < 0.0005 else number(p, 3)
+
+
 def counted(count: int, noun: str) -> str:
     """Return a count with its noun, in the plural unless there is one."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
@@ -250,6 +255,7 @@ _LATEX_ESCAPES = str.maketrans(
         "≥": r"$\geq$",
         "≤": r"$\leq$",
         "×": r"$\times$",
+        "<": r"$<$",
         "α": r"$\alpha$",
         "κ": r"$\kappa$",
         "π": r"$\pi$",

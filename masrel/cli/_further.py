@@ -1,0 +1,163 @@
+"""Options of `masrel agree` that print another table below that of agreement."""
+
+import warnings
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING
+
+import click
+
+from masrel.cli._agreement_rows import EstimateOptions, check_order, entries
+from masrel.cli._options import grouped
+from masrel.errors import MasrelWarning, ParameterError
+
+if TYPE_CHECKING:
+    from masrel.ratings import RatingsFile
+    from masrel.report._further_tables import FurtherTable, Question
+
+_PAIRS = ("stratified_kappa", "pooled_kappa")
+"""Coefficients of each rater's grades of two sessions."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FurtherOptions:
+    """Which tables are printed beside that of agreement."""
+
+    retest: bool
+    each_category: bool
+    symmetry: bool
+    indices: bool
+    compare: bool
+
+    def record(self) -> dict[str, object]:
+        """Return the tables that were chosen."""
+        return {field.name: True for field in fields(self) if getattr(self, field.name)}
+
+    def checked(self, options: EstimateOptions, by: str | None) -> EstimateOptions:
+        """Return what is estimated between raters, with the default of a comparison."""
+        if not self.compare:
+            return options
+        if by is None:
+            raise ParameterError(
+                "--compare: needs --by with the column that tells the groups apart"
+            )
+        if options.target not in (None, "items"):
+            raise ParameterError(
+                "--compare: a difference generalises to other items, so it takes "
+                f"--target items, got --target {options.target}"
+            )
+        return replace(options, target="items")
+
+    def between_raters(
+        self, file: "RatingsFile", options: EstimateOptions
+    ) -> EstimateOptions | None:
+        """Return what is estimated between raters; None where that is nothing."""
+        if not self.retest:
+            return options
+        if all(len(part.raters) == 1 for part in file.parts):
+            return None
+        if options.coefficients is None:
+            return options
+        rest = [name for name in options.coefficients if name not in _PAIRS]
+        return replace(options, coefficients=rest) if rest else None
+
+    def part_labels(self, file: "RatingsFile") -> tuple[str | None, list[str]]:
+        """Return what tells groups and sessions apart, and what each is called."""
+        from masrel.report._further_tables import heading, label, part_names
+
+        names = [part_names(file, part) for part in file.parts]
+        return heading(names[0]) or None, [label(of.values()) for of in names]
+
+
+further_options = grouped(
+    "further",
+    FurtherOptions,
+    click.option(
+        "--retest",
+        is_flag=True,
+        help="Agreement of each rater with him- or herself in the two sessions of "
+        "--session, and of all; stratified_kappa, and pooled_kappa if named.",
+    ),
+    click.option(
+        "--each-category",
+        is_flag=True,
+        help="Kappa of each category against all others.",
+    ),
+    click.option(
+        "--symmetry",
+        is_flag=True,
+        help="Tests of change of two raters: McNemar, Bowker, Stuart-Maxwell, Bhapkar.",
+    ),
+    click.option(
+        "--indices",
+        is_flag=True,
+        help="Of two raters and two categories: PABAK, prevalence, bias, largest "
+        "kappa, positive and negative agreement.",
+    ),
+    click.option(
+        "--compare",
+        is_flag=True,
+        help="Differences between the groups of --by, with p and Holm's adjustment.",
+    ),
+)
+
+
+def further_tables(
+    file: "RatingsFile",
+    further: FurtherOptions,
+    options: EstimateOptions,
+    *,
+    explain: bool,
+) -> "list[FurtherTable]":
+    """Return the tables that were chosen; of those that were not nothing is loaded."""
+    if not further.record():
+        return []
+    check_order(options, file.scale, file.is_ordered)
+    question = _question(options, explain)
+    tables = []
+    with warnings.catch_warnings():
+        # Every note is in a result, and so below its table or in the JSON.
+        warnings.simplefilter("ignore", MasrelWarning)
+        if further.retest or further.each_category:
+            from masrel.report._further_tables import category_table, retest_table
+
+            names = options.coefficients or []
+            pairs = ["stratified_kappa"]
+            if options.takes_all or "pooled_kappa" in names:
+                pairs.append("pooled_kappa")
+            if further.retest:
+                tables.append(retest_table(file, question, pairs))
+            if further.each_category:
+                tables.append(category_table(file, question))
+        if further.symmetry or further.indices:
+            from masrel.report._two_rater_tables import index_table, symmetry_table
+
+            tables += [symmetry_table(file)] if further.symmetry else []
+            tables += [index_table(file)] if further.indices else []
+        between = further.between_raters(file, options)
+        if further.compare and between is not None:
+            tables.append(_differences(file, between, question))
+    return tables
+
+
+def _question(options: EstimateOptions, explain: bool) -> "Question":
+    from masrel.report._further_tables import Question
+
+    return Question(
+        weights=options.weights,
+        target=options.target,
+        interval=options.interval,
+        level=options.level,
+        n_resamples=options.n_resamples,
+        seed=options.seed,
+        explain=explain,
+    )
+
+
+def _differences(
+    file: "RatingsFile", options: EstimateOptions, question: "Question"
+) -> "FurtherTable":
+    from masrel.report._difference_table import difference_table
+
+    n_raters = max(len(part.raters) for part in file.parts) or file.read["n_raters"]
+    of_all = entries(options, n_raters, file.scale, file.is_ordered)
+    return difference_table(file, of_all, question, skip=options.takes_all)

@@ -1,0 +1,273 @@
+"""How much the groups of a file of ratings differ in agreement, pair by pair.
+
+In: a `RatingsFile` whose parts are the groups. Out: a table, and the same for JSON.
+"""
+
+import itertools
+import math
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from masrel.agreement import CodedRatings, Coefficient, Significance, holm
+from masrel.errors import MasrelError, MasrelWarning, ParameterError
+from masrel.estimates import Estimate, as_document
+from masrel.ratings import RatingsFile, RatingsPart
+from masrel.report._further_tables import (
+    FurtherTable,
+    Question,
+    coded_part,
+    data_of,
+    label,
+    part_names,
+)
+from masrel.report._tables import Column, Table, Value, p_text, percent
+
+_ITEMS = {"dependent": "the same", "independent": "others"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Pair:
+    """Two groups, and whether they are of the same items."""
+
+    first: str
+    second: str
+    ratings: tuple[CodedRatings, CodedRatings]  # row by row the same items, if they are
+    design: Literal["dependent", "independent"]
+    n_shared: int  # names of items that both have
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Difference:
+    """One coefficient of two groups."""
+
+    pair: _Pair
+    title: str
+    estimate: Estimate
+    test: Significance
+    adjusted: float  # p after Holm, over the pairs of the coefficient
+
+
+def difference_table(
+    file: RatingsFile,
+    entries: Sequence[Coefficient],
+    question: Question,
+    *,
+    skip: bool = False,
+) -> FurtherTable:
+    """Return the difference of every two groups in every coefficient."""
+    # skip: whether a coefficient without such an interval is left out, and not refused
+    if len(file.parts) < 2:
+        raise ParameterError(
+            "--compare: needs two groups or more, so --by with the column that tells "
+            "them apart"
+        )
+    if question.target not in (None, "items"):
+        raise ParameterError(
+            "--compare: a difference generalises to other items, so it takes "
+            f"--target items, got --target {question.target}"
+        )
+    pairs = _pairs(file)
+    differences: list[_Difference] = []
+    without = []
+    for entry in entries:
+        if skip and entry.kernel is None:
+            without.append(entry.title)
+        else:
+            differences += _differences(entry, pairs, question)
+    return FurtherTable(
+        key="differences",
+        table=Table(
+            name="differences",
+            caption="Differences of agreement between groups",
+            columns=_COLUMNS,
+            rows=tuple(map(_cells, differences)),
+            notes=_notes(differences, pairs, question, without),
+            data=data_of(file),
+        ),
+        documents=list(map(_document, differences)),
+    )
+
+
+def _pairs(file: RatingsFile) -> list[_Pair]:
+    parts = file.parts
+    groups = [label(part_names(file, part).values()) for part in parts]
+    coded = [coded_part(part, "--compare") for part in parts]
+    rows = [_rated_rows(*of_part) for of_part in zip(parts, coded, strict=True)]
+    pairs = []
+    for one, other in itertools.combinations(range(len(parts)), 2):
+        shared = rows[one].keys() & rows[other].keys()
+        is_same = bool(shared) and rows[one].keys() == rows[other].keys()
+        ratings = coded[one], coded[other]
+        if is_same:
+            order = list(rows[one])
+            ratings = (
+                _rows_of(coded[one], [rows[one][item] for item in order]),
+                _rows_of(coded[other], [rows[other][item] for item in order]),
+            )
+        pairs.append(
+            _Pair(
+                first=groups[one],
+                second=groups[other],
+                ratings=ratings,
+                design="dependent" if is_same else "independent",
+                n_shared=len(shared),
+            )
+        )
+    return pairs
+
+
+def _rated_rows(part: RatingsPart, coded: CodedRatings) -> dict[str, int]:
+    # item to its row; an item that nobody rated is none
+    rated = np.max(coded.codes, axis=1) >= 0
+    return {item: row for row, item in enumerate(part.items) if rated[row]}
+
+
+def _rows_of(coded: CodedRatings, rows: list[int]) -> CodedRatings:
+    return CodedRatings(codes=coded.codes[np.array(rows)], categories=coded.categories)
+
+
+def _differences(
+    entry: Coefficient, pairs: Sequence[_Pair], question: Question
+) -> list[_Difference]:
+    from masrel.intervals import difference, difference_test
+
+    weights = question.weights if entry.weighted else "identity"
+    results = []
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", MasrelWarning)  # the results say it
+        for pair in pairs:
+            try:
+                estimate = difference(
+                    entry,
+                    *pair.ratings,
+                    design=pair.design,
+                    weights=weights,
+                    level=question.level,
+                )
+                test = difference_test(
+                    entry, *pair.ratings, design=pair.design, weights=weights
+                )
+            except MasrelError as error:
+                raise type(error)(
+                    f"--compare: {pair.first} and {pair.second}: {error}"
+                ) from error
+            results.append((pair, estimate, test))
+    adjusted = holm([test.p_value for _, _, test in results])
+    title = entry.title if weights == "identity" else f"{entry.title}, {weights}"
+    return [
+        _Difference(pair=pair, title=title, estimate=estimate, test=test, adjusted=p)
+        for (pair, estimate, test), p in zip(results, adjusted, strict=True)
+    ]
+
+
+_COLUMNS = (
+    Column(key="coefficient", heading="Coefficient", where="csv"),
+    Column(key="title", heading="Coefficient", align="left"),
+    Column(key="weights", heading="Weights", where="csv"),
+    Column(key="first", heading="First", align="left"),
+    Column(key="second", heading="Second", align="left"),
+    Column(key="items", heading="Items", align="left"),
+    Column(key="difference", heading="Difference", digits=3),
+    Column(key="standard_error", heading="SE", digits=3),
+    Column(key="low", heading="Low", digits=3),
+    Column(key="high", heading="High", digits=3),
+    Column(key="level", heading="Level", where="csv"),
+    Column(key="t", heading="t", digits=2, where="csv"),
+    Column(key="df", heading="df", digits=1, where="csv"),
+    Column(key="p", heading="p", where="page"),
+    Column(key="p_value", heading="p", where="csv"),
+    Column(key="p_shown_holm", heading="p (Holm)", where="page"),
+    Column(key="p_holm", heading="p (Holm)", where="csv"),
+)
+
+
+def _name(difference: _Difference) -> str:
+    return difference.estimate.coefficient.removeprefix("difference of ")
+
+
+def _cells(difference: _Difference) -> tuple[Value, ...]:
+    estimate, test, pair = difference.estimate, difference.test, difference.pair
+    interval = estimate.interval
+    return (
+        _name(difference),
+        difference.title,
+        estimate.weights,
+        pair.first,
+        pair.second,
+        _ITEMS[pair.design],
+        estimate.value,
+        estimate.standard_error,
+        math.nan if interval is None else interval.low,
+        math.nan if interval is None else interval.high,
+        None if interval is None else interval.level,
+        test.statistic,
+        test.df[0],
+        p_text(test.p_value),
+        test.p_value,
+        p_text(difference.adjusted),
+        difference.adjusted,
+    )
+
+
+def _document(difference: _Difference) -> dict[str, object]:
+    test, pair = difference.test, difference.pair
+    numbers = {
+        "t": test.statistic,
+        "df": test.df[0],
+        "p_value": test.p_value,
+        "p_holm": difference.adjusted,
+    }
+    is_defined = test.reason is None
+    return {
+        "first": pair.first,
+        "second": pair.second,
+        "design": pair.design,
+        **as_document(difference.estimate),
+        "coefficient": _name(difference),
+        **{key: value if is_defined else None for key, value in numbers.items()},
+        "test_reason": test.reason,
+    }
+
+
+def _notes(
+    differences: Sequence[_Difference],
+    pairs: Sequence[_Pair],
+    question: Question,
+    without: Sequence[str],
+) -> tuple[str, ...]:
+    notes = [
+        "Difference: the first less the second. SE, "
+        f"{percent(question.level)} % CI and p: item jackknife, t; they generalise to "
+        "other items like these, graded by the same raters; raters are taken as they "
+        "are, whether groups share them or not.",
+        f"p (Holm): adjusted for {len(pairs)} pairs, each coefficient by itself."
+        if len(pairs) > 1
+        else "p (Holm): there is one pair, so nothing to adjust.",
+    ]
+    if any(pair.design == "dependent" for pair in pairs):
+        notes.append(
+            "Items the same: both groups have items of the same names, taken for the "
+            "same items, and an item is left out of both at once."
+        )
+    notes += [
+        f"{pair.first} and {pair.second}: {pair.n_shared} items have the same name, "
+        "taken for different items."
+        for pair in pairs
+        if pair.design == "independent" and pair.n_shared
+    ]
+    remarks: dict[str, None] = {}
+    for difference in differences:
+        pair, interval = difference.pair, difference.estimate.interval
+        texts = [] if interval is None else list(interval.notes)
+        if difference.test.reason is not None:
+            texts.append(f"undefined: {difference.test.reason}")
+        for text in texts:
+            name = f"{difference.title}, {pair.first} and {pair.second}"
+            remarks[f"{name}: {text}."] = None
+    if without:
+        notes.append(f"Left out: {', '.join(without)}: there is no such interval.")
+    return (*notes, *remarks)
