@@ -76,16 +76,22 @@ class _Ratings:
 
 
 def read_export(
-    name: str, source: str, files: dict[str, list[Any]], grade: str | None
+    name: str, source: str, files: list[tuple[str, list[Any]]], grade: str | None
 ) -> Export:
-    """Read the export of a tool; its values come by the name of the file in it."""
+    """Read the export of a tool: the values of its files, each by the file's name."""
     if source not in _TOOLS:
         raise ParameterError(f"--from: needed {', '.join(_TOOLS)}, got {source!r}")
     ratings = _Ratings(name, grade)
-    records = [(who, value) for who, values in files.items() for value in values]
+    records = [(who, value) for who, values in files for value in values]
     if not records or not all(isinstance(value, dict) for _, value in records):
         raise ratings.error(f"needed the records of {source}, got no list of objects")
-    of = _TOOLS[source](ratings, records)
+    try:
+        of = _TOOLS[source](ratings, records)
+    except (TypeError, AttributeError, KeyError, StopIteration) as error:
+        raise ratings.error(
+            f"is no export of {source}, or damaged: a record after "
+            f"{len(ratings.rows)} annotations has another shape ({error})"
+        ) from error
     if not ratings.rows:
         raise ratings.error(f"needed ratings of {of}, got none")
     frame = pd.DataFrame(
@@ -128,41 +134,35 @@ def _label_studio(ratings: _Ratings, records: _Records) -> str:
     if not annotations:
         raise ratings.error("needed tasks with annotations: the JSON export, got none")
     of = ratings.choose(
-        (
-            str(result.get("from_name"))
-            for _, annotation in annotations
-            for result in annotation.get("result") or ()
-            if _is_category(result)
-        ),
+        (field for _, annotation in annotations for field in _categories(annotation)),
         "fields of categories",
     )
     for task, annotation in annotations:
         if annotation.get("was_cancelled") or annotation.get("skipped"):
             ratings.dropped["skipped"] += 1
             continue
-        grades = [
-            grade
-            for result in annotation.get("result") or ()
-            if _is_category(result) and result.get("from_name") == of
-            for grade in _grades_of(result)
-        ]
         who = annotation.get("completed_by")
         if isinstance(who, dict):
             who = who.get("email") or who.get("id")
+        grades = _categories(annotation).get(of)
         ratings.add(task.get("id"), who, grades, _text_of(task.get("data")))
     return of
 
 
-def _is_category(result: dict[str, Any]) -> bool:
-    # of the whole task, not of a region, whose place stands beside the category
-    value, key = result.get("value"), _CATEGORIES.get(str(result.get("type")))
-    return isinstance(value, dict) and key is not None and set(value) == {key}
+def _categories(annotation: dict[str, Any]) -> dict[str, list[Any]]:
+    # of the whole task by field; beside those of a region stands its place
+    grades: dict[str, list[Any]] = {}
+    for result in annotation.get("result") or ():
+        value, key = result.get("value"), _CATEGORIES.get(str(result.get("type")))
+        if isinstance(value, dict) and key is not None and set(value) == {key}:
+            of = grades.setdefault(str(result.get("from_name")), [])
+            of += _grades_of(key, value[key])
+    return grades
 
 
-def _grades_of(result: dict[str, Any]) -> list[Any]:
-    value = result["value"][_CATEGORIES[result["type"]]]
-    if result["type"] == "taxonomy":  # paths from the root
-        return ["/".join(map(str, path)) for path in value]
+def _grades_of(key: str, value: Any) -> list[Any]:
+    if key == "taxonomy":  # paths from the root
+        return ["/".join(map(str, p)) if isinstance(p, list) else p for p in value]
     return value if isinstance(value, list) else [value]
 
 
@@ -182,9 +182,9 @@ def _label_studio_min(ratings: _Ratings, records: _Records) -> str:
         grade = task.get(of)
         if isinstance(grade, list) and len(grade) == 1:
             grade = grade[0]
-        for kind, key in _CATEGORIES.items():
+        for key in _CATEGORIES.values():
             if isinstance(grade, dict) and set(grade) == {key}:
-                grade = _grades_of({"type": kind, "value": grade})
+                grade = _grades_of(key, grade[key])
         ratings.add(task.get("id"), task.get("annotator"), grade, task.get("text"))
     return of
 
@@ -202,7 +202,7 @@ def _doccano(ratings: _Ratings, records: _Records) -> str:
     for who, example in records:
         grades: dict[Any, list[Any]] = {}
         labels = example.get(of)
-        if of == "annotations":  # before version 1.3: labels and users by their numbers
+        if of == "annotations":  # old exports: labels and users by their numbers
             for label in labels or ():
                 grade = label if "start_offset" in label else label.get("label")
                 grades.setdefault(label.get("user"), []).append(grade)

@@ -31,6 +31,7 @@ _PYREADSTAT = {
     ".sas7bdat": "read_sas7bdat",
     ".xpt": "read_xport",
 }
+_EXPORTED = (".json", ".jsonl", ".csv")
 _ENCODED = (".sav", ".zsav", ".dta", ".sas7bdat", ".xpt")  # pyreadstat takes theirs
 
 
@@ -139,18 +140,27 @@ def _sheet_of(
     return next(iter(filled.items()), (", ".join(names), None))
 
 
-def _json_files(name: str, suffix: str, data: bytes) -> dict[str, list[Any]]:
-    # values of an export by the name of the file in it; "" where it is one file
+def _json_files(name: str, suffix: str, data: bytes) -> list[tuple[str, list[Any]]]:
+    # an export's files, each by its name without the ending, "" where it is one alone
     if not data.startswith(b"PK\3\4"):  # a pipe has no name that says .zip
-        return {"": _json_values(name, suffix, data)}
+        return [("", _json_values(name, suffix, data))]
     with zipfile.ZipFile(io.BytesIO(data)) as packed:
-        members = [m for m in packed.namelist() if not m.endswith("/")]
-        return {
-            Path(member).stem: _json_values(
-                f"{name}: {member}", Path(member).suffix.lower(), packed.read(member)
+        members = [
+            path
+            for member in packed.namelist()
+            if (path := Path(member)).suffix.lower() in _EXPORTED
+            and path.parts[0] != "__MACOSX"  # what a Mac adds to every archive
+        ]
+        if not members:
+            raise RatingsError(f"{name}: needed {', '.join(_EXPORTED)} in it, got none")
+        files = []
+        for path in members:
+            member = path.as_posix()
+            values = _json_values(
+                f"{name}: {member}", path.suffix.lower(), packed.read(member)
             )
-            for member in members
-        }
+            files.append((path.stem, values))
+        return files
 
 
 def _json_values(name: str, suffix: str, data: bytes) -> list[Any]:

@@ -115,6 +115,23 @@ class TestLabelStudio:
         assert grades(file) == {("1", "5"): "good", ("1", "7"): "bad"}
         assert file.read["dropped"] == {"skipped": 1}
 
+    def test_the_completions_of_old_versions_are_annotations(
+        self, tmp_path: Path
+    ) -> None:
+        tasks = [
+            {
+                "id": 1,
+                "completions": [
+                    {"completed_by": 5, "result": [choice("mood", "good")]},
+                    {"completed_by": 6, "result": [], "skipped": True},
+                    {"completed_by": 7, "result": [choice("mood", "bad")]},
+                ],
+            }
+        ]
+        file = read_ratings(write(tmp_path / "e.json", tasks), source="label-studio")
+        assert grades(file) == {("1", "5"): "good", ("1", "7"): "bad"}
+        assert file.read["dropped"] == {"skipped": 1}
+
     def test_a_project_with_several_fields_needs_one(self, tmp_path: Path) -> None:
         stars = {"from_name": "stars", "type": "rating", "value": {"rating": 4}}
         box = {"from_name": "box", "type": "labels", "value": {"start": 0, "end": 3}}
@@ -225,6 +242,20 @@ class TestDoccano:
             ("1", "bo"): "bad",
             ("2", "ann"): None,  # not labelled, or not yet
             ("2", "bo"): "good",
+        }
+
+    def test_other_files_of_the_archive_are_not_read(self, tmp_path: Path) -> None:
+        path = self.archive(
+            tmp_path / "export.zip",
+            ann=[{"id": 1, "label": ["good"]}],
+            bo=[{"id": 1, "label": ["bad"]}],
+        )
+        with zipfile.ZipFile(path, "a") as packed:
+            packed.writestr("__MACOSX/._ann.jsonl", b"\0\5\26\7")
+            packed.writestr("notes.txt", "ann is new")
+        assert grades(read_ratings(path, source="doccano")) == {
+            ("1", "ann"): "good",
+            ("1", "bo"): "bad",
         }
 
     def test_the_annotator_may_stand_in_the_record(self, tmp_path: Path) -> None:
@@ -400,6 +431,26 @@ def test_who_and_what_must_be_known(tmp_path: Path, source: str) -> None:
     path = write(tmp_path / "e.json", rows[source])
     with pytest.raises(MasrelError, match=r"needed its (item|annotator), got none"):
         read_ratings(path, source=source)
+
+
+@pytest.mark.parametrize(
+    ("source", "rows"),
+    [
+        ("label-studio", [task(1, annotation(KIM) | {"result": ["x"]})]),
+        ("label-studio", [{"id": 1, "annotations": 3}]),
+        ("doccano", [{"id": 1, "annotations": ["x"]}]),
+        ("doccano", [{"id": [1], "label": ["a"], "user": ["ann"]}]),
+        ("prodigy", [answer(5, "kim") | {"accept": {"A": 1}}]),
+        ("inception", [{"doc": "a", "user": ["x"], "label": "l"}]),
+    ],
+)
+def test_records_of_another_shape_are_refused(
+    tmp_path: Path, source: str, rows: object
+) -> None:
+    path = write(tmp_path / "e.json", rows)
+    with pytest.raises(MasrelError, match=r"e\.json: ") as refusal:
+        read_ratings(path, source=source)
+    assert "\n" not in str(refusal.value)
 
 
 def test_the_tool_must_be_known(tmp_path: Path) -> None:

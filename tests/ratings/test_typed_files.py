@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from masrel.errors import RatingsError
+from masrel.errors import ParameterError, RatingsError
 from masrel.ratings import RatingsFile, read_ratings
 
 LONG = {
@@ -203,6 +203,18 @@ class TestArrow:
         frame.to_parquet(tmp_path / "r.parquet")
         assert grades(read_ratings(tmp_path / "r.parquet"))["A", "Lee"] == "2"
 
+    def test_a_table_without_rows_is_refused(self, tmp_path: Path) -> None:
+        path = parquet(tmp_path / "r.parquet", {"item": [], "Kim": [], "Lee": []})
+        with pytest.raises(RatingsError, match="needed rows of ratings"):
+            read_ratings(path)
+
+    def test_options_of_other_formats_are_refused(self, tmp_path: Path) -> None:
+        path = parquet(tmp_path / "r.parquet", LONG)
+        with pytest.raises(ParameterError, match="--sheet: needed a workbook"):
+            read_ratings(path, sheet="R")
+        with pytest.raises(ParameterError, match="--encoding: needed a file of text"):
+            read_ratings(path, encoding="latin-1")
+
     def test_lists_in_cells_are_refused(self, tmp_path: Path) -> None:
         columns = {"item": ["A", "B"], "Kim": [[1], [2, 3]], "Lee": [1, 2]}
         with pytest.raises(RatingsError, match="column 'Kim': needed text or numbers"):
@@ -285,6 +297,9 @@ class TestJson:
             ('[{"item": "A", "Kim": [1]}]', "object 1: .*'Kim', got what is nested"),
             ('[{"item": "A"\n,]', "line 2: is no JSON"),
             ("[]", "needed a JSON list of objects"),
+            ("{}", "needed rows of ratings below the names"),
+            ("null", "needed a JSON list of objects"),
+            ('{"data": [{"a": 1}]}', "'data': needed text or numbers, got a dict"),
             ("[1, 2]", "needed a JSON list of objects"),
             ('{"item": ["A"], "Kim": []}', "object 1: .* nested"),
             ("", "the file is empty"),
