@@ -168,9 +168,12 @@ class DistinctItems:
             size = counts.sum(axis=1)
         else:  # as a rule: everybody rated everything
             size = float(groups[0].size)
-        # `dot` does what @ does, in half the time for a few items.
-        matrix = v.fractions if exact else v.floats
-        disagreement = (counts.dot(matrix) * counts).sum(axis=1)
+        if v.numerators is None:  # without its matrix: Σ_l v_kl n_l is n - n_k
+            others = np.reshape(size, (-1, 1)) - counts
+        else:
+            # `dot` does what @ does, in half the time for a few items.
+            others = counts.dot(v.fractions if exact else v.floats)
+        disagreement = (others * counts).sum(axis=1)
         arrays = ItemArrays(counts, freq, size, disagreement)
         if v.numerators is None and not exact:
             self._arrays = arrays

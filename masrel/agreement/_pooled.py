@@ -216,10 +216,21 @@ def _influence(
     if factor:
         p = np.array([divide(part, sums.total) for part in sums.marginals])
         of_chance = identity_weights(q) if coefficient.nominal else v
-        matrix = of_chance.fractions if exact else of_chance.floats
-        slopes = matrix.dot(p) * (2 * divide(factor, divisor) * ratio * inverse)
-        u = u + counts.dot(slopes) / size
+        if exact and of_chance.numerators is None:
+            others = p.sum() - p
+        else:
+            others = (of_chance.fractions if exact else of_chance.floats).dot(p)
+        slopes = others * (2 * divide(factor, divisor) * ratio * inverse)
+        u = u + (_sparse_dot(counts, slopes) if exact else counts.dot(slopes)) / size
     return Influence(u - freq.dot(u) / sums.n_rated, freq, terms)
+
+
+def _sparse_dot(counts: Any, slopes: Any) -> Any:
+    # the same as `dot`, for whole numbers most of which are 0, and fractions
+    item, category = np.nonzero(counts)
+    sums = np.zeros(len(counts), dtype=object)
+    np.add.at(sums, item, counts[item, category] * slopes[category])
+    return sums
 
 
 def _features(coded: CodedRatings, v: Floats) -> Floats:

@@ -3,7 +3,7 @@
 import math
 import warnings
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import TYPE_CHECKING, Literal
 
 import click
 
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
         CountedRatings,
         WeightName,
     )
+    from masrel.ratings import RatingsPart
     from masrel.report._agreement_table import AgreementRow
     from masrel.scales import Scale
 
@@ -131,20 +132,8 @@ def _register() -> str:
     return "\n".join(aligned(lines, ["left"] * 4, rule=True))
 
 
-class Part(Protocol):
-    """Ratings that are estimated together."""
-
-    @property
-    def ratings(self) -> "CodedRatings | CountedRatings":
-        """What coefficients of numbers and ranks take."""
-
-    @property
-    def counted(self) -> "CountedRatings":
-        """What all others take."""
-
-
 def estimate_rows(
-    part: Part,
+    part: "RatingsPart",
     *,
     group: str,
     n_raters: int,

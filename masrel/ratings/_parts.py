@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from masrel.agreement import CodedRatings, CountedRatings, count_ratings
 from masrel.agreement._counts import DistinctItems
 from masrel.agreement._labels import code_type
-from masrel.errors import RatingsError
+from masrel.errors import ParameterError, RatingsError
 from masrel.ratings._grades import coded_texts, is_number
 from masrel.ratings._layout import Layout
 from masrel.ratings._sheets import Sheet
@@ -24,6 +24,7 @@ Codes = NDArray[np.int64]
 
 _MAX_DENSE = 20_000_000  # places, items by raters, that are always kept one by one
 _MAX_SPARSE = 8  # places a rating beyond which only counts are kept
+_MAX_COUNTED = 20_000_000  # places, items by categories, that can be counted
 _MAX_COUNTS = 200_000_000  # places, items by categories, of counts
 
 
@@ -52,7 +53,22 @@ class RatingsPart:
 
     @cached_property
     def counted(self) -> CountedRatings:
-        """The ratings, counted once for several coefficients."""
+        """The ratings, counted once for several coefficients.
+
+        Raises
+        ------
+        ParameterError
+            If they are measurements, with too many different values to be counted.
+        """
+        q = len(self.ratings.categories)
+        if isinstance(self.ratings, CodedRatings):
+            n_items = len(self.ratings.codes)
+            if n_items * q > _MAX_COUNTED:
+                raise ParameterError(
+                    f"{n_items} items with {q} different grades look like "
+                    "measurements, and cannot be counted as categories: "
+                    "--coefficients icc_a1 or icc_c1"
+                )
         return count_ratings(self.ratings)
 
 
