@@ -21,6 +21,7 @@ from masrel.report._further_tables import (
     Question,
     coded_part,
     data_of,
+    finite,
     label,
     part_names,
 )
@@ -215,20 +216,16 @@ def _cells(difference: _Difference) -> tuple[Value, ...]:
 
 def _document(difference: _Difference) -> dict[str, object]:
     test, pair = difference.test, difference.pair
-    numbers = {
-        "t": test.statistic,
-        "df": test.df[0],
-        "p_value": test.p_value,
-        "p_holm": difference.adjusted,
-    }
-    is_defined = test.reason is None
     return {
         "first": pair.first,
         "second": pair.second,
         "design": pair.design,
         **as_document(difference.estimate),
         "coefficient": _name(difference),
-        **{key: value if is_defined else None for key, value in numbers.items()},
+        "t": finite(test.statistic),
+        "df": finite(test.df[0]),
+        "p_value": finite(test.p_value),
+        "p_holm": finite(difference.adjusted),
         "test_reason": test.reason,
     }
 
@@ -259,15 +256,23 @@ def _notes(
         for pair in pairs
         if pair.design == "independent" and pair.n_shared
     ]
-    remarks: dict[str, None] = {}
+    if without:
+        notes.append(f"Left out: {', '.join(without)}: there is no such interval.")
+    return (*notes, *_remarks(differences))
+
+
+def _remarks(differences: Sequence[_Difference]) -> list[str]:
+    # what to know of single differences, or of all alike
+    rows_of: dict[str, list[str]] = {}
     for difference in differences:
         pair, interval = difference.pair, difference.estimate.interval
         texts = [] if interval is None else list(interval.notes)
         if difference.test.reason is not None:
             texts.append(f"undefined: {difference.test.reason}")
         for text in texts:
-            name = f"{difference.title}, {pair.first} and {pair.second}"
-            remarks[f"{name}: {text}."] = None
-    if without:
-        notes.append(f"Left out: {', '.join(without)}: there is no such interval.")
-    return (*notes, *remarks)
+            name = f"{difference.title} ({pair.first} and {pair.second})"
+            rows_of.setdefault(text, []).append(name)
+    return [
+        f"{text}." if len(names) == len(differences) else f"{'; '.join(names)}: {text}."
+        for text, names in rows_of.items()
+    ]

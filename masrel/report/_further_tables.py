@@ -4,6 +4,7 @@ In: a `RatingsFile` and what is asked of every estimate. Out: a table, and the s
 plain values for JSON.
 """
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
@@ -71,6 +72,12 @@ def part_names(file: RatingsFile, part: RatingsPart) -> dict[str, str]:
     if part.session is not None and len({other.session for other in file.parts}) > 1:
         names[str(file.read["session"])] = part.session
     return names
+
+
+def finite(value: object) -> object:
+    """Return a value as JSON has it: ``nan`` and infinities as None."""
+    is_lost = isinstance(value, float) and not math.isfinite(value)
+    return None if is_lost else value
 
 
 def part_keys(file: RatingsFile, part: RatingsPart) -> dict[str, object]:
@@ -158,19 +165,16 @@ def retest_table(
         raise ParameterError(
             "--retest: needs --session with the column of the two sessions"
         )
-    groups: dict[str | None, list[RatingsPart]] = {}
-    for part in file.parts:
-        groups.setdefault(part.group, []).append(part)
+    by = None if file.read["by"] is None else str(file.read["by"])
     rows: list[AgreementRow] = []
     documents: list[dict[str, object]] = []
     notes: list[str] = []
-    for group, parts in groups.items():
-        pairs = _retest_pairs(file, parts)
-        head = [] if group is None else [group]
-        of_group = _retest_rows(head, pairs, question, names)
+    for group in dict.fromkeys(part.group for part in file.parts):
+        pairs = _retest_pairs(file, [p for p in file.parts if p.group == group])
+        of_group = _retest_rows(group, pairs, question, names)
         rows += of_group
         notes += pairs.notes
-        keys = {} if group is None else {group_key(str(file.read["by"])): group}
+        keys = {} if by is None else {group_key(by): group}
         raters: list[str | None] = [*pairs.raters, *[None] * len(names)]
         documents += [
             {**keys, "rater": rater, **document}
@@ -181,7 +185,7 @@ def retest_table(
     table = agreement_table(
         rows,
         caption="Agreement of raters with themselves",
-        by=heading([*([] if None in groups else [str(file.read["by"])]), "rater"]),
+        by=heading(filter(None, (by, "rater"))),
         notes=tuple(notes),
         explain=question.explain,
         data=data_of(file),
@@ -204,8 +208,9 @@ class _RetestPairs:
 
 
 def _retest_rows(
-    head: Sequence[str], pairs: _RetestPairs, question: Question, names: Sequence[str]
+    group: str | None, pairs: _RetestPairs, question: Question, names: Sequence[str]
 ) -> list[AgreementRow]:
+    head = [] if group is None else [group]
     # of a single rater other raters cannot be asked
     alone = question
     if question.target in ("raters", "both"):
@@ -230,42 +235,58 @@ def _retest_rows(
 
 def _retest_pairs(file: RatingsFile, parts: Sequence[RatingsPart]) -> _RetestPairs:
     # by the names of raters and of items, those of both sessions alone
-    sessions = [str(part.session) for part in parts]
     of_group = "" if parts[0].group is None else f"{parts[0].group}: "
+    _check_sessions(file, parts, of_group)
+    raters = _of_both(parts, "a rater", [part.raters for part in parts], of_group)
+    items = _of_both(parts, "an item", [part.items for part in parts], of_group)
+    codes = np.stack([_aligned(part, items, raters) for part in parts], axis=2)
+    return _RetestPairs(
+        raters=raters,
+        ratings=CodedRatings(
+            codes=codes.reshape(len(items), 2 * len(raters)),
+            categories=file.scale.values,
+        ),
+        notes=_left_out(of_group, parts, raters, items),
+    )
+
+
+def _check_sessions(
+    file: RatingsFile, parts: Sequence[RatingsPart], of_group: str
+) -> None:
     column = file.read["session"]
     if parts[0].session is None:
         raise ParameterError(
             f"--retest: compares the sessions of column {column!r}, so that --by must "
             "not take them apart"
         )
-    if len(sessions) != 2:
+    if len(parts) != 2:
+        sessions = [str(part.session) for part in parts]
         raise RatingsError(
             f"--retest: {of_group}needs two sessions in column {column!r}, got "
             f"{len(sessions)} ({named(sessions)})"
         )
-    first, second = parts
-    raters = [rater for rater in first.raters if rater in set(second.raters)]
-    items = [item for item in first.items if item in set(second.items)]
-    for noun, both, names in (
-        ("a rater", raters, [part.raters for part in parts]),
-        ("an item", items, [part.items for part in parts]),
-    ):
-        if not both:
-            each = (
-                f"{named(of)} in {session!r}"
-                for of, session in zip(names, sessions, strict=True)
-            )
-            raise RatingsError(
-                f"--retest: {of_group}needs {noun} of both sessions, got "
-                f"{' and '.join(each)}"
-            )
-    columns = [_aligned(part, items, raters) for part in parts]
-    codes = np.stack(columns, axis=2).reshape(len(items), 2 * len(raters))
-    return _RetestPairs(
-        raters=tuple(raters),
-        ratings=CodedRatings(codes=codes, categories=file.scale.values),
-        notes=_left_out(of_group, parts, raters, items),
-    )
+
+
+def _of_both(
+    parts: Sequence[RatingsPart],
+    noun: str,
+    names: Sequence[tuple[str, ...]],
+    of_group: str,
+) -> tuple[str, ...]:
+    # the names that both sessions have, as they come in the first
+    first, second = names
+    again = set(second)
+    both = tuple(name for name in first if name in again)
+    if not both:
+        each = (
+            f"{named(of)} in {part.session!r}"
+            for of, part in zip(names, parts, strict=True)
+        )
+        raise RatingsError(
+            f"--retest: {of_group}needs {noun} of both sessions, got "
+            f"{' and '.join(each)}"
+        )
+    return both
 
 
 def _aligned(
@@ -290,12 +311,11 @@ def _left_out(
     notes = [
         f"{of_group}Each rater's grades of {first.session} and of {second.session}."
     ]
-    texts = []
+    texts, of_both = [], {"rater": set(raters), "item": set(items)}
     for part in parts:
-        lone = [name for name in part.raters if name not in set(raters)]
-        texts += [f"rater {named(lone)} ({part.session} only)"] if lone else []
-        lone = [name for name in part.items if name not in set(items)]
-        texts += [f"item {named(lone)} ({part.session} only)"] if lone else []
+        for noun, names in (("rater", part.raters), ("item", part.items)):
+            lone = [name for name in names if name not in of_both[noun]]
+            texts += [f"{noun} {named(lone)} ({part.session} only)"] if lone else []
     if texts:
         notes.append(f"{of_group}Left out: {'; '.join(texts)}.")
     return tuple(notes)

@@ -5,8 +5,9 @@ In: a `RatingsFile`. Out: a table, and the same as plain values for JSON.
 
 import math
 import warnings
-from collections.abc import Callable
-from dataclasses import asdict
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -32,6 +33,7 @@ from masrel.report._further_tables import (
     FurtherTable,
     coded_part,
     data_of,
+    finite,
     label,
     named,
     part_keys,
@@ -48,6 +50,30 @@ _TESTS: dict[str, str] = {
     "stuart_maxwell": "Stuart-Maxwell",
     "bhapkar": "Bhapkar",
 }
+
+_TEST_COLUMNS = (
+    Column(key="test", heading="Test", align="left"),
+    Column(key="statistic", heading="Statistic", digits=3),
+    Column(key="distribution", heading="Distribution", align="left"),
+    Column(key="df", heading="df"),
+    Column(key="p", heading="p", where="page"),
+    Column(key="p_value", heading="p", where="csv"),
+    Column(key="n_items", heading="Items"),
+)
+
+_INDEX_COLUMNS = (
+    Column(key="index", heading="Index", align="left"),
+    Column(key="value", heading="Value", digits=3),
+    Column(key="standard_error", heading="SE", digits=3),
+)
+
+_INDEX_NOTES = (
+    "PABAK: 2 p_o − 1, which is Brennan-Prediger's coefficient of two categories; "
+    "SE: delta method, items as the sample.",
+    "Agreement on a category: of the ratings in it, the part that met the same of the "
+    "other rater; of two categories negative and positive agreement.",
+    "Largest κ: what the margins of the raters allow.",
+)
 
 _INFINITE = "infinite: all items changed, and one way"
 
@@ -68,22 +94,13 @@ def symmetry_table(file: RatingsFile) -> FurtherTable:
             notes[f"{title}: whether {result.hypothesis}{size}."] = None
             if note is not None:
                 notes[f"{label([*names, title])}: {note}."] = None
-    columns = [
-        Column(key="test", heading="Test", align="left"),
-        Column(key="statistic", heading="Statistic", digits=3),
-        Column(key="distribution", heading="Distribution", align="left"),
-        Column(key="df", heading="df"),
-        Column(key="p", heading="p", where="page"),
-        Column(key="p_value", heading="p", where="csv"),
-        Column(key="n_items", heading="Items"),
-    ]
     return FurtherTable(
         key="symmetry",
         table=_table(
             file,
             "symmetry",
             "Do the changes from one rater to the other balance?",
-            columns,
+            _TEST_COLUMNS,
             cells,
             tuple(notes),
         ),
@@ -129,7 +146,7 @@ def _test_document(
 ) -> dict[str, object]:
     test, _, kind = name.partition(", ")
     fields = {
-        key: None if isinstance(value, float) and not math.isfinite(value) else value
+        key: finite(value)
         for key, value in asdict(result).items()
         if key not in ("name", "df")
     }
@@ -147,75 +164,80 @@ def index_table(file: RatingsFile) -> FurtherTable:
     """Return what the margins of two raters and two categories do to kappa."""
     cells: list[tuple[Value, ...]] = []
     documents: list[dict[str, object]] = []
-    notes = [
-        "PABAK: 2 p_o − 1, which is Brennan-Prediger's coefficient of two categories; "
-        "SE: delta method, items as the sample.",
-        "Agreement on a category: of the ratings in it, the part that met the same of "
-        "the other rater; of two categories negative and positive agreement.",
-        "Largest κ: what the margins of the raters allow.",
-    ]
+    notes = list(_INDEX_NOTES)
     for part in file.parts:
-        table = _two_raters(file, part, "--indices")
         names = part_names(file, part).values()
-        if len(table) != 2:
-            grades = file.scale.grades
-            raise RatingsError(
-                f"--indices: needs a scale of two categories, got {len(grades)} "
-                f"({named(grades)})"
-            )
-        for name, title, category, value, error, reason in _indices(file, part, table):
-            cells.append((*names, title, value, error))
-            documents.append(
-                {
-                    **part_keys(file, part),
-                    "index": name,
-                    "title": title,
-                    "category": category,
-                    "value": None if math.isnan(value) else value,
-                    "standard_error": error,
-                    "n_items": int(table.sum()),
-                    "reason": reason,
-                }
-            )
-            if reason is not None:
-                notes.append(f"{label([*names, title])}: {reason}.")
-    columns = [
-        Column(key="index", heading="Index", align="left"),
-        Column(key="value", heading="Value", digits=3),
-        Column(key="standard_error", heading="SE", digits=3),
-    ]
+        for index in _indices(file, part):
+            error = index.standard_error
+            cells.append((*names, index.title, index.value, error))
+            fields = {key: finite(value) for key, value in asdict(index).items()}
+            documents.append({**part_keys(file, part), **fields})
+            if index.reason is not None:
+                notes.append(f"{label([*names, index.title])}: {index.reason}.")
     caption = "Prevalence, bias and agreement on each category"
     return FurtherTable(
         key="indices",
-        table=_table(file, "indices", caption, columns, cells, tuple(notes)),
+        table=_table(file, "indices", caption, _INDEX_COLUMNS, cells, tuple(notes)),
         documents=documents,
     )
 
 
-_Index = tuple[str, str, str | None, float, float | None, str | None]
-"""Name, title, of which category, value, error if it has one, and why there is none."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Index:
+    """A number that describes the table of two raters."""
+
+    index: str  # name of it in the JSON
+    title: str
+    category: str | None = None  # of which, if it is of one
+    value: float
+    standard_error: float | None = None  # None where it has none
+    n_items: int
+    reason: str | None  # why it is undefined, or None
 
 
-def _indices(
-    file: RatingsFile, part: RatingsPart, table: NDArray[np.int64]
-) -> list[_Index]:
-    pabak, why = _with_reason(lambda: brennan_prediger(part.counted))
-    error = None if math.isnan(pabak.standard_error) else pabak.standard_error
-    rows: list[_Index] = [("pabak", "PABAK", None, pabak.value, error, why)]
-    of_table: list[tuple[str, str, Callable[[], float]]] = [
-        ("prevalence_index", "Prevalence index", lambda: prevalence_index(table)),
-        ("bias_index", "Bias index", lambda: bias_index(table)),
-        ("kappa_max", "Largest κ", lambda: kappa_max(table)),
-    ]
-    for name, title, call in of_table:
-        value, why = _with_reason(call)
-        rows.append((name, title, None, value, None, why))
+def _indices(file: RatingsFile, part: RatingsPart) -> list[_Index]:
+    table, grades = _two_raters(file, part, "--indices"), file.scale.grades
+    if len(grades) != 2:
+        raise RatingsError(
+            f"--indices: needs a scale of two categories, got {len(grades)} "
+            f"({named(grades)})"
+        )
+    n_items = int(table.sum())
+    estimate, why = _with_reason(lambda: brennan_prediger(part.counted))
+    pabak = _Index(
+        index="pabak",
+        title="PABAK",
+        value=estimate.value,
+        standard_error=estimate.standard_error,
+        n_items=n_items,
+        reason=why,
+    )
+    of_table: list[_Index] = []
+    for name, title, function in (
+        ("prevalence_index", "Prevalence index", prevalence_index),
+        ("bias_index", "Bias index", bias_index),
+        ("kappa_max", "Largest κ", kappa_max),
+    ):
+        value, why = _with_reason(partial(function, table))
+        of_table.append(
+            _Index(index=name, title=title, value=value, n_items=n_items, reason=why)
+        )
     shares, why = _with_reason(lambda: specific_agreement(table))
-    for grade, share in zip(file.scale.grades, shares, strict=True):
-        reason = why if math.isnan(share) else None
-        title = f"Agreement on {grade}"
-        rows.append(("specific_agreement", title, grade, share, None, reason))
-    return rows
+    return [
+        pabak,
+        *of_table,
+        *(
+            _Index(
+                index="specific_agreement",
+                title=f"Agreement on {grade}",
+                category=grade,
+                value=share,
+                n_items=n_items,
+                reason=why if math.isnan(share) else None,
+            )
+            for grade, share in zip(grades, shares, strict=True)
+        ),
+    ]
 
 
 def _with_reason(call: Callable[[], _T]) -> tuple[_T, str | None]:
@@ -242,7 +264,7 @@ def _table(
     file: RatingsFile,
     name: str,
     caption: str,
-    columns: list[Column],
+    columns: Sequence[Column],
     cells: list[tuple[Value, ...]],
     notes: tuple[str, ...],
 ) -> Table:
