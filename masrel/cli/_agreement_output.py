@@ -82,7 +82,7 @@ def write_agreement(
                 rows,
                 file=str(file),
                 sha256=sha256,
-                options={**options.record(), "by": by},
+                options={**options.record(), "by": read.get("by", by)},
                 scale=scale,
                 read=read,
                 notes=notes,

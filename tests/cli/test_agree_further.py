@@ -183,9 +183,10 @@ def test_a_rater_and_an_item_of_one_session_are_left_out_and_named(
 
 
 def test_the_first_table_estimates_each_session(masrel: Caller, sessions: Path) -> None:
-    found = record(masrel, sessions, "--session", "session", "--retest")["estimates"]
-    expected = record(masrel, sessions, "--by", "session")["estimates"]
-    assert found == expected
+    found = record(masrel, sessions, "--session", "session", "--retest")
+    expected = record(masrel, sessions, "--by", "session")
+    assert found["estimates"] == expected["estimates"]
+    assert found["options"] == {**expected["options"], "by": None}
 
 
 def test_one_rater_alone_has_a_retest_and_nothing_between_raters(
@@ -258,6 +259,15 @@ def test_a_retest_that_cannot_be_is_refused(
 def test_a_retest_needs_a_column_of_sessions(masrel: Caller, clinics: Path) -> None:
     assert "--retest: needs --session" in refused(
         masrel, clinics, "--ignore", "clinic", "--retest"
+    )
+
+
+def test_a_retest_of_counts_is_refused(masrel: Caller, tmp_path: Path) -> None:
+    rows = [(session, n, 2, 0) for session in "ab" for n in range(3)]
+    path = write(tmp_path / "n.csv", "session,item,yes,no", rows)
+    names = ("--counts", "--session", "session", "--retest")
+    assert "--retest: needs to know who rated what, got --counts" in refused(
+        masrel, path, *names
     )
 
 
