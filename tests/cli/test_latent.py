@@ -101,7 +101,7 @@ def test_the_figure_shows_items_thresholds_and_raters(
     monkeypatch.setitem(STYLE, "svg.fonttype", "none")  # text stays text
     file, figure = tmp_path / "study.csv", tmp_path / "scale.svg"
     file.write_text(SESSIONS, encoding="utf-8")
-    asked = ("latent", file, "--items", "fixed", "--session", "second", "--one-prior")
+    asked = ("latent", file, "--items", "fixed", "--only", "second", "--one-prior")
     done = masrel(*asked, "--categories", "0,1,2,3", "--quiet", "--figure", figure)
     assert done.code == 0
     assert done.err == f"figure: {figure}\n"
@@ -120,8 +120,8 @@ def test_progress_is_shown_at_a_terminal(masrel: Caller, wide: Path) -> None:
     ("text", "options", "said"),
     [
         (WIDE.replace("1+", "x"), (), "--categories: the model needs every grade"),
-        (SESSIONS, (), "holds 2 sessions (first, second); --session chooses one"),
-        (SESSIONS, ("--session", "third"), "holds no session third"),
+        (SESSIONS, (), "holds 2 sessions (first, second); --only chooses one"),
+        (SESSIONS, ("--only", "third"), "holds no session third"),
         (NUMBERS, ("--level", "95"), "level: needs (0, 1), got 95"),
         (NUMBERS, ("--seed", "-1"), "--seed: needs at least 0"),
         (NUMBERS, ("--figure", "scale.jpg"), "--figure: needs a name that ends in"),
