@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.ratings._grades import alike_texts, is_number, normal_form
+from masrel.ratings._grades import USUAL_MISSING, alike_texts, is_number, normal_form
 from masrel.ratings._layout import Layout
 from masrel.ratings._sheets import Sheet
 from masrel.scales import Scale
@@ -87,7 +87,7 @@ def doubt_columns(
         )
     return [
         *warnings,
-        *_looks_counted(codes, scale),
+        *_looks_counted(names, codes, scale),
         *_second_header(sheet, codes, scale),
     ]
 
@@ -113,14 +113,18 @@ def _first_line(
     sheet: Sheet, layout: Layout, names: Sequence[str], scale: Scale
 ) -> list[str]:
     # names that are grades, and more names than rows
-    is_named = all(_ITEM_NAME.fullmatch(sheet.header[place]) for place in layout.item)
     if not sheet.has_header or sheet.is_transposed:
         return []
-    values = set(map(normal_form, scale.grades))
+    grades = set(map(normal_form, scale.grades))
+    are_numbers = all(map(is_number, scale.grades))
+    n_grades = sum(
+        normal_form(name) in grades
+        or name in USUAL_MISSING
+        or (are_numbers and is_number(name))
+        for name in names
+    )
     warnings = []
-    if {normal_form(name) for name in names} <= values and not (
-        layout.item and is_named
-    ):
+    if n_grades >= len(names) / 2 and not _has_item_name(sheet, layout):
         warnings.append(
             f"the names of the columns, {', '.join(map(repr, names[:_SHOWN]))}, are "
             "grades: --no-header if the first line is a row like the others, --counts "
@@ -132,6 +136,16 @@ def _first_line(
             "--transpose if a row is a rater"
         )
     return warnings
+
+
+def _has_item_name(sheet: Sheet, layout: Layout) -> bool:
+    # whether the items' column has a name like one, and not like that of an item
+    for place in layout.item:
+        name, below = sheet.header[place], str(sheet.column(place)[0])
+        is_numbered = re.sub(r"\d+", "0", name) == re.sub(r"\d+", "0", below)
+        if is_numbered or not _ITEM_NAME.fullmatch(name):
+            return False
+    return bool(layout.item)
 
 
 def _first_column(sheet: Sheet, layout: Layout, scale: Scale) -> list[str]:
@@ -196,10 +210,12 @@ def _unlike(codes: NDArray[np.int64], scale: Scale) -> set[int]:
     }
 
 
-def _looks_counted(codes: NDArray[np.int64], scale: Scale) -> list[str]:
+def _looks_counted(
+    names: Sequence[str], codes: NDArray[np.int64], scale: Scale
+) -> list[str]:
     # Whole numbers whose sum is the same in every row, or in most and nowhere above
     # what one of them is alone, as where all raters agree.
-    if not all(map(is_number, scale.grades)) or len(codes) < 3 or codes.shape[1] < 2:
+    if not all(map(is_number, scale.grades)) or len(codes) < 2 or codes.shape[1] < 2:
         return []
     values = np.array([*scale.values, 0.0])  # a missing count, at -1, is 0
     if (values < 0).any() or (values % 1 != 0).any():
@@ -207,6 +223,7 @@ def _looks_counted(codes: NDArray[np.int64], scale: Scale) -> list[str]:
     sums = values[codes].sum(axis=1)
     total = sums.max()
     has_zeros = 0 in scale.values or bool((codes < 0).any())
+    has_zeros |= all(map(is_number, names))  # as names of grades are
     is_most = values.max() == total and (sums == total).mean() >= 1 / 2
     if total < 2 or not has_zeros or not ((sums == total).all() or is_most):
         return []
@@ -279,29 +296,36 @@ def doubt_counts(sheet: Sheet, layout: Layout, table: NDArray[np.int64]) -> list
     """Refuse or warn of a table of counts that has sums, or no column of items."""
     # of a table (n_rows, n_categories)
     names = [sheet.header[place] for place in layout.raters]
-    for k, name in enumerate(names):
-        is_sum = (2 * table[:, k] == table.sum(axis=1)).all() and table[:, k].any()
-        if is_sum and (len(names) > 2 or _SUMMARY.fullmatch(name)):
-            raise sheet.error(
-                f"{name!r} is the sum of the other columns: --ignore {_option([name])} "
-                "leaves it aside"
-            )
-    if len(table) > 2 and (2 * table[-1] == table.sum(axis=0)).all() and table.any():
-        raise sheet.error(
-            f"{sheet.where(len(table) - 1)}: is the sum of the rows above: delete it"
+    warnings = []
+    if len(names) > 1 and (2 * table[:, -1] == table.sum(axis=1)).all():
+        text = (
+            f"{names[-1]!r} is the sum of the other columns: --ignore "
+            f"{_option([names[-1]])} leaves it aside"
         )
-    warnings = doubt_names("categories", names)
-    if layout.kind == "counts" and layout.item:
-        cells = [str(cell).strip() for cell in sheet.column(layout.item[0])]
-        name = sheet.header[layout.item[0]]
-        are_counts = all(cell.isdecimal() for cell in cells)
-        if layout.is_item_guessed and are_counts and not _ITEM_NAME.fullmatch(name):
-            warnings.append(
-                f"the first column, {name!r}, is taken for the names of items: "
-                "--no-item if it is a category"
-            )
-        elif len(set(cells)) < len(cells) and layout.by is None:
-            warnings.append(
-                f"{name!r} names items more than once: each row counts as an item"
-            )
-    return warnings
+        if _SUMMARY.fullmatch(names[-1]):
+            raise sheet.error(text)
+        warnings += [text] * (len(names) > 2)
+    cells = [str(cell).strip() for place in layout.item for cell in sheet.column(place)]
+    if len(table) > 2 and (2 * table[-1] == table.sum(axis=0)).all():
+        text = f"{sheet.where(len(table) - 1)}: is the sum of the rows above: delete it"
+        if cells and _SUMMARY.fullmatch(cells[-1]):
+            raise sheet.error(text)
+        warnings.append(text)
+    warnings += doubt_names("categories", names)
+    return warnings + (_doubt_items(sheet, layout, cells) if cells else [])
+
+
+def _doubt_items(sheet: Sheet, layout: Layout, cells: Sequence[str]) -> list[str]:
+    # of a table of counts: cells that may be counts, or the same item twice
+    name = sheet.header[layout.item[0]]
+    are_counts = all(cell.isdecimal() for cell in cells)
+    if layout.kind == "table":
+        return []
+    if layout.is_item_guessed and are_counts and not _ITEM_NAME.fullmatch(name):
+        return [
+            f"the first column, {name!r}, is taken for the names of items: --no-item "
+            "if it is a category"
+        ]
+    if len(layout.item) == 1 and len(set(cells)) < len(cells) and layout.by is None:
+        return [f"{name!r} names items more than once: each row counts as an item"]
+    return []

@@ -366,7 +366,7 @@ def _far_codes(grades: Sequence[str], freq: Mapping[str, int]) -> list[str]:
         order = sorted(grades, key=Decimal, reverse=is_top)
         values = [abs(float(grade) - float(order[-1])) for grade in order]
         codes = 0
-        while codes < len(order) - 2 and _is_code(order[codes]):
+        while codes < len(order) - 1 and _is_code(order[codes]):
             codes += 1
         for n_far in range(1, codes + 1):
             gap, rest = values[n_far - 1] - values[n_far], values[n_far:]
@@ -395,23 +395,20 @@ def _stray(
     met: Mapping[str, int],
     stands: Callable[[str], str],
 ) -> list[str]:
-    # the few texts among numbers, or codes such as 99 among texts
+    # texts among numbers, or numbers among texts, whichever are fewer
     n_numbers, n_others = (sum(map(met.__getitem__, t)) for t in (numbers, others))
-    if len(numbers) > 1 and n_others <= n_numbers:
+    if n_others <= n_numbers:
         forms = set(map(normal_form, numbers))  # those are named already
         strays = [
             text
             for text in others
             if not _HALF_GRADE.fullmatch(text) and normal_form(text) not in forms
         ]
-        return strays and [
-            f"no number: {_shown(strays)} ({stands(strays[0])}), so that all grades "
-            f"are text; if that is missing, {_missing_option(strays)}"
-        ]
-    codes = [text for text in numbers if is_number(text) and _is_code(text)]
-    if codes and len(numbers) < len(others) and n_numbers < n_others:
-        return [
-            f"a number among grades that are text: {_shown(codes)} "
-            f"({stands(codes[0])}); if that is missing, {_missing_option(codes)}"
-        ]
-    return []
+        what, so = "no number", ", so that all grades are text"
+    else:
+        strays = list(numbers)
+        what, so = "a number among grades that are text", ""
+    return strays and [
+        f"{what}: {_shown(strays)} ({stands(strays[0])}){so}; if that is missing, "
+        f"{_missing_option(strays)}"
+    ]

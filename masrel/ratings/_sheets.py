@@ -203,7 +203,8 @@ def _decoded(name: str, data: bytes, encoding: str | None) -> str:
         line = text.count("\n", 0, text.index("\0")) + 1
         hint = "; --encoding utf-16 may be right" if 0 in data[:4] else ""
         raise RatingsError(f"{name}: line {line}: needed text, got a zero byte{hint}")
-    return text.removeprefix("\ufeff")
+    text = text.removeprefix("\ufeff")
+    return text if "\n" in text else text.replace("\r", "\n")  # of an old Mac
 
 
 def _text_records(
@@ -261,6 +262,8 @@ def _comments(
     below = text[start:].split("\n", 1)[0].rstrip("\r")
     for candidate in [delimiter] if delimiter else [",", ";", "\t", "|"]:
         n_cells = _n_cells(comments[-1], candidate)
+        if candidate == _BLANKS and comments[-1].startswith("# "):
+            continue
         if 1 < n_cells == _n_cells(below, candidate):
             if re.match(r"#\s+[^\s,;|]", comments[-1]) and candidate != "\t":
                 raise RatingsError(
@@ -305,6 +308,10 @@ def _delimiter_of(name: str, body: str) -> str:
         n_fields[delimiter] = [len(record) for record in records]
     consistent = [d for d, n in n_fields.items() if _is_table(n)]
     marked = [d for d in consistent if d != _BLANKS] or consistent
+    if _BLANKS in consistent and n_fields[_BLANKS][0] > n_fields[marked[0]][0]:
+        # it may be a decimal comma, unless it stands beside a quote
+        if f'"{marked[0]}' not in head and f'{marked[0]}"' not in head:
+            marked = [*marked, _BLANKS]
     if len(marked) > 1:
         names = " and ".join(_DELIMITERS[d] for d in marked)
         raise RatingsError(
@@ -354,8 +361,9 @@ def _is_table(n_fields: Sequence[int]) -> bool:
     # as many cells in every record, or one more below a header without row names
     if not n_fields or len(set(n_fields[1:])) > 1:
         return False
+    # a decimal comma is in the rows alone
     below = n_fields[1] if len(n_fields) > 1 else n_fields[0]
-    return below > 1 and below - n_fields[0] in (0, 1)
+    return n_fields[0] > 1 and below - n_fields[0] in (0, 1)
 
 
 class _Lines:
