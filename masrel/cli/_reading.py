@@ -155,6 +155,8 @@ table_options = [
 
 def what_was_read(file: "RatingsFile") -> list[str]:
     """Return the lines that say what was read, above a table."""
+    from masrel.report._tables import counted
+
     read = file.read
     form = [read["format"], read.get("delimiter"), read.get("encoding")]
     if read.get("sheet"):
@@ -164,7 +166,8 @@ def what_was_read(file: "RatingsFile") -> list[str]:
     if len(names) > _SHOWN:
         raters += f" and {len(names) - _SHOWN} more"
     items = f" named by {' and '.join(map(repr, read['item']))}" if read["item"] else ""
-    counts = f"{read['n_items']} items{items}, {read['n_raters']} raters"
+    counts = f"{counted(read['n_items'], 'item')}{items}, "
+    counts += counted(read["n_raters"], "rater")
     first = f"Read {', '.join(filter(None, form))}: {counts}"
     return [first + (f" ({raters})." if raters else "."), " ".join(_of_grades(file))]
 

@@ -161,8 +161,8 @@ def as_text(table: Table, *, width: int | None = None) -> str:
     columns, body = page_cells(table)
     head = [column.heading for column in columns]
     lines = aligned([head, *body], [column.align for column in columns], rule=True)
-    notes = wrapped(table.notes, width)
-    return "\n".join([table.labelled_caption, *table.read, *lines, *notes])
+    read, notes = wrapped(table.read, width), wrapped(table.notes, width)
+    return "\n".join([table.labelled_caption, *read, *lines, *notes])
 
 
 def wrapped(notes: Sequence[str], width: int | None) -> list[str]:
