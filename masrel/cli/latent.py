@@ -11,6 +11,7 @@ from masrel.cli._options import (
     output_options,
     write_output,
 )
+from masrel.cli._progress import duration_words, progress
 from masrel.cli._reading import (
     ReadingOptions,
     read_file,
@@ -45,7 +46,7 @@ if TYPE_CHECKING:
     json="Write the result here; - prints it, and nothing else, on stdout.",
     figure="Draw the scale into this .png, .svg or .pdf.",
     csv="Print every digit as CSV.",
-    quiet="No progress bar.",
+    quiet="No progress, and no word on how long it takes.",
 )
 def latent(
     file: Path,
@@ -80,7 +81,7 @@ def latent(
         level=level,
         seed=seed,
         compare=not one_prior,
-        hides_progress=output.hides_progress,
+        is_quiet=output.quiet,
     )
     from masrel.report._latent_trait import (
         latent_document,
@@ -127,28 +128,37 @@ def _sample(
     level: float,
     seed: int,
     compare: bool,
-    hides_progress: bool | None,
+    is_quiet: bool,
 ) -> "LatentTrait":
     import numpy as np
     import pandas as pd
-    from tqdm import tqdm
 
     from masrel.agreement import code_ratings
     from masrel.intervals import latent_trait
+    from masrel.intervals.latent._trait import expected_seconds
 
     codes = code_ratings(part.ratings).codes
     grades = np.array([*ratings.scale.grades, None], dtype=object)[codes]
     table = pd.DataFrame(grades, index=part.items, columns=part.raters, dtype=object)
-    # nothing is shown of a call that is refused at once
-    with tqdm(
-        desc="sampling", unit=" steps", delay=0.01, disable=hides_progress
-    ) as bar:
+    categories = list(ratings.scale.grades)
+    if not is_quiet:
+        seconds = expected_seconds(
+            table, items=items, categories=categories, level=level, compare=compare
+        )
+        halves = "; --one-prior halves it" if compare else ""
+        click.echo(
+            f"{duration_words(seconds)}: {len(part.items)} items, "
+            f"{len(part.raters)} raters, {len(categories)} grades{halves}",
+            err=True,
+        )
+    with progress("sampling", " steps", is_quiet=is_quiet) as shown:
         return latent_trait(
             table,
             items=items,
-            categories=list(ratings.scale.grades),
+            categories=categories,
             level=level,
             compare=compare,
-            progress=bar.update,
+            progress=shown.update,
+            expect=shown.expect,
             rng=seed,
         )

@@ -87,11 +87,16 @@ def quantile_error(chains: Floats, share: float) -> float:
     return float(error)
 
 
+def steps_needed(r_hat: float, ess: float, min_ess: float) -> float:
+    """Return how many times as many steps it takes in all."""
+    return max((r_hat - 1.0) / (MAX_R_HAT - 1.0), min_ess / max(ess, 1.0))
+
+
 def not_converged(
     total: int, r_hat: float, ess: float, min_ess: float
 ) -> ConvergenceError:
     """Return the error that says how many more steps a sampler needs."""
-    needed = max((r_hat - 1.0) / (MAX_R_HAT - 1.0), min_ess / max(ess, 1.0))
+    needed = steps_needed(r_hat, ess, min_ess)
     more = int(total * needed) - total if np.isfinite(needed) else total
     return ConvergenceError(
         f"the sampler has not converged after {total} steps: R-hat {r_hat:.4f} (needs "

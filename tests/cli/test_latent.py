@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -114,6 +115,21 @@ def test_the_figure_shows_items_thresholds_and_raters(
 def test_progress_is_shown_at_a_terminal(masrel: Caller, wide: Path) -> None:
     done = masrel.at_a_terminal("latent", wide, "--items", "fixed", "--one-prior")
     assert "sampling" in done.err
+
+
+def test_without_a_terminal_a_line_says_how_long_and_others_how_far(
+    masrel: Caller, wide: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("masrel.cli._progress._PERIOD_S", 0.0)
+    done = masrel("latent", wide, "--items", "fixed")
+    first, *others = done.err.splitlines()
+    assert re.fullmatch(
+        r"about \d+ (s|min): 4 items, 3 raters, \d+ grades; --one-prior halves it",
+        first,
+    )
+    assert others
+    for line in others:
+        assert re.fullmatch(r"sampling: \d+ %, about \d+ (s|min) left", line)
 
 
 @pytest.mark.parametrize(

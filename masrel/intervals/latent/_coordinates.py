@@ -4,8 +4,10 @@ Ratings determine where items and thresholds lie relative to each other in units
 c = √(1 - ρ), the standard deviation of a rating around its item; about ρ they say
 nothing more. So thresholds are T_k = (τ_k - α) / c from the one of them that halves the
 ratings, α. The coordinate of an item that its ratings place is how far (θ_i - α) / c is
-from the thresholds between its grades; that of an item they hardly place is θ_i / √ρ,
-the unit of its prior.
+from the thresholds between its grades. An item that all raters gave the first or the
+last grade lies anywhere beyond the threshold next to it: its coordinate y, which is
+√(ρ) / c log(1 + e^y) + y beyond it, turns that wall into a slope. The coordinate of an
+item that ratings hardly place is θ_i / √ρ, the unit of its prior.
 """
 
 from dataclasses import dataclass, field
@@ -52,14 +54,17 @@ class UnconstrainedPoint:
     threshold: Floats = field(compare=False, repr=False)
     # (n, n_items): the items' coordinates
     raw_item: Floats = field(compare=False, repr=False)
+    # log(1 + e^y) √ρ/c and the slope of that by y, where y is the item's coordinate:
+    # (n, n_items), and 0 where no grade is the only one
+    reach: Floats = field(compare=False, repr=False)
+    stretch: Floats = field(compare=False, repr=False)
     # b, w: (n, n_raters): b_r / ω and w_r
     b: Floats = field(compare=False, repr=False)
     w: Floats = field(compare=False, repr=False)
-    # logit_share, logit_fraction, log_noise_sd: (n, 1): logit ρ, logit f, log η
+    # logit_share, logit_fraction: (n, 1): logit ρ and logit f
     logit_share: Floats = field(compare=False, repr=False)
     logit_fraction: Floats = field(compare=False, repr=False)
-    log_noise_sd: Floats = field(compare=False, repr=False)
-    # share, root, fraction, noise_sd: (n, 1): ρ, c, f and η
+    # share, root, fraction, noise_sd: (n, 1): ρ, c, f and ±η
     share: Floats = field(compare=False, repr=False)
     root: Floats = field(compare=False, repr=False)
     fraction: Floats = field(compare=False, repr=False)
@@ -90,7 +95,7 @@ class UnconstrainedPoint:
             thresholds=self.tau,
             item_share=self.share[:, 0],
             noise_fraction=fraction,
-            noise_spread=self.noise_sd[:, 0],
+            noise_spread=np.abs(self.noise_sd[:, 0]),
             bias_variance=rest * expit(-self.logit_fraction[:, 0]),
             noise_variance=rest * fraction,
         )
@@ -101,18 +106,23 @@ class Coordinates:
     """What a position holds."""
 
     # In this order: one coordinate an item; b_r / ω and w_r (n_raters each); logit ρ,
-    # logit f, log η; α; and the logarithms of the distances between neighbouring T_k,
-    # from the lowest pair up.
+    # logit f, ±η; α; and the logarithms of the distances between neighbouring T_k,
+    # from the lowest pair up. With η goes -η: the w_r then have the other sign, and
+    # η = 0, where raters' noises are alike, is not at infinity.
 
     # n_items, n_raters, n_categories: sizes
     n_items: int
     n_raters: int
     n_categories: int
     middle: int  # the threshold that is α: the one that halves the ratings best
-    # (n_items,): items whose coordinate is v_i = u_i - Σ_k W_ik T_k; of the others it
-    # is z_i = θ_i / √ρ
+    # (n_items,): items whose coordinate tells u_i - Σ_k W_ik T_k; of the others it is
+    # z_i = θ_i / √ρ
     placed: NDArray[np.bool_] = field(compare=False, repr=False)
-    # (n_items, n_categories - 1): W: weights of the thresholds between an item's grades
+    # (n_items,): -1 where all ratings are the first grade, 1 where they are the last,
+    # if the item is placed; 0 elsewhere
+    beyond: Floats = field(compare=False, repr=False)
+    # (n_items, n_categories - 1): W: weights of the thresholds between an item's
+    # grades, or next to its only one
     threshold_weights: Floats = field(compare=False, repr=False)
 
     @classmethod
@@ -124,6 +134,8 @@ class Coordinates:
         n_each = rated.sum(axis=1)
         share = at_most / n_each.clip(1)[:, None]
         weight = share * (1.0 - share)  # 0 where all are on one side
+        first, last = share[:, 0] == 1.0, (n_each > 0) & (share[:, -1] == 0.0)
+        weight[first, 0] = weight[last, -1] = 1.0
         total = weight.sum(axis=1)
         placed = (total > 0.0) & _tell_items_apart(codes)
         scale = np.where(placed, 1.0 / np.where(placed, total, 1.0), 0.0)
@@ -133,6 +145,7 @@ class Coordinates:
             n_categories=n_categories,
             middle=int(np.abs(2 * at_most.sum(axis=0) - rated.sum()).argmin()),
             placed=placed,
+            beyond=placed * (last.astype(np.float64) - first),
             threshold_weights=scale[:, None] * weight,
         )
 
@@ -151,7 +164,7 @@ class Coordinates:
         position = np.zeros(self.n_dimensions)
         at = self.share_start
         position[at] = 1.0
-        position[at + 2] = np.log(noise_spread)
+        position[at + 2] = noise_spread
         tau = ndtri(np.arange(1, self.n_categories) / self.n_categories)
         position[at + 3] = tau[self.middle]
         position[at + 4 :] = np.log(np.diff(tau) / np.sqrt(expit(-1.0)))
@@ -162,27 +175,31 @@ class Coordinates:
         at, n = self.share_start, self.n_items
         raw_item, b, w = np.split(position[:, :at], [n, n + self.n_raters], axis=1)
         rho, f, eta, anchor = np.split(position[:, at : at + 4], 4, axis=1)
-        share, fraction, noise_sd = expit(rho), expit(f), np.exp(eta)
+        share, fraction = expit(rho), expit(f)
         root = np.sqrt(expit(-rho))
         gap = np.exp(position[:, at + 4 :])
         threshold = self._thresholds(gap)
-        by_ratings = raw_item + threshold @ self.threshold_weights.T
+        across = np.where(self.beyond, np.exp(0.5 * rho), 0.0)  # √ρ / c
+        reach = across * np.logaddexp(0.0, raw_item)
+        moved = np.where(self.beyond, self.beyond * (reach + raw_item), raw_item)
+        by_ratings = moved + threshold @ self.threshold_weights.T
         by_prior = (np.sqrt(share) * raw_item - anchor) / root
         return UnconstrainedPoint(
             item=np.where(self.placed, by_ratings, by_prior),
             bias=np.sqrt(expit(-f)) * b,
-            noise=np.sqrt(fraction) * np.exp(noise_sd * w),
+            noise=np.sqrt(fraction) * np.exp(eta * w),
             threshold=threshold,
             raw_item=raw_item,
+            reach=reach,
+            stretch=across * expit(raw_item),
             b=b,
             w=w,
             logit_share=rho,
             logit_fraction=f,
-            log_noise_sd=eta,
             share=share,
             root=root,
             fraction=fraction,
-            noise_sd=noise_sd,
+            noise_sd=eta,
             anchor=anchor,
             gap=gap,
         )
@@ -197,9 +214,23 @@ class Coordinates:
         """Return log |∂(θ, τ) / ∂(their coordinates)|, (n,), without items' √ρ."""
         # z_i is a unit normal by its prior, whose density needs no Jacobian.
         n_scaled = int(self.placed.sum()) + self.n_categories - 2
-        return np.asarray(
-            n_scaled * np.log(point.root[:, 0]) + np.log(point.gap).sum(axis=1)
+        stretched = np.log(point.gap).sum(axis=1) + np.log1p(point.stretch).sum(axis=1)
+        return np.asarray(n_scaled * np.log(point.root[:, 0]) + stretched)
+
+    def by_item(
+        self, slope: Floats, point: UnconstrainedPoint
+    ) -> tuple[Floats, Floats]:
+        """Turn slopes by u_i of placed items into slopes by y_i, and through ρ'."""
+        # slope (n, n_items), with those of log_jacobian -> (n, n_items), (n, 1)
+        share = point.stretch / (1.0 + point.stretch)
+        by_coordinate = np.where(
+            self.beyond,
+            self.beyond * slope * (1.0 + point.stretch)
+            + share * expit(-point.raw_item),
+            slope,
         )
+        through = 0.5 * (self.beyond * slope * point.reach + share)
+        return by_coordinate, through.sum(axis=1, keepdims=True)
 
     def by_threshold(self, slope: Floats, point: UnconstrainedPoint) -> Floats:
         """Turn slopes by T_k into slopes by the logarithms of their distances."""

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import log_ndtr, ndtr
 
 from masrel.agreement._kernel import Floats
 from masrel.agreement._labels import Codes
@@ -110,67 +111,116 @@ class Cells:
     """Between which thresholds each rating fell."""
 
     shape: tuple[int, int]  # items and raters
-    # lower, upper: (n_items * n_raters,): thresholds below and above, counting -∞ as 0
-    # and ∞ as n_categories; a missing rating fell between those two
-    lower: NDArray[np.intp] = field(compare=False, repr=False)
-    upper: NDArray[np.intp] = field(compare=False, repr=False)
-    # at_lower, at_upper: (n_items * n_raters, n_categories - 1): 1 where a threshold is
-    # the lower, the upper end
+    # side: (n_items, n_raters): -1 for a rating in the first grade, 1 in the last,
+    # which one threshold bounds: the probability is Φ(x); 0 for others and missing ones
+    side: Floats = field(compare=False, repr=False)
+    # inner, below: (n_inner,): the others, counted through the table row by row, and
+    # the threshold below them
+    inner: NDArray[np.intp] = field(compare=False, repr=False)
+    below: NDArray[np.intp] = field(compare=False, repr=False)
+    # (n_inner, n_categories - 1): 1 where a threshold is the one below, and above
     at_lower: Floats = field(compare=False, repr=False)
     at_upper: Floats = field(compare=False, repr=False)
 
     @classmethod
     def of(cls, codes: Codes, n_categories: int) -> "Cells":
         """Take codes of shape (n_items, n_raters), -1 where missing."""
-        flat = codes.ravel().astype(np.intp)
-        lower = np.where(flat < 0, 0, flat)
-        upper = np.where(flat < 0, n_categories, flat + 1)
-        ends = np.arange(1, n_categories)
+        flat, last = codes.ravel().astype(np.intp), n_categories - 1
+        (inner,) = np.nonzero((flat > 0) & (flat < last))
+        below = flat[inner] - 1
+        ends = np.arange(last)
         return cls(
             shape=(codes.shape[0], codes.shape[1]),
-            lower=lower,
-            upper=upper,
-            at_lower=(lower[:, None] == ends).astype(np.float64),
-            at_upper=(upper[:, None] == ends).astype(np.float64),
+            side=(codes == last).astype(np.float64) - (codes == 0),
+            inner=inner,
+            below=below,
+            at_lower=(below[:, None] == ends).astype(np.float64),
+            at_upper=(below[:, None] + 1 == ends).astype(np.float64),
         )
 
     def log_likelihood(self, point: UnconstrainedPoint) -> Floats:
         """Return the logarithm, (n,); -inf where a rating has probability 0."""
-        low, high, _ = self._ends(point)
-        return np.asarray(np.log(normal_probability(low, high)).sum(axis=1))
+        density = np.zeros(len(point.item))
+        if self.side.any():
+            x, _ = self._edge(point)
+            density += np.einsum("nir,ir->n", log_ndtr(x), np.abs(self.side))
+        if self.inner.size:
+            low, high, _ = self._inner_ends(point)
+            density += np.log(normal_probability(low, high)).sum(axis=1)
+        return density
 
     def slopes(self, point: UnconstrainedPoint) -> CellSlopes:
         """Return the slopes of `log_likelihood`; not finite where it is -inf."""
-        low, high, sharp = self._ends(point)
+        by_edge = self._edge_slopes(point)
+        if not self.inner.size:
+            return by_edge
+        low, high, sharp = self._inner_ends(point)
         probability = normal_probability(low, high)
         at_low = normal_density(low) / probability
         at_high = normal_density(high) / probability
-        wide = np.where(np.isfinite(low), low * at_low, 0.0)
-        wide -= np.where(np.isfinite(high), high * at_high, 0.0)
+        wide = low * at_low - high * at_high
         at_low *= sharp
         at_high *= sharp
-        centre = (at_low - at_high).reshape(-1, *self.shape)
+        by_cell, by_noise = np.zeros((2, len(low), self.side.size))
+        by_cell[:, self.inner] = at_low - at_high
+        by_noise[:, self.inner] = wide
+        by_cell = by_cell.reshape(-1, *self.shape)
         # einsum and not a product of matrices, whose threads cost more than they save
         threshold = np.einsum("nr,rk->nk", at_high, self.at_upper)
         threshold -= np.einsum("nr,rk->nk", at_low, self.at_lower)
         return CellSlopes(
-            item=centre.sum(axis=2),
-            bias=centre.sum(axis=1),
-            log_noise=wide.reshape(-1, *self.shape).sum(axis=1),
+            item=by_edge.item + by_cell.sum(axis=2),
+            bias=by_edge.bias + by_cell.sum(axis=1),
+            log_noise=by_edge.log_noise + by_noise.reshape(-1, *self.shape).sum(axis=1),
+            threshold=by_edge.threshold + threshold,
+        )
+
+    def _edge_slopes(self, point: UnconstrainedPoint) -> CellSlopes:
+        # of the ratings at the ends of the scale
+        x, sharp = self._edge(point)
+        hazard = x * x
+        hazard *= -0.5
+        np.exp(hazard, out=hazard)
+        hazard /= ndtr(x)
+        hazard *= self.side / np.sqrt(2.0 * np.pi)
+        x *= self.side
+        x *= hazard
+        hazard *= sharp
+        threshold = np.zeros_like(point.threshold)
+        if threshold.shape[1] > 1:
+            threshold[:, 0] = -np.einsum("nir,ir->n", hazard, self.side < 0)
+            threshold[:, -1] = -np.einsum("nir,ir->n", hazard, self.side > 0)
+        else:
+            threshold[:, 0] = -hazard.sum(axis=(1, 2))
+        return CellSlopes(
+            item=hazard.sum(axis=2),
+            bias=hazard.sum(axis=1),
+            log_noise=-x.sum(axis=1),
             threshold=threshold,
         )
 
-    def _ends(self, point: UnconstrainedPoint) -> tuple[Floats, Floats, Floats]:
-        # of each rating's cell both ends in its rater's noises, and the noise under
-        # one: three of shape (n, n_items * n_raters)
-        n = len(point.item)
-        far = np.full((n, 1), np.inf)
-        ends = np.hstack([-far, point.threshold, far])
-        centre = point.item[:, :, None] + point.bias[:, None, :]
-        centre = centre.reshape(n, -1)
-        sharp = np.tile(1.0 / point.noise, self.shape[0])
-        low = (ends[:, self.lower] - centre) * sharp
-        high = (ends[:, self.upper] - centre) * sharp
+    def _edge(self, point: UnconstrainedPoint) -> tuple[Floats, Floats]:
+        # how far within its grade each rating at an end of the scale lies, in its
+        # rater's noises, (n, n_items, n_raters), and one over those, (n, 1, n_raters)
+        sharp = (1.0 / point.noise)[:, None, :]
+        x = point.item[:, :, None] + point.bias[:, None, :]
+        if point.threshold.shape[1] > 1:
+            first, last = point.threshold[:, 0], point.threshold[:, -1]
+            x -= np.where(self.side > 0, last[:, None, None], first[:, None, None])
+        else:
+            x -= point.threshold[:, :, None]
+        x *= sharp
+        x *= self.side
+        return x, sharp
+
+    def _inner_ends(self, point: UnconstrainedPoint) -> tuple[Floats, Floats, Floats]:
+        # of each rating between two thresholds both ends in its rater's noises, and
+        # the noise under one: three of shape (n, n_inner)
+        item, rater = np.divmod(self.inner, self.shape[1])
+        sharp = (1.0 / point.noise)[:, rater]
+        centre = point.item[:, item] + point.bias[:, rater]
+        low = (point.threshold[:, self.below] - centre) * sharp
+        high = (point.threshold[:, self.below + 1] - centre) * sharp
         return low, high, sharp
 
 
@@ -195,15 +245,6 @@ class LatentDensity:
     def n_dimensions(self) -> int:
         """Length of a position."""
         return self.coordinates.n_dimensions
-
-    @property
-    def tilt(self) -> Floats:
-        """Slopes, (n_dimensions,), that take a spike off the density."""
-        # Where ρ goes to 0, all severities can go to one point, and the joint density
-        # to infinity, on next to no volume. With these slopes added it has a mode.
-        slopes = np.zeros(self.n_dimensions)
-        slopes[self.coordinates.share_start] = 0.5 * self.coordinates.placed.sum()
-        return slopes
 
     def start(self) -> Floats:
         """Return a position, (n_dimensions,), where the density is near its peak."""
@@ -239,7 +280,7 @@ class LatentDensity:
         # Beta density and Jacobian of the logit: ρ^a (1 - ρ)^b
         shares = a * np.logaddexp(0.0, -rho) + b * np.logaddexp(0.0, rho)
         shares += c * np.logaddexp(0.0, -f) + d * np.logaddexp(0.0, f)
-        of_sd = point.log_noise_sd - 0.5 * (point.noise_sd / prior.noise_spread) ** 2
+        of_sd = -0.5 * (point.noise_sd / prior.noise_spread) ** 2
         # Dirichlet density of the shares Φ(τ_k) - Φ(τ_(k-1)), Jacobian Π φ(τ_k)
         tau = point.tau
         density += (of_sd - shares)[:, 0] - 0.5 * (tau**2).sum(axis=1)
@@ -265,13 +306,12 @@ class LatentDensity:
         # of the prior by θ_i and by τ_k
         item = np.where(placed, -severity / share, 0.0)
         tau = self._by_tau(point.tau)
+        by_place = np.where(placed, by.item + root * item, 0.0)
+        by_coordinate, through = coordinates.by_item(by_place, point)
         by_raw_item = np.where(
-            placed,
-            by.item + root * item,
-            by.item * np.sqrt(share) / root - point.raw_item,
+            placed, by_coordinate, by.item * np.sqrt(share) / root - point.raw_item
         )
-        shifted = np.where(placed, by.item, 0.0) + root * item
-        threshold = by.threshold + root * tau + shifted @ coordinates.threshold_weights
+        threshold = by.threshold + root * tau + by_place @ coordinates.threshold_weights
         loose = np.where(placed, 0.0, by.item)  # moves against the thresholds with α
         anchor = item.sum(axis=1) + tau.sum(axis=1) - (loose / root).sum(axis=1)
         bias_root = np.sqrt(1.0 - point.fraction)
@@ -280,7 +320,7 @@ class LatentDensity:
                 by_raw_item,
                 bias_root * by.bias - point.b,
                 point.noise_sd * by.log_noise - point.w,
-                self._by_share(point, item, tau, loose),
+                self._by_share(point, item, tau, loose) + through,
                 self._by_fraction_and_noise_sd(point, by),
                 anchor[:, None],
                 1.0 + self.coordinates.by_threshold(threshold, point),
@@ -319,7 +359,7 @@ class LatentDensity:
     def _by_fraction_and_noise_sd(
         self, point: UnconstrainedPoint, by: CellSlopes
     ) -> Floats:
-        # by logit f and log η, (n, 2)
+        # by logit f and ±η, (n, 2)
         c, d = self.prior.noise_fraction
         f, eta = point.fraction, point.noise_sd
         bias = 0.5 * (by.bias * point.bias).sum(axis=1, keepdims=True)
@@ -328,6 +368,6 @@ class LatentDensity:
         return np.hstack(
             [
                 (1.0 - f) * (noise + c) - f * (bias + d),
-                eta * noises + 1.0 - (eta / self.prior.noise_spread) ** 2,
+                noises - eta / self.prior.noise_spread**2,
             ]
         )

@@ -5,6 +5,7 @@ adapting has no distribution to converge to.
 """
 
 import itertools
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -13,7 +14,13 @@ import numpy as np
 from scipy.optimize import minimize
 
 from masrel.agreement._kernel import Floats
-from masrel.intervals._mcmc import MAX_R_HAT, Walkers, diagnose, not_converged
+from masrel.intervals._mcmc import (
+    MAX_R_HAT,
+    Walkers,
+    diagnose,
+    not_converged,
+    steps_needed,
+)
 from masrel.intervals.latent._coordinates import Traits
 from masrel.intervals.latent._density import LatentDensity
 from masrel.intervals.latent._implied import (
@@ -27,12 +34,24 @@ JOURNEY = 1.5
 """How far a proposal goes in units of the metric: a quarter of an orbit is π/2."""
 
 MIN_ESS = 4_000.0  # an end of a 95 % interval within .04 posterior deviations
-_WARM_UP = (100, 100, 100)
+_WARM_UP = (40, 40, 60, 40)  # the metric is fitted after each but the last
+_BLOCK = 5  # steps of warm-up between two fits of the step length
 _FIRST_STEP = 0.1
-_BEST_ACCEPTANCE = (0.8, 0.97)
+_MAX_STEP = 1.0
+_BEST_ACCEPTANCE = 0.8
+_SHORTEST = 0.5  # how far step lengths scatter; in warm-up farther, out of corners
+EXPECTED_STEPS = 2_000
+"""Steps of a chain that studies take, warm-up among them: from 1000 to 5000."""
+
+_GRADIENTS = 12_000  # of 64 chains, and checks, that studies take
+_CHECKS = 5
+_N_CURVED = 16  # chains at whose places the curvature is averaged
+_UNKNOWN = 0.3  # deviation in which chains begin around ρ', f' and η
+_WIDER = 2.0  # from where a variance of the draws is believed over the curvature
 _MAX_KEPT = 500  # positions of a chain; beyond, every other one is dropped
 _N_CHAINS = 64
-_MIN_CURVATURE = 0.2  # least curvature at the mode that is believed
+_MANY = 1_000  # ratings from which half as many chains do: a step then costs by them
+_MIN_CURVATURE = 0.2  # least curvature that is believed
 _MAX_DROP = 0.75  # how far below the mode chains may begin, per dimension
 _MAX_KAPPAS = 8_192  # positions where an integral over new items is computed
 
@@ -65,6 +84,7 @@ def fit_latent(
     n_steps: int,
     max_steps: int,
     progress: Callable[[int], object] | None,
+    expect: Callable[[int], object] | None = None,
 ) -> LatentFit:
     """Sample the model until every reported quantity has converged."""
     agreement: list[Agreement] = []
@@ -87,6 +107,7 @@ def fit_latent(
         n_steps=n_steps,
         max_steps=max_steps,
         progress=progress,
+        expect=expect,
     )
     return LatentFit(
         density=density,
@@ -94,6 +115,37 @@ def fit_latent(
         parts=_parts(density.traits(start)),
         agreement=agreement[0],
     )
+
+
+def _n_chains(density: LatentDensity) -> int:
+    return _N_CHAINS // 2 if density.cells.side.size > _MANY else _N_CHAINS
+
+
+def n_warm_up_steps() -> int:
+    """Return how many steps of every chain are thrown away."""
+    return sum(_WARM_UP)
+
+
+def expected_run_seconds(density: LatentDensity, items: Items) -> float:
+    """Return about how long the model takes to converge under one prior."""
+    # Costs are those of one gradient and of kappa and the diagnostics at a check,
+    # timed; how many there will be is what studies took.
+    n_chains = _n_chains(density)
+    position = np.tile(density.start(), (n_chains, 1))
+    gradient = _timed(lambda: density.gradient(position))
+    kappa = _timed(lambda: _agreement(density, position[:, None], items))
+    draws = np.random.default_rng(0).standard_normal((n_chains, _MAX_KEPT // 2))
+    check = _timed(lambda: diagnose(draws)) * (density.n_dimensions + 3)
+    n_kappas = _MAX_KAPPAS / n_chains if items == "random" else _MAX_KEPT
+    return _GRADIENTS * gradient + _CHECKS * (check + n_kappas * kappa)
+
+
+def _timed(call: Callable[[], object]) -> float:
+    # seconds, of the second of two calls
+    for _ in range(2):
+        begin = time.perf_counter()
+        call()
+    return time.perf_counter() - begin
 
 
 def _reported(traits: Traits) -> list[tuple[str, Floats]]:
@@ -137,29 +189,51 @@ def _some(positions: Floats, max_draws: int) -> Floats:
 def _begin(
     density: LatentDensity, generator: np.random.Generator
 ) -> tuple[Floats, Floats]:
-    # -> starts (n_chains, d) spread as a normal around the mode, and its covariance
-    tilt = density.tilt
+    # -> starts (n_chains, d) spread as a normal, and its covariance. The joint density
+    # has its mode in a spike of next to no volume: the peak is looked for with ρ, f
+    # and η held.
+    at = density.coordinates.share_start
+    loose = np.delete(np.arange(density.n_dimensions), slice(at, at + 3))
+    peak = density.start()
 
-    def height(x: Floats) -> Floats:
-        return np.asarray(density.log_density(x) + x @ tilt)
+    def downhill(part: Floats) -> tuple[float, Floats]:
+        row = np.array(peak)
+        row[loose] = part
+        value, slope = density.log_density(row[None]), density.gradient(row[None])
+        return -float(value[0]), -slope[0, loose]
 
-    def downhill(x: Floats) -> tuple[float, Floats]:
-        row = x[None]
-        return -float(height(row)[0]), -density.gradient(row)[0] - tilt
-
-    optimum = minimize(downhill, density.start(), jac=True, method="BFGS")
-    mode = optimum.x
-    around = 1e-4 * np.eye(mode.size)
-    slopes = density.gradient(mode + around) - density.gradient(mode - around)
-    bend = -0.5 * (slopes + slopes.T) / 2e-4
-    curvature, axes = np.linalg.eigh(bend)
-    covariance = (axes / curvature.clip(_MIN_CURVATURE)) @ axes.T
-    away = generator.standard_normal((_N_CHAINS, mode.size))
+    optimum = minimize(downhill, peak[loose], jac=True, method="L-BFGS-B")
+    peak[loose] = optimum.x
+    held = np.ix_(loose, loose)
+    covariance = _UNKNOWN**2 * np.eye(peak.size)
+    covariance[held] = _inverse(_curvature(density, peak[None])[held])
+    away = generator.standard_normal((_n_chains(density), peak.size))
     away = away @ np.linalg.cholesky(covariance).T
-    lowest = -optimum.fun - _MAX_DROP * mode.size
-    while (low := ~(height(mode + away) > lowest)).any():
+    lowest = -optimum.fun - _MAX_DROP * peak.size
+    while (low := ~(density.log_density(peak + away) > lowest)).any():
         away[low] *= 0.8  # walls of the likelihood are nearer than a normal's
-    return mode + away, covariance
+    return peak + away, covariance
+
+
+def _curvature(density: "SmoothDensity", positions: Floats) -> Floats:
+    # minus the second derivatives, (d, d), averaged over positions (n, d)
+    n, d = positions.shape
+    around = 1e-4 * np.eye(d)
+    total = np.zeros((d, d))
+    for first in range(0, d, _N_CHAINS):  # no more rows at once than there are chains
+        rows = around[first : first + _N_CHAINS]
+        for position in positions:
+            slope = density.gradient(position - rows) - density.gradient(
+                position + rows
+            )
+            total[first : first + len(rows)] += slope
+    return np.asarray(0.5 * (total + total.T) / (2e-4 * n))
+
+
+def _inverse(curvature: Floats) -> Floats:
+    # -> a covariance
+    values, axes = np.linalg.eigh(curvature)
+    return np.asarray((axes / values.clip(_MIN_CURVATURE)) @ axes.T)
 
 
 class SmoothDensity(Protocol):
@@ -198,15 +272,17 @@ def sample_smooth(
     n_steps: int,
     max_steps: int,
     progress: Callable[[int], object] | None = None,
+    expect: Callable[[int], object] | None = None,
 ) -> Chains:
     """Sample a density by Hamiltonian proposals until its quantities have converged."""
-    # shape of start: (n_chains, n_dimensions); of covariance: n_dimensions squared
-    report = progress or _silent
+    # shape of start: (n_chains, n_dimensions); of covariance: n_dimensions squared;
+    # expect is called with the steps there will be in all, as far as is known
+    report, plan = progress or _silent, expect or _silent
+    plan(EXPECTED_STEPS)
     walkers = _warm_up(density, start, covariance, generator, report)
     positions = np.empty((len(start), 0, start.shape[1]))
-    total, thin = 0, 1
+    total, thin, more = 0, 1, n_steps
     while total < max_steps:
-        more = n_steps if total == 0 else min(total, max_steps - total)
         n_made, positions, thin = _go_on(walkers, more, positions, thin, report)
         total += n_made
         values = quantities(positions)
@@ -220,6 +296,11 @@ def sample_smooth(
                 n_steps=total,
                 acceptance=walkers.acceptance,
             )
+        needed = steps_needed(float(r_hat.max()), float(ess.min()), MIN_ESS)
+        plan(sum(_WARM_UP) + int(total * max(needed, 1.0)))
+        # no more than as many again: the first steps say little of how many it takes
+        share = min(max(1.1 * needed - 1.0, 0.25), 1.0)
+        more = min(int(share * total) + 1, max_steps - total)
     raise not_converged(total, float(r_hat.max()), float(ess.min()), MIN_ESS)
 
 
@@ -233,30 +314,35 @@ def _warm_up(
     # fits the metric to where the chains went and the step to how many proposals
     # were taken
     step = _FIRST_STEP
-    for n_steps in (*_WARM_UP, 0):
+    for stage, n_steps in enumerate(_WARM_UP):
         root = np.linalg.cholesky(covariance).astype(np.float64)
-        proposal = hamiltonian_proposal(density.gradient, root, step)
-        walkers = Walkers(density.log_density, proposal, start, generator)
-        if n_steps == 0:
-            break
-        positions = walkers.run(n_steps)
-        report(n_steps)
-        start = positions[:, -1]
-        covariance = _covariance(positions[:, n_steps // 2 :], covariance)
-        if walkers.acceptance < _BEST_ACCEPTANCE[0]:
-            step *= 0.6
-        elif walkers.acceptance > _BEST_ACCEPTANCE[1]:
-            step *= 1.5
-    return walkers
+        positions = []
+        for first in range(0, n_steps, _BLOCK):
+            proposal = hamiltonian_proposal(density.gradient, root, step, 0.1)
+            walkers = Walkers(density.log_density, proposal, start, generator)
+            positions.append(walkers.run(min(_BLOCK, n_steps - first)))
+            start = positions[-1][:, -1]
+            report(positions[-1].shape[1])
+            step *= float(np.exp(walkers.acceptance - _BEST_ACCEPTANCE))
+            step = min(step, _MAX_STEP)
+        if stage < len(_WARM_UP) - 1:
+            covariance = _inverse(_curvature(density, start[:_N_CURVED]))
+            if stage > 0:
+                late = np.concatenate(positions[len(positions) // 2 :], axis=1)
+                covariance = _widened(covariance, late)
+    proposal = hamiltonian_proposal(density.gradient, root, step, _SHORTEST)
+    return Walkers(density.log_density, proposal, start, generator)
 
 
-def _covariance(positions: Floats, before: Floats) -> Floats:
-    # (n_chains, n_steps, d) -> (d, d), with as much of the one before as it takes for
-    # the draws, of which one in ten counts, to know every direction
-    n_chains, n_steps, d = positions.shape
-    sample = np.asarray(np.cov(positions.reshape(-1, d).T), dtype=np.float64)
-    mix = d / (d + n_chains * n_steps / 10)
-    return np.asarray((1.0 - mix) * sample.reshape(d, d) + mix * before)
+def _widened(covariance: Floats, positions: Floats) -> Floats:
+    # -> (d, d), with the variance of positions (n_chains, n, d) along the directions
+    # in which they went much farther; in others so few of them know less than slopes
+    root = np.linalg.cholesky(covariance)
+    flat = positions.reshape(-1, positions.shape[2])
+    sample = np.asarray(np.cov(flat @ np.linalg.inv(root).T, rowvar=False))
+    values, axes = np.linalg.eigh(sample.reshape(covariance.shape))
+    wide = np.where(values > _WIDER, values, 1.0)
+    return np.asarray(root @ (axes * wide) @ axes.T @ root.T)
 
 
 def _go_on(
@@ -283,12 +369,16 @@ def _silent(_: int) -> None: ...
 
 
 def hamiltonian_proposal(
-    gradient: Callable[[Floats], Floats], root: Floats, step: float
+    gradient: Callable[[Floats], Floats],
+    root: Floats,
+    step: float,
+    shortest: float = _SHORTEST,
 ) -> _Proposal:
     """Make a proposal for a Metropolis step of many walkers at once."""
     # Each walker gets a momentum p ~ N(0, I) and a step length of its own, and moves by
     # leapfrog steps in coordinates whose covariance is about I.
-    # Takes root (n_dimensions, n_dimensions)
+    # Takes root (n_dimensions, n_dimensions), and how much shorter the shortest step
+    # is than the longest.
     # Positions and random state to new positions and the logarithms of what the ratio
     # of densities is multiplied by: exp(|p|²/2 - |p'|²/2). A leapfrog keeps volume and
     # is its own inverse but for the sign of p, so that this is all.
@@ -300,7 +390,7 @@ def hamiltonian_proposal(
         position: Floats, random: np.random.RandomState
     ) -> tuple[Floats, Floats]:
         momentum = random.standard_normal(position.shape)
-        length = 1.4 * step * 0.1 ** random.uniform(size=(len(position), 1))
+        length = 1.4 * step * shortest ** random.uniform(size=(len(position), 1))
         before = 0.5 * (momentum**2).sum(axis=1)
         with np.errstate(over="ignore", invalid="ignore"):  # a wall; not taken then
             momentum = momentum + 0.5 * length * (gradient(position) @ root)

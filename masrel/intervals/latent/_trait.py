@@ -21,7 +21,12 @@ from masrel.intervals.latent._implied import (
     grade_probabilities,
     predictive_checks,
 )
-from masrel.intervals.latent._sampler import LatentFit, fit_latent
+from masrel.intervals.latent._sampler import (
+    LatentFit,
+    expected_run_seconds,
+    fit_latent,
+    n_warm_up_steps,
+)
 from masrel.intervals.quantity import Quantity
 
 _TARGETS: dict[str, Target] = {"fixed": "raters", "random": "both"}
@@ -127,10 +132,11 @@ def latent_trait(
     prior: LatentPrior | None = None,
     other_prior: LatentPrior | None = None,
     compare: bool = True,
-    n_steps: int = 1_000,
+    n_steps: int = 250,
     max_steps: int = 32_000,
     keep_chains: bool = False,
     progress: Callable[[int], object] | None = None,
+    expect: Callable[[int], object] | None = None,
     rng: np.random.Generator | int | None = None,
 ) -> LatentTrait:
     """Place items, raters and thresholds on one scale, and read kappa off it.
@@ -160,6 +166,9 @@ def latent_trait(
     progress : callable, optional
         Called with the number of steps just made, such as the ``update`` of a
         progress bar.
+    expect : callable, optional
+        Called with the number of steps there will be in all, whenever that is known
+        better.
     rng : Generator or int, optional
         Where randomness comes from; an integer is recorded as the seed. Without it a
         fresh seed is drawn and recorded.
@@ -203,10 +212,7 @@ def latent_trait(
     ...     ratings, items="fixed", categories=[1, 2, 3, 4], rng=1
     ... )
     """
-    if items not in _TARGETS:
-        raise ParameterError(f'items: needs "fixed" or "random", got {items!r}')
-    if not 0.0 < level < 1.0:
-        raise ParameterError(f"level: needs (0, 1), got {level}")
+    _check_kappa(items, level)
     if min(n_steps, max_steps) < 20:
         raise ParameterError("n_steps, max_steps: need at least 20")
     checked = _Ratings.of(ratings, categories)
@@ -221,12 +227,36 @@ def latent_trait(
         max_steps=max_steps,
         keep_chains=keep_chains,
         progress=progress,
+        expect=expect,
+        n_runs=1 + compare,
         seed=seed,
     )
     other = None
     if compare:
         other = _summarize(question, other_prior or LatentPrior.other(), seeds[1], None)
     return _summarize(question, prior or LatentPrior(), seeds[0], other)
+
+
+def _check_kappa(items: Items, level: float) -> None:
+    if items not in _TARGETS:
+        raise ParameterError(f'items: needs "fixed" or "random", got {items!r}')
+    if not 0.0 < level < 1.0:
+        raise ParameterError(f"level: needs (0, 1), got {level}")
+
+
+def expected_seconds(
+    ratings: object,
+    *,
+    items: Items,
+    categories: Sequence[Label],
+    level: float,
+    compare: bool,
+) -> float:
+    """Return about how long `latent_trait` takes, after its checks."""
+    _check_kappa(items, level)
+    checked = _Ratings.of(ratings, categories)
+    density = LatentDensity.of(checked.codes, len(categories), LatentPrior())
+    return (1 + compare) * expected_run_seconds(density, items)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -304,6 +334,9 @@ class _Question:
     keep_chains: bool  # whether the result holds the draws
     # called with the number of steps just made
     progress: Callable[[int], object] | None = field(compare=False, repr=False)
+    # called with the number of steps now expected of all runs, one for each prior
+    expect: Callable[[int], object] | None = field(compare=False, repr=False)
+    n_runs: int
     seed: int | None  # the seed to be recorded
 
 
@@ -312,6 +345,14 @@ def _summarize(
 ) -> LatentTrait:
     """Sample the model and put its result together."""
     data, generator = question.ratings, np.random.default_rng(seed)
+
+    def expect(n_steps: int) -> None:
+        # the runs before this one are in `other`, those after it take as long
+        if question.expect is not None:
+            made = other.n_steps + n_warm_up_steps() if other else 0
+            left = question.n_runs - (other is not None)
+            question.expect(made + left * n_steps)
+
     fit = fit_latent(
         LatentDensity.of(data.codes, len(data.categories), prior),
         question.items,
@@ -319,6 +360,7 @@ def _summarize(
         n_steps=question.n_steps,
         max_steps=question.max_steps,
         progress=question.progress,
+        expect=expect,
     )
     some = fit.draws(_REPLICATES)
 

@@ -22,19 +22,25 @@ def natural(x: Floats, like: Coordinates) -> Floats:
     n_items, n_raters = like.n_items, like.n_raters
     items, b, w = np.split(x[: n_items + 2 * n_raters], [n_items, n_items + n_raters])
     a, c, e, anchor, *gaps = x[n_items + 2 * n_raters :].tolist()
-    rho, f, eta = 1 / (1 + math.exp(-a)), 1 / (1 + math.exp(-c)), math.exp(e)
+    rho, f, eta = 1 / (1 + math.exp(-a)), 1 / (1 + math.exp(-c)), abs(e)
     unit = math.sqrt(1 - rho)
+
+    def away(y: float) -> float:
+        # of an item with one grade, beyond the threshold next to it
+        return math.sqrt(rho) * math.log(1 + math.exp(y)) + unit * y
+
     tau = [anchor]
     for gap in gaps[: like.middle][::-1]:
         tau.insert(0, tau[0] - unit * math.exp(gap))
     for gap in gaps[like.middle :]:
         tau.append(tau[-1] + unit * math.exp(gap))
     theta = [
-        sum(share * t for share, t in zip(weights, tau, strict=True)) + unit * value
+        sum(share * t for share, t in zip(weights, tau, strict=True))
+        + (side * away(value) if side else unit * value)
         if is_placed
         else math.sqrt(rho) * value
-        for value, is_placed, weights in zip(
-            items, like.placed, like.threshold_weights, strict=True
+        for value, is_placed, side, weights in zip(
+            items, like.placed, like.beyond, like.threshold_weights, strict=True
         )
     ]
     below = stats.norm.cdf([-np.inf, *tau, np.inf])
@@ -43,7 +49,7 @@ def natural(x: Floats, like: Coordinates) -> Floats:
         [
             *theta,
             *(math.sqrt((1 - rho) * (1 - f)) * b),
-            *(log_noise + eta * w),
+            *(log_noise + e * w),
             rho,
             f,
             eta,
