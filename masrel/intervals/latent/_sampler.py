@@ -37,9 +37,9 @@ MIN_ESS = 4_000.0  # an end of a 95 % interval within .04 posterior deviations
 _WARM_UP = (40, 40, 60, 40)  # the metric is fitted after each but the last
 _BLOCK = 5  # steps of warm-up between two fits of the step length
 _FIRST_STEP = 0.1
-_MAX_STEP = 1.0
+_STEPS = (0.02, 1.0)  # the least and the largest
 _BEST_ACCEPTANCE = 0.8
-_SHORTEST = 0.5  # how far step lengths scatter; in warm-up farther, out of corners
+_SHORTEST = 0.05  # a step length as a share of the longest
 EXPECTED_STEPS = 2_000
 """Steps of a chain that studies take, warm-up among them: from 1000 to 5000."""
 
@@ -318,19 +318,19 @@ def _warm_up(
         root = np.linalg.cholesky(covariance).astype(np.float64)
         positions = []
         for first in range(0, n_steps, _BLOCK):
-            proposal = hamiltonian_proposal(density.gradient, root, step, 0.1)
+            proposal = hamiltonian_proposal(density.gradient, root, step)
             walkers = Walkers(density.log_density, proposal, start, generator)
             positions.append(walkers.run(min(_BLOCK, n_steps - first)))
             start = positions[-1][:, -1]
             report(positions[-1].shape[1])
             step *= float(np.exp(walkers.acceptance - _BEST_ACCEPTANCE))
-            step = min(step, _MAX_STEP)
+            step = min(max(step, _STEPS[0]), _STEPS[1])
         if stage < len(_WARM_UP) - 1:
             covariance = _inverse(_curvature(density, start[:_N_CURVED]))
             if stage > 0:
                 late = np.concatenate(positions[len(positions) // 2 :], axis=1)
                 covariance = _widened(covariance, late)
-    proposal = hamiltonian_proposal(density.gradient, root, step, _SHORTEST)
+    proposal = hamiltonian_proposal(density.gradient, root, step)
     return Walkers(density.log_density, proposal, start, generator)
 
 
@@ -372,13 +372,12 @@ def hamiltonian_proposal(
     gradient: Callable[[Floats], Floats],
     root: Floats,
     step: float,
-    shortest: float = _SHORTEST,
 ) -> _Proposal:
     """Make a proposal for a Metropolis step of many walkers at once."""
     # Each walker gets a momentum p ~ N(0, I) and a step length of its own, and moves by
     # leapfrog steps in coordinates whose covariance is about I.
-    # Takes root (n_dimensions, n_dimensions), and how much shorter the shortest step
-    # is than the longest.
+    # Takes root (n_dimensions, n_dimensions). Few steps are much shorter than the
+    # others; they lead out of corners.
     # Positions and random state to new positions and the logarithms of what the ratio
     # of densities is multiplied by: exp(|p|²/2 - |p'|²/2). A leapfrog keeps volume and
     # is its own inverse but for the sign of p, so that this is all.
@@ -390,7 +389,7 @@ def hamiltonian_proposal(
         position: Floats, random: np.random.RandomState
     ) -> tuple[Floats, Floats]:
         momentum = random.standard_normal(position.shape)
-        length = 1.4 * step * shortest ** random.uniform(size=(len(position), 1))
+        length = 1.3 * step * _SHORTEST ** random.uniform(size=(len(position), 1)) ** 3
         before = 0.5 * (momentum**2).sum(axis=1)
         with np.errstate(over="ignore", invalid="ignore"):  # a wall; not taken then
             momentum = momentum + 0.5 * length * (gradient(position) @ root)
