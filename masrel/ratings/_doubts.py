@@ -41,15 +41,15 @@ def without_second_header(sheet: Sheet) -> tuple[Sheet, list[str]]:
     from dataclasses import replace
 
     for row in range(min(2, len(sheet.cells))):
-        cells = sheet.cells.iloc[row].tolist()
-        if all('"ImportId"' in cell for cell in cells if cell):
-            kept = sheet.cells.iloc[row + 1 :]
+        if all('"ImportId"' in cell for cell in sheet.cells[row] if cell):
             text = (
                 f"{sheet.where(0)} to {sheet.where(row)} are questions and import ids "
                 "of Qualtrics, no ratings: left out"
             )
             dropped = {**sheet.dropped, "second header": row + 1}
-            return replace(sheet, cells=kept, dropped=dropped), [text]
+            rest = slice(row + 1, None)
+            cells, numbers = sheet.cells[rest], sheet.numbers[rest]
+            return replace(sheet, cells=cells, numbers=numbers, dropped=dropped), [text]
     return sheet, []
 
 

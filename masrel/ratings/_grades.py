@@ -14,7 +14,6 @@ from functools import cache
 from itertools import pairwise
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from masrel.errors import ParameterError, RatingsError
@@ -71,13 +70,16 @@ class Grades:
 def coded_texts(cells: NDArray[np.object_]) -> tuple[NDArray[np.int64], list[str]]:
     """Return the texts of cells and where each occurs; blanks around them go."""
     # (n,) -> (n,) places in the texts
-    codes, uniques = pd.factorize(cells)
+    listed = cells.tolist()
+    uniques = dict.fromkeys(listed)
+    number = {text: code for code, text in enumerate(uniques)}
+    codes = np.fromiter(map(number.__getitem__, listed), np.int64, len(listed))
     texts = [_plain(text) for text in uniques]
     place: dict[str, int] = {}
     places = [place.setdefault(text, len(place)) for text in texts]
     if len(place) < len(texts):
         codes = np.array(places, dtype=np.int64)[codes]
-    return np.asarray(codes, dtype=np.int64), list(place)
+    return codes, list(place)
 
 
 def _plain(text: str) -> str:
@@ -300,6 +302,11 @@ def _observed_scale(grades: Sequence[str]) -> Scale:
 def normal_form(text: str) -> str:
     """Return what texts have in common that a reader takes for the same."""
     plain = text.casefold()
+    if plain.isalnum() and plain.isascii():  # as most names of items are
+        if plain.isdigit():
+            return plain.lstrip("0") or "0"
+        if not plain[0].isdigit():
+            return plain
     if not plain.isascii():
         plain = _INVISIBLE.sub("", unicodedata.normalize("NFKC", plain))
         plain = plain.casefold().translate(_LOOK_ALIKE)
@@ -310,15 +317,18 @@ def normal_form(text: str) -> str:
             plain = plain.replace(",", ".")
         plain = plain.rstrip(".,:;!") or plain[:1]
     if plain[:1] in _NUMBER_BEGINS and is_number(plain):
-        return str(Decimal(plain).normalize())
+        return f"{Decimal(plain).normalize():f}"
     return plain
 
 
 def alike_texts(texts: Sequence[str]) -> list[list[str]]:
     """Return the texts that differ by spelling alone, together."""
+    forms = list(map(normal_form, texts))
+    if len(set(forms)) == len(forms):
+        return []
     groups: dict[str, list[str]] = {}
-    for text in texts:
-        groups.setdefault(normal_form(text), []).append(text)
+    for form, text in zip(forms, texts, strict=True):
+        groups.setdefault(form, []).append(text)
     return [group for group in groups.values() if len(group) > 1]
 
 

@@ -5,7 +5,6 @@ from functools import cached_property, partial
 from typing import Literal
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from masrel.agreement import CodedRatings, CountedRatings, count_ratings
@@ -115,10 +114,10 @@ def part_codes(
         columns.append((codes, list(texts)))
     (of_group, groups), (of_session, sessions) = columns
     key = of_group * len(sessions) + of_session
-    codes, met = pd.factorize(key)
+    codes, met = _first_met(key)
     n = len(sessions)
     names = [(groups[k // n], sessions[k % n]) for k in met.tolist()]
-    return np.asarray(codes, dtype=np.int64)[rows], names
+    return codes[rows], names
 
 
 def without_repeats(
@@ -244,10 +243,20 @@ def put_together(
     )
 
 
+def _first_met(codes: Codes) -> tuple[Codes, Codes]:
+    # codes in the order in which they are met, and which they were
+    first = np.full(int(codes.max(initial=0)) + 1, len(codes))
+    first[codes[::-1]] = np.arange(len(codes) - 1, -1, -1)
+    places = np.argsort(first, kind="stable")[: int((first < len(codes)).sum())]
+    rank = np.zeros(len(first), dtype=np.int64)
+    rank[places] = np.arange(len(places))
+    return rank[codes], places
+
+
 def _names_met(codes: Codes, names: list[str]) -> tuple[Codes, tuple[str, ...]]:
     # codes of the names that occur, in the order in which they do
-    met, places = pd.factorize(codes)
-    return np.asarray(met, dtype=np.int64), tuple(names[place] for place in places)
+    met, places = _first_met(codes)
+    return met, tuple(names[place] for place in places)
 
 
 def _dense(

@@ -20,13 +20,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from masrel.errors import ParameterError, RatingsError
 
 _SNIFFED = 1 << 16  # letters that the separator is found in
 _MANY_COLUMNS = 1000
+_LARGE = 1 << 22  # letters of a text that pandas reads
 _RECORDS = 20  # records that the separator is found in
 _BLANKS = " "  # any number of blanks or tabs, as R's write.table writes
 _DELIMITERS = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", " ": "blanks"}
@@ -53,6 +53,8 @@ _MARKS = {
     b"%PDF": ".pdf, which is not read",
 }
 """How files begin that are no text, and what their names end in."""
+
+Cells = NDArray[np.object_]
 
 TEXT_FORMATS = {".csv": "CSV", ".tsv": "TSV", ".txt": "text", ".dat": "text"}
 _TYPED_FORMATS = (
@@ -81,9 +83,9 @@ class Sheet:
     name: str  # the file, as the caller calls it
     sha256: str  # of its bytes
     header: tuple[str, ...]  # names of the columns, all different
-    # cells as text, one column each, numbered as the header; the index is the number
-    # of the record in the file, from 0
-    cells: pd.DataFrame = field(repr=False)
+    cells: Cells = field(repr=False)  # (n_rows, n_columns), as text
+    # (n_rows,): number of the record of every row in the file, from 0
+    numbers: NDArray[np.int64] = field(repr=False)
     # format; delimiter, encoding or sheet; what codes are called
     facts: dict[str, Any]
     dropped: dict[str, int]  # why rows are left out, and how many
@@ -94,12 +96,11 @@ class Sheet:
 
     def where(self, row: int) -> str:
         """Return where a row of `cells`, from 0, stands in the file."""
-        return self.line_of(int(self.cells.index[row]))
+        return self.line_of(int(self.numbers[row]))
 
     def column(self, position: int) -> NDArray[np.object_]:
         """Return the cells of a column."""
-        cells: NDArray[np.object_] = self.cells[position].to_numpy(dtype=object)
-        return cells
+        return self.cells[:, position]
 
     def error(self, message: str) -> RatingsError:
         """Return the error of this file with a message."""
@@ -118,16 +119,15 @@ def read_sheet(path: Path | str, options: SheetOptions) -> Sheet:
     if options.source is not None or ending in _TYPED_FORMATS:
         from masrel.ratings._typed_files import read_typed
 
-        records, facts, left_out = read_typed(name, ending, data, options)
-        first = int(records.index[0])
-        line_of: Callable[[int], str] = partial(_row_number, first)
-        records, simulated = records.reset_index(drop=True), False
+        frame, facts, left_out = read_typed(name, ending, data, options)
+        line_of: Callable[[int], str] = partial(_row_number, int(frame.index[0]))
+        records, simulated = frame.to_numpy(dtype=object), False
     else:
         text = _decoded(name, data, options.encoding)
         kind = TEXT_FORMATS.get(ending, "text")
         records, facts, line_of, simulated = _text_records(name, text, kind, options)
     if options.transpose:
-        records, line_of = records.T.reset_index(drop=True), _column_number
+        records, line_of = records.T, _column_number
     sheet = _with_header(name, sha256, records, facts, options, line_of)
     return replace(
         sheet,
@@ -209,7 +209,7 @@ def _decoded(name: str, data: bytes, encoding: str | None) -> str:
 
 def _text_records(
     name: str, text: str, kind: str, options: SheetOptions
-) -> tuple[pd.DataFrame, dict[str, Any], Callable[[int], str], bool]:
+) -> tuple[Cells, dict[str, Any], Callable[[int], str], bool]:
     # -> records with the header as the first, what the format is, where records are,
     # whether a comment labels them simulated
     declared = re.match(r'"?sep=(.)"?(\r\n|\n|\r)', text, re.IGNORECASE)
@@ -230,7 +230,7 @@ def _text_records(
         )
     if not options.no_header:
         lines.refuse_second_header()
-    records = lines.frame()
+    records = lines.cells()
     facts: dict[str, Any] = {
         "format": kind,
         "delimiter": _DELIMITERS.get(delimiter, delimiter),
@@ -377,7 +377,7 @@ class _Lines:
         self.has_row_names = len(first) > 1 and set(first[1:]) == {first[0] + 1}
         self.width = first[0] + self.has_row_names
 
-    def _records(self) -> Iterator[tuple[int, list[str]]]:
+    def _records(self, *, is_strict: bool = False) -> Iterator[tuple[int, list[str]]]:
         # -> line where it begins, cells; records of blank lines are left out
         lines = io.StringIO(self._body, newline="")
         if self._delimiter == _BLANKS:
@@ -386,7 +386,12 @@ class _Lines:
                     yield number + self._n_before, record
             return
         blanks = self._delimiter != "\t"
-        reader = csv.reader(lines, delimiter=self._delimiter, skipinitialspace=blanks)
+        reader = csv.reader(
+            lines,
+            delimiter=self._delimiter,
+            skipinitialspace=blanks,
+            strict=is_strict,
+        )
         begins = 1
         _allow_long_cells(self._body)
         for record in reader:
@@ -414,14 +419,39 @@ class _Lines:
                 "delete it; --no-header if the first line is a row like the others"
             )
 
-    def frame(self) -> pd.DataFrame:
+    def cells(self) -> Cells:
         """Return the records as cells of text, that of the names first."""
-        if self.width > _MANY_COLUMNS:  # pandas takes its time for every column
-            rows = [record for _, record in self._records()]
-            self._check_widths()
+        # pandas takes its time to load, and for every column
+        is_small = len(self._body) < _LARGE and self._delimiter != _BLANKS
+        if is_small or self.width > _MANY_COLUMNS:
+            rows = self._checked_records()
             if self.has_row_names:
                 rows[0] = [*rows[0], ""]
-            return self._named(pd.DataFrame(np.array(rows, dtype=object), dtype=object))
+            return self._named(np.array(rows, dtype=object))
+        return self._named(self._parsed())
+
+    def _checked_records(self) -> list[list[str]]:
+        # by the csv module, a quote that is not closed refused
+        try:
+            rows = [record for _, record in self._records(is_strict=True)]
+        except csv.Error as error:
+            if "unexpected end" in str(error):
+                raise self._unclosed(error) from error
+            rows = [record for _, record in self._records()]
+        if {*map(len, rows[self.has_row_names :])} != {self.width}:
+            self._check_widths()
+        return rows
+
+    def _unclosed(self, error: Exception) -> RatingsError:
+        *_, (line, _) = self._records()  # the last, which begins with that quote
+        return RatingsError(
+            f"{self._name}: line {line}: a quote that is opened is not closed ({error})"
+        )
+
+    def _parsed(self) -> Cells:
+        # by pandas
+        import pandas as pd
+
         try:
             frame = pd.read_csv(
                 io.BytesIO(self._body.encode()),
@@ -435,15 +465,13 @@ class _Lines:
             )
         except pd.errors.ParserError as error:
             self._check_widths()
-            raise RatingsError(
-                f"{self._name}: a quote that is opened is not closed ({error})"
-            ) from error
+            raise self._unclosed(error) from error
+        cells = frame.to_numpy(dtype=object)
         # pandas fills a short record up in silence, so that its last cell is empty
-        last = frame[self.width - 1].to_numpy(dtype=object)
-        may_be_short = (last[int(self.has_row_names) :] == "").any()
-        if may_be_short and not self._is_plainly_full(len(frame)):
+        may_be_short = (cells[int(self.has_row_names) :, -1] == "").any()
+        if may_be_short and not self._is_plainly_full(len(cells)):
             self._check_widths()
-        return self._named(frame)
+        return cells
 
     def _is_plainly_full(self, n_records: int) -> bool:
         # whether counting separators shows that no record is short, as none is long
@@ -454,12 +482,11 @@ class _Lines:
             and self._body.count(self._delimiter) == n_separators
         )
 
-    def _named(self, frame: pd.DataFrame) -> pd.DataFrame:
+    def _named(self, cells: Cells) -> Cells:
         # the names above their columns: that of the row names is empty, and first
-        last = frame.iloc[:, -1].to_numpy(dtype=object)
-        if self.has_row_names and not (last[1:] == "").all():
-            frame.iloc[0] = ["", *frame.iloc[0].tolist()[:-1]]
-        return frame
+        if self.has_row_names and not (cells[1:, -1] == "").all():
+            cells[0] = ["", *cells[0, :-1]]
+        return cells
 
     def _check_widths(self) -> None:
         # refuse the first record that has another number of cells
@@ -483,7 +510,7 @@ def _column_number(number: int) -> str:
 def _with_header(
     name: str,
     sha256: str,
-    records: pd.DataFrame,
+    records: Cells,
     facts: dict[str, Any],
     options: SheetOptions,
     line_of: Callable[[int], str],
@@ -491,21 +518,23 @@ def _with_header(
     if options.no_header:
         header = tuple(str(n) for n in range(1, records.shape[1] + 1))
     else:
-        header = tuple(str(cell).strip() for cell in records.iloc[0].tolist())
-        records = records.iloc[1:]
+        header = tuple(str(cell).strip() for cell in records[0].tolist())
+    numbers = np.arange(int(not options.no_header), len(records))
+    records = records[numbers[0] :] if len(numbers) else records[:0]
     blank = _blank_rows(records)
     dropped = {"blank": int(blank.sum())} if blank.any() else {}
-    records = records[~blank] if blank.any() else records
+    if blank.any():
+        records, numbers = records[~blank], numbers[~blank]
     # a separator at the end of every line makes a column without name and cells
-    if header and not header[-1] and (records.iloc[:, -1] == "").all():
-        header, records = header[:-1], records.iloc[:, :-1]
+    if header and not header[-1] and (records[:, -1] == "").all():
+        header, records = header[:-1], records[:, :-1]
     _check_names(name, header, line_of)
-    records.columns = pd.RangeIndex(len(header))
     return Sheet(
         name=name,
         sha256=sha256,
         header=header,
         cells=records,
+        numbers=numbers,
         facts=facts,
         dropped=dropped,
         has_header=not options.no_header,
@@ -532,14 +561,12 @@ def _check_names(
         seen.add(cell)
 
 
-def _blank_rows(records: pd.DataFrame) -> NDArray[np.bool_]:
+def _blank_rows(records: Cells) -> NDArray[np.bool_]:
     # rows of nothing but blanks
     blank = np.zeros(len(records), dtype=bool)
     if not len(records):
         return blank
-    places = np.flatnonzero(records.iloc[:, -1].to_numpy(dtype=object) == "")
-    first = records.iloc[:, 0].to_numpy(dtype=object)[places]
-    places = places[[not cell.strip() for cell in first]]
-    cells = records.iloc[places].to_numpy(dtype=object)
-    blank[places] = [not any(cell.strip() for cell in row) for row in cells]
+    places = np.flatnonzero(records[:, -1] == "")
+    places = places[[not cell.strip() for cell in records[places, 0]]]
+    blank[places] = [not any(cell.strip() for cell in row) for row in records[places]]
     return blank

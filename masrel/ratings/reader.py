@@ -297,7 +297,7 @@ def _wide(
 ) -> tuple[Triples, Grades, list[str]]:
     n_rows, n_raters = len(sheet.cells), len(layout.raters)
     places = list(layout.raters)
-    cells = sheet.cells[places].to_numpy(dtype=object).ravel()
+    cells = sheet.cells[:, places].ravel()
     grade, grades = _grades_of(sheet, cells, places, options)
     doubts = doubt_columns(sheet, layout, grade.reshape(n_rows, n_raters), grades.scale)
     if layout.item:
@@ -366,7 +366,7 @@ def _counted(
 
 def _whole_numbers(sheet: Sheet, layout: Layout) -> NDArray[np.int64]:
     # -> (n_rows, n_categories)
-    cells = sheet.cells[list(layout.raters)].to_numpy(dtype=object)
+    cells = sheet.cells[:, list(layout.raters)]
     codes, texts = coded_texts(cells.ravel())
     values = []
     for code, text in enumerate(texts):
