@@ -289,7 +289,9 @@ def doubt_names(kind: str, names: Sequence[str]) -> list[str]:
 
 
 def _is_no_item(name: str) -> bool:
-    return name[:1] == "#" or (len(name) < 14 and bool(_SUMMARY.fullmatch(name)))
+    if name.isdigit() or len(name) >= 14:
+        return name[:1] == "#"
+    return name[:1] == "#" or bool(_SUMMARY.fullmatch(name))
 
 
 def doubt_counts(sheet: Sheet, layout: Layout, table: NDArray[np.int64]) -> list[str]:

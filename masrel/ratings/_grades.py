@@ -323,7 +323,10 @@ def normal_form(text: str) -> str:
 
 def alike_texts(texts: Sequence[str]) -> list[list[str]]:
     """Return the texts that differ by spelling alone, together."""
-    forms = list(map(normal_form, texts))
+    if max(map(len, texts), default=0) < 19 and "".join(texts).isdigit():
+        forms = list(map(str, map(int, texts)))  # most names of items are numbers
+    else:
+        forms = list(map(normal_form, texts))
     if len(set(forms)) == len(forms):
         return []
     groups: dict[str, list[str]] = {}
