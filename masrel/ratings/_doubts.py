@@ -124,9 +124,13 @@ def _first_line(
         for name in names
     )
     warnings = []
-    if n_grades >= len(names) / 2 and not _has_item_name(sheet, layout):
+    firsts = [(sheet.header[p], str(sheet.column(p)[0])) for p in layout.item]
+    # P1 above P2; a name that is no item's above its names
+    is_numbered = any(_numbered(name) == _numbered(cell) for name, cell in firsts)
+    is_named = firsts and all(_ITEM_NAME.fullmatch(name) for name, _ in firsts)
+    if is_numbered or (n_grades >= len(names) / 2 and not is_named):
         warnings.append(
-            f"the names of the columns, {', '.join(map(repr, names[:_SHOWN]))}, are "
+            f"the names of the columns, {', '.join(map(repr, names[:_SHOWN]))}, may be "
             "grades: --no-header if the first line is a row like the others, --counts "
             "if cells are numbers of raters"
         )
@@ -138,14 +142,8 @@ def _first_line(
     return warnings
 
 
-def _has_item_name(sheet: Sheet, layout: Layout) -> bool:
-    # whether the items' column has a name like one, and not like that of an item
-    for place in layout.item:
-        name, below = sheet.header[place], str(sheet.column(place)[0])
-        is_numbered = re.sub(r"\d+", "0", name) == re.sub(r"\d+", "0", below)
-        if is_numbered or not _ITEM_NAME.fullmatch(name):
-            return False
-    return bool(layout.item)
+def _numbered(name: str) -> str:
+    return re.sub(r"\d+", "0", name)
 
 
 def _first_column(sheet: Sheet, layout: Layout, scale: Scale) -> list[str]:

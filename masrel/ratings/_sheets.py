@@ -308,10 +308,11 @@ def _delimiter_of(name: str, body: str) -> str:
         n_fields[delimiter] = [len(record) for record in records]
     consistent = [d for d, n in n_fields.items() if _is_table(n)]
     marked = [d for d in consistent if d != _BLANKS] or consistent
-    if _BLANKS in consistent and n_fields[_BLANKS][0] > n_fields[marked[0]][0]:
-        # it may be a decimal comma, unless it stands beside a quote
-        if f'"{marked[0]}' not in head and f'{marked[0]}"' not in head:
-            marked = [*marked, _BLANKS]
+    if "," in marked and not re.search(r"(?<!\d),|,(?!\d)", head):  # decimal commas?
+        if len(marked) > 1:
+            marked.remove(",")
+        elif _BLANKS in consistent and n_fields[_BLANKS][0] > n_fields[","][0]:
+            marked.append(_BLANKS)
     if len(marked) > 1:
         names = " and ".join(_DELIMITERS[d] for d in marked)
         raise RatingsError(

@@ -274,7 +274,9 @@ def written(draw: st.DrawFn, layout: Layout, options: list[str]) -> tuple[bytes,
     encoding = draw(st.sampled_from(ENCODINGS))
     if encoding == "latin-1":
         options += ["--encoding", "latin-1"]
-    if draw(st.integers(0, 3)) == 0:
+    # decimal commas between blanks may be columns
+    is_ambiguous = delimiter == " " and "--decimal" in options
+    if is_ambiguous or draw(st.integers(0, 3)) == 0:
         options += [
             "--delimiter",
             {" ": "blanks", "\t": "tab"}.get(delimiter, delimiter),
