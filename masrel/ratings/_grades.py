@@ -323,7 +323,7 @@ def normal_form(text: str) -> str:
 
 def alike_texts(texts: Sequence[str]) -> list[list[str]]:
     """Return the texts that differ by spelling alone, together."""
-    if max(map(len, texts), default=0) < 19 and "".join(texts).isdigit():
+    if max(map(len, texts), default=0) < 19 and all(map(str.isdecimal, texts)):
         forms = list(map(str, map(int, texts)))  # most names of items are numbers
     else:
         forms = list(map(normal_form, texts))
