@@ -48,9 +48,10 @@ def progress(description: str, unit: str, *, is_quiet: bool) -> Iterator[Progres
     """Show a bar on stderr, or a line every ten seconds where that is no terminal."""
     is_terminal = sys.stderr.isatty()
     # nothing is shown of a call that is refused at once
-    with tqdm(
+    bar: tqdm[None] = tqdm(
         desc=description, unit=unit, delay=0.01, disable=is_quiet or not is_terminal
-    ) as bar:
+    )
+    with bar:
         yield Progress(description, bar, shows=not (is_quiet or is_terminal))
 
 

@@ -30,7 +30,7 @@ class ReadingOptions:
     by: str | None = None
     repeated: "Repeated"
     categories: list[str] | None
-    missing: tuple[str, ...]
+    missing_codes: tuple[str, ...]
     decimal: str
     delimiter: str
     encoding: str | None
@@ -60,7 +60,10 @@ def read_file(file: Path, options: ReadingOptions) -> "RatingsFile":
         raise ParameterError(
             f"--decimal: needed one letter such as a comma, got {options.decimal!r}"
         )
-    arguments |= {"delimiter": delimiter, "missing": _codes(options.missing)}
+    arguments |= {
+        "delimiter": delimiter,
+        "missing_codes": _codes(options.missing_codes),
+    }
     return read_ratings(file, **arguments)
 
 
@@ -106,6 +109,7 @@ reading_options = [
     ),
     click.option(
         "--missing",
+        "missing_codes",
         multiple=True,
         metavar="CODE,…",
         help="Cells that are missing grades, beside empty ones and NA.",

@@ -6,9 +6,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.ratings._grades import USUAL_MISSING, alike_texts, is_number, normal_form
+from masrel.ratings._grade_texts import (
+    USUAL_MISSING,
+    alike_texts,
+    is_number,
+    normal_form,
+)
 from masrel.ratings._layout import Layout
-from masrel.ratings._sheets import Sheet
+from masrel.ratings._text_cells import Sheet
 from masrel.scales import Scale
 
 # Names of columns that are seldom those of raters.

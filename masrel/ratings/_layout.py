@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from masrel.errors import ParameterError, RatingsError
-from masrel.ratings._sheets import Sheet
+from masrel.ratings._text_cells import Sheet
 
 Kind = Literal["long", "wide", "counts", "table"]
 
@@ -209,20 +209,20 @@ def _long(
         place = _role(sheet, "item", None, used)
         item = () if place is None else (place,)
     roles = {"item": item[0] if item else None, "rater": rater, "grade": grade}
-    missing = [role for role, place in roles.items() if place is None]
+    unknown = [role for role, place in roles.items() if place is None]
     used = taken | set(item) | {p for p in roles.values() if p is not None}
     left = [place for place in range(len(header)) if place not in used]
-    if len(missing) == 1 and len(left) == 1:
-        roles[missing[0]] = left[0]
+    if len(unknown) == 1 and len(left) == 1:
+        roles[unknown[0]] = left[0]
         item = item or (left[0],)
-        missing = []
-    if missing:
+        unknown = []
+    if unknown:
         known = ", ".join(
             f"the {role} is {header[place]!r}"
             for role, place in roles.items()
             if place is not None
         )
-        options_needed = " and ".join(f"--{role}" for role in missing)
+        options_needed = " and ".join(f"--{role}" for role in unknown)
         raise sheet.error(
             f"{sheet.line_of(0)}: looks like one row a rating ({known}): needs "
             f"{options_needed}, {_listed(sheet)}; if its columns are raters, --raters "

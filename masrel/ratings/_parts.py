@@ -11,9 +11,9 @@ from masrel.agreement import CodedRatings, CountedRatings, count_ratings
 from masrel.agreement._counts import DistinctItems
 from masrel.agreement._labels import code_type
 from masrel.errors import ParameterError, RatingsError
-from masrel.ratings._grades import coded_texts, is_number
+from masrel.ratings._grade_texts import coded_texts, is_number
 from masrel.ratings._layout import Layout
-from masrel.ratings._sheets import Sheet
+from masrel.ratings._text_cells import Sheet
 from masrel.scales import Scale
 
 Repeated = Literal["error", "first", "last", "mean"]
@@ -164,14 +164,14 @@ def _repeats(
         triples.rater_names[triples.rater[first]],
     )
     used = {*layout.item, *layout.raters, layout.rater, layout.grade, layout.by}
-    apart = []
+    columns = []
     for place, name in enumerate(sheet.header):
         if place not in {*used, layout.session}:
             codes, texts = coded_texts(sheet.column(place))
             full = key * len(texts) + codes[triples.row]
             if 1 < len(texts) < len(sheet.cells) and len(np.unique(full)) == len(key):
-                apart.append(name)
-    hint = f" (--by {apart[0]!r} would)" if apart else ""
+                columns.append(name)
+    hint = f" (--by {columns[0]!r} would)" if columns else ""
     if layout.kind == "wide":
         guess = ", --rater and --grade name the columns of one row a rating"
     else:

@@ -19,7 +19,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from masrel.errors import ParameterError, RatingsError
-from masrel.ratings._sheets import SheetOptions
+from masrel.ratings._text_cells import SheetOptions
 
 _WORKBOOKS = (".xlsx", ".xlsm", ".xls", ".ods")
 _ARROW = {".parquet": "pyarrow.parquet", ".feather": "pyarrow.feather"}

@@ -1,9 +1,9 @@
 """Any file of ratings, in whatever shape its program left it, as ratings.
 
 In: a path and what the caller says of it. Out: a `RatingsFile` with what was read. The
-stages: `_sheets` (bytes to cells of text), `_layout` (which column is what), `_grades`
-(which grade a text is), `_doubts` (what looks like something else), `_parts` (ratings
-put together item by rater).
+stages: `_text_cells` (bytes to cells of text), `_layout` (which column is what),
+`_grade_texts` (which grade a text is), `_doubts` (what looks like something else),
+`_parts` (ratings put together item by rater).
 """
 
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ from masrel.ratings._doubts import (
     doubt_names,
     without_second_header,
 )
-from masrel.ratings._grades import (
+from masrel.ratings._grade_texts import (
     USUAL_MISSING,
     GradeOptions,
     Grades,
@@ -42,7 +42,7 @@ from masrel.ratings._parts import (
     put_together,
     without_repeats,
 )
-from masrel.ratings._sheets import Sheet, SheetOptions, read_sheet
+from masrel.ratings._text_cells import Sheet, SheetOptions, read_sheet
 from masrel.scales import Scale
 
 
@@ -88,7 +88,7 @@ def read_ratings(
     by: str | None = None,
     repeated: Repeated = "error",
     categories: Sequence[str] | None = None,
-    missing: Sequence[str] = (),
+    missing_codes: Sequence[str] = (),
     decimal: str = ".",
     delimiter: str | None = None,
     encoding: str | None = None,
@@ -119,7 +119,7 @@ def read_ratings(
         What becomes of a second grade of an item by the same rater.
     categories : sequence of str, optional
         Every grade of the scale, in order; the grades met unless given.
-    missing : sequence of str, optional
+    missing_codes : sequence of str, optional
         Cells that stand for a missing grade, beside empty ones and NA.
     decimal, delimiter, encoding, sheet : str, optional
         Decimal mark, separator of cells, encoding, and sheet of a workbook.
@@ -176,7 +176,7 @@ def read_ratings(
     )
     options = GradeOptions(
         categories=None if categories is None else tuple(categories),
-        missing=tuple(missing),
+        missing_codes=tuple(missing_codes),
         decimal=decimal,
     )
     cells, warnings = without_second_header(read_sheet(path, form))
@@ -464,7 +464,7 @@ def _record(
         "by": _name(sheet, layout.by),
         "ignored": [n for p, n in enumerate(sheet.header) if p not in used],
         "grades": {grade: n for grade, n in counted if n},
-        "missing": grades.missing,
+        "missing": grades.n_missing,
         "merged": grades.merged,
         "dropped": sheet.dropped,
         "scale": {

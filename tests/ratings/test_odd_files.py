@@ -224,7 +224,7 @@ def test_what_may_be_one_of_two_grades_is_refused(
 @pytest.mark.parametrize("spelling", ["#N/A", "-99", "x", ".", "9.0", "--"])
 def test_a_code_that_is_named_is_missing(spelling: str, tmp_path: Path) -> None:
     data = with_spelling(NUMBERS, spelling)
-    got = outcome(tmp_path, data, missing=[spelling.removesuffix(".0")])
+    got = outcome(tmp_path, data, missing_codes=[spelling.removesuffix(".0")])
     assert got == ("right", "", with_grade(NUMBERS, None))
 
 
@@ -668,9 +668,9 @@ REFUSED: dict[str, Any] = {
     "a grade that is missing": (
         BASE,
         "--categories, --missing",
-        {"categories": ["1", "2", "3"], "missing": ["3.0"]},
+        {"categories": ["1", "2", "3"], "missing_codes": ["3.0"]},
     ),
-    "all missing": (BASE, "grade", {"missing": ["1", "2", "3"]}),
+    "all missing": (BASE, "grade", {"missing_codes": ["1", "2", "3"]}),
 }
 
 

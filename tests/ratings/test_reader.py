@@ -210,7 +210,7 @@ def test_a_contingency_table(tmp_path: Path) -> None:
 
 def test_codes_of_missing_grades(tmp_path: Path) -> None:
     text = "item,Kim,Lee\nA,1,9\nB,x,2\nC,2,2\nD,9.0,not rated\n"
-    file = read(tmp_path, text, missing=["9", "x", "not rated"])
+    file = read(tmp_path, text, missing_codes=["9", "x", "not rated"])
     assert grades_of(file) == [["1", None], [None, "2"], ["2", "2"], [None, None]]
     assert file.read["missing"] == {"9": 1, "x": 1, "9.0": 1, "not rated": 1}
     assert file.read["n_missing"] == 4
@@ -435,7 +435,10 @@ def test_a_crowd_is_counted(tmp_path: Path) -> None:
         ({"counts": True, "table": True}, "--counts, --table"),
         ({"no_item": True, "item": "patient"}, "--no-item"),
         ({"categories": ["1", "2", "2", "3"]}, r"repeated: \['2'\]"),
-        ({"categories": ["1", "2", "3"], "missing": ["3"]}, "'3' is a grade or miss"),
+        (
+            {"categories": ["1", "2", "3"], "missing_codes": ["3"]},
+            "'3' is a grade or miss",
+        ),
     ],
 )
 def test_wrong_options(options: dict[str, Any], words: str, tmp_path: Path) -> None:

@@ -129,7 +129,7 @@ class TestWorkbook:
         path = workbook(tmp_path / "r.xlsx", R=rows, empty=[])
         with pytest.raises(RatingsError, match=r"row 6.*n/a"):
             read_ratings(path)
-        file = read_ratings(path, missing=["n/a"])
+        file = read_ratings(path, missing_codes=["n/a"])
         assert grades(file)["C", "Kim"] is None
         assert grades(file)["A", "Lee"] == "1+"
 

@@ -114,17 +114,17 @@ def read_sheet(path: Path | str, options: SheetOptions) -> Sheet:
         raise RatingsError(f"{name}: needed a header and rows, the file is empty")
     sha256 = hashlib.sha256(data).hexdigest()
     inner, data = _unpacked(name, data, is_export=options.source is not None)
-    ending = Path(inner).suffix.lower()
+    suffix = Path(inner).suffix.lower()
     left_out: dict[str, int] = {}
-    if options.source is not None or ending in _TYPED_FORMATS:
+    if options.source is not None or suffix in _TYPED_FORMATS:
         from masrel.ratings._typed_files import read_typed
 
-        frame, facts, left_out = read_typed(name, ending, data, options)
+        frame, facts, left_out = read_typed(name, suffix, data, options)
         line_of: Callable[[int], str] = partial(_row_number, int(frame.index[0]))
         records, simulated = frame.to_numpy(dtype=object), False
     else:
         text = _decoded(name, data, options.encoding)
-        kind = TEXT_FORMATS.get(ending, "text")
+        kind = TEXT_FORMATS.get(suffix, "text")
         records, facts, line_of, simulated = _text_records(name, text, kind, options)
     if options.transpose:
         records, line_of = records.T, _column_number
@@ -149,17 +149,17 @@ def _bytes_of(path: Path | str) -> bytes:
 
 
 def _unpacked(name: str, data: bytes, *, is_export: bool) -> tuple[str, bytes]:
-    # what is in a packed file, by its ending: the name without it, and the bytes
-    stem, ending = name.removesuffix(Path(name).suffix), Path(name).suffix.lower()
+    # what is in a packed file, by its suffix: the name without it, and the bytes
+    stem, suffix = name.removesuffix(Path(name).suffix), Path(name).suffix.lower()
     packed = next((e for mark, e in _PACKED.items() if data.startswith(mark)), None)
-    ending = packed or ending  # a pipe has no ending
-    stem = stem if name.lower().endswith(ending) else name
+    suffix = packed or suffix  # a pipe has no suffix
+    stem = stem if name.lower().endswith(suffix) else name
     try:
-        if ending == ".gz":
+        if suffix == ".gz":
             return stem, gzip.decompress(data)
-        if ending == ".xz":
+        if suffix == ".xz":
             return stem, lzma.decompress(data)
-        if ending == ".zip":
+        if suffix == ".zip":
             with zipfile.ZipFile(io.BytesIO(data)) as archive:
                 members = [m for m in archive.namelist() if not m.endswith("/")]
                 if len(members) > 1 and is_export:  # such as a file of each annotator
@@ -175,7 +175,7 @@ def _unpacked(name: str, data: bytes, *, is_export: bool) -> tuple[str, bytes]:
         *(RuntimeError, NotImplementedError),  # encrypted, packed in another way
     ) as error:
         raise RatingsError(
-            f"{name}: is damaged, or no {ending} file ({error})"
+            f"{name}: is damaged, or no {suffix} file ({error})"
         ) from error
     return name, data
 
@@ -183,9 +183,9 @@ def _unpacked(name: str, data: bytes, *, is_export: bool) -> tuple[str, bytes]:
 def _decoded(name: str, data: bytes, encoding: str | None) -> str:
     marked = next((e for bom, e in _BOMS if data.startswith(bom)), None)
     encoding = encoding or marked or "utf-8"
-    for mark, ending in _MARKS.items():
+    for mark, suffix in _MARKS.items():
         if data.startswith(mark):
-            raise RatingsError(f"{name}: needed text, got a file of the kind {ending}")
+            raise RatingsError(f"{name}: needed text, got a file of the kind {suffix}")
     try:
         text = data.decode("utf-8-sig" if encoding == "utf-8" else encoding)
     except UnicodeDecodeError as error:

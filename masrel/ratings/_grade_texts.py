@@ -47,7 +47,7 @@ class GradeOptions:
     """What a caller says of the grades."""
 
     categories: tuple[str, ...] | None = None  # every grade of the scale in order
-    missing: tuple[str, ...] = ()  # codes of missing grades beside the usual ones
+    missing_codes: tuple[str, ...] = ()  # codes of missing grades beside the usual ones
     decimal: str = "."
 
 
@@ -58,7 +58,7 @@ class Grades:
     scale: Scale
     codes: NDArray[np.int64]  # (n_texts,): place in the scale, -1 where missing
     merged: dict[str, list[str]] = field(default_factory=dict)  # grade to its spellings
-    missing: dict[str, int] = field(default_factory=dict)  # code to number of cells
+    n_missing: dict[str, int] = field(default_factory=dict)  # code to number of cells
     warnings: list[str] = field(default_factory=list)
 
     @property
@@ -103,15 +103,15 @@ def read_grades(
     # freq (n_texts,): how many cells have each
     options = _checked(options)
     declared = options.categories or ()
-    missing = dict.fromkeys(_missing_codes(texts, options), 0)
+    absent = set(_missing_codes(texts, options))
     as_number = {text: _decimal_point(text, options.decimal) for text in texts}
-    places = [i for i, text in enumerate(texts) if text not in missing and freq[i]]
+    places = [i for i, text in enumerate(texts) if text not in absent and freq[i]]
     grades = Grades(
         scale=MODIFIED_ASHWORTH, codes=np.full(len(texts), -1, dtype=np.int64)
     )
     for text, n in zip(texts, freq.tolist(), strict=True):
-        if text in missing and n:
-            grades.missing[text] = int(n)
+        if text in absent and n:
+            grades.n_missing[text] = int(n)
     met = {texts[i]: int(freq[i]) for i in places}
     if not met:
         raise RatingsError("needed at least one grade, got none")
@@ -141,7 +141,7 @@ def read_grades(
 def _checked(options: GradeOptions) -> GradeOptions:
     # categories and codes as cells are: without blanks around them, by one Unicode form
     declared = tuple(map(_plain, options.categories or ()))
-    codes = tuple(map(_plain, options.missing))
+    codes = tuple(map(_plain, options.missing_codes))
     again = [grade for grade in dict.fromkeys(declared) if declared.count(grade) > 1]
     if again or "" in declared:
         what = f"repeated: {again}" if again else "got none between two commas"
@@ -152,14 +152,14 @@ def _checked(options: GradeOptions) -> GradeOptions:
             raise ParameterError(
                 f"--categories, --missing: {code!r} is a grade or missing, not both"
             )
-    return replace(options, categories=declared or None, missing=codes)
+    return replace(options, categories=declared or None, missing_codes=codes)
 
 
 def _missing_codes(texts: Sequence[str], options: GradeOptions) -> list[str]:
     # texts that stand for a missing grade; numbers among the codes by their value
     declared = options.categories or ()
-    codes = {c for c in USUAL_MISSING if c not in declared} | set(options.missing)
-    numbers = {Decimal(code) for code in options.missing if is_number(code)}
+    codes = {c for c in USUAL_MISSING if c not in declared} | set(options.missing_codes)
+    numbers = {Decimal(code) for code in options.missing_codes if is_number(code)}
     return [
         text
         for text in texts
