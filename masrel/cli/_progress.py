@@ -4,6 +4,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Never
 
 import click
 from tqdm import tqdm
@@ -14,7 +15,7 @@ _PERIOD_S = 10.0
 class Progress:
     """Steps made of those that are expected."""
 
-    def __init__(self, description: str, bar: "tqdm[None]", *, shows: bool) -> None:
+    def __init__(self, description: str, bar: "tqdm[Never]", *, shows: bool) -> None:
         self._description = description
         self._bar = bar
         self._shows = shows  # lines, where there is no bar
@@ -48,7 +49,7 @@ def progress(description: str, unit: str, *, is_quiet: bool) -> Iterator[Progres
     """Show a bar on stderr, or a line every ten seconds where that is no terminal."""
     is_terminal = sys.stderr.isatty()
     # nothing is shown of a call that is refused at once
-    bar: tqdm[None] = tqdm(
+    bar = tqdm(
         desc=description, unit=unit, delay=0.01, disable=is_quiet or not is_terminal
     )
     with bar:
