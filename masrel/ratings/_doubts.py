@@ -282,7 +282,7 @@ def doubt_names(kind: str, names: Sequence[str]) -> list[str]:
         for group in alike_texts(names)[:_SHOWN]
     ]
     if kind == "items":
-        odd = [name for name in names if _is_no_item(name)]
+        odd = [n for n in names if not n.isdigit() and _is_no_item(n)]
         if 0 < len(odd) < len(names) / 2:
             warnings.append(
                 f"{', '.join(map(repr, odd[:_SHOWN]))} counts as an item: if it is a "
@@ -292,9 +292,7 @@ def doubt_names(kind: str, names: Sequence[str]) -> list[str]:
 
 
 def _is_no_item(name: str) -> bool:
-    if name.isdigit() or len(name) >= 14:
-        return name[:1] == "#"
-    return name[:1] == "#" or bool(_SUMMARY.fullmatch(name))
+    return name[:1] == "#" or (len(name) < 14 and bool(_SUMMARY.fullmatch(name)))
 
 
 def doubt_counts(sheet: Sheet, layout: Layout, table: NDArray[np.int64]) -> list[str]:

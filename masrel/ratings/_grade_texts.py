@@ -31,6 +31,7 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,5})?", re.ASCII)
 _NUMBER_BEGINS = frozenset("+-.0123456789")
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+", re.ASCII)
 _HALF_GRADE = re.compile(r"\d+([+-]+|[A-Za-z])")  # 1+, 4-, 2a: numbers, more or less
+_UNPLAIN = re.compile(r"[^\x21-\x7e]")  # blanks, and letters that may have two forms
 _INVISIBLE = re.compile("[\u200b-\u200f\u2060\ufeff\u00ad]")
 _NEEDS_CARE = re.compile(r"[\s'\"`=,.:;!]")
 # Dashes, and Cyrillic and Greek letters that look like Latin ones.
@@ -71,9 +72,13 @@ def coded_texts(cells: NDArray[np.object_]) -> tuple[NDArray[np.int64], list[str
     """Return the texts of cells and where each occurs; blanks around them go."""
     # (n,) -> (n,) places in the texts
     listed = cells.tolist()
-    uniques = dict.fromkeys(listed)
-    number = {text: code for code, text in enumerate(uniques)}
-    codes = np.fromiter(map(number.__getitem__, listed), np.int64, len(listed))
+    uniques = list(dict.fromkeys(listed))
+    codes = np.arange(len(listed))
+    if len(uniques) < len(listed):
+        number = dict(zip(uniques, range(len(uniques)), strict=True))
+        codes = np.fromiter(map(number.__getitem__, listed), np.int64, len(listed))
+    if not _UNPLAIN.search("".join(uniques)):
+        return codes, uniques
     texts = [_plain(text) for text in uniques]
     place: dict[str, int] = {}
     places = [place.setdefault(text, len(place)) for text in texts]
@@ -324,9 +329,9 @@ def normal_form(text: str) -> str:
 def alike_texts(texts: Sequence[str]) -> list[list[str]]:
     """Return the texts that differ by spelling alone, together."""
     if max(map(len, texts), default=0) < 19 and all(map(str.isdecimal, texts)):
-        forms = list(map(str, map(int, texts)))  # most names of items are numbers
-    else:
-        forms = list(map(normal_form, texts))
+        if len(set(map(int, texts))) == len(texts):  # as most names of items are
+            return []
+    forms = list(map(normal_form, texts))
     if len(set(forms)) == len(forms):
         return []
     groups: dict[str, list[str]] = {}

@@ -378,23 +378,24 @@ class _Lines:
         self.has_row_names = len(first) > 1 and set(first[1:]) == {first[0] + 1}
         self.width = first[0] + self.has_row_names
 
-    def _records(self, *, is_strict: bool = False) -> Iterator[tuple[int, list[str]]]:
+    def _reader(self, *, is_strict: bool = False) -> Any:
+        # the csv module's reader of the text
+        _allow_long_cells(self._body)
+        return csv.reader(
+            io.StringIO(self._body, newline=""),
+            delimiter=self._delimiter,
+            skipinitialspace=self._delimiter != "\t",
+            strict=is_strict,
+        )
+
+    def _records(self) -> Iterator[tuple[int, list[str]]]:
         # -> line where it begins, cells; records of blank lines are left out
-        lines = io.StringIO(self._body, newline="")
         if self._delimiter == _BLANKS:
             for number, record in enumerate(_rows(self._body, _BLANKS), start=1):
                 if record:
                     yield number + self._n_before, record
             return
-        blanks = self._delimiter != "\t"
-        reader = csv.reader(
-            lines,
-            delimiter=self._delimiter,
-            skipinitialspace=blanks,
-            strict=is_strict,
-        )
-        begins = 1
-        _allow_long_cells(self._body)
+        reader, begins = self._reader(), 1
         for record in reader:
             if record and (len(record) > 1 or record[0].strip(" \t")):
                 yield begins + self._n_before, record
@@ -433,14 +434,15 @@ class _Lines:
 
     def _checked_records(self) -> list[list[str]]:
         # by the csv module, a quote that is not closed refused
+        rows: list[list[str]] = []
         try:
-            rows = [record for _, record in self._records(is_strict=True)]
+            rows = list(self._reader(is_strict=True))
         except csv.Error as error:
             if "unexpected end" in str(error):
                 raise self._unclosed(error) from error
-            rows = [record for _, record in self._records()]
         if {*map(len, rows[self.has_row_names :])} != {self.width}:
             self._check_widths()
+            rows = [record for _, record in self._records()]
         return rows
 
     def _unclosed(self, error: Exception) -> RatingsError:
