@@ -168,8 +168,8 @@ class DistinctItems:
             size = counts.sum(axis=1)
         else:  # as a rule: everybody rated everything
             size = float(groups[0].size)
-        if v.numerators is None:  # without its matrix: Σ_l v_kl n_l is n - n_k
-            others = np.reshape(size, (-1, 1)) - counts
+        if exact and v.numerators is None:  # Σ_l v_kl n_l is n - n_k; no matrix
+            others = size[:, None] - counts
         else:
             # `dot` does what @ does, in half the time for a few items.
             others = counts.dot(v.fractions if exact else v.floats)

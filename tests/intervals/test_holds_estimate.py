@@ -87,6 +87,7 @@ DO_NOT_PROMISE = {
     "posterior": "so may a posterior, which a prior pulls",
     "retest_model": "the same",
     "latent_trait": "the same",
+    "difference_test": "it is a p-value, not an interval",
 }
 KERNELS = [name for name, entry in COEFFICIENTS.items() if entry.kernel is not None]
 OF_RATERS = ("raters", "both")
