@@ -126,6 +126,10 @@ def _resolved(sheet: Sheet, options: LayoutOptions) -> LayoutOptions:
     # the options with every name checked
     if options.counts and options.table:
         raise ParameterError("--counts, --table: needed one of them, got both")
+    if options.session and (options.counts or options.table):
+        raise ParameterError(
+            "--session: counts do not say who rated what; --by tells groups apart"
+        )
     if options.raters and (options.rater or options.grade):
         raise ParameterError(
             "--raters names the columns of a wide table, --rater and --grade those of "

@@ -434,6 +434,7 @@ def test_a_crowd_is_counted(tmp_path: Path) -> None:
         ({"raters": ["Kim", "Lee", "Kim"]}, "'Kim' twice"),
         ({"counts": True, "table": True}, "--counts, --table"),
         ({"no_item": True, "item": "patient"}, "--no-item"),
+        ({"counts": True, "session": "patient"}, "--session: counts do not say"),
         ({"categories": ["1", "2", "2", "3"]}, r"repeated: \['2'\]"),
         (
             {"categories": ["1", "2", "3"], "missing_codes": ["3"]},
