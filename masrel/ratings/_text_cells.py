@@ -14,6 +14,7 @@ import sys
 import zipfile
 import zlib
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -292,12 +293,19 @@ def _rows(text: str, delimiter: str) -> Iterator[list[str]]:
     else:
         lines = io.StringIO(text, newline="")
         blanks = delimiter != "\t"
-        _allow_long_cells(text)
-        yield from csv.reader(lines, delimiter=delimiter, skipinitialspace=blanks)
+        with _long_cells(text):
+            yield from csv.reader(lines, delimiter=delimiter, skipinitialspace=blanks)
 
 
-def _allow_long_cells(text: str) -> None:
-    csv.field_size_limit(max(csv.field_size_limit(), len(text)))
+@contextmanager
+def _long_cells(text: str) -> Iterator[None]:
+    # cells as long as the text, while it is read: the limit is one for all readers
+    limit = csv.field_size_limit()
+    csv.field_size_limit(max(limit, len(text)))
+    try:
+        yield
+    finally:
+        csv.field_size_limit(limit)
 
 
 def _delimiter_of(name: str, body: str) -> str:
@@ -380,7 +388,6 @@ class _Lines:
 
     def _reader(self, *, is_strict: bool = False) -> Any:
         # the csv module's reader of the text
-        _allow_long_cells(self._body)
         return csv.reader(
             io.StringIO(self._body, newline=""),
             delimiter=self._delimiter,
@@ -396,10 +403,11 @@ class _Lines:
                     yield number + self._n_before, record
             return
         reader, begins = self._reader(), 1
-        for record in reader:
-            if record and (len(record) > 1 or record[0].strip(" \t")):
-                yield begins + self._n_before, record
-            begins = reader.line_num + 1
+        with _long_cells(self._body):
+            for record in reader:
+                if record and (len(record) > 1 or record[0].strip(" \t")):
+                    yield begins + self._n_before, record
+                begins = reader.line_num + 1
 
     def line_of(self, number: int) -> str:
         """Return the line of a record."""
@@ -436,7 +444,8 @@ class _Lines:
         # by the csv module, a quote that is not closed refused
         rows: list[list[str]] = []
         try:
-            rows = list(self._reader(is_strict=True))
+            with _long_cells(self._body):
+                rows = list(self._reader(is_strict=True))
         except csv.Error as error:
             if "unexpected end" in str(error):
                 raise self._unclosed(error) from error

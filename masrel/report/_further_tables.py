@@ -161,10 +161,6 @@ def retest_table(
     file: RatingsFile, question: Question, names: Sequence[str] = ("stratified_kappa",)
 ) -> FurtherTable:
     """Return how well raters agree with themselves, each and all together."""
-    if file.read["layout"] in ("counts", "table"):
-        raise ParameterError(
-            f"--retest: needs to know who rated what, got --{file.read['layout']}"
-        )
     if file.read["session"] is None:
         raise ParameterError(
             "--retest: needs --session with the column of the two sessions"

@@ -266,7 +266,7 @@ def test_a_retest_of_counts_is_refused(masrel: Caller, tmp_path: Path) -> None:
     rows = [(session, n, 2, 0) for session in "ab" for n in range(3)]
     path = write(tmp_path / "n.csv", "session,item,yes,no", rows)
     names = ("--counts", "--session", "session", "--retest")
-    assert "--retest: needs to know who rated what, got --counts" in refused(
+    assert "--session: counts do not say who rated what" in refused(
         masrel, path, *names
     )
 
