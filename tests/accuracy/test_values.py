@@ -38,7 +38,7 @@ def wrong_with(case: Case, weights: Sequence[str]) -> list[str]:
             case,
             weights,
             id=f"{case.name}-{weights}",
-            marks=[pytest.mark.long] if case.long else [],
+            marks=pytest.mark.long if case.long else pytest.mark.slow,
         )
         for case in CASES
         for weights in case.weights

@@ -246,6 +246,7 @@ def test_progress_counts_warm_up_and_both_priors() -> None:
     assert sum(steps) == result.n_steps + result.other.n_steps + 2 * 75
 
 
+@pytest.mark.slow
 def test_a_rater_who_grades_high_and_one_who_is_careless_are_found() -> None:
     rng = np.random.default_rng(3)
     severity = np.repeat([-2.0, -1.0, 0.0, 1.0, 2.0], 4)

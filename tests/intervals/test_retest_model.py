@@ -29,6 +29,7 @@ def drawn_pairs(
     return study
 
 
+@pytest.mark.slow
 def test_on_many_pairs_of_alike_raters_it_is_stratified_kappa() -> None:
     rng = np.random.default_rng(11)
     shares = np.tile([0.1, 0.2, 0.4, 0.3], (6, 1))

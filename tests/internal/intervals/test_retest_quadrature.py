@@ -176,6 +176,7 @@ def test_ranks_of_what_made_the_data_are_uniform(n_raters: int, n_items: int) ->
     assert stats.kstest(below, "uniform").pvalue > 1e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "table",
     [
