@@ -3,20 +3,20 @@
 import shlex
 import shutil
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from masrel.cli._agreement_rows import EstimateOptions
 from masrel.cli._options import OutputOptions, echo_notes, write_output
+from masrel.cli._reading import ReadingOptions, what_was_read
 
 if TYPE_CHECKING:
+    from masrel.ratings import RatingsFile
     from masrel.report._agreement_table import AgreementRow
     from masrel.report._further_tables import FurtherTable
-    from masrel.scales import Scale
 
 
 _WIDTHS = (88, 100)
@@ -39,29 +39,26 @@ def write_agreement(
     rows: "Sequence[AgreementRow]",
     output: OutputOptions,
     *,
-    file: Path,
-    sha256: str | None,
-    scale: "Scale",
+    ratings: "RatingsFile",
+    reading: ReadingOptions,
     options: EstimateOptions,
     by: str | None,
-    read: Mapping[str, object],
-    read_lines: tuple[str, ...] = (),
-    notes: tuple[str, ...] = (),
-    explain: bool = False,
-    simulated: bool = False,
-    further: "Sequence[FurtherTable]" = (),
+    explain: bool,
+    further: "Sequence[FurtherTable]",
 ) -> None:
     """Print and write estimates in the forms that were chosen."""
-    # read: what was read, as plain values for JSON, and read_lines for a screen;
-    # further: tables below that of the estimates, or in its place if there are none
+    # by: what tells groups apart; further: tables below that of the estimates, or in
+    # its place if there are none
     from masrel.report import _agreement_table as shown
     from masrel.report._tables import SIMULATED
 
     target, bands = options.target, options.words
-    data = "simulated" if simulated else "foreign"
+    is_sentence = output.sentence and bool(rows)
+    data = "simulated" if ratings.simulated else "foreign"
+    read_lines, notes = tuple(what_was_read(ratings)), _notes(ratings, options)
     table = shown.agreement_table(
         rows,
-        caption=f"Agreement of the raters in {file}",
+        caption=f"Agreement of the raters in {ratings.read['file']}",
         by=by,
         bands=bands,
         read=read_lines,
@@ -80,11 +77,9 @@ def write_agreement(
         document=lambda: {
             **shown.agreement_record(
                 rows,
-                file=str(file),
-                sha256=sha256,
-                options={**options.record(), "by": read.get("by", by)},
-                scale=scale,
-                read=read,
+                read={**ratings.read, "options": reading.record()},
+                options={**options.record(), "by": ratings.read["by"]},
+                scale=ratings.scale,
                 notes=notes,
                 by=by,
                 bands=bands,
@@ -93,21 +88,19 @@ def write_agreement(
         },
         text=lambda: (
             shown.agreement_sentences(rows, by=by, bands=bands, data=data)
-            if output.sentence and rows
+            if is_sentence
             else table
         ),
-        figure=None
-        if target is None
-        else lambda: shown.agreement_forest(drawn, target),
-        stamp=SIMULATED if simulated else "",
+        figure=target and (lambda: shown.agreement_forest(drawn, target)),
+        stamp=SIMULATED if ratings.simulated else "",
         notes=(*read_lines, *notes),
         more=more,
         width=_screen_width(),
     )
-    if output.sentence and rows:
+    if is_sentence:
         echo_notes((*read_lines, *table.notes))
     offer = _interval_offer(rows, options)
-    if offer is not None:
+    if offer is not None and ratings.read["file"] != "-":  # what was piped in is gone
         click.echo(offer, err=True)
 
 
@@ -119,11 +112,13 @@ def _screen_width() -> int:
     return min(shutil.get_terminal_size((elsewhere, 24)).columns, most)
 
 
-def order_notes(is_ordered: bool, options: EstimateOptions) -> tuple[str, ...]:
-    """Return what is left out of all coefficients because grades have no order."""
-    if is_ordered or not options.takes_all:
-        return ()
+def _notes(ratings: "RatingsFile", options: EstimateOptions) -> tuple[str, ...]:
+    """Return what may have been read wrongly, and what is left out of it."""
+    warnings = tuple(f"warning: {text}" for text in ratings.warnings)
+    if ratings.is_ordered or not options.takes_all:
+        return warnings
     return (
+        *warnings,
         "Left out: the six forms of ICC, Kendall's W and Robinson's A, which need "
         "grades that are numbers or --categories with every grade in order.",
     )

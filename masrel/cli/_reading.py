@@ -1,6 +1,6 @@
 """The options of verbs that read any file of ratings, and what they say of it."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,26 +19,35 @@ _SHOWN = 12  # raters that are named
 class ReadingOptions:
     """What the caller says of a file; None and () are for the file to tell."""
 
-    item: tuple[str, ...]
-    rater: str | None
-    grade: str | None
-    raters: tuple[str, ...]
-    ignore: tuple[str, ...]
-    no_item: bool
-    no_header: bool
-    session: str | None
+    item: tuple[str, ...] = ()
+    rater: str | None = None
+    grade: str | None = None
+    raters: tuple[str, ...] = ()
+    ignore: tuple[str, ...] = ()
+    no_item: bool = False
+    no_header: bool = False
+    session: str | None = None
     by: str | None = None
-    repeated: "Repeated"
-    categories: list[str] | None
-    missing_codes: tuple[str, ...]
-    decimal: str
-    delimiter: str
-    encoding: str | None
-    sheet: str | None
-    transpose: bool
+    repeated: "Repeated" = "error"
+    categories: list[str] | None = None
+    missing_codes: tuple[str, ...] = ()
+    decimal: str = "."
+    delimiter: str = "auto"
+    encoding: str | None = None
+    sheet: str | None = None
+    transpose: bool = False
     counts: bool = False
     table: bool = False
-    source: str | None
+    source: str | None = None
+
+    def record(self) -> dict[str, object]:
+        """Return what the caller said, as plain values for JSON."""
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {
+            name: list(value) if isinstance(value, tuple) else value
+            for name, value in values.items()
+            if value != getattr(type(self)(), name)
+        }
 
 
 def _codes(texts: tuple[str, ...]) -> list[str]:

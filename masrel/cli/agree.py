@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from masrel.cli._agreement_output import WithArguments, order_notes, write_agreement
+from masrel.cli._agreement_output import WithArguments, write_agreement
 from masrel.cli._agreement_rows import (
     EstimateOptions,
     estimate_options,
@@ -18,7 +18,6 @@ from masrel.cli._reading import (
     read_file,
     reading_options,
     table_options,
-    what_was_read,
 )
 from masrel.errors import ParameterError, RatingsError
 
@@ -70,21 +69,15 @@ def agree(
             "--figure: shows intervals, so it needs --target raters, items or both"
         )
     ratings = read_file(file, reading)
-    warnings = tuple(f"warning: {text}" for text in ratings.warnings)
     by, groups = _groups(ratings, further, file)
     write_agreement(
         _estimate(ratings, groups, further.between_raters(ratings, options)),
         output,
-        file=file,
-        sha256=ratings.read["sha256"],
-        scale=ratings.scale,
+        ratings=ratings,
+        reading=reading,
         options=options,
         by=by,
-        read=ratings.read,
-        read_lines=tuple(what_was_read(ratings)),
-        notes=(*warnings, *order_notes(ratings.is_ordered, options)),
         explain=explain,
-        simulated=ratings.simulated,
         further=further_tables(ratings, further, options, explain=explain),
     )
 

@@ -60,7 +60,7 @@ def latent(
 ) -> None:
     """Place the raters and items in FILE on one scale.
 
-    FILE is a CSV table of grades on an ordered scale, as for agree. An ordinal
+    FILE holds grades on an ordered scale, in any shape that agree reads. An ordinal
     latent-trait model gives kappa for new raters, each rater's bias and noise, each
     item's severity, and the thresholds between grades. It takes seconds to minutes.
     """

@@ -266,28 +266,27 @@ def _reached(row: AgreementRow, bands: BandScale | None) -> str:
 def agreement_record(
     rows: Sequence[AgreementRow],
     *,
-    file: str,
-    sha256: str | None,
+    read: Mapping[str, object],
     options: Mapping[str, object],
     scale: Scale,
-    read: Mapping[str, object],
     notes: tuple[str, ...] = (),
     by: str | None = None,
     bands: BandScale | None = None,
 ) -> dict[str, object]:
     """Return all that made the estimates, and them, as plain values for JSON."""
     # read: of what was read, plain already; the others as of `agreement_table`
+    of_file = dict(read)
     return {
         "masrel": masrel.__version__,
-        "file": file,
-        "sha256": sha256,
+        "file": of_file.pop("file"),
+        "sha256": of_file.pop("sha256"),
         "options": dict(options),
         "scale": {
             "name": scale.name,
             "grades": list(scale.grades),
             "values": list(scale.values),
         },
-        "read": dict(read),
+        "read": of_file,
         "notes": list(notes),
         "estimates": estimate_documents(rows, by=by, bands=bands),
     }
