@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from masrel.ratings._grade_texts import (
     alike_texts,
     is_number,
     normal_form,
+    quoted,
 )
 from masrel.ratings._layout import Layout
 from masrel.ratings._text_cells import Sheet
@@ -43,8 +45,6 @@ _SHOWN = 6
 
 def without_second_header(sheet: Sheet) -> tuple[Sheet, list[str]]:
     """Leave Qualtrics' lines of questions and import ids out, and say so."""
-    from dataclasses import replace
-
     for row in range(min(2, len(sheet.cells))):
         if all('"ImportId"' in cell for cell in sheet.cells[row] if cell):
             text = (
@@ -76,31 +76,25 @@ def doubt_columns(
         raise sheet.error(
             f"{', '.join(map(repr, listed))}: no grade in common with the other "
             "columns, or the name of something else: --ignore "
-            f"{_option(listed)} leaves such columns aside, --raters names those that "
+            f"{quoted(listed)} leaves such columns aside, --raters names those that "
             "rate"
         )
     warnings += [
         f"column {names[k]!r} counts as a rater; if it is none, --ignore "
-        f"{_option([names[k]])}"
+        f"{quoted([names[k]])}"
         for k in sorted(named)
     ]
     alone = [names[k] for k in sorted(odd - named)][:_SHOWN]
     if alone and len(names) > 1:
         warnings.append(
             f"no grade in common with the other columns: {', '.join(map(repr, alone))}"
-            f"; if it is no rater, --ignore {_option(alone)}"
+            f"; if it is no rater, --ignore {quoted(alone)}"
         )
     return [
         *warnings,
         *_looks_counted(names, codes, scale),
         *_second_header(sheet, codes, scale),
     ]
-
-
-def _option(names: Sequence[str]) -> str:
-    import shlex
-
-    return shlex.quote(",".join(names))
 
 
 def _refuse_contingency(sheet: Sheet, layout: Layout, names: Sequence[str]) -> None:
@@ -166,7 +160,7 @@ def _first_column(sheet: Sheet, layout: Layout, scale: Scale) -> list[str]:
     if len(distinct) < len(cells) and n_in_scale < len(distinct):
         return []  # refused as repeated
     choices = (
-        f"--no-item if it is a rater, --item {_option([name])} if it names the items"
+        f"--no-item if it is a rater, --item {quoted([name])} if it names the items"
     )
     if len(distinct) < len(cells):
         raise sheet.error(
@@ -184,33 +178,17 @@ def _is_among(text: str, numbers: set[float]) -> bool:
 
 def _unlike(codes: NDArray[np.int64], scale: Scale) -> set[int]:
     # columns without a grade, or a value, in common with any other
-    n_columns = codes.shape[1]
     rated = [np.unique(column[column >= 0]) for column in codes.T]
-    if all(map(is_number, scale.grades)):
-        ends = [(c[0], c[-1]) if len(c) else None for c in rated]
-        values = [
-            None if e is None else (scale.values[e[0]], scale.values[e[1]])
-            for e in ends
-        ]
-        return {
-            k
-            for k, mine in enumerate(values)
-            if mine is not None
-            and any(other is not None for j, other in enumerate(values) if j != k)
-            and not any(
-                other is not None and mine[0] <= other[1] and other[0] <= mine[1]
-                for j, other in enumerate(values)
-                if j != k
-            )
-        }
-    n_columns_of = np.bincount(
-        np.concatenate(rated) if n_columns else [], minlength=len(scale.grades)
-    )
-    return {
-        k
-        for k, mine in enumerate(rated)
-        if len(mine) and (n_columns_of[mine] == 1).all()
-    }
+    known = np.flatnonzero([len(grades) for grades in rated])
+    if len(known) < 2:
+        return set()
+    if all(map(is_number, scale.grades)):  # measurements seldom are the same twice
+        values = np.array(scale.values)
+        low, high = (values[[rated[k][end] for k in known]] for end in (0, -1))
+        n_like = ((low[:, None] <= high) & (low <= high[:, None])).sum(axis=1)
+        return set(known[n_like == 1].tolist())  # each is like itself
+    n_columns = np.bincount(np.concatenate(rated), minlength=len(scale.grades))
+    return {int(k) for k in known if (n_columns[rated[k]] == 1).all()}
 
 
 def _looks_counted(
@@ -303,7 +281,7 @@ def doubt_counts(sheet: Sheet, layout: Layout, table: NDArray[np.int64]) -> list
     if len(names) > 1 and (2 * table[:, -1] == table.sum(axis=1)).all():
         text = (
             f"{names[-1]!r} is the sum of the other columns: --ignore "
-            f"{_option([names[-1]])} leaves it aside"
+            f"{quoted([names[-1]])} leaves it aside"
         )
         if _SUMMARY.fullmatch(names[-1]):
             raise sheet.error(text)

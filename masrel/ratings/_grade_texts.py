@@ -6,6 +6,7 @@ be wrong, and each time it is noted; whatever else looks alike is warned of.
 
 import math
 import re
+import shlex
 import unicodedata
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -211,7 +212,7 @@ def _declared_grades(
             wrong.append(text)
     if wrong:
         likely = [t for t in wrong if _looks_missing(t)]
-        hint = f"; {_missing_option(likely)} if it is missing" if likely else ""
+        hint = f"; --missing {quoted(likely)} if it is missing" if likely else ""
         raise RatingsError(
             f"{stands(wrong[0])}: needed one of {', '.join(declared)}, got "
             f"{_shown(wrong)}{hint}"
@@ -226,7 +227,7 @@ def _refuse_doubtful(
     if likely:
         raise RatingsError(
             f"{stands(likely[0])}: {_shown(likely)} looks like a missing grade: "
-            f"{_missing_option(likely)} counts it as one, --categories with it in the "
+            f"--missing {quoted(likely)} counts it as one, --categories with it in the "
             "scale as a grade"
         )
     broken = [text for text in met if "\n" in text or "\r" in text]
@@ -262,10 +263,9 @@ def _looks_missing(text: str) -> bool:
     return normal_form(text) in _missing_forms()
 
 
-def _missing_option(codes: Sequence[str]) -> str:
-    import shlex
-
-    return f"--missing {shlex.quote(','.join(codes))}"
+def quoted(names: Sequence[str]) -> str:
+    """Return a list as an option takes it on a command line."""
+    return shlex.quote(",".join(names))
 
 
 def _observed_grades(
@@ -396,7 +396,7 @@ def _far_codes(grades: Sequence[str], freq: Mapping[str, int]) -> list[str]:
                 named = ", ".join(f"{g} ({freq[g]} times)" for g in far)
                 warnings.append(
                     f"{named}: far from the other grades; if missing ones are meant, "
-                    f"{_missing_option(far)}"
+                    f"--missing {quoted(far)}"
                 )
                 break
     return warnings
@@ -428,5 +428,5 @@ def _stray(
         what, so = "a number among grades that are text", ""
     return strays and [
         f"{what}: {_shown(strays)} ({stands(strays[0])}){so}; if that is missing, "
-        f"{_missing_option(strays)}"
+        f"--missing {quoted(strays)}"
     ]

@@ -1,6 +1,6 @@
 """Ratings one by one, put together item by rater: repeats, groups, many raters."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Literal
 
@@ -84,13 +84,12 @@ class Triples:
     rater_names: list[str]
 
     def __getitem__(self, chosen: NDArray[np.bool_] | Codes) -> "Triples":
-        return Triples(
+        return replace(
+            self,
             item=self.item[chosen],
             rater=self.rater[chosen],
             grade=self.grade[chosen],
             row=self.row[chosen],
-            item_names=self.item_names,
-            rater_names=self.rater_names,
         )
 
 
@@ -202,15 +201,7 @@ def _means(
     met = np.unique(mean[n_grades > 0])
     codes = np.where(n_grades > 0, np.searchsorted(met, mean), -1)
     grades = tuple(f"{x:.0f}" if x.is_integer() else repr(x) for x in met.tolist())
-    averaged = Triples(
-        item=triples.item,
-        rater=triples.rater,
-        grade=codes[of_key],
-        row=triples.row,
-        item_names=triples.item_names,
-        rater_names=triples.rater_names,
-    )
-    return averaged, Scale(name="observed", grades=grades)
+    return replace(triples, grade=codes[of_key]), Scale(name="observed", grades=grades)
 
 
 def put_together(

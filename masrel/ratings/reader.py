@@ -491,7 +491,7 @@ def _file(
     return RatingsFile(
         parts=tuple(parts),
         scale=scale,
-        is_ordered=grades.is_ordered or scale is not grades.scale,
+        is_ordered=grades.is_ordered,
         read={
             "file": sheet.name,
             "sha256": sheet.sha256,
