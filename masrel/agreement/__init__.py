@@ -4,7 +4,8 @@ In: item × rater labels (or counts, or a contingency table). Out: an `Estimate`
 `Significance` from a test.
 """
 
-from masrel.agreement._counts import CountedRatings, count_ratings, count_table
+from masrel.agreement._count_tables import count_table
+from masrel.agreement._counts import CountedRatings, count_ratings
 from masrel.agreement._data import CodedRatings, code_long, code_ratings
 from masrel.agreement._labels import Label
 from masrel.agreement._weights import WeightName, Weights, declared_weights
@@ -19,18 +20,20 @@ from masrel.agreement.conger import conger_kappa
 from masrel.agreement.contingency import (
     McnemarKind,
     bhapkar,
-    bias_index,
     bowker,
     contingency_table,
-    kappa_max,
     mcnemar,
-    prevalence_index,
-    specific_agreement,
     stuart_maxwell,
 )
 from masrel.agreement.fleiss import fleiss_kappa, fleiss_kappa_from_counts
 from masrel.agreement.gwet import gwet_ac, gwet_ac_from_counts
 from masrel.agreement.icc import IccForm, icc, icc_f_test, robinson_a
+from masrel.agreement.indices import (
+    bias_index,
+    kappa_max,
+    prevalence_index,
+    specific_agreement,
+)
 from masrel.agreement.kendall import kendall_w, kendall_w_test
 from masrel.agreement.krippendorff import (
     Metric,

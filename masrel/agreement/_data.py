@@ -7,14 +7,13 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from masrel.agreement._array_codes import array_codes, frame_codes
 from masrel.agreement._labels import (
     NOTHING,
     Codes,
     Label,
-    array_codes,
     check_categories,
     code_type,
-    frame_codes,
     label_rows,
     labels_met,
     lookup,

@@ -15,12 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from masrel.agreement._counts import (
-    DistinctItems,
-    bilinear,
-    count_ratings,
-    item_counts,
-)
+from masrel.agreement._counts import DistinctItems, bilinear, count_ratings, item_counts
 from masrel.agreement._data import CodedRatings
 from masrel.agreement._kernel import (
     NO_CHANCE,

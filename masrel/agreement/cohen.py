@@ -5,7 +5,7 @@ from functools import partial
 
 from numpy.typing import ArrayLike
 
-from masrel.agreement._counts import check_table, column_categories
+from masrel.agreement._count_tables import check_table, column_categories
 from masrel.agreement._data import code_ratings
 from masrel.agreement._kernel import (
     Influence,

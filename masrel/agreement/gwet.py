@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from numpy.typing import ArrayLike
 
-from masrel.agreement._counts import take_counts
+from masrel.agreement._count_tables import take_counts
 from masrel.agreement._kernel import Variance
 from masrel.agreement._labels import Label
 from masrel.agreement._pooled import GWET, estimate_pooled

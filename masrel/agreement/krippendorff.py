@@ -10,6 +10,7 @@ from typing import Any, Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
+from masrel.agreement._count_tables import take_counts
 from masrel.agreement._counts import (
     CountedRatings,
     DistinctItems,
@@ -17,7 +18,6 @@ from masrel.agreement._counts import (
     bilinear,
     count_ratings,
     item_counts,
-    take_counts,
 )
 from masrel.agreement._data import CodedRatings
 from masrel.agreement._kernel import (

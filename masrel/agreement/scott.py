@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from numpy.typing import ArrayLike
 
-from masrel.agreement._counts import count_table
+from masrel.agreement._count_tables import count_table
 from masrel.agreement._data import code_ratings, complete
 from masrel.agreement._labels import Label
 from masrel.agreement._pairs import two_raters

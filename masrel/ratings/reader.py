@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.agreement import CodedRatings, CountedRatings
-from masrel.agreement._counts import count_table, take_counts
+from masrel.agreement._count_tables import count_table, take_counts
 from masrel.errors import ParameterError, RatingsError
 from masrel.ratings._doubts import (
     doubt_columns,

@@ -20,16 +20,13 @@ from masrel.agreement import (
     krippendorff_alpha_from_counts,
     percent_agreement_from_counts,
 )
-from masrel.agreement._counts import (
-    DistinctItems,
-    bilinear,
+from masrel.agreement._count_tables import (
     check_counts,
     check_table,
     column_categories,
-    distinct_rows,
-    item_counts,
     take_counts,
 )
+from masrel.agreement._counts import DistinctItems, bilinear, distinct_rows, item_counts
 from masrel.errors import CountsError, ParameterError
 
 Codes = NDArray[np.int8]
