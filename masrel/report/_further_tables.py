@@ -1,6 +1,6 @@
 """What a file of ratings says beyond its agreement: test and retest, each category.
 
-In: a `RatingsFile` and what is asked of every estimate. Out: a table, and the same as
+In: a `RatingsFile` and how every estimate is made. Out: a table, and the same as
 plain values for JSON.
 """
 
@@ -45,7 +45,7 @@ class FurtherTable:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Question:
-    """What every estimate of a table is asked."""
+    """How every estimate of a table is made."""
 
     weights: WeightName = "identity"
     target: Target | None = None  # no interval when None
@@ -110,7 +110,7 @@ def coded_part(part: RatingsPart, option: str) -> CodedRatings:
         raise RatingsError(f"{option}: {error}") from error
 
 
-def _asked_row(
+def _estimate_row(
     name: str, ratings: CodedRatings, group: str, question: Question, n_raters: int
 ) -> AgreementRow:
     # one coefficient, with the interval if there is such a one
@@ -211,13 +211,13 @@ def _retest_rows(
     group: str | None, pairs: _RetestPairs, question: Question, names: Sequence[str]
 ) -> list[AgreementRow]:
     head = [] if group is None else [group]
-    # of a single rater other raters cannot be asked
+    # a single rater says nothing of other raters
     alone = question
     if question.target in ("raters", "both"):
         alone = replace(question, target=None)
     codes = pairs.ratings.codes
     rows = [
-        _asked_row(
+        _estimate_row(
             "cohen_kappa",
             replace(pairs.ratings, codes=codes[:, 2 * place : 2 * place + 2]),
             label([*head, rater]),
@@ -228,7 +228,7 @@ def _retest_rows(
     ]
     everybody = label([*head, "all"])
     return rows + [
-        _asked_row(name, pairs.ratings, everybody, question, len(pairs.raters))
+        _estimate_row(name, pairs.ratings, everybody, question, len(pairs.raters))
         for name in names
     ]
 
