@@ -191,11 +191,22 @@ def category_values(categories: Sequence[Label]) -> list[Fraction]:
     if isinstance(categories[0], str):
         return [Fraction(rank) for rank in range(1, len(categories) + 1)]
     for value in categories:
-        if not math.isfinite(float(value)):
+        try:
+            is_finite = math.isfinite(float(value))
+        except OverflowError:  # a whole number that no float holds
+            is_finite = False
+        if not is_finite:
             raise ParameterError(
-                f"categories: weights need finite numbers, got {value!r}"
+                f"categories: weights need finite numbers, got {_shortened(value)}"
             )
     return [Fraction(value) for value in categories]
+
+
+def _shortened(value: Label) -> str:
+    # whole numbers of thousands of digits are no part of a sentence
+    if isinstance(value, int) and abs(value) >= 10**20:
+        return f"a whole number of {value.bit_length()} bits"
+    return repr(value)
 
 
 def _absence(weights: str, values: list[Fraction]) -> str | None:

@@ -28,6 +28,9 @@ _NAMES: dict[IccForm, str] = {
 }
 """Form to its name in the register."""
 
+_SQUARABLE = 400
+"""Binary exponent up to which squares, and sums and products of them, are floats."""
+
 
 def icc(
     ratings: object,
@@ -281,7 +284,7 @@ def _reason(
 @dataclass(frozen=True, slots=True)
 class _Anova:
     # mean squares of [1], of items, raters, residual, and within items; sums of squares
-    # are times (n k)²
+    # are times (n k)²; of the ratings over `unit`, 1 unless their squares are no floats
     n: int
     k: int
     items: float
@@ -290,6 +293,7 @@ class _Anova:
     within: float
     ss_items: float
     ss_residual: float
+    unit: float = 1.0
 
     @classmethod
     def of(cls, values: NDArray[np.float64]) -> "_Anova":
@@ -298,6 +302,7 @@ class _Anova:
             return cls(n, k, *[math.nan] * 6)
         # Deviations times n k, which are whole, and so exact, for whole ratings; from
         # the first rating, so that a common offset of all costs no digits.
+        values, unit = _squarable(values)
         x = values - values[0, 0]
         of_items, of_raters = x.sum(axis=1, keepdims=True), x.sum(axis=0, keepdims=True)
         total = x.sum()
@@ -316,6 +321,7 @@ class _Anova:
             float((within**2).sum()) / (scale * (n * (k - 1))),
             ss_items,
             ss_residual,
+            unit,
         )
 
     def error(self, form: str) -> float:
@@ -336,6 +342,14 @@ class _Anova:
 
     def value(self, form: str) -> float:
         return (self.items - self.error(form)) / self.denominator(form)
+
+
+def _squarable(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+    """Return values whose squares are floats, and the power of two they are over."""
+    exponent = int(np.frexp(np.abs(values).max())[1]) - 1
+    if -_SQUARABLE < exponent < _SQUARABLE:
+        return values, 1.0
+    return np.ldexp(values, -exponent), math.ldexp(1.0, exponent)
 
 
 def _interval(anova: _Anova, form: IccForm, level: float) -> Interval:

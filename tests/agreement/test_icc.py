@@ -274,3 +274,28 @@ def test_an_interval_holds_its_estimate_or_says_why_it_is_none(
         slack = 1e-12 * abs(found.value)
         assert found.interval.low <= found.value + slack
         assert found.interval.high >= found.value - slack
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("factor", [2.0**500, 2.0**-540, 2.0**-990, 2.0**1018])
+def test_ratings_whose_squares_are_no_floats_have_the_same_icc(
+    form: IccForm, factor: float
+) -> None:
+    # An ICC is a ratio of squares: the unit of the ratings goes out of it, and a power
+    # of two changes no digit.
+    plain, scaled = icc(TABLE_2, form=form), icc(np.array(TABLE_2) * factor, form=form)
+    assert (scaled.value, scaled.interval) == (plain.value, plain.interval)
+    assert icc_f_test(np.array(TABLE_2) * factor) == icc_f_test(TABLE_2)
+
+
+@pytest.mark.parametrize("factor", [1e150, 1e-160, 1e-300, 1e300])
+def test_ratings_times_any_number_have_the_same_icc(factor: float) -> None:
+    ratings = np.random.default_rng(0).normal(size=(10, 3))
+    assert icc(ratings * factor).value == pytest.approx(icc(ratings).value, rel=1e-13)
+    table = (ratings * factor).tolist()
+    assert icc(table).value == pytest.approx(icc(ratings).value, rel=1e-13)
+
+
+def test_a_whole_number_beyond_every_float_is_refused() -> None:
+    with pytest.raises(ParameterError, match="finite numbers, got a whole number"):
+        icc([[10**400, 1], [2, 3]])
