@@ -99,6 +99,12 @@ class Interval:
     reason: str | None = None
     distribution: Distribution | None = field(default=None, compare=False, repr=False)
 
+    def __str__(self) -> str:
+        return _as_text(_interval_lines(self))
+
+    def _repr_html_(self) -> str:
+        return _as_html(_interval_lines(self))
+
 
 _T = TypeVar("_T")
 
@@ -160,9 +166,62 @@ class Estimate:
     reason: str | None = None
 
     def __str__(self) -> str:
-        if self.reason is not None:
-            return f"{self.coefficient}: undefined ({self.reason})"
-        return f"{self.coefficient}: {self.value:.4g} (SE {self.standard_error:.2g})"
+        return _as_text(_estimate_lines(self))
+
+    def _repr_html_(self) -> str:
+        return _as_html(_estimate_lines(self))
+
+
+_Lines = list[tuple[str, str]]  # what is shown of a result, by name
+
+_POPULATIONS: dict[Target, str] = {
+    "items": "other items",
+    "raters": "other raters",
+    "both": "other items and raters",
+}
+
+
+def _estimate_lines(estimate: Estimate) -> _Lines:
+    """Return the coefficient and, where there is one, its interval."""
+    name, text = estimate.coefficient, f"undefined ({estimate.reason})"
+    if estimate.weights != "identity":
+        name = f"{name} ({estimate.weights})"
+    if estimate.reason is None:
+        text = f"{estimate.value:.4g}"
+        if not math.isnan(estimate.standard_error):
+            text += f" (SE {estimate.standard_error:.2g})"
+    interval = estimate.interval
+    return [(name, text), *([] if interval is None else _interval_lines(interval))]
+
+
+def _interval_lines(interval: Interval) -> _Lines:
+    """Return the ends of an interval, what it generalises to, and how it was made."""
+    ends = f"{interval.low:.4g} to {interval.high:.4g}"
+    if interval.reason is not None:
+        ends = f"undefined ({interval.reason})"
+    return [
+        (f"{100.0 * interval.level:.6g} % {interval.kind} interval", ends),
+        ("generalises to", _POPULATIONS[interval.target]),
+        ("method", interval.method),
+        *(("note", note) for note in interval.notes),
+    ]
+
+
+def _as_text(lines: _Lines) -> str:
+    """Return the first line, and the others below it."""
+    return "\n  ".join(f"{name}: {text}" for name, text in lines)
+
+
+def _as_html(lines: _Lines) -> str:
+    """Return the lines as a table with their names in the first column."""
+    from html import escape  # loaded only in a notebook
+
+    rows = (
+        f"<tr><th scope='row' style='text-align: left'>{escape(name)}</th>"
+        f"<td style='text-align: left'>{escape(text)}</td></tr>"
+        for name, text in lines
+    )
+    return f"<table>{''.join(rows)}</table>"
 
 
 def as_document(result: Estimate | Interval) -> dict[str, object]:

@@ -3,6 +3,7 @@
 import dataclasses
 import math
 import warnings
+from xml.etree import ElementTree
 
 import pytest
 
@@ -77,6 +78,49 @@ def test_a_document_has_every_field_and_no_nan() -> None:
 def test_an_undefined_estimate_says_so_in_its_line() -> None:
     assert str(estimate()) == "fleiss_kappa: 0.5 (SE 0.1)"
     assert "undefined (0/0)" in str(estimate(value=math.nan, reason="0/0"))
+
+
+def interval(**changes: object) -> Interval:
+    plain = Interval(
+        low=0.21,
+        high=0.79,
+        level=0.9,
+        kind="confidence",
+        method="item jackknife, t(3)",
+        target="both",
+        notes=("few <items>",),
+    )
+    return dataclasses.replace(plain, **changes)  # type: ignore[arg-type]
+
+
+def test_a_result_shows_its_interval_and_what_it_generalises_to() -> None:
+    assert str(estimate(weights="linear", interval=interval())).splitlines() == [
+        "fleiss_kappa (linear): 0.5 (SE 0.1)",
+        "  90 % confidence interval: 0.21 to 0.79",
+        "  generalises to: other items and raters",
+        "  method: item jackknife, t(3)",
+        "  note: few <items>",
+    ]
+    shown = str(interval(target="items", kind="credible", level=0.999))
+    assert shown.startswith("99.9 % credible interval: 0.21 to 0.79\n")
+    assert "generalises to: other items\n" in shown
+    # what has no such error shows none, rather than "nan"
+    assert str(estimate(standard_error=math.nan)) == "fleiss_kappa: 0.5"
+
+
+def test_an_undefined_interval_says_why() -> None:
+    nothing = interval(low=math.nan, high=math.nan, reason="one item")
+    assert "interval: undefined (one item)" in str(estimate(interval=nothing))
+    assert "nan" not in str(nothing)
+
+
+def test_a_notebook_shows_the_lines_that_are_printed() -> None:
+    for result in (estimate(interval=interval()), interval(), estimate()):
+        page = ElementTree.fromstring(result._repr_html_())
+        rows = [[cell.text for cell in row] for row in page]
+        printed = [line.strip().split(": ", 1) for line in str(result).splitlines()]
+        assert rows == printed
+        assert page.tag == "table"
 
 
 def test_everything_raised_on_purpose_has_one_root() -> None:

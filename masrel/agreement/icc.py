@@ -13,7 +13,7 @@ from masrel.agreement._kernel import undefined
 from masrel.agreement._labels import Label
 from masrel.agreement.significance import Significance
 from masrel.errors import ParameterError
-from masrel.estimates import Estimate, Interval
+from masrel.estimates import Estimate, Interval, Target
 
 IccForm = Literal["ICC(1)", "ICC(1,k)", "ICC(C,1)", "ICC(C,k)", "ICC(A,1)", "ICC(A,k)"]
 """One-way; consistency and absolute agreement; of one rating and of the mean of k."""
@@ -369,9 +369,16 @@ def _interval(anova: _Anova, form: IccForm, level: float) -> Interval:
         level=level,
         kind="confidence",
         method="F distribution",
-        target="items" if form.startswith("ICC(C") else "both",
+        target=_target_of(form),
         reason=reason,
     )
+
+
+def _target_of(form: IccForm) -> Target:
+    """Return what the interval generalises to."""
+    # Consistency leaves out what raters differ by in level: their variance is in no
+    # mean square of its interval. In the others raters are a sample, too.
+    return "items" if form.startswith("ICC(C") else "both"
 
 
 def _without_interval(anova: _Anova, form: str) -> str | None:

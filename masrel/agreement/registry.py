@@ -34,6 +34,7 @@ from masrel.agreement.conger import conger_kappa
 from masrel.agreement.fleiss import fleiss_kappa
 from masrel.agreement.gwet import gwet_ac
 from masrel.agreement.icc import _NAMES as ICC_NAMES
+from masrel.agreement.icc import _target_of as icc_target
 from masrel.agreement.icc import icc, robinson_a
 from masrel.agreement.kendall import kendall_w
 from masrel.agreement.krippendorff import _KERNEL as KRIPPENDORFF_KERNEL
@@ -43,7 +44,7 @@ from masrel.agreement.percent import percent_agreement
 from masrel.agreement.scott import scott_pi
 from masrel.agreement.two_sessions import pooled_kappa, stratified_kappa
 from masrel.errors import ParameterError
-from masrel.estimates import Estimate
+from masrel.estimates import Estimate, Target
 
 Property = Literal[
     "items in any order",
@@ -91,8 +92,8 @@ class Coefficient:
         Whether 0 is what chance gives.
     weighted : bool
         Whether it takes weights.
-    has_interval : bool
-        Whether it comes with an interval, and takes its level.
+    interval_target : {"items", "raters", "both"} or None
+        What the interval that it comes with generalises to; None without one.
     code : callable
         Ratings and categories to the codes its kernel takes.
     needs_order : bool
@@ -110,8 +111,13 @@ class Coefficient:
     highest: float = 1.0
     chance_corrected: bool = True
     weighted: bool = True
-    has_interval: bool = False
+    interval_target: Target | None = None
     code: Callable[..., CodedRatings] = code_ratings
+
+    @property
+    def has_interval(self) -> bool:
+        """Whether it comes with an interval, and takes its level."""
+        return self.interval_target is not None
 
     @property
     def needs_order(self) -> bool:
@@ -251,7 +257,7 @@ _ALL = (
             lowest=-math.inf,
             highest=math.inf if form == "ICC(A,k)" else 1.0,
             weighted=False,
-            has_interval=True,
+            interval_target=icc_target(form),
         )
         for form, name in ICC_NAMES.items()
     ),

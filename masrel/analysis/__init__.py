@@ -1,13 +1,17 @@
 """The estimates a study's plan asks for, and nothing else.
 
 In: a protocol, its ratings and grades given in person. Out: an `Analysis`, written
-as JSON in full precision; or a regression of the grades.
+as JSON in full precision; or a regression of the grades, or estimates as a frame.
 """
 
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from masrel.analysis._analysis_json import as_analysis_document, write_analysis
+    from masrel.analysis._analysis_json import (
+        as_analysis_document,
+        to_frame,
+        write_analysis,
+    )
     from masrel.analysis._grading import Effect, GradeRegression, grade_regression
     from masrel.analysis._plan import analyze
     from masrel.analysis._results import (
@@ -39,6 +43,7 @@ __all__ = [
     "analyze",
     "as_analysis_document",
     "grade_regression",
+    "to_frame",
     "write_analysis",
 ]
 
@@ -48,6 +53,7 @@ _HOMES = {
     "analyze": "_plan",
     "as_analysis_document": "_analysis_json",
     "grade_regression": "_grading",
+    "to_frame": "_analysis_json",
     "write_analysis": "_analysis_json",
 }
 

@@ -1,15 +1,20 @@
-"""The file of an analysis: JSON, every digit kept, inputs named beside each number."""
+"""Results in other forms: an analysis as JSON, every digit kept; several as a frame."""
 
 import dataclasses
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import msgspec
 
 from masrel.analysis._results import Analysis
-from masrel.estimates import Interval, as_document
+from masrel.errors import ParameterError
+from masrel.estimates import Estimate, Interval, as_document
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 
 def as_analysis_document(analysis: Analysis) -> dict[str, object]:
@@ -57,6 +62,79 @@ def write_analysis(analysis: Analysis, path: Path) -> None:
     )
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text + "\n", encoding="utf-8", newline="\n")
+
+
+def to_frame(results: "Iterable[Estimate] | Mapping[str, Estimate]") -> "DataFrame":
+    """Put several estimates into a DataFrame, one row each.
+
+    Parameters
+    ----------
+    results : iterable of Estimate, or mapping of str to Estimate
+        The estimates, with or without intervals; names of a mapping become the index.
+
+    Returns
+    -------
+    DataFrame, shape (n_results, n_fields)
+        A column for each field of `Estimate`, by its name, with the fields of
+        `Interval` in place of its interval; why an interval is undefined is
+        ``interval_reason``. Columns are the same for any results, and empty where a
+        result has no such thing. Every digit is kept.
+
+    Raises
+    ------
+    ParameterError
+        If a result is not an `Estimate`.
+    ImportError
+        If pandas is not installed.
+
+    Examples
+    --------
+    >>> from masrel.agreement import fleiss_kappa, gwet_ac
+    >>> ratings = [["a", "a"], ["a", "b"], ["b", "b"], ["b", "b"]]
+    >>> frame = to_frame({"kappa": fleiss_kappa(ratings), "AC1": gwet_ac(ratings)})
+    >>> frame[["coefficient", "value", "n_items"]].round(3)
+            coefficient  value  n_items
+    kappa  fleiss_kappa  0.467        4
+    AC1         gwet_ac  0.529        4
+    """
+    from pandas import DataFrame  # loaded only when asked for
+
+    index = None
+    if isinstance(results, Mapping):
+        index, results = list(results), results.values()
+    rows = [_row(result, place) for place, result in enumerate(results)]
+    return DataFrame(rows, index=index, columns=list(_columns()))
+
+
+def _columns() -> dict[str, tuple[str, str]]:
+    # column to what it is a field of and its name there
+    columns: dict[str, tuple[str, str]] = {}
+    of_interval = [field.name for field in dataclasses.fields(Interval)]
+    of_interval.remove("distribution")
+    for field in dataclasses.fields(Estimate):
+        if field.name != "interval":
+            columns[field.name] = ("estimate", field.name)
+            continue
+        for name in of_interval:
+            column = "interval_reason" if name == "reason" else name
+            columns[column] = ("interval", name)
+    return columns
+
+
+def _row(result: object, place: int) -> dict[str, object]:
+    # of one estimate; nan where a number is missing
+    if not isinstance(result, Estimate):
+        raise ParameterError(
+            f"results: place {place}: needs an Estimate, got {type(result).__name__}"
+        )
+    parts = {"estimate": result, "interval": result.interval}
+    row = {
+        column: getattr(parts[part], name, None)
+        for column, (part, name) in _columns().items()
+    }
+    if result.interval is None:
+        row |= {"low": math.nan, "high": math.nan, "level": math.nan}
+    return row
 
 
 def _with_inputs(part: object, analysis: Analysis) -> dict[str, object]:

@@ -138,7 +138,7 @@ def _interval_offer(
     if options.target is not None or not any(can):
         return None
     more, but = ["--target", "items"], ""
-    without = [e for e in entries if e.kernel is None and not e.has_interval]
+    without = [e for e in entries if e.kernel is None and e.interval_target != "items"]
     if without and not options.takes_all:  # named, they would be refused
         others = (entry.name for entry in entries if entry not in without)
         more = ["--coefficients", ",".join(dict.fromkeys(others)), *more]

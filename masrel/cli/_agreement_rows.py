@@ -203,8 +203,8 @@ def _estimate(
 ) -> Estimate:
     """Return the coefficient, with the interval that answers for the target."""
     weights: WeightName = options.weights if entry.weighted else "identity"
-    # An interval that a coefficient comes with is not computed a second time.
-    is_done = entry.has_interval and (options.interval == "auto" or options.takes_all)
+    # Among all that fit, one that comes with an interval has it, whatever its target.
+    is_done = entry.has_interval and options.takes_all
     if options.target is None or not has_target or is_done:
         return entry(
             ratings, categories=ratings.categories, weights=weights, level=level

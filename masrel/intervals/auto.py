@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Literal, TypedDict, get_args
+from typing import TYPE_CHECKING, Literal, NoReturn, TypedDict, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -94,6 +94,8 @@ def estimate(
     entry = (
         coefficient if isinstance(coefficient, Coefficient) else find_entry(coefficient)
     )
+    if method == "auto" and entry.interval_target not in (None, target):
+        _refuse_target(entry, target)
     if entry.kernel is None:
         result = entry(ratings, categories=categories, weights=weights, level=level)
     else:
@@ -129,6 +131,19 @@ def estimate(
         interval = posterior(entry, ratings, rng=rng, **options)
     # `vars` has the standard error as it is: still to be computed when it is read.
     return Estimate(**{**vars(result), "interval": interval})
+
+
+def _refuse_target(entry: Coefficient, target: str) -> NoReturn:
+    if target not in get_args(Target):
+        raise ParameterError(
+            f"target: needs one of {', '.join(get_args(Target))}, got {target!r}"
+        )
+    there_is = entry.interval_target
+    raise ParameterError(
+        f"target: the interval of {entry.title} generalises to other "
+        f'{_OTHERS[str(there_is)]}, which is "{there_is}", and it has no other; got '
+        f'"{target}"'
+    )
 
 
 class _Options(TypedDict):

@@ -432,13 +432,13 @@ def test_weights_of_undeclared_text_are_refused_and_of_numbers_told(
 
 def test_a_level_is_that_of_every_interval(masrel: Caller, wide: Path) -> None:
     call = ("--target", "items", "--level", "0.8", "--json", "-")
-    names = "icc_1,fleiss_kappa"
+    names = "icc_c1,fleiss_kappa"
     found = estimates(masrel("agree", wide, "--coefficients", names, *call))
     assert [e["interval"]["level"] for e in found] == [0.8, 0.8]
     said = refused(
         masrel("agree", wide, "--coefficients", names, "--interval", "bootstrap", *call)
     )
-    assert "ICC(1) is no function of sums" in said
+    assert "ICC(C,1) is no function of sums" in said
     # under "all" it keeps the interval that it comes with
     every = ("--coefficients", "all", "--interval", "jackknife")
     (icc, *_) = (

@@ -134,12 +134,23 @@ def test_the_columns_of_a_csv(masrel: Caller, tmp_path: Path) -> None:
     assert head == f"session,{names},data"
     head = masrel(*call, "--words", "fleiss").out.splitlines()[0]
     assert head == f"session,{names},words,data"
-    rows = table(masrel(*call, "--coefficients", "icc_c1,icc_a1"))
-    shown = [[row[key] for key in ("level", "method", "target")] for row in rows[:2]]
-    assert shown == [
-        ["0.95", "F distribution", "items"],
-        ["0.95", "F distribution", "both"],
-    ]
+
+
+@pytest.mark.parametrize(("target", "name"), [("items", "icc_c1"), ("both", "icc_a1")])
+def test_an_icc_has_an_interval_for_one_target(
+    masrel: Caller, tmp_path: Path, target: str, name: str
+) -> None:
+    call = ("agree", written(tmp_path, SESSIONS), "--by", "session", "--target")
+    first, *_ = table(masrel(*call, target, "--coefficients", name, "--csv"))
+    shown = [first[key] for key in ("level", "method", "target")]
+    assert shown == ["0.95", "F distribution", target]
+    for other in {"items", "raters", "both"} - {target}:
+        done = masrel(*call, other, "--coefficients", name)
+        assert f'which is "{target}", and it has no other; got "{other}"' in done.err
+        assert (done.code, done.out) == (2, "")
+    # among all that fit it is shown as what it is
+    rows = table(masrel(*call, "raters", "--coefficients", "all", "--csv"))
+    assert {r["target"] for r in rows if r["coefficient"] == name} == {target}
 
 
 def latex(masrel: Caller, folder: Path) -> str:
@@ -408,11 +419,11 @@ def test_the_offer_works_where_coefficients_were_named(
     masrel: Caller, wide: Path
 ) -> None:
     words, command = offer(
-        masrel("agree", wide, "--coefficients", "kendall_w,gwet_ac,icc_1", "--csv")
+        masrel(*("agree", wide, "--coefficients"), "icc_a1,gwet_ac,icc_c1", "--csv")
     )
-    assert words.endswith("(without Kendall's W)")
+    assert words.endswith("(without ICC(A,1))")  # its interval is for raters, too
     names = [row["coefficient"] for row in table(masrel(*command))]
-    assert names == ["gwet_ac", "icc_1"]
+    assert names == ["gwet_ac", "icc_c1"]
     _, command = offer(masrel("agree", "--", wide))
     assert masrel(*command).code == 0
 

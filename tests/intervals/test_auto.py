@@ -3,6 +3,7 @@
 import dataclasses
 import itertools
 import math
+import re
 import subprocess
 import sys
 import warnings
@@ -258,9 +259,27 @@ def test_a_bootstrap_draws_as_many_resamples_as_it_is_told() -> None:
 
 def test_a_coefficient_with_its_own_interval_keeps_it() -> None:
     numbers = [[int(grade == LABELS[0]) for grade in row] for row in MEDIUM]
-    found: Estimate = estimate("icc_1", numbers, target="items", level=0.9)
+    found: Estimate = estimate("icc_1", numbers, target="both", level=0.9)
     assert found.interval is not None
     assert (found.interval.method, found.interval.level) == ("F distribution", 0.9)
+
+
+@pytest.mark.parametrize("name", [n for n, e in COEFFICIENTS.items() if e.has_interval])
+def test_an_interval_that_comes_with_an_estimate_answers_one_question(
+    name: str,
+) -> None:
+    numbers = [[9, 2, 5, 8], [6, 1, 3, 2], [8, 4, 6, 8], [7, 1, 2, 6], [10, 5, 6, 9]]
+    entry = COEFFICIENTS[name]
+    answered = entry.interval_target
+    found = estimate(name, numbers, target=answered)  # type: ignore[arg-type]
+    assert found.interval is not None
+    assert found.interval.target == answered
+    for target in {"items", "raters", "both"} - {answered}:
+        said = f'{re.escape(entry.title)} generalises to .* "{answered}", .* "{target}"'
+        with pytest.raises(ParameterError, match=said):
+            estimate(name, numbers, target=target)  # type: ignore[arg-type]
+    with pytest.raises(ParameterError, match="target: needs one of items, raters, bot"):
+        estimate(name, numbers, target="xyz")  # type: ignore[arg-type]
 
 
 def test_wrong_options_and_two_raters_are_refused() -> None:

@@ -167,7 +167,8 @@ def test_an_interval_that_comes_with_an_estimate_holds_it(
         scores = scores + rng.normal(size=r) + rng.normal(size=(n, r))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", MasrelWarning)
-            result = estimate(coefficient, scores, target="items", level=level)
+            target = COEFFICIENTS[coefficient].interval_target
+            result = estimate(coefficient, scores, target=target, level=level)  # type: ignore[arg-type]
         assert result.interval is not None
         check((result.value, result.interval))
 
