@@ -27,6 +27,10 @@ _FEW_ROWS = 1 << 10  # rows for which one call costs less than a few for each ra
 _MAX_KEYS = 1 << 22  # keys that are counted in a table rather than sorted
 _MAX_SORTED = 20_000  # items that are sorted to find those alike
 _BLOCK = 1 << 16  # items counted at once, so that they stay in the cache
+_MAX_SMALL = 1 << 16  # keys that are counted by products of floats; < 2^24, so exact
+# Ratings that are multiplied at once: they stay in the cache, and BLAS, which may take
+# from 460 800 on, starts no threads, which wait for each other where cores are shared.
+_SMALL_BLOCK = 1 << 17
 
 
 class SizeGroup(NamedTuple):
@@ -105,23 +109,16 @@ class DistinctItems:
     def of_codes(cls, coded: CodedRatings) -> "DistinctItems":
         """Count the raters of each category, and put equal items together."""
         codes, q = coded.codes, len(coded.categories)
-        n_items, n_raters = codes.shape
+        n_raters = codes.shape[1]
         if codes.size <= FEW:
             counter = Counter(map(tuple, item_counts(coded).tolist()))
             counter.pop((0,) * q, None)
             return cls(list(counter), list(counter.values()), q)
-        # An item is one number: Σ over its raters of (n_raters + 1) to the power code.
-        base = n_raters + 1
-        n_keys = base**q
-        if n_keys <= min(_MAX_KEYS, 16 * n_items):
-            counted = _blocks(n_items, lambda at: _item_keys(codes[at], base, q))
-            freq = _table_of_keys(counted, n_keys)
-            keys = np.flatnonzero(freq)
-            freq = freq[keys]
-        elif n_keys < 2**62 and n_items <= _MAX_SORTED:
-            keys, freq = np.unique(_item_keys(codes, base, q), return_counts=True)
-        else:
+        counted = _count_item_keys(codes, q)
+        if counted is None:
             return cls.of_arrays(item_counts(coded))
+        keys, freq = counted
+        base = n_raters + 1
         powers = base ** np.arange(q, dtype=np.int64)
         return cls.of_arrays(keys[:, None] // powers % base, freq)
 
@@ -271,6 +268,9 @@ def distinct_rows(codes: Codes, n_categories: int) -> tuple[Integers, Integers]:
         freq = last + 1
         freq[1:] -= freq[:-1]  # numpy sees that they overlap
         return codes[order[last]].astype(np.int64), freq
+    small = _small_rows(codes, n_categories, n_items // 2)
+    if small is not None:
+        return small
     if n_keys > min(_MAX_KEYS, 16 * n_items):
         keys, freq = np.unique(_row_keys(codes, base), return_counts=True)
     else:
@@ -279,6 +279,69 @@ def distinct_rows(codes: Codes, n_categories: int) -> tuple[Integers, Integers]:
         keys = np.flatnonzero(table)
         freq = table[keys]
     return keys[:, None] // powers % base - 1, freq.astype(np.int64)
+
+
+def _count_item_keys(
+    codes: Codes, n_categories: int
+) -> tuple[Integers, Integers] | None:
+    # An item is one number: Σ over its raters of (n_raters + 1) to the power code.
+    # These ascending, and how often each occurs; None if they may be too many.
+    n_items, n_raters = codes.shape
+    base, q = n_raters + 1, n_categories
+    n_keys = base**q
+    is_sorted = n_keys < 2**62 and n_items <= _MAX_SORTED
+    if not (has_table := n_keys <= min(_MAX_KEYS, 16 * n_items)) and not is_sorted:
+        return None
+    small = _small_rows(codes, q, n_items // 10)
+    if small is not None:
+        rows, often = small
+        keys, at = np.unique(_item_keys(rows, base, q), return_inverse=True)
+        return keys, np.bincount(at, often).astype(np.int64)  # floats, exact to 2^53
+    if has_table:
+        table = _table_of_keys(
+            _blocks(n_items, lambda at: _item_keys(codes[at], base, q)), n_keys
+        )
+        keys = np.flatnonzero(table)
+        return keys, table[keys]
+    keys, freq = np.unique(_item_keys(codes, base, q), return_counts=True)
+    return keys, freq
+
+
+def _small_rows(
+    codes: Codes, n_categories: int, most: int
+) -> tuple[Integers, Integers] | None:
+    # distinct rows and how often each occurs, by their keys; None if those are many
+    n_raters = codes.shape[1]
+    most = min(_MAX_SMALL, most)
+    if n_categories**n_raters > most:
+        return None
+    lowest = -1 if codes.min() < 0 else 0  # a missing rating is a digit of its own
+    base = n_categories - lowest
+    n_keys = base**n_raters
+    if n_keys > most:
+        return None
+    freq = np.zeros(n_keys, dtype=np.int64)
+    block = max(_BLOCK, n_keys)
+    for start in range(0, len(codes), block):
+        keys = _small_keys(codes[start : start + block], lowest, base)
+        freq += np.bincount(keys, minlength=n_keys)
+    powers = base ** np.arange(n_raters, dtype=np.int64)
+    present = np.flatnonzero(freq)
+    return present[:, None] // powers % base + lowest, freq[present]
+
+
+def _small_keys(codes: Codes, lowest: int, base: int) -> Integers:
+    # Σ_r (code_r - lowest) base^r as a product of floats, each sum of which is a whole
+    # number below 2^24
+    n_items, n_raters = codes.shape
+    powers = (base ** np.arange(n_raters, dtype=np.int64)).astype(np.float32)
+    offset = -lowest * powers.sum()
+    keys = np.empty(n_items, dtype=np.int64)
+    block = max(1, min(1 << 14, _SMALL_BLOCK // n_raters))
+    for start in range(0, n_items, block):
+        rows = slice(start, start + block)
+        keys[rows] = codes[rows].astype(np.float32) @ powers + offset
+    return keys
 
 
 def _blocks(n_items: int, keys: Callable[[slice], Integers]) -> Iterable[Integers]:

@@ -114,6 +114,15 @@ def others(quick: bool) -> list[Line]:
     ]
     n = 10_000 if quick else 1_000_000
     rng = np.random.default_rng(2)
+    small = made(rng, n, 5).astype(np.int8)
+    works = {
+        "masrel": lambda: three(small),
+        "numpy.bincount of each of its columns": lambda: [
+            np.bincount(column) for column in small.T
+        ],
+    }
+    name = f"{n:,} × 5 int8, three coefficients"
+    lines.append(Line(name=name, times=side_by_side(works, turns=15)))
     pairs: Codes = made(rng, n, 2)
     works = {"masrel": lambda: cohen_kappa(pairs).value}
     if present(["scikit-learn"]):

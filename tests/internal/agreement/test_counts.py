@@ -1,6 +1,7 @@
 """Distinct items and rows, counted in whichever way, are those of a plain count."""
 
 from collections import Counter
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -66,6 +67,7 @@ SHAPES = [
     (2_001, 1, 3),  # just more than few
     (5_000, 3, 4),  # 4⁴ keys: a table of keys
     (70_000, 2, 3),  # more than one block
+    (40_000, 5, 4),  # 5⁵ rows: keys of rows before keys of items
     (1_000, 8, 4),  # 9⁴ keys of at most 16 000
     (1_000, 5, 9),  # 6⁹ keys: too many, counted category by category
     (1_000, 3, 30),  # more categories than raters
@@ -106,7 +108,7 @@ def test_equal_rows_of_a_table_of_counts_are_put_together(largest: int) -> None:
     assert frequencies(take_counts(counts, None).items) == expected
 
 
-@pytest.mark.parametrize("shape", [*SHAPES[:6], (300, 40, 4), (300, 70, 126)])
+@pytest.mark.parametrize("shape", [*SHAPES[:7], (300, 40, 4), (300, 70, 126)])
 def test_distinct_rows_are_those_of_a_plain_count(
     shape: tuple[int, int, int],
 ) -> None:
@@ -125,6 +127,30 @@ def test_a_pattern_of_missing_ratings_and_of_the_last_category_come_back() -> No
         ([-1, 3, -1], 1),
         ([3, 3, 3], 2),
     ]
+
+
+@pytest.mark.parametrize("order", ["C", "F"])
+@pytest.mark.parametrize("lowest", [-1, 0])
+@pytest.mark.parametrize(
+    ("n_items", "n_raters", "n_categories"),
+    [(140_000, 16, 2), (9_000, 3, 12), (3_000, 10, 1)],
+)
+def test_rows_in_products_of_floats_come_in_order_and_complete(
+    n_items: int,
+    n_raters: int,
+    n_categories: int,
+    lowest: int,
+    order: Literal["C", "F"],
+) -> None:
+    # 2¹⁶ keys without a missing rating; the largest key of all is among them
+    rng = np.random.default_rng(n_items + lowest)
+    codes = rng.integers(lowest, n_categories, (n_items, n_raters), dtype=np.int8)
+    codes[-1] = n_categories - 1
+    rows, freq = distinct_rows(np.asarray(codes, order=order), n_categories)
+    keys = (codes + 1) @ (n_categories + 1) ** np.arange(n_raters)
+    _, first, often = np.unique(keys, return_index=True, return_counts=True)
+    assert np.array_equal(rows, codes[first])
+    assert np.array_equal(freq, often)
 
 
 NAMES = ["identity", "linear", "quadratic", "radical"]
