@@ -96,7 +96,8 @@ further_options = grouped(
     click.option(
         "--compare",
         is_flag=True,
-        help="Differences between the groups of --by, with p and Holm's adjustment.",
+        help="Differences between the groups of --by, with p and Holm's adjustment, "
+        "and the test that three or more are equal.",
     ),
 )
 
@@ -135,7 +136,7 @@ def further_tables(
             tables += [index_table(file)] if further.indices else []
         between = further.between_raters(file, options)
         if further.compare and between is not None:
-            tables.append(_differences(file, between, question))
+            tables += _comparisons(file, between, question)
     return tables
 
 
@@ -153,11 +154,15 @@ def _question(options: EstimateOptions, explain: bool) -> "Question":
     )
 
 
-def _differences(
+def _comparisons(
     file: "RatingsFile", options: EstimateOptions, question: "Question"
-) -> "FurtherTable":
+) -> "list[FurtherTable]":
     from masrel.report._difference_table import difference_table
+    from masrel.report._equality_table import equality_table
 
     n_raters = max(len(part.raters) for part in file.parts) or file.read["n_raters"]
     of_all = entries(options, n_raters, file.scale, file.is_ordered)
-    return difference_table(file, of_all, question, skip=options.takes_all)
+    tables = [difference_table(file, of_all, question, skip=options.takes_all)]
+    if len(file.parts) > 2:  # of two the difference says it
+        tables.append(equality_table(file, of_all, question))
+    return tables

@@ -10,9 +10,11 @@ from masrel.intervals.analytic import analytic
 from masrel.intervals.auto import estimate
 from masrel.intervals.bootstrap import bootstrap
 from masrel.intervals.difference import difference, difference_test
+from masrel.intervals.equality import donner_test, equality_test
 from masrel.intervals.jackknife import jackknife
 from masrel.intervals.posterior import posterior
 from masrel.intervals.quantity import Quantity
+from masrel.intervals.several import Differences, differences
 
 if TYPE_CHECKING:
     from masrel.intervals.latent._density import LatentPrior
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
     from masrel.intervals.self_agreement import RetestModel, retest_model
 
 __all__ = [
+    "Differences",
     "LatentChains",
     "LatentPrior",
     "LatentTrait",
@@ -31,6 +34,9 @@ __all__ = [
     "bootstrap",
     "difference",
     "difference_test",
+    "differences",
+    "donner_test",
+    "equality_test",
     "estimate",
     "jackknife",
     "latent_trait",

@@ -97,7 +97,7 @@ def _pairs(file: RatingsFile) -> list[_Pair]:
     parts = file.parts
     groups = [label(part_names(file, part).values()) for part in parts]
     coded = [coded_part(part, "--compare") for part in parts]
-    rows = [_rated_rows(*of_part) for of_part in zip(parts, coded, strict=True)]
+    rows = [rated_rows(*of_part) for of_part in zip(parts, coded, strict=True)]
     pairs = []
     for one, other in itertools.combinations(range(len(parts)), 2):
         shared = rows[one].keys() & rows[other].keys()
@@ -106,8 +106,8 @@ def _pairs(file: RatingsFile) -> list[_Pair]:
         if is_same:
             order = list(rows[one])
             ratings = (
-                _rows_of(coded[one], [rows[one][item] for item in order]),
-                _rows_of(coded[other], [rows[other][item] for item in order]),
+                rows_of(coded[one], [rows[one][item] for item in order]),
+                rows_of(coded[other], [rows[other][item] for item in order]),
             )
         pairs.append(
             _Pair(
@@ -121,13 +121,14 @@ def _pairs(file: RatingsFile) -> list[_Pair]:
     return pairs
 
 
-def _rated_rows(part: RatingsPart, coded: CodedRatings) -> dict[str, int]:
-    # item to its row; an item that nobody rated is none
+def rated_rows(part: RatingsPart, coded: CodedRatings) -> dict[str, int]:
+    """Return the row of every item that somebody rated."""
     rated = np.max(coded.codes, axis=1) >= 0
     return {item: row for row, item in enumerate(part.items) if rated[row]}
 
 
-def _rows_of(coded: CodedRatings, rows: list[int]) -> CodedRatings:
+def rows_of(coded: CodedRatings, rows: list[int]) -> CodedRatings:
+    """Return the ratings of some items in this order."""
     return CodedRatings(codes=coded.codes[np.array(rows)], categories=coded.categories)
 
 
@@ -263,7 +264,7 @@ def _notes(
 
 def _remarks(differences: Sequence[_Difference]) -> list[str]:
     # what to know of single differences, or of all alike
-    rows_of: dict[str, list[str]] = {}
+    rows_with: dict[str, list[str]] = {}
     for difference in differences:
         pair, interval = difference.pair, difference.estimate.interval
         texts = [] if interval is None else list(interval.notes)
@@ -271,8 +272,8 @@ def _remarks(differences: Sequence[_Difference]) -> list[str]:
             texts.append(f"undefined: {difference.test.reason}")
         for text in texts:
             name = f"{difference.title} ({pair.first} and {pair.second})"
-            rows_of.setdefault(text, []).append(name)
+            rows_with.setdefault(text, []).append(name)
     return [
         f"{text}." if len(names) == len(differences) else f"{'; '.join(names)}: {text}."
-        for text, names in rows_of.items()
+        for text, names in rows_with.items()
     ]

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from scipy import stats
 
@@ -584,6 +585,58 @@ def test_a_comparison_that_cannot_be_is_refused(
     assert reason in refused(masrel, clinics, "--compare", *arguments)
 
 
+def three_groups(folder: Path, *, same_items: bool) -> Path:
+    rng = np.random.default_rng(29)
+    lines = ["item,when,Kim,Lee"]
+    for when, share in (("before", 0.4), ("after", 0.8), ("later", 0.7)):
+        for k in range(40):
+            true = rng.integers(0, 2)
+            pair = [
+                true if rng.random() < share else rng.integers(0, 2) for _ in range(2)
+            ]
+            name = f"m{k}" if same_items else f"{when} {k}"
+            lines.append(f"{name},{when},{pair[0]},{pair[1]}")
+    path = folder / "three.csv"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def test_three_groups_of_other_items_are_tested_for_equality(
+    masrel: Caller, tmp_path: Path
+) -> None:
+    path = three_groups(tmp_path, same_items=False)
+    names = ("--by", "when", "--compare", "--coefficients", "scott_pi")
+    document = record(masrel, path, *names)
+    estimates, tests = document["estimates"], document["equality"]
+    assert [test["test"] for test in tests] == ["equality_test", "donner_test"]
+    precision = np.array([e["standard_error"] for e in estimates]) ** -2.0
+    values = np.array([e["value"] for e in estimates])
+    away = values - precision @ values / precision.sum()
+    assert tests[0]["statistic"] == pytest.approx(precision @ away**2, rel=1e-12)
+    assert tests[0]["df"] == [2.0]
+    shown = masrel("agree", path, *names).out
+    assert "Fleiss' weighted χ²: groups of other items" in shown
+
+
+def test_three_groups_of_the_same_items_are_tested_by_hotellings_t2(
+    masrel: Caller, tmp_path: Path
+) -> None:
+    path = three_groups(tmp_path, same_items=True)
+    rows = [line.split(",") for line in path.read_text().splitlines()[1:]]
+    sets = [
+        [row[2:] for row in rows if row[1] == when]
+        for when in ("before", "after", "later")
+    ]
+    expected = intervals.differences(
+        "cohen_kappa", sets, categories=["0", "1"]
+    ).equality
+    names = ("--by", "when", "--compare", "--coefficients", "cohen_kappa")
+    (test,) = record(masrel, path, *names)["equality"]
+    assert test["statistic"] == pytest.approx(expected.statistic, rel=1e-12)
+    assert test["df"] == [2.0, 38.0]
+    assert test["p_value"] == pytest.approx(expected.p_value, rel=1e-12)
+
+
 def test_one_group_is_not_compared(masrel: Caller, tmp_path: Path) -> None:
     rows = [("A", n, "a", "ab"[n % 2]) for n in range(6)]
     path = write(tmp_path / "w.csv", "clinic,item,Kim,Lee", rows)
@@ -598,18 +651,18 @@ ALL = ("--by", "clinic", "--each-category", "--symmetry", "--indices", "--compar
 
 
 def test_text_csv_and_latex_have_every_table(masrel: Caller, clinics: Path) -> None:
-    names = ["categories", "symmetry", "indices", "differences"]
+    names = ["categories", "symmetry", "indices", "differences", "equality"]
     document = record(masrel, clinics, *ALL)
     assert [key for key in document if key in names] == names
-    assert len(masrel("agree", clinics, *ALL).out.split("\n\n")) == 5
+    assert len(masrel("agree", clinics, *ALL).out.split("\n\n")) == 6
     latex = masrel("agree", clinics, *ALL, "--latex").out
-    assert [f"\\label{{tab:{name}}}" in latex for name in names] == [True] * 4
-    assert latex.count(r"\begin{table}") == latex.count(r"\end{table}") == 5
+    assert [f"\\label{{tab:{name}}}" in latex for name in names] == [True] * 5
+    assert latex.count(r"\begin{table}") == latex.count(r"\end{table}") == 6
     tables = [
         list(csv.DictReader(part.splitlines()))
         for part in masrel("agree", clinics, *ALL, "--csv").out.split("\n\n")
     ]
-    assert len(tables) == 5
+    assert len(tables) == 6
     for name, rows in zip(names, tables[1:], strict=True):
         assert len(rows) == len(document[name])
     for row, found in zip(tables[4], document["differences"], strict=True):

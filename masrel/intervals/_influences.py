@@ -1,0 +1,94 @@
+"""How far each item, or cluster of items, moves a coefficient: the delta method.
+
+In: an `IntervalProblem`. Out: the derivative of the coefficient in the weight of every
+item, added up over clusters where items come in such.
+"""
+
+import math
+from collections.abc import Hashable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from masrel.agreement._kernel import Floats
+from masrel.errors import ParameterError
+from masrel.intervals._problem import Integers, IntervalProblem, blocks
+
+_STEP = 1e-30  # of a derivative by a complex step, which cancels no digits [1]
+_PLACES = 1 << 20  # complex numbers at once
+
+# [1] Squire, W., Trapp, G. (1998). Using complex variables to estimate derivatives of
+# real functions. SIAM Review, 40(1), 110-112. https://doi.org/10.1137/S003614459631241X
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UnitInfluences:
+    """What each unit adds to the error of a coefficient."""
+
+    moves: Floats = field(compare=False, repr=False)  # (n_units,)
+    n_units: int  # those that the coefficient knows of
+
+
+def cluster_codes(clusters: object, n_items: int) -> Integers:
+    """Return which cluster every item belongs to, as numbers from 0."""
+    # -> (n_items,)
+    if isinstance(clusters, str | bytes) or not isinstance(clusters, Iterable):
+        raise ParameterError(
+            f"clusters: needs one label an item, got {type(clusters).__name__}"
+        )
+    labels: Sequence[object] = (
+        clusters.tolist() if isinstance(clusters, np.ndarray) else list(clusters)
+    )
+    if len(labels) != n_items:
+        raise ParameterError(
+            f"clusters: needs one label an item, {n_items}, got {len(labels)}"
+        )
+    numbers: dict[Hashable, int] = {}
+    codes = np.empty(n_items, dtype=np.int64)
+    for item, label in enumerate(labels):
+        is_missing = label is None or label == "" or label != label
+        if is_missing or not isinstance(label, Hashable):
+            raise ParameterError(
+                f"clusters: item {item} needs the label of its cluster, got {label!r}"
+            )
+        codes[item] = numbers.setdefault(label, len(numbers))
+    return codes
+
+
+def unit_influences(problem: IntervalProblem, units: Integers) -> UnitInfluences:
+    """Return the derivative of the coefficient in the weight of each unit."""
+    # units (n_items,): the unit of every row of the ratings, from 0
+    slopes = _slopes(problem)
+    n_items = len(problem.coded.codes)
+    moves, known = np.zeros(n_items), np.zeros(n_items, dtype=bool)
+    for block in blocks(n_items):
+        part = replace(problem.coded, codes=problem.coded.codes[block])
+        features = problem.features(part)
+        moves[block] = features @ slopes
+        known[block] = features.any(axis=1)  # without a pair some have none
+    n_units = int(units.max(initial=-1)) + 1
+    return UnitInfluences(
+        moves=np.bincount(units, weights=moves, minlength=n_units).astype(float),
+        n_units=len(np.unique(units[known])),
+    )
+
+
+def sample_factor(influences: UnitInfluences) -> float:
+    """Return by what the squares of influences are multiplied: n/(n - 1)."""
+    n = influences.n_units
+    return n / (n - 1) if n > 1 else math.nan
+
+
+def _slopes(problem: IntervalProblem) -> Floats:
+    # the derivative of the coefficient in each sum, (n_features,)
+    n = len(problem.sums)
+    if math.isnan(problem.value):
+        return np.full(n, math.nan)
+    slopes = np.empty(n)
+    rows = max(1, _PLACES // n)
+    for start in range(0, n, rows):
+        stop = min(start + rows, n)
+        stepped = np.repeat(problem.sums[None].astype(complex), stop - start, axis=0)
+        stepped[np.arange(stop - start), np.arange(start, stop)] += 1j * _STEP
+        slopes[start:stop] = np.imag(problem.values(stepped)) / _STEP
+    return slopes

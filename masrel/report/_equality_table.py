@@ -1,0 +1,179 @@
+"""Whether all groups of a file of ratings agree as well: one test a coefficient.
+
+In: a `RatingsFile` whose parts are the groups. Out: a table, and the same for JSON.
+"""
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from masrel.agreement import CodedRatings, Coefficient, Significance
+from masrel.errors import MasrelWarning
+from masrel.ratings import RatingsFile
+from masrel.report._difference_table import rated_rows, rows_of
+from masrel.report._further_tables import (
+    FurtherTable,
+    Question,
+    coded_part,
+    data_of,
+    finite,
+)
+from masrel.report._tables import Column, Table, Value, p_text
+
+_FLEISS = "Fleiss' weighted χ²"
+_DONNER = "Donner's goodness of fit"
+_HOTELLING = "Hotelling's T² as F"
+
+_NOTES = {
+    _FLEISS: f"{_FLEISS}: groups of other items, by their delta-method errors.",
+    _DONNER: f"{_DONNER}: two raters and two categories, of one κ of all groups; it "
+    "holds its level in smaller groups.",
+    _HOTELLING: f"{_HOTELLING}: items of the same names in several groups, taken for "
+    "the same items, by the delta method.",
+}
+_INTRACLASS = ("fleiss_kappa", "scott_pi")
+"""Coefficients that are the intraclass kappa of two raters and two categories."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Groups:
+    """The ratings of all groups, item by item."""
+
+    sets: tuple[CodedRatings, ...]
+    is_same: bool  # whether some groups are of the same items, which are aligned
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Test:
+    """A test of one coefficient of all groups."""
+
+    entry: Coefficient
+    weights: str
+    name: str
+    result: Significance
+
+
+def equality_table(
+    file: RatingsFile,
+    entries: Sequence[Coefficient],
+    question: Question,
+) -> FurtherTable:
+    """Return the test that all groups have the same coefficient, for each of them."""
+    groups = _groups(file)
+    tests: list[_Test] = []
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", MasrelWarning)  # the results say it
+        for entry in entries:
+            if entry.kernel is not None:  # else the table of differences says it
+                tests += _tests(entry, groups, question)
+    names = dict.fromkeys(test.name for test in tests)
+    undefined = [
+        f"{test.entry.title}: undefined: {test.result.reason}."
+        for test in tests
+        if test.result.reason is not None
+    ]
+    return FurtherTable(
+        key="equality",
+        table=Table(
+            name="equality",
+            caption="Equality of agreement in all groups",
+            columns=_COLUMNS,
+            rows=tuple(map(_cells, tests)),
+            notes=(*(_NOTES[name] for name in names), *undefined),
+            data=data_of(file),
+        ),
+        documents=list(map(_document, tests)),
+    )
+
+
+def _groups(file: RatingsFile) -> _Groups:
+    # groups of the same items have them in the same rows, others in rows of their own
+    coded = [coded_part(part, "--compare") for part in file.parts]
+    rated = [rated_rows(*both) for both in zip(file.parts, coded, strict=True)]
+    starts: dict[frozenset[str], tuple[int, list[str]]] = {}
+    n_rows = 0
+    for rows in rated:
+        if frozenset(rows) not in starts:
+            starts[frozenset(rows)] = n_rows, list(rows)
+            n_rows += len(rows)
+    if len(starts) == len(coded):
+        return _Groups(sets=tuple(coded), is_same=False)
+    sets = []
+    for ratings, rows in zip(coded, rated, strict=True):
+        start, items = starts[frozenset(rows)]
+        codes = np.full((n_rows, ratings.codes.shape[1]), -1, ratings.codes.dtype)
+        chosen = rows_of(ratings, [rows[item] for item in items]).codes
+        codes[start : start + len(items)] = chosen
+        sets.append(replace(ratings, codes=codes))
+    return _Groups(sets=tuple(sets), is_same=True)
+
+
+def _tests(entry: Coefficient, groups: _Groups, question: Question) -> list[_Test]:
+    from masrel.intervals import differences, donner_test, equality_test
+
+    weights = question.weights if entry.weighted else "identity"
+    if groups.is_same:
+        result = differences(entry, groups.sets, weights=weights).equality
+        return [_Test(entry=entry, weights=weights, name=_HOTELLING, result=result)]
+    estimates = [entry(ratings, weights=weights) for ratings in groups.sets]
+    tests = [
+        _Test(
+            entry=entry,
+            weights=weights,
+            name=_FLEISS,
+            result=equality_test(estimates),
+        )
+    ]
+    of_two = all(
+        ratings.codes.shape[1] == 2 and len(ratings.categories) == 2
+        for ratings in groups.sets
+    )
+    if of_two and entry.name in _INTRACLASS:
+        result = donner_test(groups.sets)
+        tests.append(_Test(entry=entry, weights=weights, name=_DONNER, result=result))
+    return tests
+
+
+_COLUMNS = (
+    Column(key="coefficient", heading="Coefficient", where="csv"),
+    Column(key="title", heading="Coefficient", align="left"),
+    Column(key="weights", heading="Weights", where="csv"),
+    Column(key="test", heading="Test", align="left"),
+    Column(key="statistic", heading="Statistic", digits=2),
+    Column(key="distribution", heading="Distribution", align="left", where="csv"),
+    Column(key="df", heading="df", align="left"),
+    Column(key="p", heading="p", where="page"),
+    Column(key="p_value", heading="p", where="csv"),
+)
+
+
+def _cells(test: _Test) -> tuple[Value, ...]:
+    result, title = test.result, test.entry.title
+    return (
+        test.entry.name,
+        title if test.weights == "identity" else f"{title}, {test.weights}",
+        test.weights,
+        test.name,
+        result.statistic,
+        result.distribution,
+        ", ".join(f"{df:g}" for df in result.df) or None,
+        p_text(result.p_value),
+        result.p_value,
+    )
+
+
+def _document(test: _Test) -> dict[str, object]:
+    result = test.result
+    return {
+        "coefficient": test.entry.name,
+        "weights": test.weights,
+        "test": result.name,
+        "statistic": finite(result.statistic),
+        "distribution": result.distribution,
+        "df": list(result.df),
+        "p_value": finite(result.p_value),
+        "n_items": result.n_items,
+        "reason": result.reason,
+    }
