@@ -44,11 +44,18 @@ from masrel.agreement.light import Deletion, light_kappa
 from masrel.agreement.percent import percent_agreement, percent_agreement_from_counts
 from masrel.agreement.registry import COEFFICIENTS, Coefficient, Property, coefficient
 from masrel.agreement.scott import scott_pi, scott_pi_from_table
-from masrel.agreement.significance import Significance, holm, p_value
+from masrel.agreement.significance import (
+    Alternative,
+    Significance,
+    equivalence_p_value,
+    holm,
+    p_value,
+)
 from masrel.agreement.two_sessions import pooled_kappa, stratified_kappa
 
 __all__ = [
     "COEFFICIENTS",
+    "Alternative",
     "Band",
     "BandScale",
     "CodedRatings",
@@ -81,6 +88,7 @@ __all__ = [
     "count_ratings",
     "count_table",
     "declared_weights",
+    "equivalence_p_value",
     "fleiss_kappa",
     "fleiss_kappa_from_counts",
     "fleiss_null",

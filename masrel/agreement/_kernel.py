@@ -30,6 +30,10 @@ VARIANCES = get_args(Variance)
 
 NO_PAIR = "no item has ratings of two raters"
 NO_CHANCE = "0/0: chance agreement is 1, all ratings are in one category"
+NO_SPREAD = (
+    "the standard error is 0: no item moves the estimate, which does not mean that "
+    "there is no uncertainty"
+)
 
 _CANCELLED = 1e-3  # of its terms: a sum in floats so small has lost three digits
 

@@ -4,6 +4,8 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from masrel.agreement._kernel import undefined
+from masrel.agreement.significance import _why_untestable
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate
 
@@ -51,7 +53,7 @@ class Band:
     low, high : float
         Its ends. Which band a value at an end belongs to is as published: below for
         0.2, 0.4, 0.6 and 0.8 of Landis and Koch and of Altman and for 0.75 of Fleiss,
-        above for the others. It matters where the standard error is 0.
+        above for the others. It matters for `strength`.
     word : str
         Its name.
     probability : float
@@ -81,12 +83,18 @@ def bands(estimate: Estimate, *, scale: BandScale = "landis_koch") -> tuple[Band
     -------
     tuple of Band
         Best first. Probabilities are ``nan`` where the estimate or its error is
-        undefined.
+        undefined, or the error is 0.
 
     Raises
     ------
     ParameterError
         If the scale is unknown.
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        If there are no probabilities. An error of 0 means that no item moves the
+        estimate, which is no certainty.
 
     Notes
     -----
@@ -113,11 +121,14 @@ def bands(estimate: Estimate, *, scale: BandScale = "landis_koch") -> tuple[Band
     [('almost perfect', 0.0), ('substantial', 0.06), ('moderate', 0.5)]
     """
     steps = _steps(scale)
+    reason = _why_untestable(estimate)
+    if reason is not None:
+        undefined(f"band of {estimate.coefficient}", reason)
     every: list[Band] = []
     high, better = 1.0, 0.0
-    for low, closed, word in steps:
+    for low, _, word in steps:
         end = -math.inf if low == -1.0 > estimate.value else low
-        inside, cumulative = _probabilities(estimate, end, high, closed, better)
+        inside, cumulative = _probabilities(estimate, end, high, better)
         band = Band(
             low=end, high=high, word=word, probability=inside, cumulative=cumulative
         )
@@ -183,12 +194,17 @@ def benchmark(
     Returns
     -------
     str
-        The word; ``"undefined"`` where the estimate or its error is.
+        The word; ``"undefined"`` where the estimate or its error is, or the error is 0.
 
     Raises
     ------
     ParameterError
         If the scale is unknown, or the level is not within (0, 1).
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        As `bands`.
 
     Notes
     -----
@@ -212,15 +228,12 @@ def benchmark(
 
 
 def _probabilities(
-    estimate: Estimate, low: float, high: float, closed: bool, better: float
+    estimate: Estimate, low: float, high: float, better: float
 ) -> tuple[float, float]:
     # of a band, and of it and the better ones, whose probability is `better`
     value, error = estimate.value, estimate.standard_error
-    if math.isnan(value) or math.isnan(error):
+    if math.isnan(value) or not error > 0.0:
         return math.nan, math.nan
-    if error == 0.0:  # no doubt at all, as far as the error goes
-        reached = float(value > low or (closed and value == low))
-        return reached - better, reached
     every = _between(value, error, -math.inf if value < -1.0 else -1.0, 1.0)
     inside = _between(value, error, low, high) / every
     return inside, min(better + inside, 1.0)

@@ -3,7 +3,11 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal, get_args
 
+import numpy as np
+
+from masrel.agreement._kernel import NO_SPREAD, undefined
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate
 
@@ -52,40 +56,167 @@ class Significance:
         )
 
 
-def p_value(estimate: Estimate) -> float:
-    """Return the two-sided p-value of the hypothesis that a coefficient is 0.
+Alternative = Literal["two-sided", "greater", "less"]
+"""What a p-value is evidence for: that the true value is other, greater or less."""
+
+
+def p_value(
+    estimate: Estimate,
+    *,
+    null: float | None = None,
+    alternative: Alternative = "two-sided",
+) -> float:
+    """Return the p-value of the hypothesis that a coefficient is some value.
 
     Parameters
     ----------
     estimate : Estimate
         With its delta-method standard error, items as the sample.
+    null : float, optional
+        The value under the hypothesis; 0 for coefficients that are corrected for
+        chance. Others have no such value and need one.
+    alternative : {"two-sided", "greater", "less"}, optional
+        What a small p-value is evidence for. "greater" than the value that is just
+        too low shows non-inferiority.
 
     Returns
     -------
     float
-        P(|t| ≥ |value / standard error|) with n - 1 degrees of freedom, accurate to
-        the far tail; 0 for an error of 0 and a value that is not, ``nan`` where the
-        estimate or its error is undefined.
+        Of t = (value - null) / standard error, by Student's t with n - 1 degrees of
+        freedom, accurate to the far tail; ``nan`` where it is undefined.
+
+    Raises
+    ------
+    ParameterError
+        If an option is invalid, or no `null` is given for a coefficient that is not
+        corrected for chance.
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        If the estimate or its standard error is undefined, or the error is 0: no item
+        moves the estimate, which is no certainty.
 
     Notes
     -----
     The standard error is that of the estimate and not that under the hypothesis; for
-    the latter see `fleiss_null`.
+    the latter see `fleiss_null`. `equivalence_p_value` tests that a coefficient lies
+    between two values.
+
+    Examples
+    --------
+    Is kappa, 0.4 here, other than 0? Is it greater than 0.2?
+
+    >>> from masrel.agreement import cohen_kappa_from_table
+    >>> kappa = cohen_kappa_from_table([[20, 5], [10, 15]])
+    >>> round(p_value(kappa), 4)
+    0.003
+    >>> round(p_value(kappa, null=0.2, alternative="greater"), 4)
+    0.0627
+    """
+    from scipy.special import stdtr  # loaded only when a p-value is asked for
+
+    if alternative not in get_args(Alternative):
+        raise ParameterError(
+            f"alternative: needs one of {', '.join(get_args(Alternative))}, "
+            f"got {alternative!r}"
+        )
+    value = _null(estimate, null)
+    reason = _why_untestable(estimate)
+    if reason is not None:
+        undefined(f"p-value of {estimate.coefficient}", reason)
+        return math.nan
+    t = (estimate.value - value) / estimate.standard_error
+    df = estimate.n_items - 1
+    if alternative == "two-sided":
+        return min(1.0, 2.0 * float(stdtr(df, -abs(t))))
+    return float(stdtr(df, -t if alternative == "greater" else t))
+
+
+def equivalence_p_value(estimate: Estimate, *, low: float, high: float) -> float:
+    """Return the p-value of the hypothesis that a coefficient lies outside two values.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        With its delta-method standard error, items as the sample.
+    low, high : float
+        Ends between which values count as equivalent.
+
+    Returns
+    -------
+    float
+        The larger of two one-sided p-values: that the coefficient is at most `low`,
+        and that it is at least `high`. Below 0.05 the 90 % interval by the same
+        standard error lies between them. ``nan`` where it is undefined.
+
+    Raises
+    ------
+    ParameterError
+        If the ends are not finite numbers in ascending order.
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        As `p_value`.
+
+    References
+    ----------
+    .. [1] Schuirmann, D. J. (1987). A comparison of the two one-sided tests procedure
+       and the power approach for assessing the equivalence of average
+       bioavailability. Journal of Pharmacokinetics and Biopharmaceutics, 15(6),
+       657-680. https://doi.org/10.1007/BF01068419
 
     Examples
     --------
     >>> from masrel.agreement import cohen_kappa_from_table
-    >>> round(p_value(cohen_kappa_from_table([[20, 5], [10, 15]])), 4)
-    0.003
+    >>> kappa = cohen_kappa_from_table([[20, 5], [10, 15]])
+    >>> round(equivalence_p_value(kappa, low=0.1, high=0.7), 4)
+    0.0117
     """
-    from scipy.special import stdtr  # loaded only when a p-value is asked for
-
-    if math.isnan(estimate.value) or math.isnan(estimate.standard_error):
+    if not _finite("low", low) < _finite("high", high):
+        raise ParameterError(f"low, high: needs low < high, got {low} and {high}")
+    above = p_value(estimate, null=low, alternative="greater")
+    if math.isnan(above):  # with a warning already
         return math.nan
+    return max(above, p_value(estimate, null=high, alternative="less"))
+
+
+def _null(estimate: Estimate, null: float | None) -> float:
+    """Check the value under the hypothesis, 0 if that is what chance gives."""
+    if null is None:
+        # Imported here: the register imports coefficients that import this file.
+        from masrel.agreement.registry import COEFFICIENTS
+
+        entry = COEFFICIENTS.get(estimate.coefficient)
+        if entry is not None and not entry.chance_corrected:
+            raise ParameterError(
+                f"null: needs a value for {entry.title}: it is not corrected for "
+                "chance, so that 0 is not what chance gives"
+            )
+        return 0.0
+    return _finite("null", null)
+
+
+def _finite(name: str, value: float) -> float:
+    """Check a number."""
+    is_number = isinstance(value, int | float | np.number)
+    if not is_number or isinstance(value, bool) or not math.isfinite(value):
+        raise ParameterError(f"{name}: needs a finite number, got {value!r}")
+    return float(value)
+
+
+def _why_untestable(estimate: Estimate) -> str | None:
+    """Return why an estimate has no law around it, or None."""
+    if math.isnan(estimate.value):
+        return estimate.reason or "the estimate itself is undefined"
     if estimate.standard_error == 0.0:
-        return 1.0 if estimate.value == 0.0 else 0.0
-    t = abs(estimate.value / estimate.standard_error)
-    return min(1.0, 2.0 * float(stdtr(estimate.n_items - 1, -t)))
+        return NO_SPREAD
+    if not math.isnan(estimate.standard_error):
+        return None
+    if estimate.n_items < 2:
+        return "one item has no standard error"
+    return "it has no standard error"
 
 
 def holm(p_values: Sequence[float]) -> list[float]:

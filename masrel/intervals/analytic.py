@@ -8,6 +8,7 @@ from typing import Literal, get_args
 from numpy.typing import ArrayLike
 
 from masrel.agreement import Label, WeightName
+from masrel.agreement._kernel import NO_SPREAD
 from masrel.errors import ParameterError, UndefinedStatisticWarning
 from masrel.estimates import Estimate, Interval, Target
 from masrel.intervals._problem import (
@@ -145,7 +146,4 @@ def _why_undefined(estimate: Estimate) -> str | None:
         return estimate.reason
     if math.isnan(estimate.standard_error):
         return "one item has no standard error"
-    return (
-        "the standard error is 0: every item agrees alike, which does not mean that "
-        "there is no uncertainty"
-    )
+    return NO_SPREAD

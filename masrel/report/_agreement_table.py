@@ -141,6 +141,8 @@ def _word(row: AgreementRow, bands: BandScale) -> str | None:
         return None
     if row.lower_bound is not None:
         return strength(row.lower_bound, scale=bands)
+    if not estimate.standard_error > 0.0:  # said in a note rather than warned of
+        return "undefined"
     return benchmark(estimate, scale=bands)
 
 
@@ -222,6 +224,8 @@ def _words_note(
         none = " where there is none" if laws else ""
         laws.append(f"a normal law around the estimate{none}")
     by = f", by {', or by '.join(laws)}" if laws else ""
+    if any(r.lower_bound is None and r.estimate.standard_error == 0.0 for r in named):
+        by += "; undefined where the SE is 0, which does not mean that it is certain"
     return (
         f"At least: the best word of {_SOURCES[bands]} that the true value reaches "
         f"with 95 % probability{by}; the words are conventions.",

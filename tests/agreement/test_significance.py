@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from typing import get_args
 
 import mpmath
 import pytest
@@ -10,8 +11,12 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from masrel.agreement import (
+    COEFFICIENTS,
+    Alternative,
     Significance,
+    cohen_kappa,
     cohen_kappa_from_table,
+    equivalence_p_value,
     fleiss_kappa,
     holm,
     icc,
@@ -21,6 +26,7 @@ from masrel.agreement import (
 )
 from masrel.errors import ParameterError, UndefinedStatisticWarning
 from masrel.estimates import Estimate
+from tests.agreement.undefined import assert_undefined
 
 
 def estimate(value: float, error: float, n_items: int = 20) -> Estimate:
@@ -96,16 +102,20 @@ def test_of_percent_agreement_it_is_the_t_test_of_a_mean(
 ) -> None:
     # Every item complete: its agreement is 0, 1/3 or 1, their mean is Student's.
     shares = [((a == b) + (a == c) + (b == c)) / 3 for a, b, c in grades]
-    if len(set(shares)) == 1:  # a standard error of 0
-        assert p_value(percent_agreement(grades)) == (0.0 if shares[0] else 1.0)
-        return
-    other = stats.ttest_1samp(shares, 0.0)
-    assert p_value(percent_agreement(grades)) == pytest.approx(other.pvalue, rel=1e-9)
+    for null in (0, 0.5):
+        for alternative in get_args(Alternative):
+            options = {"null": null, "alternative": alternative}
+            if len(set(shares)) == 1:  # a standard error of 0
+                assert_undefined(lambda: p_value(percent_agreement(grades), **options))  # noqa: B023
+                continue
+            other = stats.ttest_1samp(shares, null, alternative=alternative)
+            found = p_value(percent_agreement(grades), **options)
+            assert found == pytest.approx(other.pvalue, rel=1e-9)
 
 
 @given(
     value=st.floats(-1, 1),
-    error=st.floats(0, 10),
+    error=st.floats(0, 10, exclude_min=True),
     n_items=st.integers(2, 10_000),
 )
 def test_is_a_probability_whatever_the_sign(
@@ -128,13 +138,103 @@ def test_of_exactly_nothing_is_one() -> None:
     assert p_value(estimate(-0.0, 0.3)) == 1.0
 
 
-def test_without_any_doubt_it_is_none_or_certain() -> None:
-    # An error of 0: whatever is not 0 cannot be.
-    assert p_value(estimate(0.0, 0.0)) == 1.0
-    assert p_value(estimate(1.0, 0.0)) == 0.0
-    assert p_value(estimate(-1e-300, 0.0)) == 0.0
-    perfect = fleiss_kappa([["a", "a"], ["b", "b"]])
-    assert (perfect.standard_error, p_value(perfect)) == (0.0, 0.0)
+def test_an_error_of_0_is_no_certainty() -> None:
+    # Two items, both raters agree: nobody knows κ to be 1.
+    perfect = cohen_kappa([["a", "a"], ["b", "b"]])
+    assert (perfect.value, perfect.standard_error) == (1.0, 0.0)
+    for estimate_ in (perfect, estimate(0.0, 0.0), estimate(-1e-300, 0.0)):
+        with pytest.warns(UndefinedStatisticWarning, match="error is 0: no item moves"):
+            assert math.isnan(p_value(estimate_))
+        with pytest.warns(UndefinedStatisticWarning, match="error is 0: no item moves"):
+            assert math.isnan(equivalence_p_value(estimate_, low=-0.5, high=0.5))
+
+
+@pytest.mark.parametrize("name", ["percent_agreement", "kendall_w", "robinson_a"])
+def test_what_is_not_corrected_for_chance_is_not_compared_with_0(name: str) -> None:
+    shares = COEFFICIENTS[name]([[1, 2], [2, 2], [3, 1], [4, 5]])
+    with pytest.raises(
+        ParameterError, match=r"null: needs a value for .* not corrected"
+    ):
+        p_value(shares)
+    if name == "percent_agreement":  # 1/4 of four items: t = (1/4 - 1/2) / (1/4) = -1
+        assert p_value(shares, null=0.25) == 1.0
+        # P(|T| ≥ 1) with 3 degrees of freedom: 1 - (2/π)(π/6 + (1/2)(√3/2))
+        by_hand = 1.0 - 2.0 / math.pi * (math.pi / 6.0 + math.sqrt(3.0) / 4.0)
+        assert p_value(shares, null=0.5) == pytest.approx(by_hand, rel=1e-12)
+
+
+# Tables of Cohen's kappa against a value: Fleiss, Cohen and Everitt's error over n and
+# the normal law, computed independently; ours has n - 1 and Student's t.
+AGAINST = [
+    ([[20, 5], [10, 15]], "identity", 0.4, 0.4, 0.126996062931, 0.128285396118),
+    ([[40, 4], [3, 13]], "identity", 0.5, 0.707520891365, 0.102805194105, 0.1036727639),
+    (
+        *([[15, 4, 1], [3, 12, 5], [0, 4, 16]], "linear", 0.4),
+        *(0.6625, 0.0747717229096, 0.0754027191),
+    ),
+    (
+        *([[15, 4, 1], [3, 12, 5], [0, 4, 16]], "quadratic", 0.4),
+        *(0.75, 0.0670561539143, 0.0676220386634),
+    ),
+]
+
+
+@pytest.mark.parametrize("case", AGAINST)
+def test_kappa_against_a_value(case: tuple[object, ...]) -> None:
+    table, weights, null, value, over_n, over_one_less = case
+    kappa = cohen_kappa_from_table(table, weights=weights)  # type: ignore[arg-type]
+    n = kappa.n_items
+    assert kappa.value == pytest.approx(value, abs=1e-12)
+    assert kappa.standard_error == pytest.approx(over_one_less, rel=1e-9)
+    assert over_one_less == pytest.approx(over_n * math.sqrt(n / (n - 1)), rel=1e-9)  # type: ignore[operator]
+    t = (value - null) / over_one_less  # type: ignore[operator]
+    two = p_value(kappa, null=null)  # type: ignore[arg-type]
+    assert two == pytest.approx(both_tails(abs(t), n - 1), rel=1e-6, abs=1e-12)
+    greater = p_value(kappa, null=null, alternative="greater")  # type: ignore[arg-type]
+    less = p_value(kappa, null=null, alternative="less")  # type: ignore[arg-type]
+    assert greater + less == pytest.approx(1.0, rel=1e-12)
+    assert 2.0 * min(greater, less) == pytest.approx(two, rel=1e-12)
+
+
+@given(
+    value=st.floats(-1, 1),
+    error=st.floats(0.01, 0.5),
+    low=st.floats(-1, 0.3),
+    width=st.floats(0.01, 1),
+)
+def test_equivalence_is_two_one_sided_tests_and_an_interval(
+    value: float, error: float, low: float, width: float
+) -> None:
+    high = low + width
+    shown = estimate(value, error)
+    p = equivalence_p_value(shown, low=low, high=high)
+    t = stats.t(19)
+    parts = t.sf((value - low) / error), t.cdf((value - high) / error)
+    assert p == pytest.approx(max(parts), rel=1e-8)
+    # below a: the interval of level 1 - 2a lies between the two values
+    for a in (0.01, 0.05, 0.2):
+        half = t.ppf(1.0 - a) * error
+        if abs(p - a) > 1e-9:
+            assert (p < a) == (low < value - half and value + half < high)
+
+
+def test_non_inferiority_by_hand() -> None:
+    # κ = .75 with error .25, at least .5 needed; t(2): P(T ≥ 1) = (1 - 1/√3) / 2
+    found = p_value(estimate(0.75, 0.25, 3), null=0.5, alternative="greater")
+    assert found == pytest.approx((1.0 - 1.0 / math.sqrt(3.0)) / 2.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("wrong", [math.nan, math.inf, "0.4", True])
+def test_a_hypothesis_is_a_number(wrong: float) -> None:
+    kappa = estimate(0.5, 0.1)
+    with pytest.raises(ParameterError, match="null: needs a finite number, got"):
+        p_value(kappa, null=wrong)
+    with pytest.raises(ParameterError, match="low: needs a finite number, got"):
+        equivalence_p_value(kappa, low=wrong, high=0.5)
+    with pytest.raises(ParameterError, match=r"needs low < high, got 0\.5 and 0\.5"):
+        equivalence_p_value(kappa, low=0.5, high=0.5)
+    with pytest.raises(ParameterError, match="alternative: needs one of two-sided, gr"):
+        p_value(kappa, alternative=wrong)  # type: ignore[arg-type]
 
 
 def test_an_error_too_small_to_divide_by_is_no_fault() -> None:
@@ -142,19 +242,22 @@ def test_an_error_too_small_to_divide_by_is_no_fault() -> None:
 
 
 def test_is_undefined_where_the_estimate_or_its_error_is() -> None:
-    assert math.isnan(p_value(estimate(math.nan, math.nan)))
-    assert math.isnan(p_value(estimate(0.5, math.nan)))
+    assert_undefined(lambda: p_value(estimate(math.nan, math.nan)))
+    assert_undefined(lambda: p_value(estimate(0.5, math.nan)))
     with pytest.warns(UndefinedStatisticWarning):
-        assert math.isnan(p_value(fleiss_kappa([["a", "a"]] * 3)))
+        nothing = fleiss_kappa([["a", "a"]] * 3)
+    with pytest.warns(UndefinedStatisticWarning, match="p-value .* 0/0: chance"):
+        assert math.isnan(p_value(nothing))
     one_item = fleiss_kappa([["a", "b"]], categories=["a", "b"])
     assert one_item.reason is None
-    assert math.isnan(p_value(one_item))
+    with pytest.warns(UndefinedStatisticWarning, match="one item has no standard err"):
+        assert math.isnan(p_value(one_item))
 
 
 def test_coefficients_with_tests_of_their_own_have_none_here() -> None:
     table = [[1, 2], [2, 3], [4, 4]]
-    assert math.isnan(p_value(kendall_w(table)))
-    assert math.isnan(p_value(icc(table)))
+    assert_undefined(lambda: p_value(kendall_w(table), null=0.5))
+    assert_undefined(lambda: p_value(icc(table)))
 
 
 def test_a_test_is_no_interval_and_cannot_be_changed() -> None:
