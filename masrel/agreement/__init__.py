@@ -8,7 +8,12 @@ from masrel.agreement._count_tables import count_table
 from masrel.agreement._counts import CountedRatings, count_ratings
 from masrel.agreement._data import CodedRatings, code_long, code_ratings
 from masrel.agreement._labels import Label
-from masrel.agreement._weights import WeightName, Weights, declared_weights
+from masrel.agreement._weights import (
+    WeightName,
+    Weights,
+    WeightsLike,
+    declared_weights,
+)
 from masrel.agreement.benchmarks import Band, BandScale, bands, benchmark, strength
 from masrel.agreement.brennan_prediger import (
     brennan_prediger,
@@ -70,6 +75,7 @@ __all__ = [
     "Significance",
     "WeightName",
     "Weights",
+    "WeightsLike",
     "bands",
     "benchmark",
     "bhapkar",

@@ -1,5 +1,6 @@
 """Arrays and frames of labels as codes: positions in the scale."""
 
+import itertools
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -13,6 +14,7 @@ from masrel.agreement._labels import (
     code_type,
     is_missing,
     labels_met,
+    labels_of_rows,
     lookup,
 )
 from masrel.errors import RatingsError
@@ -195,8 +197,10 @@ def _search_coder(values: Array, codes: NDArray[np.intp]) -> _Coder:
 def _object_codes(
     labels: Array, declared: tuple[Label, ...] | None
 ) -> tuple[Codes, tuple[Label, ...]]:
-    flat = labels.ravel().tolist()
-    known = labels_met(flat) if declared is None else declared
+    rows, known = labels.tolist(), declared
+    if known is None:
+        rows, known = labels_of_rows(rows)
+    flat = list(itertools.chain.from_iterable(rows))
     position: dict[object, int] = {label: code for code, label in enumerate(known)}
     position[None] = _MISSING
     try:

@@ -29,7 +29,6 @@ Variance = Literal["delta", "irrcac"]
 VARIANCES = get_args(Variance)
 
 NO_PAIR = "no item has ratings of two raters"
-NO_CHANCE = "0/0: chance agreement is 1, all ratings are in one category"
 NO_SPREAD = (
     "the standard error is 0: no item moves the estimate, which does not mean that "
     "there is no uncertainty"

@@ -19,6 +19,20 @@ Codes = NDArray[np.signedinteger[Any]]
 _PLAIN = ({str}, {int})
 
 
+SET_SEPARATOR, EMPTY_SET = "; ", "∅"
+
+
+def text_of_set(labels: Set[Any]) -> str:
+    """Return the text that stands for a set of labels: its elements in order."""
+    elements = sorted(map(str, labels))
+    if any(SET_SEPARATOR.strip() in element for element in elements):
+        raise RatingsError(
+            "ratings: labels in a set need to have no semicolon, which separates them, "
+            f"got {elements}"
+        )
+    return SET_SEPARATOR.join(elements) or EMPTY_SET
+
+
 def is_missing(label: object) -> bool:
     """Return whether a label is None, ``nan``, or pandas' NA or NaT."""
     if label is None:
@@ -38,7 +52,12 @@ def check_categories(categories: Sequence[Label]) -> tuple[Label, ...]:
             f"categories: needs a sequence of at least one label, got {categories!r}"
         )
     declared = tuple(
-        label.item() if isinstance(label, np.generic) else label for label in categories
+        label.item()
+        if isinstance(label, np.generic)
+        else text_of_set(label)
+        if isinstance(label, Set)
+        else label
+        for label in categories
     )
     if not declared:
         raise RatingsError("categories: needs a sequence of at least one label, got ()")
@@ -69,17 +88,44 @@ def labels_met(labels: Iterable[object]) -> tuple[Label, ...]:
 
 
 def _one_kind(labels: Iterable[Any], where: str) -> None:
-    kinds = {isinstance(label, str): label for label in labels}
+    kinds = {}
+    for label in labels:
+        if not _is_label(label):
+            raise RatingsError(
+                f"{where}: labels need to be text or numbers, got {label!r}"
+            )
+        kinds[isinstance(label, str)] = label
     if len(kinds) > 1:
         raise RatingsError(
             f"{where}: text and numbers cannot be mixed, got {kinds[True]!r} "
             f"and {kinds[False]!r}"
         )
-    if kinds and not isinstance(label := next(iter(kinds.values())), str | int | float):
-        if not isinstance(label, np.number):
-            raise RatingsError(
-                f"{where}: labels need to be text or numbers, got {label!r}"
-            )
+
+
+def _is_label(label: object) -> bool:
+    return isinstance(label, str | int | float | np.number)
+
+
+def labels_of_rows(
+    rows: list[list[object]],
+) -> tuple[list[list[object]], tuple[Label, ...]]:
+    """Return rows with sets as text, and the distinct labels in order."""
+    try:
+        return rows, labels_met(itertools.chain.from_iterable(rows))
+    except RatingsError:
+        pass  # sets become text; of anything else, the row and the column are named
+    plain = [
+        [text_of_set(label) if isinstance(label, Set) else label for label in row]
+        for row in rows
+    ]
+    for i, row in enumerate(plain):
+        for j, label in enumerate(row):
+            if not is_missing(label) and not _is_label(label):
+                raise RatingsError(
+                    f"ratings: row {i}, column {j}: labels need to be text or numbers, "
+                    f"or sets of them, got {label!r}"
+                )
+    return plain, labels_met(itertools.chain.from_iterable(plain))
 
 
 def code_type(n_categories: int) -> type[np.signedinteger[Any]]:
@@ -96,7 +142,7 @@ def lookup(
     if is_missing(label):
         return -1
     try:
-        return position[label]
+        return position[text_of_set(label) if isinstance(label, Set) else label]
     except (KeyError, TypeError) as error:
         known = ", ".join(repr(k) for k in position if k is not None)
         raise RatingsError(
@@ -120,7 +166,7 @@ def label_rows(
     if len(widths := set(map(len, rows))) != 1 or 0 in widths:
         _refuse_shape(rows)
     if categories is None:
-        return rows, labels_met(itertools.chain.from_iterable(rows))
+        return labels_of_rows(rows)
     return rows, check_categories(categories)
 
 

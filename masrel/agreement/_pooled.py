@@ -13,12 +13,10 @@ from operator import truediv
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from masrel.agreement._counts import DistinctItems, bilinear, count_ratings, item_counts
 from masrel.agreement._data import CodedRatings
 from masrel.agreement._kernel import (
-    NO_CHANCE,
     NO_PAIR,
     VARIANCES,
     Floats,
@@ -36,8 +34,8 @@ from masrel.agreement._kernel import (
 )
 from masrel.agreement._labels import Codes, Label
 from masrel.agreement._weights import (
-    WeightName,
     Weights,
+    WeightsLike,
     declared_weights,
     identity_weights,
     named_weights,
@@ -101,7 +99,7 @@ def estimate_pooled(
     coefficient: PooledCoefficient,
     ratings: object,
     categories: Sequence[Label] | None,
-    weights: "WeightName | ArrayLike",
+    weights: "WeightsLike",
     variance: Variance = "delta",
     population: int | None = None,
 ) -> Estimate:
@@ -161,7 +159,7 @@ def ratio_estimate(
     else:
         p_o, p_e = (over_o - d_o) / over_o, (over_e - d_e) / over_e
         if reason is None and d_e == 0:
-            reason = NO_CHANCE
+            reason = v.no_chance
     if reason is not None:
         undefined(title, reason)
     else:

@@ -29,7 +29,17 @@ WeightName = Literal[
 ]
 """Names of the weights there are."""
 
+NO_CHANCE = "0/0: chance agreement is 1, all ratings are in one category"
+
 _NAMES = get_args(WeightName)
+
+# What irr, psych, vcd, scikit-learn and multiagree call some of them.
+_ALIASES: dict[str, WeightName] = {
+    "unweighted": "identity",
+    "nominal": "identity",
+    "equal": "linear",
+    "squared": "quadratic",
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,6 +73,16 @@ class Weights:
             return self.n_categories * (self.n_categories - 1)
         return sum(map(sum, self.numerators))
 
+    @property
+    def no_chance(self) -> str:
+        """Why chance agreement is 1, if it is."""
+        alike = self.numerators is not None and any(
+            v == 0 for k, row in enumerate(self.numerators) for v in row[:k]
+        )
+        if alike:
+            return "0/0: chance agreement is 1, to the weights all ratings are alike"
+        return NO_CHANCE
+
     @cached_property
     def floats(self) -> NDArray[np.float64]:
         """The v_kl as floats, (n_categories, n_categories); ``nan`` for a reason."""
@@ -85,8 +105,26 @@ class Weights:
         return np.asarray(numerators * Fraction(1, self.denominator))
 
     def as_floats(self) -> NDArray[np.float64]:
-        """Return v as floats, (n_categories, n_categories); ``nan`` for a reason."""
-        return self.floats
+        """Return w, a matrix as `weights=` takes it; ``nan`` for a reason."""
+        return np.asarray(1.0 - self.floats)
+
+
+WeightsLike = Weights | WeightName | ArrayLike | None
+"""What `weights=` takes: a name or a matrix, or what they made; None for identity."""
+
+
+def plain_name(name: str) -> str:
+    """Return the name here of weights that have another one elsewhere."""
+    return _ALIASES[name] if name in _ALIASES else name
+
+
+def is_identity(weights: "WeightsLike") -> bool:
+    """Return whether weights count every miss in full."""
+    if isinstance(weights, Weights):
+        return weights.name == "identity"
+    return weights is None or (
+        isinstance(weights, str) and plain_name(weights) == "identity"
+    )
 
 
 @cache
@@ -96,7 +134,7 @@ def identity_weights(n_categories: int) -> Weights:
 
 
 def declared_weights(
-    weights: "WeightName | ArrayLike",
+    weights: "WeightsLike",
     categories: Sequence[Label],
     *,
     declared: bool = True,
@@ -105,9 +143,11 @@ def declared_weights(
 
     Parameters
     ----------
-    weights : str or array_like, shape (n_categories, n_categories)
-        A name (see Notes), or the weights w themselves: symmetric, 1 on the diagonal,
-        elsewhere at most 1. A number is taken as the exact binary value it is.
+    weights : str, array_like, Weights or None
+        A name (see Notes), or the weights w themselves, shape (n_categories,
+        n_categories): symmetric, 1 on the diagonal, elsewhere at most 1. A number is
+        taken as the exact binary value it is. Weights that are made are returned; None
+        are identity weights.
     categories : sequence of str, int or float
         The declared scale in order. Numbers weigh by value, text by rank.
     declared : bool, optional
@@ -138,6 +178,9 @@ def declared_weights(
     - bipolar: (x_k - x_l)² / [(x_k + x_l - 2 min)(2 max - x_k - x_l)], over its
       largest value
 
+    "unweighted" and "nominal" are other names of "identity", "equal" is one of
+    "linear", "squared" of "quadratic"; the result has the name here.
+
     References
     ----------
     .. [1] Gwet, K. L. (2014). Handbook of Inter-Rater Reliability, 4th ed., ch. 3.
@@ -148,16 +191,32 @@ def declared_weights(
     >>> made.numerators, made.denominator
     (((0, 1, 2), (1, 0, 1), (2, 1, 0)), 2)
     """
+    if weights is None:
+        weights = "identity"
     if isinstance(weights, str):
         return named_weights(weights, tuple(categories), declared)
+    if isinstance(weights, Weights):
+        return _of_other(weights, categories, declared)
     _check_order(categories, declared)
     return _of_matrix(weights, len(categories))
+
+
+def _of_other(weights: Weights, categories: Sequence[Label], declared: bool) -> Weights:
+    """Return weights that are made, of as many categories."""
+    if not is_identity(weights):
+        _check_order(categories, declared)
+    if weights.n_categories != len(categories):
+        raise ParameterError(
+            f"weights: needs those of {len(categories)} categories, got weights "
+            f'"{weights.name}" of {weights.n_categories}'
+        )
+    return weights
 
 
 @lru_cache(maxsize=64)
 def named_weights(name: str, categories: tuple[Label, ...], declared: bool) -> Weights:
     """Return the weights of that name, made once for a scale."""
-    n = len(categories)
+    n, name = len(categories), plain_name(name)
     if name not in _NAMES:
         raise ParameterError(
             f"weights: needs one of {', '.join(_NAMES)} or a matrix, got {name!r}"

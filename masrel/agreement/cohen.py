@@ -20,7 +20,7 @@ from masrel.agreement._pairs import (
     two_raters,
 )
 from masrel.agreement._pooled import ratio_estimate
-from masrel.agreement._weights import WeightName, Weights, declared_weights
+from masrel.agreement._weights import Weights, WeightsLike, declared_weights
 from masrel.estimates import Estimate
 
 
@@ -28,7 +28,7 @@ def cohen_kappa(
     ratings: object,
     *,
     categories: Sequence[Label] | None = None,
-    weights: "WeightName | ArrayLike" = "identity",
+    weights: "WeightsLike" = "identity",
     population: int | None = None,
 ) -> Estimate:
     """Estimate Cohen's kappa of two raters, or weighted kappa.
@@ -90,7 +90,7 @@ def cohen_kappa_from_table(
     table: ArrayLike,
     *,
     categories: Sequence[Label] | None = None,
-    weights: "WeightName | ArrayLike" = "identity",
+    weights: "WeightsLike" = "identity",
     population: int | None = None,
 ) -> Estimate:
     """Estimate Cohen's kappa from a contingency table.

@@ -8,7 +8,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from masrel.agreement._counts import DistinctItems, bilinear, distinct_rows, item_counts
 from masrel.agreement._data import CodedRatings, code_ratings
@@ -24,7 +23,7 @@ from masrel.agreement._kernel import (
 )
 from masrel.agreement._labels import Label
 from masrel.agreement._pooled import ratio_estimate
-from masrel.agreement._weights import WeightName, Weights, declared_weights
+from masrel.agreement._weights import Weights, WeightsLike, declared_weights
 from masrel.estimates import Estimate
 
 
@@ -32,7 +31,7 @@ def conger_kappa(
     ratings: object,
     *,
     categories: Sequence[Label] | None = None,
-    weights: "WeightName | ArrayLike" = "identity",
+    weights: "WeightsLike" = "identity",
     variance: Variance = "delta",
     population: int | None = None,
 ) -> Estimate:

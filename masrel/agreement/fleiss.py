@@ -8,7 +8,7 @@ from masrel.agreement._count_tables import take_counts
 from masrel.agreement._kernel import Variance
 from masrel.agreement._labels import Label
 from masrel.agreement._pooled import FLEISS, estimate_pooled
-from masrel.agreement._weights import WeightName
+from masrel.agreement._weights import WeightsLike
 from masrel.estimates import Estimate
 
 
@@ -16,7 +16,7 @@ def fleiss_kappa(
     ratings: object,
     *,
     categories: Sequence[Label] | None = None,
-    weights: "WeightName | ArrayLike" = "identity",
+    weights: "WeightsLike" = "identity",
     variance: Variance = "delta",
     population: int | None = None,
 ) -> Estimate:
@@ -80,7 +80,7 @@ def fleiss_kappa_from_counts(
     counts: ArrayLike,
     *,
     categories: Sequence[Label] | None = None,
-    weights: "WeightName | ArrayLike" = "identity",
+    weights: "WeightsLike" = "identity",
     variance: Variance = "delta",
     population: int | None = None,
 ) -> Estimate:

@@ -31,8 +31,8 @@ from masrel.agreement._kernel import (
 from masrel.agreement._labels import Label
 from masrel.agreement._pooled import ratio_estimate
 from masrel.agreement._weights import (
-    WeightName,
     Weights,
+    WeightsLike,
     category_values,
     declared_weights,
     every_pair,
@@ -52,7 +52,7 @@ def krippendorff_alpha(
     ratings: object,
     *,
     categories: Sequence[Label] | None = None,
-    weights: "WeightName | ArrayLike | None" = None,
+    weights: "WeightsLike" = None,
     metric: Metric | None = None,
     population: int | None = None,
 ) -> Estimate:
@@ -123,7 +123,7 @@ def krippendorff_alpha_from_counts(
     counts: ArrayLike,
     *,
     categories: Sequence[Label] | None = None,
-    weights: "WeightName | ArrayLike | None" = None,
+    weights: "WeightsLike" = None,
     metric: Metric | None = None,
     population: int | None = None,
 ) -> Estimate:
@@ -227,7 +227,7 @@ def _influence(items: DistinctItems, v: Weights, sums: _Sums, exact: bool) -> In
 
 def _disagreement(
     counted: CountedRatings,
-    weights: "WeightName | ArrayLike | None",
+    weights: "WeightsLike",
     metric: Metric | None,
 ) -> Weights:
     if metric is None:

@@ -8,7 +8,6 @@ from functools import partial
 from typing import Any, Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from masrel.agreement._counts import distinct_rows
 from masrel.agreement._data import CodedRatings, code_ratings, complete
@@ -27,7 +26,12 @@ from masrel.agreement._pairs import (
     of_pairs,
     pair_table,
 )
-from masrel.agreement._weights import WeightName, Weights, declared_weights
+from masrel.agreement._weights import (
+    NO_CHANCE,
+    Weights,
+    WeightsLike,
+    declared_weights,
+)
 from masrel.errors import ParameterError, RatingsError
 from masrel.estimates import Estimate
 
@@ -39,7 +43,7 @@ def light_kappa(
     ratings: object,
     *,
     categories: Sequence[Label] | None = None,
-    weights: "WeightName | ArrayLike" = "identity",
+    weights: "WeightsLike" = "identity",
     deletion: Deletion = "listwise",
     population: int | None = None,
 ) -> Estimate:
@@ -157,6 +161,8 @@ def _reason(
         if of_two.n == 0:
             return undefined("Light's kappa", f"no item has both ratings {of_pair}")
         if of_two.expected == 0:
+            if v.no_chance != NO_CHANCE:
+                return undefined("Light's kappa", v.no_chance)
             return undefined("Light's kappa", f"0/0: one category is all {of_pair}")
     return None
 

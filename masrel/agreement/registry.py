@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Literal, get_args
 
-from numpy.typing import ArrayLike
-
 from masrel.agreement._data import CodedRatings, code_pairs, code_ratings
 from masrel.agreement._kernel import Kernel
 from masrel.agreement._labels import Label
@@ -26,7 +24,7 @@ from masrel.agreement._pooled import (
     complete_kernel,
     pooled_kernel,
 )
-from masrel.agreement._weights import WeightName
+from masrel.agreement._weights import WeightsLike, is_identity
 from masrel.agreement.brennan_prediger import brennan_prediger
 from masrel.agreement.cohen import cohen_kappa
 from masrel.agreement.conger import _KERNEL as CONGER_KERNEL
@@ -129,14 +127,14 @@ class Coefficient:
         ratings: object,
         *,
         categories: Sequence[Label] | None = None,
-        weights: "WeightName | ArrayLike" = "identity",
+        weights: "WeightsLike" = "identity",
         level: float = 0.95,
     ) -> Estimate:
         """Estimate the coefficient, as its public function does."""
         # The level is that of an interval which comes with it.
         if self.weighted:
             return self.function(ratings, categories=categories, weights=weights)
-        if not (isinstance(weights, str) and weights == "identity"):
+        if not is_identity(weights):
             raise ParameterError(f"weights: {self.title} takes none, got {weights!r}")
         if self.has_interval:
             return self.function(ratings, categories=categories, level=level)

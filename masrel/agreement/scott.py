@@ -9,7 +9,7 @@ from masrel.agreement._data import code_ratings, complete
 from masrel.agreement._labels import Label
 from masrel.agreement._pairs import two_raters
 from masrel.agreement._pooled import SCOTT, estimate_pooled
-from masrel.agreement._weights import WeightName
+from masrel.agreement._weights import WeightsLike
 from masrel.estimates import Estimate
 
 
@@ -17,7 +17,7 @@ def scott_pi(
     ratings: object,
     *,
     categories: Sequence[Label] | None = None,
-    weights: "WeightName | ArrayLike" = "identity",
+    weights: "WeightsLike" = "identity",
     population: int | None = None,
 ) -> Estimate:
     """Estimate Scott's pi of two raters.
@@ -74,7 +74,7 @@ def scott_pi_from_table(
     table: ArrayLike,
     *,
     categories: Sequence[Label] | None = None,
-    weights: "WeightName | ArrayLike" = "identity",
+    weights: "WeightsLike" = "identity",
     population: int | None = None,
 ) -> Estimate:
     """Estimate Scott's pi from a contingency table.

@@ -5,7 +5,6 @@ from fractions import Fraction
 from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from masrel.agreement._counts import distinct_rows
 from masrel.agreement._data import CodedRatings, code_pairs, pairs_of_raters
@@ -21,7 +20,7 @@ from masrel.agreement._pairs import (
     pair_table,
 )
 from masrel.agreement._pooled import ratio_estimate
-from masrel.agreement._weights import WeightName, Weights, declared_weights
+from masrel.agreement._weights import Weights, WeightsLike, declared_weights
 from masrel.estimates import Estimate
 
 
@@ -29,7 +28,7 @@ def stratified_kappa(
     pairs: object,
     *,
     categories: Sequence[Label] | None = None,
-    weights: "WeightName | ArrayLike" = "identity",
+    weights: "WeightsLike" = "identity",
 ) -> Estimate:
     """Estimate one kappa over raters who each rated the same items twice.
 
@@ -135,7 +134,7 @@ def pooled_kappa(
     pairs: object,
     *,
     categories: Sequence[Label] | None = None,
-    weights: "WeightName | ArrayLike" = "identity",
+    weights: "WeightsLike" = "identity",
 ) -> Estimate:
     """Estimate Cohen's kappa of the pairs of all raters together.
 

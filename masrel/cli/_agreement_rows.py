@@ -72,6 +72,12 @@ def _list_register(
     return value
 
 
+def _plain_weights(name: str) -> str:
+    from masrel.agreement._weights import plain_name
+
+    return plain_name(name)
+
+
 estimate_options = grouped(
     "options",
     EstimateOptions,
@@ -88,6 +94,8 @@ estimate_options = grouped(
     click.option(
         "--weights",
         default="identity",
+        type=_plain_weights,
+        metavar="NAME",
         show_default=True,
         help="identity, linear, quadratic, ordinal, radical, ratio, circular or "
         "bipolar.",

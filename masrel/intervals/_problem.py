@@ -7,14 +7,14 @@ from dataclasses import dataclass, field, replace
 from typing import NoReturn, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from masrel.agreement import (
     COEFFICIENTS,
     CodedRatings,
     Coefficient,
     Label,
-    WeightName,
+    WeightsLike,
     coefficient,
     declared_weights,
 )
@@ -175,7 +175,7 @@ def pose_problem(
     *,
     target: Target,
     categories: Sequence[Label] | None,
-    weights: "WeightName | ArrayLike",
+    weights: "WeightsLike",
     level: float,
 ) -> IntervalProblem:
     """Check a question and prepare its data."""

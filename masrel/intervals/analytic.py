@@ -5,9 +5,7 @@ import warnings
 from collections.abc import Sequence
 from typing import Literal, get_args
 
-from numpy.typing import ArrayLike
-
-from masrel.agreement import Label, WeightName
+from masrel.agreement import Label, WeightsLike
 from masrel.agreement._kernel import NO_SPREAD
 from masrel.errors import ParameterError, UndefinedStatisticWarning
 from masrel.estimates import Estimate, Interval, Target
@@ -35,7 +33,7 @@ def analytic(
     *,
     target: Target,
     categories: Sequence[Label] | None = None,
-    weights: "WeightName | ArrayLike" = "identity",
+    weights: "WeightsLike" = "identity",
     level: float = 0.95,
     distribution: _Distribution = "t",
 ) -> Interval:

@@ -5,9 +5,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Literal, NoReturn, TypedDict, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from masrel.agreement import Coefficient, CountedRatings, Label
+from masrel.agreement._weights import is_identity
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Target
 from masrel.intervals._problem import Statistic, find_entry, pose_problem
@@ -17,7 +17,7 @@ from masrel.intervals.jackknife import jackknife
 from masrel.intervals.posterior import _RHO_COEFFICIENTS, posterior
 
 if TYPE_CHECKING:
-    from masrel.agreement import WeightName
+    from masrel.agreement import WeightsLike
 
 _Method = Literal["auto", "analytic", "jackknife", "bootstrap", "posterior"]
 """Kinds of intervals; "auto" chooses one by target and size."""
@@ -32,7 +32,7 @@ def estimate(
     target: Target,
     method: _Method = "auto",
     categories: Sequence[Label] | None = None,
-    weights: "WeightName | ArrayLike" = "identity",
+    weights: "WeightsLike" = "identity",
     level: float = 0.95,
     n_resamples: int = 10_000,
     rng: np.random.Generator | int | None = None,
@@ -112,10 +112,9 @@ def estimate(
         # Imported here: the other methods load no scipy.
         from masrel.intervals._choice import choose_interval
 
-        identity = isinstance(weights, str) and weights == "identity"
         interval, why = choose_interval(
             pose_problem(entry, ratings, **options),
-            modelled=identity and entry.name in _RHO_COEFFICIENTS,
+            modelled=is_identity(weights) and entry.name in _RHO_COEFFICIENTS,
         )
         note = f"chosen for other {_OTHERS[target]}: {why}"
         interval = replace(interval, target=target, notes=(note, *interval.notes))
@@ -150,5 +149,5 @@ class _Options(TypedDict):
     # what every method takes
     target: Target
     categories: Sequence[Label] | None
-    weights: "WeightName | ArrayLike"
+    weights: "WeightsLike"
     level: float

@@ -7,9 +7,9 @@ from functools import partial
 from typing import Any, Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from masrel.agreement import Label, WeightName
+from masrel.agreement import Label, WeightsLike
 from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target
 from masrel.intervals._endpoints import (
@@ -38,7 +38,7 @@ def bootstrap(
     *,
     target: Target,
     categories: Sequence[Label] | None = None,
-    weights: "WeightName | ArrayLike" = "identity",
+    weights: "WeightsLike" = "identity",
     level: float = 0.95,
     n_resamples: int = 10_000,
     kind: Kind = "percentile",

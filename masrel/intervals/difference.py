@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from masrel.agreement import Label, Significance, WeightName
+from masrel.agreement import Label, Significance, WeightsLike
 from masrel.errors import (
     ParameterError,
     RatingsError,
@@ -35,7 +34,7 @@ def difference(
     *,
     design: _Design,
     categories: Sequence[Label] | None = None,
-    weights: "WeightName | ArrayLike" = "identity",
+    weights: "WeightsLike" = "identity",
     level: float = 0.95,
 ) -> Estimate:
     """Estimate how much a coefficient of some ratings exceeds that of others.
@@ -125,7 +124,7 @@ def difference_test(
     *,
     design: _Design,
     categories: Sequence[Label] | None = None,
-    weights: "WeightName | ArrayLike" = "identity",
+    weights: "WeightsLike" = "identity",
 ) -> Significance:
     """Test whether a coefficient is the same of some ratings as of others.
 
@@ -221,7 +220,7 @@ def _compare(
     second: object,
     design: _Design,
     categories: Sequence[Label] | None,
-    weights: "WeightName | ArrayLike",
+    weights: "WeightsLike",
     level: float,
 ) -> _Compared:
     """Check both sets of ratings, and estimate their difference and its variance."""

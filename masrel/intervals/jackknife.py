@@ -5,9 +5,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from masrel.agreement import Label, WeightName
+from masrel.agreement import Label, WeightsLike
 from masrel.agreement._kernel import Floats
 from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target
@@ -28,7 +27,7 @@ def jackknife(
     *,
     target: Target,
     categories: Sequence[Label] | None = None,
-    weights: "WeightName | ArrayLike" = "identity",
+    weights: "WeightsLike" = "identity",
     level: float = 0.95,
 ) -> Interval:
     """Compute a jackknife interval with Student's t.

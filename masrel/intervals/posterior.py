@@ -4,15 +4,15 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from masrel.agreement import Label
+from masrel.agreement._weights import is_identity
 from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target
 from masrel.intervals._problem import IntervalProblem, Statistic, pose_problem
 
 if TYPE_CHECKING:
-    from masrel.agreement import WeightName
+    from masrel.agreement import WeightsLike
     from masrel.intervals._rho import Prior, PriorName
 
 # Coefficients whose value in the population is ρ of the Dirichlet-multinomial model.
@@ -28,7 +28,7 @@ def posterior(
     *,
     target: Target,
     categories: Sequence[Label] | None = None,
-    weights: "WeightName | ArrayLike" = "identity",
+    weights: "WeightsLike" = "identity",
     level: float = 0.95,
     model: _Model = "auto",
     prior: "PriorName" = "uniform",
@@ -136,7 +136,7 @@ def posterior(
 
     checked_prior = Prior.of(prior, 1.0 if concentration is None else concentration)
     _check_options(problem, model, method)
-    identity = isinstance(weights, str) and weights == "identity"
+    identity = is_identity(weights)
     has_rho = problem.entry.name in _RHO_COEFFICIENTS and identity
     name = problem.entry.name if identity else f"weighted {problem.entry.name}"
     if model == "table" or (model == "auto" and not has_rho):

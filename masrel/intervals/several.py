@@ -8,9 +8,8 @@ from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from masrel.agreement import Label, Significance, WeightName
+from masrel.agreement import Label, Significance, WeightsLike
 from masrel.agreement._kernel import Floats, Integers
 from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
 from masrel.estimates import Estimate
@@ -114,7 +113,7 @@ def differences(
     *,
     clusters: object = None,
     categories: Sequence[Label] | None = None,
-    weights: "WeightName | ArrayLike" = "identity",
+    weights: "WeightsLike" = "identity",
     level: float = 0.95,
     simultaneous: _Simultaneous = "max_t",
 ) -> Differences:

@@ -137,3 +137,35 @@ def test_pairs_of_a_rater_need_two_grades_each() -> None:
         stratified_kappa([[["a", "b"], 3]])
     with pytest.raises(RatingsError, match="rater 1, item 0: needs two grades, got 1"):
         stratified_kappa([[["a", "b"]], [["a"]]])
+
+
+def test_a_label_that_is_no_label_is_named_with_its_place() -> None:
+    said = r"row 0, column 0: labels need to be text or numbers, .*got \(1, 2\)"
+    for ratings in ([[(1, 2), 3], [3, (1, 2)]], [[(1, 2), "a"], ["a", (1, 2)]]):
+        with pytest.raises(RatingsError, match=said):
+            fleiss_kappa(ratings)
+        table = np.empty((2, 2), dtype=object)
+        for i, row in enumerate(ratings):
+            for j, label in enumerate(row):
+                table[i, j] = label
+        with pytest.raises(RatingsError, match=said):
+            fleiss_kappa(table)
+        with pytest.raises(RatingsError, match=said):
+            fleiss_kappa(pd.DataFrame(table))
+    with pytest.raises(RatingsError, match=r"row 1, column 1: labels .* got \[3\]"):
+        fleiss_kappa([[1, 2], [2, [3]]])
+    with pytest.raises(RatingsError, match="text and numbers cannot be mixed"):
+        fleiss_kappa([[1, "a"], ["a", 1]])
+
+
+def test_a_set_of_labels_is_a_category() -> None:
+    sets = [[{"a"}, {"a", "b"}], [{"b", "a"}, frozenset("ab")], [set(), set()]]
+    text = [["a", "a; b"], ["a; b", "a; b"], ["∅", "∅"]]
+    assert fleiss_kappa(sets) == fleiss_kappa(text)
+    scale = [{"a"}, {"a", "b"}, set()]
+    declared = fleiss_kappa(sets, categories=scale)  # type: ignore[arg-type]
+    assert declared.value == fleiss_kappa(text).value
+    with pytest.raises(RatingsError, match="row 0, column 1: needs one of 'a' or"):
+        fleiss_kappa(sets, categories=["a"])
+    with pytest.raises(RatingsError, match="no semicolon, which separates them"):
+        fleiss_kappa([[{"a;b"}, {"a"}]])

@@ -20,6 +20,7 @@ from masrel.agreement import (
     percent_agreement,
 )
 from masrel.errors import ParameterError, UndefinedStatisticWarning
+from masrel.intervals import jackknife
 
 NAMES = get_args(WeightName)
 UNEVEN = [1, 2, 4]  # range 3; differences 1, 2, 3
@@ -29,7 +30,7 @@ TEXT = ["1", "1+", "2", "3"]
 def agreement(name: object, scale: list[float] | list[str]) -> list[list[float]]:
     """Return w = 1 - v."""
     made = declared_weights(name, scale)  # type: ignore[arg-type]
-    return (1.0 - made.as_floats()).tolist()  # type: ignore[no-any-return]
+    return made.as_floats().tolist()  # type: ignore[no-any-return]
 
 
 def exact(name: str, scale: list[object]) -> list[list[Fraction]]:
@@ -72,7 +73,7 @@ def test_radical_weights_by_hand() -> None:
 def test_identity_weights_make_no_matrix() -> None:
     made = declared_weights("identity", UNEVEN)
     assert made.numerators is None
-    assert made.as_floats().tolist() == [[0, 1, 1], [1, 0, 1], [1, 1, 0]]
+    assert made.as_floats().tolist() == np.eye(3).tolist()
     assert made.total == 6
 
 
@@ -116,7 +117,7 @@ def test_every_weight_is_symmetric_zero_on_the_diagonal_and_at_most_one(
     if made.reason is not None:
         assert name == "ratio"
         return
-    v = made.as_floats()
+    v = 1.0 - made.as_floats()
     assert (v == v.T).all()
     assert (np.diagonal(v) == 0).all()
     # bipolar and ratio weights of numbers of both signs aside, v lies within [0, 1]
@@ -139,7 +140,7 @@ def test_linear_and_quadratic_weights_have_no_unit_and_no_origin(
 
 @pytest.mark.parametrize("name", NAMES)
 def test_two_categories_have_but_one_kind_of_weights(name: WeightName) -> None:
-    assert declared_weights(name, [2, 7]).as_floats().tolist() == [[0, 1], [1, 0]]
+    assert declared_weights(name, [2, 7]).as_floats().tolist() == [[1, 0], [0, 1]]
 
 
 @pytest.mark.parametrize("name", ["identity", "linear", "quadratic", "ordinal"])
@@ -241,3 +242,65 @@ def test_one_category_has_no_weights(function: object, name: str) -> None:
 
 def test_percent_agreement_of_one_category_is_one() -> None:
     assert percent_agreement([["a", "a"], ["a", "a"]]).value == 1.0
+
+
+@pytest.mark.parametrize(
+    ("elsewhere", "here"),
+    [
+        ("unweighted", "identity"),
+        ("nominal", "identity"),
+        (None, "identity"),
+        ("equal", "linear"),
+        ("squared", "quadratic"),
+    ],
+)
+def test_names_of_other_packages_are_taken(elsewhere: str | None, here: str) -> None:
+    ratings = [[1, 2], [2, 2], [4, 4], [4, 1], [2, 1], [1, 1]] * 2
+    for name in ("cohen_kappa", "fleiss_kappa", "conger_kappa", "krippendorff_alpha"):
+        known = COEFFICIENTS[name](ratings, weights=elsewhere)
+        assert known == COEFFICIENTS[name](ratings, weights=here)
+        assert known.weights == here
+        of_other = jackknife(name, ratings, target="items", weights=elsewhere)
+        assert of_other == jackknife(name, ratings, target="items", weights=here)
+
+
+def test_a_coefficient_without_weights_takes_none_by_any_name() -> None:
+    for weights in (None, "unweighted", "identity"):
+        assert COEFFICIENTS["icc_1"]([[1, 2], [2, 3]], weights=weights).reason is None
+    with pytest.raises(ParameterError, match=r"weights: ICC\(1\) takes none"):
+        COEFFICIENTS["icc_1"]([[1, 2], [2, 3]], weights="equal")
+
+
+def test_what_weights_make_is_taken_as_weights() -> None:
+    ratings, scale = [[1, 2], [2, 2], [4, 4], [4, 1], [2, 1], [1, 1]], [1, 2, 4]
+    named = fleiss_kappa(ratings, categories=scale, weights="quadratic")
+    made = declared_weights("quadratic", scale)
+    assert fleiss_kappa(ratings, categories=scale, weights=made) == named
+    # as_floats is rounded: 8/9 is no float
+    floats = fleiss_kappa(ratings, categories=scale, weights=made.as_floats())
+    assert floats.value == pytest.approx(named.value, rel=1e-15)
+    with pytest.raises(ParameterError, match='of 2 categories, got weights "quad'):
+        fleiss_kappa([[1, 2]], weights=made)
+    text = [["low", "high"], ["low", "low"]]
+    linear = declared_weights("linear", ["low", "high"])
+    with pytest.raises(ParameterError, match="need the declared scale in order"):
+        fleiss_kappa(text, weights=linear)
+    identity = declared_weights("identity", ["low", "high"])
+    assert fleiss_kappa(text, weights=identity) == fleiss_kappa(text)
+
+
+@pytest.mark.parametrize(
+    "name", ["fleiss_kappa", "cohen_kappa", "conger_kappa", "light_kappa"]
+)
+def test_weights_to_which_all_ratings_are_alike_are_the_reason(name: str) -> None:
+    alike = "0/0: chance agreement is 1, to the weights all ratings are alike"
+    with pytest.warns(UndefinedStatisticWarning, match="to the weights"):
+        ones = COEFFICIENTS[name]([[1, 2], [2, 2], [2, 1]], weights=np.ones((2, 2)))
+    assert ones.reason == alike
+    # of three categories the first two are alike, and the third is not used
+    some = [[1, 1, 0], [1, 1, 0], [0, 0, 1]]
+    with pytest.warns(UndefinedStatisticWarning, match="to the weights"):
+        result = COEFFICIENTS[name](
+            [[1, 2], [2, 2]], categories=[1, 2, 3], weights=some
+        )
+    assert result.reason == alike

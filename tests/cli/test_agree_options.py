@@ -145,9 +145,10 @@ def test_numbers_weigh_by_value_and_ten_comes_after_two(
 def test_weights_are_named_beside_the_coefficient(masrel: Caller, wide: Path) -> None:
     done = masrel("agree", wide, "--weights", "quadratic")
     assert "Fleiss' κ, quadratic" in done.out
-    said = refused(masrel("agree", wide, "--weights", "squared"))
+    assert masrel("agree", wide, "--weights", "squared").out == done.out
+    said = refused(masrel("agree", wide, "--weights", "quadratik"))
     assert "needs one of identity, linear, quadratic" in said
-    assert "'squared'" in said
+    assert "'quadratik'" in said
 
 
 @pytest.mark.parametrize(

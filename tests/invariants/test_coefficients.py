@@ -239,7 +239,7 @@ def test_kernel_and_function_are_the_same_coefficient(
 ) -> None:
     table, weights = data.draw(for_entry(entry)), data.draw(weights_for(entry))
     coded = entry.code(shaped(entry, table), LABELS)
-    v = declared_weights(weights, LABELS).as_floats()
+    v = declared_weights(weights, LABELS).floats
     assert entry.kernel is not None
     value = float(entry.kernel.value(entry.kernel.features(coded, v).sum(axis=0), v))
     found = estimate(entry, table, weights=weights).value

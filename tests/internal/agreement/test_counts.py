@@ -173,9 +173,9 @@ def test_bilinear_sums_are_those_of_the_matrix(name: str) -> None:
     v = declared_weights(name, [1, 2, 4, 7])  # type: ignore[arg-type]
     x, y = np.array([3, 0, 2, 5]), np.array([1, 4, 0, 2])
     assert float(bilinear(v, x.tolist(), y.tolist()) / v.denominator) == pytest.approx(
-        float(x @ v.as_floats() @ y), rel=1e-15
+        float(x @ v.floats @ y), rel=1e-15
     )
-    assert v.total / v.denominator == pytest.approx(v.as_floats().sum(), rel=1e-15)
+    assert v.total / v.denominator == pytest.approx(v.floats.sum(), rel=1e-15)
 
 
 def test_sums_by_hand() -> None:

@@ -49,7 +49,7 @@ def test_of_resampled_raters_only_items_that_one_of_them_rated_count(
     kernel = COEFFICIENTS[name].kernel
     assert kernel is not None
     assert kernel.rater_sums is not None
-    v = declared_weights(weights, [1, 2, 4]).as_floats()  # type: ignore[arg-type]
+    v = declared_weights(weights, [1, 2, 4]).floats  # type: ignore[arg-type]
     rows, freq = distinct_rows(CODES, 3)
     sums = kernel.rater_sums(CodedRatings(codes=rows, categories=(1, 2, 4)), freq, v)
     chance = {
