@@ -73,6 +73,8 @@ class Coefficient:
         Its name; that of its public function unless that has several forms.
     title : str
         Its name for a reader.
+    aliases : tuple of str
+        Other names of the same number, by which it can be asked for.
     function : callable
         The public function.
     kernel : Kernel or None
@@ -102,6 +104,7 @@ class Coefficient:
     title: str
     function: Callable[..., Estimate]
     kernel: Kernel | None
+    aliases: tuple[str, ...] = ()
     properties: frozenset[Property] = _EVERY
     shape: Literal["ratings", "pairs"] = "ratings"
     n_raters: tuple[int, int | None] = (2, None)
@@ -191,6 +194,9 @@ _ALL = (
         title="Brennan-Prediger",
         function=brennan_prediger,
         kernel=pooled_kernel(BRENNAN_PREDIGER),
+        # Bennett, Alpert and Goldstein (1954); Maxwell (1977), of two categories, which
+        # Byrt, Bishop and Carlin (1993) call PABAK; Randolph (2005), of many raters
+        aliases=("bennett_s", "randolph_kappa", "maxwell_re", "pabak"),
         properties=_EVERY - {"unused category"},
     ),
     Coefficient(
@@ -264,6 +270,8 @@ _ALL = (
 COEFFICIENTS: dict[str, Coefficient] = {entry.name: entry for entry in _ALL}
 """Name to coefficient."""
 
+_BY_ALIAS = {alias: entry for entry in _ALL for alias in entry.aliases}
+
 
 def coefficient(name: str) -> Coefficient:
     """Look a coefficient up by name.
@@ -271,7 +279,7 @@ def coefficient(name: str) -> Coefficient:
     Parameters
     ----------
     name : str
-        Its name in the register.
+        Its name in the register, or another that it is known by.
 
     Returns
     -------
@@ -288,7 +296,11 @@ def coefficient(name: str) -> Coefficient:
     --------
     >>> coefficient("fleiss_kappa").title
     "Fleiss' κ"
+    >>> coefficient("randolph_kappa").name
+    'brennan_prediger'
     """
+    if name in _BY_ALIAS:
+        return _BY_ALIAS[name]
     if name not in COEFFICIENTS:
         meant = _meant_by(name)
         raise ParameterError(
@@ -303,8 +315,9 @@ def _meant_by(name: str) -> str | None:
     import difflib  # loaded only for an error
 
     typed = name.strip().lower().replace(" ", "_").replace("-", "_").replace("'", "")
-    parts = [known for known in COEFFICIENTS if typed in known.split("_")]
+    names = [*COEFFICIENTS, *_BY_ALIAS]
+    parts = [known for known in names if typed in known.split("_")]
     if parts:
         return parts[0] if len(parts) == 1 else None
-    near = difflib.get_close_matches(typed, COEFFICIENTS, n=1, cutoff=0.75)
+    near = difflib.get_close_matches(typed, names, n=1, cutoff=0.75)
     return near[0] if near else None

@@ -129,15 +129,16 @@ def _register() -> str:
     from masrel.agreement import COEFFICIENTS
     from masrel.report._tables import aligned
 
-    lines = [("name", "title", "raters", "weights")]
+    lines = [("name", "title", "raters", "weights", "also called")]
     for entry in COEFFICIENTS.values():
         fewest, most = entry.n_raters
         raters = str(fewest) if most == fewest else f"{fewest} or more"
         if entry.shape == "pairs":
             raters += ", each twice (--retest)"
         weights = "any" if entry.weighted else "none"
-        lines.append((entry.name, entry.title, raters, weights))
-    return "\n".join(aligned(lines, ["left"] * 4, rule=True))
+        aliases = ", ".join(entry.aliases)
+        lines.append((entry.name, entry.title, raters, weights, aliases))
+    return "\n".join(aligned(lines, ["left"] * 5, rule=True))
 
 
 def estimate_rows(

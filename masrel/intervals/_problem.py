@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.agreement import (
-    COEFFICIENTS,
     CodedRatings,
     Coefficient,
     Label,
@@ -228,9 +227,7 @@ def find_entry(statistic: str | Callable[..., Estimate]) -> Coefficient:
     name = statistic
     if not isinstance(name, str):
         name = getattr(statistic, "__name__", repr(statistic))
-    if name not in COEFFICIENTS:
-        coefficient(name)  # an error that lists those there are
-    return COEFFICIENTS[name]
+    return coefficient(name)
 
 
 def _refuse_raters(entry: Coefficient, n_raters: int) -> NoReturn:

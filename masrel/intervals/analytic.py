@@ -3,27 +3,34 @@
 import math
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Literal, get_args
 
 from masrel.agreement import Label, WeightsLike
 from masrel.agreement._kernel import NO_SPREAD
 from masrel.errors import ParameterError, UndefinedStatisticWarning
-from masrel.estimates import Estimate, Interval, Target
+from masrel.estimates import Estimate, Interval, Target, Unit
 from masrel.intervals._problem import (
     IntervalProblem,
     Statistic,
     pose_problem,
     warn_small,
 )
+from masrel.intervals._published_errors import (
+    NAMES,
+    ErrorName,
+    check_error,
+    published_error,
+)
 
 _Distribution = Literal["t", "normal", "logit", "fisher"]
 """What an interval is taken from, and on which scale."""
 
 _METHODS: dict[_Distribution, str] = {
-    "t": "delta method, t(n-1)",
-    "normal": "delta method, normal",
-    "logit": "delta method, t(n-1) on the logit",
-    "fisher": "delta method, t(n-1) on Fisher's z",
+    "t": "t(n-1)",
+    "normal": "normal",
+    "logit": "t(n-1) on the logit",
+    "fisher": "t(n-1) on Fisher's z",
 }
 
 
@@ -36,8 +43,9 @@ def analytic(
     weights: "WeightsLike" = "identity",
     level: float = 0.95,
     distribution: _Distribution = "t",
+    error: ErrorName = "delta",
 ) -> Interval:
-    """Compute an interval from the delta-method standard error.
+    """Compute an interval from a standard error.
 
     Parameters
     ----------
@@ -45,8 +53,9 @@ def analytic(
         Name of a coefficient, or its public function.
     ratings : nested sequence, array_like or DataFrame
         What the coefficient takes.
-    target : {"items"}
-        The standard error takes items as the sample; it says nothing of raters.
+    target : {"items", "both"}
+        The standard error takes items as the sample and says nothing of raters; with
+        the unconditional error, "both".
     categories : sequence, optional
         The declared scale in order.
     weights : str or array_like, optional
@@ -56,6 +65,8 @@ def analytic(
     distribution : {"t", "normal", "logit", "fisher"}, optional
         Student's t with n - 1 degrees, the normal, or t on the logit of the
         position between the ends of the parameter space or on Fisher's z.
+    error : {"delta", "over_n", "cohen", "irrcac", "unconditional"}, optional
+        Ours, or the one that others publish, by name; see Notes.
 
     Returns
     -------
@@ -65,20 +76,44 @@ def analytic(
     Raises
     ------
     ParameterError
-        If an option is invalid, or `target` is not "items".
+        If an option is invalid, the error does not answer for the target, or is not
+        of the coefficient.
     RatingsError
         If the ratings do not fit the coefficient.
 
     Warns
     -----
     SmallSampleWarning
-        Below 10 items.
+        Below 10 items, and with the unconditional error below 5 raters.
     UndefinedStatisticWarning
         If the estimate or its standard error is undefined or 0.
+
+    Notes
+    -----
+    "over_n" is the delta method's with n in place of n - 1: for Cohen's kappa Fleiss,
+    Cohen and Everitt's [2]_, which the R packages vcd and psych print (psych's of
+    weighted kappa has a fault), with "normal" their interval. "cohen" is Cohen's own
+    [3]_, √[p_o (1 - p_o) / (n (1 - p_e)²)], as if chance agreement were known, and with
+    weights that of [4]_. "irrcac" is what the package irrCAC prints, also of
+    Krippendorff's alpha; the two are the same where every item has at least two
+    ratings, but for alpha. "unconditional" is Gwet's [5]_ for other items and raters:
+    the variance over items with these raters, and the jackknife's over raters. The
+    degrees of freedom are the smaller of n - 1 and those of the raters.
 
     References
     ----------
     .. [1] Gwet, K. L. (2014). Handbook of Inter-Rater Reliability, 4th ed., ch. 5.
+    .. [2] Fleiss, J. L., Cohen, J., Everitt, B. S. (1969). Large sample standard
+       errors of kappa and weighted kappa. Psychological Bulletin, 72(5), 323-327.
+       https://doi.org/10.1037/h0028106
+    .. [3] Cohen, J. (1960). A coefficient of agreement for nominal scales.
+       Educational and Psychological Measurement, 20(1), 37-46, equation 7.
+       https://doi.org/10.1177/001316446002000104
+    .. [4] Cohen, J. (1968). Weighted kappa. Psychological Bulletin, 70(4), 213-220.
+       https://doi.org/10.1037/h0026256
+    .. [5] Gwet, K. L. (2008). Variance estimation of nominal-scale inter-rater
+       reliability with random selection of raters. Psychometrika, 73(3), 407-430.
+       https://doi.org/10.1007/s11336-007-9054-8
 
     Examples
     --------
@@ -86,6 +121,15 @@ def analytic(
     >>> interval = analytic("cohen_kappa", ratings, target="items")
     >>> round(interval.low, 3), round(interval.high, 3)
     (0.14, 0.86)
+
+    As R's vcd and psych print it:
+
+    >>> interval = analytic(
+    ...     "cohen_kappa", ratings, target="items", error="over_n",
+    ...     distribution="normal",
+    ... )
+    >>> round(interval.low, 3), round(interval.high, 3)
+    (0.171, 0.829)
     """
     if distribution not in get_args(_Distribution):
         raise ParameterError(
@@ -100,41 +144,49 @@ def analytic(
         weights=weights,
         level=level,
     )
-    if target != "items":
-        raise ParameterError(
-            'target: the delta method generalises to other items only, so "items"; for '
-            f'other raters use the jackknife; got "{target}"'
-        )
+    check_error(error, target)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UndefinedStatisticWarning)  # given below
         estimate = problem.entry(problem.coded, weights=weights)
-    return _interval_around_estimate(problem, estimate, distribution)
+    if error != "delta" and estimate.reason is None and estimate.n_items > 1:
+        by_name = published_error(problem, estimate, error, weights)
+        estimate = replace(estimate, standard_error=by_name)
+    return _interval_around_estimate(problem, estimate, distribution, error)
 
 
 def _interval_around_estimate(
-    problem: IntervalProblem, estimate: Estimate, distribution: _Distribution
+    problem: IntervalProblem,
+    estimate: Estimate,
+    distribution: _Distribution,
+    error: ErrorName,
 ) -> Interval:
-    method = _METHODS[distribution]
+    unit: Unit | None = None
+    method = f"{NAMES[error]}, {_METHODS[distribution]}"
+    if error == "unconditional":
+        method, unit = method.replace("n-1", "min(n, r)-1"), "raters"
     reason = _why_undefined(estimate)
     if reason is not None:
-        return problem.undefined(reason, method=method, unit=None)
-    notes = warn_small(estimate.n_items, 10, "items")
+        return problem.undefined(reason, method=method, unit=unit)
+    notes, df = warn_small(estimate.n_items, 10, "items"), estimate.n_items - 1
+    if unit == "raters":
+        notes += warn_small(estimate.n_raters, 5, "raters")
+        df = min(df, estimate.n_raters - 1)
     lowest = None
     if distribution in ("logit", "fisher"):
         # artanh x is half the logit of (x + 1)/2, so that both give the same ends
         lowest = problem.entry.lowest if distribution == "logit" else -1.0
         if not lowest < estimate.value < 1.0:
             reason = "the estimate is not inside the ends of the parameter space"
-            return problem.undefined(reason, method=method, unit=None)
+            return problem.undefined(reason, method=method, unit=unit)
     if distribution == "normal":
         from scipy.special import ndtri  # loaded only when an interval needs it
 
         quantile = float(ndtri(0.5 + 0.5 * problem.level))
     else:
-        quantile = problem.student_t(estimate.n_items - 1)
+        quantile = problem.student_t(df)
     half = quantile * estimate.standard_error
     return problem.around(
-        estimate.value, half, lowest=lowest, method=method, unit=None, notes=notes
+        estimate.value, half, lowest=lowest, method=method, unit=unit, notes=notes
     )
 
 
@@ -142,6 +194,8 @@ def _why_undefined(estimate: Estimate) -> str | None:
     """Return why there is no interval, if there is none."""
     if estimate.reason is not None or estimate.standard_error > 0.0:
         return estimate.reason
-    if math.isnan(estimate.standard_error):
+    if estimate.n_items < 2:
         return "one item has no standard error"
+    if math.isnan(estimate.standard_error):
+        return "with one of the raters left out the estimate is undefined"
     return NO_SPREAD

@@ -452,9 +452,19 @@ def test_the_register_is_listed_without_a_file(masrel: Caller) -> None:
         assert words in done.out
 
 
+def test_a_coefficient_can_be_asked_for_by_another_name(
+    masrel: Caller, wide: Path
+) -> None:
+    assert "bennett_s, randolph_kappa" in masrel("agree", "--coefficients", "list").out
+    rows = table(masrel("agree", wide, "--coefficients", "maxwell_re", "--csv"))
+    same = table(masrel("agree", wide, "--coefficients", "brennan_prediger", "--csv"))
+    assert rows == same
+
+
 @pytest.mark.parametrize(
     ("typed", "meant"),
     [
+        ("randolf_kappa", "randolph_kappa"),
         ("flies_kappa", "fleiss_kappa"),
         ("fleiss", "fleiss_kappa"),
         ("Cohen's kappa", "cohen_kappa"),

@@ -13,11 +13,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import masrel.agreement
+import masrel.intervals
 from masrel.agreement import (
     COEFFICIENTS,
     Coefficient,
     Property,
     WeightName,
+    coefficient,
     declared_weights,
 )
 from masrel.errors import UndefinedStatisticWarning
@@ -342,6 +344,32 @@ def _public(names: Mapping[str, object]) -> set[str]:
         and not name.endswith(("_from_counts", "_from_table"))
         and name != "category_kappa"  # one of Fleiss' kappa, for a category
     }
+
+
+@pytest.mark.parametrize(
+    ("alias", "name"),
+    [(alias, e.name) for e in COEFFICIENTS.values() for alias in e.aliases],
+)
+def test_another_name_is_the_same_coefficient(alias: str, name: str) -> None:
+    assert alias not in COEFFICIENTS
+    assert coefficient(alias) is COEFFICIENTS[name]
+    assert coefficient(alias)([["a", "a"], ["a", "b"]]).coefficient == name
+
+
+def test_names_that_people_know_by_hand() -> None:
+    # 35 of 50 alike: PABAK and RE 2 · .7 - 1; of three categories S = (3 · .7 - 1)/2
+    pairs = [["a", "a"]] * 20 + [["b", "b"]] * 15 + [["a", "b"]] * 15
+    for alias in ("pabak", "maxwell_re", "bennett_s"):
+        assert coefficient(alias)(pairs).value == pytest.approx(0.4, rel=1e-15)
+    three = {"categories": ["a", "b", "c"]}
+    for alias in ("bennett_s", "randolph_kappa"):
+        found = coefficient(alias)(pairs, **three).value  # type: ignore[arg-type]
+        assert found == pytest.approx(0.55, rel=1e-15)
+        result = masrel.intervals.estimate(alias, pairs, target="items", **three)  # type: ignore[arg-type]
+        assert (result.coefficient, result.value) == ("brennan_prediger", found)
+        assert (
+            masrel.intervals.analytic(alias, pairs, target="items", **three).low < found
+        )  # type: ignore[arg-type]
 
 
 def test_every_public_coefficient_is_registered() -> None:
