@@ -365,6 +365,15 @@ def complete_values(
 ) -> NDArray[np.float64]:
     """Return the values of items that every rater rated."""
     # ratings (n_items, n_raters) -> (n_complete_items, n_raters)
+    values = rating_values(ratings, categories)
+    return values[~np.isnan(values).any(axis=1)]
+
+
+def rating_values(
+    ratings: Any, categories: Sequence[Label] | None
+) -> NDArray[np.float64]:
+    """Return ratings as numbers, ``nan`` where there is none."""
+    # -> (n_items, n_raters)
     if isinstance(ratings, np.ma.MaskedArray):
         ratings = unmasked(ratings)
     if categories is None and isinstance(ratings, np.ndarray):
@@ -376,7 +385,7 @@ def complete_values(
                     f"ratings: row {row}, column {column}: needs a finite number, got "
                     f"{values[row, column]}"
                 )
-            return values[~np.isnan(values).any(axis=1)]
+            return values
     coded = code_ratings(ratings, categories)
     if not coded.categories:
         return np.empty((0, coded.codes.shape[1]))
@@ -386,5 +395,4 @@ def complete_values(
             f"text, such as {coded.categories[0]!r}"
         )
     known = [float(value) for value in category_values(coded.categories)]
-    values = np.array([*known, np.nan])[coded.codes]  # missing, -1, is the last
-    return values[~np.isnan(values).any(axis=1)]
+    return np.array([*known, np.nan])[coded.codes]  # missing, -1, is the last

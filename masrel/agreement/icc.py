@@ -1,4 +1,8 @@
-"""What mean squares say: six intraclass correlations, and Robinson's A."""
+"""What mean squares say: six intraclass correlations, and Robinson's A.
+
+A table with gaps has no mean squares: variances are then estimated by restricted
+maximum likelihood, and the interval is read from its profile.
+"""
 
 import math
 from collections.abc import Sequence
@@ -8,9 +12,16 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement._data import complete_values
+from masrel.agreement._data import complete_values, rating_values
 from masrel.agreement._kernel import undefined
 from masrel.agreement._labels import Label
+from masrel.agreement._reml import (
+    Components,
+    crossed_components,
+    icc_ends,
+    nested_components,
+    rated_part,
+)
 from masrel.agreement.significance import Significance
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Interval, Target
@@ -58,9 +69,10 @@ def icc(
     -------
     Estimate
         The coefficient, named after its form: ``"icc_a1"`` is ICC(A,1). The interval,
-        from the F distribution, generalises to other items and, for absolute
-        agreement and one-way forms, to other raters too. There is no delta-method
-        error; observed and chance agreement do not exist.
+        from the F distribution, or from the profile likelihood where ratings are
+        missing, generalises to other items and, for absolute agreement and one-way
+        forms, to other raters too. There is no delta-method error; observed and chance
+        agreement do not exist.
 
     Raises
     ------
@@ -72,15 +84,22 @@ def icc(
     Warns
     -----
     UndefinedStatisticWarning
-        If there are fewer than two complete items or raters, or no variance, or a
-        total variance estimated as 0; the value is then ``nan``.
+        If there are fewer than two items or raters, or no variance, or a total
+        variance estimated as 0, or too few ratings to tell the variances from each
+        other; the value is then ``nan``.
 
     Notes
     -----
-    Items with a missing rating are left out. Where the total variance is estimated
-    as less than 0, which takes items that hardly differ, the formula's value lies
-    outside [-1, 1] and there is no interval. The interval of ICC(A,k) is that of
-    ICC(A,1) stepped up by Spearman and Brown's formula.
+    A complete table has mean squares. Where its total variance is estimated as less
+    than 0, which takes items that hardly differ, the formula's value lies outside
+    [-1, 1] and there is no interval. The interval of ICC(A,k) is that of ICC(A,1)
+    stepped up by Spearman and Brown's formula.
+
+    Where ratings are missing, all that there are count: the variances of items, raters
+    and residual are estimated by restricted maximum likelihood [3]_, each 0 or more;
+    k is the number of raters of the table; the interval is the profile likelihood's,
+    and its notes have the variances. Items and raters without any rating are no part
+    of it.
 
     References
     ----------
@@ -90,6 +109,9 @@ def icc(
     .. [2] Shrout, P. E., Fleiss, J. L. (1979). Intraclass correlations: uses in
        assessing rater reliability. Psychological Bulletin, 86(2), 420-428.
        https://doi.org/10.1037/0033-2909.86.2.420
+    .. [3] Patterson, H. D., Thompson, R. (1971). Recovery of inter-block information
+       when block sizes are unequal. Biometrika, 58(3), 545-554.
+       https://doi.org/10.1093/biomet/58.3.545
 
     Examples
     --------
@@ -99,15 +121,24 @@ def icc(
     ...          [7, 1, 2, 6], [10, 5, 6, 9], [6, 2, 4, 7]]
     >>> [round(icc(table, form=form).value, 2) for form in ("ICC(1)", "ICC(A,1)")]
     [0.17, 0.29]
+
+    The same without three of its ratings:
+
+    >>> table[0][1] = table[3][2] = table[5][0] = None
+    >>> round(icc(table).value, 2)
+    0.3
     """
     _check(form, level)
-    values = complete_values(ratings, categories)
-    anova = _Anova.of(values)
-    reason = _reason(values, anova, form)
-    value, interval = math.nan, None
-    if reason is None:
-        value = anova.value(form)
-        interval = _interval(anova, form, level)
+    values = rated_part(rating_values(ratings, categories))
+    if np.isnan(values).any():
+        value, interval, reason = _with_gaps(values, form, level)
+    else:
+        anova = _Anova.of(values)
+        reason = _reason(values, anova, form)
+        value, interval = math.nan, None
+        if reason is None:
+            value = anova.value(form)
+            interval = _interval(anova, form, level)
     n_items, n_raters = values.shape
     return Estimate(
         coefficient=_NAMES[form],
@@ -119,9 +150,17 @@ def icc(
         chance=math.nan,
         n_items=n_items,
         n_raters=n_raters,
-        n_categories=len(np.unique(values)) if categories is None else len(categories),
+        n_categories=_n_categories(values, categories),
         reason=reason,
     )
+
+
+def _n_categories(
+    values: NDArray[np.float64], categories: Sequence[Label] | None
+) -> int:
+    if categories is not None:
+        return len(categories)
+    return len(np.unique(values[~np.isnan(values)]))
 
 
 def icc_f_test(
@@ -153,7 +192,11 @@ def icc_f_test(
     Warns
     -----
     UndefinedStatisticWarning
-        As `icc`.
+        If there are fewer than two complete items or raters, or no variance.
+
+    Notes
+    -----
+    Items with a missing rating are left out: F is exact for complete tables alone.
 
     References
     ----------
@@ -350,6 +393,45 @@ def _squarable(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]
     if -_SQUARABLE < exponent < _SQUARABLE:
         return values, 1.0
     return np.ldexp(values, -exponent), math.ldexp(1.0, exponent)
+
+
+def _with_gaps(
+    values: NDArray[np.float64], form: IccForm, level: float
+) -> tuple[float, Interval | None, str | None]:
+    """Return value, interval and reason of a table with missing ratings."""
+    one_way = form.startswith("ICC(1")
+    components = (nested_components if one_way else crossed_components)(values)
+    if components.reason is not None:
+        return math.nan, None, undefined(form, components.reason)
+    absolute = form.startswith("ICC(A")
+    error = components.residual + (components.raters if absolute else 0.0)
+    if components.items == 0.0 and error == 0.0:
+        why = "0/0: neither items nor ratings of an item differ"
+        return math.nan, None, undefined(form, why)
+    k = components.n_raters if form.endswith("k)") else 1
+    low, high = icc_ends(components, absolute=absolute, level=level)
+    interval = Interval(
+        low=_stepped_up(low, k),
+        high=_stepped_up(high, k),
+        level=level,
+        kind="confidence",
+        method="REML, profile likelihood",
+        target=_target_of(form),
+        notes=_gap_notes(components, form),
+    )
+    return components.items / (components.items + error / k), interval, None
+
+
+def _gap_notes(components: Components, form: str) -> tuple[str, ...]:
+    """Return what to know of an estimate from a table with gaps."""
+    notes = [components.words]
+    if form.endswith("k)"):
+        mean = components.n_ratings / components.n_items
+        notes.append(
+            f"k is the {components.n_raters} raters of the table; an item has "
+            f"{mean:.3g} ratings on average"
+        )
+    return tuple(notes)
 
 
 def _interval(anova: _Anova, form: IccForm, level: float) -> Interval:
