@@ -24,6 +24,7 @@ The tree::
     MasrelWarning (UserWarning)
     ├── UndefinedStatisticWarning  a statistic is 0/0; its value is nan, with a reason
     ├── SmallSampleWarning         an interval rests on too little to hold what it says
+    ├── RatingsWarning             labels look as if they stood for missing ratings
     ├── RecordingWarning           part of a recording is not used, or is suspect
     └── OverrunWarning             the control loop missed deadlines
 """
@@ -45,6 +46,7 @@ __all__ = [
     "ParameterError",
     "ProtocolError",
     "RatingsError",
+    "RatingsWarning",
     "RecordingError",
     "RecordingWarning",
     "ScheduleError",
@@ -194,6 +196,10 @@ class UndefinedStatisticWarning(MasrelWarning):
 
 class SmallSampleWarning(MasrelWarning):
     """An interval rests on too little data to hold what it says."""
+
+
+class RatingsWarning(MasrelWarning):
+    """Labels of ratings look as if they stood for missing ones."""
 
 
 class RecordingWarning(MasrelWarning):

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.agreement._data import FEW, CodedRatings, check_scale, code_ratings
-from masrel.agreement._labels import Codes, Label, label_rows
+from masrel.agreement._labels import Codes, Label, has_doubtful_text, label_rows
 from masrel.agreement._weights import Weights
 
 Array = NDArray[Any]
@@ -431,6 +431,11 @@ def count_ratings(
     RatingsError
         If the ratings are not such a table.
 
+    Warns
+    -----
+    RatingsWarning
+        As `code_ratings`.
+
     Examples
     --------
     >>> from masrel.agreement import fleiss_kappa, gwet_ac
@@ -447,7 +452,9 @@ def count_ratings(
         few = ratings.tolist()
     if isinstance(few, list) and len(few) <= FEW:
         rows, scale = label_rows(few, categories)
-        counter = _count_complete(rows, scale)
+        counter = None
+        if categories is not None or not has_doubtful_text(scale):
+            counter = _count_complete(rows, scale)
         if counter is not None:
             return CountedRatings(
                 categories=scale,

@@ -14,6 +14,7 @@ from masrel.agreement._labels import (
     Label,
     check_categories,
     code_type,
+    doubt_texts,
     label_rows,
     labels_met,
     lookup,
@@ -96,7 +97,14 @@ def code_ratings(
     ------
     RatingsError
         If the table is empty, ragged or not of two dimensions, a label is not
-        among the categories, or categories repeat or mix text and numbers.
+        among the categories, or is "" and nobody declared it, or categories repeat or
+        mix text and numbers.
+
+    Warns
+    -----
+    RatingsWarning
+        If nobody declared the categories, and some labels are the text "nan", "None",
+        "NaT" or "<NA>", which ``astype(str)`` makes of a missing rating.
 
     Examples
     --------
@@ -134,6 +142,8 @@ def code_ratings(
                 for i, row in enumerate(rows)
             ]
         codes = np.array(of_rows, dtype=code_type(len(known)))
+    if not declared:
+        doubt_texts(known, codes)
     codes.setflags(write=False)
     return CodedRatings(codes=codes, categories=known, declared=declared)
 
@@ -220,9 +230,14 @@ def code_long(
     ------
     RatingsError
         If a column is not there, an item or a rater is missing, a grade is not among
-        the categories, or a rating is repeated.
+        the categories, or is "" and nobody declared it, or a rating is repeated.
     ParameterError
         If `repeated` is not one of the three.
+
+    Warns
+    -----
+    RatingsWarning
+        As `code_ratings`.
 
     Examples
     --------
@@ -286,7 +301,10 @@ def _grades(
         except KeyError:
             row = int(np.argmax(positions == code))
             lookup(label, position, row, name)
-    return table[positions], declared  # missing, -1, is the last
+    grades = table[positions]  # missing, -1, is the last
+    if categories is None:
+        doubt_texts(declared, grades, name)
+    return grades, declared
 
 
 def _refuse_repeats(

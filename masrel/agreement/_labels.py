@@ -1,13 +1,15 @@
 """Labels of ratings, the scale they make, and rows of a list of them."""
 
 import itertools
+import sys
+import warnings
 from collections.abc import Iterable, Mapping, Sequence, Set
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.errors import RatingsError
+from masrel.errors import RatingsError, RatingsWarning
 
 Label = str | int | float
 """What a grade is called: text or a number."""
@@ -126,6 +128,50 @@ def labels_of_rows(
                     f"or sets of them, got {label!r}"
                 )
     return plain, labels_met(itertools.chain.from_iterable(plain))
+
+
+_TEXTS_OF_NOTHING = frozenset({"nan", "None", "NaT", "<NA>"})
+
+
+def has_doubtful_text(labels: Sequence[Label]) -> bool:
+    """Return whether a scale that nobody declared has texts that may be no grades."""
+    if not labels or not isinstance(labels[0], str):
+        return False
+    return labels[0] == "" or not _TEXTS_OF_NOTHING.isdisjoint(labels)
+
+
+def doubt_texts(labels: Sequence[Label], codes: Codes, column: str = "") -> None:
+    """Refuse "" where nobody declared it, and warn of what astype(str) leaves."""
+    # codes (n_items, n_raters), or of the ratings of a column
+    if not has_doubtful_text(labels):
+        return
+    if labels[0] == "":  # the first in the order of the alphabet
+        row, *rest = np.argwhere(codes == 0)[0].tolist()
+        raise RatingsError(
+            f"ratings: row {row}, column {rest[0] if rest else column!r}: needs a "
+            "label, or None for a missing rating, got ''; it is one where categories "
+            "declare it"
+        )
+    doubtful = [
+        f"{label!r} ({np.count_nonzero(codes == code)} times)"
+        for code, label in enumerate(labels)
+        if label in _TEXTS_OF_NOTHING
+    ]
+    warnings.warn(
+        f"ratings: text that looks like a missing rating counts as a grade: "
+        f"{', '.join(doubtful)}; give None for a missing rating, or declare the text "
+        "in categories",
+        RatingsWarning,
+        stacklevel=_outside(),
+    )
+
+
+def _outside() -> int:
+    # the stacklevel, from a function that calls this one, of who called the package
+    frame, level = sys._getframe(1), 1
+    while frame.f_back and str(frame.f_globals.get("__name__")).startswith("masrel."):
+        frame, level = frame.f_back, level + 1
+    return level
 
 
 def code_type(n_categories: int) -> type[np.signedinteger[Any]]:

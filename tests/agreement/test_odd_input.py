@@ -1,12 +1,15 @@
 """Input that is nearly ratings: read as what it says, or refused by name."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from masrel.agreement import (
+    code_long,
+    code_ratings,
     cohen_kappa_from_table,
     count_ratings,
     fleiss_kappa,
@@ -17,7 +20,9 @@ from masrel.agreement import (
     robinson_a,
     stratified_kappa,
 )
-from masrel.errors import CountsError, ParameterError, RatingsError
+from masrel.errors import CountsError, ParameterError, RatingsError, RatingsWarning
+from masrel.intervals import analytic, estimate, jackknife
+from masrel.ratings import read_ratings
 
 PLAIN = [["a", "b"], ["b", "b"], [None, "a"], ["a", "a"]]
 NUMBERS = [[1.0, 2.0], [2.0, 2.0], [None, 1.0], [1.0, 1.0]]
@@ -64,6 +69,85 @@ def test_missing_in_the_ways_of_pandas_is_missing() -> None:
     plain = gwet_ac([["a", None], ["b", "b"], ["a", "b"]])
     for missing in (pd.NA, float("nan"), np.float64("nan"), pd.NaT):
         assert gwet_ac([["a", missing], ["b", "b"], ["a", "b"]]) == plain
+
+
+FORMS: dict[str, Callable[[list[list[object]]], object]] = {
+    "lists": lambda rows: rows,
+    "array of text": lambda rows: np.array(rows),
+    "large array of text": lambda rows: np.array(rows * 40),
+    "array of objects": lambda rows: np.array(rows, dtype=object),
+    "large array of objects": lambda rows: np.array(rows * 40, dtype=object),
+    "frame": pd.DataFrame,
+    "frame of categories": lambda rows: pd.DataFrame(rows).astype("category"),
+    "frame of strings": lambda rows: pd.DataFrame(rows).astype("string"),
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_empty_text_is_no_grade_unless_it_is_declared(form: str) -> None:
+    rows: list[list[object]] = [["b", "a"], ["a", ""], ["", "b"]]
+    ratings = FORMS[form](rows)
+    for function in (fleiss_kappa, gwet_ac, count_ratings, code_ratings):
+        with pytest.raises(
+            RatingsError, match=r"row 1, column 1: needs a label, or None for.*got ''"
+        ):
+            function(ratings)
+    declared = fleiss_kappa(ratings, categories=["", "a", "b"])
+    assert declared.n_categories == 3
+
+
+@pytest.mark.parametrize("text", ["nan", "None", "NaT", "<NA>"])
+@pytest.mark.parametrize("form", FORMS)
+def test_what_astype_str_leaves_of_a_missing_rating_is_warned_of(
+    form: str, text: str
+) -> None:
+    rows: list[list[object]] = [["b", "a"], ["a", text], [text, "b"]]
+    ratings = FORMS[form](rows)
+    n = 80 if "large" in form else 2
+    for function in (fleiss_kappa, count_ratings, code_ratings):
+        with pytest.warns(RatingsWarning) as noted:
+            function(ratings)
+        assert len(noted) == 1
+        assert f"{text!r} ({n} times)" in str(noted[0].message)
+        assert noted[0].filename == __file__
+        function(ratings, categories=sorted(["a", "b", text]))  # and no warning
+    plain = fleiss_kappa(FORMS[form]([["b", "a"], ["a", "c"], ["c", "b"]])).value
+    with pytest.warns(RatingsWarning):
+        assert fleiss_kappa(ratings).value == plain
+
+
+def test_an_interval_warns_once_of_text_that_is_no_grade() -> None:
+    rows = [["b", "a", "a"], ["a", "None", "b"], ["b", "b", "b"], ["a", "a", "a"]] * 4
+    for method in (estimate, jackknife, analytic):
+        with pytest.warns(RatingsWarning) as noted:
+            method("fleiss_kappa", rows, target="items")  # type: ignore[operator]
+        assert [w.category for w in noted] == [RatingsWarning]
+        assert noted[0].filename == __file__
+
+
+def test_long_ratings_have_the_same_rules() -> None:
+    frame = pd.DataFrame(
+        {"item": [1, 1, 2, 2], "rater": ["A", "B"] * 2, "grade": ["a", "", "a", "b"]}
+    )
+    with pytest.raises(RatingsError, match="row 1, column 'grade': needs a label, or"):
+        code_long(frame)
+    assert code_long(frame, categories=["", "a", "b"]).codes.tolist() == [
+        [1, 0],
+        [1, 2],
+    ]
+    with pytest.warns(RatingsWarning, match=r"'nan' \(1 times\)"):
+        code_long(frame.replace("", "nan"))
+
+
+def test_a_file_says_what_looks_missing_in_its_own_words(tmp_path: Path) -> None:
+    path = tmp_path / "r.csv"
+    path.write_text("item,A,B\n1,a,b\n2,a,\n3,b,b\n", encoding="utf-8")
+    part = read_ratings(path).parts[0]
+    assert fleiss_kappa(part.counted).value == fleiss_kappa(part.ratings).value
+    path.write_text("item,A,B\n1,a,b\n2,a,nan\n3,b,b\n", encoding="utf-8")
+    options = {"categories": ("a", "b", "nan")}
+    part = read_ratings(path, **options).parts[0]  # type: ignore[arg-type]
+    assert fleiss_kappa(part.ratings).n_categories == 3  # and no warning
 
 
 def test_ragged_tables_are_refused_as_what_they_are() -> None:

@@ -88,6 +88,9 @@ DO_NOT_PROMISE = {
     "retest_model": "the same",
     "latent_trait": "the same",
     "difference_test": "it is a p-value, not an interval",
+    "equality_test": "the same",
+    "donner_test": "the same",
+    "differences": "of many pairs at once; test_several.py holds them to their values",
 }
 KERNELS = [name for name, entry in COEFFICIENTS.items() if entry.kernel is not None]
 OF_RATERS = ("raters", "both")
