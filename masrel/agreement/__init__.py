@@ -8,6 +8,7 @@ from masrel.agreement._count_tables import count_table
 from masrel.agreement._counts import CountedRatings, count_ratings
 from masrel.agreement._data import CodedRatings, code_long, code_ratings
 from masrel.agreement._labels import Label
+from masrel.agreement._metrics import Metric
 from masrel.agreement._weights import (
     WeightName,
     Weights,
@@ -41,7 +42,6 @@ from masrel.agreement.indices import (
 )
 from masrel.agreement.kendall import kendall_w, kendall_w_test
 from masrel.agreement.krippendorff import (
-    Metric,
     krippendorff_alpha,
     krippendorff_alpha_from_counts,
 )

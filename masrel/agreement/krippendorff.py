@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from fractions import Fraction
 from functools import partial
 from operator import truediv
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,23 +29,16 @@ from masrel.agreement._kernel import (
     weighted_disagreement,
 )
 from masrel.agreement._labels import Label
+from masrel.agreement._metrics import Metric, metric_weights
 from masrel.agreement._pooled import ratio_estimate
 from masrel.agreement._weights import (
     Weights,
     WeightsLike,
-    category_values,
     declared_weights,
-    every_pair,
-    identity_weights,
     named_weights,
-    over_one_denominator,
-    squared_ratio,
 )
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate
-
-Metric = Literal["nominal", "ordinal", "interval", "ratio"]
-"""Names of the difference functions."""
 
 
 def krippendorff_alpha(
@@ -67,9 +60,11 @@ def krippendorff_alpha(
     weights : str or array_like, shape (n_categories, n_categories), optional
         How much two categories agree, as for the other coefficients; see
         `declared_weights`. Identity unless `metric` is given.
-    metric : {"nominal", "ordinal", "interval", "ratio"}, optional
+    metric : {"nominal", "ordinal", "interval", "ratio", "jaccard", "masi"}, optional
         Krippendorff's own difference function instead of weights. His ordinal metric
-        counts the ratings between two grades and is not the weights "ordinal".
+        counts the ratings between two grades and is not the weights "ordinal". The last
+        two are distances of sets: of ratings that are sets of labels, or text with
+        semicolons between labels.
     population : int, optional
         Items there are in all, for the finite-population correction.
 
@@ -106,6 +101,8 @@ def krippendorff_alpha(
     .. [2] Hayes, A. F., Krippendorff, K. (2007). Answering the call for a standard
        reliability measure for coding data. Communication Methods and Measures,
        1(1), 77-89. https://doi.org/10.1080/19312450709336664
+    .. [3] Passonneau, R. (2006). Measuring agreement on set-valued items (MASI) for
+       semantic and pragmatic annotation. LREC 2006.
 
     Examples
     --------
@@ -237,49 +234,7 @@ def _disagreement(
         return declared_weights(weights, counted.categories, declared=counted.declared)
     if weights is not None:
         raise ParameterError("weights, metric: needs one of them, got both")
-    return _metric_weights(metric, counted)
-
-
-def _metric_weights(metric: Metric, counted: CountedRatings) -> Weights:
-    # Krippendorff's difference functions δ², exact; they grow without bound.
-    # [1], pp. 232-236
-    if metric not in get_args(Metric):
-        raise ParameterError(
-            f"metric: needs one of {', '.join(get_args(Metric))}, got {metric!r}"
-        )
-    if metric == "nominal":
-        return Weights(name="nominal", n_categories=len(counted.categories))
-    if not counted.declared and isinstance(counted.categories[0], str):
-        raise ParameterError(
-            f"categories: the {metric} metric needs the declared scale in order, the "
-            f"ratings are text: {', '.join(map(str, counted.categories))}"
-        )
-    if metric == "ordinal":
-        squares = every_pair(_middles(counted), lambda x, y: (x - y) ** 2)
-        return over_one_denominator("ordinal metric", squares)
-    values = category_values(counted.categories)
-    if metric == "interval":
-        squares = every_pair(values, lambda x, y: (x - y) ** 2)
-        return over_one_denominator("interval", squares)
-    if any(x + y == 0 for i, x in enumerate(values) for y in values[:i]):
-        raise ParameterError(
-            "metric: ratio needs values of which no two sum to 0, got "
-            f"{', '.join(str(float(value)) for value in values)}"
-        )
-    return over_one_denominator("ratio metric", every_pair(values, squared_ratio))
-
-
-def _middles(counted: CountedRatings) -> list[Fraction]:
-    # Σ_{g<k} n_g + n_k/2: ratings up to the middle of each grade, of items with a pair
-    q = len(counted.categories)
-    groups = counted.items.sums(identity_weights(q)).groups
-    usable = [group.totals for group in groups if group.size > 1]
-    middles, lower = [], 0
-    for k in range(q):
-        total = sum(totals[k] for totals in usable)
-        middles.append(Fraction(2 * lower + total, 2))
-        lower += total
-    return middles
+    return metric_weights(metric, counted)
 
 
 def _features(coded: CodedRatings, v: Floats) -> Floats:

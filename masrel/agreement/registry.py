@@ -2,13 +2,20 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal, get_args
 
+from masrel.agreement._counts import count_ratings
 from masrel.agreement._data import CodedRatings, code_pairs, code_ratings
 from masrel.agreement._kernel import Kernel
 from masrel.agreement._labels import Label
+from masrel.agreement._metrics import (
+    ORDINAL_KERNEL,
+    Metric,
+    check_metric,
+    metric_weights,
+)
 from masrel.agreement._pairs import (
     COHEN_KERNEL,
     LIGHT_KERNEL,
@@ -24,7 +31,12 @@ from masrel.agreement._pooled import (
     complete_kernel,
     pooled_kernel,
 )
-from masrel.agreement._weights import WeightsLike, is_identity
+from masrel.agreement._weights import (
+    Weights,
+    WeightsLike,
+    declared_weights,
+    is_identity,
+)
 from masrel.agreement.brennan_prediger import brennan_prediger
 from masrel.agreement.cohen import cohen_kappa
 from masrel.agreement.conger import _KERNEL as CONGER_KERNEL
@@ -96,6 +108,8 @@ class Coefficient:
         What the interval that it comes with generalises to; None without one.
     code : callable
         Ratings and categories to the codes its kernel takes.
+    metric : {"nominal", "ordinal", "interval", "ratio", "jaccard", "masi"} or None
+        Krippendorff's difference function by which it is computed; None for weights.
     needs_order : bool
         Whether grades without an order have no such coefficient, whatever the weights.
     """
@@ -114,6 +128,7 @@ class Coefficient:
     weighted: bool = True
     interval_target: Target | None = None
     code: Callable[..., CodedRatings] = code_ratings
+    metric: Metric | None = None
 
     @property
     def has_interval(self) -> bool:
@@ -137,11 +152,47 @@ class Coefficient:
         # The level is that of an interval which comes with it.
         if self.weighted:
             return self.function(ratings, categories=categories, weights=weights)
-        if not is_identity(weights):
-            raise ParameterError(f"weights: {self.title} takes none, got {weights!r}")
+        self._refuse_weights(weights)
         if self.has_interval:
             return self.function(ratings, categories=categories, level=level)
         return self.function(ratings, categories=categories)
+
+    def by_metric(self, metric: Metric | None) -> "Coefficient":
+        """Return the coefficient by one of Krippendorff's metrics; itself for None."""
+        if metric is None or metric == self.metric:
+            return self
+        if self.name != "krippendorff_alpha":
+            raise ParameterError(
+                f"metric: is of krippendorff_alpha alone, got {metric!r} for "
+                f"{self.name}; other coefficients take weights"
+            )
+        check_metric(metric)
+        is_ordered = metric in ("ordinal", "interval", "ratio")
+        order: frozenset[Property] = frozenset({"categories in any order"})
+        return replace(
+            self,
+            title=f"{self.title}, {metric} metric",
+            function=partial(krippendorff_alpha, metric=metric),
+            kernel=ORDINAL_KERNEL if metric == "ordinal" else self.kernel,
+            properties=self.properties - order if is_ordered else self.properties,
+            weighted=False,
+            metric=metric,
+        )
+
+    def disagreement(self, coded: CodedRatings, weights: "WeightsLike") -> Weights:
+        """Return how much two categories of some ratings disagree."""
+        if self.metric is None:
+            return declared_weights(weights, coded.categories, declared=coded.declared)
+        self._refuse_weights(weights)
+        return metric_weights(self.metric, count_ratings(coded))
+
+    def is_nominal(self, weights: "WeightsLike") -> bool:
+        """Return whether every miss counts in full."""
+        return is_identity(weights) and self.metric in (None, "nominal")
+
+    def _refuse_weights(self, weights: "WeightsLike") -> None:
+        if not is_identity(weights):
+            raise ParameterError(f"weights: {self.title} takes none, got {weights!r}")
 
 
 _RANKS = frozenset[Property](

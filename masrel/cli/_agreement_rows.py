@@ -2,7 +2,7 @@
 
 import math
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 import click
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
         CodedRatings,
         Coefficient,
         CountedRatings,
+        Metric,
         WeightName,
     )
     from masrel.ratings import RatingsPart
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
     from masrel.scales import Scale
 
 _USUAL = ["percent_agreement", "fleiss_kappa"]
+
+_OF_METRIC = "krippendorff_alpha"
+"""The coefficient that has metrics."""
 
 _SURE = 0.95
 """Probability with which the true value reaches the word that is named."""
@@ -42,16 +46,29 @@ class EstimateOptions:
     n_resamples: int
     seed: int
     words: "BandScale | None"  # whose words for values
+    metric: "Metric | None" = None  # of Krippendorff's alpha
 
     @property
     def takes_all(self) -> bool:
         """Whether all coefficients are estimated that fit."""
         return self.coefficients == ["all"]
 
+    @property
+    def names(self) -> list[str]:
+        """The coefficients that are named, or the usual ones."""
+        if self.coefficients is not None:
+            return self.coefficients
+        return _USUAL if self.metric is None else [_OF_METRIC]
+
+    def by_metric(self, entry: "Coefficient") -> "Coefficient":
+        """Return the coefficient by the metric that was chosen, if it has metrics."""
+        return entry.by_metric(self.metric) if entry.name == _OF_METRIC else entry
+
     def record(self) -> dict[str, object]:
         """Return every option that decides a number."""
+        by_metric = {} if self.metric is None else {"metric": self.metric}
         return {
-            "coefficients": self.coefficients or _USUAL,
+            "coefficients": self.names,
             "weights": self.weights,
             "target": self.target,
             "interval": self.interval,
@@ -59,6 +76,7 @@ class EstimateOptions:
             "resamples": self.n_resamples,
             "seed": self.seed,
             "words": self.words,
+            **by_metric,
         }
 
 
@@ -99,6 +117,14 @@ estimate_options = grouped(
         show_default=True,
         help="identity, linear, quadratic, ordinal, radical, ratio, circular or "
         "bipolar.",
+    ),
+    click.option(
+        "--metric",
+        type=click.Choice(
+            ["nominal", "ordinal", "interval", "ratio", "jaccard", "masi"]
+        ),
+        help="Krippendorff's alpha by his difference function in place of weights; "
+        "jaccard and masi take grades of several labels, as a;b.",
     ),
     click.option(
         "--target",
@@ -158,12 +184,28 @@ def estimate_rows(
         warnings.simplefilter("ignore", MasrelWarning)
         for entry in entries(options, n_raters, scale, is_ordered):
             ratings = part.ratings if entry.kernel is None else part.counted
+            if entry.metric in ("jaccard", "masi"):
+                ratings = _on_grades(ratings, scale)
             row, refusal = _row(entry, ratings, group, options)
             rows.append(row)
             refused += [] if refusal is None else [refusal]
     if not options.takes_all and refused and len(refused) == len(rows):
         raise refused[0]
     return rows
+
+
+def _on_grades(
+    ratings: "CodedRatings | CountedRatings", scale: "Scale"
+) -> "CodedRatings | CountedRatings":
+    """Return ratings with the text of their grades, of which a metric takes sets."""
+    from masrel.agreement import CodedRatings
+
+    if isinstance(ratings, CodedRatings):
+        return replace(ratings, categories=scale.grades)
+    coded = ratings.coded
+    if coded is not None:
+        coded = replace(coded, categories=scale.grades)
+    return replace(ratings, categories=scale.grades, source=coded)
 
 
 def _row(
@@ -178,7 +220,7 @@ def _row(
     title, notes, refusal = entry.title, [], None
     if entry.weighted and options.weights != "identity":
         title += f", {options.weights}"
-    elif options.weights != "identity" and not options.takes_all:
+    elif options.weights != "identity" and not options.takes_all and not entry.metric:
         notes.append("unweighted, there are no weights for it")
     has_target = options.target is not None
     try:
@@ -272,12 +314,17 @@ def entries(
     if options.takes_all:
         return [
             entry
-            for entry in COEFFICIENTS.values()
+            for entry in map(options.by_metric, COEFFICIENTS.values())
             if entry.shape == "ratings"
             and n_raters <= (entry.n_raters[1] or n_raters)
             and (is_ordered or not entry.needs_order)
         ]
-    chosen = [coefficient(name) for name in options.coefficients or _USUAL]
+    if options.metric is not None and _OF_METRIC not in options.names:
+        raise ParameterError(
+            f"--metric {options.metric}: is of {_OF_METRIC}, which is not among "
+            f"--coefficients {','.join(options.names)}"
+        )
+    chosen = [options.by_metric(coefficient(name)) for name in options.names]
     for entry in chosen:
         if entry.shape == "pairs":
             raise ParameterError(

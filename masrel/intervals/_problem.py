@@ -13,9 +13,9 @@ from masrel.agreement import (
     CodedRatings,
     Coefficient,
     Label,
+    Metric,
     WeightsLike,
     coefficient,
-    declared_weights,
 )
 from masrel.agreement._counts import distinct_rows
 from masrel.agreement._kernel import Floats, Kernel, RaterSums
@@ -31,6 +31,12 @@ Integers = NDArray[np.int64]
 Statistic = str | Callable[..., Estimate] | Coefficient
 """A coefficient: its name, its public function, or its entry in the register."""
 
+HELD = (
+    "the ordinal metric, which depends on the ratings, is held as it was found in all "
+    "of them"
+)
+
+_MAX_REMADE = 40  # categories up to which that metric is made anew from their pairs
 _BLOCK = 1 << 14  # items at once: what is made of them takes more room than they do
 
 
@@ -53,6 +59,7 @@ class IntervalProblem:
     min_value: float  # where intervals are cut
     target: Target
     level: float
+    notes: tuple[str, ...] = ()  # of every interval
 
     def values(self, sums: Floats) -> Floats:
         """Return the coefficient for sums of shape (..., n_features)."""
@@ -146,7 +153,7 @@ class IntervalProblem:
             method=method,
             target=self.target,
             unit=unit,
-            notes=tuple(notes),
+            notes=(*notes, *self.notes),
         )
 
     def undefined(self, reason: str, *, method: str, unit: Unit | None) -> Interval:
@@ -176,9 +183,10 @@ def pose_problem(
     categories: Sequence[Label] | None,
     weights: "WeightsLike",
     level: float,
+    metric: Metric | None = None,
 ) -> IntervalProblem:
     """Check a question and prepare its data."""
-    entry = statistic if isinstance(statistic, Coefficient) else find_entry(statistic)
+    entry = find_entry(statistic, metric)
     if target not in get_args(Target):
         raise ParameterError(
             f"target: needs one of {', '.join(get_args(Target))}, got {target!r}"
@@ -196,7 +204,10 @@ def pose_problem(
             f"coefficient: {entry.title} is no function of sums over items: there is "
             "no such interval of it"
         )
-    v = declared_weights(weights, coded.categories, declared=coded.declared).floats
+    v = entry.disagreement(coded, weights).floats
+    notes: tuple[str, ...] = ()
+    if entry.metric == "ordinal" and coded.n_categories > _MAX_REMADE:
+        kernel, notes = coefficient(entry.name).kernel or kernel, (HELD,)
     codes, freq = distinct_rows(coded.codes, len(coded.categories))
     if (codes[0] < 0).all():  # the first of them, if any, has no rating
         codes, freq = codes[1:], freq[1:]
@@ -219,15 +230,18 @@ def pose_problem(
         min_value=entry.lowest if value >= entry.lowest else -math.inf,
         target=target,
         level=level,
+        notes=notes,
     )
 
 
-def find_entry(statistic: str | Callable[..., Estimate]) -> Coefficient:
+def find_entry(statistic: Statistic, metric: Metric | None = None) -> Coefficient:
     """Return the entry of a name or a public function in the register."""
+    if isinstance(statistic, Coefficient):
+        return statistic.by_metric(metric)
     name = statistic
     if not isinstance(name, str):
         name = getattr(statistic, "__name__", repr(statistic))
-    return coefficient(name)
+    return coefficient(name).by_metric(metric)
 
 
 def _refuse_raters(entry: Coefficient, n_raters: int) -> NoReturn:

@@ -69,6 +69,8 @@ def applies_to(problem: IntervalProblem) -> bool:
     codes = problem.coded.codes
     if problem.entry.name not in CHANCE_AGREEMENT or codes.shape[1] != 2:
         return False
+    if problem.entry.metric == "ordinal":  # not one of a table, but of its ratings
+        return False
     table, _ = _table(codes, problem.coded.n_categories)
     return _nothing_to_learn(problem, table) is None
 
@@ -196,6 +198,11 @@ def _check(problem: IntervalProblem, n_draws: int) -> None:
         raise ParameterError(
             f'model: "table" applies to {", ".join(CHANCE_AGREEMENT)} of exactly two '
             f"raters; got {name} of {n_raters}"
+        )
+    if problem.entry.metric == "ordinal":
+        raise ParameterError(
+            "metric: ordinal depends on the ratings, and so has no posterior; use the "
+            "jackknife or the bootstrap"
         )
     if n_draws < _MIN_DRAWS:
         raise ParameterError(f"n_draws: needs at least {_MIN_DRAWS}, got {n_draws}")

@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Literal, get_args
 
-from masrel.agreement import Label, WeightsLike
+from masrel.agreement import Label, Metric, WeightsLike
 from masrel.agreement._kernel import NO_SPREAD
 from masrel.errors import ParameterError, UndefinedStatisticWarning
 from masrel.estimates import Estimate, Interval, Target, Unit
 from masrel.intervals._problem import (
+    HELD,
     IntervalProblem,
     Statistic,
     pose_problem,
@@ -41,6 +42,7 @@ def analytic(
     target: Target,
     categories: Sequence[Label] | None = None,
     weights: "WeightsLike" = "identity",
+    metric: Metric | None = None,
     level: float = 0.95,
     distribution: _Distribution = "t",
     error: ErrorName = "delta",
@@ -60,6 +62,9 @@ def analytic(
         The declared scale in order.
     weights : str or array_like, optional
         How much two categories agree; see `declared_weights`.
+    metric : str, optional
+        Krippendorff's difference function in place of weights; see
+        `krippendorff_alpha`, which alone takes one.
     level : float, optional
         Nominal level.
     distribution : {"t", "normal", "logit", "fisher"}, optional
@@ -142,9 +147,12 @@ def analytic(
         target=target,
         categories=categories,
         weights=weights,
+        metric=metric,
         level=level,
     )
     check_error(error, target)
+    if problem.entry.metric == "ordinal":
+        problem = replace(problem, notes=(HELD,))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UndefinedStatisticWarning)  # given below
         estimate = problem.entry(problem.coded, weights=weights)

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Literal, NoReturn, TypedDict, get_args
 import numpy as np
 
 from masrel.agreement import Coefficient, CountedRatings, Label
-from masrel.agreement._weights import is_identity
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Target
 from masrel.intervals._problem import Statistic, find_entry, pose_problem
@@ -17,7 +16,7 @@ from masrel.intervals.jackknife import jackknife
 from masrel.intervals.posterior import _RHO_COEFFICIENTS, posterior
 
 if TYPE_CHECKING:
-    from masrel.agreement import WeightsLike
+    from masrel.agreement import Metric, WeightsLike
 
 _Method = Literal["auto", "analytic", "jackknife", "bootstrap", "posterior"]
 """Kinds of intervals; "auto" chooses one by target and size."""
@@ -33,6 +32,7 @@ def estimate(
     method: _Method = "auto",
     categories: Sequence[Label] | None = None,
     weights: "WeightsLike" = "identity",
+    metric: "Metric | None" = None,
     level: float = 0.95,
     n_resamples: int = 10_000,
     rng: np.random.Generator | int | None = None,
@@ -54,6 +54,9 @@ def estimate(
         The declared scale in order.
     weights : str or array_like, optional
         How much two categories agree; see `declared_weights`.
+    metric : str, optional
+        Krippendorff's difference function in place of weights; see
+        `krippendorff_alpha`, which alone takes one.
     level : float, optional
         Nominal level.
     n_resamples : int, optional
@@ -91,9 +94,7 @@ def estimate(
         raise ParameterError(
             f"method: needs one of {', '.join(get_args(_Method))}, got {method!r}"
         )
-    entry = (
-        coefficient if isinstance(coefficient, Coefficient) else find_entry(coefficient)
-    )
+    entry = find_entry(coefficient, metric)
     if method == "auto" and entry.interval_target not in (None, target):
         _refuse_target(entry, target)
     if entry.kernel is None:
@@ -101,7 +102,7 @@ def estimate(
     else:
         if not isinstance(ratings, CountedRatings):
             ratings = entry.code(ratings, categories)  # once, for all that follows
-        result = entry.function(ratings, categories=categories, weights=weights)
+        result = entry(ratings, categories=categories, weights=weights)
         categories = None  # the ratings have them by now
     if method == "auto" and entry.has_interval:
         return result
@@ -114,7 +115,7 @@ def estimate(
 
         interval, why = choose_interval(
             pose_problem(entry, ratings, **options),
-            modelled=is_identity(weights) and entry.name in _RHO_COEFFICIENTS,
+            modelled=entry.is_nominal(weights) and entry.name in _RHO_COEFFICIENTS,
         )
         note = f"chosen for other {_OTHERS[target]}: {why}"
         interval = replace(interval, target=target, notes=(note, *interval.notes))

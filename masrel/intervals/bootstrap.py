@@ -9,9 +9,14 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement import Label, WeightsLike
+from masrel.agreement import Label, Metric, WeightsLike
 from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target
+from masrel.intervals._alpha_bootstraps import (
+    check_alpha,
+    hayes_interval,
+    hold_expected,
+)
 from masrel.intervals._endpoints import (
     EndpointRule,
     Kind,
@@ -28,6 +33,9 @@ from masrel.intervals._problem import (
 from masrel.intervals._resamples import DrawBudget, all_resamples, draw_resamples
 from masrel.intervals._units import SamplingUnits, sampling_units
 
+_Kind = Literal[Kind, "krippendorff", "hayes"]
+"""The same, and the bootstraps of alpha of other programs."""
+
 _Exact = Literal["auto"] | bool
 """Whether all resamples are taken: always, never, or if there are few enough."""
 
@@ -39,9 +47,10 @@ def bootstrap(
     target: Target,
     categories: Sequence[Label] | None = None,
     weights: "WeightsLike" = "identity",
+    metric: Metric | None = None,
     level: float = 0.95,
     n_resamples: int = 10_000,
-    kind: Kind = "percentile",
+    kind: _Kind = "percentile",
     exact: _Exact = "auto",
     clusters: Sequence[object] | NDArray[Any] | None = None,
     tolerance: float | None = None,
@@ -62,12 +71,16 @@ def bootstrap(
         The declared scale in order.
     weights : str or array_like, optional
         How much two categories agree; see `declared_weights`.
+    metric : str, optional
+        Krippendorff's difference function in place of weights; see
+        `krippendorff_alpha`, which alone takes one.
     level : float, optional
         Nominal level.
     n_resamples : int, optional
         Resamples where they are drawn, at least 100.
-    kind : {"percentile", "basic", "bca", "studentized"}, optional
-        How endpoints come from the resamples.
+    kind : {"percentile", "basic", "bca", "studentized", "krippendorff", "hayes"}
+        How endpoints come from the resamples. The last two are bootstraps of
+        Krippendorff's alpha by other programs; see Notes.
     exact : {"auto", True, False}, optional
         Whether every distinct resample is taken with its probability, instead of
         drawing some: then nothing is random. "auto" does so up to 300 000 resamples, or
@@ -125,6 +138,14 @@ def bootstrap(
     error of every resample, from exact derivatives; where that is 0, and the resample
     differs from the estimate, the ratio is infinite.
 
+    "krippendorff" takes the percentiles of resampled items, too, but holds the
+    disagreement by chance as it is in all ratings, and so does the R package
+    krippendorffsalpha by its method "customary" [3]_. "hayes" draws pairs of values in
+    place of items, corrects the result, and takes order statistics as the macro KALPHA
+    does [4]_: it takes pairs of one item for independent, and stops narrowing with many
+    items. Both need target "items" and are here so that their intervals can be
+    repeated.
+
     What is drawn has a linear function of the resample as its control: its distribution
     is computed, and says how far the sample is off [2]_. The Monte Carlo error is what
     the control leaves.
@@ -135,6 +156,12 @@ def bootstrap(
        ch. 12 to 14.
     .. [2] Davison, A. C., Hinkley, D. V. (1997). Bootstrap Methods and their
        Application, ch. 5 and 9.
+    .. [3] Hughes, J. (2021). krippendorffsalpha: an R package for measuring agreement
+       using Krippendorff's alpha coefficient. R Journal, 13(1), 413-425.
+       https://doi.org/10.32614/RJ-2021-046
+    .. [4] Hayes, A. F., Krippendorff, K. (2007). Answering the call for a standard
+       reliability measure for coding data. Communication Methods and Measures, 1(1),
+       77-89. https://doi.org/10.1080/19312450709336664
 
     Examples
     --------
@@ -164,11 +191,20 @@ def bootstrap(
         target=target,
         categories=categories,
         weights=weights,
+        metric=metric,
         level=level,
     )
+    method = f"{kind} bootstrap"
+    if kind == "hayes":
+        check_alpha(problem, kind)
+        _check_hayes(exact, clusters, tolerance)
+        return hayes_interval(problem, n_resamples, rng)
+    if kind == "krippendorff":
+        check_alpha(problem, kind)
+        problem = hold_expected(problem)
+        method, kind = "percentile bootstrap, chance held", "percentile"
     units = sampling_units(problem, clusters)
     rule = _endpoint_rule(problem, units, kind)
-    method = f"{kind} bootstrap"
     if clusters is not None:
         method += f" of {units.n} clusters"
     reason = None
@@ -201,10 +237,20 @@ def bootstrap(
     )
 
 
-def _check_options(kind: Kind, exact: _Exact, budget: DrawBudget) -> None:
-    if kind not in get_args(Kind):
+def _check_hayes(exact: _Exact, clusters: object, tolerance: float | None) -> None:
+    named = {"exact": exact is True, "clusters": clusters is not None}
+    named["tolerance"] = tolerance is not None
+    for name, is_named in named.items():
+        if is_named:
+            raise ParameterError(
+                f'{name}: does not go with kind="hayes", which draws pairs of values'
+            )
+
+
+def _check_options(kind: _Kind, exact: _Exact, budget: DrawBudget) -> None:
+    if kind not in get_args(_Kind):
         raise ParameterError(
-            f"kind: needs one of {', '.join(get_args(Kind))}, got {kind!r}"
+            f"kind: needs one of {', '.join(get_args(_Kind))}, got {kind!r}"
         )
     if not (exact is True or exact is False or exact == "auto"):
         raise ParameterError(f'exact: needs "auto", True or False, got {exact!r}')

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from masrel.agreement import Label, WeightsLike
+from masrel.agreement import Label, Metric, WeightsLike
 from masrel.agreement._kernel import Floats
 from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target
@@ -28,6 +28,7 @@ def jackknife(
     target: Target,
     categories: Sequence[Label] | None = None,
     weights: "WeightsLike" = "identity",
+    metric: Metric | None = None,
     level: float = 0.95,
 ) -> Interval:
     """Compute a jackknife interval with Student's t.
@@ -45,6 +46,9 @@ def jackknife(
         The declared scale in order.
     weights : str or array_like, optional
         How much two categories agree; see `declared_weights`.
+    metric : str, optional
+        Krippendorff's difference function in place of weights; see
+        `krippendorff_alpha`, which alone takes one.
     level : float, optional
         Nominal level.
 
@@ -97,6 +101,7 @@ def jackknife(
         target=target,
         categories=categories,
         weights=weights,
+        metric=metric,
         level=level,
     )
     return _interval_around_estimate(problem, _jackknife_variance(problem))

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 
 from masrel.agreement import Label
-from masrel.agreement._weights import is_identity
 from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target
 from masrel.intervals._problem import IntervalProblem, Statistic, pose_problem
@@ -136,7 +135,7 @@ def posterior(
 
     checked_prior = Prior.of(prior, 1.0 if concentration is None else concentration)
     _check_options(problem, model, method)
-    identity = is_identity(weights)
+    identity = problem.entry.is_nominal(weights)
     has_rho = problem.entry.name in _RHO_COEFFICIENTS and identity
     name = problem.entry.name if identity else f"weighted {problem.entry.name}"
     if model == "table" or (model == "auto" and not has_rho):

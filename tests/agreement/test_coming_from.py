@@ -346,6 +346,26 @@ def test_nltk_interval_distance() -> None:
     assert task.weighted_kappa() == pytest.approx(light, rel=1e-12)
 
 
+SETS = [[{"a"}, {"a", "b"}], [{"a", "b"}, {"b", "c"}], [{"c"}, {"c"}], [{"a"}, {"c"}]]
+
+
+@pytest.mark.parametrize(
+    ("metric", "abs_"),
+    # nltk rounds Passonneau's 2/3 and 1/3 to .67 and .33
+    [("jaccard", 1e-12), ("masi", 5e-3)],
+)
+def test_nltk_distances_of_sets(metric: Any, abs_: float) -> None:
+    distance = getattr(package("nltk.metrics.distance"), f"{metric}_distance")
+    rows: Any = [
+        (f"rater {j}", f"item {i}", frozenset(labels))
+        for i, row in enumerate(SETS)
+        for j, labels in enumerate(row)
+    ]
+    alpha = annotation_task(rows, distance=distance).alpha()
+    ours = krippendorff_alpha(SETS, metric=metric).value
+    assert ours == pytest.approx(alpha, abs=abs_)
+
+
 def test_nltk_distance_is_left_out_of_chance() -> None:
     task = annotation_task(long(RATINGS), distance=lambda x, y: abs(x - y) / 2)
     observed = percent_agreement(RATINGS, weights="linear").value

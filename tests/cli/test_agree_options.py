@@ -10,7 +10,13 @@ from typing import Any, get_args
 
 import pytest
 
-from masrel.agreement import COEFFICIENTS, BandScale, WeightName
+from masrel.agreement import (
+    COEFFICIENTS,
+    BandScale,
+    Metric,
+    WeightName,
+    krippendorff_alpha,
+)
 from masrel.estimates import Estimate, Interval
 from tests.cli.process import Caller, Done
 
@@ -499,3 +505,53 @@ def test_a_file_without_a_folder_is_refused_before_anything_is_computed(
     done = masrel("agree", wide, "--target", "both", option, "no/such.svg")
     assert (done.code, done.out) == (2, "")
     assert f"{option}: needs a folder that exists, got no/such.svg" in done.err
+
+
+# Metrics of alpha.
+
+
+def test_a_metric_is_of_alpha(masrel: Caller, tmp_path: Path) -> None:
+    path = tmp_path / "two.csv"
+    path.write_text("item,A,B\nx,1,1\ny,2,1\nz,4,4\nu,2,3\n", encoding="utf-8")
+    rows = [[1, 1], [2, 1], [4, 4], [2, 3]]
+    metrics: list[Metric] = ["nominal", "ordinal", "interval", "ratio"]
+    for metric in metrics:
+        call = ("agree", path, "--metric", metric, "--json", "-")
+        done = masrel(*call)
+        (of_alpha,) = estimates(done)
+        alpha = krippendorff_alpha(rows, metric=metric)
+        assert (of_alpha["value"], of_alpha["weights"]) == (alpha.value, alpha.weights)
+        assert json.loads(done.out)["options"]["metric"] == metric
+    done = masrel("agree", path, "--metric", "interval", "--target", "items")
+    assert "Krippendorff's α, interval metric" in done.out
+    said = refused(masrel(*call[:4], "--coefficients", "fleiss_kappa,gwet_ac"))
+    assert "--metric ratio: is of krippendorff_alpha, which is not among" in said
+
+
+def test_beside_a_metric_others_keep_their_weights(
+    masrel: Caller, tmp_path: Path
+) -> None:
+    path = tmp_path / "two.csv"
+    path.write_text("item,A,B\nx,1,1\ny,2,1\nz,4,4\nu,2,3\n", encoding="utf-8")
+    names = "fleiss_kappa,krippendorff_alpha"
+    call = ("--coefficients", names, "--weights", "linear", "--metric", "interval")
+    done = masrel("agree", path, *call)
+    assert "Fleiss' κ, linear" in done.out
+    assert "unweighted" not in done.out
+    text = tmp_path / "text.csv"
+    text.write_text("item,A,B\nx,a,a\ny,b,a\n", encoding="utf-8")
+    said = refused(masrel("agree", text, "--metric", "interval"))
+    assert "needs grades that are numbers or --categories" in said
+
+
+def test_grades_of_several_labels_are_sets(masrel: Caller, tmp_path: Path) -> None:
+    path = tmp_path / "sets.csv"
+    path.write_text("item,A,B\nx,a,a;b\ny,b;a,b;c\nz,c;b,b;c\n", encoding="utf-8")
+    sets = [[{"a"}, {"a", "b"}], [{"a", "b"}, {"b", "c"}], [{"b", "c"}, {"b", "c"}]]
+    metrics: list[Metric] = ["jaccard", "masi"]
+    for metric in metrics:
+        (of_alpha,) = estimates(
+            masrel("agree", path, "--metric", metric, "--json", "-")
+        )
+        alpha = krippendorff_alpha(sets, metric=metric)
+        assert of_alpha["value"] == alpha.value

@@ -1,0 +1,154 @@
+"""Krippendorff's difference functions δ² of two grades, and distances of sets.
+
+In: the name of a metric, and ratings that are counted. Out: `Weights`, which hold δ² as
+it is, without a largest value.
+"""
+
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Literal, get_args
+
+import numpy as np
+
+from masrel.agreement._counts import CountedRatings, item_counts
+from masrel.agreement._data import CodedRatings
+from masrel.agreement._kernel import Floats, Kernel, divide
+from masrel.agreement._labels import EMPTY_SET, SET_SEPARATOR, Label
+from masrel.agreement._weights import (
+    Weights,
+    category_values,
+    every_pair,
+    identity_weights,
+    over_one_denominator,
+    squared_ratio,
+)
+from masrel.errors import ParameterError
+
+Metric = Literal["nominal", "ordinal", "interval", "ratio", "jaccard", "masi"]
+"""Names of the difference functions; the last two are of sets of labels."""
+
+_MAX_EXPONENT = 400  # of two, of differences whose squares and sums of them are floats
+
+
+def check_metric(metric: str) -> None:
+    """Check the name of a metric."""
+    if metric not in get_args(Metric):
+        raise ParameterError(
+            f"metric: needs one of {', '.join(get_args(Metric))}, got {metric!r}"
+        )
+
+
+def metric_weights(metric: Metric, counted: CountedRatings) -> Weights:
+    """Return the δ² of a metric, exact; they grow without bound."""
+    # Krippendorff (2004), Content Analysis, 2nd ed., pp. 232-236
+    check_metric(metric)
+    if metric == "nominal":
+        return Weights(name="nominal", n_categories=len(counted.categories))
+    if metric in ("jaccard", "masi"):
+        return _of_sets(metric, counted.categories)
+    if not counted.declared and isinstance(counted.categories[0], str):
+        raise ParameterError(
+            f"categories: the {metric} metric needs the declared scale in order, the "
+            f"ratings are text: {', '.join(map(str, counted.categories))}"
+        )
+    if metric == "ordinal":
+        squares = every_pair(_middles(counted), lambda x, y: (x - y) ** 2)
+        return over_one_denominator("ordinal metric", squares)
+    values = category_values(counted.categories)
+    if metric == "interval":
+        squares = every_pair(_in_range(values), lambda x, y: (x - y) ** 2)
+        return over_one_denominator("interval", squares)
+    if any(x + y == 0 for i, x in enumerate(values) for y in values[:i]):
+        raise ParameterError(
+            "metric: ratio needs values of which no two sum to 0, got "
+            f"{', '.join(str(float(value)) for value in values)}"
+        )
+    return over_one_denominator("ratio metric", every_pair(values, squared_ratio))
+
+
+def _in_range(values: list[Fraction]) -> list[Fraction]:
+    # over a power of two, which α does not notice, where squares would be no floats
+    range_ = max(values) - min(values)
+    if range_ == 0:
+        return values
+    exponent = range_.numerator.bit_length() - range_.denominator.bit_length()
+    if abs(exponent) <= _MAX_EXPONENT:
+        return values
+    return [value / Fraction(2) ** exponent for value in values]
+
+
+def _middles(counted: CountedRatings) -> list[Fraction]:
+    # Σ_{g<k} n_g + n_k/2: ratings up to the middle of each grade, of items with a pair
+    q = len(counted.categories)
+    groups = counted.items.sums(identity_weights(q)).groups
+    usable = [group.totals for group in groups if group.size > 1]
+    middles, lower = [], 0
+    for k in range(q):
+        total = sum(totals[k] for totals in usable)
+        middles.append(Fraction(2 * lower + total, 2))
+        lower += total
+    return middles
+
+
+def _of_sets(metric: str, categories: Sequence[Label]) -> Weights:
+    # labels of several elements, as "a; b", as sets
+    if not all(isinstance(label, str) for label in categories):
+        raise ParameterError(
+            f"metric: {metric} needs sets of labels, or text with semicolons between "
+            f"labels, got {next(x for x in categories if not isinstance(x, str))!r}"
+        )
+    sets = [_elements(str(label)) for label in categories]
+    distance = _jaccard if metric == "jaccard" else _masi
+    matrix = [[distance(a, b) for b in sets] for a in sets]
+    return over_one_denominator(metric, matrix)
+
+
+def _elements(label: str) -> frozenset[str]:
+    if label == EMPTY_SET:
+        return frozenset()
+    parts = map(str.strip, label.split(SET_SEPARATOR.strip()))
+    return frozenset(part for part in parts if part)
+
+
+def _jaccard(a: frozenset[str], b: frozenset[str]) -> Fraction:
+    # 1 - |A ∩ B| / |A ∪ B|; two empty sets are the same
+    return Fraction(0) if a == b else 1 - Fraction(len(a & b), len(a | b))
+
+
+def _masi(a: frozenset[str], b: frozenset[str]) -> Fraction:
+    # Passonneau (2006), Measuring agreement on set-valued items: 1 - J M, with M = 2/3
+    # if one set holds the other, 1/3 if each has something to itself, 0 without overlap
+    if a == b:
+        return Fraction(0)
+    share = Fraction(2, 3) if a <= b or b <= a else Fraction(1, 3)
+    return 1 - Fraction(len(a & b), len(a | b)) * share
+
+
+def _ordinal_features(coded: CodedRatings, _v: Floats) -> Floats:
+    # (n_items, q²): coincidences o_kl = n_ik (n_il - [k = l]) / (n_i - 1)
+    counts = item_counts(coded).astype(np.float64)
+    size = counts.sum(axis=1)
+    pairs = counts[:, :, None] * counts[:, None, :]
+    k = np.arange(counts.shape[1])
+    pairs[:, k, k] -= counts
+    pairs /= np.maximum(size - 1.0, 1.0)[:, None, None]
+    pairs[size < 2] = 0.0
+    return np.asarray(pairs.reshape(len(counts), -1))
+
+
+def _ordinal_value(sums: Floats, _v: Floats) -> Floats:
+    # sums (..., q²) -> (...): the middles are those of the ratings that are summed
+    q = math.isqrt(sums.shape[-1])
+    table = sums.reshape(*sums.shape[:-1], q, q)
+    totals = table.sum(axis=-1)
+    n = totals.sum(axis=-1)
+    middles = np.cumsum(totals, axis=-1) - totals / 2.0
+    between = (middles[..., :, None] - middles[..., None, :]) ** 2
+    observed = (table * between).sum(axis=(-1, -2))
+    expected = np.einsum("...k,...kl,...l->...", totals, between, totals)
+    return 1.0 - divide((n - 1.0) * observed, expected)
+
+
+ORDINAL_KERNEL = Kernel(features=_ordinal_features, value=_ordinal_value)
+"""Krippendorff's alpha of the ordinal metric, which is made anew from every sum."""

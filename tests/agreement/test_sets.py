@@ -1,0 +1,70 @@
+"""Ratings that are sets of labels: Jaccard's and Passonneau's distance in alpha."""
+
+from fractions import Fraction
+
+import pytest
+
+from masrel.agreement import Metric, krippendorff_alpha
+from masrel.errors import ParameterError
+from masrel.intervals import estimate
+
+A, B, C = {"a"}, {"b"}, {"c"}
+AB, BC = {"a", "b"}, {"b", "c"}
+
+
+@pytest.mark.parametrize(
+    ("metric", "of_half", "of_third"),
+    [
+        # {a} and {a, b} share 1 of 2 labels; {a, b} and {b, c} share 1 of 3. MASI: the
+        # first is a subset, 1 - (1/2)(2/3); the second overlaps, 1 - (1/3)(1/3).
+        ("jaccard", Fraction(1, 2), Fraction(2, 3)),
+        ("masi", Fraction(2, 3), Fraction(8, 9)),
+    ],
+)
+def test_alpha_of_sets_by_hand(
+    metric: Metric, of_half: Fraction, of_third: Fraction
+) -> None:
+    # Three items: (a, ab), (ab, bc), (bc, bc): N = 6; D_o = (2 half + 2 third)/6. Each
+    # of a (1), ab (2), bc (3) with another: pairs a-ab 2, ab-bc 6, and a-bc 3, which
+    # share nothing: D_e = 2 (2 half + 6 third + 3) / 30.
+    ratings = [[A, AB], [AB, BC], [BC, BC]]
+    observed = (2 * of_half + 2 * of_third) / 6
+    expected = 2 * (2 * of_half + 6 * of_third + 3) / 30
+    result = krippendorff_alpha(ratings, metric=metric)
+    assert result.value == float(1 - observed / expected)
+    assert (result.weights, result.n_categories) == (metric, 3)
+    # the same as text, in any order of the labels, and frozen
+    text = [["a", "b;a"], ["a; b", "c;b"], ["b;c", "b; c"]]
+    assert krippendorff_alpha(text, metric=metric).value == result.value
+    frozen = [[frozenset(x) for x in row] for row in ratings]
+    assert krippendorff_alpha(frozen, metric=metric) == result
+
+
+@pytest.mark.parametrize("metric", ["jaccard", "masi"])
+def test_sets_of_one_label_are_nominal(metric: Metric) -> None:
+    ratings = [[A, A], [A, B], [C, C], [B, B], [C, A]]
+    plain = krippendorff_alpha(
+        [["a", "a"], ["a", "b"], ["c", "c"], ["b", "b"], ["c", "a"]]
+    )
+    result = krippendorff_alpha(ratings, metric=metric)
+    assert (result.value, result.standard_error) == (plain.value, plain.standard_error)
+
+
+@pytest.mark.parametrize("metric", ["jaccard", "masi"])
+def test_an_empty_set_is_far_from_all_but_itself(metric: Metric) -> None:
+    same = krippendorff_alpha([[set(), set()], [A, A], [AB, AB]], metric=metric)
+    assert same.value == 1.0
+    # of two items, one (∅, a): N = 4, D_o = 2/4; ∅ 1, a 3: D_e = 6/12: α = 0
+    assert krippendorff_alpha([[set(), A], [A, A]], metric=metric).value == 0.0
+
+
+def test_sets_have_intervals() -> None:
+    ratings = [[A, AB], [AB, BC], [BC, BC], [A, A], [B, BC], [C, C]] * 3
+    result = estimate("krippendorff_alpha", ratings, target="items", metric="masi")
+    assert result.interval is not None
+    assert result.interval.low < result.value < result.interval.high
+
+
+def test_numbers_are_no_sets() -> None:
+    with pytest.raises(ParameterError, match=r"masi needs sets of labels, .* got 1"):
+        krippendorff_alpha([[1, 2], [2, 2]], metric="masi")
