@@ -192,6 +192,47 @@ def rater_resamples(table: textbook.Table) -> Counter[Fraction | None]:
     return counted
 
 
+def agreement_of(ratings: textbook.Table, taken: Counter[int]) -> float | None:
+    """Fleiss' kappa of raters of whom some are taken twice, copies never paired."""
+    agreements, shares = [], []
+    for row in ratings:
+        rated = [(g, n) for g, n in taken.items() if row[g] is not None]
+        total = sum(n for _, n in rated)
+        if total == 0:  # whoever rated it was not drawn: it is no item
+            continue
+        shares.append([sum(n for g, n in rated if row[g] == k) / total for k in (0, 1)])
+        pairs = [
+            (row[g] == row[h], n * m) for g, n in rated for h, m in rated if g != h
+        ]
+        if pairs:
+            n_pairs = sum(n for _, n in pairs)
+            agreements.append(sum(n for same, n in pairs if same) / n_pairs)
+    p_e = sum(np.mean(column) ** 2 for column in zip(*shares, strict=True))
+    if not agreements or p_e == 1.0:
+        return None
+    return float((np.mean(agreements) - p_e) / (1.0 - p_e))
+
+
+def test_an_item_whose_raters_were_not_drawn_is_no_item() -> None:
+    # the last item is rated by the third rater alone, and is in resamples with it only
+    ratings = [[0, 1, 0], [1, 1, 0], [0, 0, 1], [0, 0, 0], [None, None, 1]]
+    values: Counter[float] = Counter()
+    for drawn in itertools.product(range(3), repeat=3):
+        kappa = agreement_of(ratings, Counter(drawn))
+        if kappa is not None:
+            values[round(kappa, 12)] += 1
+    found = exact("fleiss_kappa", ratings, target="raters", categories=range(2))
+    assert found.distribution is not None
+    weights: Counter[float] = Counter()
+    for value, weight in zip(
+        found.distribution.values, found.distribution.weights, strict=True
+    ):
+        weights[round(float(value), 12)] += weight
+    assert list(weights) == pytest.approx(sorted(values), abs=1e-11)
+    shares = [values[value] / values.total() for value in sorted(values)]
+    assert list(weights.values()) == pytest.approx(shares, rel=1e-12)
+
+
 def test_clusters_are_drawn_whole() -> None:
     groups = [FIVE[:2], FIVE[2:3], [*FIVE[3:], [0, 1, 0]], [[2, 2, 1], [1, 1, 1]]]
     law = textbook.law_of_clusters(groups, textbook.fleiss)
