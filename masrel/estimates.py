@@ -148,7 +148,11 @@ class Estimate:
         Observed and chance agreement; ``nan`` when undefined.
     n_items, n_raters, n_categories : int
         Items with at least one rating, raters with at least one, and declared
-        categories.
+        categories. Coefficients that leave items of a single rating out altogether, as
+        their pages say, do not count them.
+    n_items_paired : int
+        Items with a pair of ratings that the coefficient uses: what degrees of freedom
+        and rules for small samples count.
     reason : str or None
         Why `value` is undefined, or None.
     """
@@ -161,6 +165,7 @@ class Estimate:
     observed: float
     chance: float
     n_items: int
+    n_items_paired: int
     n_raters: int
     n_categories: int
     reason: str | None = None

@@ -23,6 +23,7 @@ def estimate(**changes: object) -> Estimate:
         observed=0.75,
         chance=0.5,
         n_items=4,
+        n_items_paired=4,
         n_raters=8,
         n_categories=6,
     )

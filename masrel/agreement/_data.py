@@ -61,6 +61,14 @@ class CodedRatings:
         return int(rated.sum())
 
     @property
+    def n_items_paired(self) -> int:
+        """Items with ratings of at least two raters."""
+        n_ratings = np.zeros(len(self.codes), dtype=np.int64)
+        for column in self.codes.T:
+            n_ratings += column != MISSING
+        return int((n_ratings > 1).sum())
+
+    @property
     def n_raters(self) -> int:
         """Raters with at least one rating."""
         # As a rule every rater has one of the first ratings: look no further.
@@ -183,6 +191,13 @@ def unmasked(ratings: Any) -> NDArray[Any]:
     plain = ratings.data.astype(float if ratings.dtype.kind == "f" else object)
     plain[masked] = None  # nan among floats
     return np.asarray(plain)
+
+
+def raters_who_rate(coded: CodedRatings) -> CodedRatings:
+    """Leave raters without any rating out, where two others are left."""
+    if coded.n_raters in (0, 1, coded.codes.shape[1]):
+        return coded
+    return replace(coded, codes=coded.codes[:, (coded.codes != MISSING).any(axis=0)])
 
 
 def complete(coded: CodedRatings) -> CodedRatings:
@@ -381,10 +396,14 @@ def pairs_of_raters(coded: CodedRatings) -> list[Codes]:
 def complete_values(
     ratings: Any, categories: Sequence[Label] | None
 ) -> NDArray[np.float64]:
-    """Return the values of items that every rater rated."""
+    """Return the values of items that every rater rated who rated any."""
     # ratings (n_items, n_raters) -> (n_complete_items, n_raters)
     values = rating_values(ratings, categories)
-    return values[~np.isnan(values).any(axis=1)]
+    missing = np.isnan(values)
+    bare = missing.all(axis=0)
+    if bare.any() and (~bare).sum() >= 2:
+        values, missing = values[:, ~bare], missing[:, ~bare]
+    return values[~missing.any(axis=1)]
 
 
 def rating_values(

@@ -29,6 +29,7 @@ Variance = Literal["delta", "irrcac"]
 VARIANCES = get_args(Variance)
 
 NO_PAIR = "no item has ratings of two raters"
+ONE_PAIR = "one item with a pair of ratings has no standard error"
 NO_SPREAD = (
     "the standard error is 0: no item moves the estimate, which does not mean that "
     "there is no uncertainty"

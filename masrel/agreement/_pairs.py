@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from masrel.agreement._counts import bilinear
-from masrel.agreement._data import CodedRatings, pairs_of_raters
+from masrel.agreement._data import CodedRatings, pairs_of_raters, raters_who_rate
 from masrel.agreement._kernel import (
     Array,
     Floats,
@@ -22,7 +22,8 @@ from masrel.errors import RatingsError
 
 
 def two_raters(coded: CodedRatings, title: str) -> CodedRatings:
-    """Return ratings that are of two raters."""
+    """Return ratings that are of two raters, others without any left out."""
+    coded = raters_who_rate(coded)
     n_columns = coded.codes.shape[1]
     if n_columns != 2:
         raise RatingsError(f"{title} needs the ratings of two raters, got {n_columns}")

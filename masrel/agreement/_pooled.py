@@ -131,6 +131,7 @@ def estimate_pooled(
         partial(_influence, coefficient, counted.items, v, (d_e, over_e), irrcac),
         population,
         sums.n_rated,
+        sums.n_usable,
         counted.n_raters,
     )
 
@@ -144,8 +145,10 @@ def ratio_estimate(
     influence: Callable[[bool], Influence],
     population: int | None,
     n_items: int,
+    n_items_paired: int,
     n_raters: int,
     reason: str | None = None,
+    n_sampled: int | None = None,
 ) -> Estimate:
     """Make 1 - D_o / D_e of two fractions, with one division, or say why not."""
     # observed, expected: D_o and D_e as numerator and denominator, 0/0 without a pair
@@ -164,7 +167,7 @@ def ratio_estimate(
         undefined(title, reason)
     else:
         value = (d_e * over_o - d_o * over_e) / (d_e * over_o)
-        error = partial(standard_error, influence, n_items, population)
+        error = partial(standard_error, influence, n_sampled or n_items, population)
     return Estimate(
         coefficient=name,
         weights=v.name,
@@ -173,6 +176,7 @@ def ratio_estimate(
         observed=p_o,
         chance=p_e,
         n_items=n_items,
+        n_items_paired=n_items_paired,
         n_raters=n_raters,
         n_categories=v.n_categories,
         reason=reason,
@@ -291,10 +295,10 @@ def _resampled_raters(coded: CodedRatings, freq: Integers, v: Floats) -> RaterSu
             n = of.sum(axis=-1)
             # Pairs of a rater with its own copies always agree: they are left out.
             pairs = n * n - (of * of).sum(axis=-1)
-            total[..., 0] += _over((of @ disagreement * of).sum(axis=-1), pairs)
+            total[..., 0] += over((of @ disagreement * of).sum(axis=-1), pairs)
             total[..., 1] += n_items * (pairs != 0)
             total[..., 2] += n_items * (n != 0)  # raters who rated none add nothing
-            total[..., 3:] += _over(of @ chosen, n[..., None])
+            total[..., 3:] += over(of @ chosen, n[..., None])
         return total
 
     return sums
@@ -317,7 +321,7 @@ def _rater_pairs(codes: Codes, freq: Integers, v: Floats) -> tuple[int, Floats, 
     return int(freq.sum()), np.einsum("rksl,kl->rs", both, v), chosen
 
 
-def _over(numerator: Floats, denominator: Floats) -> Floats:
-    # 0 where there is nothing to divide by
+def over(numerator: Floats, denominator: Floats) -> Floats:
+    """Divide, with 0 where there is nothing to divide by."""
     empty = denominator == 0
     return np.where(empty, 0.0, numerator) / np.where(empty, 1.0, denominator)

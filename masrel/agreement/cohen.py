@@ -141,6 +141,7 @@ def _estimate(table: Integers, v: Weights, population: int | None) -> Estimate:
         partial(_influence, table, v),
         population,
         n_items=sums.n,
+        n_items_paired=sums.n,
         n_raters=2 if sums.n else 0,
     )
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from masrel.agreement._counts import DistinctItems, bilinear, distinct_rows, item_counts
-from masrel.agreement._data import CodedRatings, code_ratings
+from masrel.agreement._data import CodedRatings, code_ratings, raters_who_rate
 from masrel.agreement._kernel import (
     Floats,
     Influence,
@@ -22,7 +22,7 @@ from masrel.agreement._kernel import (
     weighted_disagreement,
 )
 from masrel.agreement._labels import Label
-from masrel.agreement._pooled import ratio_estimate
+from masrel.agreement._pooled import over, ratio_estimate
 from masrel.agreement._weights import Weights, WeightsLike, declared_weights
 from masrel.estimates import Estimate
 
@@ -65,15 +65,14 @@ def conger_kappa(
     Warns
     -----
     UndefinedStatisticWarning
-        If no item has ratings of two raters, a rater has no rating, or all ratings
-        are in one category; the value is then ``nan``.
+        If no item has ratings of two raters, or all ratings are in one category; the
+        value is then ``nan``.
 
     Notes
     -----
     Chance agreement is that of two different raters, averaged over all pairs, each
     with the shares of its own ratings. Of two raters with complete ratings it is
-    Cohen's kappa. A rater without any rating has no shares, so that the coefficient
-    is undefined: leave the rater out.
+    Cohen's kappa. A rater without any rating has no shares, and is left out.
 
     References
     ----------
@@ -87,16 +86,14 @@ def conger_kappa(
     >>> conger_kappa([["a", "a"], ["a", "b"], ["b", "b"], ["b", "b"]]).value
     0.5
     """
-    coded = code_ratings(ratings, categories)
+    coded = raters_who_rate(code_ratings(ratings, categories))
     v = declared_weights(weights, coded.categories, declared=coded.declared)
     check_variance(variance)
     check_population(population, coded.n_items)
     sums = DistinctItems.of_codes(coded).sums(v)
     margins = _Margins.of(coded, v)
-    reason, influence = None, partial(_influence, coded, v, margins)
-    if 0 in margins.n_ratings:
-        reason = f"0/0: no ratings in column {margins.n_ratings.index(0)}"
-    elif sums.n_usable and margins.numerator:
+    influence = partial(_influence, coded, v, margins)
+    if sums.n_usable and margins.numerator:
         d_o, over_o = sums.observed, sums.denominator * v.denominator
         d_e, over_e = margins.numerator, margins.denominator
         ratio = Fraction(d_o * over_e, d_e * over_o)
@@ -111,8 +108,8 @@ def conger_kappa(
         influence,
         population,
         n_items=coded.n_items,
+        n_items_paired=sums.n_usable,
         n_raters=coded.n_raters,
-        reason=reason,
     )
 
 
@@ -204,13 +201,16 @@ def _value(sums: Floats, v: Floats) -> Floats:
     # sums (..., 2 + n_raters (1 + n_categories)) -> (...)
     observed = divide(sums[..., 0], sums[..., 1])
     of_raters = sums[..., 2:].reshape(*sums.shape[:-1], -1, 1 + len(v))
-    n_ratings = of_raters[..., :1]
-    shares = divide(of_raters[..., 1:], n_ratings)  # nan for a rater without any
+    chosen, n_ratings = of_raters[..., 1:], of_raters[..., 0]
+    # A rater without any rating has no shares; where raters are resampled, one who is
+    # taken c_g times has those of c_g, and c_g c_h pairs with each other rater.
+    taken = over(chosen.sum(axis=-1), n_ratings)
+    shares = over(chosen, n_ratings[..., None])
     total = shares.sum(axis=-2)
     others = total[..., None, :] - shares
     expected = ((others @ v) * shares).sum(axis=(-1, -2))
-    r = of_raters.shape[-2]
-    return 1.0 - divide(observed, expected / (r * (r - 1)))
+    n_pairs = taken.sum(axis=-1) ** 2 - (taken**2).sum(axis=-1)
+    return 1.0 - divide(observed, divide(expected, n_pairs))
 
 
 _KERNEL = Kernel(features=_features, value=_value)

@@ -75,6 +75,7 @@ def kendall_w(
         observed=math.nan,
         chance=math.nan,
         n_items=ranks.n,
+        n_items_paired=ranks.n if ranks.m > 1 else 0,
         n_raters=ranks.m,
         n_categories=len(np.unique(values)) if categories is None else len(categories),
         reason=reason,

@@ -199,6 +199,7 @@ def _estimate(counted: CountedRatings, v: Weights, population: int | None) -> Es
         partial(_influence, counted.items, v, sums),
         population,
         sums.n_items,
+        sums.n_items,
         counted.n_raters,
     )
 

@@ -10,7 +10,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from masrel.agreement._counts import distinct_rows
-from masrel.agreement._data import CodedRatings, code_ratings, complete
+from masrel.agreement._data import CodedRatings, code_ratings, complete, raters_who_rate
 from masrel.agreement._kernel import (
     Array,
     Influence,
@@ -92,7 +92,7 @@ def light_kappa(
     >>> light_kappa([["a", "a"], ["a", "b"], ["b", "b"], ["b", "b"]]).value
     0.5
     """
-    coded = code_ratings(ratings, categories)
+    coded = raters_who_rate(code_ratings(ratings, categories))
     if deletion not in get_args(Deletion):
         raise ParameterError(
             f"deletion: needs one of {', '.join(get_args(Deletion))}, got {deletion!r}"
@@ -113,7 +113,7 @@ def light_kappa(
         error = partial(
             standard_error,
             partial(_influence, coded, v, dict(zip(pairs, tables, strict=True))),
-            coded.n_items,
+            coded.n_items_paired,
             population,
         )
     return _estimate(coded, v, sums, reason, error)
@@ -141,6 +141,7 @@ def _estimate(
         observed=observed,
         chance=chance,
         n_items=coded.n_items,
+        n_items_paired=coded.n_items_paired,
         n_raters=coded.n_raters,
         n_categories=coded.n_categories,
         reason=reason,
@@ -174,14 +175,14 @@ def _influence(
     exact: bool,
 ) -> Influence:
     # An item moves the mean of the pairs' kappas by its influence on each, n / n_pair
-    # times as often as one of the n_pair items that both rated.
+    # times as often as one of the n_pair items that both rated, n items with a pair.
     rows, freq = distinct_rows(coded.codes, coded.n_categories)
     freq = freq.astype(object if exact else np.float64)
     u: Array = np.zeros(len(rows), dtype=freq.dtype)
     terms = u.copy()
     for (g, h), table in tables.items():
         slopes, pairs = PairSlopes.of(table, v, exact), rows[:, [g, h]]
-        often = Fraction(coded.n_items, int(table.sum()) * len(tables))
+        often = Fraction(coded.n_items_paired, int(table.sum()) * len(tables))
         rate: Any = often if exact else float(often)
         u += of_pairs(slopes.influence() * rate, pairs)
         terms += of_pairs(abs(slopes.observed * (rate / slopes.d_e)), pairs)

@@ -7,7 +7,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from masrel.agreement._kernel import NO_SPREAD, undefined
+from masrel.agreement._kernel import NO_SPREAD, ONE_PAIR, undefined
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate
 
@@ -83,7 +83,8 @@ def p_value(
     -------
     float
         Of t = (value - null) / standard error, by Student's t with n - 1 degrees of
-        freedom, accurate to the far tail; ``nan`` where it is undefined.
+        freedom, n the items with a pair of ratings, accurate to the far tail; ``nan``
+        where it is undefined.
 
     Raises
     ------
@@ -127,7 +128,7 @@ def p_value(
         undefined(f"p-value of {estimate.coefficient}", reason)
         return math.nan
     t = (estimate.value - value) / estimate.standard_error
-    df = estimate.n_items - 1
+    df = estimate.n_items_paired - 1
     if alternative == "two-sided":
         return min(1.0, 2.0 * float(stdtr(df, -abs(t))))
     return float(stdtr(df, -t if alternative == "greater" else t))
@@ -212,11 +213,9 @@ def _why_untestable(estimate: Estimate) -> str | None:
         return estimate.reason or "the estimate itself is undefined"
     if estimate.standard_error == 0.0:
         return NO_SPREAD
-    if not math.isnan(estimate.standard_error):
-        return None
-    if estimate.n_items < 2:
-        return "one item has no standard error"
-    return "it has no standard error"
+    if estimate.n_items_paired == 1:
+        return ONE_PAIR
+    return "it has no standard error" if math.isnan(estimate.standard_error) else None
 
 
 def holm(p_values: Sequence[float]) -> list[float]:

@@ -101,6 +101,8 @@ def stratified_kappa(
         partial(_stratified_influence, coded, tables, v),
         None,
         n_items=coded.n_items,
+        n_items_paired=_n_paired(coded),
+        n_sampled=_n_paired(coded),
         n_raters=len(used),
     )
 
@@ -110,20 +112,26 @@ def _tables(coded: CodedRatings) -> list[Integers]:
     return [pair_table(codes, coded.n_categories) for codes in pairs_of_raters(coded)]
 
 
+def _n_paired(coded: CodedRatings) -> int:
+    # items with both ratings of any rater
+    both = [(pairs >= 0).all(axis=1) for pairs in pairs_of_raters(coded)]
+    return int(np.any(both, axis=0).sum())
+
+
 def _stratified_influence(
     coded: CodedRatings, tables: list[Integers], v: Weights, exact: bool
 ) -> Influence:
     # An item moves Σ_r D_o,r and Σ_r D_e,r in every stratum that it has a pair in,
-    # n / n_r times as often as one of the n_r items of the stratum.
+    # n / n_r times as often as one of the n_r items of the stratum; n have a pair.
     slopes = {r: PairSlopes.of(t, v, exact) for r, t in enumerate(tables) if t.any()}
-    d_e = sum(of.d_e for of in slopes.values())
+    n, d_e = _n_paired(coded), sum(of.d_e for of in slopes.values())
     ratio = sum(of.d_o for of in slopes.values()) / d_e
     rows, freq = distinct_rows(coded.codes, coded.n_categories)
     freq = freq.astype(object if exact else np.float64)
     u, terms = np.zeros((2, len(rows)), dtype=freq.dtype)
     for r, of in slopes.items():
         pairs = rows[:, 2 * r : 2 * r + 2]
-        often = Fraction(coded.n_items, int(tables[r].sum()))
+        often = Fraction(n, int(tables[r].sum()))
         rate = (often if exact else float(often)) / d_e
         u += of_pairs((ratio * of.expected - of.observed) * rate, pairs)
         terms += of_pairs(abs(of.observed * rate), pairs)
@@ -197,6 +205,8 @@ def pooled_kappa(
         partial(_pooled_influence, coded, table, v),
         None,
         n_items=coded.n_items,
+        n_items_paired=_n_paired(coded),
+        n_sampled=_n_paired(coded),
         n_raters=sum(1 for of_rater in tables if of_rater.any()),
     )
 
@@ -204,9 +214,9 @@ def pooled_kappa(
 def _pooled_influence(
     coded: CodedRatings, table: Integers, v: Weights, exact: bool
 ) -> Influence:
-    # An item moves kappa by the sum of what its pairs do; items are the sample.
+    # An item moves kappa by the sum of what its pairs do; items with one are sampled.
     slopes = PairSlopes.of(table, v, exact)
-    often = Fraction(coded.n_items, int(table.sum()))
+    often = Fraction(_n_paired(coded), int(table.sum()))
     rate = often if exact else float(often)
     rows, freq = distinct_rows(coded.codes, coded.n_categories)
     strata = [rows[:, at : at + 2] for at in range(0, rows.shape[1], 2)]

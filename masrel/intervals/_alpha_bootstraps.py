@@ -143,7 +143,7 @@ class _Pairs:
         table, n = of_values.table, of_values.n
         both = np.triu(table) + np.triu(table, 1)  # each pair of values once
         kinds = np.nonzero(both)
-        others = problem.coded.n_raters - 1
+        others = problem.n_raters - 1
         most = _CELLS * int(np.count_nonzero(table))
         alike = (np.diagonal(table) / n) ** of_values.n_pairs
         return cls(

@@ -8,7 +8,8 @@ coefficients of two raters on that of their table.
 import math
 from dataclasses import replace
 
-from masrel.agreement._counts import item_counts
+import numpy as np
+
 from masrel.estimates import Interval
 from masrel.intervals._problem import IntervalProblem
 from masrel.intervals._rho import (
@@ -19,10 +20,10 @@ from masrel.intervals._rho import (
 )
 from masrel.intervals._two_raters import applies_to, default_table_interval
 from masrel.intervals.jackknife import (
-    _excess_of_raters,
     _interval_around_estimate,
     _jackknife_variance,
     _JackknifeVariance,
+    _variance_of_cells,
 )
 
 _FEW = 10  # items, and raters, below which a posterior covers best
@@ -35,25 +36,29 @@ def choose_interval(
 ) -> tuple[Interval, str]:
     """Compute the interval that covers best, and say what it is and why."""
     # modelled: whether the Dirichlet-multinomial model answers for the coefficient
-    target, n_items = problem.target, problem.n_items
-    n_raters = problem.coded.codes.shape[1]
+    # Items and raters are counted that have a pair of ratings.
+    target, n_items = problem.target, problem.n_paired_items
+    n_raters = problem.n_paired_raters
     if problem.entry.shape == "pairs":
         why = "items leave with the pairs of all their raters"
         return _interval_around_estimate(problem, _jackknife_variance(problem)), why
     if n_items == 0:
-        why = "nobody rated anything"
+        why = "no item has ratings of two raters"
         return _interval_around_estimate(problem, _jackknife_variance(problem)), why
+    if target == "both":
+        return _other_items_and_raters(problem, modelled)
     is_small = modelled and n_items < _FEW and n_raters < _FEW
     if target == "items" and is_small:
         why = f"few items ({n_items}) and raters, where it covers best"
         return default_rho_interval(problem), why
-    of_two = target == "items" and n_raters == 2
+    of_two = target == "items" and problem.n_raters == 2
     tabular = of_two and not modelled and applies_to(problem)
     if tabular and n_items < _FEW:
         why = f"few items ({n_items}), where it covers best"
         return default_table_interval(problem), why
     jackknifed = _jackknife_variance(problem)
-    n_ratings = int(problem.freq @ (problem.patterns.codes >= 0).sum(axis=1))
+    sizes = (problem.patterns.codes >= 0).sum(axis=1)
+    n_ratings = int(problem.freq @ np.where(sizes > 1, sizes, 0))
     # an accident of few disagreements gives as much
     accident = _ACCIDENT * (1.0 - problem.value) / n_ratings if modelled else 0.0
     if not jackknifed.variance > accident:
@@ -66,13 +71,11 @@ def choose_interval(
         # An intraclass correlation of r raters is at least -1/(r - 1): its logit is
         # Fisher's transformation, ln[(1 + (r - 1) κ) / (1 - κ)].
         lowest = -1.0 / (per_item - 1.0)
-    if target == "both":
-        return _other_items_and_raters(problem, is_small, lowest, jackknifed.notes)
     interval = problem.around(
         problem.value,
-        problem.student_t(n_items - 1) * math.sqrt(jackknifed.variance),
+        problem.student_t(jackknifed.df) * math.sqrt(jackknifed.variance),
         lowest=lowest,
-        method=f"item jackknife, t({n_items - 1}) on the logit",
+        method=f"item jackknife, t({jackknifed.df:g}) on the logit",
         unit="items",
         notes=jackknifed.notes,
     )
@@ -100,7 +103,7 @@ def _without_spread(
 def _lift(problem: IntervalProblem, interval: Interval) -> Interval:
     # An estimate of few items is skewed: low where its error is low, too. The posterior
     # knows, but trusts many raters too much where κ is low; halfway covers with either.
-    counts = item_counts(problem.coded)
+    counts = problem.item_counts()
     high = RhoPosterior.of(counts, DEFAULT_PRIOR, problem.level).high
     if not high > interval.high:
         return interval
@@ -114,23 +117,38 @@ def _lift(problem: IntervalProblem, interval: Interval) -> Interval:
 
 
 def _other_items_and_raters(
-    problem: IntervalProblem,
-    is_small: bool,
-    lowest: float,
-    notes: tuple[str, ...],
+    problem: IntervalProblem, modelled: bool
 ) -> tuple[Interval, str]:
-    t_raters = problem.student_t(problem.coded.codes.shape[1] - 1)
-    excess = t_raters**2 * _excess_of_raters(problem)
-    if is_small:
-        why = "few items and raters; raters add what they differ by"
-        return default_rho_interval(problem, excess), why
-    items = _jackknife_variance(replace(problem, target="items")).variance
-    interval = problem.around(
-        problem.value,
-        math.sqrt(problem.student_t(problem.n_items - 1) ** 2 * items + excess),
-        lowest=lowest,
-        method="two-way jackknife, t on the logit",
-        unit="both",
-        notes=notes,
+    # Either end is as far from the estimate as other items alone, and as other raters
+    # alone, would put it: these distances squared and added, less what both hold of the
+    # disagreement of a rater on an item, which is never taken as more than either has.
+    # So the variance is below neither; nor is an end inside either interval. With the
+    # fewer degrees of freedom of the two, in both, the answer is no surer than either.
+    df = min(problem.n_paired_items, problem.n_paired_raters) - 1
+    items, raters = (
+        choose_interval(replace(problem, target=of, max_df=df), modelled=modelled)[0]
+        for of in ("items", "raters")
     )
-    return interval, "items left out, and what raters differ by beyond single ratings"
+    why = "what items left out and raters left out move"
+    for part in (items, raters):
+        if part.reason is not None:
+            return part, why
+    if (items.low, items.high) == (raters.low, raters.high):
+        return items, why  # nothing moves, and the same model must say what that hides
+    common = problem.student_t(df) ** 2 * _variance_of_cells(problem)
+    ends = np.array([[items.low, items.high], [raters.low, raters.high]])
+    of_items, of_raters = np.maximum((ends - problem.value) * (-1.0, 1.0), 0.0) ** 2
+    both = np.minimum(of_items, of_raters)
+    low, high = np.sqrt(of_items + of_raters - np.minimum(common, both)).tolist()
+    interval = problem.confidence(
+        problem.value - low,
+        problem.value + high,
+        method=f"{items.method}, and {raters.method}",
+        unit="both",
+        notes=[
+            f"{of}: {note}"
+            for of, part in (("items", items), ("raters", raters))
+            for note in part.notes
+        ],
+    )
+    return interval, why

@@ -59,10 +59,10 @@ def unit_influences(problem: IntervalProblem, units: Integers) -> UnitInfluences
     """Return the derivative of the coefficient in the weight of each unit."""
     # units (n_items,): the unit of every row of the ratings, from 0
     slopes = _slopes(problem)
-    n_items = len(problem.coded.codes)
+    n_items = len(problem.used.codes)
     moves, known = np.zeros(n_items), np.zeros(n_items, dtype=bool)
     for block in blocks(n_items):
-        part = replace(problem.coded, codes=problem.coded.codes[block])
+        part = replace(problem.used, codes=problem.used.codes[block])
         features = problem.features(part)
         moves[block] = features @ slopes
         known[block] = features.any(axis=1)  # without a pair some have none

@@ -17,7 +17,7 @@ from masrel.agreement import (
     WeightsLike,
     coefficient,
 )
-from masrel.agreement._counts import distinct_rows
+from masrel.agreement._counts import distinct_rows, item_counts
 from masrel.agreement._kernel import Floats, Kernel, RaterSums
 from masrel.errors import (
     ParameterError,
@@ -37,6 +37,10 @@ HELD = (
 )
 
 _MAX_REMADE = 40  # categories up to which that metric is made anew from their pairs
+
+COLUMNS = {"ratings": 1, "pairs": 2}
+"""Columns of codes that a rater has, by what a coefficient takes."""
+
 _BLOCK = 1 << 14  # items at once: what is made of them takes more room than they do
 
 
@@ -49,17 +53,43 @@ class IntervalProblem:
     entry: Coefficient
     kernel: Kernel
     coded: CodedRatings  # all ratings, item by item
-    patterns: CodedRatings  # the distinct rows of ratings that are not empty
+    used: CodedRatings  # the same of raters who matter
+    distinct: CodedRatings  # the distinct rows of these, and how often each occurs
+    distinct_freq: Integers = field(compare=False, repr=False)  # (n_distinct,)
+    matters: NDArray[np.bool_] = field(compare=False, repr=False)  # (n_distinct,)
+    patterns: CodedRatings  # the distinct rows of ratings that matter
     freq: Integers = field(compare=False, repr=False)  # (n_patterns,)
     rows: Floats = field(compare=False, repr=False)  # (n_patterns, n_features)
     sums: Floats = field(compare=False, repr=False)  # over all items, (n_features,)
     v: Floats = field(compare=False, repr=False)  # disagreement of two categories
-    n_items: int  # items with a rating
+    n_items: int  # that matter: of those, an item of one rating tells of chance only
+    # those with a pair of ratings, which degrees of freedom and rules for few count
+    n_paired_items: int
     value: float  # the estimate; ``nan`` when undefined
     min_value: float  # where intervals are cut
     target: Target
     level: float
     notes: tuple[str, ...] = ()  # of every interval
+    max_df: float = math.inf  # degrees of freedom, where other parts have as few
+
+    @property
+    def n_raters(self) -> int:
+        """Raters who matter."""
+        n_columns: int = self.patterns.codes.shape[1]
+        return n_columns // COLUMNS[self.entry.shape]
+
+    @property
+    def n_paired_raters(self) -> int:
+        """Raters with a rating of an item that has a pair of ratings."""
+        if self.entry.shape == "pairs":
+            return self.n_raters
+        rated = self.patterns.codes >= 0
+        return int(rated[rated.sum(axis=1) >= 2].any(axis=0).sum())
+
+    def item_counts(self) -> Integers:
+        """Count the raters of each category for every item that matters."""
+        # -> (n_items, n_categories), equal items together
+        return item_counts(self.patterns).repeat(self.freq, axis=0)
 
     def values(self, sums: Floats) -> Floats:
         """Return the coefficient for sums of shape (..., n_features)."""
@@ -78,11 +108,6 @@ class IntervalProblem:
     def features(self, coded: CodedRatings) -> Floats:
         """Return the features of items, (n_items, n_features)."""
         return _features(self.kernel, coded, self.v)
-
-    def item_features(self) -> Floats:
-        """Return the features of every item with a rating, in order."""
-        rated = (self.coded.codes >= 0).any(axis=1)
-        return self.features(self.coded)[rated]
 
     def rater_sums(self) -> RaterSums:
         """Return sums of features as a function of how often each rater is taken."""
@@ -196,6 +221,8 @@ def pose_problem(
     coded = entry.code(ratings, categories)
     fewest, most = entry.n_raters
     n_raters = coded.codes.shape[1]
+    if most is not None and n_raters > most:
+        n_raters = coded.n_raters  # those without any rating are none
     if entry.shape == "ratings" and not fewest <= n_raters <= (most or n_raters):
         _refuse_raters(entry, n_raters)
     kernel = entry.kernel
@@ -208,23 +235,31 @@ def pose_problem(
     notes: tuple[str, ...] = ()
     if entry.metric == "ordinal" and coded.n_categories > _MAX_REMADE:
         kernel, notes = coefficient(entry.name).kernel or kernel, (HELD,)
-    codes, freq = distinct_rows(coded.codes, len(coded.categories))
-    if (codes[0] < 0).all():  # the first of them, if any, has no rating
-        codes, freq = codes[1:], freq[1:]
-    patterns = replace(coded, codes=codes)
-    rows = _features(kernel, patterns, v)
+    used, distinct, freq, rows = _what_matters(entry, kernel, coded, v)
+    matters, every_freq = np.asarray(rows.any(axis=1)), freq
+    patterns = distinct
+    if not matters.all():
+        patterns = replace(distinct, codes=distinct.codes[matters])
+        freq, rows = freq[matters], rows[matters]
     sums = np.asarray(freq @ rows)
     value = float(kernel.value(sums, v))
+    # a pair is of one rater in a test-retest, where rows without one do not matter
+    paired = (patterns.codes >= 0).sum(axis=1) >= 2
     return IntervalProblem(
         entry=entry,
         kernel=kernel,
         coded=coded,
+        used=used,
+        distinct=distinct,
+        distinct_freq=every_freq,
+        matters=matters,
         patterns=patterns,
         freq=freq,
         rows=rows,
         sums=sums,
         v=v,
         n_items=int(freq.sum()),
+        n_paired_items=int(freq @ paired),
         value=value,
         # weights, or items of a single rating, can bring a coefficient below -1
         min_value=entry.lowest if value >= entry.lowest else -math.inf,
@@ -250,6 +285,30 @@ def _refuse_raters(entry: Coefficient, n_raters: int) -> NoReturn:
     raise ParameterError(f"{entry.title} needs {needed} raters, got {n_raters}")
 
 
+def _what_matters(
+    entry: Coefficient, kernel: Kernel, coded: CodedRatings, v: Floats
+) -> tuple[CodedRatings, CodedRatings, Integers, Floats]:
+    """Return ratings of raters who matter, distinct rows, frequencies and features."""
+    # A row whose features are all 0 changes no sum: to the coefficient it is no item.
+    # A rater without a rating in the others, or a pair in a test-retest, is no rater;
+    # so the same intervals follow whether such rows and columns are there or not.
+    width, fewest = COLUMNS[entry.shape], entry.n_raters[0]
+    while True:
+        codes, freq = distinct_rows(coded.codes, len(coded.categories))
+        rated = (codes >= 0).any(axis=0)  # (n_columns,)
+        if width == 1 and fewest <= rated.sum() < rated.size:
+            coded = replace(coded, codes=coded.codes[:, rated])
+            continue
+        distinct = replace(coded, codes=codes)
+        rows = _features(kernel, distinct, v)
+        codes = codes[rows.any(axis=1)]
+        shape = (len(codes), codes.shape[1] // width, width)
+        rates = (codes >= 0).reshape(shape).all(axis=2).any(axis=0)  # (n_raters,)
+        if rates.all() or rates.sum() < fewest:
+            return coded, distinct, freq, rows
+        coded = replace(coded, codes=coded.codes[:, rates.repeat(width)])
+
+
 def _features(kernel: Kernel, coded: CodedRatings, v: Floats) -> Floats:
     # (n_items, n_features), made a block at a time
     n_items = len(coded.codes)
@@ -270,10 +329,14 @@ def blocks(n_items: int) -> Iterator[slice]:
         yield slice(start, min(start + _BLOCK, n_items))
 
 
-def warn_small(count: int, minimum: int, what: str) -> tuple[str, ...]:
+def warn_small(
+    count: int, minimum: int, what: str, of: int | None = None
+) -> tuple[str, ...]:
     """Warn below a number of items or raters, and return the note of it."""
     if count >= minimum:
         return ()
+    if of is not None and of > count:  # as many are there, few of them with a pair
+        what += " with a pair of ratings"
     note = f"{count} {what}: below {minimum} the interval may cover less than it says"
     # called by what a method calls: the warning points to who called the method
     warnings.warn(note, SmallSampleWarning, stacklevel=4)

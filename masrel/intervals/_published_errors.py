@@ -56,7 +56,8 @@ def published_error(
 ) -> float:
     """Return the standard error of an estimate by the formula of that name."""
     if error == "over_n":
-        n = estimate.n_items
+        # items with a pair in a test-retest: others are no part of that sample
+        n = problem.n_items if problem.entry.shape == "pairs" else estimate.n_items
         return estimate.standard_error * math.sqrt((n - 1) / n)
     if error == "cohen":
         return _cohen(problem)
@@ -76,7 +77,7 @@ def _cohen(problem: IntervalProblem) -> float:
             f'error: "cohen" is of Cohen\'s κ alone, got {problem.entry.title}'
         )
     v = problem.v
-    p = pair_table(problem.coded.codes, len(v)).astype(np.float64)
+    p = pair_table(problem.used.codes, len(v)).astype(np.float64)
     n = p.sum()
     p /= n
     expected = (v * np.outer(p.sum(axis=1), p.sum(axis=0))).sum()
@@ -136,5 +137,5 @@ def _irrcac_of_alpha(counts: Floats, freq: Floats, v: Floats) -> float:
 def _unconditional(problem: IntervalProblem, estimate: Estimate) -> float:
     # √(V_items + V_raters): the variance over items with these raters, and the
     # jackknife's over raters with these items
-    of_raters = _variance_of(*_without_rater(problem))
+    of_raters = _variance_of(*_without_rater(problem), problem.n_paired_raters)
     return math.sqrt(estimate.standard_error**2 + of_raters)

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit
 
-from masrel.agreement._counts import item_counts
 from masrel.errors import ParameterError
 from masrel.estimates import Distribution, Interval
 from masrel.intervals._dirichlet_multinomial import DirichletMultinomial, RhoDensity
@@ -157,29 +156,25 @@ def prior_notes(
     )
 
 
-def default_rho_interval(problem: IntervalProblem, excess: float = 0.0) -> Interval:
-    """Compute an interval that holds the estimate, and what raters differ by."""
-    # `excess` is the squared half-width that raters add
+def default_rho_interval(problem: IntervalProblem) -> Interval:
+    """Compute an interval that holds the estimate."""
     if not problem.value < 1.0:  # perfect, or undefined: one category
         return lower_bound_of_rho(problem)
-    counts = item_counts(problem.coded)
+    counts = problem.item_counts()
     posterior = RhoPosterior.of(counts, DEFAULT_PRIOR, problem.level)
     low, high = posterior.low, posterior.high
     notes = prior_notes(counts, DEFAULT_PRIOR, problem.level, low, high)
-    method = "Dirichlet-multinomial posterior, exact"
-    if excess:
-        method += ", and the spread of raters"
-        middle = posterior.quantile(0.5)
-        low = middle - math.hypot(middle - low, math.sqrt(excess))
-        high = middle + math.hypot(high - middle, math.sqrt(excess))
     if not low <= problem.value <= high:
         notes += ("widened to the estimate, which lies outside the posterior's",)
     interval = problem.confidence(
-        min(low, problem.value), max(high, problem.value), method=method, unit=None
+        min(low, problem.value),
+        max(high, problem.value),
+        method="Dirichlet-multinomial posterior, exact",
+        unit=None,
     )
     return dataclasses.replace(
         interval,
-        kind="confidence" if excess else "credible",
+        kind="credible",
         notes=(*interval.notes, *notes),
         distribution=posterior.distribution(),
     )
@@ -188,7 +183,7 @@ def default_rho_interval(problem: IntervalProblem, excess: float = 0.0) -> Inter
 def lower_bound_of_rho(problem: IntervalProblem) -> Interval:
     """Compute the interval of all that is above a lower quantile."""
     counts, prior, share = (
-        item_counts(problem.coded),
+        problem.item_counts(),
         DEFAULT_PRIOR,
         1.0 - problem.level,
     )
@@ -226,7 +221,7 @@ def rho_interval(
 ) -> Interval:
     """Compute the central credible interval of ρ."""
     method = f"Dirichlet-multinomial posterior, {'emcee' if sampled else 'exact'}"
-    counts = item_counts(problem.coded)
+    counts = problem.item_counts()
     reason = _nothing_to_learn(counts)
     if reason is not None:
         undefined = problem.undefined(reason, method=method, unit=None)

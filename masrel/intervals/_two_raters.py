@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from masrel.agreement._kernel import Floats
 from masrel.errors import ParameterError
@@ -66,12 +65,11 @@ class TablePrior:
 
 def applies_to(problem: IntervalProblem) -> bool:
     """Return whether a table of two raters can answer a question."""
-    codes = problem.coded.codes
-    if problem.entry.name not in CHANCE_AGREEMENT or codes.shape[1] != 2:
+    if problem.entry.name not in CHANCE_AGREEMENT or problem.n_raters != 2:
         return False
     if problem.entry.metric == "ordinal":  # not one of a table, but of its ratings
         return False
-    table, _ = _table(codes, problem.coded.n_categories)
+    table, _ = _table(problem)
     return _nothing_to_learn(problem, table) is None
 
 
@@ -102,7 +100,7 @@ def table_interval(
 ) -> Interval:
     """Compute the credible interval of a coefficient of two raters."""
     _check(problem, n_draws)
-    table, n_single = _table(problem.coded.codes, problem.coded.n_categories)
+    table, n_single = _table(problem)
     reason = _nothing_to_learn(problem, table)
     if reason is not None:
         undefined = problem.undefined(reason, method="table posterior", unit=None)
@@ -193,7 +191,7 @@ def _interval(
 
 
 def _check(problem: IntervalProblem, n_draws: int) -> None:
-    name, n_raters = problem.entry.name, problem.coded.codes.shape[1]
+    name, n_raters = problem.entry.name, problem.n_raters
     if name not in CHANCE_AGREEMENT or n_raters != 2:
         raise ParameterError(
             f'model: "table" applies to {", ".join(CHANCE_AGREEMENT)} of exactly two '
@@ -208,13 +206,14 @@ def _check(problem: IntervalProblem, n_draws: int) -> None:
         raise ParameterError(f"n_draws: needs at least {_MIN_DRAWS}, got {n_draws}")
 
 
-def _table(codes: NDArray[np.signedinteger], n_categories: int) -> tuple[Floats, int]:
-    # (n_items, 2) -> items per pair of categories, and items of one rating
-    n_ratings = (codes >= 0).sum(axis=1)
-    both = codes[n_ratings == 2].astype(np.int64)
-    cells = np.bincount(both @ (n_categories, 1), minlength=n_categories**2)
-    shape = (n_categories, n_categories)
-    return cells.reshape(shape).astype(np.float64), int((n_ratings == 1).sum())
+def _table(problem: IntervalProblem) -> tuple[Floats, int]:
+    # -> items per pair of categories, (n_categories, n_categories), and those of one
+    # rating that matter otherwise
+    codes, freq = problem.patterns.codes, problem.freq
+    paired = (codes >= 0).all(axis=1)
+    cells = np.zeros((problem.coded.n_categories,) * 2)
+    cells[tuple(codes[paired].T)] = freq[paired]  # distinct rows: one a cell
+    return cells, int(freq[~paired].sum())
 
 
 def _nothing_to_learn(problem: IntervalProblem, table: Floats) -> str | None:

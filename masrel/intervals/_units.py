@@ -145,30 +145,37 @@ def sampling_units(
         if clusters is not None:
             raise ParameterError('clusters: are of items, and need target="items"')
         units, name, minimum = rater_units(problem), "raters", 5
+        n_paired = problem.n_paired_raters
     elif clusters is None:
         units, name, minimum = (
             row_units(problem, problem.rows, problem.freq),
             "items",
             16,
         )
+        n_paired = problem.n_paired_items
     else:
-        units, name, minimum = cluster_units(problem, clusters), "clusters", 16
-    return replace(units, notes=warn_small(units.n, minimum, name))
+        units, n_paired = cluster_units(problem, clusters)
+        name, minimum = "clusters", 16
+    return replace(units, notes=warn_small(n_paired, minimum, name, units.n))
 
 
 def cluster_units(
     problem: IntervalProblem, clusters: Sequence[object] | NDArray[Any]
-) -> SamplingUnits:
-    """Return clusters of items, those with equal sums of features together."""
+) -> tuple[SamplingUnits, int]:
+    """Return clusters of items, those alike together, and how many have a pair."""
     # Takes clusters (n_items,)
-    numbers, n_clusters = _numbered(problem, clusters)
-    codes = problem.coded.codes
-    sums = np.zeros((n_clusters, problem.rows.shape[1]))
+    numbers = _numbered(problem, clusters)
+    codes = problem.used.codes
+    sums = np.zeros((max(1, int(numbers.max()) + 1), problem.rows.shape[1]))
+    paired = np.zeros(len(sums), dtype=bool)
     for block in blocks(len(codes)):
-        rated = np.any(codes[block] >= 0, axis=1)
-        items = replace(problem.coded, codes=codes[block][rated])
-        np.add.at(sums, numbers[block][rated], problem.features(items))
-    return row_units(problem, sums, np.ones(n_clusters, dtype=np.int64))
+        features = problem.features(replace(problem.used, codes=codes[block]))
+        np.add.at(sums, numbers[block], features)
+        has_pair = features.any(axis=1) & ((codes[block] >= 0).sum(axis=1) >= 2)
+        paired[numbers[block][has_pair]] = True
+    matters = sums.any(axis=1)
+    units = row_units(problem, sums[matters], np.ones(matters.sum(), dtype=np.int64))
+    return units, int(paired.sum())
 
 
 def rater_units(problem: IntervalProblem) -> SamplingUnits:
@@ -187,8 +194,8 @@ def rater_units(problem: IntervalProblem) -> SamplingUnits:
 
 def _numbered(
     problem: IntervalProblem, clusters: Sequence[object] | NDArray[Any]
-) -> tuple[Integers, int]:
-    """Return each item's number of cluster, -1 without ratings, and how many."""
+) -> Integers:
+    """Return each item's number of cluster, -1 without ratings."""
     labels = list(clusters)
     n_items = problem.coded.codes.shape[0]
     if len(labels) != n_items:
@@ -210,7 +217,7 @@ def _numbered(
         raise ParameterError(f"clusters: needs plain labels, {error}") from error
     if any(label is None or label != label for label in number):
         raise ParameterError("clusters: every item needs a label, got a missing one")
-    return numbers, len(number)
+    return numbers
 
 
 def row_units(problem: IntervalProblem, rows: Floats, freq: Integers) -> SamplingUnits:

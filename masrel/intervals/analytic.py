@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Literal, get_args
 
 from masrel.agreement import Label, Metric, WeightsLike
-from masrel.agreement._kernel import NO_SPREAD
+from masrel.agreement._kernel import NO_SPREAD, ONE_PAIR
 from masrel.errors import ParameterError, UndefinedStatisticWarning
 from masrel.estimates import Estimate, Interval, Target, Unit
 from masrel.intervals._problem import (
@@ -68,7 +68,8 @@ def analytic(
     level : float, optional
         Nominal level.
     distribution : {"t", "normal", "logit", "fisher"}, optional
-        Student's t with n - 1 degrees, the normal, or t on the logit of the
+        Student's t with n - 1 degrees, n the items with a pair of ratings; the
+        normal; or t on the logit of the
         position between the ends of the parameter space or on Fisher's z.
     error : {"delta", "over_n", "cohen", "irrcac", "unconditional"}, optional
         Ours, or the one that others publish, by name; see Notes.
@@ -89,7 +90,8 @@ def analytic(
     Warns
     -----
     SmallSampleWarning
-        Below 10 items, and with the unconditional error below 5 raters.
+        Below 10 items with a pair of ratings, and with the unconditional error below 5
+        raters.
     UndefinedStatisticWarning
         If the estimate or its standard error is undefined or 0.
 
@@ -175,10 +177,11 @@ def _interval_around_estimate(
     reason = _why_undefined(estimate)
     if reason is not None:
         return problem.undefined(reason, method=method, unit=unit)
-    notes, df = warn_small(estimate.n_items, 10, "items"), estimate.n_items - 1
+    df = estimate.n_items_paired - 1
+    notes = warn_small(df + 1, 10, "items", estimate.n_items)
     if unit == "raters":
-        notes += warn_small(estimate.n_raters, 5, "raters")
-        df = min(df, estimate.n_raters - 1)
+        notes += warn_small(problem.n_paired_raters, 5, "raters", estimate.n_raters)
+        df = min(df, problem.n_paired_raters - 1)
     lowest = None
     if distribution in ("logit", "fisher"):
         # artanh x is half the logit of (x + 1)/2, so that both give the same ends
@@ -200,10 +203,10 @@ def _interval_around_estimate(
 
 def _why_undefined(estimate: Estimate) -> str | None:
     """Return why there is no interval, if there is none."""
-    if estimate.reason is not None or estimate.standard_error > 0.0:
+    if estimate.reason is not None:
         return estimate.reason
-    if estimate.n_items < 2:
-        return "one item has no standard error"
+    if estimate.n_items_paired < 2:
+        return ONE_PAIR
     if math.isnan(estimate.standard_error):
         return "with one of the raters left out the estimate is undefined"
-    return NO_SPREAD
+    return None if estimate.standard_error > 0.0 else NO_SPREAD

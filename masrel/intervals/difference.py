@@ -60,8 +60,9 @@ def difference(
     Estimate
         First less second, with its jackknife standard error over items and its
         interval by Student's t, which generalises to other items: n - 1 degrees for the
-        same items, Satterthwaite's for independent ones. `observed` and `chance` are
-        differences, too.
+        same items, n those with a pair of ratings in the set that has fewer of them;
+        Satterthwaite's for independent ones. `observed` and `chance` are differences,
+        too.
 
     Raises
     ------
@@ -111,6 +112,7 @@ def difference(
         observed=one.observed - other.observed,
         chance=one.chance - other.chance,
         n_items=min(one.n_items, other.n_items),
+        n_items_paired=min(one.n_items_paired, other.n_items_paired),
         n_raters=min(one.n_raters, other.n_raters),
         n_categories=one.n_categories,
         reason=one.reason or other.reason,
@@ -273,15 +275,15 @@ def _dependent(one: IntervalProblem, other: IntervalProblem) -> tuple[float, flo
             f"design: dependent ratings need both for every item, row {row} has "
             "ratings in one of them only"
         )
-    n = one.n_items
+    n = min(one.n_paired_items, other.n_paired_items)
     if n < 2:
         return math.nan, 0.0
+    first, second = (problem.features(problem.used) for problem in (one, other))
+    matters = first.any(axis=1) | second.any(axis=1)  # the item to either of them
     # both coefficients without item i, from the sums less its features
-    first, second = (
-        problem.values(problem.sums - problem.item_features())
-        for problem in (one, other)
-    )
-    return _variance_of(first - second, np.ones(n, dtype=np.int64)), float(n - 1)
+    moved = one.values(one.sums - first) - other.values(other.sums - second)
+    freq = np.ones(int(matters.sum()), dtype=np.int64)
+    return _variance_of(moved[matters], freq, n), float(n - 1)
 
 
 def _independent(one: IntervalProblem, other: IntervalProblem) -> tuple[float, float]:
@@ -289,9 +291,11 @@ def _independent(one: IntervalProblem, other: IntervalProblem) -> tuple[float, f
     parts = [
         (
             _variance_of(
-                problem.values_without(problem.sums, problem.rows), problem.freq
+                problem.values_without(problem.sums, problem.rows),
+                problem.freq,
+                problem.n_paired_items,
             ),
-            problem.n_items - 1,
+            problem.n_paired_items - 1,
         )
         for problem in (one, other)
     ]
@@ -304,11 +308,11 @@ def _independent(one: IntervalProblem, other: IntervalProblem) -> tuple[float, f
 def _interval(compared: _Compared) -> Interval:
     method = "item jackknife of the difference, t"
     problems, value = compared.problems, compared.value
-    smaller = min(problems, key=lambda problem: problem.n_items)
+    smaller = min(problems, key=lambda problem: problem.n_paired_items)
     if compared.reason is not None:
         return smaller.undefined(compared.reason, method=method, unit="items")
     half = smaller.student_t(compared.df) * math.sqrt(compared.variance)
-    notes = warn_small(smaller.n_items, 10, "items")
+    notes = warn_small(smaller.n_paired_items, 10, "items", smaller.n_items)
     width = 1.0 - min(problem.min_value for problem in problems)  # of its space
     if value - half < -width or value + half > width:
         notes += (f"cut at the ends of the parameter space [{-width:g}, {width:g}]",)

@@ -11,6 +11,7 @@ from masrel.agreement._kernel import Floats
 from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target
 from masrel.intervals._problem import (
+    COLUMNS,
     Integers,
     IntervalProblem,
     Statistic,
@@ -75,18 +76,20 @@ def jackknife(
 
     Notes
     -----
+    Items with a single rating are left out in turn, too, where they tell of chance
+    agreement; but (n - 1)/n and the degrees of freedom count items with a pair of
+    ratings, and raters of a pair.
+
     For "both" the variances of leaving out items and of leaving out raters are
-    added, and the degrees of freedom are Satterthwaite's. The disagreement of one
-    rater on one item is in both, so this interval is rather too wide than too
+    added, and the degrees of freedom are the fewer of the two: other items and other
+    raters cannot give a surer answer than either alone. The disagreement of one rater
+    on one item is in both variances, so this interval is rather too wide than too
     narrow.
 
     References
     ----------
     .. [1] Efron, B., Stein, C. (1981). The jackknife estimate of variance. Annals of
        Statistics, 9(3), 586-596. https://doi.org/10.1214/aos/1176345462
-    .. [2] Satterthwaite, F. E. (1946). An approximate distribution of estimates of
-       variance components. Biometrics Bulletin, 2(6), 110-114.
-       https://doi.org/10.2307/3002019
 
     Examples
     --------
@@ -117,11 +120,10 @@ def _interval_around_estimate(
             jackknifed.reason, method=f"{unit} jackknife", unit=target
         )
     half = problem.student_t(jackknifed.df) * math.sqrt(jackknifed.variance)
-    t = "t" if target == "both" else f"t({jackknifed.df:g})"
-    return problem.around(
-        problem.value,
-        half,
-        method=f"{unit} jackknife, {t}",
+    return problem.confidence(
+        problem.value - half,
+        problem.value + half,
+        method=f"{unit} jackknife, t({jackknifed.df:g})",
         unit=target,
         notes=jackknifed.notes,
     )
@@ -132,7 +134,7 @@ class _JackknifeVariance:
     """How much an estimate moves when units are left out one at a time."""
 
     variance: float  # ``nan`` when undefined
-    df: float  # its degrees of freedom, Satterthwaite's for "both"
+    df: float  # its degrees of freedom
     notes: tuple[str, ...] = ()  # what is small
     reason: str | None = None  # why it makes no interval, or None
 
@@ -142,82 +144,79 @@ def _jackknife_variance(problem: IntervalProblem) -> _JackknifeVariance:
     if math.isnan(problem.value):
         reason = "the estimate itself is undefined"
         return _JackknifeVariance(variance=math.nan, df=math.nan, reason=reason)
-    parts: list[tuple[float, int]] = []
+    variance, df = 0.0, problem.max_df
     notes: tuple[str, ...] = ()
     units = _UNITS[problem.target]
     for unit in units:
         if unit == "items":
-            freq = problem.freq
+            freq, n = problem.freq, problem.n_paired_items
             replicates = problem.values_without(problem.sums, problem.rows)
         else:
             replicates, freq = _without_rater(problem)
+            n = problem.n_paired_raters
         if np.isnan(replicates).any():
             reason = f"with one of the {unit} left out the estimate is undefined"
             return _JackknifeVariance(variance=math.nan, df=math.nan, reason=reason)
-        n = int(freq.sum())
-        parts.append((_variance_of(replicates, freq), n - 1))
-        notes += warn_small(n, 10 if unit == "items" else 5, unit)
-    variance = sum(part for part, _ in parts)
+        variance += _variance_of(replicates, freq, n)
+        # Satterthwaite's degrees for a sum would lie above the fewer ones.
+        df = min(df, n - 1)
+        notes += warn_small(n, 10 if unit == "items" else 5, unit, int(freq.sum()))
     if not variance > 0.0:
         reason = (
             f"leaving out any of the {' or '.join(units)} leaves the estimate as it "
             "is, so the jackknife cannot say how uncertain it is"
         )
         return _JackknifeVariance(variance=0.0, df=math.nan, notes=notes, reason=reason)
-    df = variance**2 / sum(part**2 / n for part, n in parts)  # Satterthwaite [2]
     return _JackknifeVariance(variance=variance, df=df, notes=notes)
 
 
-def _variance_of(replicates: Floats, freq: Integers) -> float:
+def _variance_of(replicates: Floats, freq: Integers, n: int) -> float:
     """Return (n - 1)/n Σ (θ_i - mean)² of estimates with one left out [1]_."""
-    # Takes replicates (n_distinct,), freq (n_distinct,)
-    n = int(freq.sum())
+    # Takes replicates (n_distinct,), freq (n_distinct,); n are those with a pair. What
+    # is observed is a mean over these alone, whose variance this factor makes unbiased;
+    # single ratings move the mean of chance by little, and there 1 would do as well.
     if n < 2:  # nothing is left
         return math.nan
     moved = replicates - replicates[0]  # so that no change at all is exactly 0
-    deviations = moved - freq @ moved / n
+    deviations = moved - freq @ moved / freq.sum()
     return float((n - 1) / n * (freq @ deviations**2))
 
 
 def _without_rater(problem: IntervalProblem) -> tuple[Floats, Integers]:
     """Return the estimate without each rater, and a 1 for each."""
-    values = [
-        problem.values(problem.freq @ rows) for rows in _rows_without_rater(problem)
-    ]
+    values = [problem.values(sums) for sums, _ in _rows_without_rater(problem)]
     return np.array(values, dtype=np.float64), np.ones(len(values), dtype=np.int64)
 
 
-def _rows_without_rater(problem: IntervalProblem) -> Iterator[Floats]:
-    """Return the features of the patterns without one rater after the other."""
-    # They are made anew, because pairs of raters go; each (n_patterns, n_features).
-    width = 2 if problem.entry.shape == "pairs" else 1  # columns of a rater
-    codes = problem.patterns.codes
+def _rows_without_rater(problem: IntervalProblem) -> Iterator[tuple[Floats, Floats]]:
+    """Return sums, and features of the patterns, without one rater after the other."""
+    # -> (n_features,), (n_patterns, n_features), made anew, because pairs of raters go.
+    # Items that not every rater rated may matter once the one is gone who did not.
+    width = COLUMNS[problem.entry.shape]
+    codes, freq = problem.distinct.codes, problem.distinct_freq
     n_raters = codes.shape[1] // width
     fewest = 2 if width == 2 else 3
     if n_raters < fewest:
         raise ParameterError(
-            f'target: "{problem.target}" needs at least {fewest} raters, because one '
-            f"is left out; got {n_raters}"
+            f"target: needs at least {fewest} raters, because one is left out; got "
+            f"{n_raters}"
         )
     for rater in range(n_raters):
         rest = np.delete(codes, np.s_[rater * width : (rater + 1) * width], axis=1)
-        yield problem.features(replace(problem.patterns, codes=rest))
+        rows = problem.features(replace(problem.distinct, codes=rest))
+        matters = rows.any(axis=1)
+        yield freq[matters] @ rows[matters], rows[problem.matters]
 
 
-def _excess_of_raters(problem: IntervalProblem) -> float:
-    """Return the variance by which raters differ beyond single ratings, or 0."""
-    # max(0, V_R - V_C), with V_R the jackknife variance over raters and V_C that of
-    # leaving out a rater on an item,
-    # (n - 1)(r - 1)/(n r) Σ_ij (κ_-i-j - κ_-i - κ_-j + κ)².
+def _variance_of_cells(problem: IntervalProblem) -> float:
+    """Return the variance that leaving out items and leaving out raters both hold."""
+    # that of a rater on an item, (n - 1)(r - 1)/(n r) Σ_ij (κ_-i-j - κ_-i - κ_-j + κ)²
     without_item = problem.values_without(problem.sums, problem.rows)
-    without_rater, cells = [], 0.0
-    for rows in _rows_without_rater(problem):
-        sums = problem.freq @ rows
-        without_rater.append(float(problem.values(sums)))
+    cells = 0.0
+    for sums, rows in _rows_without_rater(problem):
         without_both = problem.values_without(sums, rows)
-        cell = without_both - without_item - without_rater[-1] + problem.value
+        cell = without_both - without_item - float(problem.values(sums)) + problem.value
         cells += float(problem.freq @ cell**2)
-    n, r = problem.n_items, len(without_rater)
-    of_raters = _variance_of(np.array(without_rater), np.ones(r, dtype=np.int64))
-    excess = of_raters - (n - 1) * (r - 1) / (n * r) * cells
-    return max(0.0, excess) if math.isfinite(excess) else 0.0
+    n, r = problem.n_paired_items, problem.n_paired_raters
+    variance = (n - 1) * (r - 1) / (n * r) * cells
+    return variance if math.isfinite(variance) else 0.0

@@ -178,7 +178,7 @@ def _check_dirichlet(has_rho: bool, name: str) -> None:
 def _check_table(
     problem: IntervalProblem, name: str, model: _Model, method: _Method, prior: "Prior"
 ) -> None:
-    n_raters = problem.coded.codes.shape[1]
+    n_raters = problem.n_raters
     if model == "auto" and n_raters != 2:
         raise ParameterError(
             "coefficient: a posterior applies to unweighted fleiss_kappa, scott_pi "

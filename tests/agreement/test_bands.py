@@ -34,6 +34,7 @@ def estimate(value: float, error: float) -> Estimate:
         observed=math.nan,
         chance=math.nan,
         n_items=20,
+        n_items_paired=20,
         n_raters=2,
         n_categories=2,
     )
@@ -215,7 +216,7 @@ def test_what_is_undefined_earns_no_word() -> None:
     with pytest.warns(UndefinedStatisticWarning):
         nothing = fleiss_kappa([["a", "a"], ["a", "a"]])
     one_item = fleiss_kappa([["a", "b"]])  # a value without an error
-    for found, why in ((nothing, "0/0"), (one_item, "one item has no standard error")):
+    for found, why in ((nothing, "0/0"), (one_item, "one item with a pair")):
         for scale in SCALES:
             with pytest.warns(UndefinedStatisticWarning, match=why):
                 assert benchmark(found, scale=scale) == "undefined"

@@ -32,9 +32,11 @@ def plain(table: Table, w: Sequence[Fraction]) -> Fraction | None:
         given_ = [(g, x) for g, x in zip(rater, w, strict=True) if g is not None]
         whole = sum(x for _, x in given_)
         if not whole:
-            return None
+            continue
         shares.append({k: sum(x for g, x in given_ if g == k) / whole for k in LABELS})
     both = list(itertools.combinations(shares, 2))
+    if not both:
+        return None
     chance = sum(p[k] * q[k] for p, q in both for k in LABELS) / Fraction(len(both))
     if not below or chance == 1:
         return None
@@ -138,12 +140,9 @@ def test_an_item_that_nobody_rated_is_no_item() -> None:
     assert one == other
 
 
-def test_a_rater_without_any_rating_is_named() -> None:
-    table: Table = [["a", None, "a"], ["b", None, "a"]]
-    with pytest.warns(UndefinedStatisticWarning, match="no ratings in column 1"):
-        found = conger_kappa(table)
-    assert math.isnan(found.value)
-    assert found.reason == "0/0: no ratings in column 1"
+def test_a_rater_without_any_rating_is_no_rater() -> None:
+    table: Table = [["a", None, "a"], ["b", None, "a"], ["b", None, "b"]]
+    assert conger_kappa(table) == conger_kappa([[row[0], row[2]] for row in table])
 
 
 @pytest.mark.parametrize(

@@ -47,7 +47,11 @@ def test_estimate_is_the_float_nearest_to_the_exact_value(
 ) -> None:
     exact = dataset["expected"][key]["exact"]
     found = estimate(dataset, key)
-    if exact is None:
+    if "rater_without_ratings" in dataset["name"] and "conger" in key:
+        # irrCAC has none; here a rater without any rating is no rater
+        two = {**dataset, "ratings": [row[:2] for row in dataset["ratings"]]}
+        assert found == estimate(two, key)
+    elif exact is None:
         assert math.isnan(found.value)
         assert found.reason
     else:

@@ -39,6 +39,7 @@ def estimate(value: float, error: float, n_items: int = 20) -> Estimate:
         observed=math.nan,
         chance=math.nan,
         n_items=n_items,
+        n_items_paired=n_items,
         n_raters=2,
         n_categories=2,
     )
@@ -250,7 +251,7 @@ def test_is_undefined_where_the_estimate_or_its_error_is() -> None:
         assert math.isnan(p_value(nothing))
     one_item = fleiss_kappa([["a", "b"]], categories=["a", "b"])
     assert one_item.reason is None
-    with pytest.warns(UndefinedStatisticWarning, match="one item has no standard err"):
+    with pytest.warns(UndefinedStatisticWarning, match="one item with a pair"):
         assert math.isnan(p_value(one_item))
 
 

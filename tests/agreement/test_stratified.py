@@ -83,10 +83,8 @@ def test_linear_weights_by_hand() -> None:
 @pytest.mark.filterwarnings("ignore::masrel.errors.UndefinedStatisticWarning")
 @given(strata)
 def test_value_and_error_are_those_of_the_plain_formula(pairs: list[Table]) -> None:
-    rated = [
-        i
-        for i in range(len(pairs[0]))
-        if any(grade is not None for table in pairs for grade in table[i])
+    rated = [  # with a pair of any rater
+        i for i in range(len(pairs[0])) if any(None not in table[i] for table in pairs)
     ]
     kept = [[table[i] for i in rated] for table in pairs]
     found = stratified_kappa(pairs, categories=LABELS)

@@ -121,14 +121,23 @@ def test_other_raters_leave_raters_out() -> None:
     )
 
 
-def test_both_add_what_raters_differ_by_beyond_single_ratings() -> None:
+def test_both_add_the_distances_less_what_they_hold_in_common() -> None:
     of_items, of_raters, of_cells = variances(MEDIUM)
     kappa = fleiss_kappa(MEDIUM).value
-    excess = max(0.0, of_raters - of_cells)
-    t_items, t_raters = student.ppf(0.975, [24, 3])
-    half = math.sqrt(t_items**2 * of_items + t_raters**2 * excess)
+    t = student.ppf(0.975, 3)  # the fewer degrees of freedom, of 24 and 3
+    low, high = on_logit(kappa, t * math.sqrt(of_items), 4)
+    above = posterior("fleiss_kappa", MEDIUM, target="items", categories=LABELS).high
+    high = max(high, (high + above) / 2)
+    expected = []
+    for distance in (kappa - low, high - kappa):
+        parts = distance**2, t**2 * of_raters
+        expected.append(math.sqrt(sum(parts) - min(*parts, t**2 * of_cells)))
     found = chosen(MEDIUM, "both", categories=LABELS)
-    assert (found.low, found.high) == pytest.approx(on_logit(kappa, half, 4), rel=1e-9)
+    assert found.low == pytest.approx(kappa - expected[0], rel=1e-9)
+    assert found.high == pytest.approx(min(kappa + expected[1], 1.0), rel=1e-9)
+    assert found.method == (
+        "item jackknife, t(3) on the logit, and rater jackknife, t(3)"
+    )
 
 
 @pytest.mark.parametrize("biased", [False, True])
@@ -141,13 +150,10 @@ def test_few_items_and_raters_have_the_posterior(biased: bool) -> None:
     assert (items.low, items.high) == (plain.low, plain.high)
     assert items.distribution is not None
     assert items.distribution.continuous
-    both = chosen(table, "both", categories=SCALE)
-    assert (both.low < items.low) == biased
-    assert (both.high > items.high) == biased
-    assert (both.kind, items.kind) == (
-        "confidence" if biased else "credible",
-        "credible",
-    )
+    both, raters = (chosen(table, of, categories=SCALE) for of in ("both", "raters"))  # type: ignore[arg-type]
+    assert both.low <= min(items.low, raters.low)
+    assert both.high >= max(items.high, raters.high)
+    assert (both.kind, items.kind) == ("confidence", "credible")
 
 
 @pytest.mark.parametrize("target", ["items", "raters", "both"])

@@ -70,21 +70,15 @@ def test_leaving_out_items_is_the_loop_over_them() -> None:
 
 
 @few
-def test_for_both_the_variances_add_and_degrees_are_satterthwaites() -> None:
+def test_for_both_the_variances_add_and_degrees_are_the_fewer() -> None:
     table = dirichlet_multinomial(np.random.default_rng(8), 12, 6, 0.5)
     rows = variance([fleiss_kappa(without_item(table, i)).value for i in range(12)])
     columns = variance([fleiss_kappa(without_rater(table, r)).value for r in range(6)])
-    total = rows + columns
-    df = total**2 / (rows**2 / 11 + columns**2 / 5)
     found = jackknife("fleiss_kappa", table, target="both")
     half = (found.high - found.low) / 2
-    # t lies between its values at the whole degrees around df
-    assert 5 <= df <= 16
-    ratio = half / math.sqrt(total)
-    quantiles = {5: 2.5706, 8: 2.3060, 11: 2.2010, 16: 2.1199}
-    lower = max(d for d in quantiles if d <= df)
-    upper = min(d for d in quantiles if d >= df)
-    assert quantiles[upper] - 1e-4 <= ratio <= quantiles[lower] + 1e-4
+    t5 = 2.570581835636314  # of 11 and 5 degrees
+    assert half == pytest.approx(t5 * math.sqrt(rows + columns), rel=1e-12)
+    assert found.method == "two-way jackknife, t(5)"
 
 
 @few

@@ -443,7 +443,8 @@ def _kappa(question: _Question, fit: LatentFit, other: LatentTrait | None) -> Es
             words=f"posterior draws of kappa, prior {fit.density.prior.words}",
         ),
     )
-    n_items, n_raters = question.ratings.codes.shape
+    codes = question.ratings.codes
+    n_items, n_raters = codes.shape
     return Estimate(
         coefficient="fleiss_kappa",
         weights="identity",
@@ -453,6 +454,7 @@ def _kappa(question: _Question, fit: LatentFit, other: LatentTrait | None) -> Es
         observed=float(np.median(fit.agreement.observed)),
         chance=float(np.median(fit.agreement.chance)),
         n_items=n_items,
+        n_items_paired=int(((codes >= 0).sum(axis=1) > 1).sum()),
         n_raters=n_raters,
         n_categories=len(question.ratings.categories),
     )

@@ -204,7 +204,7 @@ def test_raters_who_are_not_drawn_are_not_asked_after() -> None:
 
 def test_acceleration_is_a_sixth_of_the_skewness_of_values_left_out() -> None:
     problem = problem_of("gwet_ac", n=14)
-    features = problem.item_features()
+    features = problem.features(problem.coded)
     left = problem.values(features.sum(axis=0) - features)
     deviation = left.mean() - left
     expected = (deviation**3).sum() / (6 * (deviation**2).sum() ** 1.5)

@@ -43,6 +43,7 @@ def estimate(**changes: Any) -> Estimate:
         "observed": 81 / 112,
         "chance": 266 / 1024,
         "n_items": 4,
+        "n_items_paired": 4,
         "n_raters": 8,
         "n_categories": 6,
     }

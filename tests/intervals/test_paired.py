@@ -1,0 +1,263 @@
+"""What carries nothing changes nothing: single ratings, items and raters without any.
+
+And what generalises to items and raters is never surer than what does to either.
+"""
+
+import dataclasses
+import math
+import warnings
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from masrel.agreement import COEFFICIENTS, p_value
+from masrel.errors import MasrelWarning, SmallSampleWarning
+from masrel.estimates import Estimate, Interval, Target, as_document
+from masrel.intervals import (
+    analytic,
+    bootstrap,
+    difference,
+    estimate,
+    jackknife,
+    posterior,
+)
+from tests.intervals.data import SCALE, TABLE_V, dirichlet_multinomial
+
+pytestmark = pytest.mark.filterwarnings("ignore::masrel.errors.MasrelWarning")
+
+Table = list[list[str | None]]
+
+FULL: Table = [["a", "a"], ["a", "b"], ["b", "b"], ["b", "b"], ["a", "a"]]
+SINGLES: Table = [["a", None]] * 15 + [[None, "b"]] * 10
+PAIRS_ONLY = ["krippendorff_alpha", "cohen_kappa", "scott_pi"]
+WITH_KERNEL = [name for name, entry in COEFFICIENTS.items() if entry.kernel is not None]
+OF_ANY_RATERS = [
+    name
+    for name in WITH_KERNEL
+    if COEFFICIENTS[name].shape == "ratings" and COEFFICIENTS[name].n_raters[1] is None
+]
+
+METHODS: dict[str, Callable[..., object]] = {
+    "analytic": analytic,
+    "jackknife": jackknife,
+    "bootstrap": lambda *args, **options: bootstrap(*args, rng=1, **options),
+    "posterior": lambda *args, **options: posterior(*args, rng=1, **options),
+    "auto": lambda *args, **options: estimate(*args, **options).interval,
+    "clusters": lambda name, ratings, **options: bootstrap(
+        name, ratings, clusters=[i // 2 for i in range(len(ratings))], **options
+    ),
+}
+
+
+def quiet(method: Callable[..., object], *args: object, **options: object) -> object:
+    """What a method finds, or why it refuses."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", MasrelWarning)
+        try:
+            found = method(*args, **options)
+        except ValueError as error:
+            return str(error)
+    # nan is no nan's equal
+    return repr(found) if isinstance(found, Interval) else found
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("name", PAIRS_ONLY)
+def test_single_ratings_change_no_bit_where_only_pairs_count(
+    name: str, method: str
+) -> None:
+    options = {"target": "items", "categories": ["a", "b"]}
+    alone = quiet(METHODS[method], name, FULL, **options)
+    # at the end, so that the clusters of the others stay
+    assert quiet(METHODS[method], name, FULL + SINGLES, **options) == alone
+
+
+def test_their_degrees_of_freedom_and_warnings_count_pairs() -> None:
+    with pytest.warns(SmallSampleWarning, match="^5 items: below 10"):
+        found = jackknife("cohen_kappa", FULL + SINGLES, target="items")
+    assert found.method == "item jackknife, t(4)"
+    assert found.notes[0].startswith("5 items: below 10")
+
+
+@pytest.mark.parametrize("name", ["fleiss_kappa", "gwet_ac", "brennan_prediger"])
+def test_where_they_tell_of_chance_they_are_left_out_in_turn(name: str) -> None:
+    # Q: of 25 items with a single rating and 5 with two, (n - 1)/n and t count the 5
+    table = FULL + SINGLES
+    function = COEFFICIENTS[name]
+    centre = function(table, categories=["a", "b"])
+    assert (centre.n_items, centre.n_items_paired) == (30, 5)
+    left = np.array(
+        [
+            function(table[:i] + table[i + 1 :], categories=["a", "b"]).value
+            for i in range(30)
+        ]
+    )
+    variance = 4 / 5 * ((left - left.mean()) ** 2).sum()
+    t4 = 2.7764451051977987
+    options = {"target": "items", "categories": ["a", "b"]}
+    with pytest.warns(SmallSampleWarning, match="5 items with a pair of ratings: bel"):
+        found = jackknife(name, table, **options)  # type: ignore[arg-type]
+    low = max(-1.0, centre.value - t4 * math.sqrt(variance))
+    assert found.low == pytest.approx(low, rel=1e-9)
+    plain = analytic(name, table, **options)  # type: ignore[arg-type]
+    low = max(-1.0, centre.value - t4 * centre.standard_error)
+    assert plain.low == pytest.approx(low, rel=1e-12)
+    assert plain.notes[0].startswith("5 items with a pair of ratings: below 10")
+
+
+def test_p_values_count_pairs() -> None:
+    found = COEFFICIENTS["gwet_ac"](FULL + SINGLES)
+    t = found.value / found.standard_error
+    # P(|t(4)| ≥ t) = 1 - s (1.5 - 0.5 s²) with s = t/√(t² + 4)
+    s = t / math.sqrt(t * t + 4)
+    assert p_value(found) == pytest.approx(1 - s * (1.5 - 0.5 * s * s), rel=1e-9)
+
+
+@pytest.mark.parametrize("name", PAIRS_ONLY)
+@pytest.mark.parametrize("design", ["dependent", "independent"])
+def test_a_difference_counts_pairs(name: str, design: str) -> None:
+    other: Table = [["a", "b"], ["a", "b"], ["b", "b"], ["b", "a"], ["a", "a"]]
+    options = {"design": design, "categories": ["a", "b"]}
+    alone = difference(name, FULL, other, **options)  # type: ignore[arg-type]
+    beside = difference(name, FULL + SINGLES, other + SINGLES, **options)  # type: ignore[arg-type]
+    assert beside == alone
+    assert beside.n_items_paired == 5
+
+
+def test_the_number_of_items_with_a_pair_is_in_every_result() -> None:
+    for name, entry in COEFFICIENTS.items():
+        table = [[1, 2], [2, 2], [3, 3], [2, 1], [3, None], [None, 1]]
+        ratings = [table, table] if entry.shape == "pairs" else table
+        found = entry(ratings, categories=[1, 2, 3])
+        assert (name, found.n_items_paired) == (name, 4)
+        assert as_document(found)["n_items_paired"] == 4
+
+
+def holed(table: Table) -> list[Table]:
+    """The same ratings beside items, raters, and both that have none."""
+    bare: Table = [[*row, None, None, None] for row in table]
+    empty: Table = [[None] * len(table[0])] * 3
+    return [table + empty, bare, [*bare, [None] * len(bare[0])]]
+
+
+@pytest.mark.parametrize("target", ["items", "raters", "both"])
+@pytest.mark.parametrize("name", OF_ANY_RATERS)
+def test_items_and_raters_without_ratings_change_nothing(
+    name: str, target: Target
+) -> None:
+    options = {"target": target, "categories": SCALE}
+    for method in ("jackknife", "auto", "bootstrap", "posterior", "analytic"):
+        alone = quiet(METHODS[method], name, TABLE_V, **options)
+        for table in holed(TABLE_V):  # type: ignore[arg-type]
+            assert quiet(METHODS[method], name, table, **options) == alone
+
+
+@pytest.mark.parametrize(
+    "name", [n for n, e in COEFFICIENTS.items() if e.shape == "ratings"]
+)
+def test_nor_do_they_change_a_value_or_its_error(name: str) -> None:
+    table: Table = [["0", "0"], ["1", "2"], ["2", "2"], ["1", "1"], ["3", "2"]]
+    alone = COEFFICIENTS[name](table, categories=SCALE)
+    for ratings in holed(table):
+        assert same(COEFFICIENTS[name](ratings, categories=SCALE), alone)
+
+
+def same(one: Estimate, other: Estimate) -> bool:
+    """Whether two estimates are alike, their errors included."""
+    documents = (as_document(estimate) for estimate in (one, other))
+    return next(documents) == next(documents)
+
+
+@pytest.mark.parametrize("name", ["stratified_kappa", "pooled_kappa"])
+def test_pairs_that_are_none_move_nothing(name: str) -> None:
+    first: Table = [["a", "a"], ["b", "b"], ["a", "b"], ["b", "b"]]
+    second: Table = [["a", "a"], ["b", "a"], ["a", "a"], ["b", "b"]]
+    third: Table = [["a", "b"], ["b", "b"], ["a", "a"], ["b", "b"]]
+    lone: Table = [["a", None], [None, "b"], [None, None]]
+    none: Table = [["a", None]] * 7
+    raters = [first, second, third]
+    beside = [[*rater, *lone] for rater in raters] + [none]
+    entry = COEFFICIENTS[name]
+    one, other = entry(raters), entry(beside)
+    assert (one.value, one.standard_error) == (other.value, other.standard_error)
+    for target in ("items", "raters", "both"):
+        assert repr(jackknife(name, raters, target=target)) == repr(  # type: ignore[arg-type]
+            jackknife(name, beside, target=target)  # type: ignore[arg-type]
+        )
+
+
+def test_an_error_of_pooled_pairs_by_hand() -> None:
+    # One rater's pairs alone are Cohen's, whose sample are the items with a pair.
+    pairs: Table = [["a", "a"], ["a", "b"], ["b", "b"], ["b", "b"], ["a", None]]
+    cohen = COEFFICIENTS["cohen_kappa"](pairs)
+    pooled = COEFFICIENTS["pooled_kappa"]([pairs])
+    assert pooled.standard_error == pytest.approx(cohen.standard_error, rel=1e-12)
+    assert (pooled.n_items, pooled.n_items_paired) == (5, 4)
+
+
+def test_ratings_of_no_pair_say_so() -> None:
+    found = estimate("fleiss_kappa", [["a", None], [None, "b"]], target="items")
+    assert found.interval is not None
+    assert math.isnan(found.interval.low)
+    assert "no item has ratings of two raters" in found.interval.notes[0]
+
+
+# "both": no surer than either.
+
+
+def random_sets(seed: int, n_sets: int) -> list[np.ndarray]:
+    rng = np.random.default_rng(seed)
+    made = []
+    while len(made) < n_sets:
+        n, r = int(rng.integers(3, 40)), int(rng.integers(3, 9))
+        table = np.array(dirichlet_multinomial(rng, n, r, float(rng.uniform(0.1, 0.9))))
+        table = table.astype(float)
+        if rng.random() < 0.3:
+            table[rng.random(table.shape) < 0.2] = np.nan
+        if rng.random() < 0.3:  # a rater unlike the others
+            table[:, 0] = np.minimum(table[:, 0] + 1, np.nanmax(table))
+        made.append(table)
+    return made
+
+
+@pytest.mark.parametrize("name", OF_ANY_RATERS)
+def test_the_interval_for_both_holds_those_for_either(name: str) -> None:
+    for table in random_sets(7, 12):
+        scale = sorted(set(table[~np.isnan(table)].tolist()))
+        both, items, raters = (
+            estimate(name, table, target=of, categories=scale).interval  # type: ignore[arg-type]
+            for of in ("both", "items", "raters")
+        )
+        assert both is not None
+        assert items is not None
+        assert raters is not None
+        if both.reason is None:
+            assert both.low <= min(items.low, raters.low) + 1e-12
+            assert both.high >= max(items.high, raters.high) - 1e-12
+        else:  # what has no answer for one of them has none for both
+            assert both.reason in (items.reason, raters.reason)
+
+
+@pytest.mark.parametrize("name", OF_ANY_RATERS)
+def test_so_does_the_two_way_jackknife(name: str) -> None:
+    for table in random_sets(11, 12):
+        both, items, raters = (
+            jackknife(name, table, target=of)  # type: ignore[arg-type]
+            for of in ("both", "items", "raters")
+        )
+        if both.reason is None:
+            for one in (items, raters):
+                if one.reason is None:
+                    assert both.low <= one.low + 1e-12
+                    assert both.high >= one.high - 1e-12
+
+
+def test_both_of_table_v() -> None:
+    # items .370 to .874, raters .320 to .933; the latter at t(3) are .213 to 1.039
+    both = estimate("fleiss_kappa", TABLE_V, target="both", categories=SCALE).interval
+    assert both is not None
+    assert both.low < 0.320
+    assert both.high > 0.933
+    plain = dataclasses.replace(both, notes=())
+    assert plain.unit == plain.target == "both"
