@@ -207,33 +207,38 @@ def aligned(
 
 
 def as_latex(table: Table) -> str:
-    r"""Return a table as LaTeX that needs the package `booktabs` and no other.
+    r"""Return a table as LaTeX that needs the packages its first line names.
 
     What was read stands above it in comments.
     """
     columns, body = page_cells(table)
     letters = "".join({"left": "l", "center": "c"}.get(c.align, "r") for c in columns)
-    lines = [
-        r"% needs \usepackage{booktabs}",
-        *(f"% {line}" for line in "\n".join(table.read).splitlines()),
-        r"\begin{table}",
-        r"\centering",
-        rf"\caption{{{_latex_text(table.labelled_caption)}}}",
-        rf"\label{{tab:{table.name}}}",
-        rf"\begin{{tabular}}{{{letters}}}",
-        r"\toprule",
-        _latex_line([column.heading for column in columns]),
-        r"\midrule",
-        *map(_latex_line, body),
-        r"\bottomrule",
-        r"\end{tabular}",
-    ]
+    caption = rf"\caption{{{_latex_text(table.labelled_caption)}}}"
+    label = rf"\label{{tab:{table.name}}}"
+    head = _latex_line([column.heading for column in columns])
+    heading = [r"\toprule", head, r"\midrule"]
+    if len(body) > _ROWS_OF_A_PAGE:  # the heading stands again on every page
+        kind, end, packages = "longtable", r"\par\endgroup", "booktabs,longtable"
+        begin = [r"\begingroup", rf"\begin{{longtable}}{{{letters}}}"]
+        begin += [rf"{caption} {label} \\", *heading, r"\endfirsthead"]
+        begin += [*heading, r"\endhead"]
+    else:
+        kind, end, packages = "tabular", r"\end{table}", "booktabs"
+        begin = [r"\begin{table}", r"\centering", caption, label]
+        begin += [rf"\begin{{tabular}}{{{letters}}}", *heading]
+    lines = [*begin, *map(_latex_line, body), r"\bottomrule", rf"\end{{{kind}}}"]
     if table.notes:
         notes = r" \\ ".join(map(_latex_text, table.notes))
         lines.append(rf"\par\smallskip\footnotesize\raggedright {notes}")
-    return "\n".join([*lines, r"\end{table}"]) + "\n"
+    text = "\n".join([*lines, end]) + "\n"
+    comments = [rf"needs \usepackage{{{packages}}}"]
+    if lacking := sorted({letter for letter in text if not _is_in_latex(letter)}):
+        comments += [f"needs lualatex and a font with {' '.join(lacking)}"]
+    comments += "\n".join(table.read).splitlines()
+    return "".join(f"% {line}\n" for line in comments) + text
 
 
+_ROWS_OF_A_PAGE = 40
 _APART = "\N{ZERO WIDTH SPACE}"
 
 _LATEX_ESCAPES = str.maketrans(
@@ -256,12 +261,23 @@ _LATEX_ESCAPES = str.maketrans(
         "≤": r"$\leq$",
         "×": r"$\times$",
         "<": r"$<$",
+        ">": r"$>$",
+        "|": r"$|$",
+        "[": "{[}",  # after the end of a line LaTeX would take it for a distance
+        "*": "{*}",
         "α": r"$\alpha$",
         "κ": r"$\kappa$",
         "π": r"$\pi$",
         "ρ": r"$\rho$",
+        "χ": r"$\chi$",
     }
 )
+_LATEX_ACCENTS = frozenset(
+    "\N{COMBINING GRAVE ACCENT}\N{COMBINING ACUTE ACCENT}\N{COMBINING TILDE}"
+    "\N{COMBINING CIRCUMFLEX ACCENT}\N{COMBINING DIAERESIS}\N{COMBINING CARON}"
+    "\N{COMBINING RING ABOVE}\N{COMBINING CEDILLA}"
+)
+_LATEX_LETTERS = frozenset("ßæøœłıÆØŒŁ…‘’“”—§¶£·²³¹°")
 
 
 def _latex_line(cells: list[str]) -> str:
@@ -271,3 +287,10 @@ def _latex_line(cells: list[str]) -> str:
 def _latex_text(text: str) -> str:
     # of an option's two hyphens TeX would make a dash
     return text.replace("--", f"-{_APART}-").translate(_LATEX_ESCAPES)
+
+
+def _is_in_latex(letter: str) -> bool:
+    # whether pdflatex sets it without further packages
+    parts = unicodedata.normalize("NFD", letter)
+    is_accented = parts[0].isascii() and _LATEX_ACCENTS.issuperset(parts[1:])
+    return letter in _LATEX_LETTERS or is_accented

@@ -174,24 +174,75 @@ def test_latex_has_a_label_and_says_what_it_needs(
     assert body.isascii() or set(re.findall(r"[^\x00-\x7f]", body)) <= set("–")
 
 
-@pytest.mark.slow
-def test_latex_compiles(masrel: Caller, tmp_path: Path) -> None:
-    engines = ("pdflatex", "tectonic")
-    engine = next((shutil.which(name) for name in engines if shutil.which(name)), None)
+def compiled(folder: Path, text: str) -> str:
+    """Return the log of pdflatex, or skip where there is none."""
+    engine = shutil.which("pdflatex")
     if engine is None:
-        pytest.skip("neither pdflatex nor tectonic is installed")
-    text = latex(masrel, tmp_path)
+        pytest.skip("pdflatex is not installed")
     page = written(
-        tmp_path,
-        "\\documentclass{article}\\usepackage{booktabs}\n\\begin{document}\n"
-        f"{text}Table~\\ref{{tab:agreement}}\n\\end{{document}}\n",
+        folder,
+        "\\documentclass{article}\\usepackage{booktabs,longtable}\n"
+        f"\\begin{{document}}\n{text}Table~\\ref{{tab:agreement}}\n\\end{{document}}\n",
         "page.tex",
     )
-    stop = ["-halt-on-error"] if "pdflatex" in engine else []
     done = subprocess.run(
-        [engine, *stop, page.name], cwd=tmp_path, capture_output=True, check=False
-    )
-    assert done.returncode == 0, done.stdout[-2000:]
+        [engine, "-halt-on-error", "-interaction=nonstopmode", page.name],
+        cwd=folder, capture_output=True, check=False,
+    )  # fmt: skip
+    log = done.stdout.decode("utf-8", "replace")
+    assert done.returncode == 0, log[-2000:]
+    return log
+
+
+@pytest.mark.slow
+def test_latex_compiles(masrel: Caller, tmp_path: Path) -> None:
+    compiled(tmp_path, latex(masrel, tmp_path))
+
+
+# After the end of a line LaTeX reads [ and * as its own; > and | are other letters in
+# its fonts.
+GROUPS = ["[0, 1)", "*", "a>b|c", "José", "Łukasz"]
+
+
+def test_latex_of_many_groups_is_a_table_of_pages(
+    masrel: Caller, tmp_path: Path
+) -> None:
+    groups = [*GROUPS, *map(str, range(20))]
+    rows = [f'"{g}",{i},{i % 2},{i // 2 % 2}' for g in groups for i in range(4)]
+    path = written(tmp_path, "\n".join(["ward,item,A,B", *rows]) + "\n")
+    out = masrel("agree", path, "--by", "ward", "--latex").out
+    assert out.startswith("% needs \\usepackage{booktabs,longtable}\n")
+    assert "lualatex" not in out
+    begun = re.findall(r"\\begin\{(\w+)\}", out)
+    assert begun == re.findall(r"\\end\{(\w+)\}", out)[::-1] == ["longtable"]
+    for name in ("{[}0, 1) &", "{*} &", "a$>$b$|$c &"):
+        assert out.count(f"\n{name}") == 2
+    assert out.count("\\toprule") == 2  # on the first page, and on all others
+
+
+@pytest.mark.slow
+def test_latex_of_many_groups_compiles(masrel: Caller, tmp_path: Path) -> None:
+    groups = [*GROUPS, *map(str, range(60))]
+    rows = [f'"{g}",{i},{i % 2},{i // 2 % 2}' for g in groups for i in range(4)]
+    path = written(tmp_path, "\n".join(["ward,item,A,B", *rows]) + "\n")
+    call = ("agree", path, "--by", "ward", "--each-category", "--symmetry", "--latex")
+    log = compiled(tmp_path, masrel(*call).out)
+    pages = re.search(r"\((\d+) pages", log)
+    assert pages is not None
+    assert int(pages[1]) > 3
+    assert "Float too large" not in log
+
+
+def test_latex_names_letters_that_pdflatex_lacks(
+    masrel: Caller, tmp_path: Path
+) -> None:
+    path = written(tmp_path, "item,Ωμ,名\n1,a,b\n2,b,b\n3,a,a\n")
+    call = ("agree", path, "--latex", "--by", "ward")
+    assert "lualatex" not in masrel("agree", path, "--latex").out
+    text = "ward,item,A,B\n" + "".join(f"名η,{i},{i % 2},{i // 2}\n" for i in range(4))
+    path.write_text(text, encoding="utf-8")
+    second = masrel(*call).out.splitlines()[1]
+    assert second == "% needs lualatex and a font with η 名"
 
 
 # Notes below a table.
