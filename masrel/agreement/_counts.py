@@ -122,6 +122,18 @@ class DistinctItems:
         powers = base ** np.arange(q, dtype=np.int64)
         return cls.of_arrays(keys[:, None] // powers % base, freq)
 
+    @classmethod
+    def of_patterns(cls, coded: CodedRatings, often: Integers) -> "DistinctItems":
+        """Count the raters of each category of rows that occur so often each."""
+        codes, q = coded.codes, len(coded.categories)
+        base = codes.shape[1] + 1
+        if base**q >= 2**62:
+            return cls.of_arrays(item_counts(coded), often)
+        keys, at = np.unique(_item_keys(codes, base, q), return_inverse=True)
+        freq = np.bincount(at, often).astype(np.int64)  # floats, exact to 2^53
+        powers = base ** np.arange(q, dtype=np.int64)
+        return cls.of_arrays(keys[:, None] // powers % base, freq)
+
     def sums(self, v: Weights) -> SufficientStatistics:
         """Add the items up."""
         if v.numerators is None and self._sums is not None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from masrel.cli._options import split_commas
+from masrel.cli._progress import progress
 from masrel.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -39,6 +40,7 @@ class ReadingOptions:
     counts: bool = False
     table: bool = False
     source: str | None = None
+    stream: bool | None = None
 
     def record(self) -> dict[str, object]:
         """Return what the caller said, as plain values for JSON."""
@@ -73,7 +75,16 @@ def read_file(file: Path, options: ReadingOptions) -> "RatingsFile":
         "delimiter": delimiter,
         "missing_codes": _codes(options.missing_codes),
     }
-    return read_ratings(file, **arguments)
+    with progress("reading", "MB", is_quiet=False) as shown:
+        n_shown = 0
+
+        def show(n_bytes: int, n_expected: int) -> None:
+            nonlocal n_shown
+            shown.expect(n_expected >> 20)
+            shown.update((n_bytes >> 20) - n_shown)
+            n_shown = n_bytes >> 20
+
+        return read_ratings(file, progress=show, **arguments)
 
 
 reading_options = [

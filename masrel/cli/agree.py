@@ -34,6 +34,12 @@ if TYPE_CHECKING:
     *reading_options,
     *table_options,
     click.option("--by", metavar="COL", help="Estimate each group of this column."),
+    click.option(
+        "--stream/--no-stream",
+        default=None,
+        help="Read batch by batch, as files larger than memory are (Parquet, text); by "
+        "size unless given.",
+    ),
 )
 @estimate_options
 @further_options

@@ -59,10 +59,15 @@ def without_second_header(sheet: Sheet) -> tuple[Sheet, list[str]]:
 
 
 def doubt_columns(
-    sheet: Sheet, layout: Layout, codes: NDArray[np.int64], scale: Scale
+    sheet: Sheet,
+    layout: Layout,
+    codes: NDArray[np.int64],
+    scale: Scale,
+    freq: NDArray[np.int64] | None = None,
 ) -> list[str]:
     """Refuse or warn of columns of a wide table that are no raters."""
-    # codes (n_items, n_raters): places in the scale, -1 where missing
+    # codes (n_items, n_raters): places in the scale, -1 where missing; freq: how often
+    # each row is there, if not once
     names = [sheet.header[place] for place in layout.raters]
     _refuse_contingency(sheet, layout, names)
     warnings = _first_line(sheet, layout, names, scale)
@@ -92,7 +97,7 @@ def doubt_columns(
         )
     return [
         *warnings,
-        *_looks_counted(names, codes, scale),
+        *_looks_counted(names, codes, scale, freq),
         *_second_header(sheet, codes, scale),
     ]
 
@@ -192,7 +197,10 @@ def _unlike(codes: NDArray[np.int64], scale: Scale) -> set[int]:
 
 
 def _looks_counted(
-    names: Sequence[str], codes: NDArray[np.int64], scale: Scale
+    names: Sequence[str],
+    codes: NDArray[np.int64],
+    scale: Scale,
+    freq: NDArray[np.int64] | None,
 ) -> list[str]:
     # Whole numbers whose sum is the same in every row, or in most and nowhere above
     # what one of them is alone, as where all raters agree.
@@ -205,7 +213,8 @@ def _looks_counted(
     total = sums.max()
     has_zeros = 0 in scale.values or bool((codes < 0).any())
     has_zeros |= all(map(is_number, names))  # as names of grades are
-    is_most = values.max() == total and (sums == total).mean() >= 1 / 2
+    is_most = values.max() == total
+    is_most &= np.average(sums == total, weights=freq) >= 1 / 2
     if total < 2 or not has_zeros or not ((sums == total).all() or is_most):
         return []
     are = "every row sums" if sums.min() == total else "most rows sum"

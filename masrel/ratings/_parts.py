@@ -1,5 +1,6 @@
 """Ratings one by one, put together item by rater: repeats, groups, many raters."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Literal
@@ -24,6 +25,7 @@ Codes = NDArray[np.int64]
 _MAX_DENSE = 20_000_000  # places, items by raters, that are always kept one by one
 _MAX_SPARSE = 8  # places a rating beyond which only counts are kept
 _MAX_COUNTED = 20_000_000  # places, items by categories, that can be counted
+_MAX_LAID_OUT = 200_000_000  # ratings of a stream that are laid out one by one
 _MAX_COUNTS = 200_000_000  # places, items by categories, of counts
 
 
@@ -231,6 +233,36 @@ def put_together(
         )
     return RatingsPart(
         group=names[0], session=names[1], items=items, raters=raters, ratings=ratings
+    )
+
+
+def patterns_part(
+    rows: NDArray[np.int8], freq: Codes, raters: Sequence[str], scale: Scale
+) -> RatingsPart:
+    """Make the part of a stream: distinct rows of codes, and how often each occurs."""
+    # takes rows (n_distinct, n_raters) of codes
+    n_items = int(freq.sum())
+
+    def laid_out() -> CodedRatings:
+        if n_items * rows.shape[1] > _MAX_LAID_OUT:
+            raise RatingsError(
+                f"ratings: {n_items} items by {rows.shape[1]} raters are read as a "
+                "stream, which has counts of items, and not who rated what, for more "
+                f"than {_MAX_LAID_OUT} ratings"
+            )
+        codes = np.repeat(rows, freq, axis=0)
+        codes.setflags(write=False)
+        return CodedRatings(codes=codes, categories=scale.values)
+
+    distinct = CodedRatings(codes=rows, categories=scale.values)
+    ratings = CountedRatings(
+        categories=scale.values,
+        items=DistinctItems.of_patterns(distinct, freq),
+        n_raters=int((rows >= 0).any(axis=0).sum()),
+        source=laid_out,
+    )
+    return RatingsPart(
+        group=None, session=None, items=(), raters=tuple(raters), ratings=ratings
     )
 
 

@@ -4,9 +4,14 @@ In: a path, "-" or a pipe, and what the caller says of its format. Out: a `Sheet
 """
 
 import hashlib
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from datetime import date, datetime
+from decimal import Decimal
 from functools import partial
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -89,7 +94,7 @@ def read_sheet(path: Path | str, options: SheetOptions) -> Sheet:
         records, facts, line_of, simulated = text_records(name, text, kind, options)
     if options.transpose:
         records, line_of = records.T, _column_number
-    sheet = _with_header(name, sha256, records, facts, options, line_of)
+    sheet = named_sheet(name, sha256, records, facts, options, line_of)
     return replace(
         sheet,
         is_simulated=simulated,
@@ -106,7 +111,7 @@ def _column_number(number: int) -> str:
     return f"column {number + 1}"
 
 
-def _with_header(
+def named_sheet(
     name: str,
     sha256: str,
     records: Cells,
@@ -114,6 +119,7 @@ def _with_header(
     options: SheetOptions,
     line_of: Callable[[int], str],
 ) -> Sheet:
+    """Return records as a sheet, names first unless there are none."""
     if options.no_header:
         header = tuple(str(n) for n in range(1, records.shape[1] + 1))
     else:
@@ -169,3 +175,30 @@ def _blank_rows(records: Cells) -> NDArray[np.bool_]:
     places = places[[not cell.strip() for cell in records[places, 0]]]
     blank[places] = [not any(cell.strip() for cell in row) for row in records[places]]
     return blank
+
+
+def library(name: str, module: str, extra: str = "files") -> Any:
+    """Import a library that not everybody needs, or say how to get it."""
+    if find_spec(module.partition(".")[0]) is None:
+        raise RatingsError(
+            f"{name}: reading it needs {module.partition('.')[0]}: "
+            f"pip install 'masrel[{extra}]'"
+        )
+    return import_module(module)
+
+
+def value_text(value: Any) -> str:
+    """Return what a cell with a type says."""
+    # 1.0 of a column of numbers is the grade 1; other floats have their shortest digits
+    if isinstance(value, bool | np.bool_):
+        return str(value).lower()
+    if isinstance(value, float | np.floating | Decimal):
+        is_whole = math.isfinite(value) and value == int(value)
+        return str(int(value)) if is_whole and abs(int(value)) < 2**53 else str(value)
+    if isinstance(value, datetime) and value.timetz() != datetime.min.timetz():
+        return value.isoformat()
+    if isinstance(value, date):
+        return date(value.year, value.month, value.day).isoformat()
+    if isinstance(value, bytes):
+        return value.decode("utf-8", "backslashreplace")
+    return str(value)

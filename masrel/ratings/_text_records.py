@@ -22,7 +22,8 @@ _MANY_COLUMNS = 1000
 _LARGE = 1 << 22  # letters of a text that pandas reads
 _RECORDS = 20  # records that the separator is found in
 _BLANKS = " "  # any number of blanks or tabs, as R's write.table writes
-_DELIMITERS = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", " ": "blanks"}
+DELIMITERS = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", " ": "blanks"}
+"""Separators, and what they are called."""
 
 
 def text_records(
@@ -45,14 +46,14 @@ def text_records(
         first = body.splitlines()[0]
         raise RatingsError(
             f"{name}: line {n_before + 1}: needed cells with the separator "
-            f"{_DELIMITERS.get(delimiter, repr(delimiter))}, got {first.strip()[:60]!r}"
+            f"{DELIMITERS.get(delimiter, repr(delimiter))}, got {first.strip()[:60]!r}"
         )
     if not options.no_header:
         lines.refuse_second_header()
     records = lines.cells()
     facts: dict[str, Any] = {
         "format": kind,
-        "delimiter": _DELIMITERS.get(delimiter, delimiter),
+        "delimiter": DELIMITERS.get(delimiter, delimiter),
         "encoding": options.encoding or "utf-8",
     }
     simulated = any("SIMULATED" in comment for comment in comments)
@@ -129,7 +130,7 @@ def _long_cells(text: str) -> Iterator[None]:
 def _delimiter_of(name: str, body: str) -> str:
     head = _head(body)
     n_fields = {}
-    for delimiter in _DELIMITERS:
+    for delimiter in DELIMITERS:
         records = _first_records(head, delimiter)
         n_fields[delimiter] = [len(record) for record in records]
     consistent = [d for d, n in n_fields.items() if _is_table(n)]
@@ -140,7 +141,7 @@ def _delimiter_of(name: str, body: str) -> str:
         elif _BLANKS in consistent and n_fields[_BLANKS][0] > n_fields[","][0]:
             marked.append(_BLANKS)
     if len(marked) > 1:
-        names = " and ".join(_DELIMITERS[d] for d in marked)
+        names = " and ".join(DELIMITERS[d] for d in marked)
         raise RatingsError(
             f"{name}: line 1: needed one separator, {names} both make columns; "
             "--delimiter chooses"

@@ -3,14 +3,9 @@
 import csv
 import io
 import json
-import math
 import tempfile
 import zipfile
 from collections.abc import Callable
-from datetime import date, datetime
-from decimal import Decimal
-from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +14,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from masrel.errors import ParameterError, RatingsError
-from masrel.ratings._text_cells import SheetOptions
+from masrel.ratings._text_cells import SheetOptions, library, value_text
 
 _WORKBOOKS = (".xlsx", ".xlsm", ".xls", ".ods")
 _ARROW = {".parquet": "pyarrow.parquet", ".feather": "pyarrow.feather"}
@@ -67,16 +62,6 @@ def read_typed(
     return _records(name, frame), facts, {}
 
 
-def _library(name: str, module: str) -> Any:
-    # a library that not everybody needs
-    if find_spec(module.partition(".")[0]) is None:
-        raise RatingsError(
-            f"{name}: reading it needs {module.partition('.')[0]}: "
-            "pip install 'masrel[files]'"
-        )
-    return import_module(module)
-
-
 def _read(
     name: str, suffix: str, read: Callable[[], Any], *errors: type[Exception]
 ) -> Any:
@@ -95,7 +80,7 @@ def _read(
 def _workbook(
     name: str, suffix: str, data: bytes, options: SheetOptions
 ) -> tuple[pd.DataFrame, str]:
-    calamine = _library(name, "python_calamine")
+    calamine = library(name, "python_calamine")
     book = _read(
         name,
         suffix,
@@ -231,10 +216,10 @@ def _objects(name: str, values: list[Any]) -> pd.DataFrame:
 
 
 def _arrow(name: str, suffix: str, data: bytes) -> pd.DataFrame:
-    library = _library(name, _ARROW[suffix])
+    module = library(name, _ARROW[suffix])
 
     def read() -> pd.DataFrame:
-        table = library.read_table(io.BytesIO(data))
+        table = module.read_table(io.BytesIO(data))
         # whole numbers beside missing ones stay whole, however many digits they have
         frame: pd.DataFrame = table.to_pandas(integer_object_nulls=True)
         return frame
@@ -250,8 +235,8 @@ def _statistical(
     name: str, suffix: str, data: bytes, encoding: str | None
 ) -> tuple[pd.DataFrame, dict[str, dict[str, str]]]:
     # -> the table, and what its codes are called, column by column
-    library = _library(name, "pyreadstat")
-    read = getattr(library, _PYREADSTAT[suffix])
+    pyreadstat = library(name, "pyreadstat")
+    read = getattr(pyreadstat, _PYREADSTAT[suffix])
     text = {} if encoding is None else {"encoding": encoding}
     if suffix == ".xpt" and len(data) % 80:
         raise RatingsError(
@@ -264,11 +249,11 @@ def _statistical(
             name,
             suffix,
             lambda: read(str(file), **text),
-            library.ReadstatError,
-            library.PyreadstatError,
+            pyreadstat.ReadstatError,
+            pyreadstat.PyreadstatError,
         )
     labels = {
-        str(column): {_text(code): str(label) for code, label in codes.items()}
+        str(column): {value_text(code): str(label) for code, label in codes.items()}
         for column, codes in about.variable_value_labels.items()
     }
     return frame, labels
@@ -303,29 +288,14 @@ def _texts(where: str, column: "pd.Series[Any]") -> NDArray[np.object_]:
             # True equals 1 in Python, and is another grade
             is_missing = column.isna().to_numpy()
             cells = [
-                "" if m else _text(v) for m, v in zip(is_missing, column, strict=True)
+                "" if m else value_text(v)
+                for m, v in zip(is_missing, column, strict=True)
             ]
             return np.array(cells, dtype=object)
     # every value that occurs is written once
     codes, values = pd.factorize(column, use_na_sentinel=True)
     # numpy's floats know their precision
     each: Any = values.to_numpy() if values.dtype.kind == "f" else values
-    texts = np.array([*map(_text, each), ""], dtype=object)
+    texts = np.array([*map(value_text, each), ""], dtype=object)
     column_texts: NDArray[np.object_] = texts[codes]  # -1, a missing value, is the last
     return column_texts
-
-
-def _text(value: Any) -> str:
-    # 1.0 of a column of numbers is the grade 1; other floats have their shortest digits
-    if isinstance(value, bool | np.bool_):
-        return str(value).lower()
-    if isinstance(value, float | np.floating | Decimal):
-        is_whole = math.isfinite(value) and value == int(value)
-        return str(int(value)) if is_whole and abs(int(value)) < 2**53 else str(value)
-    if isinstance(value, datetime) and value.timetz() != datetime.min.timetz():
-        return value.isoformat()
-    if isinstance(value, date):
-        return date(value.year, value.month, value.day).isoformat()
-    if isinstance(value, bytes):
-        return value.decode("utf-8", "backslashreplace")
-    return str(value)

@@ -6,8 +6,8 @@ stages: `_text_cells` (bytes to cells of text), `_layout` (which column is what)
 `_parts` (ratings put together item by rater).
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +32,7 @@ from masrel.ratings._grade_texts import (
     is_number,
     read_grades,
 )
+from masrel.ratings._large_files import LargeFile, large_file
 from masrel.ratings._layout import Layout, LayoutOptions, find_layout
 from masrel.ratings._parts import (
     Codes,
@@ -39,9 +40,12 @@ from masrel.ratings._parts import (
     Repeated,
     Triples,
     part_codes,
+    patterns_part,
     put_together,
     without_repeats,
 )
+from masrel.ratings._stream_codes import TooManyError, merged_rows
+from masrel.ratings._streams import Streamed, stream_long, stream_wide
 from masrel.ratings._text_cells import Sheet, SheetOptions, read_sheet
 from masrel.scales import Scale
 
@@ -97,6 +101,8 @@ def read_ratings(
     counts: bool = False,
     table: bool = False,
     source: str | None = None,
+    stream: bool | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> RatingsFile:
     r"""Read any file of ratings, or say in one sentence which option would.
 
@@ -130,6 +136,11 @@ def read_ratings(
         of two raters, the first of them in the rows.
     source : str, optional
         The annotation tool whose export it is.
+    stream : bool, optional
+        Whether only the distinct rows of ratings are kept, batch by batch, so that a
+        file may be larger than memory; by its size unless given.
+    progress : callable, optional
+        Takes how many bytes of how many are read, batch by batch, of a stream.
 
     Returns
     -------
@@ -179,6 +190,11 @@ def read_ratings(
         missing_codes=tuple(missing_codes),
         decimal=decimal,
     )
+    large = large_file(path, form, _may_stream(stream, columns, repeated))
+    if large is not None:
+        streamed = _streamed(large, columns, options, stream, progress)
+        if streamed is not None:
+            return streamed
     cells, warnings = without_second_header(read_sheet(path, form))
     if not len(cells.cells):
         raise cells.error("needed rows of ratings below the names, got none")
@@ -186,6 +202,122 @@ def read_ratings(
     if layout.kind in ("counts", "table"):
         return _counted(cells, layout, options, warnings)
     return _rated(cells, layout, options, repeated, warnings)
+
+
+def _may_stream(
+    stream: bool | None, columns: LayoutOptions, repeated: Repeated
+) -> bool | None:
+    # False where only the whole file has the answer
+    whole = {
+        "--by": columns.by,
+        "--session": columns.session,
+        "--counts": columns.counts,
+        "--table": columns.table,
+        f"--repeated {repeated}": repeated != "error",
+    }
+    options = [option for option, is_given in whole.items() if is_given]
+    if not options:
+        return stream
+    if stream:
+        raise ParameterError(
+            f"{options[0]}: needs the whole file in memory, and not --stream"
+        )
+    return False
+
+
+def _streamed(
+    large: LargeFile,
+    columns: LayoutOptions,
+    options: GradeOptions,
+    stream: bool | None,
+    progress: Callable[[int, int], None] | None,
+) -> RatingsFile | None:
+    # of a long or a wide table, batch by batch; None if it is to be read as a whole
+    sheet, warnings = without_second_header(large.sheet)
+    if warnings or not len(sheet.cells):
+        return None
+    layout = find_layout(sheet, columns)
+    if layout.session is not None:
+        return None
+    read = stream_long if layout.kind == "long" else stream_wide
+    try:
+        ratings = read(large, layout, progress or (lambda _, __: None))
+    except TooManyError as error:
+        if stream:
+            raise sheet.error(f"{error}; --no-stream reads it as a whole") from error
+        return None
+    codes, grades = _streamed_grades(large, ratings, options)
+    rows, freq = merged_rows(codes, ratings.freq)
+    scale = grades.scale
+    doubts = [*ratings.doubts, *doubt_names("raters", ratings.raters)]
+    if layout.kind == "wide":
+        doubts = [*_doubts_of_rows(sheet, layout, ratings, grades, rows, freq), *doubts]
+    doubts.append(
+        "read as a stream: names of items that differ by spelling alone, or sum up "
+        "others, are not looked for"
+    )
+    rated = rows >= 0
+    counted = [
+        int(freq @ (rows == code).sum(axis=1)) for code in range(len(scale.grades))
+    ]
+    record = _record(sheet, layout, options, grades, scale, np.array(counted))
+    n_cells = int(ratings.freq @ (ratings.rows >= 0).sum(axis=1))
+    record |= {
+        "raters": ratings.raters,
+        "n_items": ratings.n_items,
+        "n_raters": len(ratings.raters),
+        "n_ratings": int(freq @ rated.sum(axis=1)),
+        "n_missing": n_cells - int(freq @ rated.sum(axis=1)),
+        "n_repeated": 0,
+        "repeated": None,
+        "dropped": {"blank": ratings.n_blank} if ratings.n_blank else {},
+    }
+    part = patterns_part(rows, freq, ratings.raters, scale)
+    file = _file(sheet, [part], scale, grades, record, doubts)
+    return replace(file, simulated=file.simulated or ratings.is_simulated)
+
+
+def _streamed_grades(
+    large: LargeFile, ratings: Streamed, options: GradeOptions
+) -> tuple[NDArray[np.int8], Grades]:
+    # the rows on the scale, (n_distinct, n_raters)
+    sheet, n = large.sheet, len(ratings.texts)
+    freq = np.array(
+        [int(ratings.freq @ (ratings.rows == k).sum(axis=1)) for k in range(n)],
+        dtype=np.int64,
+    )
+
+    def where(text: int) -> str:
+        row, column = ratings.places[text]
+        return f"{large.where(row)}, column {sheet.header[column]!r}"
+
+    try:
+        grades = read_grades(ratings.texts, freq, options, where)
+    except RatingsError as error:
+        raise sheet.error(str(error)) from None
+    codes = np.append(grades.codes, -1).astype(np.int8)
+    return codes[ratings.rows], grades
+
+
+def _doubts_of_rows(
+    sheet: Sheet,
+    layout: Layout,
+    ratings: Streamed,
+    grades: Grades,
+    rows: NDArray[np.int8],
+    freq: NDArray[np.int64],
+) -> list[str]:
+    # of a wide table whose rows are counted: its first row, and the others
+    first = np.append(grades.codes, -1)[ratings.first]
+    others = freq - (rows == first).all(axis=1)
+    codes = np.concatenate([first[None, :], rows[others > 0]]).astype(np.int64)
+    weights = np.append(1, others[others > 0])
+    doubts = doubt_columns(sheet, layout, codes, grades.scale, weights)
+    unrated = (rows < 0).all(axis=0)
+    doubts += [
+        f"{ratings.raters[k]!r} has no grade" for k in np.flatnonzero(unrated)[:6]
+    ]
+    return doubts
 
 
 def _rated(
