@@ -1,5 +1,6 @@
 """``masrel latent``: raters' biases and noises, items and thresholds on one scale."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -67,7 +68,7 @@ def latent(
     output.check_files()
     if seed < 0:
         raise ParameterError(f"--seed: needs at least 0, got {seed}")
-    ratings = read_file(file, reading)
+    ratings = read_file(file, replace(reading, stream=False))
     if not ratings.is_ordered:
         raise ParameterError(
             "--categories: the model needs every grade of the scale in order, the "

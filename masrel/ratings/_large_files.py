@@ -4,6 +4,7 @@ In: a path and what the caller says of its format. Out: a `LargeFile`, or None w
 file is small or has a form that is read as a whole.
 """
 
+import csv
 import hashlib
 import re
 from collections.abc import Callable, Iterator, Sequence
@@ -53,14 +54,11 @@ class LargeFile:
     sheet: Sheet  # of its first rows
     n_bytes: int
     is_text: bool
+    where: Callable[[int], str]  # number of a row, from 0, to where it stands
     # of columns by position, the first few of them not kept as numbers of texts
     batches: Callable[[Sequence[int], int], Iterator[Batch]]
     # least and greatest number of a column of whole ones, if that is known
     span: Callable[[int], tuple[int, int] | None]
-
-    def where(self, row: int) -> str:
-        """Return where a row, from 0, stands in the file."""
-        return f"row {row + 1}"
 
 
 def large_file(
@@ -200,6 +198,7 @@ def _parquet(path: Path, stream: bool | None) -> LargeFile | None:
         ),
         n_bytes=n_bytes,
         is_text=False,
+        where=lambda row: f"row {row + 2}",  # the names are the first
         batches=batches,
         span=span,
     )
@@ -256,6 +255,7 @@ def _text(path: Path, options: SheetOptions) -> LargeFile | None:
         sheet=replace(sheet, is_simulated=simulated),
         n_bytes=size,
         is_text=True,
+        where=partial(_line_of, path, delimiter, facts["encoding"], first),
         batches=batches,
         span=lambda _: None,
     )
@@ -270,6 +270,23 @@ def _whole_lines(name: str, head: bytes, options: SheetOptions) -> str:
     return ""
 
 
+def _line_of(
+    path: Path, delimiter: str, encoding: str, n_skipped: int, row: int
+) -> str:
+    # the line where a record begins, looked up only for a message
+    with path.open(encoding=encoding, newline="") as file:
+        for _ in range(n_skipped):
+            file.readline()
+        begins = 1
+        reader = csv.reader(file, delimiter=delimiter)
+        for record in reader:
+            if record and row == 0:
+                return f"line {n_skipped + begins}"
+            row -= bool(record)
+            begins = reader.line_num + 1
+    return "the end"
+
+
 def _text_batches(
     path: Path,
     delimiter: str,
@@ -279,7 +296,7 @@ def _text_batches(
     places: Sequence[int],
     n_plain: int,
 ) -> Iterator[Batch]:
-    lib, csv = arrow(str(path), "pyarrow"), arrow(str(path), "pyarrow.csv")
+    lib, text = arrow(str(path), "pyarrow"), arrow(str(path), "pyarrow.csv")
     names = [str(place) for place in range(width)]
     # cells as they are written; of few different ones each is kept once
     types = {
@@ -287,18 +304,18 @@ def _text_batches(
     }
     types |= {names[place]: lib.string() for place in places[:n_plain]}
     with _damage(str(path), "text"), path.open("rb") as file:
-        reader = csv.open_csv(
+        reader = text.open_csv(
             file,
-            csv.ReadOptions(
+            text.ReadOptions(
                 block_size=_BLOCK,
                 skip_rows=n_skipped,
                 column_names=names,
                 encoding=encoding,
             ),
-            csv.ParseOptions(
+            text.ParseOptions(
                 delimiter=delimiter, newlines_in_values=True, ignore_empty_lines=True
             ),
-            csv.ConvertOptions(
+            text.ConvertOptions(
                 column_types=types,
                 include_columns=[names[place] for place in places],
                 strings_can_be_null=False,

@@ -3,6 +3,7 @@
 import os
 import tempfile
 from collections.abc import Callable, Generator, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.errors import RatingsError
+from masrel.ratings._large_files import is_whole
 from masrel.ratings._text_cells import library
 
 _MEMORY = "500MB"
@@ -28,8 +30,9 @@ class PackedItems:
     twice: list[Any] | None  # the name of an item whose numbers overlap
 
 
-def packed_items(name: str, keys: Keys) -> PackedItems:
-    """Add the numbers of every item up, and count the items that are alike."""
+def packed_items(name: str, keys: Keys, marks: int) -> PackedItems:
+    """Put the numbers of every item together, and count the items that are alike."""
+    # marks: the bits of which an item has as many as ratings, unless two overlap
     duckdb = library(name, "duckdb", "big")
     # removed whatever happens, Ctrl-C too
     with tempfile.TemporaryDirectory(prefix="masrel-") as folder:
@@ -41,46 +44,50 @@ def packed_items(name: str, keys: Keys) -> PackedItems:
                 ("preserve_insertion_order", False),
             ):
                 database.execute(f"SET {option} = '{value}'")
-            return _packed(name, duckdb, database, keys)
+            return _packed(name, duckdb, database, keys, marks)
 
 
-def _packed(name: str, duckdb: Any, database: Any, keys: Keys) -> PackedItems:
-    items, sums = _columns(keys)
-    same = " AND ".join(f"sum({k}) = bit_or({k})" for k in sums)
-    ors = ", ".join(f"bit_or({k}) AS {k}" for k in sums)
-    of_items = f"SELECT {ors}, {same} AS plain FROM ratings GROUP BY {items}"
+def _packed(
+    name: str, duckdb: Any, database: Any, keys: Keys, marks: int
+) -> PackedItems:
+    items, sums = next(keys())
+    names = [f"item{k}" for k in range(len(items))]
+    columns = [f"key{k}" for k in range(len(sums))]
+    group = _group(items, names)
+    n_marks = " + ".join(f"bit_count(bit_or({k}) & {marks})" for k in columns)
+    of_items = (
+        f"SELECT {', '.join(f'bit_or({k}) AS {k}' for k in columns)}, "
+        f"{n_marks} = count(*) AS plain, any_value({group[0]}) AS one "
+        f"FROM ratings GROUP BY {', '.join(group)}"
+    )
     table = _answer(
         name,
         duckdb,
         database,
         keys,
-        f"SELECT {', '.join(sums)}, plain, count(*) AS freq FROM ({of_items}) "
-        "GROUP BY ALL",
+        f"SELECT {', '.join(columns)}, plain, count(*) AS freq, any_value(one) AS one "
+        f"FROM ({of_items}) GROUP BY {', '.join(columns)}, plain",
     )
     twice = None
-    if not all(table["plain"].tolist()):
-        query = (
-            f"SELECT {items} FROM ratings GROUP BY {items} HAVING NOT ({same}) LIMIT 1"
-        )
-        row = _answer(name, duckdb, database, keys, query)
-        twice = [
-            column[0].item() if hasattr(column[0], "item") else column[0]
-            for column in row.values()
-        ]
+    plain = table["plain"].astype(bool)
+    if not plain.all():
+        which = int(table["one"][~plain][0])
+        query = f"SELECT {', '.join(names)} FROM ratings WHERE {group[0]} = {which}"
+        row = _answer(name, duckdb, database, keys, f"{query} LIMIT 1")
+        twice = [column.tolist()[0] for column in row.values()]
     return PackedItems(
-        keys=np.column_stack([table[k] for k in sums]).astype(np.int64),
+        keys=np.column_stack([table[k] for k in columns]).astype(np.int64),
         freq=table["freq"].astype(np.int64),
         twice=twice,
     )
 
 
-def _columns(keys: Keys) -> tuple[str, list[str]]:
-    # names of the columns of items, and those of the numbers
-    items, sums = next(keys())
-    return (
-        ", ".join(f"item{k}" for k in range(len(items))),
-        [f"key{k}" for k in range(len(sums))],
-    )
+def _group(items: list[Any], names: list[str]) -> list[str]:
+    # what tells items apart: a whole number, or 128 bits of the hash of their names
+    if len(items) == 1 and is_whole(items[0]):
+        return names
+    texts = f"concat_ws(chr(31), {', '.join(names)})"
+    return [f"hash({texts})", f"hash({texts} || '~')"]
 
 
 def _answer(
@@ -121,6 +128,7 @@ def _answer(
         lines = str(error).splitlines() or ["DuckDB stopped"]
         raise RatingsError(f"{name}: sorting it failed ({lines[0][:200]})") from error
     finally:
-        stream.close()
+        with suppress(ValueError):  # DuckDB may still be reading
+            stream.close()
         database.unregister("ratings")
     return answer

@@ -8,6 +8,7 @@ ascend, in a table of a byte a rating where items are whole numbers, and else by
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from importlib.util import find_spec
 from typing import Any, NoReturn
 
 import numpy as np
@@ -21,6 +22,7 @@ from masrel.ratings._stream_codes import (
     DistinctRows,
     StreamCodes,
     TextCodes,
+    TooManyError,
     widened,
 )
 from masrel.ratings._stream_items import (
@@ -64,8 +66,7 @@ class Streamed:
 def stream_wide(large: LargeFile, layout: Layout, progress: Progress) -> Streamed:
     """Count the distinct rows of a wide table."""
     try:
-        order: Ascending | Hashed = Ascending(large.sheet.name)
-        table = _Wide(large=large, layout=layout, order=order)
+        table = _Wide(large=large, layout=layout, order=Ascending(large.sheet.name))
         table.read(progress)
     except UnorderedError:
         table = _Wide(large=large, layout=layout, order=Hashed(large.sheet.name))
@@ -74,6 +75,9 @@ def stream_wide(large: LargeFile, layout: Layout, progress: Progress) -> Streame
     if (twice := table.order.repeated()) is not None:
         _refuse_twice(large, layout, twice)
     rows, freq = table.rows.merged()
+    order = sorted(range(len(table.texts.texts)), key=table.texts.places.__getitem__)
+    number = np.empty(len(order) + 1, dtype=np.int8)
+    number[[*order, -1]] = [*range(len(order)), -1]
     doubts = []
     if not table.order.is_known:
         doubts.append(
@@ -81,11 +85,11 @@ def stream_wide(large: LargeFile, layout: Layout, progress: Progress) -> Streame
             "is there twice is not checked"
         )
     return Streamed(
-        rows=rows,
+        rows=number[rows],
         freq=freq,
-        first=np.full(len(layout.raters), -1) if table.first is None else table.first,
-        texts=table.texts.texts,
-        places=table.texts.places,
+        first=number[table.first] if table.first is not None else number[:0],
+        texts=[table.texts.texts[k] for k in order],
+        places=[table.texts.places[k] for k in order],
         raters=[large.sheet.header[place] for place in layout.raters],
         n_items=table.n_rows - table.n_blank,
         n_blank=table.n_blank,
@@ -133,8 +137,13 @@ class _Wide:
     def _codes(self, cells: Sequence[Any]) -> NDArray[np.int8]:
         # (n_raters, n_rows), so that each column is written at once
         codes = np.empty((len(cells), len(cells[0])), dtype=np.int8)
+        n_known = len(self.texts.texts)
         for j, cell in enumerate(cells):
             codes[j] = self.texts.codes(cell, self.n_rows, self.layout.raters[j])
+        for code in range(n_known, len(self.texts.texts)):  # first by rows
+            row, j = divmod(int((codes.T.ravel() == code).argmax()), len(cells))
+            place = (self.n_rows + row, self.layout.raters[j])
+            self.texts.places[code] = place
         return codes
 
     def _named_rows(
@@ -194,8 +203,9 @@ def _refuse_header(large: LargeFile, places: Sequence[int], texts: TextCodes) ->
     rows = {texts.places[texts.texts.index(name)] for name in names}
     if len({row for row, _ in rows}) == 1 and {p for _, p in rows} == set(places):
         raise large.sheet.error(
-            f"{large.where(next(iter(rows))[0])} holds the names of the columns once "
-            "more: delete it; --no-header if the first line is a row like the others"
+            f"{large.where(next(iter(rows))[0])}: holds the names of the columns "
+            "once more: delete it; --no-header if the first line is a row like the "
+            "others"
         )
 
 
@@ -228,8 +238,8 @@ def repeated_error(
         guess = ", --rater and --grade name the columns of one row a rating"
         guess += ", --no-item says that no column names items" * layout.is_item_guessed
     return large.sheet.error(
-        f"{' and '.join(rows)}: {rater!r} graded {' '.join(map(str, item))!r} more than "
-        "once: --by or --session names a column that tells such ratings apart, "
+        f"{' and '.join(rows)}: {rater!r} graded {' '.join(map(str, item))!r} more "
+        "than once: --by or --session names a column that tells such ratings apart, "
         f"--repeated first, last or mean keeps one, with --no-stream{guess}"
     )
 
@@ -473,15 +483,23 @@ def _of_engine(long: _Long, rows: DistinctRows) -> int:
     # of items in any order: DuckDB puts the ratings of each into a few whole numbers
     from masrel.ratings._spilling import packed_items
 
+    if find_spec("duckdb") is None:
+        raise TooManyError(
+            "items in no order, which a stream puts together by DuckDB: pip install "
+            "'masrel[big]'"
+        )
     while True:
-        # A grade has some bits, of which the one above is set: where two are in one
-        # place, their sum is no longer what "or" makes of them.
+        # A grade has some bits, and above them one that is set, so that an item has as
+        # many of these as ratings unless two are in one place.
         n_bits = (len(long.grades.texts) + 2).bit_length() + 1
         n_in_key = _BITS // n_bits
         n_keys = (long.n_raters + 2) // n_in_key + 1
+        marks = sum(1 << (n_bits * (k + 1) - 1) for k in range(n_in_key))
         try:
             packed = packed_items(
-                long.large.sheet.name, partial(_keys, long, n_bits, n_in_key, n_keys)
+                long.large.sheet.name,
+                partial(_keys, long, n_bits, n_in_key, n_keys),
+                marks,
             )
             break
         except UnorderedError:  # of more grades or raters than there is place for

@@ -1,0 +1,359 @@
+"""A file that is read batch by batch gives what it gives when it is read as a whole."""
+
+import csv
+import gzip
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from masrel.agreement import coefficient
+from masrel.errors import ParameterError, RatingsError
+from masrel.ratings import RatingsFile, _large_files, _streams, read_ratings
+from masrel.ratings._stream_codes import merged_rows
+
+pyarrow = pytest.importorskip("pyarrow")
+parquet = pytest.importorskip("pyarrow.parquet")
+
+NAMES = ("fleiss_kappa", "gwet_ac", "krippendorff_alpha", "conger_kappa")
+SAME = (
+    *("layout", "item", "rater", "grade", "grades", "missing", "merged", "scale"),
+    *("raters", "n_items", "n_raters", "n_ratings", "n_missing", "dropped", "sha256"),
+)
+NOTE = "read as a stream: names of items that differ"
+
+
+@pytest.fixture(autouse=True)
+def _small_batches(monkeypatch: pytest.MonkeyPatch) -> None:
+    # so that items lie across their ends
+    monkeypatch.setattr(_large_files, "_BATCH", 300)
+    monkeypatch.setattr(_large_files, "_BLOCK", 1000)
+
+
+def written(path: Path, columns: dict[str, Any]) -> Path:
+    if path.suffix == ".parquet":
+        parquet.write_table(pyarrow.table(columns), path)
+    else:
+        with path.open("w", newline="") as file:
+            rows = zip(*(list(values) for values in columns.values()), strict=True)
+            csv.writer(file).writerows([list(columns), *rows])
+    return path
+
+
+def both(path: Path, **options: Any) -> tuple[RatingsFile, RatingsFile]:
+    return (
+        read_ratings(path, stream=True, **options),
+        read_ratings(path, stream=False, **options),
+    )
+
+
+def assert_same(streamed: RatingsFile, whole: RatingsFile) -> None:
+    for key in SAME:
+        assert streamed.read[key] == whole.read[key], key
+    assert streamed.scale == whole.scale
+    assert streamed.simulated == whole.simulated
+    rest = [text for text in streamed.warnings if not text.startswith(NOTE)]
+    assert sorted(rest) == sorted(whole.warnings)
+    for name in NAMES:
+        ours, theirs = (
+            coefficient(name)(f.parts[0].counted) for f in (streamed, whole)
+        )
+        assert ours == theirs
+        assert ours.standard_error == theirs.standard_error
+
+
+def made(seed: int, n_items: int = 400, n_raters: int = 4) -> np.ndarray[Any, Any]:
+    rng = np.random.default_rng(seed)
+    truth = rng.integers(0, 4, (n_items, 1))
+    noise = rng.integers(0, 4, (n_items, n_raters))
+    return np.where(rng.random((n_items, n_raters)) < 0.6, truth, noise)
+
+
+def long_columns(
+    order: np.ndarray[Any, Any] | None, items: list[Any]
+) -> dict[str, Any]:
+    grades = made(3, len(items))
+    texts = np.array(["1", "1+", "2", ""], dtype=object)[grades]
+    n, r = grades.shape
+    rows = np.arange(n * r) if order is None else order[: n * r]
+    rows = rows[(rows % 7) != 3]  # not everybody rated everything
+    return {
+        "patient": [items[k // r] for k in rows],
+        "rater": [f"Dr. {'ABCD'[k % r]}" for k in rows],
+        "grade": texts.ravel()[rows].tolist(),
+    }
+
+
+ORDER = np.random.default_rng(9).permutation(1600)
+
+
+@pytest.mark.parametrize("ending", ["parquet", "csv"])
+class TestBothWays:
+    @pytest.mark.parametrize("has_item", [True, False])
+    def test_a_wide_table(self, tmp_path: Path, ending: str, has_item: bool) -> None:
+        grades = made(1).astype(np.int8)
+        columns = {
+            name: grades[:, j] for j, name in enumerate(("Kim", "Lee", "X", "Y"))
+        }
+        if has_item:
+            columns = {"case": np.arange(400), **columns}
+        path = written(tmp_path / f"wide.{ending}", columns)
+        assert_same(*both(path, no_item=not has_item))
+
+    def test_missing_grades_and_spellings(self, tmp_path: Path, ending: str) -> None:
+        texts = np.array(["1", "1.0", " 2 ", "", "-99"], dtype=object)
+        cells = texts[np.random.default_rng(2).integers(0, 5, (300, 3))]
+        columns = {"id": [f"p {k}" for k in range(300)]}
+        columns |= {name: cells[:, j].tolist() for j, name in enumerate("ABC")}
+        path = written(tmp_path / f"wide.{ending}", columns)
+        streamed, whole = both(path, missing_codes=["-99"])
+        assert set(whole.read["merged"]["1"]) == {"1", "1.0"}
+        assert_same(streamed, whole)
+
+    @pytest.mark.parametrize("items", ["numbers", "texts", "padded"])
+    def test_a_long_table_in_order(
+        self, tmp_path: Path, ending: str, items: str
+    ) -> None:
+        form = {"numbers": int, "texts": "p{}".format, "padded": "é{:05}".format}[items]
+        names = [form(k) for k in range(400)]
+        path = written(tmp_path / f"long.{ending}", long_columns(None, names))
+        assert_same(*both(path))
+
+    def test_items_that_two_columns_name(self, tmp_path: Path, ending: str) -> None:
+        pytest.importorskip("duckdb")
+        columns = long_columns(None, list(range(400)))
+        columns["side"] = [k % 2 for k in columns["patient"]]
+        columns["patient"] = [k // 2 for k in columns["patient"]]
+        path = written(tmp_path / f"long.{ending}", columns)
+        assert_same(*both(path, item=["patient", "side"]))
+
+    def test_a_shuffled_table_of_texts(self, tmp_path: Path, ending: str) -> None:
+        pytest.importorskip("duckdb")
+        names = [f"p{k}" for k in range(400)]
+        path = written(tmp_path / f"long.{ending}", long_columns(ORDER, names))
+        assert_same(*both(path))
+
+
+def test_a_shuffled_table_of_whole_numbers(tmp_path: Path) -> None:
+    columns = long_columns(ORDER, list(range(1000, 1400)))
+    assert_same(*both(written(tmp_path / "long.parquet", columns)))
+
+
+def test_more_raters_than_a_key_has_places_for(tmp_path: Path) -> None:
+    pytest.importorskip("duckdb")
+    grades = made(4, 60, 40)
+    order = np.random.default_rng(1).permutation(grades.size)
+    columns = {
+        "item": [f"p{k // 40}" for k in order],
+        "rater": [f"r{k % 40}" for k in order],
+        "grade": grades.ravel()[order],
+    }
+    assert_same(*both(written(tmp_path / "long.parquet", columns)))
+
+
+def test_cells_of_every_type_are_the_texts_they_are(tmp_path: Path) -> None:
+    columns = {
+        "id": pyarrow.array([3, 1, 2, 9], pyarrow.int32()),
+        "A": pyarrow.array([1.0, None, 2.5, float("nan")], pyarrow.float32()),
+        "B": pyarrow.array([1, 2, None, 1], pyarrow.int64()),
+        "C": pyarrow.array(["1", "2.50", "NA", None]).dictionary_encode(),
+        "D": pyarrow.array([1, 2, 1, 2], pyarrow.uint16()),
+    }
+    assert_same(*both(written(tmp_path / "wide.parquet", columns)))
+
+
+def test_names_of_rows_that_pandas_keeps_are_items(tmp_path: Path) -> None:
+    pandas = pytest.importorskip("pandas")
+    frame = pandas.DataFrame(made(5), columns=list("ABCD"))
+    frame.index = [f"p{k}" for k in range(400)]
+    frame.to_parquet(tmp_path / "wide.parquet")
+    assert_same(*both(tmp_path / "wide.parquet"))
+
+
+def test_blank_lines_are_left_out(tmp_path: Path) -> None:
+    path = tmp_path / "wide.csv"
+    path.write_text("id,A,B\np1,1,2\n,,\np2,2,2\n,,\n")
+    streamed, whole = both(path)
+    assert streamed.read["dropped"] == {"blank": 2}
+    assert_same(streamed, whole)
+
+
+def test_simulated_ratings_are_labelled(tmp_path: Path) -> None:
+    columns = long_columns(None, list(range(400)))
+    columns["source"] = ["rater"] * (len(columns["rater"]) - 1) + ["simulated"]
+    streamed, _ = both(written(tmp_path / "long.parquet", columns))
+    assert streamed.simulated
+
+
+@pytest.mark.parametrize(
+    ("columns", "words"),
+    [
+        ({"id": [7, 8, 7], "A": [1, 1, 2], "B": [1, 2, 2]}, "row 2 and row 4: .*'7'"),
+        ({"id": ["b", "a", "b"], "A": [1, 1, 2], "B": [1, 2, 2]}, "row 2 and row 4"),
+        ({"id": [1, None], "A": [1, 1], "B": [1, 2]}, "row 3, column 'id': needed the"),
+        (
+            {"id": [1, 2], "A": ["1", "n/a"], "B": ["1", "2"]},
+            "row 3, column 'A'.*--miss",
+        ),
+        (
+            {"item": [1, 1, 2, 1], "rater": list("ABAA"), "grade": [1, 2, 1, 2]},
+            "row 2 and row 5: 'A' graded '1' more than once",
+        ),
+        (
+            {"item": [1, 1, 2, 2], "rater": list("ABAA"), "grade": [1, 2, 1, 2]},
+            "row 4 and row 5: 'A' graded '2'",
+        ),
+        (
+            {"item": [1, 2], "rater": ["A", ""], "grade": [1, 2]},
+            "row 3, column 'rater': needed the rater, got ''",
+        ),
+        ({"id": [1, 2], "A": [None, None], "B": ["", ""]}, "needed at least one grade"),
+    ],
+)
+def test_what_is_refused_is_refused_where_it_stands(
+    tmp_path: Path, columns: dict[str, Any], words: str
+) -> None:
+    path = written(tmp_path / "table.parquet", columns)
+    with pytest.raises(RatingsError, match=words):
+        read_ratings(path, stream=True)
+    with pytest.raises(RatingsError, match=words.split(":")[0]):
+        read_ratings(path, stream=False)
+
+
+def test_a_rating_that_is_twice_in_a_shuffled_table_of_texts(tmp_path: Path) -> None:
+    pytest.importorskip("duckdb")
+    columns = long_columns(ORDER, [f"p{k}" for k in range(400)])
+    for name, value in (("patient", "p7"), ("rater", "Dr. B"), ("grade", "2")):
+        columns[name] += [value, value]
+    path = written(tmp_path / "long.parquet", columns)
+    with pytest.raises(RatingsError, match=r"'Dr\. B' graded 'p7' more than once"):
+        read_ratings(path, stream=True)
+
+
+def test_a_second_line_of_names_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(_large_files, "_HEAD_BYTES", 20)
+    path = tmp_path / "wide.csv"
+    path.write_text("id,A,B\np2,2,2\n\np3,2,1\nid,A,B\np4,1,1\n")
+    with pytest.raises(RatingsError, match="line 5: holds the names of the columns"):
+        read_ratings(path, stream=True)
+
+
+def test_a_cell_too_many_is_one_sentence(tmp_path: Path) -> None:
+    path = tmp_path / "wide.csv"
+    rows = "".join(f"p{k},1,2\n" for k in range(100_000))
+    path.write_text(f"id,A,B\n{rows}p,1,2,3\n")
+    with pytest.raises(RatingsError, match=r"is damaged, or no text file .*Expected 3"):
+        read_ratings(path, stream=True)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{"by": "rater"}, {"session": "rater"}, {"repeated": "first"}, {"counts": True}],
+)
+def test_what_needs_the_whole_file_is_no_stream(
+    tmp_path: Path, options: dict[str, Any]
+) -> None:
+    path = written(tmp_path / "long.parquet", long_columns(None, list(range(400))))
+    with pytest.raises(ParameterError, match="needs the whole file in memory"):
+        read_ratings(path, stream=True, **options)
+
+
+def test_a_packed_file_is_no_stream(tmp_path: Path) -> None:
+    path = tmp_path / "wide.csv.gz"
+    path.write_bytes(gzip.compress(b"id,A,B\np1,1,2\n"))
+    with pytest.raises(RatingsError, match="--stream: needed a Parquet file"):
+        read_ratings(path, stream=True)
+    assert len(read_ratings(path).parts) == 1
+
+
+class TestSize:
+    def test_large_files_are_streams(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        grades = made(1)
+        columns = {"id": np.arange(400)}
+        columns |= {name: grades[:, j] for j, name in enumerate("ABCD")}
+        for ending, limit in (("parquet", "_LARGE_TABLE"), ("csv", "_LARGE_TEXT")):
+            path = written(tmp_path / f"wide.{ending}", columns)
+            assert not any(map(self.is_note, read_ratings(path).warnings))
+            monkeypatch.setattr(_large_files, limit, 1000)
+            assert any(map(self.is_note, read_ratings(path).warnings))
+
+    def test_more_grades_than_a_stream_counts_are_read_as_a_whole(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        values = np.random.default_rng(1).normal(size=(400, 2))
+        columns = {"id": np.arange(400), "A": values[:, 0], "B": values[:, 1]}
+        path = written(tmp_path / "wide.parquet", columns)
+        with pytest.raises(RatingsError, match=r"more than 120 .*--no-stream"):
+            read_ratings(path, stream=True)
+        monkeypatch.setattr(_large_files, "_LARGE_TABLE", 1000)
+        assert not any(map(self.is_note, read_ratings(path).warnings))
+
+    def test_without_duckdb_a_shuffled_table_is_read_as_a_whole(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(_streams, "find_spec", lambda _: None)
+        columns = long_columns(ORDER, [f"p{k}" for k in range(400)])
+        path = written(tmp_path / "long.parquet", columns)
+        with pytest.raises(RatingsError, match=r"masrel\[big\]"):
+            read_ratings(path, stream=True)
+        monkeypatch.setattr(_large_files, "_LARGE_TABLE", 1000)
+        assert not any(map(self.is_note, read_ratings(path).warnings))
+
+    def test_who_rated_what_is_not_laid_out_without_end(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr("masrel.ratings._parts._MAX_LAID_OUT", 1000)
+        path = written(tmp_path / "long.parquet", long_columns(None, list(range(400))))
+        counted = read_ratings(path, stream=True).parts[0].counted
+        assert coefficient("fleiss_kappa")(counted).n_items
+        with pytest.raises(RatingsError, match="not who rated what"):
+            coefficient("conger_kappa")(counted)
+
+    @staticmethod
+    def is_note(text: str) -> bool:
+        return text.startswith(NOTE)
+
+
+def test_progress_ends_with_the_whole_file(tmp_path: Path) -> None:
+    path = written(tmp_path / "long.parquet", long_columns(None, list(range(400))))
+    steps: list[tuple[int, int]] = []
+    read_ratings(path, stream=True, progress=lambda *step: steps.append(step))
+    size = path.stat().st_size
+    assert len(steps) > 3
+    assert [n for n, _ in steps] == sorted(n for n, _ in steps)
+    assert steps[-1] == (size, size)
+
+
+def test_ctrl_c_leaves_no_file_behind(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("duckdb")
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(folder))
+    columns = long_columns(ORDER, [f"p{k}" for k in range(400)])
+    path = written(tmp_path / "long.parquet", columns)
+    calls: Iterator[int] = iter(range(100))
+
+    def interrupt(*_: int) -> None:
+        if next(calls) == 5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        read_ratings(path, stream=True, progress=interrupt)
+    assert list(folder.iterdir()) == []
+
+
+def test_rows_that_are_merged_are_counted_once() -> None:
+    rows = np.array([[1, -1], [0, 2], [1, -1]], dtype=np.int8)
+    merged, freq = merged_rows(rows, np.array([2, 3, 5]))
+    assert dict(zip(map(tuple, merged.tolist()), freq.tolist(), strict=True)) == {
+        (1, -1): 7,
+        (0, 2): 3,
+    }
