@@ -29,6 +29,7 @@ class ReadingOptions:
     no_header: bool = False
     session: str | None = None
     by: str | None = None
+    clusters: str | None = None
     repeated: "Repeated" = "error"
     categories: list[str] | None = None
     missing_codes: tuple[str, ...] = ()
@@ -190,6 +191,8 @@ def what_was_read(file: "RatingsFile") -> list[str]:
     if len(names) > _SHOWN:
         raters += f" and {len(names) - _SHOWN} more"
     items = f" named by {' and '.join(map(repr, read['item']))}" if read["item"] else ""
+    if read.get("clusters"):
+        items += f" in {counted(read['n_clusters'], 'cluster')} by {read['clusters']!r}"
     counts = f"{counted(read['n_items'], 'item')}{items}, "
     counts += counted(read["n_raters"], "rater")
     first = f"Read {', '.join(filter(None, form))}: {counts}"

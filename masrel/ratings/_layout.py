@@ -38,6 +38,7 @@ class LayoutOptions:
     grade: str | None = None
     session: str | None = None
     by: str | None = None
+    clusters: str | None = None
     raters: tuple[str, ...] = ()  # the raters of a wide table
     ignore: tuple[str, ...] = ()  # columns that are left aside
     no_item: bool = False  # whether every column is a rater, or a category
@@ -57,6 +58,7 @@ class Layout:
     grade: int | None = None
     session: int | None = None
     by: int | None = None
+    clusters: int | None = None
     # whether the item is the first column because nothing else was said of it
     is_item_guessed: bool = False
 
@@ -64,12 +66,22 @@ class Layout:
 def find_layout(sheet: Sheet, options: LayoutOptions) -> Layout:
     """Decide which column is what, or say which option would."""
     options = _resolved(sheet, options)
+    layout = _found(sheet, options)
+    if options.clusters is None:
+        return layout
+    return replace(layout, clusters=sheet.header.index(options.clusters))
+
+
+def _found(sheet: Sheet, options: LayoutOptions) -> Layout:
+    # every column but that of the clusters
     header = sheet.header
     position = {name: place for place, name in enumerate(header)}
     taken = {position[name] for name in options.ignore}
     by = None if options.by is None else position[options.by]
     session = _role(sheet, "session", options.session, taken)
     taken |= {place for place in (by, session) if place is not None}
+    if options.clusters is not None and options.clusters not in options.item:
+        taken.add(position[options.clusters])
     if options.counts or options.table:
         kind: Kind = "counts" if options.counts else "table"
         return _wide(sheet, kind, options, taken, session=None, by=by)
@@ -130,6 +142,10 @@ def _resolved(sheet: Sheet, options: LayoutOptions) -> LayoutOptions:
         raise ParameterError(
             "--session: counts do not say who rated what; --by tells groups apart"
         )
+    if options.clusters and (options.counts or options.table):
+        raise ParameterError(
+            "--clusters: counts do not say which item is which, so needs ratings"
+        )
     if options.raters and (options.rater or options.grade):
         raise ParameterError(
             "--raters names the columns of a wide table, --rater and --grade those of "
@@ -137,7 +153,7 @@ def _resolved(sheet: Sheet, options: LayoutOptions) -> LayoutOptions:
         )
     if options.no_item and options.item:
         raise ParameterError("--item, --no-item: needed one of them, got both")
-    for role in ("rater", "grade", "session", "by"):
+    for role in ("rater", "grade", "session", "by", "clusters"):
         name: str | None = getattr(options, role)
         if name is not None and name not in sheet.header:
             raise unknown_column(sheet, f"--{role}", name)
@@ -152,11 +168,12 @@ def _resolved(sheet: Sheet, options: LayoutOptions) -> LayoutOptions:
 
 
 def _refuse_two_roles(sheet: Sheet, options: LayoutOptions) -> None:
-    # a column that is named twice; groups may be sessions, or part of the items' names
+    # a column that is named twice; groups may be sessions, or part of the items' names,
+    # as clusters may be
     named = [(name, "--raters") for name in options.raters]
     named += [(name, "--ignore") for name in options.ignore]
     named += [(name, "--item") for name in options.item]
-    for role in ("rater", "grade", "session", "by"):
+    for role in ("rater", "grade", "session", "by", "clusters"):
         name: str | None = getattr(options, role)
         if name is not None:
             named.append((name, f"--{role}"))
@@ -166,7 +183,9 @@ def _refuse_two_roles(sheet: Sheet, options: LayoutOptions) -> None:
         other = first.setdefault(name, option)
         if (name, option) == (name, other) and named.count((name, option)) == 1:
             continue
-        if not ("--by" in (option, other) and {option, other} <= allowed):
+        both_are = {option, other}
+        is_cluster = both_are in ({"--clusters", "--item"}, {"--clusters", "--by"})
+        if not (is_cluster or ("--by" in both_are and both_are <= allowed)):
             both = option if other == option else f"{other}, {option}"
             raise sheet.error(f"{both}: needed each column once, got {name!r} twice")
 

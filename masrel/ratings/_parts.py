@@ -41,6 +41,8 @@ class RatingsPart:
         Their session; None where the file has no such column.
     items, raters : tuple of str
         Names, in the order in which they are met; raters without a name have none.
+    clusters : tuple of str
+        The cluster of each item; empty where none are told apart.
     ratings : CodedRatings or CountedRatings
         The ratings on the values of the scale, item by rater; counted where only
         counts are known, or kept because items and raters are many.
@@ -51,6 +53,7 @@ class RatingsPart:
     items: tuple[str, ...] = field(repr=False)
     raters: tuple[str, ...] = field(repr=False)
     ratings: CodedRatings | CountedRatings = field(repr=False)
+    clusters: tuple[str, ...] = field(default=(), repr=False)
 
     @cached_property
     def counted(self) -> CountedRatings:
@@ -165,6 +168,7 @@ def _repeats(
         triples.rater_names[triples.rater[first]],
     )
     used = {*layout.item, *layout.raters, layout.rater, layout.grade, layout.by}
+    used.add(layout.clusters)
     columns = []
     for place, name in enumerate(sheet.header):
         if place not in {*used, layout.session}:
@@ -264,6 +268,32 @@ def patterns_part(
     return RatingsPart(
         group=None, session=None, items=(), raters=tuple(raters), ratings=ratings
     )
+
+
+def part_clusters(
+    sheet: Sheet, triples: Triples, of_row: Codes, names: list[str], column: int
+) -> tuple[str, ...]:
+    """Return the cluster of every item, in the order of the part's items."""
+    # of_row (n_rows,): the cluster of every row of the sheet, a place in the names
+    item, items = _names_met(triples.item, triples.item_names)
+    of_rating = of_row[triples.row]
+    of_item = np.zeros(len(items), dtype=np.int64)
+    of_item[item] = of_rating
+    differs = np.flatnonzero(of_item[item] != of_rating)
+    if len(differs):
+        second = int(np.flatnonzero(item == item[differs[0]])[-1])
+        rows = " and ".join(
+            sheet.where(int(triples.row[k])) for k in (int(differs[0]), second)
+        )
+        both = " and ".join(
+            repr(names[of_rating[k]]) for k in (int(differs[0]), second)
+        )
+        raise sheet.error(
+            f"{rows}: needed one cluster of item {items[item[differs[0]]]!r} in column "
+            f"{sheet.header[column]!r}, got {both}; if items are numbered in each "
+            f"cluster, --item names both columns"
+        )
+    return tuple(names[cluster] for cluster in of_item.tolist())
 
 
 def _first_met(codes: Codes) -> tuple[Codes, Codes]:

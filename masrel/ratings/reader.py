@@ -39,6 +39,7 @@ from masrel.ratings._parts import (
     RatingsPart,
     Repeated,
     Triples,
+    part_clusters,
     part_codes,
     patterns_part,
     put_together,
@@ -90,6 +91,7 @@ def read_ratings(
     no_header: bool = False,
     session: str | None = None,
     by: str | None = None,
+    clusters: str | None = None,
     repeated: Repeated = "error",
     categories: Sequence[str] | None = None,
     missing_codes: Sequence[str] = (),
@@ -121,6 +123,9 @@ def read_ratings(
         Whether no column names the items; whether the first line is a row.
     session, by : str, optional
         Columns of the sessions, and of groups that are told apart.
+    clusters : str, optional
+        Column of the clusters that items come in, such as patients with several
+        sites: one of each item.
     repeated : {"error", "first", "last", "mean"}, optional
         What becomes of a second grade of an item by the same rater.
     categories : sequence of str, optional
@@ -179,6 +184,7 @@ def read_ratings(
         grade=grade,
         session=session,
         by=by,
+        clusters=clusters,
         raters=tuple(raters),
         ignore=tuple(ignore),
         no_item=no_item,
@@ -343,6 +349,21 @@ def _rated(
         put_together(triples if len(names) == 1 else triples[part_of == k], scale, name)
         for k, name in enumerate(names)
     ]
+    if layout.clusters is not None:
+        of_row, clusters = _named(sheet, "cluster", (layout.clusters,))
+        record |= {
+            "clusters": sheet.header[layout.clusters],
+            "n_clusters": len(np.unique(of_row[triples.row])),
+        }
+        parts = [
+            replace(
+                part,
+                clusters=part_clusters(
+                    sheet, triples[part_of == k], of_row, clusters, layout.clusters
+                ),
+            )
+            for k, part in enumerate(parts)
+        ]
     record |= {
         "raters": triples.rater_names,
         "n_items": len(triples.item_names),
@@ -584,7 +605,7 @@ def _record(
     # what was read, as far as every kind of table has it
     names = [sheet.header[place] for place in layout.item]
     used = {*layout.item, *layout.raters, layout.rater, layout.grade}
-    used |= {layout.session, layout.by}
+    used |= {layout.session, layout.by, layout.clusters}
     counted = zip(scale.grades, freq.tolist(), strict=True)
     return {
         **sheet.facts,
