@@ -3,7 +3,7 @@
 import shlex
 import shutil
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -14,8 +14,10 @@ from masrel.cli._options import OutputOptions, echo_notes, write_output
 from masrel.cli._reading import ReadingOptions, what_was_read
 
 if TYPE_CHECKING:
+    from masrel.estimates import Target
     from masrel.ratings import RatingsFile
     from masrel.report._agreement_table import AgreementRow
+    from masrel.report._figure_data import Content
     from masrel.report._further_tables import FurtherTable
 
 
@@ -71,7 +73,7 @@ def write_agreement(
     if more and not rows:
         first, *more = more
         table = replace(first, read=read_lines, notes=(*notes, *first.notes))
-    drawn = rows or [row for other in further for row in other.rows]
+    figure = _figure(rows, further, target)
     write_output(
         output,
         document=lambda: {
@@ -91,7 +93,7 @@ def write_agreement(
             if is_sentence
             else table
         ),
-        figure=target and (lambda: shown.agreement_forest(drawn, target)),
+        figure=figure,
         stamp=SIMULATED if ratings.simulated else "",
         notes=(*read_lines, *notes),
         more=more,
@@ -102,6 +104,24 @@ def write_agreement(
     offer = _interval_offer(rows, options)
     if offer is not None and ratings.read["file"] != "-":  # what was piped in is gone
         click.echo(offer, err=True)
+
+
+def _figure(
+    rows: "Sequence[AgreementRow]",
+    further: "Sequence[FurtherTable]",
+    target: "Target | None",
+) -> "Callable[[], Content] | None":
+    """Return what makes the figure: of the table that has one, else of estimates."""
+    from masrel.report._agreement_table import agreement_forest
+
+    for other in further:
+        if other.figure is not None:
+            pairs = other.figure
+            return lambda: pairs
+    if target is None:
+        return None
+    drawn = rows or [row for other in further for row in other.rows]
+    return lambda: agreement_forest(drawn, target)
 
 
 def _screen_width() -> int:

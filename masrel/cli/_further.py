@@ -27,13 +27,23 @@ class FurtherOptions:
     symmetry: bool
     indices: bool
     compare: bool
+    diagnose: bool
+    reference: str | None
 
     def record(self) -> dict[str, object]:
-        """Return the tables that were chosen."""
-        return {field.name: True for field in fields(self) if getattr(self, field.name)}
+        """Return the tables that were chosen, and the reference."""
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {name: value for name, value in values.items() if value}
 
     def checked(self, options: EstimateOptions, by: str | None) -> EstimateOptions:
         """Return what is estimated between raters, with the default of a comparison."""
+        if self.reference is not None and not self.diagnose:
+            raise ParameterError("--reference: belongs to --diagnose, got it alone")
+        if self.diagnose and options.target in ("raters", "both"):
+            raise ParameterError(
+                "--diagnose: is of these raters, so its intervals generalise to other "
+                f"items: --target items or none, got --target {options.target}"
+            )
         if not self.compare:
             return options
         if by is None:
@@ -99,6 +109,17 @@ further_options = grouped(
         help="Differences between the groups of --by, with p and Holm's adjustment, "
         "and the test that three or more are equal.",
     ),
+    click.option(
+        "--diagnose",
+        is_flag=True,
+        help="Which rater, which pair, which category: every pair, all without each "
+        "rater, each category, confusions; --figure draws them.",
+    ),
+    click.option(
+        "--reference",
+        metavar="RATER",
+        help="With --diagnose, the rater that the others are held against.",
+    ),
 )
 
 
@@ -129,6 +150,8 @@ def further_tables(
                 tables.append(retest_table(file, question, pairs))
             if further.each_category:
                 tables.append(category_table(file, question))
+        if further.diagnose:
+            tables += _diagnosis(file, further, options, question)
         if further.symmetry or further.indices:
             from masrel.report._two_rater_tables import index_table, symmetry_table
 
@@ -138,6 +161,26 @@ def further_tables(
         if further.compare and between is not None:
             tables += _comparisons(file, between, question)
     return tables
+
+
+def _diagnosis(
+    file: "RatingsFile",
+    further: FurtherOptions,
+    options: EstimateOptions,
+    question: "Question",
+) -> "list[FurtherTable]":
+    from masrel.agreement import coefficient
+    from masrel.report._diagnosis_tables import diagnosis_tables
+
+    names = options.coefficients or []
+    if options.takes_all or not names:
+        names = ["fleiss_kappa"]
+    if len(names) > 1:
+        raise ParameterError(
+            f"--diagnose: needs one coefficient, got --coefficients {','.join(names)}"
+        )
+    entry = coefficient(names[0])
+    return diagnosis_tables(file, entry, question, further.reference)
 
 
 def _question(options: EstimateOptions, explain: bool) -> "Question":

@@ -48,7 +48,8 @@ if TYPE_CHECKING:
 )
 @output_options(
     json="Write a record of all here; - prints it, and nothing else, on stdout.",
-    figure="Draw the intervals into this .png, .svg or .pdf; needs --target.",
+    figure="Draw the intervals into this .png, .svg or .pdf; needs --target, or "
+    "--diagnose.",
     csv="Print every digit as CSV.",
     latex="Print a LaTeX table.",
     sentence="Print a sentence for a paper instead of the table, one an estimate.",
@@ -70,7 +71,7 @@ def agree(
     """
     output.check_files()
     options = further.checked(options, reading.by)
-    if output.figure is not None and options.target is None:
+    if output.figure is not None and options.target is None and not further.diagnose:
         raise ParameterError(
             "--figure: shows intervals, so it needs --target raters, items or both"
         )

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from masrel.intervals.analytic import analytic
 from masrel.intervals.auto import estimate
 from masrel.intervals.bootstrap import bootstrap
+from masrel.intervals.diagnosis import Diagnosis, diagnose
 from masrel.intervals.difference import difference, difference_test
 from masrel.intervals.equality import donner_test, equality_test
 from masrel.intervals.jackknife import jackknife
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from masrel.intervals.self_agreement import RetestModel, retest_model
 
 __all__ = [
+    "Diagnosis",
     "Differences",
     "LatentChains",
     "LatentPrior",
@@ -32,6 +34,7 @@ __all__ = [
     "RetestModel",
     "analytic",
     "bootstrap",
+    "diagnose",
     "difference",
     "difference_test",
     "differences",

@@ -269,6 +269,37 @@ def pose_problem(
     )
 
 
+def rows_problem(
+    problem: IntervalProblem, codes: Integers, freq: Integers
+) -> IntervalProblem:
+    """Return the same question of other ratings: distinct rows, and how often each."""
+    # Takes codes (n_patterns, n_raters), freq (n_patterns,)
+    distinct = replace(problem.coded, codes=codes)
+    rows = problem.features(distinct)
+    matters = np.asarray(rows.any(axis=1))
+    patterns = replace(distinct, codes=codes[matters])
+    of_patterns, rows = freq[matters], rows[matters]
+    sums = np.asarray(of_patterns @ rows)
+    value = float(problem.values(sums))
+    paired = (patterns.codes >= 0).sum(axis=1) >= 2
+    return replace(
+        problem,
+        coded=distinct,
+        used=distinct,
+        distinct=distinct,
+        distinct_freq=freq,
+        matters=matters,
+        patterns=patterns,
+        freq=of_patterns,
+        rows=rows,
+        sums=sums,
+        n_items=int(of_patterns.sum()),
+        n_paired_items=int(of_patterns @ paired),
+        value=value,
+        min_value=problem.entry.lowest if value >= problem.entry.lowest else -math.inf,
+    )
+
+
 def find_entry(statistic: Statistic, metric: Metric | None = None) -> Coefficient:
     """Return the entry of a name or a public function in the register."""
     if isinstance(statistic, Coefficient):

@@ -199,6 +199,20 @@ class FrictionView:
     fit: "FrictionFit"
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RaterPairs:
+    """How well every two raters agree, and what each of them adds."""
+
+    title: str  # the coefficient
+    raters: tuple[str, ...]  # first on top
+    # by rater and rater, and then with the reference if there is one; ``nan`` for none
+    pairs: tuple[tuple[float, ...], ...]
+    reference: str | None
+    changes: tuple[float, ...]  # by rater, of the coefficient of all without
+    change_ends: tuple[tuple[float, float], ...]
+    level: float  # of the intervals
+
+
 Content = (
     GradeGrid
     | Forest
@@ -210,5 +224,6 @@ Content = (
     | CatchSchematic
     | JointFitView
     | FrictionView
+    | RaterPairs
 )
 """Whatever can be drawn."""

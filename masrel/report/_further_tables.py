@@ -28,6 +28,7 @@ from masrel.report._agreement_table import (
     estimate_documents,
     group_key,
 )
+from masrel.report._figure_data import RaterPairs
 from masrel.report._tables import Table
 
 _SHOWN = 6  # names that a note lists
@@ -41,6 +42,7 @@ class FurtherTable:
     table: Table
     documents: list[dict[str, object]]
     rows: tuple[AgreementRow, ...] = ()  # the estimates in it, for a figure
+    figure: RaterPairs | None = None  # what takes the place of that figure
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

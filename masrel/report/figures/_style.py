@@ -129,6 +129,10 @@ def _figure(content: data.Content) -> Figure:
             from masrel.report.figures._forest import forest_figure
 
             return forest_figure(content)
+        case data.RaterPairs():
+            from masrel.report.figures._rater_pairs import rater_figure
+
+            return rater_figure(content)
         case data.LatentScale():
             from masrel.report.figures._latent_scale import latent_figure
 

@@ -1,0 +1,464 @@
+"""Which rater, which pair of raters, which category: where agreement is lost."""
+
+import math
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from masrel.agreement import CodedRatings, Label, WeightsLike, specific_agreement
+from masrel.agreement._counts import distinct_rows, item_counts
+from masrel.agreement._kernel import Floats, Integers, divide
+from masrel.agreement._weights import is_identity
+from masrel.errors import MasrelWarning, ParameterError
+from masrel.estimates import Estimate
+from masrel.intervals._pair_counts import PairCounts
+from masrel.intervals._problem import (
+    IntervalProblem,
+    Statistic,
+    pose_problem,
+    rows_problem,
+    warn_small,
+)
+from masrel.intervals._shares import ItemShares
+from masrel.intervals.jackknife import _variance_of
+from masrel.intervals.posterior import _RHO_COEFFICIENTS
+
+_MAX_KEYS = 1 << 22  # rows that can differ, up to which equal ones are put together
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Diagnosis:
+    """Where raters agree and where they do not.
+
+    Arrays of intervals are ``nan`` where none were asked for, or are undefined.
+
+    Attributes
+    ----------
+    estimate : Estimate
+        The coefficient of all raters, without the reference.
+    raters : tuple of str
+        What the raters are called, without the reference.
+    categories : tuple of str, int or float
+        The scale.
+    reference : str or None
+        The rater that the others are held against, if there is one.
+    level : float
+        Level of the intervals.
+    pair_values, pair_low, pair_high : ndarray, shape (n_raters, n_raters)
+        The coefficient of every two raters; ``nan`` on the diagonal.
+    pair_items : ndarray, shape (n_raters, n_raters)
+        Items that both rated.
+    mean_values : ndarray, shape (n_raters,)
+        The mean of a rater's pairs that have a value.
+    without_values : ndarray, shape (n_raters,)
+        The coefficient without the rater; ``nan`` of two raters.
+    changes, change_errors, change_low, change_high : ndarray, shape (n_raters,)
+        By how much that exceeds the coefficient of all, with its jackknife standard
+        error over items and its interval: above 0, the others agree better without.
+    reference_values, reference_low, reference_high : ndarray, shape (n_raters,)
+        The coefficient of each rater and the reference; ``nan`` without one.
+    category_counts : ndarray, shape (n_categories,)
+        Ratings in each category.
+    category_values, category_low, category_high : ndarray, shape (n_categories,)
+        Specific agreement: of the ratings in a category, the share that meets the same
+        of another rater of the item.
+    confusion : ndarray, shape (n_raters, n_categories, n_categories)
+        How often a rating of the reference, or else of any other rater (row), met one
+        of this rater (column).
+    shares, share_low, share_high : ndarray, shape (n_raters, n_categories, \
+n_categories)
+        The same as shares of the rows.
+    notes : tuple of str
+        What the reader must know before relying on it.
+    """
+
+    estimate: Estimate
+    raters: tuple[str, ...]
+    categories: tuple[Label, ...]
+    reference: str | None
+    level: float
+    pair_values: Floats = field(compare=False, repr=False)
+    pair_low: Floats = field(compare=False, repr=False)
+    pair_high: Floats = field(compare=False, repr=False)
+    pair_items: Integers = field(compare=False, repr=False)
+    mean_values: Floats = field(compare=False, repr=False)
+    without_values: Floats = field(compare=False, repr=False)
+    changes: Floats = field(compare=False, repr=False)
+    change_errors: Floats = field(compare=False, repr=False)
+    change_low: Floats = field(compare=False, repr=False)
+    change_high: Floats = field(compare=False, repr=False)
+    reference_values: Floats = field(compare=False, repr=False)
+    reference_low: Floats = field(compare=False, repr=False)
+    reference_high: Floats = field(compare=False, repr=False)
+    category_counts: Integers = field(compare=False, repr=False)
+    category_values: Floats = field(compare=False, repr=False)
+    category_low: Floats = field(compare=False, repr=False)
+    category_high: Floats = field(compare=False, repr=False)
+    confusion: Integers = field(compare=False, repr=False)
+    shares: Floats = field(compare=False, repr=False)
+    share_low: Floats = field(compare=False, repr=False)
+    share_high: Floats = field(compare=False, repr=False)
+    notes: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        lines = [str(self.estimate), "rater: mean of pairs, all without, change"]
+        width = max(map(len, self.raters))
+        for place, rater in enumerate(self.raters):
+            lines.append(
+                f"{rater:<{width}}  {self.mean_values[place]:6.3f}  "
+                f"{self.without_values[place]:6.3f}  {self.changes[place]:+.3f}"
+                + _ends(self.change_low[place], self.change_high[place])
+            )
+        lines.append("category: ratings, agreement on it")
+        width = max(len(str(category)) for category in self.categories)
+        for place, category in enumerate(self.categories):
+            lines.append(
+                f"{category!s:<{width}}  {self.category_counts[place]:6d}  "
+                f"{self.category_values[place]:6.3f}"
+                + _ends(self.category_low[place], self.category_high[place])
+            )
+        return "\n".join(lines)
+
+
+def _ends(low: float, high: float) -> str:
+    return "" if math.isnan(low) else f"  [{low:.3f}, {high:.3f}]"
+
+
+def diagnose(
+    ratings: object,
+    *,
+    coefficient: Statistic = "fleiss_kappa",
+    target: Literal["items"] | None = None,
+    raters: Sequence[str] | None = None,
+    reference: str | int | None = None,
+    categories: Sequence[Label] | None = None,
+    weights: "WeightsLike" = "identity",
+    level: float = 0.95,
+) -> Diagnosis:
+    """Say which rater, which pair and which category agreement is lost on.
+
+    Parameters
+    ----------
+    ratings : nested sequence, array_like or DataFrame, shape (n_items, n_raters)
+        Labels or numbers; None and ``nan`` are missing.
+    coefficient : str or callable, optional
+        Name of a coefficient that takes more than two raters and two, or its public
+        function.
+    target : {"items"}, optional
+        "items" for intervals that generalise to other items, graded by these raters;
+        without it there are none. What a pair or a rater does says nothing of others.
+    raters : sequence of str, optional
+        What the raters are called; the columns of a DataFrame, else "0", "1" …
+    reference : str or int, optional
+        Name, or place, of a rater who is right: the others are held against this one,
+        who is then left out of all else.
+    categories : sequence, optional
+        The declared scale in order.
+    weights : str or array_like, optional
+        How much two categories agree; see `declared_weights`.
+    level : float, optional
+        Nominal level, of each interval by itself.
+
+    Returns
+    -------
+    Diagnosis
+        Pairs of raters, what each rater adds or takes, categories, and confusions.
+
+    Raises
+    ------
+    ParameterError
+        If an option is invalid, the coefficient does not take as many raters, or is
+        no function of sums over items.
+    RatingsError
+        If the ratings do not fit the coefficient.
+
+    Warns
+    -----
+    SmallSampleWarning
+        Below 10 items, with intervals.
+    UndefinedStatisticWarning
+        If the coefficient of all raters is undefined.
+
+    Notes
+    -----
+    The interval of a pair is that of `estimate` of the two alone. That of a change is
+    that of `difference` of the same items, first without the rater, then with all.
+    Shares are ratios of sums over items; their intervals are Clopper and Pearson's at
+    the number of single items that would vary as much [1]_, of one rater against a
+    reference exact. Many intervals are shown at once, and some miss by chance: they
+    tell where to look, not whom to blame.
+
+    References
+    ----------
+    .. [1] Korn, E. L., Graubard, B. I. (1998). Confidence intervals for proportions
+       with small expected number of positive counts estimated from survey data. Survey
+       Methodology, 24(2), 193-201.
+
+    Examples
+    --------
+    >>> ratings = [["a", "a", "b"], ["b", "b", "b"], ["a", "a", "a"], ["b", "b", "a"]]
+    >>> print(diagnose(ratings * 5, raters=["Kim", "Lee", "Ann"], target="items"))
+    """
+    if target not in ("items", None):
+        raise ParameterError(
+            "target: a rater, a pair and a category are those of these ratings, so "
+            f'"items", or None for no intervals; got {target!r}'
+        )
+    problem = pose_problem(
+        coefficient,
+        ratings,
+        target="items",
+        categories=categories,
+        weights=weights,
+        level=level,
+    )
+    if problem.entry.shape != "ratings":
+        raise ParameterError(
+            f"coefficient: {problem.entry.title} is of pairs of ratings of one rater"
+        )
+    names = _names(ratings, raters, problem.coded.codes.shape[1])
+    right = None if reference is None else _place(reference, names)
+    others = [place for place in range(len(names)) if place != right]
+    everybody = problem
+    if right is not None:
+        rest = replace(problem.coded, codes=problem.coded.codes[:, others])
+        problem = pose_problem(
+            problem.entry,
+            rest,
+            target="items",
+            categories=None,
+            weights=weights,
+            level=level,
+        )
+    estimate = problem.entry(problem.coded, weights=weights)
+    with_intervals = target is not None
+    at = level if with_intervals else None
+    notes = warn_small(estimate.n_items, 10, "items") if with_intervals else ()
+    codes, freq = _counted_rows(everybody.coded)
+    counts = PairCounts.of(codes, freq, everybody.coded.n_categories)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", MasrelWarning)  # the arrays say it
+        modelled = is_identity(weights) and problem.entry.name in _RHO_COEFFICIENTS
+        pairs = _pairs(everybody, counts, with_intervals, modelled)
+        arrays = {
+            **_of_raters(pairs, others, right),
+            **_changes(problem, codes[:, others], freq, with_intervals),
+            **_of_categories(codes, freq, counts, others, at),
+            **_confusions(codes, freq, counts, others, right, at),
+        }
+    for array in arrays.values():
+        array.setflags(write=False)
+    return Diagnosis(
+        estimate=estimate,
+        raters=tuple(names[place] for place in others),
+        categories=problem.coded.categories,
+        reference=None if right is None else names[right],
+        level=level,
+        notes=notes,
+        **arrays,
+    )
+
+
+def _names(
+    ratings: object, raters: Sequence[str] | None, n_raters: int
+) -> tuple[str, ...]:
+    columns = raters if raters is not None else getattr(ratings, "columns", None)
+    names = tuple(map(str, range(n_raters) if columns is None else columns))
+    if len(names) != n_raters:
+        raise ParameterError(
+            f"raters: needs a name for each of {n_raters}, got {len(names)}"
+        )
+    return names
+
+
+def _place(reference: str | int, names: Sequence[str]) -> int:
+    """Return which rater is the reference."""
+    if isinstance(reference, str) and reference in names:
+        return names.index(reference)
+    if isinstance(reference, int) and 0 <= reference < len(names):
+        return reference
+    raise ParameterError(
+        f"reference: needs one of {', '.join(names)}, got {reference!r}"
+    )
+
+
+def _counted_rows(coded: CodedRatings) -> tuple[Integers, Integers]:
+    """Return rows of ratings and how often each occurs, or all where many differ."""
+    # -> (n_rows, n_raters), (n_rows,)
+    codes = coded.codes
+    if (coded.n_categories + 1) ** codes.shape[1] <= _MAX_KEYS:
+        return distinct_rows(codes, coded.n_categories)
+    return codes.astype(np.int64), np.ones(len(codes), dtype=np.int64)
+
+
+def _pairs(
+    problem: IntervalProblem, counts: PairCounts, with_intervals: bool, modelled: bool
+) -> tuple[Floats, Integers]:
+    """Return value, low and high of every pair, (3, n_raters, n_raters), and items."""
+    r = counts.n_raters
+    pairs = np.full((3, r, r), math.nan)
+    if with_intervals:
+        # Imported here: values alone load no scipy.
+        from masrel.intervals._choice import choose_interval
+    for one, other in counts.pairs():
+        of_pair = rows_problem(problem, *counts.of_pair(one, other))
+        pairs[0, one, other] = of_pair.value
+        if with_intervals:
+            interval, _ = choose_interval(of_pair, modelled=modelled)
+            pairs[1:, one, other] = interval.low, interval.high
+    return np.fmax(pairs, pairs.transpose(0, 2, 1)), counts.shared()
+
+
+def _of_raters(
+    pairs: tuple[Floats, Integers], others: Sequence[int], right: int | None
+) -> dict[str, NDArray[Any]]:
+    """Return what pairs say of the raters, and of each with the reference."""
+    values, items = pairs
+    among = values[:, others][:, :, others]
+    defined = ~np.isnan(among[0])
+    reference = np.full((3, len(others)), math.nan)
+    if right is not None:
+        reference = values[:, others, right]
+    return {
+        "pair_values": among[0],
+        "pair_low": among[1],
+        "pair_high": among[2],
+        "pair_items": items[np.ix_(others, others)],
+        "mean_values": divide(
+            np.where(defined, among[0], 0.0).sum(axis=1),
+            defined.sum(axis=1).astype(np.float64),
+        ),
+        "reference_values": reference[0],
+        "reference_low": reference[1],
+        "reference_high": reference[2],
+    }
+
+
+def _changes(
+    problem: IntervalProblem, codes: Integers, freq: Integers, with_intervals: bool
+) -> dict[str, NDArray[Any]]:
+    """Return the coefficient without each rater, and how much that differs."""
+    r = codes.shape[1]
+    without, errors, half = (np.full(r, math.nan) for _ in range(3))
+    active = np.flatnonzero((codes >= 0).any(axis=0))
+    rows = problem.features(replace(problem.coded, codes=codes[:, active]))
+    sums, n_paired = freq @ rows, _n_paired(rows, codes, freq)
+    moved = problem.values_without(sums, rows) if with_intervals else np.empty(0)
+    for column, rater in enumerate(active if len(active) > 2 else ()):
+        rest = np.delete(codes[:, active], column, axis=1)
+        others = problem.features(replace(problem.coded, codes=rest))
+        of_others = freq @ others
+        without[rater] = problem.values(of_others)
+        if with_intervals:
+            # as `difference` of the same items, without the rater and with
+            change = problem.values_without(of_others, others) - moved
+            n = min(n_paired, _n_paired(others, rest, freq))
+            matters = rows.any(axis=1) | others.any(axis=1)
+            errors[rater] = math.sqrt(_variance_of(change[matters], freq[matters], n))
+            half[rater] = problem.student_t(n - 1) * errors[rater]
+    changes = without - problem.value
+    half[errors == 0.0] = math.nan  # leaving out any item leaves it as it is
+    return {
+        "without_values": without,
+        "changes": changes,
+        "change_errors": errors,
+        "change_low": changes - half,
+        "change_high": changes + half,
+    }
+
+
+def _n_paired(rows: Floats, codes: Integers, freq: Integers) -> int:
+    """Return how many items matter that have a pair of ratings."""
+    return int(freq @ (rows.any(axis=1) & ((codes >= 0).sum(axis=1) > 1)))
+
+
+def _of_categories(
+    codes: Integers,
+    freq: Integers,
+    counts: PairCounts,
+    others: Sequence[int],
+    level: float | None,
+) -> dict[str, NDArray[Any]]:
+    """Return how often each category is used, and how often raters agree on it."""
+    chosen = _each_category(codes, others, counts.n_categories)
+    met = chosen.sum(axis=1, keepdims=True) - 1.0  # other raters of the item
+    same, pairs = chosen * (chosen - 1.0), chosen * np.maximum(met, 0.0)
+    table = counts.confusion(_each_other(counts, others))[others].sum(axis=0)
+    values = np.array(specific_agreement(table))
+    ends = np.full((2, len(values)), math.nan)
+    if level is not None:
+        ends[:] = ItemShares(
+            parts=freq @ same,
+            wholes=freq @ pairs,
+            squares=freq @ same**2,
+            products=freq @ (same * pairs),
+            whole_squares=freq @ pairs**2,
+            n_items=freq @ (pairs > 0.0).astype(np.float64),
+        ).interval(level)
+    return {
+        "category_counts": (freq @ chosen).astype(np.int64),
+        "category_values": values,
+        "category_low": ends[0],
+        "category_high": ends[1],
+    }
+
+
+def _each_category(codes: Integers, raters: Sequence[int], q: int) -> Floats:
+    """Return how many of some raters chose each category, (n_rows, n_categories)."""
+    coded = CodedRatings(codes=codes[:, raters], categories=tuple(range(q)))
+    return item_counts(coded).astype(np.float64)
+
+
+def _each_other(counts: PairCounts, others: Sequence[int]) -> NDArray[np.bool_]:
+    # whose ratings each rater's are held against: of all others
+    r = counts.n_raters
+    against = np.zeros((r, r), dtype=bool)
+    against[:, others] = True
+    np.fill_diagonal(against, False)
+    return against
+
+
+def _confusions(
+    codes: Integers,
+    freq: Integers,
+    counts: PairCounts,
+    others: Sequence[int],
+    right: int | None,
+    level: float | None,
+) -> dict[str, NDArray[Any]]:
+    """Return what ratings of others, or of the reference, each rater's ratings met."""
+    q = counts.n_categories
+    against = _each_other(counts, others if right is None else [right])
+    confusion = counts.confusion(against)[others]  # (n_raters, q, q)
+    rows = np.broadcast_to(confusion.sum(axis=2, keepdims=True), confusion.shape)
+    shares = divide(confusion.astype(np.float64), rows.astype(np.float64))
+    ends = np.full((2, len(others), q, q), math.nan)
+    met = _each_category(codes, others if right is None else [right], q)
+    for place, rater in enumerate(others):
+        if level is None:
+            break
+        mine = _each_category(codes, [rater], q)
+        # of other raters, or of the reference: (n_rows, n_categories)
+        of_others = met - mine if right is None else met
+        mine *= freq[:, None]
+        squares = (of_others**2).T @ mine  # Σ a², which is Σ ab
+        n_items = ((of_others > 0).T.astype(np.float64) @ mine).sum(axis=1)
+        wide = (q, q)  # a row of the table has one whole
+        ends[:, place] = ItemShares(
+            parts=confusion[place].astype(np.float64),
+            wholes=rows[place].astype(np.float64),
+            squares=squares,
+            products=squares,
+            whole_squares=np.broadcast_to(squares.sum(axis=1)[:, None], wide),
+            n_items=np.broadcast_to(n_items[:, None], wide),
+        ).interval(level)
+    return {
+        "confusion": confusion,
+        "shares": shares,
+        "share_low": ends[0],
+        "share_high": ends[1],
+    }

@@ -1,0 +1,195 @@
+"""Agreement of every two raters as a heatmap, and what each rater adds beside it."""
+
+import math
+import textwrap
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
+from matplotlib.lines import Line2D
+from matplotlib.textpath import TextPath
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
+
+from masrel.report._figure_data import RaterPairs
+from masrel.report._tables import number, percent
+from masrel.report.figures._style import BLACK, BLUE, DASHES, GREY
+
+_Floats = NDArray[np.float64]
+
+# from little to full agreement: lighter to darker in a grey print, too
+_COLOURS = LinearSegmentedColormap.from_list(
+    "agreement", ["#F7FBFF", "#9ECAE1", "#4292C6", "#08519C", "#08306B"]
+)
+_NO_PAIR = "#E8E8E8"
+
+_CELLS = ((8, 0.42), (14, 0.33), (40, 0.2), (10_000, 0.13))  # raters, inches of a cell
+_MAX_NUMBERS = 14  # raters up to which numbers are written in the cells
+_MAX_LETTERS = 22  # of a name
+# inches: of the panel at the right and what is before it, below and above both, and of
+# the narrowest bar of colours
+_PANEL, _BETWEEN, _BELOW, _STAMP, _MIN_BAR = 2.3, 0.35, 0.95, 0.25, 1.4
+_GAP = 0.35  # of a cell, before the column of the reference
+
+_DOT: dict[str, Any] = {"marker": "o", "color": BLACK, "linestyle": "none"}
+_ZERO: dict[str, Any] = {"color": GREY, "linewidth": 0.8, "linestyle": DASHES}
+
+
+def rater_figure(content: RaterPairs) -> Figure:
+    """Return the heatmap of pairs, with the change without each rater at its right."""
+    r = len(content.raters)
+    cell = next(inches for most, inches in _CELLS if r <= most)
+    size = 9.0 if cell > 0.25 else 7.5 if cell > 0.15 else 6.0
+    names = [_short(name) for name in content.raters]
+    labels = [
+        *names,
+        *([] if content.reference is None else [_short(content.reference)]),
+    ]
+    room = max(_width(label, size) for label in labels) + 0.12
+    has_panel = any(math.isfinite(change) for change in content.changes)
+    # all places are in inches: cells stay square, and rows of both panels the same
+    across = cell * (r if content.reference is None else r + 1.0 + _GAP)
+    left = room + max(across, _MIN_BAR) + _BETWEEN
+    width = left + _PANEL + 0.2 if has_panel else left
+    above = max(room, 0.5 if has_panel else 0.0) + _STAMP
+    height = above + cell * r + _BELOW
+    figure = Figure(figsize=(width, height))
+    figure.set_layout_engine("none")
+
+    def axes(left: float, bottom: float, wide: float, high: float) -> Axes:
+        return figure.add_axes(
+            (left / width, bottom / height, wide / width, high / height)
+        )
+
+    image = _heatmap(axes(room, _BELOW, across, cell * r), content, labels, size)
+    at = axes(room, _BELOW - 0.27, max(across, _MIN_BAR), 0.12)
+    bar = figure.colorbar(image, cax=at, orientation="horizontal")
+    bar.set_label(f"{content.title} of two raters")
+    bar.outline.set_visible(False)
+    if has_panel:
+        left = room + max(across, 1.5) + _BETWEEN
+        _influence(axes(left, _BELOW, _PANEL, cell * r), content, cell)
+    return figure
+
+
+def _width(text: str, size: float) -> float:
+    # of a text in inches
+    return float(TextPath((0.0, 0.0), text, size=size).get_extents().width) / 72.0
+
+
+def _heatmap(
+    axes: Axes, content: RaterPairs, labels: list[str], size: float
+) -> AxesImage:
+    r = len(content.raters)
+    values = np.array(content.pairs, dtype=np.float64)
+    every = values[~np.isnan(values)]
+    lowest = math.floor(10.0 * min(every.min(initial=1.0), 0.9)) / 10.0
+    look: dict[str, Any] = {
+        "cmap": _COLOURS.with_extremes(bad=_NO_PAIR),
+        "vmin": lowest,
+        "vmax": 1.0,
+        "aspect": "auto",
+        "interpolation": "nearest",
+    }
+    image = axes.imshow(np.ma.masked_invalid(values[:, :r]), **look)
+    places = list(map(float, range(r)))
+    right = r - 0.5
+    if content.reference is not None:
+        start = r - 0.5 + _GAP
+        axes.imshow(
+            np.ma.masked_invalid(values[:, r:]),
+            extent=(start, start + 1.0, r - 0.5, -0.5),
+            **look,
+        )
+        places.append(start + 0.5)
+        right = start + 1.0
+    axes.set_xlim(-0.5, right)
+    axes.set_ylim(r - 0.5, -0.5)
+    for spine in axes.spines.values():
+        spine.set_visible(False)
+    axes.set_xticks(places, labels, rotation=90, fontsize=size)
+    axes.set_yticks(range(r), labels[:r], fontsize=size)
+    axes.xaxis.tick_top()
+    axes.tick_params(length=0)
+    _lines(axes, r)
+    if r <= _MAX_NUMBERS:
+        _numbers(axes, values, places, lowest)
+    return image
+
+
+def _lines(axes: Axes, r: int) -> None:
+    # white between the cells, so that each is seen by itself
+    between = np.arange(0.5, r - 1.0)
+    look: dict[str, Any] = {"color": "white", "linewidth": 1.0 if r <= 14 else 0.4}
+    axes.hlines(between, *axes.get_xlim(), **look)
+    axes.vlines(between, -0.5, r - 0.5, **look)
+
+
+def _numbers(axes: Axes, values: _Floats, places: list[float], lowest: float) -> None:
+    for row, of_row in enumerate(values):
+        for place, value in zip(places, of_row.tolist(), strict=True):
+            if math.isnan(value):
+                continue
+            is_dark = (value - lowest) / (1.0 - lowest) > 0.55
+            axes.text(
+                place,
+                row,
+                number(value, 2).replace("0.", ".", 1),
+                ha="center",
+                va="center",
+                fontsize=8,
+                color="white" if is_dark else BLACK,
+            )
+
+
+def _influence(axes: Axes, content: RaterPairs, cell: float) -> None:
+    size = 4.5 if cell > 0.25 else 3.5
+    for row, change in enumerate(content.changes):
+        low, high = content.change_ends[row]
+        if math.isfinite(low):
+            axes.plot(
+                [low, high],
+                [row, row],
+                color=BLUE,
+                linewidth=1.8 if cell > 0.15 else 1.0,
+            )
+        if math.isfinite(change):
+            axes.plot([change], [row], markersize=size, **_DOT)
+    axes.set_ylim(len(content.changes) - 0.5, -0.5)
+    axes.axvline(0.0, **_ZERO, zorder=0.5)
+    axes.grid(axis="x")
+    axes.set_yticks([])
+    axes.xaxis.set_major_locator(MaxNLocator(5))
+    axes.spines["left"].set_visible(False)
+    axes.margins(x=0.08)
+    axes.set_xlabel(
+        textwrap.fill(f"change of {content.title} without the rater", 36)
+        + "\n(right of 0: the others agree better)"
+    )
+    if any(math.isfinite(low) for low, _ in content.change_ends):
+        axes.legend(
+            handles=[
+                Line2D([], [], markersize=size, label="estimate", **_DOT),
+                Line2D(
+                    [],
+                    [],
+                    color=BLUE,
+                    linewidth=1.8,
+                    label=f"{percent(content.level)} % confidence interval",
+                ),
+            ],
+            loc="lower center",
+            bbox_to_anchor=(0.5, 1.0),
+            fontsize=8,
+        )
+
+
+def _short(name: str) -> str:
+    # the middle goes: names often differ at their end
+    if len(name) <= _MAX_LETTERS:
+        return name
+    half = (_MAX_LETTERS - 1) // 2
+    return f"{name[:half]}…{name[-half:]}"
