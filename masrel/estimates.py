@@ -23,7 +23,7 @@ __all__ = [
 Target = Literal["items", "raters", "both"]
 """What a new study would draw anew: the population an interval generalises to."""
 
-Unit = Literal["items", "raters", "both"]
+Unit = Literal["items", "raters", "both", "clusters"]
 """What is resampled or left out."""
 
 
@@ -65,7 +65,7 @@ class Interval:
         How it was computed, in words.
     target : {"items", "raters", "both"}
         The population it generalises to.
-    unit : {"items", "raters", "both"} or None
+    unit : {"items", "raters", "both", "clusters"} or None
         What was resampled or left out; None when nothing was.
     n_resamples : int or None
         Resamples or draws used; None when no Monte Carlo was used.

@@ -5,13 +5,11 @@ item, added up over clusters where items come in such.
 """
 
 import math
-from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from masrel.agreement._kernel import Floats
-from masrel.errors import ParameterError
 from masrel.intervals._problem import Integers, IntervalProblem, blocks
 
 _STEP = 1e-30  # of a derivative by a complex step, which cancels no digits [1]
@@ -27,32 +25,6 @@ class UnitInfluences:
 
     moves: Floats = field(compare=False, repr=False)  # (n_units,)
     n_units: int  # those that the coefficient knows of
-
-
-def cluster_codes(clusters: object, n_items: int) -> Integers:
-    """Return which cluster every item belongs to, as numbers from 0."""
-    # -> (n_items,)
-    if isinstance(clusters, str | bytes) or not isinstance(clusters, Iterable):
-        raise ParameterError(
-            f"clusters: needs one label an item, got {type(clusters).__name__}"
-        )
-    labels: Sequence[object] = (
-        clusters.tolist() if isinstance(clusters, np.ndarray) else list(clusters)
-    )
-    if len(labels) != n_items:
-        raise ParameterError(
-            f"clusters: needs one label an item, {n_items}, got {len(labels)}"
-        )
-    numbers: dict[Hashable, int] = {}
-    codes = np.empty(n_items, dtype=np.int64)
-    for item, label in enumerate(labels):
-        is_missing = label is None or label == "" or label != label
-        if is_missing or not isinstance(label, Hashable):
-            raise ParameterError(
-                f"clusters: item {item} needs the label of its cluster, got {label!r}"
-            )
-        codes[item] = numbers.setdefault(label, len(numbers))
-    return codes
 
 
 def unit_influences(problem: IntervalProblem, units: Integers) -> UnitInfluences:

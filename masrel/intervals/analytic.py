@@ -10,6 +10,7 @@ from masrel.agreement import Label, Metric, WeightsLike
 from masrel.agreement._kernel import NO_SPREAD, ONE_PAIR
 from masrel.errors import ParameterError, UndefinedStatisticWarning
 from masrel.estimates import Estimate, Interval, Target, Unit
+from masrel.intervals._clusters import ClusterSums, clustered_error, clusters_of
 from masrel.intervals._problem import (
     HELD,
     IntervalProblem,
@@ -46,6 +47,7 @@ def analytic(
     level: float = 0.95,
     distribution: _Distribution = "t",
     error: ErrorName = "delta",
+    clusters: object = None,
 ) -> Interval:
     """Compute an interval from a standard error.
 
@@ -73,6 +75,9 @@ def analytic(
         position between the ends of the parameter space or on Fisher's z.
     error : {"delta", "over_n", "cohen", "irrcac", "unconditional"}, optional
         Ours, or the one that others publish, by name; see Notes.
+    clusters : sequence of labels, length n_items, optional
+        The cluster of every item, such as the patient of a site: n are then clusters.
+        Each item by itself when not given.
 
     Returns
     -------
@@ -161,7 +166,18 @@ def analytic(
     if error != "delta" and estimate.reason is None and estimate.n_items > 1:
         by_name = published_error(problem, estimate, error, weights)
         estimate = replace(estimate, standard_error=by_name)
-    return _interval_around_estimate(problem, estimate, distribution, error)
+    n_clusters = None
+    if clusters is not None:
+        if error != "delta":
+            raise ParameterError(f'clusters: needs error "delta", got "{error}"')
+        codes = clusters_of(problem, clusters)
+        n_clusters = ClusterSums.of(problem, codes).n_paired
+        if estimate.reason is None and n_clusters > 1:
+            by_cluster = clustered_error(problem, codes)
+            estimate = replace(estimate, standard_error=by_cluster)
+    return _interval_around_estimate(
+        problem, estimate, distribution, error, n_clusters
+    )
 
 
 def _interval_around_estimate(
@@ -169,16 +185,23 @@ def _interval_around_estimate(
     estimate: Estimate,
     distribution: _Distribution,
     error: ErrorName,
+    n_clusters: int | None,
 ) -> Interval:
     unit: Unit | None = None
     method = f"{NAMES[error]}, {_METHODS[distribution]}"
     if error == "unconditional":
         method, unit = method.replace("n-1", "min(n, r)-1"), "raters"
-    reason = _why_undefined(estimate)
+    elif n_clusters is not None:
+        method, unit = f"{method}, of clusters", "clusters"
+    reason = _why_undefined(estimate, n_clusters)
     if reason is not None:
         return problem.undefined(reason, method=method, unit=unit)
     df = estimate.n_items_paired - 1
-    notes = warn_small(df + 1, 10, "items", estimate.n_items)
+    if n_clusters is not None:
+        df = n_clusters - 1
+        notes = warn_small(n_clusters, 10, "clusters")
+    else:
+        notes = warn_small(df + 1, 10, "items", estimate.n_items)
     if unit == "raters":
         notes += warn_small(problem.n_paired_raters, 5, "raters", estimate.n_raters)
         df = min(df, problem.n_paired_raters - 1)
@@ -201,7 +224,7 @@ def _interval_around_estimate(
     )
 
 
-def _why_undefined(estimate: Estimate) -> str | None:
+def _why_undefined(estimate: Estimate, n_clusters: int | None) -> str | None:
     """Return why there is no interval, if there is none."""
     if estimate.reason is not None:
         return estimate.reason
@@ -209,4 +232,6 @@ def _why_undefined(estimate: Estimate) -> str | None:
         return ONE_PAIR
     if math.isnan(estimate.standard_error):
         return "with one of the raters left out the estimate is undefined"
+    if n_clusters is not None and n_clusters < 2:
+        return "one cluster has no standard error"
     return None if estimate.standard_error > 0.0 else NO_SPREAD

@@ -9,10 +9,11 @@ import numpy as np
 from masrel.agreement import Coefficient, CountedRatings, Label
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Target
+from masrel.intervals._clusters import clustered_error, clusters_of
 from masrel.intervals._problem import Statistic, find_entry, pose_problem
 from masrel.intervals.analytic import analytic
 from masrel.intervals.bootstrap import bootstrap
-from masrel.intervals.jackknife import jackknife
+from masrel.intervals.jackknife import _logit_interval, jackknife
 from masrel.intervals.posterior import _RHO_COEFFICIENTS, posterior
 
 if TYPE_CHECKING:
@@ -36,6 +37,7 @@ def estimate(
     level: float = 0.95,
     n_resamples: int = 10_000,
     rng: np.random.Generator | int | None = None,
+    clusters: object = None,
 ) -> Estimate:
     """Estimate a coefficient with an interval that answers a stated question.
 
@@ -63,11 +65,16 @@ def estimate(
         Resamples of a bootstrap, where they are drawn.
     rng : Generator or int, optional
         Where randomness comes from, for methods that draw.
+    clusters : sequence of labels, length n_items, optional
+        The cluster of every item, such as the patient of a site: what a new study
+        would draw anew, with `target` "items" and `method` "auto", "analytic" or
+        "jackknife". Each item by itself when not given.
 
     Returns
     -------
     Estimate
-        The coefficient with its interval.
+        The coefficient with its interval; with clusters its standard error is of
+        these, too.
 
     Raises
     ------
@@ -104,11 +111,13 @@ def estimate(
             ratings = entry.code(ratings, categories)  # once, for all that follows
         result = entry(ratings, categories=categories, weights=weights)
         categories = None  # the ratings have them by now
-    if method == "auto" and entry.has_interval:
-        return result
     options = _Options(
         target=target, categories=categories, weights=weights, level=level
     )
+    if clusters is not None:
+        return _clustered(entry, ratings, result, method, clusters, options)
+    if method == "auto" and entry.has_interval:
+        return result
     if method == "auto":
         # Imported here: the other methods load no scipy.
         from masrel.intervals._choice import choose_interval
@@ -131,6 +140,35 @@ def estimate(
         interval = posterior(entry, ratings, rng=rng, **options)
     # `vars` has the standard error as it is: still to be computed when it is read.
     return Estimate(**{**vars(result), "interval": interval})
+
+
+def _clustered(
+    entry: Coefficient,
+    ratings: object,
+    result: Estimate,
+    method: _Method,
+    clusters: object,
+    options: "_Options",
+) -> Estimate:
+    """Return the estimate with clusters of items as the sample."""
+    if method in ("bootstrap", "posterior"):
+        raise ParameterError(
+            f'clusters: needs method "auto", "analytic" or "jackknife", got "{method}"'
+        )
+    problem = pose_problem(entry, ratings, **options)
+    codes = clusters_of(problem, clusters)
+    if method == "analytic":
+        interval = analytic(entry, ratings, clusters=codes, **options)
+    elif method == "jackknife":
+        interval = jackknife(entry, ratings, clusters=codes, **options)
+    else:
+        interval = _logit_interval(problem, codes)
+        note = "chosen for other clusters of items: left out, on a scale without ends"
+        interval = replace(interval, notes=(note, *interval.notes))
+    error = result.standard_error
+    if result.reason is None:
+        error = clustered_error(problem, codes)
+    return Estimate(**{**vars(result), "standard_error": error, "interval": interval})
 
 
 def _refuse_target(entry: Coefficient, target: str) -> NoReturn:

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from masrel.agreement import CodedRatings, Label, WeightsLike, specific_agreement
 from masrel.agreement._counts import distinct_rows, item_counts
 from masrel.agreement._kernel import Floats, Integers, divide
-from masrel.agreement._weights import is_identity
 from masrel.errors import MasrelWarning, ParameterError
 from masrel.estimates import Estimate
 from masrel.intervals._pair_counts import PairCounts
@@ -242,7 +241,8 @@ def diagnose(
     counts = PairCounts.of(codes, freq, everybody.coded.n_categories)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", MasrelWarning)  # the arrays say it
-        modelled = is_identity(weights) and problem.entry.name in _RHO_COEFFICIENTS
+        entry = problem.entry
+        modelled = entry.is_nominal(weights) and entry.name in _RHO_COEFFICIENTS
         pairs = _pairs(everybody, counts, with_intervals, modelled)
         arrays = {
             **_of_raters(pairs, others, right),

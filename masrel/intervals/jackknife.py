@@ -9,7 +9,8 @@ import numpy as np
 from masrel.agreement import Label, Metric, WeightsLike
 from masrel.agreement._kernel import Floats
 from masrel.errors import ParameterError
-from masrel.estimates import Interval, Target
+from masrel.estimates import Interval, Target, Unit
+from masrel.intervals._clusters import ClusterSums, clusters_of
 from masrel.intervals._problem import (
     COLUMNS,
     Integers,
@@ -31,6 +32,7 @@ def jackknife(
     weights: "WeightsLike" = "identity",
     metric: Metric | None = None,
     level: float = 0.95,
+    clusters: object = None,
 ) -> Interval:
     """Compute a jackknife interval with Student's t.
 
@@ -52,6 +54,9 @@ def jackknife(
         `krippendorff_alpha`, which alone takes one.
     level : float, optional
         Nominal level.
+    clusters : sequence of labels, length n_items, optional
+        The cluster of every item, such as the patient of a site: what is left out then,
+        with `target` "items". Each item by itself when not given.
 
     Returns
     -------
@@ -107,13 +112,20 @@ def jackknife(
         metric=metric,
         level=level,
     )
+    if clusters is not None:
+        codes = clusters_of(problem, clusters)
+        jackknifed = _cluster_variance(problem, codes)
+        return _interval_around_estimate(problem, jackknifed, "clusters")
     return _interval_around_estimate(problem, _jackknife_variance(problem))
 
 
 def _interval_around_estimate(
-    problem: IntervalProblem, jackknifed: "_JackknifeVariance"
+    problem: IntervalProblem,
+    jackknifed: "_JackknifeVariance",
+    target: Unit | None = None,
 ) -> Interval:
-    target = problem.target
+    # target: what was left out, where that is not what the question is about
+    target = target or problem.target
     unit = "two-way" if target == "both" else target.removesuffix("s")
     if jackknifed.reason is not None:
         return problem.undefined(
@@ -168,6 +180,42 @@ def _jackknife_variance(problem: IntervalProblem) -> _JackknifeVariance:
         )
         return _JackknifeVariance(variance=0.0, df=math.nan, notes=notes, reason=reason)
     return _JackknifeVariance(variance=variance, df=df, notes=notes)
+
+
+def _cluster_variance(problem: IntervalProblem, codes: Integers) -> _JackknifeVariance:
+    """Leave out clusters of items."""
+    if math.isnan(problem.value):
+        reason = "the estimate itself is undefined"
+        return _JackknifeVariance(variance=math.nan, df=math.nan, reason=reason)
+    clusters = ClusterSums.of(problem, codes)
+    replicates, n = clusters.values_without(problem), clusters.n_paired
+    if n < 2 or np.isnan(replicates).any():
+        reason = "with one of the clusters left out the estimate is undefined"
+        return _JackknifeVariance(variance=math.nan, df=math.nan, reason=reason)
+    notes = warn_small(n, 10, "clusters", len(replicates))
+    variance = _variance_of(replicates, np.ones(len(replicates), dtype=np.int64), n)
+    if not variance > 0.0:
+        reason = (
+            "leaving out any of the clusters leaves the estimate as it is, so the "
+            "jackknife cannot say how uncertain it is"
+        )
+        return _JackknifeVariance(variance=0.0, df=math.nan, notes=notes, reason=reason)
+    return _JackknifeVariance(variance=variance, df=n - 1, notes=notes)
+
+
+def _logit_interval(problem: IntervalProblem, codes: Integers) -> Interval:
+    """Leave out clusters of items, on a scale without ends."""
+    jackknifed = _cluster_variance(problem, codes)
+    if jackknifed.reason is not None:
+        return _interval_around_estimate(problem, jackknifed, "clusters")
+    return problem.around(
+        problem.value,
+        problem.student_t(jackknifed.df) * math.sqrt(jackknifed.variance),
+        lowest=problem.entry.lowest,
+        method=f"cluster jackknife, t({jackknifed.df:g}) on the logit",
+        unit="clusters",
+        notes=jackknifed.notes,
+    )
 
 
 def _variance_of(replicates: Floats, freq: Integers, n: int) -> float:

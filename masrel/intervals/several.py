@@ -13,7 +13,8 @@ from masrel.agreement import Label, Significance, WeightsLike
 from masrel.agreement._kernel import Floats, Integers
 from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
 from masrel.estimates import Estimate
-from masrel.intervals._influences import cluster_codes, sample_factor, unit_influences
+from masrel.intervals._clusters import cluster_codes
+from masrel.intervals._influences import sample_factor, unit_influences
 from masrel.intervals._max_t import MaxT
 from masrel.intervals._problem import (
     IntervalProblem,

@@ -108,7 +108,12 @@ def promise(interval: Interval, noun: Noun) -> str:
 
 def origin(interval: Interval, noun: Noun) -> str:
     """Return in brackets what the ends of an interval came from."""
-    units = {"items": f"{noun}s", "raters": "raters", "both": f"{noun}s and raters"}
+    units = {
+        "items": f"{noun}s",
+        "raters": "raters",
+        "both": f"{noun}s and raters",
+        "clusters": f"clusters of {noun}s",
+    }
     if interval.method.endswith(_WIDENED):
         return " (a posterior, made wider by what raters differ by)"
     if interval.unit is None:
@@ -117,6 +122,8 @@ def origin(interval: Interval, noun: Noun) -> str:
         return f" (from {units[interval.unit]} drawn with replacement)"
     if interval.unit == "both":
         return f" (from leaving out {noun}s and raters, one at a time)"
+    if interval.unit == "clusters":
+        return f" (from leaving out one cluster of {noun}s at a time)"
     one = units[interval.unit].removesuffix("s")
     return f" (from leaving out one {one} at a time)"
 
