@@ -47,6 +47,7 @@ class EstimateOptions:
     seed: int
     words: "BandScale | None"  # whose words for values
     metric: "Metric | None" = None  # of Krippendorff's alpha
+    clusters: tuple[str, ...] = ()  # that of every item of the part, if items have any
 
     @property
     def takes_all(self) -> bool:
@@ -179,6 +180,7 @@ def estimate_rows(
     """Estimate one part of the ratings, every coefficient as a row."""
     # is_ordered: whether the order of the grades is more than the alphabet's
     rows, refused = [], []
+    of_part = replace(options, clusters=part.clusters)
     with warnings.catch_warnings():
         # Every note is in the result, and so below the table or in the JSON.
         warnings.simplefilter("ignore", MasrelWarning)
@@ -186,7 +188,7 @@ def estimate_rows(
             ratings = part.ratings if entry.kernel is None else part.counted
             if entry.metric in ("jaccard", "masi"):
                 ratings = _on_grades(ratings, scale)
-            row, refusal = _row(entry, ratings, group, options)
+            row, refusal = _row(entry, ratings, group, of_part)
             rows.append(row)
             refused += [] if refusal is None else [refusal]
     if not options.takes_all and refused and len(refused) == len(rows):
@@ -255,11 +257,13 @@ def _estimate(
     """Return the coefficient, with the interval that answers for the target."""
     weights: WeightName = options.weights if entry.weighted else "identity"
     # Among all that fit, one that comes with an interval has it, whatever its target.
-    is_done = entry.has_interval and options.takes_all
+    is_done = entry.has_interval and options.takes_all and not options.clusters
     if options.target is None or not has_target or is_done:
-        return entry(
+        result = entry(
             ratings, categories=ratings.categories, weights=weights, level=level
         )
+        # one that comes with the coefficient knows of no clusters
+        return replace(result, interval=None) if options.clusters else result
     from masrel import intervals
 
     return intervals.estimate(
@@ -272,6 +276,7 @@ def _estimate(
         level=level,
         n_resamples=options.n_resamples,
         rng=options.seed,
+        clusters=options.clusters or None,
     )
 
 

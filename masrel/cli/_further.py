@@ -35,8 +35,12 @@ class FurtherOptions:
         values = {field.name: getattr(self, field.name) for field in fields(self)}
         return {name: value for name, value in values.items() if value}
 
-    def checked(self, options: EstimateOptions, by: str | None) -> EstimateOptions:
-        """Return what is estimated between raters, with the default of a comparison."""
+    def checked(
+        self, options: EstimateOptions, by: str | None, clusters: str | None
+    ) -> EstimateOptions:
+        """Return what is estimated between raters, with the defaults of its tables."""
+        if clusters is not None:
+            options = self._with_clusters(options)
         if self.reference is not None and not self.diagnose:
             raise ParameterError("--reference: belongs to --diagnose, got it alone")
         if self.diagnose and options.target in ("raters", "both"):
@@ -53,6 +57,21 @@ class FurtherOptions:
         if options.target not in (None, "items"):
             raise ParameterError(
                 "--compare: a difference generalises to other items, so it takes "
+                f"--target items, got --target {options.target}"
+            )
+        return replace(options, target="items")
+
+    def _with_clusters(self, options: EstimateOptions) -> EstimateOptions:
+        others = [name for name in self.record() if name != "compare"]
+        if others:
+            option = others[0].replace("_", "-")
+            raise ParameterError(
+                f"--clusters: --{option} takes every item by itself, so needs one of "
+                "them, got both"
+            )
+        if options.target not in (None, "items"):
+            raise ParameterError(
+                "--clusters: what is left out is a cluster of items, so it takes "
                 f"--target items, got --target {options.target}"
             )
         return replace(options, target="items")
@@ -169,17 +188,17 @@ def _diagnosis(
     options: EstimateOptions,
     question: "Question",
 ) -> "list[FurtherTable]":
-    from masrel.agreement import coefficient
     from masrel.report._diagnosis_tables import diagnosis_tables
 
-    names = options.coefficients or []
-    if options.takes_all or not names:
-        names = ["fleiss_kappa"]
-    if len(names) > 1:
+    if options.takes_all or (options.coefficients is None and options.metric is None):
+        options = replace(options, coefficients=["fleiss_kappa"])
+    if len(options.names) > 1:
         raise ParameterError(
-            f"--diagnose: needs one coefficient, got --coefficients {','.join(names)}"
+            "--diagnose: needs one coefficient, got --coefficients "
+            f"{','.join(options.names)}"
         )
-    entry = coefficient(names[0])
+    n_raters = max(len(part.raters) for part in file.parts)
+    (entry,) = entries(options, n_raters, file.scale, file.is_ordered)
     return diagnosis_tables(file, entry, question, further.reference)
 
 

@@ -40,6 +40,12 @@ if TYPE_CHECKING:
         help="Read batch by batch, as files larger than memory are (Parquet, text); by "
         "size unless given.",
     ),
+    click.option(
+        "--clusters",
+        metavar="COL",
+        help="Column of the clusters that items come in, such as patients with several "
+        "sites: they are left out as a whole.",
+    ),
 )
 @estimate_options
 @further_options
@@ -70,7 +76,7 @@ def agree(
     read in two ways is refused with the option that decides.
     """
     output.check_files()
-    options = further.checked(options, reading.by)
+    options = further.checked(options, reading.by, reading.clusters)
     if output.figure is not None and options.target is None and not further.diagnose:
         raise ParameterError(
             "--figure: shows intervals, so it needs --target raters, items or both"

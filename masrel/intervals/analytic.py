@@ -175,9 +175,7 @@ def analytic(
         if estimate.reason is None and n_clusters > 1:
             by_cluster = clustered_error(problem, codes)
             estimate = replace(estimate, standard_error=by_cluster)
-    return _interval_around_estimate(
-        problem, estimate, distribution, error, n_clusters
-    )
+    return _interval_around_estimate(problem, estimate, distribution, error, n_clusters)
 
 
 def _interval_around_estimate(

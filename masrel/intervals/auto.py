@@ -107,8 +107,9 @@ def estimate(
     if entry.kernel is None:
         result = entry(ratings, categories=categories, weights=weights, level=level)
     else:
-        if not isinstance(ratings, CountedRatings):
-            ratings = entry.code(ratings, categories)  # once, for all that follows
+        is_counted = isinstance(ratings, CountedRatings)
+        # coded once, for all that follows
+        ratings = ratings if is_counted else entry.code(ratings, categories)
         result = entry(ratings, categories=categories, weights=weights)
         categories = None  # the ratings have them by now
     options = _Options(

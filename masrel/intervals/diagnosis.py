@@ -151,7 +151,7 @@ def diagnose(
         "items" for intervals that generalise to other items, graded by these raters;
         without it there are none. What a pair or a rater does says nothing of others.
     raters : sequence of str, optional
-        What the raters are called; the columns of a DataFrame, else "0", "1" …
+        What the raters are called; the columns of a DataFrame, else their places.
     reference : str or int, optional
         Name, or place, of a rater who is right: the others are held against this one,
         who is then left out of all else.
@@ -201,6 +201,14 @@ def diagnose(
     --------
     >>> ratings = [["a", "a", "b"], ["b", "b", "b"], ["a", "a", "a"], ["b", "b", "a"]]
     >>> print(diagnose(ratings * 5, raters=["Kim", "Lee", "Ann"], target="items"))
+    fleiss_kappa: 0.3333 (SE 0.15)
+    rater: mean of pairs, all without, change
+    Kim   0.500   0.000  -0.333  [-0.499, -0.168]
+    Lee   0.500   0.000  -0.333  [-0.499, -0.168]
+    Ann   0.000   1.000  +0.667  [0.339, 0.995]
+    category: ratings, agreement on it
+    a      30   0.667  [0.438, 0.849]
+    b      30   0.667  [0.438, 0.849]
     """
     if target not in ("items", None):
         raise ParameterError(

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from masrel.agreement import Label, Significance, WeightsLike
 from masrel.errors import (
@@ -14,7 +15,8 @@ from masrel.errors import (
     RatingsError,
     UndefinedStatisticWarning,
 )
-from masrel.estimates import Estimate, Interval
+from masrel.estimates import Estimate, Interval, Unit
+from masrel.intervals._clusters import ClusterSums, clusters_of
 from masrel.intervals._problem import (
     IntervalProblem,
     Statistic,
@@ -36,6 +38,7 @@ def difference(
     categories: Sequence[Label] | None = None,
     weights: "WeightsLike" = "identity",
     level: float = 0.95,
+    clusters: object = None,
 ) -> Estimate:
     """Estimate how much a coefficient of some ratings exceeds that of others.
 
@@ -54,6 +57,10 @@ def difference(
         How much two categories agree; see `declared_weights`.
     level : float, optional
         Nominal level.
+    clusters : sequence of labels, optional
+        The cluster of every item, such as the patient of a site, which leaves as a
+        whole: one label an item, of the same items or with gaps in either set for
+        items of the other; of independent ones a pair of such, with no label in both.
 
     Returns
     -------
@@ -101,7 +108,9 @@ def difference(
     >>> round(estimate.value, 3), round(estimate.interval.low, 3)
     (0.467, 0.08)
     """
-    compared = _compare(coefficient, first, second, design, categories, weights, level)
+    compared = _compare(
+        coefficient, first, second, design, categories, weights, level, clusters
+    )
     one, other = compared.one, compared.other
     return Estimate(
         coefficient=f"difference of {one.coefficient}",
@@ -127,6 +136,7 @@ def difference_test(
     design: _Design,
     categories: Sequence[Label] | None = None,
     weights: "WeightsLike" = "identity",
+    clusters: object = None,
 ) -> Significance:
     """Test whether a coefficient is the same of some ratings as of others.
 
@@ -142,6 +152,8 @@ def difference_test(
         The declared scale in order; should be given, so that both have the same.
     weights : str or array_like, optional
         How much two categories agree; see `declared_weights`.
+    clusters : sequence of labels, optional
+        The cluster of every item; see `difference`.
 
     Returns
     -------
@@ -177,7 +189,9 @@ def difference_test(
     difference_test: 2.527, t(19), p = 0.0205
     """
     # an interval has a level, a test has none: any will do
-    compared = _compare(coefficient, first, second, design, categories, weights, 0.5)
+    compared = _compare(
+        coefficient, first, second, design, categories, weights, 0.5, clusters
+    )
     statistic = p = math.nan
     if compared.reason is not None:
         warnings.warn(
@@ -214,6 +228,8 @@ class _Compared:
     variance: float
     df: float
     reason: str | None  # why the variance makes neither interval nor test, or None
+    unit: Unit  # what was left out
+    n_units: int  # those with a pair of ratings in the set that has fewer
 
 
 def _compare(
@@ -224,6 +240,7 @@ def _compare(
     categories: Sequence[Label] | None,
     weights: "WeightsLike",
     level: float,
+    clusters: object,
 ) -> _Compared:
     """Check both sets of ratings, and estimate their difference and its variance."""
     if design not in get_args(_Design):
@@ -241,14 +258,21 @@ def _compare(
         )
         for ratings in (first, second)
     ]
-    variance_of = _dependent if design == "dependent" else _independent
-    variance, df = variance_of(*problems)
+    unit: Unit = "items" if clusters is None else "clusters"
+    n_units = min(problem.n_paired_items for problem in problems)
+    if clusters is not None:
+        variance, df, n_units = _of_clusters(problems[0], problems[1], design, clusters)
+    else:
+        variance_of = _dependent if design == "dependent" else _independent
+        variance, df = variance_of(*problems)
     one, other = (problem.entry(problem.coded, weights=weights) for problem in problems)
     reason = one.reason or other.reason
     if reason is None and math.isnan(variance):
-        reason = "with one item left out an estimate is undefined"
+        reason = f"with one {unit.removesuffix('s')} left out an estimate is undefined"
     elif reason is None and variance == 0.0:
-        reason = "leaving out any item leaves the difference as it is"
+        reason = (
+            f"leaving out any {unit.removesuffix('s')} leaves the difference as it is"
+        )
     return _Compared(
         problems=problems,
         one=one,
@@ -257,7 +281,58 @@ def _compare(
         variance=variance,
         df=df,
         reason=reason,
+        unit=unit,
+        n_units=n_units,
     )
+
+
+def _of_clusters(
+    one: IntervalProblem, other: IntervalProblem, design: _Design, clusters: object
+) -> tuple[float, float, int]:
+    """Return the jackknife variance over clusters, its degrees and how many."""
+    if design == "independent":
+        first, second = _cluster_pair(one, other, clusters)
+        parts = [
+            (_variance_of(of.values_without(problem), _once(of.known), of.n_paired), of)
+            for problem, of in ((one, first), (other, second))
+        ]
+        n = min(first.n_paired, second.n_paired)
+        return *_satterthwaite([(v, of.n_paired - 1) for v, of in parts]), n
+    if len(one.coded.codes) != len(other.coded.codes):
+        raise RatingsError(
+            "design: dependent ratings need the same rows, got "
+            f"{len(one.coded.codes)} and {len(other.coded.codes)}"
+        )
+    codes = clusters_of(one, clusters)
+    first, second = ClusterSums.of(one, codes), ClusterSums.of(other, codes)
+    known, n = first.known | second.known, min(first.n_paired, second.n_paired)
+    moved = one.values(one.sums - first.sums) - other.values(other.sums - second.sums)
+    return _variance_of(moved[known], _once(known), n), float(n - 1), n
+
+
+def _once(known: NDArray[np.bool_]) -> NDArray[np.int64]:
+    return np.ones(int(known.sum()), dtype=np.int64)
+
+
+def _cluster_pair(
+    one: IntervalProblem, other: IntervalProblem, clusters: object
+) -> tuple[ClusterSums, ClusterSums]:
+    """Return the clusters of independent ratings, which must be different ones."""
+    if not isinstance(clusters, Sequence) or len(clusters) != 2:
+        raise ParameterError(
+            "clusters: independent ratings need a pair of sequences, one label an item"
+        )
+    codes = [
+        clusters_of(problem, of)
+        for problem, of in zip((one, other), clusters, strict=True)
+    ]
+    shared = set(clusters[0]) & set(clusters[1])
+    if shared:
+        raise ParameterError(
+            "clusters: independent ratings need other clusters, got "
+            f"{min(map(str, shared))!r} in both"
+        )
+    return ClusterSums.of(one, codes[0]), ClusterSums.of(other, codes[1])
 
 
 def _dependent(one: IntervalProblem, other: IntervalProblem) -> tuple[float, float]:
@@ -299,6 +374,11 @@ def _independent(one: IntervalProblem, other: IntervalProblem) -> tuple[float, f
         )
         for problem in (one, other)
     ]
+    return _satterthwaite(parts)
+
+
+def _satterthwaite(parts: Sequence[tuple[float, int]]) -> tuple[float, float]:
+    """Return the sum of variances, and its degrees of freedom [2]_."""
     variance = sum(part for part, _ in parts)
     if not variance > 0.0:
         return variance, float(min(df for _, df in parts))
@@ -306,13 +386,15 @@ def _independent(one: IntervalProblem, other: IntervalProblem) -> tuple[float, f
 
 
 def _interval(compared: _Compared) -> Interval:
-    method = "item jackknife of the difference, t"
+    unit = compared.unit
+    method = f"{unit.removesuffix('s')} jackknife of the difference, t"
     problems, value = compared.problems, compared.value
     smaller = min(problems, key=lambda problem: problem.n_paired_items)
     if compared.reason is not None:
-        return smaller.undefined(compared.reason, method=method, unit="items")
+        return smaller.undefined(compared.reason, method=method, unit=unit)
     half = smaller.student_t(compared.df) * math.sqrt(compared.variance)
-    notes = warn_small(smaller.n_paired_items, 10, "items", smaller.n_items)
+    n_items = smaller.n_items if unit == "items" else None
+    notes = warn_small(compared.n_units, 10, unit, n_items)
     width = 1.0 - min(problem.min_value for problem in problems)  # of its space
     if value - half < -width or value + half > width:
         notes += (f"cut at the ends of the parameter space [{-width:g}, {width:g}]",)
@@ -323,6 +405,6 @@ def _interval(compared: _Compared) -> Interval:
         kind="confidence",
         method=method,
         target="items",
-        unit="items",
+        unit=unit,
         notes=notes,
     )

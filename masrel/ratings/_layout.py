@@ -66,13 +66,13 @@ class Layout:
 def find_layout(sheet: Sheet, options: LayoutOptions) -> Layout:
     """Decide which column is what, or say which option would."""
     options = _resolved(sheet, options)
-    layout = _found(sheet, options)
+    layout = _columns_of(sheet, options)
     if options.clusters is None:
         return layout
     return replace(layout, clusters=sheet.header.index(options.clusters))
 
 
-def _found(sheet: Sheet, options: LayoutOptions) -> Layout:
+def _columns_of(sheet: Sheet, options: LayoutOptions) -> Layout:
     # every column but that of the clusters
     header = sheet.header
     position = {name: place for place, name in enumerate(header)}

@@ -217,6 +217,7 @@ def _may_stream(
     whole = {
         "--by": columns.by,
         "--session": columns.session,
+        "--clusters": columns.clusters,
         "--counts": columns.counts,
         "--table": columns.table,
         f"--repeated {repeated}": repeated != "error",

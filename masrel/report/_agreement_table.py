@@ -154,7 +154,14 @@ def _errors_note(rows: Sequence[AgreementRow], in_sentences: bool) -> tuple[str,
         if not math.isnan(row.estimate.standard_error)
         and not (in_sentences and row.estimate.interval is not None)
     ]
-    return ("SE: delta method, items as the sample.",) if shown else ()
+    clustered = [row for row in shown if _is_clustered(row.estimate)]
+    samples = ["clusters"] if clustered else []
+    samples += ["items"] if len(clustered) < len(shown) else []
+    return tuple(f"SE: delta method, {sample} as the sample." for sample in samples)
+
+
+def _is_clustered(estimate: Estimate) -> bool:
+    return estimate.interval is not None and estimate.interval.unit == "clusters"
 
 
 def _notes(rows: Sequence[AgreementRow], explain: bool) -> tuple[str, ...]:
@@ -204,7 +211,10 @@ def _interval_note(interval: Interval, explain: bool) -> str:
     if interval.kind == "credible":
         kind = "credible bound" if is_bound(interval) else "credible interval"
     name = f"{percent(interval.level)} % {kind}, {interval.method}"
-    to = f"generalises to other {_POPULATIONS[interval.target]} like these"
+    population = _POPULATIONS[interval.target]
+    if interval.unit == "clusters":
+        population = f"clusters of {population}"
+    to = f"generalises to other {population} like these"
     if not explain:
         return f"{name}: {to}"
     promised = promise(interval, "item")

@@ -10,34 +10,32 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-
 from masrel.agreement import CodedRatings, Coefficient, Significance, holm
 from masrel.errors import MasrelError, MasrelWarning, ParameterError
 from masrel.estimates import Estimate, as_document
-from masrel.ratings import RatingsFile, RatingsPart
+from masrel.ratings import RatingsFile
 from masrel.report._further_tables import (
     FurtherTable,
     Question,
-    coded_part,
     data_of,
     finite,
     label,
     part_names,
 )
+from masrel.report._group_rows import groups_of, n_shared_items
 from masrel.report._tables import Column, Table, Value, p_text, percent
-
-_ITEMS = {"dependent": "the same", "independent": "others"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Pair:
-    """Two groups, and whether they are of the same items."""
+    """Two groups, and whether they are of the same items, or clusters."""
 
     first: str
     second: str
     ratings: tuple[CodedRatings, CodedRatings]  # row by row the same items, if they are
     design: Literal["dependent", "independent"]
+    same_items: bool
+    clusters: object  # of the items, as `difference` takes them
     n_shared: int  # names of items that both have
 
 
@@ -94,42 +92,24 @@ def difference_table(
 
 
 def _pairs(file: RatingsFile) -> list[_Pair]:
-    parts = file.parts
-    groups = [label(part_names(file, part).values()) for part in parts]
-    coded = [coded_part(part, "--compare") for part in parts]
-    rows = [rated_rows(*of_part) for of_part in zip(parts, coded, strict=True)]
+    names = [label(part_names(file, part).values()) for part in file.parts]
     pairs = []
-    for one, other in itertools.combinations(range(len(parts)), 2):
-        shared = rows[one].keys() & rows[other].keys()
-        is_same = bool(shared) and rows[one].keys() == rows[other].keys()
-        ratings = coded[one], coded[other]
-        if is_same:
-            order = list(rows[one])
-            ratings = (
-                rows_of(coded[one], [rows[one][item] for item in order]),
-                rows_of(coded[other], [rows[other][item] for item in order]),
-            )
+    for one, other in itertools.combinations(range(len(file.parts)), 2):
+        both = file.parts[one], file.parts[other]
+        groups = groups_of(both)
+        first, second = groups.sets
         pairs.append(
             _Pair(
-                first=groups[one],
-                second=groups[other],
-                ratings=ratings,
-                design="dependent" if is_same else "independent",
-                n_shared=len(shared),
+                first=names[one],
+                second=names[other],
+                ratings=(first, second),
+                design="dependent" if groups.is_dependent else "independent",
+                same_items=groups.same_items,
+                clusters=groups.clusters,
+                n_shared=n_shared_items(*both),
             )
         )
     return pairs
-
-
-def rated_rows(part: RatingsPart, coded: CodedRatings) -> dict[str, int]:
-    """Return the row of every item that somebody rated."""
-    rated = np.max(coded.codes, axis=1) >= 0
-    return {item: row for row, item in enumerate(part.items) if rated[row]}
-
-
-def rows_of(coded: CodedRatings, rows: list[int]) -> CodedRatings:
-    """Return the ratings of some items in this order."""
-    return CodedRatings(codes=coded.codes[np.array(rows)], categories=coded.categories)
 
 
 def _differences(
@@ -149,9 +129,14 @@ def _differences(
                     design=pair.design,
                     weights=weights,
                     level=question.level,
+                    clusters=pair.clusters,
                 )
                 test = difference_test(
-                    entry, *pair.ratings, design=pair.design, weights=weights
+                    entry,
+                    *pair.ratings,
+                    design=pair.design,
+                    weights=weights,
+                    clusters=pair.clusters,
                 )
             except MasrelError as error:
                 raise type(error)(
@@ -200,7 +185,7 @@ def _cells(difference: _Difference) -> tuple[Value, ...]:
         estimate.weights,
         pair.first,
         pair.second,
-        _ITEMS[pair.design],
+        "the same" if pair.same_items else "others",
         estimate.value,
         estimate.standard_error,
         math.nan if interval is None else interval.low,
@@ -237,16 +222,24 @@ def _notes(
     question: Question,
     without: Sequence[str],
 ) -> tuple[str, ...]:
+    is_clustered = any(pair.clusters is not None for pair in pairs)
+    unit, population = ("item", "items")
+    if is_clustered:
+        unit, population = ("cluster", "clusters of items")
     notes = [
         "Difference: the first less the second. SE, "
-        f"{percent(question.level)} % CI and p: item jackknife, t; they generalise to "
-        "other items like these, graded by the same raters; raters are taken as they "
-        "are, whether groups share them or not.",
+        f"{percent(question.level)} % CI and p: {unit} jackknife, t; they generalise "
+        f"to other {population} like these, graded by the same raters; raters are "
+        "taken as they are, whether groups share them or not.",
         f"p (Holm): adjusted for {len(pairs)} pairs, each coefficient by itself."
         if len(pairs) > 1
         else "p (Holm): there is one pair, so nothing to adjust.",
     ]
-    if any(pair.design == "dependent" for pair in pairs):
+    if any(pair.design == "dependent" for pair in pairs) and is_clustered:
+        notes.append(
+            "Groups have clusters in common, which are left out of both at once."
+        )
+    elif any(pair.design == "dependent" for pair in pairs):
         notes.append(
             "Items the same: both groups have items of the same names, taken for the "
             "same items, and an item is left out of both at once."
@@ -255,7 +248,7 @@ def _notes(
         f"{pair.first} and {pair.second}: {pair.n_shared} items have the same name, "
         "taken for different items."
         for pair in pairs
-        if pair.design == "independent" and pair.n_shared
+        if not pair.same_items and pair.n_shared
     ]
     if without:
         notes.append(f"Left out: {', '.join(without)}: there is no such interval.")

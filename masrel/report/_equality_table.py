@@ -5,21 +5,18 @@ In: a `RatingsFile` whose parts are the groups. Out: a table, and the same for J
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-import numpy as np
-
-from masrel.agreement import CodedRatings, Coefficient, Significance
+from masrel.agreement import Coefficient, Significance
 from masrel.errors import MasrelWarning
 from masrel.ratings import RatingsFile
-from masrel.report._difference_table import rated_rows, rows_of
 from masrel.report._further_tables import (
     FurtherTable,
     Question,
-    coded_part,
     data_of,
     finite,
 )
+from masrel.report._group_rows import Groups, groups_of
 from masrel.report._tables import Column, Table, Value, p_text
 
 _FLEISS = "Fleiss' weighted χ²"
@@ -30,19 +27,11 @@ _NOTES = {
     _FLEISS: f"{_FLEISS}: groups of other items, by their delta-method errors.",
     _DONNER: f"{_DONNER}: two raters and two categories, of one κ of all groups; it "
     "holds its level in smaller groups.",
-    _HOTELLING: f"{_HOTELLING}: items of the same names in several groups, taken for "
-    "the same items, by the delta method.",
+    _HOTELLING: f"{_HOTELLING}: groups of the same items, by their names, or "
+    "of the same clusters, by the delta method.",
 }
 _INTRACLASS = ("fleiss_kappa", "scott_pi")
 """Coefficients that are the intraclass kappa of two raters and two categories."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Groups:
-    """The ratings of all groups, item by item."""
-
-    sets: tuple[CodedRatings, ...]
-    is_same: bool  # whether some groups are of the same items, which are aligned
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,7 +50,7 @@ def equality_table(
     question: Question,
 ) -> FurtherTable:
     """Return the test that all groups have the same coefficient, for each of them."""
-    groups = _groups(file)
+    groups = groups_of(file.parts)
     tests: list[_Test] = []
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", MasrelWarning)  # the results say it
@@ -88,36 +77,22 @@ def equality_table(
     )
 
 
-def _groups(file: RatingsFile) -> _Groups:
-    # groups of the same items have them in the same rows, others in rows of their own
-    coded = [coded_part(part, "--compare") for part in file.parts]
-    rated = [rated_rows(*both) for both in zip(file.parts, coded, strict=True)]
-    starts: dict[frozenset[str], tuple[int, list[str]]] = {}
-    n_rows = 0
-    for rows in rated:
-        if frozenset(rows) not in starts:
-            starts[frozenset(rows)] = n_rows, list(rows)
-            n_rows += len(rows)
-    if len(starts) == len(coded):
-        return _Groups(sets=tuple(coded), is_same=False)
-    sets = []
-    for ratings, rows in zip(coded, rated, strict=True):
-        start, items = starts[frozenset(rows)]
-        codes = np.full((n_rows, ratings.codes.shape[1]), -1, ratings.codes.dtype)
-        chosen = rows_of(ratings, [rows[item] for item in items]).codes
-        codes[start : start + len(items)] = chosen
-        sets.append(replace(ratings, codes=codes))
-    return _Groups(sets=tuple(sets), is_same=True)
-
-
-def _tests(entry: Coefficient, groups: _Groups, question: Question) -> list[_Test]:
-    from masrel.intervals import differences, donner_test, equality_test
+def _tests(entry: Coefficient, groups: Groups, question: Question) -> list[_Test]:
+    from masrel.intervals import differences, donner_test, equality_test, estimate
 
     weights = question.weights if entry.weighted else "identity"
-    if groups.is_same:
-        result = differences(entry, groups.sets, weights=weights).equality
+    if groups.is_dependent:
+        result = differences(
+            entry, groups.sets, weights=weights, clusters=groups.clusters
+        ).equality
         return [_Test(entry=entry, weights=weights, name=_HOTELLING, result=result)]
-    estimates = [entry(ratings, weights=weights) for ratings in groups.sets]
+    if groups.clusters is None:
+        estimates = [entry(ratings, weights=weights) for ratings in groups.sets]
+    else:
+        estimates = [
+            estimate(entry, ratings, target="items", weights=weights, clusters=clusters)
+            for ratings, clusters in zip(groups.sets, groups.clusters, strict=True)
+        ]
     tests = [
         _Test(
             entry=entry,
@@ -130,7 +105,7 @@ def _tests(entry: Coefficient, groups: _Groups, question: Question) -> list[_Tes
         ratings.codes.shape[1] == 2 and len(ratings.categories) == 2
         for ratings in groups.sets
     )
-    if of_two and entry.name in _INTRACLASS:
+    if of_two and groups.clusters is None and entry.name in _INTRACLASS:
         result = donner_test(groups.sets)
         tests.append(_Test(entry=entry, weights=weights, name=_DONNER, result=result))
     return tests

@@ -1,0 +1,245 @@
+"""masrel agree --diagnose and --clusters: as computed by the library, and refusals."""
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from masrel import intervals
+from masrel.ratings import read_ratings
+from tests.cli.process import Caller
+
+Record = dict[str, Any]
+
+NAMES = ("Kim", "Lee", "Ann", "Gold")
+
+
+@pytest.fixture
+def wide(tmp_path: Path) -> Path:
+    """Three raters and a reference on two sites."""
+    rng = np.random.default_rng(3)
+    true = rng.integers(0, 3, 40)
+    lines = ["item,site," + ",".join(NAMES)]
+    for k, grade in enumerate(true):
+        seen = [
+            grade if rng.random() < share else rng.integers(0, 3)
+            for share in (0.9, 0.8, 0.4, 0.97)
+        ]
+        site = "north" if k < 20 else "south"
+        lines.append(f"i{k},{site}," + ",".join("abc"[g] for g in seen))
+    path = tmp_path / "wide.csv"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def sites(tmp_path: Path) -> Path:
+    """Two raters on one to four teeth of a patient, left or right."""
+    rng = np.random.default_rng(5)
+    lines = ["patient,tooth,side,Kim,Lee"]
+    for patient in range(18):
+        for tooth in range(1 + patient % 4):
+            true = rng.integers(0, 2)
+            pair = [
+                true if rng.random() < 0.75 else rng.integers(0, 2) for _ in range(2)
+            ]
+            side = "left" if tooth % 2 else "right"
+            lines.append(f"p{patient},{tooth},{side},{pair[0]},{pair[1]}")
+    path = tmp_path / "sites.csv"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def record(masrel: Caller, *arguments: object) -> Record:
+    done = masrel("agree", *arguments, "--json", "-")
+    assert done.code in (0, None), done.err
+    document: Record = json.loads(done.out)
+    return document
+
+
+def refused(masrel: Caller, *arguments: object) -> str:
+    done = masrel("agree", *arguments)
+    assert done.code == 2
+    assert done.out == ""
+    return done.err
+
+
+def test_a_diagnosis_is_that_of_the_library(masrel: Caller, wide: Path) -> None:
+    arguments = (wide, "--ignore", "site", "--diagnose", "--target", "items")
+    document = record(masrel, *arguments, "--reference", "Gold")
+    (part,) = read_ratings(wide, ignore=["site"]).parts
+    expected = intervals.diagnose(
+        part.ratings, target="items", raters=part.raters, reference="Gold"
+    )
+    raters = document["diagnosis_raters"]
+    assert [row["rater"] for row in raters] == ["Kim", "Lee", "Ann"]
+    for place, row in enumerate(raters):
+        assert row["change"] == expected.changes[place]
+        assert row["low"] == expected.change_low[place]
+        assert row["with_reference"] == expected.reference_values[place]
+    assert document["diagnosis_pairs"][1]["value"] == expected.pair_values[0, 2]
+    assert document["diagnosis_pairs"][1]["high"] == expected.pair_high[0, 2]
+    categories = document["diagnosis_categories"]
+    assert [row["agreement"] for row in categories] == list(expected.category_values)
+    cells = document["diagnosis_confusion"]
+    assert len(cells) == 3 * 3 * 3
+    (cell,) = (
+        c for c in cells if (c["rater"], c["of"], c["said"]) == ("Ann", "a", "b")
+    )
+    assert cell["n"] == expected.confusion[2, 0, 1]
+    assert cell["low"] == expected.share_low[2, 0, 1]
+    assert document["estimates"]  # the first table is there, too
+
+
+def test_groups_are_diagnosed_each_and_without_a_target_there_are_no_intervals(
+    masrel: Caller, wide: Path
+) -> None:
+    document = record(masrel, wide, "--by", "site", "--diagnose")
+    assert [row["site"] for row in document["diagnosis_raters"]] == 4 * ["north"] + (
+        4 * ["south"]
+    )
+    assert all(row["low"] is None for row in document["diagnosis_raters"])
+    out = masrel("agree", wide, "--by", "site", "--diagnose").out
+    assert "No intervals: --target items has them." in out
+    tables = [
+        list(csv.DictReader(part.splitlines()))
+        for part in masrel(
+            "agree", wide, "--by", "site", "--diagnose", "--csv"
+        ).out.split("\n\n")
+    ]
+    assert [len(rows) for rows in tables] == [4, 8, 12, 6, 24]
+    assert tables[1][0]["group"] == "north"
+
+
+def test_of_many_raters_the_pairs_that_agree_least_are_shown(
+    masrel: Caller, tmp_path: Path
+) -> None:
+    rng = np.random.default_rng(7)
+    lines = ["item," + ",".join(f"R{k}" for k in range(10))]
+    for k in range(30):
+        seen = [k % 3 if rng.random() < 0.7 else rng.integers(0, 3) for _ in range(10)]
+        lines.append(f"i{k}," + ",".join(map(str, seen)))
+    path = tmp_path / "many.csv"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    document = record(masrel, path, "--diagnose")
+    assert len(document["diagnosis_pairs"]) == 45
+    out = masrel("agree", path, "--diagnose").out
+    assert "The 20 pairs that agree least; --json has 45." in out
+    lowest = min(row["value"] for row in document["diagnosis_pairs"])
+    below = out.split("every two raters\n")[1].splitlines()
+    assert below[2].split()[2].replace("−", "-") == f"{lowest:.3f}"
+
+
+@pytest.mark.parametrize("target", [(), ("--target", "items")])
+def test_the_figure_of_a_diagnosis_needs_no_interval(
+    masrel: Caller, wide: Path, tmp_path: Path, target: tuple[str, ...]
+) -> None:
+    figure = tmp_path / "pairs.svg"
+    arguments = ("--ignore", "site", "--diagnose", "--figure", figure, *target)
+    assert masrel("agree", wide, *arguments).code in (0, None)
+    assert figure.read_bytes().startswith(b"<?xml")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--reference", "Gold"), "--reference: belongs to --diagnose"),
+        (("--diagnose", "--target", "raters"), "--diagnose: is of these raters"),
+        (("--diagnose", "--reference", "Bob"), "--reference: needs one of Kim, Lee"),
+        (
+            ("--diagnose", "--coefficients", "gwet_ac,fleiss_kappa"),
+            "--diagnose: needs one coefficient, got --coefficients gwet_ac,fleiss",
+        ),
+        (
+            ("--diagnose", "--coefficients", "conger_kappa", "--clusters", "site"),
+            "--clusters: --diagnose takes every item by itself",
+        ),
+        (("--clusters", "Site"), "--clusters: there is no column 'Site'"),
+        (("--clusters", "site", "--target", "both"), "so it takes --target items"),
+        (("--clusters", "Kim", "--raters", "Kim,Lee"), "needed each column once"),
+    ],
+)
+def test_options_that_do_not_fit_are_refused(
+    masrel: Caller, wide: Path, arguments: tuple[str, ...], message: str
+) -> None:
+    ignore = () if "site" in arguments else ("--ignore", "site")
+    assert message in refused(masrel, wide, *ignore, *arguments)
+
+
+def test_counts_have_neither_clusters_nor_a_diagnosis(
+    masrel: Caller, tmp_path: Path
+) -> None:
+    path = tmp_path / "counts.csv"
+    path.write_text("item,p,a,b\nx,1,2,0\ny,1,1,1\n", encoding="utf-8")
+    assert "--clusters: counts do not" in refused(
+        masrel, path, "--counts", "--clusters", "p"
+    )
+    assert "who rated what" in refused(
+        masrel, path, "--counts", "--ignore", "p", "--diagnose"
+    )
+
+
+def test_clusters_are_left_out_as_in_the_library(masrel: Caller, sites: Path) -> None:
+    names = ("--item", "patient,tooth", "--ignore", "side", "--clusters", "patient")
+    document = record(masrel, sites, *names, "--coefficients", "scott_pi")
+    (row,) = document["estimates"]
+    (part,) = read_ratings(
+        sites, item="patient,tooth", ignore=["side"], clusters="patient"
+    ).parts
+    assert part.clusters[:4] == ("p0", "p1", "p1", "p2")
+    expected = intervals.estimate(
+        "scott_pi", part.ratings, target="items", clusters=part.clusters
+    )
+    assert expected.interval is not None
+    assert row["standard_error"] == expected.standard_error
+    assert row["interval"]["low"] == expected.interval.low
+    assert row["interval"]["unit"] == "clusters"
+    assert document["read"]["n_clusters"] == 18
+    out = masrel("agree", sites, *names).out
+    assert "in 18 clusters by 'patient'" in out.replace("\n  ", " ")
+    assert "SE: delta method, clusters as the sample." in out
+
+
+def test_groups_with_clusters_in_common_are_compared_cluster_by_cluster(
+    masrel: Caller, sites: Path
+) -> None:
+    names = ("--item", "patient,tooth", "--by", "side", "--clusters", "patient")
+    coefficients = ("--coefficients", "fleiss_kappa")
+    document = record(masrel, sites, *names, "--compare", *coefficients)
+    (row,) = document["differences"]
+    file = read_ratings(sites, item="patient,tooth", by="side", clusters="patient")
+    first, second = file.parts
+    rows = len(first.items) + len(second.items)
+    stacked = []
+    for part, start in ((first, 0), (second, len(first.items))):
+        table = np.full((rows, 2), np.nan)
+        codes = np.asarray(part.counted.coded.codes)  # type: ignore[union-attr]
+        table[start : start + len(codes)] = codes
+        stacked.append(table)
+    expected = intervals.difference(
+        "fleiss_kappa",
+        *stacked,
+        design="dependent",
+        categories=[0, 1],
+        clusters=[*first.clusters, *second.clusters],
+    )
+    assert expected.interval is not None
+    assert row["value"] == pytest.approx(expected.value, rel=1e-12)
+    assert row["interval"]["low"] == pytest.approx(expected.interval.low, rel=1e-12)
+    assert row["design"] == "dependent"
+    out = masrel("agree", sites, *names, "--compare").out
+    assert "Groups have clusters in common" in out
+
+
+def test_an_item_is_in_one_cluster(masrel: Caller, tmp_path: Path) -> None:
+    path = tmp_path / "long.csv"
+    path.write_text(
+        "rater,item,patient,grade\nA,1,p,x\nB,1,p,y\nA,2,p,x\nB,2,q,x\n",
+        encoding="utf-8",
+    )
+    message = refused(masrel, path, "--item", "item", "--clusters", "patient")
+    assert "line 4 and line 5: needed one cluster of item '2'" in message
+    assert "got 'p' and 'q'" in message

@@ -1,0 +1,257 @@
+"""Items in clusters: against multiagree, a loop over clusters, coverage; refusals."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy import stats
+
+from masrel.agreement import COEFFICIENTS
+from masrel.errors import ParameterError, RatingsError, SmallSampleWarning
+from masrel.intervals import (
+    analytic,
+    difference,
+    difference_test,
+    differences,
+    estimate,
+    jackknife,
+)
+
+FILE = Path(__file__).parents[1] / "oracles" / "several_kappas.json"
+SETTINGS = json.loads(FILE.read_text(encoding="utf-8"))["settings"]
+KINDS = [n for n, e in COEFFICIENTS.items() if e.kernel and e.shape == "ratings"]
+
+
+def drawn(
+    n_clusters: int, seed: int, r: int = 2, strength: float = 1.0
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Ratings of items in clusters of one to four, alike in how well raters agree."""
+    rng = np.random.default_rng(seed)
+    sizes = rng.integers(1, 5, n_clusters)
+    clusters = np.repeat(np.arange(n_clusters), sizes)
+    true = rng.integers(0, 3, len(clusters))
+    easy = 1.0 / (1.0 + np.exp(-0.8 - strength * rng.normal(size=n_clusters)))
+    same = rng.random((len(clusters), r)) < easy[clusters, None]
+    ratings = np.where(same, true[:, None], rng.integers(0, 3, (len(clusters), r)))
+    return ratings.astype(float), clusters
+
+
+@pytest.mark.parametrize("place", ["01", "02", "03"])
+def test_one_kappa_has_the_interval_of_multiagree(place: str) -> None:
+    setting = SETTINGS[f"dependent_kappas_clustered-{place}"]
+    data = SETTINGS["dependent_kappas_clustered-01"]["data"]
+    ratings = np.array(data["ratings"])[:, :2]
+    options: dict[str, Any] = {
+        "target": "items",
+        "clusters": data["cluster"],
+        "weights": setting["weights"],
+        "categories": [1, 2, 3],
+    }
+    normal = analytic("cohen_kappa", ratings, distribution="normal", **options)
+    assert (normal.low, normal.high) == pytest.approx(
+        setting["one_kappa_interval95"], rel=1e-8
+    )
+    found = estimate("cohen_kappa", ratings, method="analytic", **options)
+    error = setting["reference"]["se"][0]
+    assert found.standard_error == pytest.approx(error, rel=1e-8)
+    assert found.interval is not None
+    half = stats.t.ppf(0.975, setting["reference"]["n_clusters"] - 1) * error
+    assert found.interval.high == pytest.approx(found.value + half, rel=1e-8)
+    assert found.interval.unit == "clusters"
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_the_jackknife_leaves_out_every_cluster_once(name: str) -> None:
+    ratings, clusters = drawn(15, 3)
+    ratings[[2, 9], 0] = np.nan
+    found = jackknife(
+        name, ratings, target="items", clusters=clusters, categories=[0, 1, 2]
+    )
+    without = [
+        COEFFICIENTS[name](ratings[clusters != c], categories=[0, 1, 2]).value
+        for c in range(15)
+    ]
+    variance = 14 / 15 * float(((without - np.mean(without)) ** 2).sum())
+    value = COEFFICIENTS[name](ratings, categories=[0, 1, 2]).value
+    half = stats.t.ppf(0.975, 14) * math.sqrt(variance)
+    assert found.low == pytest.approx(value - half, rel=1e-9)
+    assert found.high == pytest.approx(min(value + half, 1.0), rel=1e-9)
+    assert found.method == "cluster jackknife, t(14)"
+
+
+def test_items_that_are_clusters_by_themselves_change_nothing() -> None:
+    ratings, _ = drawn(20, 5)
+    labels = [f"item {k}" for k in range(len(ratings))]
+    for make in (analytic, jackknife):
+        alone = make("fleiss_kappa", ratings, target="items")
+        of_clusters = make("fleiss_kappa", ratings, target="items", clusters=labels)
+        ends = of_clusters.low, of_clusters.high
+        assert ends == pytest.approx((alone.low, alone.high), rel=1e-10)
+
+
+def test_by_default_clusters_are_left_out_on_the_logit() -> None:
+    ratings, clusters = drawn(20, 5)
+    found = estimate("gwet_ac", ratings, target="items", clusters=list(clusters))
+    interval = found.interval
+    assert interval is not None
+    assert interval.method == "cluster jackknife, t(19) on the logit"
+    assert interval.low < found.value < interval.high < 1.0
+    plain = jackknife("gwet_ac", ratings, target="items", clusters=clusters)
+    # the same error, divided by the slope of the logit between -1 and 1
+    share = (1.0 + found.value) / 2.0
+    half = (plain.high - plain.low) / 2.0 / (2.0 * share * (1.0 - share))
+    middle = math.log(share / (1.0 - share))
+    expected = 2.0 / (1.0 + math.exp(-(middle - half))) - 1.0
+    assert interval.low == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_difference_leaves_a_cluster_out_of_both_at_once() -> None:
+    first, clusters = drawn(18, 7)
+    second = drawn(18, 7, strength=3.0)[0]
+    found = difference(
+        "fleiss_kappa",
+        first,
+        second,
+        design="dependent",
+        categories=[0, 1, 2],
+        clusters=clusters,
+    )
+    without = [
+        differences_of(first[clusters != c], second[clusters != c]) for c in range(18)
+    ]
+    variance = 17 / 18 * float(((without - np.mean(without)) ** 2).sum())
+    assert found.standard_error == pytest.approx(math.sqrt(variance), rel=1e-9)
+    assert found.interval is not None
+    assert found.interval.unit == "clusters"
+    # the delta method gives about the same
+    delta = differences(
+        "fleiss_kappa", [first, second], clusters=clusters, categories=[0, 1, 2]
+    )
+    assert delta.errors[0, 1] == pytest.approx(found.standard_error, rel=0.1)
+
+
+def differences_of(first: NDArray[np.float64], second: NDArray[np.float64]) -> float:
+    one, other = (
+        COEFFICIENTS["fleiss_kappa"](of, categories=[0, 1, 2]) for of in (first, second)
+    )
+    return one.value - other.value
+
+
+def test_independent_clusters_add_their_variances() -> None:
+    (first, of_first), (second, of_second) = drawn(12, 11), drawn(16, 13)
+    labels = [f"a{c}" for c in of_first], [f"b{c}" for c in of_second]
+    found = difference(
+        "fleiss_kappa",
+        first,
+        second,
+        design="independent",
+        categories=[0, 1, 2],
+        clusters=labels,
+    )
+    variance, df = 0.0, 0.0
+    for ratings, codes in ((first, of_first), (second, of_second)):
+        n = int(codes.max()) + 1
+        without = [
+            COEFFICIENTS["fleiss_kappa"](
+                ratings[codes != c], categories=[0, 1, 2]
+            ).value
+            for c in range(n)
+        ]
+        part = (n - 1) / n * float(((without - np.mean(without)) ** 2).sum())
+        variance, df = variance + part, df + part**2 / (n - 1)
+    assert found.standard_error == pytest.approx(math.sqrt(variance), rel=1e-9)
+    test = difference_test(
+        "fleiss_kappa",
+        first,
+        second,
+        design="independent",
+        categories=[0, 1, 2],
+        clusters=labels,
+    )
+    assert test.df[0] == pytest.approx(variance**2 / df, rel=1e-9)
+    with pytest.raises(ParameterError, match="need other clusters, got 'a1' in both"):
+        difference(
+            "fleiss_kappa",
+            first,
+            second,
+            design="independent",
+            clusters=(labels[0], ["a1", *labels[1][1:]]),
+        )
+    with pytest.raises(ParameterError, match="a pair of sequences"):
+        difference(
+            "fleiss_kappa", first, second, design="independent", clusters=labels[0]
+        )
+
+
+def test_dependent_clusters_are_of_the_same_rows() -> None:
+    first, clusters = drawn(12, 11)
+    with pytest.raises(RatingsError, match="need the same rows"):
+        difference(
+            "fleiss_kappa", first, first[1:], design="dependent", clusters=clusters
+        )
+
+
+@pytest.mark.parametrize("method", ["bootstrap", "posterior"])
+def test_other_methods_take_no_clusters(method: Any) -> None:
+    ratings, clusters = drawn(12, 11)
+    with pytest.raises(ParameterError, match=f'clusters: needs method .* "{method}"'):
+        estimate(
+            "fleiss_kappa", ratings, target="items", method=method, clusters=clusters
+        )
+
+
+@pytest.mark.parametrize("target", ["raters", "both"])
+def test_clusters_are_of_items(target: Any) -> None:
+    ratings, clusters = drawn(12, 11, r=3)
+    for make in (estimate, jackknife):
+        with pytest.raises(ParameterError, match=r'clusters: .* so target "items"'):
+            make("fleiss_kappa", ratings, target=target, clusters=clusters)
+
+
+def test_a_coefficient_that_is_no_function_of_sums_takes_no_clusters() -> None:
+    ratings, clusters = drawn(12, 11)
+    with pytest.raises(ParameterError, match="no function of sums over items"):
+        estimate("kendall_w", ratings, target="items", clusters=clusters)
+
+
+def test_few_clusters_are_warned_of_and_one_says_nothing() -> None:
+    ratings, clusters = drawn(6, 17)
+    for make in (analytic, jackknife):
+        with pytest.warns(SmallSampleWarning, match="6 clusters"):
+            make("fleiss_kappa", ratings, target="items", clusters=clusters)
+        with pytest.warns(match="one.* cluster"):
+            found = make(
+                "fleiss_kappa", ratings, target="items", clusters=["p"] * len(ratings)
+            )
+        assert found.reason is not None
+        assert math.isnan(found.low)
+
+
+@pytest.mark.slow
+def test_with_clusters_the_interval_covers_and_without_it_does_not() -> None:
+    # 40 clusters of eight items whose agreement is the cluster's: of 500 studies 95 %
+    # hold the kappa of many clusters, with an error of 1 %
+    def study(rng: np.random.Generator, n: int) -> NDArray[np.int64]:
+        true = rng.integers(0, 2, (n, 8, 1))
+        easy = rng.random((n, 1, 1)) < 0.6
+        seen = np.where(easy, true, rng.integers(0, 2, (n, 8, 2)))
+        return seen.reshape(-1, 2)
+
+    rng = np.random.default_rng(23)
+    clusters = np.repeat(np.arange(40), 8)
+    value = COEFFICIENTS["fleiss_kappa"](study(rng, 200_000)).value
+    held = np.zeros(2)
+    for _ in range(500):
+        ratings = study(rng, 40)
+        for k, labels in enumerate((clusters, None)):
+            interval = estimate(
+                "fleiss_kappa", ratings, target="items", clusters=labels
+            ).interval
+            assert interval is not None
+            held[k] += interval.low <= value <= interval.high
+    assert 0.92 <= held[0] / 500 <= 0.98
+    assert held[1] / 500 < 0.9
