@@ -17,7 +17,7 @@ from masrel.report._further_tables import (
     finite,
 )
 from masrel.report._group_rows import Groups, groups_of
-from masrel.report._tables import Column, Table, Value, p_text
+from masrel.report._tables import Column, Table, Value, p_text, significant
 
 _FLEISS = "Fleiss' weighted χ²"
 _DONNER = "Donner's goodness of fit"
@@ -133,7 +133,7 @@ def _cells(test: _Test) -> tuple[Value, ...]:
         test.name,
         result.statistic,
         result.distribution,
-        ", ".join(f"{df:g}" for df in result.df) or None,
+        ", ".join(map(significant, result.df)) or None,
         p_text(result.p_value),
         result.p_value,
     )

@@ -91,6 +91,7 @@ DO_NOT_PROMISE = {
     "equality_test": "the same",
     "donner_test": "the same",
     "differences": "of many pairs at once; test_several.py holds them to their values",
+    "diagnose": "the same; its intervals are those of `estimate` and `difference`",
 }
 KERNELS = [name for name, entry in COEFFICIENTS.items() if entry.kernel is not None]
 OF_RATERS = ("raters", "both")
