@@ -4,7 +4,7 @@ In: item × rater labels (or counts, or a contingency table). Out: an `Estimate`
 `Significance` from a test.
 """
 
-from masrel.agreement._count_tables import count_table
+from masrel.agreement._count_tables import count_items, count_table
 from masrel.agreement._counts import CountedRatings, count_ratings
 from masrel.agreement._data import CodedRatings, code_long, code_ratings
 from masrel.agreement._labels import Label
@@ -91,6 +91,7 @@ __all__ = [
     "cohen_kappa_from_table",
     "conger_kappa",
     "contingency_table",
+    "count_items",
     "count_ratings",
     "count_table",
     "declared_weights",

@@ -1,13 +1,17 @@
 """Tables of counts and contingency tables, checked, as counted ratings."""
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from masrel.agreement._counts import CountedRatings, DistinctItems, Integers
-from masrel.agreement._labels import Label, check_categories
+from masrel.agreement._data import MISSING, CodedRatings
+from masrel.agreement._labels import Label, check_categories, code_type
 from masrel.errors import CountsError, ParameterError
+
+_MAX_PLACES = 100_000_000  # that are made of counts, where ratings are gone through
 
 
 def count_table(
@@ -25,8 +29,9 @@ def count_table(
     Returns
     -------
     CountedRatings
-        What coefficients of unnamed raters take in place of ratings. For Cohen's
-        kappa and Scott's pi see `cohen_kappa_from_table` and `scott_pi_from_table`.
+        What every coefficient of two raters and more, and every interval, takes in
+        place of ratings. Those that tell raters apart spread the items out, up to
+        10^8; `cohen_kappa_from_table` and `scott_pi_from_table` take any number.
 
     Raises
     ------
@@ -37,12 +42,17 @@ def count_table(
 
     Examples
     --------
-    >>> from masrel.agreement import gwet_ac
-    >>> gwet_ac(count_table([[20, 5], [10, 15]])).value
+    >>> from masrel.agreement import cohen_kappa, gwet_ac
+    >>> counted = count_table([[20, 5], [10, 15]])
+    >>> cohen_kappa(counted).value
+    0.4
+    >>> gwet_ac(counted).value
     0.40594059405940597
     """
-    cells: list[list[int]] = check_table(table).tolist()
+    checked = check_table(table)
+    cells: list[list[int]] = checked.tolist()
     q = len(cells)
+    labels = tuple(column_categories(categories, q))
     freq: dict[tuple[int, ...], int] = {}
     for first, row in enumerate(cells):
         for second, n in enumerate(row):
@@ -50,18 +60,56 @@ def count_table(
                 item = tuple((k == first) + (k == second) for k in range(q))
                 freq[item] = freq.get(item, 0) + n
     return CountedRatings(
-        categories=tuple(column_categories(categories, q)),
+        categories=labels,
         items=DistinctItems(list(freq), list(freq.values()), q),
         n_raters=2 if freq else 0,
-        source=None,
+        source=partial(_spread_table, checked, labels),
     )
 
 
-def take_counts(
-    counts: ArrayLike, categories: Sequence[Label] | None
+def _spread_table(table: Integers, categories: tuple[Label, ...]) -> CodedRatings:
+    # table (n_categories, n_categories) -> codes (n_items, 2)
+    _check_places("table", sum(map(sum, table.tolist())))
+    cells = np.indices(table.shape).reshape(2, -1).T
+    codes = cells.astype(code_type(len(categories))).repeat(table.ravel(), axis=0)
+    codes.setflags(write=False)
+    return CodedRatings(codes=codes, categories=categories)
+
+
+def count_items(
+    counts: ArrayLike, *, categories: Sequence[Label] | None = None
 ) -> CountedRatings:
-    """Take a table of counts as counted ratings, equal rows together."""
-    # Takes counts (n_items, n_categories)
+    """Take how many raters chose each category, item by item, as counted ratings.
+
+    Parameters
+    ----------
+    counts : array_like of int, shape (n_items, n_categories)
+        Raters per item and category; rows may have different sums.
+    categories : sequence of str, int or float, optional
+        The declared scale in order; 1 to n_categories unless given.
+
+    Returns
+    -------
+    CountedRatings
+        What coefficients that do not tell raters apart take in place of ratings:
+        percent agreement, Fleiss' kappa, Brennan-Prediger's, Gwet's AC and
+        Krippendorff's alpha; so do their intervals for other items. `n_raters` is the
+        largest row sum.
+
+    Raises
+    ------
+    CountsError
+        If it is not a table of counts.
+    ParameterError
+        If there are not as many categories as columns.
+
+    Examples
+    --------
+    >>> from masrel.agreement import fleiss_kappa
+    >>> counted = count_items([[3, 0], [2, 1], [0, 3], [0, 2]])
+    >>> round(fleiss_kappa(counted).value, 3)
+    0.662
+    """
     table = check_counts(counts)
     n_columns = table.shape[1]
     small = int(table.max()) * n_columns < 2**62  # else Python's integers
@@ -71,6 +119,34 @@ def take_counts(
         n_raters=int((table if small else table.astype(object)).sum(axis=1).max()),
         source=None,
     )
+
+
+def places_of(counted: CountedRatings) -> CodedRatings:
+    """Return counts as codes whose columns are places, and no raters."""
+    # -> codes (n_items, most ratings of an item), equal items together
+    freq = [int(n) for n in counted.items.freq]
+    _check_places("counts", sum(freq) * max(counted.n_raters, 1))
+    rows = np.array(counted.items.rows, dtype=np.int64)  # (n_distinct, n_categories)
+    rows = rows.reshape(len(freq), counted.items.n_categories)
+    sizes = rows.sum(axis=1)
+    codes = np.full((len(rows), max(counted.n_raters, 2)), MISSING, dtype=np.int64)
+    places = np.arange(codes.shape[1]) < sizes[:, None]
+    codes[places] = np.tile(np.arange(rows.shape[1]), len(rows)).repeat(rows.ravel())
+    codes = codes.astype(code_type(rows.shape[1])).repeat(freq, axis=0)
+    if not freq:  # nobody rated anything
+        codes = np.full((1, 2), MISSING)
+    return CodedRatings(
+        codes=codes, categories=counted.categories, declared=counted.declared
+    )
+
+
+def _check_places(name: str, n_places: int) -> None:
+    # ratings that are taken one by one
+    if n_places > _MAX_PLACES:
+        raise CountsError(
+            f"{name}: needs at most {_MAX_PLACES:.0e} ratings to be spread out, got "
+            f"{n_places}"
+        )
 
 
 def check_counts(counts: ArrayLike) -> Integers:

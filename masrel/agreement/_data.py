@@ -399,11 +399,10 @@ def complete_values(
     """Return the values of items that every rater rated who rated any."""
     # ratings (n_items, n_raters) -> (n_complete_items, n_raters)
     values = rating_values(ratings, categories)
-    missing = np.isnan(values)
-    bare = missing.all(axis=0)
-    if bare.any() and (~bare).sum() >= 2:
-        values, missing = values[:, ~bare], missing[:, ~bare]
-    return values[~missing.any(axis=1)]
+    rates = ~np.isnan(values).all(axis=0)
+    if 2 <= rates.sum() < rates.size:
+        values = values[:, rates]
+    return values[~np.isnan(values).any(axis=1)]
 
 
 def rating_values(

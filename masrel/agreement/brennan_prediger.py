@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from numpy.typing import ArrayLike
 
-from masrel.agreement._count_tables import take_counts
+from masrel.agreement._count_tables import count_items
 from masrel.agreement._kernel import Variance
 from masrel.agreement._labels import Label
 from masrel.agreement._pooled import BRENNAN_PREDIGER, estimate_pooled
@@ -114,7 +114,7 @@ def brennan_prediger_from_counts(
     >>> round(brennan_prediger_from_counts([[2, 0], [2, 0], [1, 1]]).value, 3)
     0.333
     """
-    counted = take_counts(counts, categories)
+    counted = count_items(counts, categories=categories)
     return estimate_pooled(
         BRENNAN_PREDIGER, counted, None, weights, variance, population
     )

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from masrel.agreement._count_tables import take_counts
+from masrel.agreement._count_tables import count_items
 from masrel.agreement._counts import (
     CountedRatings,
     DistinctItems,
@@ -155,7 +155,7 @@ def krippendorff_alpha_from_counts(
     >>> round(krippendorff_alpha_from_counts([[2, 0], [0, 2], [1, 1]]).value, 3)
     0.444
     """
-    counted = take_counts(counts, categories)
+    counted = count_items(counts, categories=categories)
     v = _disagreement(counted, weights, metric)
     return _estimate(counted, v, population)
 

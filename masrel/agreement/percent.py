@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from numpy.typing import ArrayLike
 
-from masrel.agreement._count_tables import take_counts
+from masrel.agreement._count_tables import count_items
 from masrel.agreement._kernel import Variance
 from masrel.agreement._labels import Label
 from masrel.agreement._pooled import PERCENT, estimate_pooled
@@ -109,5 +109,5 @@ def percent_agreement_from_counts(
     >>> percent_agreement_from_counts([[2, 0], [1, 1]]).value
     0.5
     """
-    counted = take_counts(counts, categories)
+    counted = count_items(counts, categories=categories)
     return estimate_pooled(PERCENT, counted, None, weights, variance, population)

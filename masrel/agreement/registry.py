@@ -110,6 +110,9 @@ class Coefficient:
         Ratings and categories to the codes its kernel takes.
     metric : {"nominal", "ordinal", "interval", "ratio", "jaccard", "masi"} or None
         Krippendorff's difference function by which it is computed; None for weights.
+    tells_raters_apart : bool
+        Whether who rated what matters to its value; False where counts of raters per
+        item and category are enough.
     needs_order : bool
         Whether grades without an order have no such coefficient, whatever the weights.
     """
@@ -127,6 +130,7 @@ class Coefficient:
     chance_corrected: bool = True
     weighted: bool = True
     interval_target: Target | None = None
+    tells_raters_apart: bool = True
     code: Callable[..., CodedRatings] = code_ratings
     metric: Metric | None = None
 
@@ -205,6 +209,7 @@ _ALL = (
         title="Percent agreement",
         function=percent_agreement,
         kernel=pooled_kernel(PERCENT),
+        tells_raters_apart=False,
         lowest=0.0,
         chance_corrected=False,
     ),
@@ -226,6 +231,7 @@ _ALL = (
         title="Fleiss' κ",
         function=fleiss_kappa,
         kernel=pooled_kernel(FLEISS),
+        tells_raters_apart=False,
     ),
     Coefficient(
         name="light_kappa",
@@ -245,6 +251,7 @@ _ALL = (
         title="Brennan-Prediger",
         function=brennan_prediger,
         kernel=pooled_kernel(BRENNAN_PREDIGER),
+        tells_raters_apart=False,
         # Bennett, Alpert and Goldstein (1954); Maxwell (1977), of two categories, which
         # Byrt, Bishop and Carlin (1993) call PABAK; Randolph (2005), of many raters
         aliases=("bennett_s", "randolph_kappa", "maxwell_re", "pabak"),
@@ -255,6 +262,7 @@ _ALL = (
         title="Gwet's AC",
         function=gwet_ac,
         kernel=pooled_kernel(GWET),
+        tells_raters_apart=False,
         properties=_EVERY - {"unused category"},
     ),
     Coefficient(
@@ -262,6 +270,7 @@ _ALL = (
         title="Krippendorff's α",
         function=krippendorff_alpha,
         kernel=KRIPPENDORFF_KERNEL,
+        tells_raters_apart=False,
         properties=_EVERY - {"items twice"},
     ),
     Coefficient(

@@ -125,6 +125,7 @@ def _other_items_and_raters(
     # So the variance is below neither; nor is an end inside either interval. With the
     # fewer degrees of freedom of the two, in both, the answer is no surer than either.
     df = min(problem.n_paired_items, problem.n_paired_raters) - 1
+    common = problem.student_t(df) ** 2 * _variance_of_cells(problem)
     items, raters = (
         choose_interval(replace(problem, target=of, max_df=df), modelled=modelled)[0]
         for of in ("items", "raters")
@@ -135,7 +136,6 @@ def _other_items_and_raters(
             return part, why
     if (items.low, items.high) == (raters.low, raters.high):
         return items, why  # nothing moves, and the same model must say what that hides
-    common = problem.student_t(df) ** 2 * _variance_of_cells(problem)
     ends = np.array([[items.low, items.high], [raters.low, raters.high]])
     of_items, of_raters = np.maximum((ends - problem.value) * (-1.0, 1.0), 0.0) ** 2
     both = np.minimum(of_items, of_raters)

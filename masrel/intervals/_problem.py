@@ -12,12 +12,16 @@ from numpy.typing import NDArray
 from masrel.agreement import (
     CodedRatings,
     Coefficient,
+    CountedRatings,
     Label,
     Metric,
     WeightsLike,
+    code_ratings,
     coefficient,
 )
+from masrel.agreement._count_tables import places_of
 from masrel.agreement._counts import distinct_rows, item_counts
+from masrel.agreement._data import check_scale
 from masrel.agreement._kernel import Floats, Kernel, RaterSums
 from masrel.errors import (
     ParameterError,
@@ -218,7 +222,10 @@ def pose_problem(
         )
     if not 0.0 < level < 1.0:
         raise ParameterError(f"level: needs (0, 1), got {level}")
-    coded = entry.code(ratings, categories)
+    if isinstance(ratings, CountedRatings) and not entry.tells_raters_apart:
+        coded = _of_counted(ratings, target, categories)
+    else:
+        coded = entry.code(ratings, categories)
     fewest, most = entry.n_raters
     n_raters = coded.codes.shape[1]
     if most is not None and n_raters > most:
@@ -298,6 +305,22 @@ def rows_problem(
         value=value,
         min_value=problem.entry.lowest if value >= problem.entry.lowest else -math.inf,
     )
+
+
+def _of_counted(
+    ratings: CountedRatings, target: Target, categories: Sequence[Label] | None
+) -> CodedRatings:
+    # counted ratings, or counts that do not say who rated what
+    if ratings.coded is not None:
+        return code_ratings(ratings, categories)
+    if target != "items":
+        raise ParameterError(
+            "target: counts do not say who rated what, so that an interval generalises "
+            f'to other "items"; got "{target}"'
+        )
+    if categories is not None:
+        check_scale(ratings.categories, categories)
+    return places_of(ratings)
 
 
 def find_entry(statistic: Statistic, metric: Metric | None = None) -> Coefficient:

@@ -246,8 +246,8 @@ def _rows_without_rater(problem: IntervalProblem) -> Iterator[tuple[Floats, Floa
     fewest = 2 if width == 2 else 3
     if n_raters < fewest:
         raise ParameterError(
-            f"target: needs at least {fewest} raters, because one is left out; got "
-            f"{n_raters}"
+            f'target: "{problem.target}" needs at least {fewest} raters, because one '
+            f"is left out; got {n_raters}"
         )
     for rater in range(n_raters):
         rest = np.delete(codes, np.s_[rater * width : (rater + 1) * width], axis=1)

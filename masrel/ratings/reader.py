@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement import CodedRatings, CountedRatings
-from masrel.agreement._count_tables import count_table, take_counts
+from masrel.agreement._count_tables import count_items, count_table
 from masrel.errors import ParameterError, RatingsError
 from masrel.ratings._doubts import (
     doubt_columns,
@@ -568,19 +567,7 @@ def _table_rows(sheet: Sheet, layout: Layout, names: list[str]) -> list[str]:
 
 
 def _table_part(table: NDArray[np.int64], scale: Scale) -> RatingsPart:
-    q = len(scale.grades)
-    counted = count_table(table, categories=scale.values)
-
-    def pairs() -> CodedRatings:
-        codes = np.repeat(np.indices((q, q)).reshape(2, -1).T, table.ravel(), axis=0)
-        return CodedRatings(codes=codes, categories=scale.values)
-
-    ratings = CountedRatings(
-        categories=counted.categories,
-        items=counted.items,
-        n_raters=counted.n_raters,
-        source=pairs,
-    )
+    ratings = count_table(table, categories=scale.values)
     return RatingsPart(
         group=None, session=None, items=(), raters=("rows", "columns"), ratings=ratings
     )
@@ -589,7 +576,7 @@ def _table_part(table: NDArray[np.int64], scale: Scale) -> RatingsPart:
 def _counts_part(
     table: NDArray[np.int64], scale: Scale, name: tuple[str | None, str | None]
 ) -> RatingsPart:
-    ratings = take_counts(table, scale.values)
+    ratings = count_items(table, categories=scale.values)
     return RatingsPart(
         group=name[0], session=name[1], items=(), raters=(), ratings=ratings
     )

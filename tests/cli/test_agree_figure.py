@@ -102,11 +102,13 @@ def test_the_figure_says_what_the_table_says(masrel: Caller, tmp_path: Path) -> 
     wanted = ("--coefficients", "all", "--target", "both")
     masrel("agree", TABLE_V, *wanted, "--figure", file)
     svg = file.read_text("utf-8")
-    assert "0.626 [0.370, 0.874]" in svg
+    assert "0.626 [0.214, 1.000]" in svg
     assert "intervals for other items and raters" in svg
     assert svg.count(">other items<") == 2  # of ICC(C,1) and ICC(C,k) alone
-    assert "95 % credible interval" in svg
     assert "95 % confidence interval" in svg
+    masrel("agree", TABLE_V, *wanted[:3], "items", "--figure", file)
+    svg = file.read_text("utf-8")
+    assert "95 % credible interval" in svg
     assert "posterior density" in svg
     assert "resamples" not in svg
     assert "SIMULATED" not in svg

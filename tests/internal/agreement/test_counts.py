@@ -25,7 +25,7 @@ from masrel.agreement._count_tables import (
     check_counts,
     check_table,
     column_categories,
-    take_counts,
+    count_items,
 )
 from masrel.agreement._counts import DistinctItems, bilinear, distinct_rows, item_counts
 from masrel.errors import CountsError, ParameterError
@@ -94,7 +94,7 @@ def test_counts_of_items_are_those_of_a_plain_count(rows: list[list[int]]) -> No
     assert [tuple(row) for row in counts.tolist()] == [
         tuple(row.count(k) for k in range(3)) for row in rows
     ]
-    assert frequencies(take_counts(counts, None).items) == plain_count(codes, 3)
+    assert frequencies(count_items(counts).items) == plain_count(codes, 3)
 
 
 @pytest.mark.parametrize("largest", [1, 9, 40, 10_000])
@@ -105,7 +105,7 @@ def test_equal_rows_of_a_table_of_counts_are_put_together(largest: int) -> None:
     counts[0, 0] = largest
     expected = Counter(map(tuple, counts.tolist()))
     del expected[(0,) * 5]
-    assert frequencies(take_counts(counts, None).items) == expected
+    assert frequencies(count_items(counts).items) == expected
 
 
 @pytest.mark.parametrize("shape", [*SHAPES[:7], (300, 40, 4), (300, 70, 126)])
