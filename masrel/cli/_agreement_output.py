@@ -5,6 +5,7 @@ import shutil
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -102,7 +103,8 @@ def write_agreement(
     if is_sentence:
         echo_notes((*read_lines, *table.notes))
     offer = _interval_offer(rows, options)
-    if offer is not None and ratings.read["file"] != "-":  # what was piped in is gone
+    # what came through a pipe is gone
+    if offer is not None and Path(ratings.read["file"]).is_file():
         click.echo(offer, err=True)
 
 

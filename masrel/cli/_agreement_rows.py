@@ -1,6 +1,5 @@
 """What `masrel agree` estimates: which coefficients, with which interval and bound."""
 
-import math
 import warnings
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
@@ -28,9 +27,6 @@ _USUAL = ["percent_agreement", "fleiss_kappa"]
 
 _OF_METRIC = "krippendorff_alpha"
 """The coefficient that has metrics."""
-
-_SURE = 0.95
-"""Probability with which the true value reaches the word that is named."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -235,8 +231,15 @@ def _row(
         refusal, has_target = error, False
         estimate = _estimate(entry, ratings, options, options.level, has_target)
     bound = None
-    if options.words and entry.chance_corrected and estimate.interval is not None:
-        bound = _lower_bound(entry, ratings, options, estimate, has_target)
+    if options.words and entry.chance_corrected:
+        from masrel.report._estimate_words import surely_reached
+
+        bound = surely_reached(
+            estimate.interval,
+            lambda level: (
+                _estimate(entry, ratings, options, level, has_target).interval
+            ),
+        )
     row = AgreementRow(
         group=group,
         title=title,
@@ -278,26 +281,6 @@ def _estimate(
         rng=options.seed,
         clusters=options.clusters or None,
     )
-
-
-def _lower_bound(
-    entry: "Coefficient",
-    ratings: "CodedRatings | CountedRatings",
-    options: EstimateOptions,
-    estimate: Estimate,
-    has_target: bool,
-) -> float:
-    """Return what the true value reaches with 95 %, by the interval of its estimate."""
-    from masrel.report._estimate_words import is_bound
-
-    interval = estimate.interval
-    if interval is None or interval.reason is not None:
-        return math.nan
-    # the lower end of an interval leaves out half of what is outside, a bound all
-    level = _SURE if is_bound(interval) else round(2.0 * _SURE - 1.0, 12)
-    if level != options.level:
-        interval = _estimate(entry, ratings, options, level, has_target).interval
-    return math.nan if interval is None else interval.low
 
 
 def check_order(options: EstimateOptions, scale: "Scale", is_ordered: bool) -> None:

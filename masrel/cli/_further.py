@@ -213,6 +213,7 @@ def _question(options: EstimateOptions, explain: bool) -> "Question":
         n_resamples=options.n_resamples,
         seed=options.seed,
         explain=explain,
+        bands=options.words,
     )
 
 

@@ -58,6 +58,15 @@ def without_second_header(sheet: Sheet) -> tuple[Sheet, list[str]]:
     return sheet, []
 
 
+def doubt_errors(sheet: Sheet) -> list[str]:
+    """Warn of a workbook's errors of formulas, which come as empty cells."""
+    errors = sheet.facts.get("errors", {})
+    if not errors:
+        return []
+    listed = ", ".join(f"{text} ×{n}" for text, n in errors.items())
+    return [f"errors of formulas in the workbook are read as empty cells: {listed}"]
+
+
 def doubt_columns(
     sheet: Sheet,
     layout: Layout,

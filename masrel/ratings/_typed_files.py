@@ -3,8 +3,10 @@
 import csv
 import io
 import json
+import re
 import tempfile
 import zipfile
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -26,6 +28,10 @@ _PYREADSTAT = {
     ".sas7bdat": "read_sas7bdat",
     ".xpt": "read_xport",
 }
+# a cell of type error: its formula, if any, and its value
+_ERROR_CELL = re.compile(
+    rb'<c\s[^>]*?\bt="e"[^>]*>(?:<f[^>]*?(?:/>|>[^<]*</f>))?<v>([^<]*)</v>'
+)
 _EXPORTED = (".json", ".jsonl", ".csv")
 _ENCODED = (".sav", ".zsav", ".dta", ".sas7bdat", ".xpt")  # pyreadstat takes theirs
 
@@ -50,6 +56,8 @@ def read_typed(
         return _records(name, export.frame), export.facts, export.dropped
     if suffix in _WORKBOOKS:
         records, facts["sheet"] = _workbook(name, suffix, data, options)
+        if errors := _error_cells(suffix, data):
+            facts["errors"] = errors
         return records, facts, {}
     if suffix in (".json", ".jsonl"):
         frame = _objects(name, _json_values(name, suffix, data))
@@ -99,6 +107,19 @@ def _workbook(
     # a column without name and cells is a space between others
     records = records.loc[:, (records != "").any(axis=0)]
     return records.set_axis(range(records.shape[1]), axis=1), sheet
+
+
+def _error_cells(suffix: str, data: bytes) -> dict[str, int]:
+    # errors of formulas in any sheet, such as #N/A, which calamine gives as empty
+    if suffix not in (".xlsx", ".xlsm"):
+        return {}
+    errors: Counter[str] = Counter()
+    with zipfile.ZipFile(io.BytesIO(data)) as packed:
+        for member in packed.namelist():
+            if member.startswith("xl/worksheets/") and member.endswith(".xml"):
+                texts = _ERROR_CELL.findall(packed.read(member))
+                errors.update(text.decode("utf-8", "replace") for text in texts)
+    return dict(errors)
 
 
 def _sheet_of(

@@ -19,6 +19,7 @@ from masrel.errors import ParameterError, RatingsError
 from masrel.ratings._doubts import (
     doubt_columns,
     doubt_counts,
+    doubt_errors,
     doubt_long,
     doubt_names,
     without_second_header,
@@ -203,6 +204,7 @@ def read_ratings(
     cells, warnings = without_second_header(read_sheet(path, form))
     if not len(cells.cells):
         raise cells.error("needed rows of ratings below the names, got none")
+    warnings += doubt_errors(cells)
     layout = find_layout(cells, columns)
     if layout.kind in ("counts", "table"):
         return _counted(cells, layout, options, warnings)
@@ -476,6 +478,11 @@ def _counted(
     sheet: Sheet, layout: Layout, options: GradeOptions, warnings: list[str]
 ) -> RatingsFile:
     # of a table of counts, or a contingency table
+    if options.missing_codes:
+        raise ParameterError(
+            f"--missing: names grades that are missing, and cells of --{layout.kind} "
+            f"are numbers of ratings; got {', '.join(options.missing_codes)}"
+        )
     names = [sheet.header[place] for place in layout.raters]
     table = _whole_numbers(sheet, layout)
     warnings = [*warnings, *doubt_counts(sheet, layout, table)]

@@ -136,8 +136,9 @@ def _has_error(estimate: Estimate) -> bool:
 def _word(row: AgreementRow, bands: BandScale) -> str | None:
     """Return the best word that the true value reaches with 95 % probability."""
     estimate = row.estimate
-    entry = COEFFICIENTS[estimate.coefficient]
-    if not entry.chance_corrected or math.isnan(estimate.value):
+    entry = COEFFICIENTS.get(estimate.coefficient)  # none of kappa of a category
+    is_raw = entry is not None and not entry.chance_corrected
+    if is_raw or math.isnan(estimate.value):
         return None
     if row.lower_bound is not None:
         return strength(row.lower_bound, scale=bands)

@@ -1,6 +1,7 @@
 """Estimates and intervals in words: what they are, of whom, and what they promise."""
 
 import math
+from collections.abc import Callable
 from typing import Literal
 
 from masrel.agreement import COEFFICIENTS
@@ -10,6 +11,8 @@ from masrel.report._tables import UNDEFINED, counted, interval_text, number, per
 
 Noun = Literal["model", "item"]
 """What is rated: a haptic model in a study, any item elsewhere."""
+
+_SURE = 0.95  # probability with which the true value reaches the word for it
 
 TARGETS = {
     "raters": "other raters",
@@ -131,6 +134,21 @@ def origin(interval: Interval, noun: Noun) -> str:
 def is_bound(interval: Interval) -> bool:
     """Return whether only the lower end is a bound, at the whole level."""
     return interval.method.endswith(_ONE_SIDED)
+
+
+def surely_reached(
+    interval: Interval | None, at_level: Callable[[float], Interval | None]
+) -> float | None:
+    """Return what the true value reaches with 95 %; None without an interval."""
+    # at_level: the same interval at another level
+    if interval is None:
+        return None
+    if interval.reason is not None:
+        return math.nan
+    # the lower end of an interval leaves out half of what is outside, a bound all
+    level = _SURE if is_bound(interval) else round(2.0 * _SURE - 1.0, 12)
+    other = interval if level == interval.level else at_level(level)
+    return math.nan if other is None else other.low
 
 
 def aside(interval: Interval) -> str:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.agreement import (
+    BandScale,
     CodedRatings,
     WeightName,
     category_kappa,
@@ -28,6 +29,7 @@ from masrel.report._agreement_table import (
     estimate_documents,
     group_key,
 )
+from masrel.report._estimate_words import surely_reached
 from masrel.report._figure_data import RaterPairs
 from masrel.report._tables import Table
 
@@ -59,6 +61,7 @@ class Question:
     n_resamples: int = 10_000
     seed: int = 0
     explain: bool = False  # whether notes say what an interval promises
+    bands: BandScale | None = None  # whose words for values
 
 
 def data_of(file: RatingsFile) -> str:
@@ -118,16 +121,36 @@ def _estimate_row(
     # one coefficient, with the interval if there is such a one
     entry, weights = coefficient(name), question.weights
     notes: tuple[str, ...] = ()
+    bound = None
     estimate = entry(ratings, weights=weights)
     if question.target is not None:
         interval, notes = _interval(name, ratings, question, weights)
         estimate = _changed(estimate, interval=interval)
+        bound = _lower_bound(name, ratings, question, weights, interval)
     return AgreementRow(
         group=group,
         title=entry.title if weights == "identity" else f"{entry.title}, {weights}",
         estimate=_changed(estimate, n_raters=min(estimate.n_raters, n_raters)),
         notes=notes,
+        lower_bound=bound,
     )
+
+
+def _lower_bound(
+    name: str,
+    ratings: CodedRatings,
+    question: Question,
+    weights: WeightName,
+    interval: Interval | None,
+) -> float | None:
+    # what the true value reaches, where a word is to be named for it
+    if question.bands is None:
+        return None
+
+    def at_level(level: float) -> Interval | None:
+        return _interval(name, ratings, replace(question, level=level), weights)[0]
+
+    return surely_reached(interval, at_level)
 
 
 def _interval(
@@ -181,7 +204,7 @@ def retest_table(
         documents += [
             {**keys, "rater": rater, **document}
             for rater, document in zip(
-                raters, estimate_documents(of_group), strict=True
+                raters, estimate_documents(of_group, bands=question.bands), strict=True
             )
         ]
     table = agreement_table(
@@ -190,6 +213,7 @@ def retest_table(
         by=heading(filter(None, (by, "rater"))),
         notes=tuple(notes),
         explain=question.explain,
+        bands=question.bands,
         data=data_of(file),
     )
     return FurtherTable(
@@ -333,17 +357,17 @@ def category_table(file: RatingsFile, question: Question) -> FurtherTable:
             for place in range(len(file.scale.grades))
         ]
         rows += of_part
+        of_grades = estimate_documents(of_part, bands=question.bands)
         documents += [
             {**part_keys(file, part), "category": grade, **document}
-            for grade, document in zip(
-                file.scale.grades, estimate_documents(of_part), strict=True
-            )
+            for grade, document in zip(file.scale.grades, of_grades, strict=True)
         ]
     table = agreement_table(
         rows,
         caption="Agreement on each category against all others",
         by=heading([*part_names(file, file.parts[0]), "category"]),
         explain=question.explain,
+        bands=question.bands,
         data=data_of(file),
     )
     return FurtherTable(
@@ -359,6 +383,7 @@ def _category_row(
 ) -> AgreementRow:
     grade = file.scale.grades[place]
     notes: tuple[str, ...] = ()
+    bound = None
     estimate = category_kappa(part.counted, file.scale.values[place])
     if question.target is not None and estimate.reason is None:
         # that of Fleiss' kappa of the two categories that the scale is folded to
@@ -368,12 +393,14 @@ def _category_row(
             notes = ("no interval: counts do not say who rated what",)
         else:
             interval, notes = _interval("fleiss_kappa", folded, question, "identity")
+            bound = _lower_bound("fleiss_kappa", folded, question, "identity", interval)
         estimate = _changed(estimate, interval=interval)
     return AgreementRow(
         group=label([*part_names(file, part).values(), grade]),
         title="Fleiss' κ, category",
         estimate=_changed(estimate, weights=grade),
         notes=notes,
+        lower_bound=bound,
     )
 
 

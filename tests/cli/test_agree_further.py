@@ -14,7 +14,7 @@ import pytest
 from scipy import stats
 
 from masrel import intervals
-from masrel.agreement import holm
+from masrel.agreement import holm, strength
 from tests.agreement.test_category import DIAGNOSES, PATIENTS, RATINGS
 from tests.cli.process import Caller
 
@@ -702,3 +702,25 @@ def test_without_the_options_nothing_of_them_is_loaded(clinics: Path) -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     )
     assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_words_reach_the_tables_of_estimates(masrel: Caller, tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    rows = [
+        (session, item, *((item % 3 + (rng.random(2) < 0.3)) % 3).tolist())
+        for session in ("test", "retest")
+        for item in range(30)
+    ]
+    path = write(tmp_path / "r.csv", "session,item,A,B", rows)
+    call = ("agree", path, "--session", "session", "--retest", "--each-category")
+    call = (*call, "--words", "altman", "--json", "-")
+    plain = json.loads(masrel(*call).out)
+    for key in ("retest", "categories"):
+        for one in plain[key]:  # of a normal law without an interval
+            reached = one["value"] - stats.norm.ppf(0.95) * one["standard_error"]
+            assert one["word"] == strength(reached, scale="altman")
+    shown = json.loads(masrel(*call, "--target", "items", "--level", "0.9").out)
+    for key in ("retest", "categories"):
+        for one in shown[key]:
+            low = one["interval"]["low"]
+            assert one["word"] == strength(low, scale="altman")

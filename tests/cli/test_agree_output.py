@@ -481,6 +481,18 @@ def test_the_offer_works_where_coefficients_were_named(
     assert masrel(*command).code == 0
 
 
+def test_nothing_is_offered_for_what_came_through_a_pipe(
+    masrel: Caller, wide: Path
+) -> None:
+    assert "no interval" in masrel("agree", wide).err
+    reading, writing = os.pipe()
+    os.write(writing, wide.read_bytes())
+    os.close(writing)
+    done = masrel("agree", f"/dev/fd/{reading}")
+    os.close(reading)
+    assert (done.code, done.err) == (0, "")
+
+
 def test_nothing_is_offered_where_all_is_there(masrel: Caller, wide: Path) -> None:
     for names in ("icc_1,icc_ak", "kendall_w"):
         assert "--target" not in masrel("agree", wide, "--coefficients", names).err

@@ -435,6 +435,7 @@ def test_a_crowd_is_counted(tmp_path: Path) -> None:
         ({"counts": True, "table": True}, "--counts, --table"),
         ({"no_item": True, "item": "patient"}, "--no-item"),
         ({"counts": True, "session": "patient"}, "--session: counts do not say"),
+        ({"counts": True, "missing_codes": ["9"]}, "--missing: .* --counts .*got 9"),
         ({"categories": ["1", "2", "2", "3"]}, r"repeated: \['2'\]"),
         (
             {"categories": ["1", "2", "3"], "missing_codes": ["3"]},

@@ -143,6 +143,31 @@ class TestWorkbook:
             read_ratings(path, sheet="six")
         assert grades(read_ratings(path, sheet="two"))["A", "Lee"] == "3"
 
+    def test_errors_of_formulas_are_empty_and_warned_of(self, tmp_path: Path) -> None:
+        pytest.importorskip("python_calamine")
+        rows = [*WIDE, ["D", "#N/A", "=1/0"], ["E", "1", "#N/A"], ["F", "1", 't="e"']]
+        path = workbook(tmp_path / "r.xlsx", R=rows)
+        file = read_ratings(path, missing_codes=['t="e"'])
+        (warning,) = [w for w in file.warnings if "formulas" in w]
+        assert warning.endswith("are read as empty cells: #N/A ×2")
+        assert file.read["errors"] == {"#N/A": 2}
+        assert grades(file)["D", "Kim"] is None
+        none = read_ratings(workbook(tmp_path / "r.xlsx", R=WIDE))
+        assert "errors" not in none.read
+
+    def test_an_error_s_formula_is_no_part_of_it(self, tmp_path: Path) -> None:
+        pytest.importorskip("python_calamine")
+        path = workbook(tmp_path / "r.xlsx", R=[*WIDE, ["D", "#DIV/0!", 1]])
+        kept = {}
+        with zipfile.ZipFile(path) as packed:
+            kept = {name: packed.read(name) for name in packed.namelist()}
+        name = "xl/worksheets/sheet1.xml"
+        kept[name] = kept[name].replace(b"<v>#DIV/0!", b"<f>1/0&lt;2</f><v>#DIV/0!")
+        with zipfile.ZipFile(path, "w") as packed:
+            for name, data in kept.items():
+                packed.writestr(name, data)
+        assert read_ratings(path).read["errors"] == {"#DIV/0!": 1}
+
     def test_a_sheet_without_cells_is_refused(self, tmp_path: Path) -> None:
         pytest.importorskip("python_calamine")
         with pytest.raises(RatingsError, match="needed a header and rows, got none"):
