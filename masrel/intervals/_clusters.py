@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.agreement._kernel import Floats
+from masrel.agreement._labels import is_missing
 from masrel.errors import ParameterError
 from masrel.intervals._influences import sample_factor, unit_influences
 from masrel.intervals._problem import Integers, IntervalProblem, blocks
@@ -82,8 +83,7 @@ def cluster_codes(clusters: object, n_items: int) -> Integers:
     numbers: dict[Hashable, int] = {}
     codes = np.empty(n_items, dtype=np.int64)
     for item, label in enumerate(labels):
-        is_missing = label is None or label == "" or label != label
-        if is_missing or not isinstance(label, Hashable):
+        if is_missing(label) or not isinstance(label, Hashable) or label == "":
             raise ParameterError(
                 f"clusters: item {item} needs the label of its cluster, got {label!r}"
             )

@@ -2,14 +2,20 @@
 
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement import CodedRatings, Label, WeightsLike, specific_agreement
+from masrel.agreement import (
+    CodedRatings,
+    Label,
+    Metric,
+    WeightsLike,
+    specific_agreement,
+)
 from masrel.agreement._counts import distinct_rows, item_counts
 from masrel.agreement._kernel import Floats, Integers, divide
 from masrel.errors import MasrelWarning, ParameterError
@@ -18,6 +24,7 @@ from masrel.intervals._pair_counts import PairCounts
 from masrel.intervals._problem import (
     IntervalProblem,
     Statistic,
+    find_entry,
     pose_problem,
     rows_problem,
     warn_small,
@@ -136,6 +143,7 @@ def diagnose(
     reference: str | int | None = None,
     categories: Sequence[Label] | None = None,
     weights: "WeightsLike" = "identity",
+    metric: Metric | None = None,
     level: float = 0.95,
 ) -> Diagnosis:
     """Say which rater, which pair and which category agreement is lost on.
@@ -159,6 +167,9 @@ def diagnose(
         The declared scale in order.
     weights : str or array_like, optional
         How much two categories agree; see `declared_weights`.
+    metric : str, optional
+        Krippendorff's difference function in place of weights; see
+        `krippendorff_alpha`, which alone takes one.
     level : float, optional
         Nominal level, of each interval by itself.
 
@@ -215,18 +226,20 @@ def diagnose(
             "target: a rater, a pair and a category are those of these ratings, so "
             f'"items", or None for no intervals; got {target!r}'
         )
+    entry = find_entry(coefficient, metric)
+    if entry.shape != "ratings":
+        raise ParameterError(
+            f"coefficient: needs one of several raters, and {entry.title} is of each "
+            "rater's grades of two sessions"
+        )
     problem = pose_problem(
-        coefficient,
+        entry,
         ratings,
         target="items",
         categories=categories,
         weights=weights,
         level=level,
     )
-    if problem.entry.shape != "ratings":
-        raise ParameterError(
-            f"coefficient: {problem.entry.title} is of pairs of ratings of one rater"
-        )
     names = _names(ratings, raters, problem.coded.codes.shape[1])
     right = None if reference is None else _place(reference, names)
     others = [place for place in range(len(names)) if place != right]
@@ -234,14 +247,14 @@ def diagnose(
     if right is not None:
         rest = replace(problem.coded, codes=problem.coded.codes[:, others])
         problem = pose_problem(
-            problem.entry,
+            entry,
             rest,
             target="items",
             categories=None,
             weights=weights,
             level=level,
         )
-    estimate = problem.entry(problem.coded, weights=weights)
+    estimate = entry(problem.coded, weights=weights)
     with_intervals = target is not None
     at = level if with_intervals else None
     notes = warn_small(estimate.n_items, 10, "items") if with_intervals else ()
@@ -249,7 +262,6 @@ def diagnose(
     counts = PairCounts.of(codes, freq, everybody.coded.n_categories)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", MasrelWarning)  # the arrays say it
-        entry = problem.entry
         modelled = entry.is_nominal(weights) and entry.name in _RHO_COEFFICIENTS
         pairs = _pairs(everybody, counts, with_intervals, modelled)
         arrays = {
@@ -274,6 +286,10 @@ def diagnose(
 def _names(
     ratings: object, raters: Sequence[str] | None, n_raters: int
 ) -> tuple[str, ...]:
+    if raters is not None and (
+        isinstance(raters, str) or not isinstance(raters, Iterable)
+    ):
+        raise ParameterError(f"raters: needs a name for each, got {raters!r}")
     columns = raters if raters is not None else getattr(ratings, "columns", None)
     names = tuple(map(str, range(n_raters) if columns is None else columns))
     if len(names) != n_raters:
@@ -287,8 +303,13 @@ def _place(reference: str | int, names: Sequence[str]) -> int:
     """Return which rater is the reference."""
     if isinstance(reference, str) and reference in names:
         return names.index(reference)
-    if isinstance(reference, int) and 0 <= reference < len(names):
-        return reference
+    is_place = isinstance(reference, int | np.integer)
+    if (
+        is_place
+        and not isinstance(reference, bool)
+        and 0 <= int(reference) < len(names)
+    ):
+        return int(reference)
     raise ParameterError(
         f"reference: needs one of {', '.join(names)}, got {reference!r}"
     )

@@ -2,7 +2,7 @@
 
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -57,7 +57,7 @@ def equality_test(estimates: Sequence[Estimate]) -> Significance:
     >>> print(equality_test([cohen_kappa_from_table(table) for table in tables]))
     equality_test: 7.971, chi-squared(2), p = 0.0186
     """
-    checked = list(estimates)
+    checked = list(estimates) if isinstance(estimates, Iterable) else [estimates]
     if len(checked) < 2 or not all(isinstance(e, Estimate) for e in checked):
         raise ParameterError(
             "estimates: needs two or more of type Estimate, got "
@@ -137,6 +137,10 @@ def donner_test(
     donner_test: 7.047, chi-squared(2), p = 0.0295
     """
     name = "donner_test"
+    if isinstance(groups, str) or not isinstance(groups, Iterable):
+        raise ParameterError(
+            f"groups: needs the ratings of two groups or more, got {groups!r}"
+        )
     tables = [_concordance(ratings, k, categories) for k, ratings in enumerate(groups)]
     if len(tables) < 2:
         raise ParameterError(f"groups: needs two or more, got {len(tables)}")

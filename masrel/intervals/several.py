@@ -3,13 +3,13 @@
 import itertools
 import math
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 import numpy as np
 
-from masrel.agreement import Label, Significance, WeightsLike
+from masrel.agreement import Label, Metric, Significance, WeightsLike
 from masrel.agreement._kernel import Floats, Integers
 from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
 from masrel.estimates import Estimate
@@ -115,6 +115,7 @@ def differences(
     clusters: object = None,
     categories: Sequence[Label] | None = None,
     weights: "WeightsLike" = "identity",
+    metric: Metric | None = None,
     level: float = 0.95,
     simultaneous: _Simultaneous = "max_t",
 ) -> Differences:
@@ -134,6 +135,9 @@ def differences(
         The declared scale in order; should be given, so that all have the same.
     weights : str or array_like, optional
         How much two categories agree; see `declared_weights`.
+    metric : str, optional
+        Krippendorff's difference function in place of weights; see
+        `krippendorff_alpha`, which alone takes one.
     level : float, optional
         Probability with which all intervals hold at once.
     simultaneous : {"max_t", "bonferroni", "scheffe"}, optional
@@ -204,6 +208,7 @@ def differences(
             target="items",
             categories=categories,
             weights=weights,
+            metric=metric,
             level=level,
         )
         for ratings in tables
@@ -242,6 +247,8 @@ def _named_sets(
 ) -> tuple[tuple[str, ...], list[object]]:
     if isinstance(sets, Mapping):
         names, tables = tuple(map(str, sets)), list(sets.values())
+    elif isinstance(sets, str) or not isinstance(sets, Iterable):
+        raise ParameterError(f"sets: needs ratings of two sets or more, got {sets!r}")
     else:
         tables = list(sets)
         names = tuple(str(place) for place in range(len(tables)))

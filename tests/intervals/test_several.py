@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 from numpy.typing import NDArray
 from scipy import stats
@@ -17,6 +18,7 @@ from masrel.agreement import (
     cohen_kappa,
     cohen_kappa_from_table,
     count_table,
+    krippendorff_alpha,
     scott_pi,
 )
 from masrel.errors import (
@@ -143,6 +145,19 @@ def test_without_clusters_errors_are_those_of_the_coefficients(name: str) -> Non
     assert found.standard_errors == pytest.approx(expected, rel=1e-9)
 
 
+@pytest.mark.parametrize("metric", ["nominal", "interval", "ratio"])
+def test_alpha_by_a_metric_has_the_error_that_it_has_alone(metric: Any) -> None:
+    tables = [table + 1 for table in sets(3, 40, 2)]
+    changes = differences(
+        "krippendorff_alpha", tables, categories=[1, 2, 3], metric=metric
+    )
+    expected = [
+        krippendorff_alpha(table, categories=[1, 2, 3], metric=metric).standard_error
+        for table in tables
+    ]
+    assert changes.standard_errors == pytest.approx(expected, rel=1e-9)
+
+
 def test_every_item_twice_in_a_cluster_counts_once() -> None:
     tables = sets(5, 30, 3)
     alone = differences("cohen_kappa", tables, categories=[0, 1, 2])
@@ -257,6 +272,9 @@ def test_few_clusters_are_warned_of() -> None:
         ("abc", "one label an item, got str"),
         ([None, *range(29)], "item 0 needs the label of its cluster, got None"),
         ([*range(29), float("nan")], "item 29 needs the label of its cluster"),
+        ([*range(29), pd.NA], "item 29 needs the label of its cluster"),
+        ([*range(29), []], "item 29 needs the label of its cluster"),
+        (7, "one label an item, got int"),
     ],
 )
 def test_clusters_are_one_label_an_item(clusters: object, message: str) -> None:
@@ -270,6 +288,8 @@ def test_sets_are_of_the_same_items() -> None:
         differences("cohen_kappa", [first, second[1:]])
     with pytest.raises(ParameterError, match="two or more, got 1"):
         differences("cohen_kappa", [first])
+    with pytest.raises(ParameterError, match="sets: needs ratings of two sets"):
+        differences("cohen_kappa", 5)  # type: ignore[arg-type]
     with pytest.raises(ParameterError, match="simultaneous"):
         differences("cohen_kappa", [first, second], simultaneous="tukey")  # type: ignore[arg-type]
 
@@ -356,6 +376,10 @@ def test_estimates_that_cannot_be_compared_are_refused() -> None:
     pairs = [["a", "a"], ["b", "b"], ["a", "b"]] * 3
     with pytest.raises(ParameterError, match=r"cohen_kappa \(identity\), scott_pi"):
         equality_test([cohen_kappa(pairs), scott_pi(pairs)])
+    with pytest.raises(ParameterError, match="two or more of type Estimate, got int"):
+        equality_test(5)  # type: ignore[arg-type]
+    with pytest.raises(ParameterError, match="groups: needs the ratings of two"):
+        donner_test(5)  # type: ignore[arg-type]
     with pytest.raises(ParameterError, match="two or more"):
         equality_test([cohen_kappa(pairs)])
     with pytest.warns(UndefinedStatisticWarning, match="estimate 1: its standard"):

@@ -19,6 +19,7 @@ from scipy.special import expit, ndtr, ndtri
 from masrel.agreement._kernel import Floats
 from masrel.agreement._labels import Codes
 
+NOISE_UNIT = 0.2  # η of about which logarithms of the noises differ in studies
 _PLAIN = 5.0  # variance of items' means over its error, where ratings place items
 
 
@@ -43,6 +44,61 @@ class Traits:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Information:
+    """What ratings tell of numbers s z, z ~ N(0, 1): as if each was seen at m once."""
+
+    # I, m: (n_raters,): the information, one over the variance, and the place
+    amount: Floats = field(compare=False, repr=False)
+    place: Floats = field(compare=False, repr=False)
+
+    @classmethod
+    def none(cls, n_raters: int) -> "Information":
+        """Return that nothing is known."""
+        return cls(amount=np.zeros(n_raters), place=np.zeros(n_raters))
+
+    @classmethod
+    def at_peak(cls, peak: Floats, curvature: Floats, scale: float) -> "Information":
+        """Take z where the posterior has its peak, and the likelihood's curvature."""
+        amount = curvature.clip(0.0) / scale**2
+        known = scale * amount
+        # the peak is at m s I / (1 + s² I)
+        place = peak * (1.0 + scale * known) / np.where(known > 0.0, known, np.inf)
+        return cls(amount=amount, place=place)
+
+    def scaled(self, coordinate: Floats, scale: Floats) -> "Scaled":
+        """Return z at coordinates (n, n_raters), where scales are s, (n, 1)."""
+        # Given s, z is normal around m s I / (1 + s² I) with variance 1 / (1 + s² I).
+        # In units of that its coordinate is a unit normal whatever s is, where z itself
+        # makes a funnel of z and s.
+        known = scale * self.amount
+        precision = 1.0 + scale * known
+        root = np.sqrt(precision)
+        centre = known * self.place / precision
+        away = coordinate / root
+        slope = self.amount * self.place - (2.0 * centre + away) * known
+        return Scaled(
+            value=centre + away,
+            by_coordinate=1.0 / root,
+            by_scale=slope / precision,
+            log_jacobian=-0.5 * np.log(precision).sum(axis=1),
+            jacobian_by_scale=-(known / precision).sum(axis=1, keepdims=True),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scaled:
+    """Numbers z at n positions, with how they change."""
+
+    # value, by_coordinate, by_scale: (n, n_raters): z and its slopes
+    value: Floats = field(compare=False, repr=False)
+    by_coordinate: Floats = field(compare=False, repr=False)
+    by_scale: Floats = field(compare=False, repr=False)
+    # (n,) and (n, 1): Σ log ∂z/∂(coordinate), and the slope of that by s
+    log_jacobian: Floats = field(compare=False, repr=False)
+    jacobian_by_scale: Floats = field(compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class UnconstrainedPoint:
     """The unknowns at n positions in units of c, and the coordinates themselves."""
 
@@ -59,16 +115,18 @@ class UnconstrainedPoint:
     reach: Floats = field(compare=False, repr=False)
     stretch: Floats = field(compare=False, repr=False)
     # b, w: (n, n_raters): b_r / ω and w_r
-    b: Floats = field(compare=False, repr=False)
-    w: Floats = field(compare=False, repr=False)
+    b: "Scaled" = field(compare=False, repr=False)
+    w: "Scaled" = field(compare=False, repr=False)
     # logit_share, logit_fraction: (n, 1): logit ρ and logit f
     logit_share: Floats = field(compare=False, repr=False)
     logit_fraction: Floats = field(compare=False, repr=False)
-    # share, root, fraction, noise_sd: (n, 1): ρ, c, f and ±η
+    # share, root, fraction, noise_sd: (n, 1): ρ, c, f and η
     share: Floats = field(compare=False, repr=False)
     root: Floats = field(compare=False, repr=False)
     fraction: Floats = field(compare=False, repr=False)
     noise_sd: Floats = field(compare=False, repr=False)
+    # (n, 1): the coordinate of η
+    raw_noise_sd: Floats = field(compare=False, repr=False)
     anchor: Floats = field(compare=False, repr=False)  # (n, 1): α
     # (n, n_categories - 2): distances of neighbouring T_k
     gap: Floats = field(compare=False, repr=False)
@@ -95,7 +153,7 @@ class UnconstrainedPoint:
             thresholds=self.tau,
             item_share=self.share[:, 0],
             noise_fraction=fraction,
-            noise_spread=np.abs(self.noise_sd[:, 0]),
+            noise_spread=self.noise_sd[:, 0],
             bias_variance=rest * expit(-self.logit_fraction[:, 0]),
             noise_variance=rest * fraction,
         )
@@ -105,10 +163,10 @@ class UnconstrainedPoint:
 class Coordinates:
     """What a position holds."""
 
-    # In this order: one coordinate an item; b_r / ω and w_r (n_raters each); logit ρ,
-    # logit f, ±η; α; and the logarithms of the distances between neighbouring T_k,
-    # from the lowest pair up. With η goes -η: the w_r then have the other sign, and
-    # η = 0, where raters' noises are alike, is not at infinity.
+    # In this order: one coordinate an item; those of b_r / ω and w_r (n_raters each);
+    # logit ρ, logit f, and y where η = 0.2 log(1 + e^y), which falls to 0
+    # as e^y and grows as y; α; and the logarithms of the distances between neighbouring
+    # T_k, from the lowest pair up.
 
     # n_items, n_raters, n_categories: sizes
     n_items: int
@@ -121,9 +179,15 @@ class Coordinates:
     # (n_items,): -1 where all ratings are the first grade, 1 where they are the last,
     # if the item is placed; 0 elsewhere
     beyond: Floats = field(compare=False, repr=False)
+    # (n_items,): slope of u_i by y on the wrong side of that threshold: the error there
+    # of as many ratings; 1 where the item is not beyond one
+    inside: Floats = field(compare=False, repr=False)
     # (n_items, n_categories - 1): W: weights of the thresholds between an item's
     # grades, or next to its only one
     threshold_weights: Floats = field(compare=False, repr=False)
+    # what ratings tell of b_r / c = √(1 - f) b and of log(σ_r / σ) = η w
+    of_bias: Information = field(compare=False, repr=False)
+    of_noise: Information = field(compare=False, repr=False)
 
     @classmethod
     def of(cls, codes: Codes, n_categories: int) -> "Coordinates":
@@ -139,14 +203,18 @@ class Coordinates:
         total = weight.sum(axis=1)
         placed = (total > 0.0) & _tell_items_apart(codes)
         scale = np.where(placed, 1.0 / np.where(placed, total, 1.0), 0.0)
+        beyond = placed * (last.astype(np.float64) - first)
         return cls(
             n_items=codes.shape[0],
             n_raters=codes.shape[1],
             n_categories=n_categories,
             middle=int(np.abs(2 * at_most.sum(axis=0) - rated.sum()).argmin()),
             placed=placed,
-            beyond=placed * (last.astype(np.float64) - first),
+            beyond=beyond,
+            inside=np.where(beyond, 1.0 / np.sqrt(n_each.clip(1)), 1.0),
             threshold_weights=scale[:, None] * weight,
+            of_bias=Information.none(codes.shape[1]),
+            of_noise=Information.none(codes.shape[1]),
         )
 
     @property
@@ -164,7 +232,7 @@ class Coordinates:
         position = np.zeros(self.n_dimensions)
         at = self.share_start
         position[at] = 1.0
-        position[at + 2] = noise_spread
+        position[at + 2] = np.log(np.expm1(noise_spread / NOISE_UNIT))
         tau = ndtri(np.arange(1, self.n_categories) / self.n_categories)
         position[at + 3] = tau[self.middle]
         position[at + 4 :] = np.log(np.diff(tau) / np.sqrt(expit(-1.0)))
@@ -173,21 +241,29 @@ class Coordinates:
     def point(self, position: Floats) -> UnconstrainedPoint:
         """Return what positions (n, n_dimensions) hold."""
         at, n = self.share_start, self.n_items
-        raw_item, b, w = np.split(position[:, :at], [n, n + self.n_raters], axis=1)
-        rho, f, eta, anchor = np.split(position[:, at : at + 4], 4, axis=1)
+        raw_item, raw_b, raw_w = np.split(
+            position[:, :at], [n, n + self.n_raters], axis=1
+        )
+        rho, f, raw_eta, anchor = np.split(position[:, at : at + 4], 4, axis=1)
         share, fraction = expit(rho), expit(f)
         root = np.sqrt(expit(-rho))
+        spread = np.sqrt(expit(-f))
+        b = self.of_bias.scaled(raw_b, spread)
+        eta = NOISE_UNIT * np.logaddexp(0.0, raw_eta)
+        w = self.of_noise.scaled(raw_w, eta)
         gap = np.exp(position[:, at + 4 :])
         threshold = self._thresholds(gap)
         across = np.where(self.beyond, np.exp(0.5 * rho), 0.0)  # √ρ / c
         reach = across * np.logaddexp(0.0, raw_item)
-        moved = np.where(self.beyond, self.beyond * (reach + raw_item), raw_item)
+        moved = np.where(
+            self.beyond, self.beyond * (reach + self.inside * raw_item), raw_item
+        )
         by_ratings = moved + threshold @ self.threshold_weights.T
         by_prior = (np.sqrt(share) * raw_item - anchor) / root
         return UnconstrainedPoint(
             item=np.where(self.placed, by_ratings, by_prior),
-            bias=np.sqrt(expit(-f)) * b,
-            noise=np.sqrt(fraction) * np.exp(eta * w),
+            bias=spread * b.value,
+            noise=np.sqrt(fraction) * np.exp(eta * w.value),
             threshold=threshold,
             raw_item=raw_item,
             reach=reach,
@@ -200,6 +276,7 @@ class Coordinates:
             root=root,
             fraction=fraction,
             noise_sd=eta,
+            raw_noise_sd=raw_eta,
             anchor=anchor,
             gap=gap,
         )
@@ -214,7 +291,9 @@ class Coordinates:
         """Return log |∂(θ, τ) / ∂(their coordinates)|, (n,), without items' √ρ."""
         # z_i is a unit normal by its prior, whose density needs no Jacobian.
         n_scaled = int(self.placed.sum()) + self.n_categories - 2
-        stretched = np.log(point.gap).sum(axis=1) + np.log1p(point.stretch).sum(axis=1)
+        stretched = np.log(point.gap).sum(axis=1) + np.log(
+            self.inside + point.stretch
+        ).sum(axis=1)
         return np.asarray(n_scaled * np.log(point.root[:, 0]) + stretched)
 
     def by_item(
@@ -222,10 +301,10 @@ class Coordinates:
     ) -> tuple[Floats, Floats]:
         """Turn slopes by u_i of placed items into slopes by y_i, and through ρ'."""
         # slope (n, n_items), with those of log_jacobian -> (n, n_items), (n, 1)
-        share = point.stretch / (1.0 + point.stretch)
+        share = point.stretch / (self.inside + point.stretch)
         by_coordinate = np.where(
             self.beyond,
-            self.beyond * slope * (1.0 + point.stretch)
+            self.beyond * slope * (self.inside + point.stretch)
             + share * expit(-point.raw_item),
             slope,
         )

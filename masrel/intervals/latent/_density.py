@@ -9,12 +9,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import log_ndtr, ndtr
+from scipy.special import expit, log_ndtr, ndtr
 
 from masrel.agreement._kernel import Floats
 from masrel.agreement._labels import Codes
 from masrel.errors import ParameterError
 from masrel.intervals.latent._coordinates import (
+    NOISE_UNIT,
     Coordinates,
     Traits,
     UnconstrainedPoint,
@@ -276,11 +277,13 @@ class LatentDensity:
             -0.5 * point.severity**2 / point.share + 0.5 * np.logaddexp(0.0, -rho),
             -0.5 * point.raw_item**2,
         )
-        density = of_items.sum(axis=1) - 0.5 * (point.b**2 + point.w**2).sum(axis=1)
+        density = of_items.sum(axis=1) + point.b.log_jacobian + point.w.log_jacobian
+        density -= 0.5 * (point.b.value**2 + point.w.value**2).sum(axis=1)
         # Beta density and Jacobian of the logit: ρ^a (1 - ρ)^b
         shares = a * np.logaddexp(0.0, -rho) + b * np.logaddexp(0.0, rho)
         shares += c * np.logaddexp(0.0, -f) + d * np.logaddexp(0.0, f)
         of_sd = -0.5 * (point.noise_sd / prior.noise_spread) ** 2
+        of_sd -= np.logaddexp(0.0, -point.raw_noise_sd)
         # Dirichlet density of the shares Φ(τ_k) - Φ(τ_(k-1)), Jacobian Π φ(τ_k)
         tau = point.tau
         density += (of_sd - shares)[:, 0] - 0.5 * (tau**2).sum(axis=1)
@@ -314,14 +317,16 @@ class LatentDensity:
         threshold = by.threshold + root * tau + by_place @ coordinates.threshold_weights
         loose = np.where(placed, 0.0, by.item)  # moves against the thresholds with α
         anchor = item.sum(axis=1) + tau.sum(axis=1) - (loose / root).sum(axis=1)
-        bias_root = np.sqrt(1.0 - point.fraction)
+        b, w = point.b, point.w
+        by_b = np.sqrt(1.0 - point.fraction) * by.bias - b.value
+        by_w = point.noise_sd * by.log_noise - w.value
         return np.hstack(
             [
                 by_raw_item,
-                bias_root * by.bias - point.b,
-                point.noise_sd * by.log_noise - point.w,
+                by_b * b.by_coordinate,
+                by_w * w.by_coordinate,
                 self._by_share(point, item, tau, loose) + through,
-                self._by_fraction_and_noise_sd(point, by),
+                self._by_fraction_and_noise_sd(point, by, by_b, by_w),
                 anchor[:, None],
                 1.0 + self.coordinates.by_threshold(threshold, point),
             ]
@@ -357,17 +362,21 @@ class LatentDensity:
         )
 
     def _by_fraction_and_noise_sd(
-        self, point: UnconstrainedPoint, by: CellSlopes
+        self, point: UnconstrainedPoint, by: CellSlopes, by_b: Floats, by_w: Floats
     ) -> Floats:
-        # by logit f and ±η, (n, 2)
+        # by logit f and ±η, (n, 2); √(1 - f) and η scale b and w
         c, d = self.prior.noise_fraction
-        f, eta = point.fraction, point.noise_sd
-        bias = 0.5 * (by.bias * point.bias).sum(axis=1, keepdims=True)
+        f, eta, b, w = point.fraction, point.noise_sd, point.b, point.w
+        bias = by.bias * b.value + by_b * b.by_scale
+        spread = bias.sum(axis=1, keepdims=True) + b.jacobian_by_scale
         noise = 0.5 * by.log_noise.sum(axis=1, keepdims=True)
-        noises = (by.log_noise * point.w).sum(axis=1, keepdims=True)
+        noises = (by.log_noise * w.value + by_w * w.by_scale).sum(axis=1, keepdims=True)
         return np.hstack(
             [
-                (1.0 - f) * (noise + c) - f * (bias + d),
-                noises - eta / self.prior.noise_spread**2,
+                (1.0 - f) * (noise + c) - f * (0.5 * np.sqrt(1.0 - f) * spread + d),
+                (noises + w.jacobian_by_scale - eta / self.prior.noise_spread**2)
+                * NOISE_UNIT
+                * expit(point.raw_noise_sd)
+                + expit(-point.raw_noise_sd),
             ]
         )

@@ -7,7 +7,7 @@ adapting has no distribution to converge to.
 import itertools
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -21,7 +21,7 @@ from masrel.intervals._mcmc import (
     not_converged,
     steps_needed,
 )
-from masrel.intervals.latent._coordinates import Traits
+from masrel.intervals.latent._coordinates import Information, Traits
 from masrel.intervals.latent._density import LatentDensity
 from masrel.intervals.latent._implied import (
     Agreement,
@@ -30,8 +30,9 @@ from masrel.intervals.latent._implied import (
     agreement_on_new_items,
 )
 
-JOURNEY = 1.5
-"""How far a proposal goes in units of the metric: a quarter of an orbit is π/2."""
+JOURNEY = 2.0
+"""How far a proposal of the fitted step length goes, in units of the metric; with the
+lengths there are, a quarter of an orbit on average, π/2."""
 
 MIN_ESS = 4_000.0  # an end of a 95 % interval within .04 posterior deviations
 _WARM_UP = (40, 40, 60, 40)  # the metric is fitted after each but the last
@@ -39,13 +40,14 @@ _BLOCK = 5  # steps of warm-up between two fits of the step length
 _FIRST_STEP = 0.1
 _STEPS = (0.02, 1.0)  # the least and the largest
 _BEST_ACCEPTANCE = 0.8
-_SHORTEST = 0.05  # a step length as a share of the longest
+LONGEST = 1.15  # the longest step length of a proposal, over the fitted one
+SHORTEST = 0.27  # the shortest, as a share of the longest
 EXPECTED_STEPS = 2_000
 """Steps of a chain that studies take, warm-up among them: from 1000 to 5000."""
 
 _GRADIENTS = 12_000  # of 64 chains, and checks, that studies take
 _CHECKS = 5
-_N_CURVED = 16  # chains at whose places the curvature is averaged
+_N_CURVED = 32  # chains at whose places the curvature is averaged
 _UNKNOWN = 0.3  # deviation in which chains begin around ρ', f' and η
 _WIDER = 2.0  # from where a variance of the draws is believed over the curvature
 _MAX_KEPT = 500  # positions of a chain; beyond, every other one is dropped
@@ -97,7 +99,7 @@ def fit_latent(
         rest = columns.reshape(len(columns), *positions.shape[:2])
         return [kappa.reshape(len(positions), -1), *rest]
 
-    start, covariance = _begin(density, generator)
+    density, start, covariance = _begin(density, generator)
     chains = sample_smooth(
         density,
         quantities,
@@ -188,7 +190,7 @@ def _some(positions: Floats, max_draws: int) -> Floats:
 
 def _begin(
     density: LatentDensity, generator: np.random.Generator
-) -> tuple[Floats, Floats]:
+) -> tuple[LatentDensity, Floats, Floats]:
     # -> starts (n_chains, d) spread as a normal, and its covariance. The joint density
     # has its mode in a spike of next to no volume: the peak is looked for with ρ, f
     # and η held.
@@ -204,6 +206,7 @@ def _begin(
 
     optimum = minimize(downhill, peak[loose], jac=True, method="L-BFGS-B")
     peak[loose] = optimum.x
+    density, peak = _informed(density, peak)
     held = np.ix_(loose, loose)
     covariance = _UNKNOWN**2 * np.eye(peak.size)
     covariance[held] = _inverse(_curvature(density, peak[None])[held])
@@ -212,7 +215,25 @@ def _begin(
     lowest = -optimum.fun - _MAX_DROP * peak.size
     while (low := ~(density.log_density(peak + away) > lowest)).any():
         away[low] *= 0.8  # walls of the likelihood are nearer than a normal's
-    return peak + away, covariance
+    return density, peak + away, covariance
+
+
+def _informed(density: LatentDensity, peak: Floats) -> tuple[LatentDensity, Floats]:
+    # -> with coordinates of biases and noises that know what ratings tell of each, as
+    # seen at the peak; and the peak in them
+    coordinates, point = density.coordinates, density.coordinates.point(peak[None])
+    curvature = np.diag(_curvature(density, peak[None])) - 1.0
+    n, first = coordinates.n_raters, coordinates.n_items
+    scales = np.sqrt(1.0 - point.fraction[0, 0]), point.noise_sd[0, 0]
+    parts = slice(first, first + n), slice(first + n, first + 2 * n)
+    known = [
+        Information.at_peak(peak[part], curvature[part], float(scale))
+        for part, scale in zip(parts, scales, strict=True)
+    ]
+    peak = np.array(peak)
+    peak[first : first + 2 * n] = 0.0
+    informed = replace(coordinates, of_bias=known[0], of_noise=known[1])
+    return replace(density, coordinates=informed), peak
 
 
 def _curvature(density: "SmoothDensity", positions: Floats) -> Floats:
@@ -389,7 +410,8 @@ def hamiltonian_proposal(
         position: Floats, random: np.random.RandomState
     ) -> tuple[Floats, Floats]:
         momentum = random.standard_normal(position.shape)
-        length = 1.3 * step * _SHORTEST ** random.uniform(size=(len(position), 1)) ** 3
+        length = random.uniform(size=(len(position), 1)) ** 1.5
+        length = LONGEST * step * SHORTEST**length
         before = 0.5 * (momentum**2).sum(axis=1)
         with np.errstate(over="ignore", invalid="ignore"):  # a wall; not taken then
             momentum = momentum + 0.5 * length * (gradient(position) @ root)

@@ -1,6 +1,7 @@
 """The latent-trait density against a textbook in scalars."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +9,11 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from masrel.intervals import LatentPrior
-from masrel.intervals.latent._coordinates import Coordinates, grade_shares
+from masrel.intervals.latent._coordinates import (
+    Coordinates,
+    Information,
+    grade_shares,
+)
 from masrel.intervals.latent._density import LatentDensity
 
 Floats = NDArray[np.float64]
@@ -22,12 +27,18 @@ def natural(x: Floats, like: Coordinates) -> Floats:
     n_items, n_raters = like.n_items, like.n_raters
     items, b, w = np.split(x[: n_items + 2 * n_raters], [n_items, n_items + n_raters])
     a, c, e, anchor, *gaps = x[n_items + 2 * n_raters :].tolist()
-    rho, f, eta = 1 / (1 + math.exp(-a)), 1 / (1 + math.exp(-c)), abs(e)
+    rho, f = 1 / (1 + math.exp(-a)), 1 / (1 + math.exp(-c))
+    eta = 0.2 * math.log(1 + math.exp(e))
     unit = math.sqrt(1 - rho)
 
-    def away(y: float) -> float:
+    def away(y: float, slope: float) -> float:
         # of an item with one grade, beyond the threshold next to it
-        return math.sqrt(rho) * math.log(1 + math.exp(y)) + unit * y
+        return math.sqrt(rho) * math.log(1 + math.exp(y)) + unit * slope * y
+
+    def spread(x: Floats, scale: float, of: Information) -> Floats:
+        # of numbers of one scale, that were seen at m with variance 1 / I
+        weight = scale**2 * of.amount / (1 + scale**2 * of.amount)
+        return weight * of.place + scale * x / np.sqrt(1 + scale**2 * of.amount)
 
     tau = [anchor]
     for gap in gaps[: like.middle][::-1]:
@@ -36,11 +47,16 @@ def natural(x: Floats, like: Coordinates) -> Floats:
         tau.append(tau[-1] + unit * math.exp(gap))
     theta = [
         sum(share * t for share, t in zip(weights, tau, strict=True))
-        + (side * away(value) if side else unit * value)
+        + (side * away(value, slope) if side else unit * value)
         if is_placed
         else math.sqrt(rho) * value
-        for value, is_placed, side, weights in zip(
-            items, like.placed, like.beyond, like.threshold_weights, strict=True
+        for value, is_placed, side, slope, weights in zip(
+            items,
+            like.placed,
+            like.beyond,
+            like.inside,
+            like.threshold_weights,
+            strict=True,
         )
     ]
     below = stats.norm.cdf([-np.inf, *tau, np.inf])
@@ -48,8 +64,8 @@ def natural(x: Floats, like: Coordinates) -> Floats:
     return np.array(
         [
             *theta,
-            *(math.sqrt((1 - rho) * (1 - f)) * b),
-            *(log_noise + e * w),
+            *(unit * spread(b, math.sqrt(1 - f), like.of_bias)),
+            *(log_noise + spread(w, eta, like.of_noise)),
             rho,
             f,
             eta,
@@ -58,10 +74,21 @@ def natural(x: Floats, like: Coordinates) -> Floats:
     )
 
 
+def informed(codes: NDArray[np.int64], n: int, prior: LatentPrior) -> LatentDensity:
+    """Return a density that knows something of each rater."""
+    density = LatentDensity.of(codes, n, prior)
+    m = codes.shape[1]
+    known = {
+        "of_bias": Information(amount=np.arange(m) * 7.0, place=0.3 - np.arange(m)),
+        "of_noise": Information(amount=np.arange(m) * 9.0, place=np.arange(m) - 0.4),
+    }
+    return replace(density, coordinates=replace(density.coordinates, **known))
+
+
 def textbook(x: Floats, codes: NDArray[np.int64], n: int, prior: LatentPrior) -> float:
     """Log-density in natural unknowns, and the Jacobian by differences."""
     n_items, n_raters = codes.shape
-    like = LatentDensity.of(codes, n, prior).coordinates
+    like = informed(codes, n, prior).coordinates
     unknowns = natural(x, like)
     theta, b, log_sigma = np.split(
         unknowns[: n_items + 2 * n_raters], [n_items, n_items + n_raters]
@@ -115,11 +142,12 @@ def test_items_that_ratings_tell_apart_are_placed_by_them() -> None:
 
 
 @pytest.mark.parametrize("prior", PRIORS)
-@pytest.mark.parametrize("n_categories", [5, 6])
+@pytest.mark.parametrize("n_categories", [3, 5, 6])
 def test_density_is_the_textbook_one(prior: LatentPrior, n_categories: int) -> None:
-    density = LatentDensity.of(RATINGS, n_categories, prior)
+    codes = np.minimum(RATINGS, n_categories - 1)  # of 3, items have only the last
+    density = informed(codes, n_categories, prior)
     x = positions(density, 8)
-    theirs = [textbook(row, RATINGS, n_categories, prior) for row in x]
+    theirs = [textbook(row, codes, n_categories, prior) for row in x]
     off = density.log_density(x) - theirs
     assert np.ptp(off) < 1e-6  # one constant; the numerical Jacobian is that good
 
@@ -127,7 +155,7 @@ def test_density_is_the_textbook_one(prior: LatentPrior, n_categories: int) -> N
 @pytest.mark.parametrize("prior", PRIORS)
 def test_two_grades_have_one_threshold(prior: LatentPrior) -> None:
     codes = np.array([[0, 1], [1, 1]])
-    density = LatentDensity.of(codes, 2, prior)
+    density = informed(codes, 2, prior)
     assert density.n_dimensions == 2 + 4 + 3 + 1
     x = positions(density, 6)
     off = density.log_density(x) - [textbook(row, codes, 2, prior) for row in x]
@@ -135,7 +163,7 @@ def test_two_grades_have_one_threshold(prior: LatentPrior) -> None:
 
 
 def test_a_missing_jacobian_is_seen_by_the_textbook() -> None:
-    density = LatentDensity.of(RATINGS, 5, LatentPrior())
+    density = informed(RATINGS, 5, LatentPrior())
     x = positions(density, 8)
     without = density.log_density(x) - x[:, -3:].sum(axis=1)  # of the log distances
     off = without - [textbook(row, RATINGS, 5, LatentPrior()) for row in x]
@@ -146,7 +174,7 @@ def test_a_missing_jacobian_is_seen_by_the_textbook() -> None:
 @pytest.mark.parametrize("n_categories", [2, 3, 6])
 def test_slopes_are_those_of_the_density(prior: LatentPrior, n_categories: int) -> None:
     codes = np.minimum(RATINGS, n_categories - 1)
-    density = LatentDensity.of(codes, n_categories, prior)
+    density = informed(codes, n_categories, prior)
     x = positions(density, 10)
     for k, h in enumerate(1e-5 * np.eye(density.n_dimensions)):
         numerical = (density.log_density(x + h) - density.log_density(x - h)) / 2e-5
@@ -178,14 +206,14 @@ def test_thresholds_ascend_around_the_one_that_halves_the_ratings() -> None:
 
 
 def test_the_three_shares_are_the_variance() -> None:
-    density = LatentDensity.of(RATINGS, 5, LatentPrior())
+    density = informed(RATINGS, 5, LatentPrior())
     traits = density.traits(positions(density, 20))
     total = traits.item_share + traits.bias_variance + traits.noise_variance
     assert total == pytest.approx(np.ones(20))
 
 
 def test_far_out_the_density_is_zero_and_not_nan() -> None:
-    density = LatentDensity.of(RATINGS, 5, LatentPrior())
+    density = informed(RATINGS, 5, LatentPrior())
     far = np.vstack([s * 800.0 * np.eye(density.n_dimensions) for s in (1, -1)])
     assert not np.isnan(density.log_density(far)).any()
     assert np.isfinite(density.gradient(far)).all()
@@ -204,7 +232,7 @@ def test_shares_of_far_grades_keep_their_digits() -> None:
 
 
 def test_many_walkers_are_one_call() -> None:
-    density = LatentDensity.of(RATINGS, 5, LatentPrior())
+    density = informed(RATINGS, 5, LatentPrior())
     x = positions(density, 30)
     one_by_one = np.concatenate([density.log_density(row[None]) for row in x])
     assert density.log_density(x) == pytest.approx(one_by_one, rel=1e-13)

@@ -12,6 +12,7 @@ from masrel.report._figure_data import (
     Forest,
     ForestRow,
     GradeGrid,
+    RaterPairs,
     SpeedColumn,
     SpeedDots,
     TraceColumns,
@@ -19,6 +20,7 @@ from masrel.report._figure_data import (
 )
 from masrel.report.figures import draw
 from masrel.report.figures._forest import forest_figure
+from masrel.report.figures._rater_pairs import rater_figure
 from masrel.report.figures._style import STYLE, house_style
 
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -84,6 +86,22 @@ def panel() -> TracePanel:
     return TracePanel(title="HM1", stretches=(stretch, stretch))
 
 
+def pairs(n_raters: int, reference: str | None = None) -> RaterPairs:
+    values = np.linspace(-0.2, 1.0, n_raters * n_raters).reshape(n_raters, n_raters)
+    values[np.diag_indices(n_raters)] = np.nan
+    if reference is not None:
+        values = np.column_stack([values, values[:, 0]])
+    return RaterPairs(
+        title="Fleiss' κ",
+        raters=tuple(f"R{k}" for k in range(n_raters)),
+        pairs=tuple(map(tuple, values.tolist())),
+        reference=reference,
+        changes=tuple(0.01 * k - 0.02 for k in range(n_raters)),
+        change_ends=tuple((0.01 * k - 0.05, 0.01 * k) for k in range(n_raters)),
+        level=0.95,
+    )
+
+
 DRAWINGS = {
     "grades": grid(),
     "many raters": grid(14),
@@ -97,6 +115,8 @@ DRAWINGS = {
         raters=("R1", "R2"),
         slowest=60.0,
     ),
+    "pairs": pairs(3),
+    "pairs of many raters, with a reference": pairs(20, reference="a long name " * 4),
     "traces": TraceColumns(panels=(panel(),)),
 }
 
@@ -229,3 +249,31 @@ def test_what_leaves_the_axis_is_an_arrow_at_its_end(
     assert {line.get_marker() for line in axes.lines} - {"None"} == markers
     inside = [x for line in axes.lines for x in line.get_xdata()]
     assert min(inside) >= axes.get_xlim()[0]
+
+
+def test_pairs_are_written_in_their_cells_and_long_names_are_shortened(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(STYLE, "svg.fonttype", "none")
+    few = svg_of("pairs", "").decode()
+    assert few.count(">R0</text>") == 2  # of the row and of the column
+    assert few.count(">−.05</text>") == 1
+    assert ">95 % confidence interval</text>" in few
+    many = svg_of("pairs of many raters, with a reference", "").decode()
+    assert ">a long nam…" in many
+    assert ">.05</text>" not in many
+
+
+def test_two_raters_have_a_map_and_nothing_beside_it() -> None:
+    nan = float("nan")
+    content = RaterPairs(
+        title="Scott's π",
+        raters=("A", "B"),
+        pairs=((nan, 0.5), (0.5, nan)),
+        reference=None,
+        changes=(nan, nan),
+        change_ends=((nan, nan), (nan, nan)),
+        level=0.95,
+    )
+    assert len(rater_figure(content).axes) == 2  # the map and its colours
+    assert len(rater_figure(pairs(3)).axes) == 3
