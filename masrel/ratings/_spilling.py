@@ -57,23 +57,24 @@ def _packed(
     n_marks = " + ".join(f"bit_count(bit_or({k}) & {marks})" for k in columns)
     of_items = (
         f"SELECT {', '.join(f'bit_or({k}) AS {k}' for k in columns)}, "
-        f"{n_marks} = count(*) AS plain, any_value({group[0]}) AS one "
-        f"FROM ratings GROUP BY {', '.join(group)}"
+        f"{n_marks} = count(*) AS plain FROM ratings GROUP BY {', '.join(group)}"
     )
     table = _answer(
         name,
         duckdb,
         database,
         keys,
-        f"SELECT {', '.join(columns)}, plain, count(*) AS freq, any_value(one) AS one "
-        f"FROM ({of_items}) GROUP BY {', '.join(columns)}, plain",
+        f"SELECT {', '.join(columns)}, plain, count(*) AS freq FROM ({of_items}) "
+        f"GROUP BY {', '.join(columns)}, plain",
     )
     twice = None
-    plain = table["plain"].astype(bool)
-    if not plain.all():
-        which = int(table["one"][~plain][0])
-        query = f"SELECT {', '.join(names)} FROM ratings WHERE {group[0]} = {which}"
-        row = _answer(name, duckdb, database, keys, f"{query} LIMIT 1")
+    if not table["plain"].astype(bool).all():
+        firsts = ", ".join(f"any_value({column})" for column in names)
+        query = (
+            f"SELECT {firsts} FROM ratings GROUP BY {', '.join(group)} "
+            f"HAVING {n_marks} <> count(*) LIMIT 1"
+        )
+        row = _answer(name, duckdb, database, keys, query)
         twice = [column.tolist()[0] for column in row.values()]
     return PackedItems(
         keys=np.column_stack([table[k] for k in columns]).astype(np.int64),
@@ -86,7 +87,7 @@ def _group(items: list[Any], names: list[str]) -> list[str]:
     # what tells items apart: a whole number, or 128 bits of the hash of their names
     if len(items) == 1 and is_whole(items[0]):
         return names
-    texts = f"concat_ws(chr(31), {', '.join(names)})"
+    texts = names[0] if len(names) == 1 else f"concat_ws(chr(31), {', '.join(names)})"
     return [f"hash({texts})", f"hash({texts} || '~')"]
 
 

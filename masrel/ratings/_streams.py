@@ -493,7 +493,7 @@ def _of_engine(long: _Long, rows: DistinctRows) -> int:
         # many of these as ratings unless two are in one place.
         n_bits = (len(long.grades.texts) + 2).bit_length() + 1
         n_in_key = _BITS // n_bits
-        n_keys = (long.n_raters + 2) // n_in_key + 1
+        n_keys = -(-long.n_raters // n_in_key)
         marks = sum(1 << (n_bits * (k + 1) - 1) for k in range(n_in_key))
         try:
             packed = packed_items(
@@ -523,6 +523,10 @@ def _keys(
     for items, grade, rater in long.batches():
         if len(long.grades.texts) > mark or long.n_raters > n_in_key * n_keys:
             raise UnorderedError
-        which, at = np.divmod(rater, n_in_key)
-        value = (grade.astype(np.int64) | mark) << (at * n_bits)
-        yield items, [np.where(which == k, value, 0) for k in range(n_keys)]
+        which, at = np.divmod(np.arange(long.n_raters), n_in_key)
+        value = (grade.astype(np.int64) | mark) << (at * n_bits)[rater]
+        if n_keys == 1:
+            yield items, [value]
+        else:
+            of = which[rater]
+            yield items, [np.where(of == k, value, 0) for k in range(n_keys)]
