@@ -51,7 +51,9 @@ class TextCodes:
             self._refuse()
         texts = [*cell_texts(column.dictionary), ""]  # a missing cell is the last
         table = np.array([self._code.get(text, -1) for text in texts], self._dtype)
-        index = numbers_of(column.indices.fill_null(n))
+        indices = column.indices
+        # to fill them would load pandas
+        index = numbers_of(indices.fill_null(n) if indices.null_count else indices)
         return self._looked_up(index, table, texts.__getitem__, (row, place))
 
     def _of_whole(
