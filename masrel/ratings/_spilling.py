@@ -2,9 +2,10 @@
 
 import os
 import tempfile
-from collections.abc import Callable, Generator, Iterator
-from contextlib import suppress
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import chain
+from threading import Event, Thread
 from typing import Any
 
 import numpy as np
@@ -94,42 +95,57 @@ def _group(items: list[Any], names: list[str]) -> list[str]:
 def _answer(
     name: str, duckdb: Any, database: Any, keys: Keys, query: str
 ) -> dict[str, NDArray[Any]]:
-    arrow = library(name, "pyarrow")
+    # the columns of a query of ratings that come batch by batch
+    stopped, done = Event(), Event()
     errors: list[BaseException] = []  # DuckDB would say them in its own words
-
-    def batches() -> Generator[Any]:
-        try:
-            for items, sums in keys():
-                yield arrow.RecordBatch.from_arrays(
-                    [*items, *map(arrow.array, sums)],
-                    names=[
-                        *(f"item{k}" for k in range(len(items))),
-                        *(f"key{k}" for k in range(len(sums))),
-                    ],
-                )
-        except BaseException as error:
-            errors.append(error)
-            raise
-
-    stream = batches()
+    answers: list[dict[str, NDArray[Any]]] = []
+    stream = _batches(name, keys, stopped, errors)
     first = next(stream)
-
-    def every() -> Iterator[Any]:
-        yield first
-        yield from stream
-
+    reader = library(name, "pyarrow").RecordBatchReader
     database.register(
-        "ratings", arrow.RecordBatchReader.from_batches(first.schema, every())
+        "ratings", reader.from_batches(first.schema, chain([first], stream))
     )
+
+    def work() -> None:
+        try:
+            answers.append(database.execute(query).fetchnumpy())
+        except (duckdb.Error, RuntimeError) as error:
+            errors.append(error)
+        finally:
+            done.set()
+
+    # in a thread, because DuckDB holds Ctrl-C back until all is read
+    Thread(target=work, daemon=True).start()
     try:
-        answer: dict[str, NDArray[Any]] = database.execute(query).fetchnumpy()
-    except duckdb.Error as error:
-        if errors:
-            raise errors[0] from None
-        lines = str(error).splitlines() or ["DuckDB stopped"]
-        raise RatingsError(f"{name}: sorting it failed ({lines[0][:200]})") from error
-    finally:
-        with suppress(ValueError):  # DuckDB may still be reading
-            stream.close()
+        while not done.wait(0.1):
+            pass
+    except KeyboardInterrupt:
+        stopped.set()
+        database.interrupt()
+        done.wait()
+        raise
+    if answers:
         database.unregister("ratings")
-    return answer
+        return answers[0]
+    if not isinstance(errors[0], duckdb.Error):
+        raise errors[0]
+    lines = str(errors[0]).splitlines() or ["DuckDB stopped"]
+    raise RatingsError(f"{name}: grouping it failed ({lines[0][:200]})") from errors[0]
+
+
+def _batches(
+    name: str, keys: Keys, stopped: Event, errors: list[BaseException]
+) -> Iterator[Any]:
+    # record batches of items and numbers
+    arrow = library(name, "pyarrow")
+    try:
+        for items, sums in keys():
+            if stopped.is_set():
+                return
+            names = [f"item{k}" for k in range(len(items))]
+            names += [f"key{k}" for k in range(len(sums))]
+            columns = [*items, *map(arrow.array, sums)]
+            yield arrow.RecordBatch.from_arrays(columns, names=names)
+    except BaseException as error:
+        errors.append(error)
+        raise
