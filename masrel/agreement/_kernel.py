@@ -22,6 +22,7 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Array = NDArray[Any]
 RaterSums = Callable[[Floats], Floats]
+CrossedSums = Callable[[Floats, Floats], Floats]
 
 Variance = Literal["delta", "irrcac"]
 """Which standard error: the delta method's, or the one irrCAC prints."""
@@ -54,6 +55,10 @@ class Kernel:
     # rater is never paired with a copy of itself. None where raters cannot be
     # resampled.
     rater_sums: Callable[[CodedRatings, Integers, Floats], RaterSums] | None = None
+    # distinct rows and v to a callable: how often each row and each rater is taken,
+    # shapes (n, n_rows) and (n, n_raters), to sums of shape (n, n_features); None where
+    # rater_sums is
+    crossed_sums: Callable[[CodedRatings, Floats], CrossedSums] | None = None
 
 
 def divide(numerator: Floats, denominator: Floats) -> Floats:

@@ -19,6 +19,7 @@ from masrel.agreement._data import CodedRatings
 from masrel.agreement._kernel import (
     NO_PAIR,
     VARIANCES,
+    CrossedSums,
     Floats,
     Influence,
     Integers,
@@ -261,7 +262,12 @@ def pooled_kernel(coefficient: PooledCoefficient) -> Kernel:
         expected = constant / divisor + factor / divisor * between
         return 1.0 - divide(observed, expected)
 
-    return Kernel(features=_features, value=value, rater_sums=_resampled_raters)
+    return Kernel(
+        features=_features,
+        value=value,
+        rater_sums=resampled_raters,
+        crossed_sums=crossed_sums,
+    )
 
 
 def complete_kernel(coefficient: PooledCoefficient) -> Kernel:
@@ -276,7 +282,8 @@ def complete_kernel(coefficient: PooledCoefficient) -> Kernel:
     return Kernel(features=features, value=kernel.value)
 
 
-def _resampled_raters(coded: CodedRatings, freq: Integers, v: Floats) -> RaterSums:
+def resampled_raters(coded: CodedRatings, freq: Integers, v: Floats) -> RaterSums:
+    """Return sums of features as a function of how often each rater is taken."""
     # Items that the same raters rated are summed once, pair of raters by pair: Σ_i v of
     # their categories is a quadratic form in how often each rater is taken.
     patterns, kind = np.unique(coded.codes >= 0, axis=0, return_inverse=True)
@@ -300,6 +307,27 @@ def _resampled_raters(coded: CodedRatings, freq: Integers, v: Floats) -> RaterSu
             total[..., 2] += n_items * (n != 0)  # raters who rated none add nothing
             total[..., 3:] += over(of @ chosen, n[..., None])
         return total
+
+    return sums
+
+
+def crossed_sums(coded: CodedRatings, v: Floats) -> CrossedSums:
+    """Return the same as a function of how often each row and each rater is taken."""
+    each = (coded.codes[:, :, None] == np.arange(len(v))).astype(np.float64)
+    rated = (coded.codes >= 0).astype(np.float64)  # (n_rows, n_raters)
+
+    def sums(rows: Floats, raters: Floats) -> Floats:
+        # (n, n_rows), (n, n_raters) -> (n, 3 + n_categories)
+        counts = np.tensordot(raters, each, axes=(1, 1))  # (n, n_rows, n_categories)
+        n = counts.sum(axis=-1)
+        # Copies of a rater agree, and disagree in nothing: only their number goes.
+        pairs = n * n - raters**2 @ rated.T
+        features = np.empty((*n.shape, 3 + len(v)))
+        features[..., 0] = over(weighted_disagreement(counts, v), pairs)
+        features[..., 1] = pairs != 0
+        features[..., 2] = n != 0
+        features[..., 3:] = over(counts, n[..., None])
+        return np.asarray(np.einsum("np,npf->nf", rows, features))
 
     return sums
 

@@ -12,9 +12,12 @@ import numpy as np
 from masrel.agreement._counts import DistinctItems, bilinear, distinct_rows, item_counts
 from masrel.agreement._data import CodedRatings, code_ratings, raters_who_rate
 from masrel.agreement._kernel import (
+    CrossedSums,
     Floats,
     Influence,
+    Integers,
     Kernel,
+    RaterSums,
     Variance,
     check_population,
     check_variance,
@@ -22,7 +25,12 @@ from masrel.agreement._kernel import (
     weighted_disagreement,
 )
 from masrel.agreement._labels import Label
-from masrel.agreement._pooled import over, ratio_estimate
+from masrel.agreement._pooled import (
+    crossed_sums,
+    over,
+    ratio_estimate,
+    resampled_raters,
+)
 from masrel.agreement._weights import Weights, WeightsLike, declared_weights
 from masrel.estimates import Estimate
 
@@ -213,4 +221,48 @@ def _value(sums: Floats, v: Floats) -> Floats:
     return 1.0 - divide(observed, divide(expected, n_pairs))
 
 
-_KERNEL = Kernel(features=_features, value=_value)
+def _resampled_raters(coded: CodedRatings, freq: Integers, v: Floats) -> RaterSums:
+    pooled, n_ratings, chosen = resampled_raters(coded, freq, v), *_marginals(coded, v)
+
+    def sums(taken: Floats) -> Floats:
+        # (..., n_raters) -> (..., 2 + n_raters (1 + n_categories))
+        of_raters = taken[..., None] * (freq @ chosen).reshape(n_ratings.shape[1], -1)
+        n = np.broadcast_to(freq @ n_ratings, taken.shape)
+        return _joined(pooled(taken), n, of_raters)
+
+    return sums
+
+
+def _crossed_sums(coded: CodedRatings, v: Floats) -> CrossedSums:
+    pooled, n_ratings, chosen = crossed_sums(coded, v), *_marginals(coded, v)
+
+    def sums(rows: Floats, raters: Floats) -> Floats:
+        # (n, n_rows), (n, n_raters) -> (n, 2 + n_raters (1 + n_categories))
+        of_raters = raters[..., None] * (rows @ chosen).reshape(*raters.shape, -1)
+        return _joined(pooled(rows, raters), rows @ n_ratings, of_raters)
+
+    return sums
+
+
+def _marginals(coded: CodedRatings, v: Floats) -> tuple[Floats, Floats]:
+    # whether each rater rated, (n_rows, n_raters), and which category each chose,
+    # (n_rows, n_raters n_categories)
+    chosen = coded.codes[:, :, None] == np.arange(len(v))
+    rated = coded.codes >= 0
+    return rated.astype(np.float64), chosen.reshape(len(rated), -1).astype(np.float64)
+
+
+def _joined(pooled: Floats, n_ratings: Floats, chosen: Floats) -> Floats:
+    # Sums of `_features` from those of a coefficient that tells no raters apart. Takes
+    # pooled (..., 3 + n_categories), n_ratings (..., n_raters), chosen of each rater
+    of_raters = np.concatenate([n_ratings[..., None], chosen], axis=-1)
+    flat = of_raters.reshape(*pooled.shape[:-1], -1)
+    return np.concatenate((pooled[..., :2], flat), axis=-1)
+
+
+_KERNEL = Kernel(
+    features=_features,
+    value=_value,
+    rater_sums=_resampled_raters,
+    crossed_sums=_crossed_sums,
+)

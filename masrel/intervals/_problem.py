@@ -123,6 +123,14 @@ class IntervalProblem:
             )
         return self.kernel.rater_sums(self.patterns, self.freq, self.v)
 
+    def crossed_values(self) -> Callable[[Floats, Floats], Floats]:
+        """Return values by how often each pattern and each rater is taken."""
+        self.rater_sums()  # or an error
+        if self.kernel.crossed_sums is None:  # whoever has one has both
+            raise ParameterError(f"target: none of both for {self.entry.title}")
+        sums = self.kernel.crossed_sums(self.patterns, self.v)
+        return lambda items, raters: self.values(sums(items, raters))
+
     def student_t(self, df: float) -> float:
         """Return the two-sided quantile of Student's t at the level."""
         from scipy.special import stdtrit  # loaded only when an interval needs it

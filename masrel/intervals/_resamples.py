@@ -24,7 +24,7 @@ from masrel.intervals._lattice import (
     sums_of_scores,
     sums_of_steps,
 )
-from masrel.intervals._units import SamplingUnits
+from masrel.intervals._units import CrossedUnits, SamplingUnits
 
 Statistic = Callable[[Floats], Floats]
 """How often each unit is drawn, (n_resamples, n_units), to values (n_resamples,)."""
@@ -49,14 +49,53 @@ _FINE = 60.0  # integer scores in a standard deviation of one draw
 _MAX_SPAN = 1 << 18  # integers that sums of scores span
 
 
+def all_crossed_resamples(units: CrossedUnits, *, insist: bool) -> AllResamples | None:
+    """Take every pair of a resample of items and one of raters, if there are few."""
+    items, raters = units.items, units.raters
+    n_distinct = math.comb(items.n + items.freq.size - 1, items.n)
+    n_distinct *= math.comb(2 * raters.n - 1, raters.n)
+    if n_distinct > (_MAX_INSISTED if insist else _MAX_ALL):
+        if insist:
+            raise ParameterError(
+                f"exact: there are {_rounded(n_distinct)} distinct resamples of items "
+                "and raters: too many; draw some of them instead"
+            )
+        return None
+    of_items, item_weights = compositions(items.n, items.shares)
+    of_raters, rater_weights = compositions(raters.n, raters.shares)
+    values = np.empty(n_distinct)
+    size = max(1, _CHUNK // units.width)
+    for start in range(0, n_distinct, size):
+        item, rater = np.divmod(
+            np.arange(start, min(start + size, n_distinct)), len(of_raters)
+        )
+        values[start : start + size] = units.of_both(
+            of_items[item].astype(np.float64), of_raters[rater].astype(np.float64)
+        )
+    return AllResamples.of(values, np.outer(item_weights, rater_weights).ravel())
+
+
+def _crossed_sampler(units: CrossedUnits) -> "Sampler":
+    def draw_chunk(size: int, generator: np.random.Generator) -> Draws:
+        items, raters = (
+            generator.multinomial(of.n, of.shares, size=size).astype(np.float64)
+            for of in (units.items, units.raters)
+        )
+        return units.of_both(items, raters), None
+
+    return Sampler(draw_chunk=draw_chunk, width=units.width)
+
+
 def all_resamples(
-    units: SamplingUnits, statistic: Statistic | None, *, insist: bool
+    units: SamplingUnits | CrossedUnits, statistic: Statistic | None, *, insist: bool
 ) -> AllResamples | None:
     """Take every distinct resample once, with its probability.
 
     None if there are too many, and an error if that is not accepted. Without a
     statistic it is the coefficient, a function of sums of features.
     """
+    if isinstance(units, CrossedUnits):
+        return all_crossed_resamples(units, insist=insist)
     n_distinct = math.comb(units.n + units.freq.size - 1, units.n)
     if n_distinct > _FEW and statistic is None:
         merged = _merged(units, n_distinct)
@@ -155,14 +194,17 @@ class DrawBudget:
 
 
 def draw_resamples(
-    units: SamplingUnits,
+    units: SamplingUnits | CrossedUnits,
     statistic: Statistic | None,
     rule: EndpointRule,
     budget: DrawBudget,
     generator: np.random.Generator,
 ) -> DrawnResamples:
     """Draw resamples, more of them while an end is less certain than it should be."""
-    sampler = sampler_of(units, statistic)
+    if isinstance(units, CrossedUnits):
+        sampler = _crossed_sampler(units)
+    else:
+        sampler = sampler_of(units, statistic)
     values, scores = sampler.draw(budget.n_resamples, generator)
     while True:
         resamples = _drawn(sampler, values, scores)

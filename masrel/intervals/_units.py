@@ -34,6 +34,7 @@ class SamplingUnits:
     # sums (..., n_features) to the coefficient (...), ``nan`` where undefined
     values: Callable[[Floats], Floats]
     notes: tuple[str, ...] = ()  # that they are few
+    words: str = ""  # what they are, where a method does not say
 
     @cached_property
     def lattice(self) -> Lattice | None:
@@ -132,18 +133,53 @@ def _derivatives(
     return slopes
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CrossedUnits:
+    """Items and raters, of which as many are drawn as there are, by themselves."""
+
+    # Owen (2007): a rating is there as often as its item and its rater together.
+    items: SamplingUnits
+    raters: SamplingUnits
+    # how often each is drawn, (n, n_patterns) and (n, n_raters), to values (n,)
+    of_both: Callable[[Floats, Floats], Floats]
+    width: int  # numbers that one resample takes
+    notes: tuple[str, ...]  # that items or raters are few
+    words: str = " of items and raters"
+
+    def acceleration(self) -> float:
+        """Return a sixth of the skewness of a sum of what items and raters move."""
+        # of independent samples, with l/n ≈ (n - 1)/n (mean - value without one)
+        # [Efron and Tibshirani (1993), (14.15), for one]
+        cubes = squares = 0.0
+        items, raters = self.items.freq.astype(float), np.ones(self.raters.n)
+        without = (
+            (items - np.eye(items.size), np.tile(raters, (items.size, 1)), items),
+            (np.tile(items, (raters.size, 1)), raters - np.eye(raters.size), raters),
+        )
+        for of_items, of_raters, freq in without:
+            values = self.of_both(of_items, of_raters)
+            known = ~np.isnan(values)
+            values, freq = values[known], freq[known]
+            n = freq.sum()
+            if n > 0:
+                moves = (n - 1.0) / n * (freq @ values / n - values)
+                cubes += float(freq @ moves**3)
+                squares += float(freq @ moves**2)
+        return cubes / (6.0 * squares**1.5) if squares > 0.0 else 0.0
+
+
 def sampling_units(
     problem: IntervalProblem, clusters: Sequence[object] | NDArray[Any] | None
-) -> SamplingUnits:
+) -> SamplingUnits | CrossedUnits:
     """Return what is resampled, with a warning where there is little of it."""
+    if problem.target != "items" and clusters is not None:
+        raise ParameterError('clusters: are of items, and need target="items"')
     if problem.target == "both":
-        raise ParameterError(
-            'target: the bootstrap resamples "items" or "raters"; for both use the '
-            "jackknife"
-        )
+        both = crossed_units(problem)
+        few = warn_small(problem.n_paired_items, 16, "items", problem.n_items)
+        few += warn_small(problem.n_paired_raters, 5, "raters", problem.n_raters)
+        return replace(both, notes=few)
     if problem.target == "raters":
-        if clusters is not None:
-            raise ParameterError('clusters: are of items, and need target="items"')
         units, name, minimum = rater_units(problem), "raters", 5
         n_paired = problem.n_paired_raters
     elif clusters is None:
@@ -157,6 +193,26 @@ def sampling_units(
         units, n_paired = cluster_units(problem, clusters)
         name, minimum = "clusters", 16
     return replace(units, notes=warn_small(n_paired, minimum, name, units.n))
+
+
+def crossed_units(problem: IntervalProblem) -> CrossedUnits:
+    """Return items and raters, to be drawn both."""
+    raters = rater_units(problem)  # or an error
+    items = SamplingUnits(
+        n=problem.n_items,
+        freq=problem.freq,
+        shares=np.asarray(problem.freq / max(problem.n_items, 1)),
+        rows=None,
+        sums=lambda counts: counts @ problem.rows,
+        values=problem.values,
+    )
+    return CrossedUnits(
+        items=items,
+        raters=raters,
+        of_both=problem.crossed_values(),
+        width=problem.freq.size * (3 * len(problem.v) + 6) + raters.n,
+        notes=(),
+    )
 
 
 def cluster_units(
@@ -175,7 +231,7 @@ def cluster_units(
         paired[numbers[block][has_pair]] = True
     matters = sums.any(axis=1)
     units = row_units(problem, sums[matters], np.ones(matters.sum(), dtype=np.int64))
-    return units, int(paired.sum())
+    return replace(units, words=f" of {units.n} clusters"), int(paired.sum())
 
 
 def rater_units(problem: IntervalProblem) -> SamplingUnits:

@@ -31,7 +31,7 @@ from masrel.intervals._problem import (
     recorded_generator,
 )
 from masrel.intervals._resamples import DrawBudget, all_resamples, draw_resamples
-from masrel.intervals._units import SamplingUnits, sampling_units
+from masrel.intervals._units import CrossedUnits, SamplingUnits, sampling_units
 
 _Kind = Literal[Kind, "krippendorff", "hayes"]
 """The same, and the bootstraps of alpha of other programs."""
@@ -65,8 +65,9 @@ def bootstrap(
         Name of a coefficient, or its public function.
     ratings : nested sequence, array_like or DataFrame
         What the coefficient takes.
-    target : {"items", "raters"}
-        What a new study would draw anew, and so what is resampled.
+    target : {"items", "raters", "both"}
+        What a new study would draw anew, and so what is resampled; for "both" items
+        and raters, each by themselves [5]_.
     categories : sequence, optional
         The declared scale in order.
     weights : str or array_like, optional
@@ -130,7 +131,8 @@ def bootstrap(
     are left out and counted in `n_undefined`; the probabilities of the others are
     scaled up to 1. An exact interval counts distinct resamples there, and a note says
     how probable they are. When raters are resampled, a rater is never paired with a
-    copy of itself: such pairs agree always and say nothing.
+    copy of itself: such pairs agree always and say nothing. Raters of percent
+    agreement, Fleiss' and Conger's kappa, Gwet's AC and Brennan-Prediger's can be.
 
     A quantile is the least value whose probability adds up to it, and where it adds up
     to just that, the middle between this value and the next. Ties with the estimate
@@ -162,6 +164,8 @@ def bootstrap(
     .. [4] Hayes, A. F., Krippendorff, K. (2007). Answering the call for a standard
        reliability measure for coding data. Communication Methods and Measures, 1(1),
        77-89. https://doi.org/10.1080/19312450709336664
+    .. [5] Owen, A. B. (2007). The pigeonhole bootstrap. Annals of Applied Statistics,
+       1(2), 386-411. https://doi.org/10.1214/07-AOAS122
 
     Examples
     --------
@@ -204,9 +208,8 @@ def bootstrap(
         problem = hold_expected(problem)
         method, kind = "percentile bootstrap, chance held", "percentile"
     units = sampling_units(problem, clusters)
+    method += units.words
     rule = _endpoint_rule(problem, units, kind)
-    if clusters is not None:
-        method += f" of {units.n} clusters"
     reason = None
     if math.isnan(rule.value):
         reason = "the estimate itself is undefined"
@@ -270,19 +273,24 @@ def _check_options(kind: _Kind, exact: _Exact, budget: DrawBudget) -> None:
 
 
 def _endpoint_rule(
-    problem: IntervalProblem, units: SamplingUnits, kind: Kind
+    problem: IntervalProblem, units: SamplingUnits | CrossedUnits, kind: Kind
 ) -> EndpointRule:
     rule = EndpointRule(kind=kind, level=problem.level, value=problem.value)
     if kind == "bca" and not math.isnan(rule.value):
         return replace(rule, skew=units.acceleration())
     if kind == "studentized" and not math.isnan(rule.value):
+        if isinstance(units, CrossedUnits):
+            raise ParameterError(
+                'kind: "studentized" needs the standard error of every resample, which '
+                'there is for target "items" or "raters" alone'
+            )
         (error,) = units.standard_errors(units.freq[None].astype(np.float64))
         return replace(rule, error=float(error))
     return rule
 
 
 def _resamples(
-    units: SamplingUnits,
+    units: SamplingUnits | CrossedUnits,
     rule: EndpointRule,
     exact: _Exact,
     budget: DrawBudget,
@@ -290,7 +298,7 @@ def _resamples(
 ) -> tuple[Resamples, int | None]:
     """Take all resamples, or draw some and return the seed that repeats them."""
     statistic = None
-    if rule.kind == "studentized":
+    if rule.kind == "studentized" and isinstance(units, SamplingUnits):
         statistic = partial(units.studentized, value=rule.value, error=rule.error)
     if exact is not False:
         resamples = all_resamples(units, statistic, insist=exact is True)

@@ -188,7 +188,6 @@ def test_few_items_and_raters_are_warned_of() -> None:
 @pytest.mark.parametrize(
     ("coefficient", "options", "said"),
     [
-        ("fleiss_kappa", {"target": "both"}, 'resamples "items" or "raters"'),
         (
             "fleiss_kappa",
             {"target": "items", "n_resamples": 99},
