@@ -1,6 +1,7 @@
 """Arrays and frames of labels as codes: positions in the scale."""
 
 import itertools
+import sys
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -33,7 +34,8 @@ def array_codes(
     # Takes labels (n_items, n_raters)
     kind = labels.dtype.kind
     is_text = declared is not None and isinstance(declared[0], str)
-    if kind not in "iufU" or (declared is not None and is_text != (kind == "U")):
+    is_other = declared is not None and is_text != (kind == "U")
+    if kind not in "iufU" or is_other or (kind == "f" and _has_giant(declared)):
         return _object_codes(labels, declared)
     plain = _plain(labels)
     if declared is not None:
@@ -45,6 +47,13 @@ def array_codes(
     except RatingsError:
         known = _labels_met(plain, labels.dtype)
         return _codes(labels, plain, known), known
+
+
+def _has_giant(declared: tuple[Label, ...] | None) -> bool:
+    # a whole number that no float holds
+    return declared is not None and any(
+        isinstance(label, int) and abs(label) > sys.float_info.max for label in declared
+    )
 
 
 def _codes(labels: Array, plain: Array, known: tuple[Label, ...]) -> Codes:

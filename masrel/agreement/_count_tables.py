@@ -163,6 +163,8 @@ def check_counts(counts: ArrayLike) -> Integers:
         )
     if table.dtype.kind not in "iuf":
         raise CountsError(f"counts: needs whole numbers, got {table.dtype}")
+    if table.dtype.kind == "f":  # a half has no 2^53
+        table = table.astype(np.float64)
     wrong = ~((table >= 0) & (table == np.floor(table)) & (table < 2**53))
     if wrong.any():
         row, column = np.argwhere(wrong)[0]

@@ -497,6 +497,10 @@ def _count_complete(
         for row in rows:
             item = tuple(map(row.count, scale))
             freq[item] = freq.get(item, 0) + 1
-    except (TypeError, ValueError):  # something that is neither equal nor unequal
+    except (
+        ArithmeticError,
+        TypeError,
+        ValueError,
+    ):  # something that is neither equal nor unequal
         return None
     return freq if set(map(sum, freq)) == {n_raters} else None

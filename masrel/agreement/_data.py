@@ -1,6 +1,6 @@
 """Ratings in any form, checked once, as integer codes."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, get_args
 
@@ -15,9 +15,11 @@ from masrel.agreement._labels import (
     check_categories,
     code_type,
     doubt_texts,
+    is_row,
     label_rows,
     labels_met,
     lookup,
+    shown,
 )
 from masrel.agreement._weights import category_values
 from masrel.errors import ParameterError, RatingsError
@@ -161,8 +163,7 @@ def _table_codes(
 ) -> tuple[Codes, tuple[Label, ...], bool]:
     # of an array or a frame: codes, scale, and whether that was declared
     declared = None if categories is None else check_categories(categories)
-    if isinstance(ratings, np.ma.MaskedArray):
-        ratings = unmasked(ratings)
+    ratings = plain_array(ratings)
     if not isinstance(ratings, np.ndarray):  # a DataFrame, without importing pandas
         return frame_codes(ratings, declared)
     if ratings.ndim != 2:
@@ -183,8 +184,16 @@ def check_scale(known: tuple[Label, ...], categories: Sequence[Label]) -> None:
         )
 
 
-def unmasked(ratings: Any) -> NDArray[Any]:
-    """Make what is masked missing."""
+def plain_array(ratings: Any) -> Any:
+    """Return a matrix or a masked array as a plain one, and all else as it is."""
+    if isinstance(ratings, np.ma.MaskedArray):
+        return _unmasked(ratings)
+    is_other = isinstance(ratings, np.ndarray) and type(ratings) is not np.ndarray
+    return np.asarray(ratings) if is_other else ratings
+
+
+def _unmasked(ratings: Any) -> NDArray[Any]:
+    # what is masked is missing
     masked = np.ma.getmaskarray(ratings)
     if not masked.any():
         return np.asarray(ratings.data)
@@ -266,6 +275,8 @@ def code_long(
         raise ParameterError(
             f"repeated: needs one of {', '.join(get_args(Repeated))}, got {repeated!r}"
         )
+    if not hasattr(frame, "columns") or not hasattr(frame, "iloc"):
+        raise RatingsError(f"frame: needs a DataFrame, got {type(frame).__name__}")
     absent = [name for name in (item, rater, grade) if name not in frame.columns]
     if absent:
         raise RatingsError(
@@ -348,7 +359,7 @@ def code_pairs(
         if categories is not None:
             check_scale(pairs.categories, categories)
         return pairs
-    if isinstance(pairs, str) or not isinstance(pairs, Iterable):
+    if not is_row(pairs):
         raise RatingsError(
             f"pairs: needs one table (items, 2) per rater, got {type(pairs).__name__}"
         )
@@ -369,13 +380,14 @@ def code_pairs(
 
 def _plain(table: object, rater: int) -> list[list[object]]:
     # one rater's table -> n_items lists of 2 labels
-    if not isinstance(table, Iterable) or isinstance(table, str):
-        raise RatingsError(f"pairs: rater {rater} needs a table, got {table!r}")
+    if not is_row(table):
+        raise RatingsError(f"pairs: rater {rater} needs a table, got {shown(table)}")
     rows = []
     for item, pair in enumerate(table):
-        if isinstance(pair, str) or not isinstance(pair, Iterable):
+        if not is_row(pair):
             raise RatingsError(
-                f"pairs: rater {rater}, item {item}: needs two grades, got {pair!r}"
+                f"pairs: rater {rater}, item {item}: needs two grades, got "
+                f"{shown(pair)}"
             )
         rows.append(list(pair))
         if len(rows[-1]) != 2:
@@ -410,8 +422,7 @@ def rating_values(
 ) -> NDArray[np.float64]:
     """Return ratings as numbers, ``nan`` where there is none."""
     # -> (n_items, n_raters)
-    if isinstance(ratings, np.ma.MaskedArray):
-        ratings = unmasked(ratings)
+    ratings = plain_array(ratings)
     if categories is None and isinstance(ratings, np.ndarray):
         if ratings.ndim == 2 and ratings.dtype.kind in "iuf" and ratings.size:
             values = ratings.astype(np.float64)

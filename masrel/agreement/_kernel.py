@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.agreement._data import CodedRatings
+from masrel.agreement._labels import shown
 from masrel.errors import ParameterError, UndefinedStatisticWarning
 
 Floats = NDArray[np.float64]
@@ -108,6 +109,13 @@ def check_variance(variance: str) -> None:
         raise ParameterError(
             f"variance: needs one of {', '.join(VARIANCES)}, got {variance!r}"
         )
+
+
+def check_level(level: float) -> None:
+    """Check the level of an interval, or the probability of a word."""
+    is_number = isinstance(level, int | float | np.integer | np.floating)
+    if not (is_number and 0.0 < level < 1.0):
+        raise ParameterError(f"level: needs (0, 1), got {shown(level)}")
 
 
 def check_population(population: int | None, n_items: int) -> None:

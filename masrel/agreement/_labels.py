@@ -4,7 +4,7 @@ import itertools
 import sys
 import warnings
 from collections.abc import Iterable, Mapping, Sequence, Set
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,12 @@ Codes = NDArray[np.signedinteger[Any]]
 
 
 _PLAIN = ({str}, {int})
+
+
+def shown(value: object) -> str:
+    """Return what a message shows of a value: one line, and not a long one."""
+    text = " ".join(f"{value!r}".split())
+    return text if len(text) <= 80 else f"{text[:77]}..."
 
 
 SET_SEPARATOR, EMPTY_SET = "; ", "∅"
@@ -41,7 +47,10 @@ def is_missing(label: object) -> bool:
         return True
     if isinstance(label, str):
         return False
-    same = label == label
+    try:
+        same = label == label
+    except (ArithmeticError, TypeError, ValueError):  # a signalling nan of decimals
+        return False
     if isinstance(same, bool | np.bool_):
         return not same
     return same is label  # pandas' NA, which does not know whether it is itself
@@ -218,13 +227,13 @@ def label_rows(
 
 def _rows(ratings: Any) -> list[list[object]]:
     # nested sequences -> n_items lists of labels
-    if not _is_row(ratings):
+    if not is_row(ratings):
         raise RatingsError(
             f"ratings: needs an item × rater table, got {type(ratings).__name__}"
         )
     rows: list[list[object]] = []
     for row in ratings:
-        if not _is_row(row):
+        if not is_row(row):
             raise RatingsError(
                 f"ratings: row {len(rows)} needs one rating per rater, got {row!r}"
             )
@@ -232,11 +241,11 @@ def _rows(ratings: Any) -> list[list[object]]:
     return rows
 
 
-def _is_row(row: object) -> bool:
+def is_row(row: object) -> TypeGuard[Iterable[Any]]:
+    """Return whether something is a sequence of labels or of rows."""
     # a mapping would give its keys, a set its labels in any order
-    return isinstance(row, Iterable) and not isinstance(
-        row, str | bytes | Mapping | Set
-    )
+    is_iterable = isinstance(row, Iterable) and getattr(row, "ndim", 1) > 0
+    return is_iterable and not isinstance(row, str | bytes | Mapping | Set)
 
 
 def _refuse_shape(rows: list[list[object]]) -> None:

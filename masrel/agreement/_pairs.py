@@ -117,6 +117,8 @@ def _features(coded: CodedRatings, v: Floats) -> Floats:
     # (n_items, 2 + 2 n_categories): disagreement, presence, both categories; zeros
     # where a rating is missing
     codes, ranks = coded.codes, np.arange(len(v))
+    if not len(v):  # nobody rated anything
+        return np.zeros((len(codes), 2))
     both = np.min(codes, axis=1) >= 0
     disagreement = np.where(both, v[codes[:, 0], codes[:, 1]], 0.0)
     first, second = (both[:, None] & (codes[:, [r]] == ranks) for r in (0, 1))

@@ -249,6 +249,8 @@ def pooled_kernel(coefficient: PooledCoefficient) -> Kernel:
     """Return a coefficient of unnamed raters as a function of sums over items."""
 
     def value(sums: Floats, v: Floats) -> Floats:
+        if not len(v):  # nobody rated anything
+            return np.full(sums.shape[:-1], np.nan)
         observed = divide(sums[..., 0], sums[..., 1])
         constant, factor, divisor = coefficient.chance(len(v), v.sum(), 1.0)
         if factor == 0:

@@ -14,8 +14,8 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from masrel.agreement._labels import Label
-from masrel.errors import ParameterError
+from masrel.agreement._labels import Label, is_row, shown
+from masrel.errors import ParameterError, RatingsError
 
 WeightName = Literal[
     "identity",
@@ -193,8 +193,14 @@ def declared_weights(
     """
     if weights is None:
         weights = "identity"
+    if not is_row(categories):
+        raise RatingsError(
+            "categories: needs a sequence of at least one label, got "
+            f"{shown(categories)}"
+        )
+    categories = tuple(categories)
     if isinstance(weights, str):
-        return named_weights(weights, tuple(categories), declared)
+        return named_weights(weights, categories, declared)
     if isinstance(weights, Weights):
         return _of_other(weights, categories, declared)
     _check_order(categories, declared)
@@ -223,6 +229,8 @@ def named_weights(name: str, categories: tuple[Label, ...], declared: bool) -> W
         )
     if name == "identity":
         return identity_weights(n)
+    if n == 0:  # nobody rated anything
+        return Weights(name=name, n_categories=0)
     _check_order(categories, declared)
     values = category_values(categories)
     if (reason := _absence(name, values)) is not None:
@@ -232,6 +240,9 @@ def named_weights(name: str, categories: tuple[Label, ...], declared: bool) -> W
     distance = _DISTANCES[name](values)
     matrix = every_pair(values, distance)
     largest = max(map(max, matrix))
+    if not largest:  # a sine of π, of values without end
+        reason = f"0/0: the values lie too far apart for {name} weights"
+        return Weights(name=name, n_categories=n, reason=reason)
     return over_one_denominator(
         name, [[value / largest for value in row] for row in matrix]
     )
@@ -252,13 +263,19 @@ def category_values(categories: Sequence[Label]) -> list[Fraction]:
     for value in categories:
         try:
             is_finite = math.isfinite(float(value))
-        except OverflowError:  # a whole number that no float holds
+        except (OverflowError, TypeError):  # a whole number that no float holds
             is_finite = False
         if not is_finite:
             raise ParameterError(
                 f"categories: weights need finite numbers, got {_shortened(value)}"
             )
-    return [Fraction(value) for value in categories]
+    return [_exact(value) for value in categories]
+
+
+def _exact(value: Label) -> Fraction:
+    if isinstance(value, np.floating):  # of another size than Python's
+        return Fraction(*value.as_integer_ratio())
+    return Fraction(value)
 
 
 def _shortened(value: Label) -> str:

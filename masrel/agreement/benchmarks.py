@@ -4,7 +4,10 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from masrel.agreement._kernel import undefined
+import numpy as np
+
+from masrel.agreement._kernel import check_level, undefined
+from masrel.agreement._labels import shown
 from masrel.agreement.significance import _why_untestable
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate
@@ -163,7 +166,9 @@ def strength(value: float, *, scale: BandScale = "landis_koch") -> str:
     ('fair', 'moderate')
     """
     steps = _steps(scale)
-    if math.isnan(value):
+    if not isinstance(value, int | float | np.number):
+        raise ParameterError(f"value: needs a number, got {shown(value)}")
+    if value != value:
         return "undefined"
     reached = (
         word for low, closed, word in steps if value > low or (closed and value == low)
@@ -219,8 +224,7 @@ def benchmark(
     >>> benchmark(cohen_kappa_from_table([[20, 5], [10, 15]]))
     'slight'
     """
-    if not 0.0 < level < 1.0:
-        raise ParameterError(f"level: needs (0, 1), got {level}")
+    check_level(level)
     every = bands(estimate, scale=scale)
     if math.isnan(every[-1].cumulative):
         return "undefined"

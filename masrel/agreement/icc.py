@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.agreement._data import complete_values, rating_values
-from masrel.agreement._kernel import undefined
+from masrel.agreement._kernel import check_level, undefined
 from masrel.agreement._labels import Label
 from masrel.agreement._reml import (
     Components,
@@ -308,8 +308,7 @@ def _check(form: str, level: float) -> None:
         raise ParameterError(
             f"form: needs one of {', '.join(get_args(IccForm))}, got {form!r}"
         )
-    if not 0.0 < level < 1.0:
-        raise ParameterError(f"level: needs (0, 1), got {level}")
+    check_level(level)
 
 
 def _reason(

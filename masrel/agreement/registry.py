@@ -9,7 +9,7 @@ from typing import Literal, get_args
 from masrel.agreement._counts import count_ratings
 from masrel.agreement._data import CodedRatings, code_pairs, code_ratings
 from masrel.agreement._kernel import Kernel
-from masrel.agreement._labels import Label
+from masrel.agreement._labels import Label, shown
 from masrel.agreement._metrics import (
     ORDINAL_KERNEL,
     Metric,
@@ -196,7 +196,9 @@ class Coefficient:
 
     def _refuse_weights(self, weights: "WeightsLike") -> None:
         if not is_identity(weights):
-            raise ParameterError(f"weights: {self.title} takes none, got {weights!r}")
+            raise ParameterError(
+                f"weights: {self.title} takes none, got {shown(weights)}"
+            )
 
 
 _RANKS = frozenset[Property](

@@ -1,6 +1,7 @@
 """The result of a test of a hypothesis, and p-values of estimates."""
 
 import math
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
@@ -8,6 +9,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from masrel.agreement._kernel import NO_SPREAD, ONE_PAIR, undefined
+from masrel.agreement._labels import is_row, shown
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate
 
@@ -122,6 +124,7 @@ def p_value(
             f"alternative: needs one of {', '.join(get_args(Alternative))}, "
             f"got {alternative!r}"
         )
+    _check_estimate(estimate)
     value = _null(estimate, null)
     reason = _why_untestable(estimate)
     if reason is not None:
@@ -199,16 +202,28 @@ def _null(estimate: Estimate, null: float | None) -> float:
     return _finite("null", null)
 
 
+def _check_estimate(estimate: object) -> None:
+    """Check that a result is an estimate."""
+    if not isinstance(estimate, Estimate):
+        raise ParameterError(
+            f"estimate: needs an Estimate, got {type(estimate).__name__}"
+        )
+
+
+_LARGEST = sys.float_info.max
+
+
 def _finite(name: str, value: float) -> float:
     """Check a number."""
-    is_number = isinstance(value, int | float | np.number)
-    if not is_number or isinstance(value, bool) or not math.isfinite(value):
-        raise ParameterError(f"{name}: needs a finite number, got {value!r}")
+    is_number = isinstance(value, int | float | np.integer | np.floating)
+    if not is_number or isinstance(value, bool) or not abs(value) <= _LARGEST:
+        raise ParameterError(f"{name}: needs a finite number, got {shown(value)}")
     return float(value)
 
 
 def _why_untestable(estimate: Estimate) -> str | None:
     """Return why an estimate has no law around it, or None."""
+    _check_estimate(estimate)
     if math.isnan(estimate.value):
         return estimate.reason or "the estimate itself is undefined"
     if estimate.standard_error == 0.0:
@@ -253,9 +268,15 @@ def holm(p_values: Sequence[float]) -> list[float]:
     >>> holm([0.03, 0.01, 0.02])
     [0.04, 0.03, 0.04]
     """
+    if not is_row(p_values):
+        raise ParameterError(f"p_values: needs a sequence, got {shown(p_values)}")
+    p_values = list(p_values)
     for place, p in enumerate(p_values):
-        if not (math.isnan(p) or 0.0 <= p <= 1.0):
-            raise ParameterError(f"p_values: place {place}: needs [0, 1], got {p}")
+        is_number = isinstance(p, int | float | np.number)
+        if not (is_number and (math.isnan(p) or 0.0 <= p <= 1.0)):
+            raise ParameterError(
+                f"p_values: place {place}: needs [0, 1], got {shown(p)}"
+            )
     known = [place for place, p in enumerate(p_values) if not math.isnan(p)]
     adjusted, least = [math.nan] * len(p_values), 0.0
     for rank, place in enumerate(sorted(known, key=p_values.__getitem__)):

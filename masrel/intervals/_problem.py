@@ -22,7 +22,8 @@ from masrel.agreement import (
 from masrel.agreement._count_tables import places_of
 from masrel.agreement._counts import distinct_rows, item_counts
 from masrel.agreement._data import check_scale
-from masrel.agreement._kernel import Floats, Kernel, RaterSums
+from masrel.agreement._kernel import Floats, Kernel, RaterSums, check_level
+from masrel.agreement._labels import shown
 from masrel.errors import (
     ParameterError,
     SmallSampleWarning,
@@ -228,8 +229,7 @@ def pose_problem(
         raise ParameterError(
             f"target: needs one of {', '.join(get_args(Target))}, got {target!r}"
         )
-    if not 0.0 < level < 1.0:
-        raise ParameterError(f"level: needs (0, 1), got {level}")
+    check_level(level)
     if isinstance(ratings, CountedRatings) and not entry.tells_raters_apart:
         coded = _of_counted(ratings, target, categories)
     else:
@@ -403,6 +403,15 @@ def warn_small(
     # called by what a method calls: the warning points to who called the method
     warnings.warn(note, SmallSampleWarning, stacklevel=4)
     return (note,)
+
+
+def check_whole(name: str, value: int, minimum: int) -> None:
+    """Check a whole number of at least a minimum."""
+    is_whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if not is_whole or value < minimum:
+        raise ParameterError(
+            f"{name}: needs a whole number of at least {minimum}, got {shown(value)}"
+        )
 
 
 def recorded_generator(

@@ -48,7 +48,8 @@ class Prior:
             raise ParameterError(
                 f"prior: needs one of {', '.join(get_args(PriorName))}, got {name!r}"
             )
-        if not 0.0 < concentration < math.inf:
+        is_number = isinstance(concentration, int | float | np.number)
+        if not (is_number and 0.0 < concentration < math.inf):
             raise ParameterError(
                 f"concentration: needs a positive number, got {concentration!r}"
             )

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.agreement._kernel import Floats
+from masrel.agreement._labels import is_row, shown
 from masrel.errors import ParameterError
 from masrel.intervals._lattice import Lattice, lattice_of
 from masrel.intervals._problem import Integers, IntervalProblem, blocks, warn_small
@@ -252,6 +253,10 @@ def _numbered(
     problem: IntervalProblem, clusters: Sequence[object] | NDArray[Any]
 ) -> Integers:
     """Return each item's number of cluster, -1 without ratings."""
+    if not isinstance(clusters, str) and not is_row(clusters):
+        raise ParameterError(
+            f"clusters: needs one label for each item, got {shown(clusters)}"
+        )
     labels = list(clusters)
     n_items = problem.coded.codes.shape[0]
     if len(labels) != n_items:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.agreement import Label, Metric, WeightsLike
+from masrel.agreement._labels import shown
 from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target
 from masrel.intervals._alpha_bootstraps import (
@@ -27,6 +28,7 @@ from masrel.intervals._problem import (
     IntervalProblem,
     Statistic,
     check_rng,
+    check_whole,
     pose_problem,
     recorded_generator,
 )
@@ -257,13 +259,14 @@ def _check_options(kind: _Kind, exact: _Exact, budget: DrawBudget) -> None:
         )
     if not (exact is True or exact is False or exact == "auto"):
         raise ParameterError(f'exact: needs "auto", True or False, got {exact!r}')
-    if budget.n_resamples < 100:
+    check_whole("n_resamples", budget.n_resamples, 100)
+    check_whole("max_resamples", budget.max_resamples, 1)
+    tolerance = budget.tolerance
+    if tolerance is not None and not (
+        isinstance(tolerance, int | float | np.number) and tolerance > 0.0
+    ):
         raise ParameterError(
-            f"n_resamples: needs at least 100, got {budget.n_resamples}"
-        )
-    if budget.tolerance is not None and not budget.tolerance > 0.0:
-        raise ParameterError(
-            f"tolerance: needs a number above 0, got {budget.tolerance}"
+            f"tolerance: needs a number above 0, got {shown(tolerance)}"
         )
     if budget.max_resamples < budget.n_resamples:
         raise ParameterError(

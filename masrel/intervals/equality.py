@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from masrel.agreement import Label, Significance, count_ratings
+from masrel.agreement._labels import is_row, shown
 from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
 from masrel.estimates import Estimate
 
@@ -177,11 +178,11 @@ def _concordance(
         counted = count_ratings(ratings, categories)
     except RatingsError as error:
         raise RatingsError(f"groups: group {place}: {error}") from error
-    rows = np.array(counted.items.rows, dtype=np.int64).reshape(
-        -1, counted.items.n_categories
-    )
-    freq = np.array(counted.items.freq, dtype=np.int64)
     used = counted.items.n_categories
+    rows = np.array(counted.items.rows, dtype=np.int64).reshape(-1, max(used, 1))
+    freq = np.array(counted.items.freq, dtype=np.int64)
+    if used == 0:
+        raise RatingsError(f"groups: group {place}: needs a rating, got none")
     if used > 2 or rows.sum(axis=1).max(initial=0) > 2:
         raise RatingsError(
             f"groups: group {place}: needs two raters and two categories, got "

@@ -19,9 +19,9 @@ from scipy.special import betainc, expit, gammaln, logit
 
 from masrel.agreement import Label
 from masrel.agreement._data import code_pairs, pairs_of_raters
-from masrel.agreement._kernel import Floats
+from masrel.agreement._kernel import Floats, check_level
 from masrel.agreement._pairs import pair_table
-from masrel.errors import ParameterError, UndefinedStatisticWarning
+from masrel.errors import UndefinedStatisticWarning
 from masrel.estimates import Interval, Target
 from masrel.intervals._dirichlet_multinomial import log_convolve
 from masrel.intervals._quadrature import (
@@ -136,8 +136,7 @@ def retest_model(
     >>> model.n_pairs, round(model.kappa.value, 3)
     ((4, 4), 0.631)
     """
-    if not 0.0 < level < 1.0:
-        raise ParameterError(f"level: needs (0, 1), got {level}")
+    check_level(level)
     checked_prior = Prior.of(prior, concentration)
     coded = code_pairs(pairs, categories)
     every = [pair_table(codes, coded.n_categories) for codes in pairs_of_raters(coded)]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.agreement import Label, code_ratings
-from masrel.agreement._kernel import Floats
+from masrel.agreement._kernel import Floats, check_level
 from masrel.agreement._labels import Codes
 from masrel.errors import ParameterError, RatingsError
 from masrel.estimates import Distribution, Estimate, Interval, Target
@@ -240,8 +240,7 @@ def latent_trait(
 def _check_kappa(items: Items, level: float) -> None:
     if items not in _TARGETS:
         raise ParameterError(f'items: needs "fixed" or "random", got {items!r}')
-    if not 0.0 < level < 1.0:
-        raise ParameterError(f"level: needs (0, 1), got {level}")
+    check_level(level)
 
 
 def expected_seconds(

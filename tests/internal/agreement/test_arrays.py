@@ -126,7 +126,7 @@ def test_a_number_of_no_category_is_refused_without_noise(stranger: float) -> No
 def text_arrays(draw: st.DrawFn) -> NDArray[Any]:
     width = draw(st.sampled_from([1, 2, 3, 10]))
     shape = draw(arrays.array_shapes(min_dims=2, max_dims=2, max_side=5))
-    letters = st.text("01+23aé\U0001d538", max_size=min(width, 3))
+    letters = st.text("01+23aé\U0001d538", min_size=1, max_size=min(width, 3))
     dtype = draw(st.sampled_from("<>")) + f"U{width}"
     return draw(arrays.arrays(dtype, shape, elements=letters))
 
