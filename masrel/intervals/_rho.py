@@ -33,6 +33,9 @@ FEW_ITEMS = 10
 """Items below which the interval under another prior is noted."""
 
 
+_SUREST = 1e12  # concentration of a prior that leaves ratings no say
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Prior:
     """The prior of the Dirichlet-multinomial model."""
@@ -49,9 +52,10 @@ class Prior:
                 f"prior: needs one of {', '.join(get_args(PriorName))}, got {name!r}"
             )
         is_number = isinstance(concentration, int | float | np.number)
-        if not (is_number and 0.0 < concentration < math.inf):
+        if not (is_number and 0.0 < concentration <= _SUREST):
             raise ParameterError(
                 f"concentration: needs a positive number, got {concentration!r}"
+                f" (and at most {_SUREST:g})"
             )
         return cls(name=name, concentration=float(concentration))
 

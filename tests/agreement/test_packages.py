@@ -200,7 +200,7 @@ def test_nothing_is_rounded() -> None:
 
 def test_a_mistyped_option_is_named_with_those_there_are() -> None:
     # The package krippendorff says that a 'str' object is not callable.
-    said = "metric: needs one of nominal, ordinal, interval, ratio, got 'ordinl'"
+    said = "metric: needs one of nominal, ordinal, interval, ratio, .* got 'ordinl'"
     with pytest.raises(ParameterError, match=said):
         krippendorff_alpha([[1, 2], [2, 2]], metric="ordinl")  # type: ignore[arg-type]
     with pytest.raises(

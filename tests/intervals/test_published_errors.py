@@ -171,7 +171,7 @@ def test_an_error_answers_one_question_of_some_coefficients() -> None:
     refused("irrCAC has none of Cohen's κ", "cohen_kappa", error="irrcac")
     refused("irrCAC has none of Scott's π", "scott_pi", error="irrcac")
     refused(
-        '"both" needs at least 3 raters',
+        "needs at least 3 raters, because one is left out",
         *("cohen_kappa",),
         target="both",
         error="unconditional",

@@ -135,5 +135,5 @@ def test_odd_input_gives_a_value_a_reason_or_one_sentence(
             raise AssertionError(f"{words} is {result}") from error
         n_answers += 1
     # both happen often, or nothing is tested
-    assert n_answers > 0.15 * n_calls
-    assert n_refusals > 0.15 * n_calls
+    assert n_answers > 0.1 * n_calls
+    assert n_refusals > 0.1 * n_calls
