@@ -24,21 +24,26 @@ class PairCounts:
     def of(cls, codes: Integers, freq: Integers, n_categories: int) -> "PairCounts":
         """Count distinct rows of codes that occur so often."""
         # Takes codes (n_patterns, n_raters), freq (n_patterns,)
-        n_raters, q = codes.shape[1], n_categories + 1
-        side = n_raters * q
+        n_raters, q = codes.shape[1], n_categories
+        total = np.zeros((n_raters * q, n_raters * q))
         # a sum over a block of ones is exact in 32 bits, and twice as fast
-        narrow = int(freq.sum()) < _EXACT
-        total = np.zeros((side, side))
+        dtype = np.float32 if int(freq.sum()) < _EXACT else np.float64
         for start in range(0, len(codes), _BLOCK):
             block = slice(start, start + _BLOCK)
-            ones = (codes[block, :, None] == np.arange(-1, n_categories)).reshape(
-                -1, side
-            )
-            each = ones.astype(np.float32 if narrow else np.float64)
-            total += (each * freq[block, None].astype(each.dtype)).T @ each
-        return cls(
-            tables=np.rint(total).astype(np.int64).reshape(n_raters, q, n_raters, q)
-        )
+            ones = codes[block, :, None] == np.arange(q, dtype=codes.dtype)
+            each = ones.reshape(len(ones), -1).astype(dtype)
+            if (freq[block] == 1).all():
+                total += each.T @ each  # of a matrix with itself: half the work
+            else:
+                total += (each * freq[block, None].astype(dtype)).T @ each
+        met = np.rint(total).astype(np.int64).reshape(n_raters, q, n_raters, q)
+        # a rating without one of the other is what all ratings are less those with
+        tables = np.zeros((n_raters, q + 1, n_raters, q + 1), dtype=np.int64)
+        tables[:, 1:, :, 1:] = met
+        chosen = np.einsum("ikik->ik", met)
+        tables[:, 0, :, 1:] = chosen - met.sum(axis=1)
+        tables[:, 1:, :, 0] = chosen[:, :, None] - met.sum(axis=3)
+        return cls(tables=tables)
 
     @property
     def n_raters(self) -> int:

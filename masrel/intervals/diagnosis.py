@@ -321,7 +321,7 @@ def _counted_rows(coded: CodedRatings) -> tuple[Integers, Integers]:
     codes = coded.codes
     if (coded.n_categories + 1) ** codes.shape[1] <= _MAX_KEYS:
         return distinct_rows(codes, coded.n_categories)
-    return codes.astype(np.int64), np.ones(len(codes), dtype=np.int64)
+    return codes, np.ones(len(codes), dtype=np.int64)
 
 
 def _pairs(
