@@ -204,9 +204,12 @@ def _interval_lines(interval: Interval) -> _Lines:
     ends = f"{interval.low:.4g} to {interval.high:.4g}"
     if interval.reason is not None:
         ends = f"undefined ({interval.reason})"
+    population = _POPULATIONS[interval.target]
+    if interval.unit == "clusters":
+        population = population.replace("items", "clusters of items")
     return [
         (f"{100.0 * interval.level:.6g} % {interval.kind} interval", ends),
-        ("generalises to", _POPULATIONS[interval.target]),
+        ("generalises to", population),
         ("method", interval.method),
         *(("note", note) for note in interval.notes),
     ]

@@ -89,7 +89,10 @@ def meaning(interval: Interval, noun: Noun) -> str:
 def promise(interval: Interval, noun: Noun) -> str:
     """Return what an interval promises, and of whom."""
     level = f"{percent(interval.level)} %"
-    population = _POPULATIONS[interval.target].replace("{}", noun)
+    # clusters are drawn anew with the items in them
+    of_whom = f"cluster of {noun}" if interval.unit == "clusters" else noun
+    population = _POPULATIONS[interval.target].replace("{}", of_whom)
+    population = population.replace(f"cluster of {noun}s", f"clusters of {noun}s")
     if interval.kind == "confidence":
         return (
             f"if {population}, again and again, about {level} of the intervals made "

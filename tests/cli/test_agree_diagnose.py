@@ -201,6 +201,9 @@ def test_clusters_are_left_out_as_in_the_library(masrel: Caller, sites: Path) ->
     out = masrel("agree", sites, *names).out
     assert "in 18 clusters by 'patient'" in out.replace("\n  ", " ")
     assert "SE: delta method, clusters as the sample." in out
+    explained = masrel("agree", sites, *names, "--explain").out.replace("\n  ", " ")
+    assert "if these raters graded other clusters of items like these" in explained
+    assert "(from leaving out one cluster of items at a time)" in explained
 
 
 def test_groups_with_clusters_in_common_are_compared_cluster_by_cluster(

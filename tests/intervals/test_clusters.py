@@ -100,6 +100,7 @@ def test_by_default_clusters_are_left_out_on_the_logit() -> None:
     assert interval is not None
     assert interval.method == "cluster jackknife, t(19) on the logit"
     assert interval.low < found.value < interval.high < 1.0
+    assert "generalises to: other clusters of items" in str(found)
     plain = jackknife("gwet_ac", ratings, target="items", clusters=clusters)
     # the same error, divided by the slope of the logit between -1 and 1
     share = (1.0 + found.value) / 2.0
