@@ -16,12 +16,14 @@ from masrel.agreement._weights import (
     declared_weights,
 )
 from masrel.agreement.benchmarks import Band, BandScale, bands, benchmark, strength
+from masrel.agreement.bland_altman import LimitsOfAgreement, limits_of_agreement
 from masrel.agreement.brennan_prediger import (
     brennan_prediger,
     brennan_prediger_from_counts,
 )
 from masrel.agreement.category import category_kappa, fleiss_null
 from masrel.agreement.cohen import cohen_kappa, cohen_kappa_from_table
+from masrel.agreement.concordance import lin_ccc
 from masrel.agreement.conger import conger_kappa
 from masrel.agreement.contingency import (
     McnemarKind,
@@ -46,6 +48,7 @@ from masrel.agreement.krippendorff import (
     krippendorff_alpha_from_counts,
 )
 from masrel.agreement.light import Deletion, light_kappa
+from masrel.agreement.measurement import ErrorKind, mdc, sem
 from masrel.agreement.percent import percent_agreement, percent_agreement_from_counts
 from masrel.agreement.registry import COEFFICIENTS, Coefficient, Property, coefficient
 from masrel.agreement.scott import scott_pi, scott_pi_from_table
@@ -67,8 +70,10 @@ __all__ = [
     "Coefficient",
     "CountedRatings",
     "Deletion",
+    "ErrorKind",
     "IccForm",
     "Label",
+    "LimitsOfAgreement",
     "McnemarKind",
     "Metric",
     "Property",
@@ -110,7 +115,10 @@ __all__ = [
     "krippendorff_alpha",
     "krippendorff_alpha_from_counts",
     "light_kappa",
+    "limits_of_agreement",
+    "lin_ccc",
     "mcnemar",
+    "mdc",
     "p_value",
     "percent_agreement",
     "percent_agreement_from_counts",
@@ -119,6 +127,7 @@ __all__ = [
     "robinson_a",
     "scott_pi",
     "scott_pi_from_table",
+    "sem",
     "specific_agreement",
     "stratified_kappa",
     "strength",

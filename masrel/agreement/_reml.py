@@ -26,6 +26,9 @@ _CONVERGED = 1e-11
 _MANY = 100
 """Raters from which on the profile is taken to have one valley: looking costs much."""
 
+_RATIOS = (0.0, *np.geomspace(1e-3, 1e3, 10))
+"""Ratios of raters to the residual, among which the way down to a valley begins."""
+
 _TO_ZERO = -0.3
 """Step of a logarithm from which on 0 is tried: towards 0 they tend to -1."""
 
@@ -433,7 +436,12 @@ def icc_ends(
     fit = components.fit
     if fit is None:
         return _ends_without_residual(components, absolute, level)
-    profile = _Profile(fit=fit, absolute=absolute, has_raters=components.has_raters)
+    profile = _Profile(
+        fit=fit,
+        absolute=absolute,
+        has_raters=components.has_raters,
+        last=float(fit.ratios[1]),
+    )
     height = NormalDist().inv_cdf(0.5 + 0.5 * level)
     low, high = profile.end(height, -1.0), profile.end(height, 1.0)
     return low, high
@@ -462,6 +470,7 @@ class _Profile:
     fit: _Fit
     absolute: bool
     has_raters: bool
+    last: float  # ratio of raters that was likeliest last
 
     def end(self, height: float, side: float) -> float:
         """Return ρ where the root of the deviance above the least is so high."""
@@ -519,20 +528,22 @@ class _Profile:
                 point = self._at(odds, ratio)
                 continue
             step = -lean * ratio / max(abs(bend * ratio**2 + lean * ratio), 1e-12)
+            if abs(step) < 1e-5:  # which moves the deviance by its square
+                break
             ahead, point = self._shorter(odds, ratio, point, step)
-            if ahead == ratio or abs(step) < 1e-6:
+            if ahead == ratio:
                 break
             ratio = ahead
+        self.last = ratio
         above = math.sqrt(max(point.deviance - self.fit.deviance, 0.0))
         slope = point.slopes[0] * self._of_items(odds, ratio)
         return above, slope / (2.0 * above) if above else 0.0
 
     def _start(self, odds: float) -> float:
         # the best of some ratios of raters: there may be more than one valley
-        best = float(self.fit.ratios[1])
         if not self.has_raters or len(self.fit.sums.total) > _MANY:
-            return best
-        grid = np.array([0.0, *np.geomspace(1e-3, 1e3, 10), best])
+            return self.last
+        grid = np.array([*_RATIOS, self.last])
         if self.absolute:
             heights = np.diag(_deviances(self.fit.sums, odds * (1.0 + grid), grid))
         else:

@@ -39,6 +39,7 @@ from masrel.agreement._weights import (
 )
 from masrel.agreement.brennan_prediger import brennan_prediger
 from masrel.agreement.cohen import cohen_kappa
+from masrel.agreement.concordance import lin_ccc
 from masrel.agreement.conger import _KERNEL as CONGER_KERNEL
 from masrel.agreement.conger import conger_kappa
 from masrel.agreement.fleiss import fleiss_kappa
@@ -50,6 +51,7 @@ from masrel.agreement.kendall import kendall_w
 from masrel.agreement.krippendorff import _KERNEL as KRIPPENDORFF_KERNEL
 from masrel.agreement.krippendorff import krippendorff_alpha
 from masrel.agreement.light import light_kappa
+from masrel.agreement.measurement import ErrorKind, mdc, sem
 from masrel.agreement.percent import percent_agreement
 from masrel.agreement.scott import scott_pi
 from masrel.agreement.two_sessions import pooled_kappa, stratified_kappa
@@ -106,6 +108,9 @@ class Coefficient:
         Whether it takes weights.
     interval_target : {"items", "raters", "both"} or None
         What the interval that it comes with generalises to; None without one.
+    in_units : bool
+        Whether its value is in the units of the ratings, and so no coefficient that
+        could be shown beside others.
     code : callable
         Ratings and categories to the codes its kernel takes.
     metric : {"nominal", "ordinal", "interval", "ratio", "jaccard", "masi"} or None
@@ -131,6 +136,7 @@ class Coefficient:
     weighted: bool = True
     interval_target: Target | None = None
     tells_raters_apart: bool = True
+    in_units: bool = False
     code: Callable[..., CodedRatings] = code_ratings
     metric: Metric | None = None
 
@@ -203,6 +209,13 @@ class Coefficient:
 
 _RANKS = frozenset[Property](
     {"items in any order", "raters in any order", "unused category", "items twice"}
+)
+
+_ERRORS: tuple[tuple[str, str, Callable[..., Estimate], ErrorKind, Target], ...] = (
+    ("sem", "SEM", sem, "agreement", "both"),
+    ("sem_consistency", "SEM, consistency", sem, "consistency", "items"),
+    ("mdc", "MDC95", mdc, "agreement", "both"),
+    ("mdc_consistency", "MDC95, consistency", mdc, "consistency", "items"),
 )
 
 _ALL = (
@@ -326,6 +339,31 @@ _ALL = (
             interval_target=icc_target(form),
         )
         for form, name in ICC_NAMES.items()
+    ),
+    Coefficient(
+        name="lin_ccc",
+        title="Lin's concordance",
+        function=lin_ccc,
+        kernel=None,
+        properties=_RANKS | {"perfect agreement"},
+        weighted=False,
+        interval_target="items",
+    ),
+    *(
+        Coefficient(
+            name=name,
+            title=title,
+            function=partial(function, kind=kind),
+            kernel=None,
+            properties=_RANKS - {"items twice"},
+            lowest=0.0,
+            highest=math.inf,
+            chance_corrected=False,
+            weighted=False,
+            interval_target=target,
+            in_units=True,
+        )
+        for name, title, function, kind, target in _ERRORS
     ),
 )
 
