@@ -57,16 +57,12 @@ class Components:
         parts = {"items": self.items, "raters": self.raters, "residual": self.residual}
         if not self.has_raters:
             del parts["raters"]
-        listed = ", ".join(
+        listed = [
             f"{name} {value * self.unit * self.unit:.4g}"
+            + " (the least it can be)" * (value == 0.0)
             for name, value in parts.items()
-        )
-        zeros = [name for name, value in parts.items() if value == 0.0]
-        ends = f"; {' and '.join(zeros)}: 0 is the least it can be" if zeros else ""
-        return (
-            "ratings are missing, so variances are estimated by restricted maximum "
-            f"likelihood ({listed}){ends}"
-        )
+        ]
+        return f"ratings are missing; variances by REML: {', '.join(listed)}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -181,9 +177,9 @@ def _residual(
     # (k, k): the Laplacian of raters who are linked by items
     laplacian = np.diag(rated.sum(axis=0).astype(float)) - rated.T @ weight
     levels, *_ = np.linalg.lstsq(laplacian, within.sum(axis=0), rcond=1e-10)
-    own = np.where(rated, levels - (weight @ levels)[:, None], 0.0)
+    fitted = np.where(rated, levels - (weight @ levels)[:, None], 0.0)
     rank = np.linalg.matrix_rank(laplacian, tol=1e-10 * rated.sum(), hermitian=True)
-    return float(((within - own) ** 2).sum()), df - int(rank)
+    return float(((within - fitted) ** 2).sum()), df - int(rank)
 
 
 def _without_residual(
@@ -193,13 +189,13 @@ def _without_residual(
     sizes = rated.sum(axis=1)
     items = centred.sum(axis=1) / sizes
     levels = np.zeros(rated.shape[1])
-    spread = np.where(rated, centred - items[:, None], 0.0)
-    if has_raters and (spread**2).sum() > _EXACT * (centred**2).sum():
+    within = np.where(rated, centred - items[:, None], 0.0)
+    if has_raters and (within**2).sum() > _EXACT * (centred**2).sum():
         weight = rated / sizes[:, None]
         laplacian = np.diag(rated.sum(axis=0).astype(float)) - rated.T @ weight
         if np.linalg.matrix_rank(laplacian, hermitian=True) < len(levels) - 1:
             return replace(blank, reason="no residual, and raters whom no item links")
-        levels, *_ = np.linalg.lstsq(laplacian, spread.sum(axis=0), rcond=None)
+        levels, *_ = np.linalg.lstsq(laplacian, within.sum(axis=0), rcond=None)
         items = items - weight @ levels
     return replace(
         blank,
@@ -415,9 +411,9 @@ def _estimated(
     traces[2, :2] = traces[:2, 2] = point.determinant_slopes - traces[:2, :2] @ ratios
     trace = sums.n_ratings - 1 - ratios @ point.determinant_slopes
     traces[2, 2] = trace - ratios @ traces[:2, 2]
-    kept = [0, 1, 2] if has_raters else [0, 2]
+    rows = [0, 1, 2] if has_raters else [0, 2]
     covariance = np.zeros((3, 3))
-    covariance[np.ix_(kept, kept)] = np.linalg.inv(0.5 * traces[np.ix_(kept, kept)])
+    covariance[np.ix_(rows, rows)] = np.linalg.inv(0.5 * traces[np.ix_(rows, rows)])
     return replace(
         blank,
         items=float(ratios[0]) * residual,
@@ -528,7 +524,7 @@ class _Profile:
                 point = self._at(odds, ratio)
                 continue
             step = -lean * ratio / max(abs(bend * ratio**2 + lean * ratio), 1e-12)
-            if abs(step) < 1e-5:  # which moves the deviance by its square
+            if abs(step) < 1e-6:  # which moves the deviance by its square
                 break
             ahead, point = self._shorter(odds, ratio, point, step)
             if ahead == ratio:

@@ -74,7 +74,7 @@ def lin_ccc(
     Examples
     --------
     >>> round(lin_ccc([[1, 2], [3, 3], [5, 7]]).value, 4)
-    0.9048
+    0.8
     """
     if not 0.0 < level < 1.0:
         raise ParameterError(f"level: needs (0, 1), got {level}")
@@ -146,13 +146,13 @@ def _overall(values: NDArray[np.float64]) -> tuple[float, float]:
     x, levels = values - means, means - means.mean()
     within = _within(values)
     # (k - 1) Σ_j σ_j² + Σ_{j<l} (μ_j - μ_l)², and what each item adds to it
-    apart = k * float((levels**2).sum())
+    between = k * float((levels**2).sum())
     pull = (k - 1) * (x**2).sum(axis=1) + 2.0 * k * x @ levels
-    whole = float(pull.mean()) + apart
+    whole = float(pull.mean()) + between
     ratio = float(within.mean()) / whole
     if n < _FEW:
         return 1.0 - ratio, math.nan
-    influence = (within - ratio * (pull + apart)) / whole
+    influence = (within - ratio * (pull + between)) / whole
     return 1.0 - ratio, math.sqrt(float((influence**2).sum()) / (n * (n - 1)))
 
 
@@ -212,5 +212,5 @@ def _width(
 
     limit = np.nextafter(1.0, 0.0)  # without its one disagreement all may be perfect
     z = np.arctanh(np.clip(_without_each(values), -limit, limit))
-    spread = math.sqrt((n - 1) / n * float(((z - z.mean()) ** 2).sum()))
-    return float(stdtrit(n - 1, 0.5 + 0.5 * level)) * spread
+    error_z = math.sqrt((n - 1) / n * float(((z - z.mean()) ** 2).sum()))
+    return float(stdtrit(n - 1, 0.5 + 0.5 * level)) * error_z

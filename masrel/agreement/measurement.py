@@ -222,8 +222,8 @@ def _equivalent(components: Components) -> _Squares:
     if c.residual > 0.0:
         n = -float(v[2, 2] / v[1, 2])
         df_residual = float(2.0 * c.residual**2 / v[2, 2])
-        spread = float(n**2 * v[1, 1] - v[2, 2])
-        df_raters = 2.0 * (c.residual + n * c.raters) ** 2 / spread
+        noise = float(n**2 * v[1, 1] - v[2, 2])
+        df_raters = 2.0 * (c.residual + n * c.raters) ** 2 / noise
     return _Squares(
         raters=c.residual + n * c.raters,
         residual=c.residual,

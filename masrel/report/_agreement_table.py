@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import masrel
 from masrel.agreement import COEFFICIENTS, BandScale, benchmark, strength
+from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Interval, Target, as_document
 from masrel.report._estimate_words import (
     aside,
@@ -129,8 +130,9 @@ def _cells(row: AgreementRow) -> tuple[Value, ...]:
 
 
 def _has_error(estimate: Estimate) -> bool:
-    # observed agreement is nan where the statistic has none, and so no error
-    return not math.isnan(estimate.observed) or estimate.reason is not None
+    # without observed agreement a statistic as a rule has no error either
+    parts = (estimate.observed, estimate.standard_error)
+    return not all(map(math.isnan, parts)) or estimate.reason is not None
 
 
 def _word(row: AgreementRow, bands: BandScale) -> str | None:
@@ -339,6 +341,9 @@ def _why_null(estimate: Estimate) -> list[str]:
         else:
             title = COEFFICIENTS[estimate.coefficient].title
             why.append(f"standard_error, observed, chance: null, {title} has none")
+    elif math.isnan(estimate.observed) and estimate.reason is None:
+        title = COEFFICIENTS[estimate.coefficient].title
+        why.append(f"observed, chance: null, {title} has none")
     if interval is not None:
         ends = (("low", interval.low), ("high", interval.high))
         why += [
@@ -351,6 +356,13 @@ def _why_null(estimate: Estimate) -> list[str]:
 
 def agreement_forest(rows: Sequence[AgreementRow], target: Target) -> Forest:
     """Return what a figure shows: the estimates and their intervals."""
+    # what is in the units of the ratings is on no axis of agreement
+    rows = [row for row in rows if not COEFFICIENTS[row.estimate.coefficient].in_units]
+    if not rows:
+        raise ParameterError(
+            "--figure: shows coefficients of agreement, got only estimates in the "
+            "units of the ratings"
+        )
     population = _POPULATIONS[target]
     several = len({row.group for row in rows}) > 1
     return Forest(

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import Literal
 
 from masrel.agreement import COEFFICIENTS
@@ -173,14 +174,16 @@ def sentence(estimate: Estimate, *, word: str = "") -> str:
     sizes = (counted(estimate.n_items, "item"), counted(estimate.n_raters, "rater"))
     if estimate.reason is not None:
         return f"{name} is undefined ({estimate.reason}), {', '.join(sizes)}."
-    parts = (f"{name} = {_apa(estimate.value)}", *_uncertainty(estimate), word, *sizes)
+    shown = partial(number, digits=2) if entry.in_units else _apa
+    uncertainty = _uncertainty(estimate, shown)
+    parts = (f"{name} = {shown(estimate.value)}", *uncertainty, word, *sizes)
     return f"{', '.join(filter(None, parts))}."
 
 
-def _uncertainty(estimate: Estimate) -> list[str]:
+def _uncertainty(estimate: Estimate, shown: Callable[[float], str]) -> list[str]:
     # the interval, or why there is none and the standard error in its place
     interval, error = estimate.interval, estimate.standard_error
-    errors = [] if math.isnan(error) else [f"SE = {_apa(error)}"]
+    errors = [] if math.isnan(error) else [f"SE = {shown(error)}"]
     if interval is None:
         return errors
     name = f"{percent(interval.level)} % {_SHORT_KINDS[interval.kind]}"
@@ -189,8 +192,8 @@ def _uncertainty(estimate: Estimate) -> list[str]:
     method = interval.method.split(",")[0]
     if is_bound(interval):
         name = f"{percent(interval.level)} % {interval.kind} lower bound"
-        return [f"{name} {_apa(interval.low)} ({method})"]
-    return [f"{name} [{_apa(interval.low)}, {_apa(interval.high)}] ({method})"]
+        return [f"{name} {shown(interval.low)} ({method})"]
+    return [f"{name} [{shown(interval.low)}, {shown(interval.high)}] ({method})"]
 
 
 _SHORT_KINDS = {"confidence": "CI", "credible": "credible interval"}

@@ -268,6 +268,8 @@ _LATEX_ESCAPES = str.maketrans(
         "α": r"$\alpha$",
         "κ": r"$\kappa$",
         "π": r"$\pi$",
+        "χ": r"$\chi$",
+        "²": "$^2$",
         "ρ": r"$\rho$",
         "χ": r"$\chi$",
     }

@@ -143,7 +143,7 @@ def test_a_variance_of_zero_is_said() -> None:
     assert result.value == 0.0
     assert result.interval is not None
     assert result.interval.low == 0.0 < result.interval.high
-    assert "items and raters: 0 is the least it can be" in result.interval.notes[0]
+    assert "items 0 (the least it can be), raters 0 (the" in result.interval.notes[0]
 
 
 @pytest.mark.parametrize("form", ["ICC(1)", "ICC(A,1)", "ICC(C,1)"])

@@ -587,7 +587,7 @@ def test_text_without_an_order_has_no_numbers(masrel: Caller, tmp_path: Path) ->
     assert {"fleiss_kappa", "gwet_ac", "cohen_kappa"} <= names
     assert not any(COEFFICIENTS[name].needs_order for name in names)
     (note,) = made["notes"]
-    assert note.startswith("Left out: the six forms of ICC, Kendall's W and Robinson's")
+    assert note.startswith("Left out: the six forms of ICC, Lin's concordance, Kendall")
     declared = ("--categories", "low,mid,high", "--coefficients", "all", "--json", "-")
     made = document(masrel("agree", path, *declared))
     assert "icc_a1" in {one["coefficient"] for one in made["estimates"]}

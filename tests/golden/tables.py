@@ -44,6 +44,10 @@ OF_COUNTED = (
 OF_POSTERIOR = ("fleiss_kappa", "scott_pi", "krippendorff_alpha")
 
 
+UNPICKED = ("lin_ccc", "sem", "sem_consistency", "mdc", "mdc_consistency")
+"""Coefficients of which only values are stored: others are picked by their places."""
+
+
 def cases() -> list[Case]:
     """One case a table and group."""
     groups = {"agreement": _coefficients, "intervals": _intervals, "tests": _tests}
@@ -142,6 +146,7 @@ def _applicable(table: Drawn, method: str, *, every: bool) -> list[str]:
     return [
         name
         for name, entry in COEFFICIENTS.items()
+        if name not in UNPICKED
         if every
         or (
             (two or entry.n_raters != (2, 2))
