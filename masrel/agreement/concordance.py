@@ -95,6 +95,7 @@ def lin_ccc(
         observed=math.nan,
         chance=math.nan,
         n_items=n,
+        n_items_paired=n if k > 1 else 0,
         n_raters=k,
         n_categories=len(np.unique(values)) if categories is None else len(categories),
         reason=reason,

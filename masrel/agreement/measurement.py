@@ -167,6 +167,7 @@ def _error(
         observed=math.nan,
         chance=math.nan,
         n_items=n_items,
+        n_items_paired=int(((~np.isnan(values)).sum(axis=1) > 1).sum()),
         n_raters=n_raters,
         n_categories=_n_categories(values, categories),
         reason=reason,

@@ -109,8 +109,9 @@ class Coefficient:
     interval_target : {"items", "raters", "both"} or None
         What the interval that it comes with generalises to; None without one.
     in_units : bool
-        Whether its value is in the units of the ratings, and so no coefficient that
-        could be shown beside others.
+        Whether its value is in the units of the ratings.
+    by_name_only : bool
+        Whether it is left out where all coefficients are asked for.
     code : callable
         Ratings and categories to the codes its kernel takes.
     metric : {"nominal", "ordinal", "interval", "ratio", "jaccard", "masi"} or None
@@ -137,6 +138,7 @@ class Coefficient:
     interval_target: Target | None = None
     tells_raters_apart: bool = True
     in_units: bool = False
+    by_name_only: bool = False
     code: Callable[..., CodedRatings] = code_ratings
     metric: Metric | None = None
 
@@ -348,6 +350,7 @@ _ALL = (
         properties=_RANKS | {"perfect agreement"},
         weighted=False,
         interval_target="items",
+        by_name_only=True,  # ICC(A,1) says nearly the same
     ),
     *(
         Coefficient(
@@ -362,6 +365,7 @@ _ALL = (
             weighted=False,
             interval_target=target,
             in_units=True,
+            by_name_only=True,
         )
         for name, title, function, kind, target in _ERRORS
     ),

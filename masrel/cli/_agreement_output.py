@@ -141,9 +141,8 @@ def _notes(ratings: "RatingsFile", options: EstimateOptions) -> tuple[str, ...]:
         return warnings
     return (
         *warnings,
-        "Left out: the six forms of ICC, Lin's concordance, Kendall's W and Robinson's "
-        "A, which need grades that are numbers or --categories with every grade in "
-        "order.",
+        "Left out: the six forms of ICC, Kendall's W and Robinson's A, which need "
+        "grades that are numbers or --categories with every grade in order.",
     )
 
 

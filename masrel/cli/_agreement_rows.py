@@ -103,8 +103,8 @@ estimate_options = grouped(
         type=split_commas,
         is_eager=True,
         callback=_list_register,
-        help="Names of coefficients, separated by commas; all that fit, but those in "
-        "the units of the ratings; or list, which prints them and ends.",
+        help="Names of coefficients, separated by commas; all that fit (but "
+        "lin_ccc, sem and mdc); or list, which prints them and ends.",
     ),
     click.option(
         "--weights",
@@ -304,7 +304,7 @@ def entries(
             entry
             for entry in map(options.by_metric, COEFFICIENTS.values())
             if entry.shape == "ratings"
-            and not entry.in_units
+            and not entry.by_name_only
             and n_raters <= (entry.n_raters[1] or n_raters)
             and (is_ordered or not entry.needs_order)
         ]

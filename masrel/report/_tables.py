@@ -268,7 +268,6 @@ _LATEX_ESCAPES = str.maketrans(
         "α": r"$\alpha$",
         "κ": r"$\kappa$",
         "π": r"$\pi$",
-        "χ": r"$\chi$",
         "²": "$^2$",
         "ρ": r"$\rho$",
         "χ": r"$\chi$",

@@ -453,7 +453,7 @@ def test_a_level_is_that_of_every_interval(masrel: Caller, wide: Path) -> None:
         for e in estimates(masrel("agree", wide, *every, *call))
         if e["coefficient"].startswith("icc")
     )
-    assert icc["interval"]["method"] == "F distribution"
+    assert icc["interval"]["method"] == "REML, profile likelihood"
 
 
 def test_what_nobody_named_needs_no_posterior_and_what_was_named_does(
