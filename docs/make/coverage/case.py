@@ -70,6 +70,11 @@ class Case:
         """Student's quantile with r - 1 degrees of freedom."""
         return float(student(self.r - 1))
 
+    @property
+    def t_fewest(self) -> float:
+        """Student's quantile with the fewer degrees of freedom of the two."""
+        return max(self.t_items, self.t_raters)
+
     def spreads(self, variance: Floats) -> Truths:
         """Whether a variance is more than an accident."""
         return has_spread(variance, self.value, self.n * self.r)

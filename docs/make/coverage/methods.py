@@ -72,10 +72,10 @@ def two_way(
     """Jackknife variances of both, added, perhaps less what both hold."""
     spread = case.spread
     items, raters = spread.of_items, spread.of_raters
-    variance, df = joined((items, case.n - 1), (raters, case.r - 1))
+    variance = items + raters
     if corrected:
         variance = np.maximum(variance - spread.of_cells, np.maximum(items, raters))
-    ends = around(case.value, student(df) * np.sqrt(variance), scale, case.r)
+    ends = around(case.value, case.t_fewest * np.sqrt(variance), scale, case.r)
     if stopgap:
         return ends.where(case.spreads(variance), case.posterior.one_sided)
     return ends.where(variance > 0.0, _none(case))
@@ -109,9 +109,11 @@ def posterior_and_excess(case: Case) -> Bounds:
     return case.posterior.holding(case.value, wide)
 
 
-def lifted(case: Case) -> Bounds:
+def lifted(case: Case, t: float | None = None) -> Bounds:
     """The jackknife on the intraclass scale, its upper end halfway to a higher one."""
-    ends, above = of_items(case, "intraclass"), case.posterior.central.high
+    t = case.t_items if t is None else t
+    ends = one_way(case, case.spread.of_items, t, "intraclass")
+    above = case.posterior.central.high
     high = np.maximum(ends.high, 0.5 * (ends.high + above))
     higher = Bounds(low=ends.low, high=high)
     return higher.where(case.spreads(case.spread.of_items), ends)
@@ -119,9 +121,15 @@ def lifted(case: Case) -> Bounds:
 
 def default_of_items(case: Case) -> Bounds:
     """What is recommended where other items could have come."""
+    return _items(case, case.t_items)
+
+
+def _items(case: Case, t: float) -> Bounds:
     if is_small(case):
         return posterior_holding(case)
-    return lifted(case) if case.n < SEVERAL else of_items(case, "intraclass")
+    if case.n < SEVERAL:
+        return lifted(case, t)
+    return one_way(case, case.spread.of_items, t, "intraclass")
 
 
 def default_of_raters(case: Case) -> Bounds:
@@ -131,11 +139,21 @@ def default_of_raters(case: Case) -> Bounds:
 
 def default_of_both(case: Case) -> Bounds:
     """What is recommended where both could have come."""
-    if not is_small(case):
-        return items_and_excess(case)
-    variance = case.spread.of_items + case.spread.of_raters
-    ends = posterior_and_excess(case)
-    return ends.where(case.spreads(variance), case.posterior.one_sided)
+    t = case.t_fewest
+    items = _items(case, t)
+    raters = one_way(case, case.spread.of_raters, t, "plain")
+    common = t**2 * np.nan_to_num(case.spread.of_cells)
+
+    def distance(of_items: Floats, of_raters: Floats) -> Floats:
+        one, other = (np.maximum(of, 0.0) ** 2 for of in (of_items, of_raters))
+        shared = np.minimum(common, np.minimum(one, other))
+        return np.asarray(np.sqrt(one + other - shared))
+
+    low = case.value - distance(case.value - items.low, case.value - raters.low)
+    high = case.value + distance(items.high - case.value, raters.high - case.value)
+    ends = Bounds(low=np.maximum(low, -1.0), high=np.minimum(high, 1.0))
+    alike = (items.low == raters.low) & (items.high == raters.high)
+    return items.where(alike, ends)
 
 
 def _none(case: Case) -> Bounds:
