@@ -166,7 +166,7 @@ def _influence(axes: Axes, content: RaterPairs, cell: float) -> None:
     axes.spines["left"].set_visible(False)
     axes.margins(x=0.08)
     axes.set_xlabel(
-        textwrap.fill(f"change of {content.title} without the rater", 36)
+        textwrap.fill(f"change of {content.title} without the rater", 38)
         + "\n(right of 0: the others agree better)"
     )
     if any(math.isfinite(low) for low, _ in content.change_ends):
