@@ -24,6 +24,7 @@ Array = NDArray[Any]
 _Coder = Callable[[Array], Array]
 
 _BLOCK = 1 << 16  # labels coded at once, so that they stay in the cache
+_MANY_LABELS = 4096  # in the first block, from which on all are sorted
 _WIDEST = 1 << 16  # span of whole numbers for which a table of codes is made
 
 
@@ -41,7 +42,10 @@ def array_codes(
     if declared is not None:
         return _codes(labels, plain, declared), declared
     # As a rule the first block has every label: the rest is then read only once.
-    known = _labels_met(plain[next(_blocks(plain))], labels.dtype)
+    first = plain[next(_blocks(plain))]
+    known = _labels_met(first, labels.dtype)
+    if len(known) > _MANY_LABELS:
+        return _sorted_codes(labels)
     try:
         return _codes(labels, plain, known), known
     except RatingsError:
@@ -54,6 +58,17 @@ def _has_giant(declared: tuple[Label, ...] | None) -> bool:
     return declared is not None and any(
         isinstance(label, int) and abs(label) > sys.float_info.max for label in declared
     )
+
+
+def _sorted_codes(labels: Array) -> tuple[Codes, tuple[Label, ...]]:
+    # so many labels that sorting all ratings is the fastest way to number them
+    flat = labels.ravel()
+    met, codes = np.unique(flat, return_inverse=True)
+    codes = codes.astype(code_type(met.size)).reshape(labels.shape)
+    if met.dtype.kind == "f" and met.size and np.isnan(met[-1]):
+        codes[codes == met.size - 1] = _MISSING
+        met = met[:-1]
+    return codes, tuple(met.tolist())
 
 
 def _codes(labels: Array, plain: Array, known: tuple[Label, ...]) -> Codes:

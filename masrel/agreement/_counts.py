@@ -10,14 +10,17 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from operator import mul
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from masrel.agreement._data import FEW, CodedRatings, check_scale, code_ratings
 from masrel.agreement._labels import Codes, Label, has_doubtful_text, label_rows
-from masrel.agreement._weights import Weights
+from masrel.agreement._weights import MANY, ManyWeights, Weights
+
+if TYPE_CHECKING:
+    from masrel.agreement._many_grades import ManyItems
 
 Array = NDArray[Any]
 Integers = NDArray[np.int64]
@@ -34,12 +37,15 @@ _SMALL_BLOCK = 1 << 17
 
 
 class SizeGroup(NamedTuple):
-    """Sums over the items that have the same number of ratings."""
+    """Sums over the items that have the same number of ratings.
+
+    Whole numbers; floats by weights of many categories.
+    """
 
     size: int  # ratings of each item, at least 1
     n_items: int
-    totals: list[int]  # (n_categories,): ratings per category
-    disagreement: int  # Σ_i Σ_kl v_kl n_ik n_il, times the denominator of the weights
+    totals: Any  # (n_categories,): ratings per category
+    disagreement: Any  # Σ_i Σ_kl v_kl n_ik n_il, times the denominator of the weights
 
 
 class SufficientStatistics(NamedTuple):
@@ -50,11 +56,11 @@ class SufficientStatistics(NamedTuple):
     n_usable: int  # items with at least two
     # D_o, the mean over usable items of Σ_kl v_kl n_ik n_il / (n_i (n_i - 1)), is
     # `observed` / `denominator`; the denominator is 0 if no item is usable
-    observed: int
+    observed: Any
     denominator: int
     # p_k, the mean over rated items of the part of their raters who chose category k,
     # is `marginals`_k / `total`
-    marginals: list[int]
+    marginals: Any
     total: int
 
 
@@ -76,6 +82,7 @@ class DistinctItems:
     rows: list[tuple[int, ...]] | Integers  # (n_distinct, n_categories)
     freq: list[int] | Integers  # (n_distinct,)
     n_categories: int
+    _groups: list[SizeGroup] | None = None  # where they are known, and no rows are
     _sums: SufficientStatistics | None = None  # of identity weights
     _arrays: ItemArrays | None = None
 
@@ -138,7 +145,9 @@ class DistinctItems:
         """Add the items up."""
         if v.numerators is None and self._sums is not None:
             return self._sums
-        groups = sum_groups(self.rows, self.freq, v)
+        groups = self._groups
+        if groups is None:
+            groups = sum_groups(self.rows, self.freq, v)
         n_rated = n_usable = observed = 0
         multiple = 1  # of n (n - 1) for every number of ratings n
         for size, n_items, _, disagreement in groups:
@@ -176,7 +185,9 @@ class DistinctItems:
             size = counts.sum(axis=1)
         else:  # as a rule: everybody rated everything
             size = float(groups[0].size)
-        if exact and v.numerators is None:  # Σ_l v_kl n_l is n - n_k; no matrix
+        if isinstance(v, ManyWeights):
+            others = counts.astype(np.float64) @ v.distances
+        elif exact and v.numerators is None:  # Σ_l v_kl n_l is n - n_k; no matrix
             others = size[:, None] - counts
         else:
             # `dot` does what @ does, in half the time for a few items.
@@ -194,6 +205,8 @@ def sum_groups(
     """Add up items by their number of ratings."""
     # Takes rows (n_distinct, n_categories), freq (n_distinct,)
     groups = []
+    if isinstance(v, ManyWeights):
+        rows, freq = np.asarray(rows), np.asarray(freq)
     if isinstance(rows, list) and isinstance(freq, list):
         sizes = list(map(sum, rows))
         for size in sorted(set(sizes)):
@@ -220,6 +233,9 @@ def sum_groups(
         n_items, totals = int(often.sum()), weighed.sum(axis=0).tolist()
         if v.numerators is None:
             disagreement = n_items * size * size - int((weighed * of).sum())
+        elif isinstance(v, ManyWeights):
+            others = of.astype(np.float64) @ v.distances
+            disagreement = ((others * of).sum(axis=1) @ often).item()
         else:  # Σ_kl v_kl Σ_i n_ik n_il
             products = (weighed.T @ of).tolist()
             disagreement = sum(
@@ -230,10 +246,17 @@ def sum_groups(
     return groups
 
 
-def bilinear(v: Weights, x: Sequence[int], y: Sequence[int]) -> int:
-    """Return Σ_kl v_kl x_k y_l of whole numbers, times the denominator of v."""
+def bilinear(v: Weights, x: Sequence[int], y: Sequence[int]) -> Any:
+    """Return Σ_kl v_kl x_k y_l of whole numbers, times the denominator of v.
+
+    Of many categories it is a float, and so may x and y be.
+    """
+    if isinstance(v, ManyWeights) or isinstance(x, np.ndarray):
+        first = np.asarray(x, np.float64)
+        second = first if y is x else np.asarray(y, np.float64)
+        return v.operator.between(first, second)
     if v.numerators is None:
-        agreeing: int = sum(map(mul, x, y))
+        agreeing = sum(map(mul, x, y))
         return sum(x) * sum(y) - agreeing
     return sum(
         n * sum(map(mul, row, y)) for row, n in zip(v.numerators, x, strict=True) if n
@@ -408,7 +431,7 @@ class CountedRatings:
     """
 
     categories: tuple[Label, ...]
-    items: DistinctItems
+    items: "DistinctItems | ManyItems"
     n_raters: int
     source: CodedRatings | Callable[[], CodedRatings] | None
     declared: bool = True
@@ -479,10 +502,22 @@ def count_ratings(
     return CountedRatings(
         categories=coded.categories,
         declared=coded.declared,
-        items=DistinctItems.of_codes(coded),
+        items=DistinctItems.of_codes(coded)
+        if len(coded.categories) <= MANY
+        else items_of(coded),
         n_raters=coded.n_raters,
         source=coded,
     )
+
+
+def items_of(coded: CodedRatings) -> "DistinctItems | ManyItems":
+    """Return the items of coded ratings, counted or as they are."""
+    if len(coded.categories) <= MANY:
+        return DistinctItems.of_codes(coded)
+    # Imported here: it takes the types of this module, and few need it.
+    from masrel.agreement._many_grades import ManyItems
+
+    return ManyItems(coded)
 
 
 def _count_complete(

@@ -13,15 +13,20 @@ import numpy as np
 
 from masrel.agreement._counts import CountedRatings, item_counts
 from masrel.agreement._data import CodedRatings
+from masrel.agreement._distances import Squared, centred
 from masrel.agreement._kernel import Floats, Kernel, divide
 from masrel.agreement._labels import EMPTY_SET, SET_SEPARATOR, Label
 from masrel.agreement._weights import (
+    MANY,
+    ManyWeights,
     Weights,
     category_values,
     every_pair,
     identity_weights,
     over_one_denominator,
+    ratio_weights,
     squared_ratio,
+    value_array,
 )
 from masrel.errors import ParameterError
 
@@ -52,6 +57,8 @@ def metric_weights(metric: Metric, counted: CountedRatings) -> Weights:
             f"categories: the {metric} metric needs the declared scale in order, the "
             f"ratings are text: {', '.join(map(str, counted.categories))}"
         )
+    if len(counted.categories) > MANY:
+        return _of_many(metric, counted)
     if metric == "ordinal":
         squares = every_pair(_middles(counted), lambda x, y: (x - y) ** 2)
         return over_one_denominator("ordinal metric", squares)
@@ -67,6 +74,19 @@ def metric_weights(metric: Metric, counted: CountedRatings) -> Weights:
     return over_one_denominator("ratio metric", every_pair(values, squared_ratio))
 
 
+def _of_many(metric: Metric, counted: CountedRatings) -> Weights:
+    if metric == "ratio":
+        return ratio_weights("ratio metric", counted.categories, factor=1.0)
+    if metric == "ordinal":
+        name, values = "ordinal metric", _middles_of_many(counted)
+    else:
+        name, values = "interval", value_array(counted.categories)
+    distances = Squared(centred(values)[0][:, None])
+    return ManyWeights(
+        name=name, n_categories=len(values), numerators=(), distances=distances
+    )
+
+
 def _in_range(values: list[Fraction]) -> list[Fraction]:
     # over a power of two, which α does not notice, where squares would be no floats
     range_ = max(values) - min(values)
@@ -78,17 +98,25 @@ def _in_range(values: list[Fraction]) -> list[Fraction]:
     return [value / Fraction(2) ** exponent for value in values]
 
 
+def _middles_of_many(counted: CountedRatings) -> Floats:
+    # as floats, which are exact to 2^52 ratings
+    q = len(counted.categories)
+    groups = counted.items.sums(identity_weights(q)).groups
+    usable = [np.array(group.totals) for group in groups if group.size > 1]
+    totals = sum(usable, np.zeros(q))
+    return np.cumsum(totals) - totals / 2.0
+
+
 def _middles(counted: CountedRatings) -> list[Fraction]:
     # Σ_{g<k} n_g + n_k/2: ratings up to the middle of each grade, of items with a pair
     q = len(counted.categories)
     groups = counted.items.sums(identity_weights(q)).groups
     usable = [group.totals for group in groups if group.size > 1]
     middles, lower = [], 0
-    for k in range(q):
-        total = sum(totals[k] for totals in usable)
+    for total in map(sum, zip(*usable, strict=True)):
         middles.append(Fraction(2 * lower + total, 2))
         lower += total
-    return middles
+    return middles or [Fraction(0)] * q
 
 
 def _of_sets(metric: str, categories: Sequence[Label]) -> Weights:

@@ -34,7 +34,9 @@ from masrel.agreement._kernel import (
     weighted_disagreement,
 )
 from masrel.agreement._labels import Codes, Label
+from masrel.agreement._many_grades import ManyItems, measurements
 from masrel.agreement._weights import (
+    MANY,
     Weights,
     WeightsLike,
     declared_weights,
@@ -105,7 +107,11 @@ def estimate_pooled(
     population: int | None = None,
 ) -> Estimate:
     """Check ratings and options, and estimate 1 - D_o / D_e with one division."""
-    counted = count_ratings(ratings, categories)
+    counted = None
+    if type(ratings) is np.ndarray and ratings.size > _BLOCK:
+        counted = measurements(ratings, categories, weights)
+    if counted is None:
+        counted = count_ratings(ratings, categories)
     if isinstance(weights, str):  # made once for a scale
         v = named_weights(weights, counted.categories, counted.declared)
     else:
@@ -186,7 +192,7 @@ def ratio_estimate(
 
 def _influence(
     coefficient: PooledCoefficient,
-    items: DistinctItems,
+    items: "DistinctItems | ManyItems",
     v: Weights,
     expected: tuple[int, int],
     irrcac: bool,
@@ -196,6 +202,7 @@ def _influence(
     # h_k = ∂D_e/∂p_k,
     #   D_e u_i = (D_o/D_e) Σ_k h_k (x_ik - p_k) - (n/n') (d_i - D_o s_i).
     d_e, over_e = expected
+    exact = exact and isinstance(items, DistinctItems)
     divide: Callable[[int, int], Any] = Fraction if exact else truediv
     sums, (counts, freq, size, disagreement) = items.sums(v), items.arrays(v, exact)
     rate, inverse = divide(sums.n_rated, sums.n_usable), divide(over_e, d_e)
@@ -212,9 +219,14 @@ def _influence(
     q = len(sums.marginals)
     _, factor, divisor = coefficient.chance(q, v.total, v.denominator)
     if factor:
-        p = np.array([divide(part, sums.total) for part in sums.marginals])
+        if isinstance(sums.marginals, np.ndarray):
+            p = sums.marginals / sums.total
+        else:
+            p = np.array([divide(part, sums.total) for part in sums.marginals])
         of_chance = identity_weights(q) if coefficient.nominal else v
-        if exact and of_chance.numerators is None:
+        if q > MANY:
+            others = of_chance.dot(p, exact=exact)
+        elif exact and of_chance.numerators is None:
             others = p.sum() - p
         else:
             others = (of_chance.fractions if exact else of_chance.floats).dot(p)

@@ -14,6 +14,16 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from masrel.agreement._distances import (
+    Both,
+    Differing,
+    Distances,
+    Linear,
+    Ratio,
+    Squared,
+    centred,
+    on_a_circle,
+)
 from masrel.agreement._labels import Label, is_row, shown
 from masrel.errors import ParameterError, RatingsError
 
@@ -28,6 +38,11 @@ WeightName = Literal[
     "bipolar",
 ]
 """Names of the weights there are."""
+
+MANY = 128
+"""Categories of which a matrix is made; of more, none is."""
+
+_NO_RATIO = "division by 0: ratio weights divide by sums of two values of the scale"
 
 NO_CHANCE = "0/0: chance agreement is 1, all ratings are in one category"
 
@@ -74,6 +89,24 @@ class Weights:
         return sum(map(sum, self.numerators))
 
     @property
+    def has_matrix(self) -> bool:
+        """Whether every v_kl is held."""
+        return self.numerators is not None
+
+    def dot(self, p: NDArray[Any], *, exact: bool) -> NDArray[Any]:
+        """Return Σ_l v_kl p_l, (n_categories,)."""
+        if self.numerators is None and (exact or self.n_categories > MANY):
+            return np.asarray(p.sum() - p)
+        return np.asarray((self.fractions if exact else self.floats).dot(p))
+
+    @property
+    def operator(self) -> Any:
+        """The v_kl as a matrix, or what takes its place: `Distances`."""
+        if self.numerators is None and self.n_categories > MANY:
+            return Differing(self.n_categories)
+        return self.floats
+
+    @property
     def no_chance(self) -> str:
         """Why chance agreement is 1, if it is."""
         alike = self.numerators is not None and any(
@@ -107,6 +140,37 @@ class Weights:
     def as_floats(self) -> NDArray[np.float64]:
         """Return w, a matrix as `weights=` takes it; ``nan`` for a reason."""
         return np.asarray(1.0 - self.floats)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ManyWeights(Weights):
+    """Weights of more categories than a matrix is made for: floats, not integers."""
+
+    distances: Distances
+
+    @property
+    def has_matrix(self) -> bool:
+        """Whether every v_kl is held: no."""
+        return False
+
+    @cached_property
+    def total(self) -> Any:
+        """Σ_kl v_kl."""
+        return self.distances.sum()
+
+    @property
+    def operator(self) -> Distances:
+        """What takes the place of a matrix."""
+        return self.distances
+
+    @cached_property
+    def floats(self) -> NDArray[np.float64]:
+        """The v_kl as floats, (n_categories, n_categories)."""
+        return np.eye(self.n_categories) @ self.distances
+
+    def dot(self, p: NDArray[Any], *, exact: bool) -> NDArray[Any]:  # noqa: ARG002 - floats alone
+        """Return Σ_l v_kl p_l, (n_categories,)."""
+        return self.distances.dot(p.astype(np.float64))
 
 
 WeightsLike = Weights | WeightName | ArrayLike | None
@@ -219,7 +283,6 @@ def _of_other(weights: Weights, categories: Sequence[Label], declared: bool) -> 
     return weights
 
 
-@lru_cache(maxsize=64)
 def named_weights(name: str, categories: tuple[Label, ...], declared: bool) -> Weights:
     """Return the weights of that name, made once for a scale."""
     n, name = len(categories), plain_name(name)
@@ -232,6 +295,73 @@ def named_weights(name: str, categories: tuple[Label, ...], declared: bool) -> W
     if n == 0:  # nobody rated anything
         return Weights(name=name, n_categories=0)
     _check_order(categories, declared)
+    if n > MANY:
+        return _many_weights(name, categories)
+    return _exact_weights(name, categories)
+
+
+def _many_weights(name: str, categories: Sequence[Label]) -> Weights:
+    values, range_ = centred(value_array(categories))
+    n = len(values)
+    if name == "ratio":
+        return ratio_weights("ratio", categories)
+    if name == "linear":
+        distances: Distances = Linear(values, 1.0 / range_)
+    elif name == "quadratic":
+        distances = Squared(values[:, None] / range_)
+    elif name == "ordinal":
+        # d (d + 1) / (n (n - 1)) of ranks d apart
+        ranks, largest = centred(np.arange(float(n)))[0], n * (n - 1.0)
+        squares = Squared(ranks[:, None] / math.sqrt(largest))
+        distances = Both(squares, Linear(ranks, 1.0 / largest))
+    elif name == "circular":
+        distances = on_a_circle(value_array(categories))
+    else:
+        raise ParameterError(
+            f"weights: {name} needs a matrix of every two categories, which is made of "
+            f"at most {MANY}, got {n}; linear, quadratic, ordinal, ratio and circular "
+            "need none"
+        )
+    return ManyWeights(name=name, n_categories=n, numerators=(), distances=distances)
+
+
+def ratio_weights(
+    name: str, categories: Sequence[Label], factor: float | None = None
+) -> Weights:
+    """Return ratio weights of many categories; by default the largest v is 1."""
+    values, n = value_array(categories), len(categories)
+    low, high = float(values.min()), float(values.max())
+    if name == "ratio" and 0.0 in values:
+        return Weights(name=name, n_categories=n, reason=_NO_RATIO)
+    if low < 0.0 < high:
+        raise ParameterError(
+            f"categories: the ratio of {n} different values needs values of one sign, "
+            f"got {low:g} to {high:g}"
+        )
+    if factor is None:
+        factor = ((high + low) / (high - low)) ** 2
+    return ManyWeights(
+        name=name, n_categories=n, numerators=(), distances=Ratio(values, factor)
+    )
+
+
+def value_array(categories: Sequence[Label]) -> NDArray[np.float64]:
+    """Return what categories weigh, as floats: text by rank from 1."""
+    if isinstance(categories[0], str):
+        return np.arange(1.0, len(categories) + 1.0)
+    try:
+        values = np.array(categories, dtype=np.float64)
+    except OverflowError:  # a whole number that no float holds: refused with its value
+        values = np.array([math.inf])
+    if not np.isfinite(values).all():
+        category_values(categories)
+    return values
+
+
+@lru_cache(maxsize=64)
+def _exact_weights(name: str, categories: tuple[Label, ...]) -> Weights:
+    # as fractions
+    n = len(categories)
     values = category_values(categories)
     if (reason := _absence(name, values)) is not None:
         return Weights(name=name, n_categories=n, reason=reason)
@@ -291,7 +421,7 @@ def _absence(weights: str, values: list[Fraction]) -> str | None:
     if weights == "ratio" and any(
         x + y == 0 for i, x in enumerate(values) for y in values[: i + 1]
     ):
-        return "division by 0: ratio weights divide by sums of two values of the scale"
+        return _NO_RATIO
     return None
 
 

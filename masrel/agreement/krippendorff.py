@@ -29,9 +29,12 @@ from masrel.agreement._kernel import (
     weighted_disagreement,
 )
 from masrel.agreement._labels import Label
+from masrel.agreement._many_grades import ManyItems, measurements
 from masrel.agreement._metrics import Metric, metric_weights
 from masrel.agreement._pooled import ratio_estimate
 from masrel.agreement._weights import (
+    MANY,
+    ManyWeights,
     Weights,
     WeightsLike,
     declared_weights,
@@ -111,7 +114,11 @@ def krippendorff_alpha(
     >>> round(krippendorff_alpha([["a", "a"], ["b", "b"], ["a", "b"]]).value, 3)
     0.444
     """
-    counted = count_ratings(ratings, categories)
+    counted = None
+    if type(ratings) is np.ndarray and ratings.size > _BLOCK:
+        counted = measurements(ratings, categories, metric or weights)
+    if counted is None:
+        counted = count_ratings(ratings, categories)
     v = _disagreement(counted, weights, metric)
     return _estimate(counted, v, population)
 
@@ -160,20 +167,29 @@ def krippendorff_alpha_from_counts(
     return _estimate(counted, v, population)
 
 
+_BLOCK = 1 << 14  # ratings from which on numbers that differ are taken as they are
+
+
 class _Sums(NamedTuple):
+    # whole numbers; floats by weights of many categories
     # α = 1 - (n - 1) A / B over the n ratings of items that have at least two
     n_items: int
     n_ratings: int
     multiple: int  # of every n_i - 1
-    observed: int  # A = Σ_i V_i / (n_i - 1), times `multiple`
-    totals: list[int]  # ratings per category
-    expected: int  # B = Σ_kl v_kl n_k n_l
+    observed: Any  # A = Σ_i V_i / (n_i - 1), times `multiple`
+    totals: Any  # ratings per category
+    expected: Any  # B = Σ_kl v_kl n_k n_l
 
 
 def _sums(usable: list[SizeGroup], v: Weights) -> _Sums:
     if len(usable) == 1:  # as a rule: everybody rated everything
         ((size, n_items, totals, observed),) = usable
         n_ratings, multiple = n_items * size, size - 1
+    elif isinstance(v, ManyWeights):
+        multiple = 1  # of floats
+        observed = sum([group.disagreement / (group.size - 1) for group in usable])
+        totals = sum([group.totals for group in usable], np.zeros(v.n_categories))
+        n_items, n_ratings = sum(group.n_items for group in usable), int(totals.sum())
     else:
         multiple = math.lcm(*[group.size - 1 for group in usable])
         observed = sum(g.disagreement * (multiple // (g.size - 1)) for g in usable)
@@ -204,10 +220,13 @@ def _estimate(counted: CountedRatings, v: Weights, population: int | None) -> Es
     )
 
 
-def _influence(items: DistinctItems, v: Weights, sums: _Sums, exact: bool) -> Influence:
+def _influence(
+    items: "DistinctItems | ManyItems", v: Weights, sums: _Sums, exact: bool
+) -> Influence:
     # With Q = 1 - α = (n - 1) A / B, the influence of item i among m is
     #   u_i = m Q [2 Σ_k h_k n_ik / B - V_i / ((n_i - 1) A) - n_i / (n - 1)],
     # h_k = Σ_l v_kl n_l.
+    exact = exact and isinstance(items, DistinctItems)
     divide: Callable[[int, int], Any] = Fraction if exact else truediv
     m, n, w = sums.n_items, sums.n_ratings, v.denominator
     counts, freq, size, disagreement = items.arrays(v, exact)
@@ -216,8 +235,11 @@ def _influence(items: DistinctItems, v: Weights, sums: _Sums, exact: bool) -> In
         disagreement = disagreement[~single]
     q = divide((n - 1) * sums.observed, sums.multiple * sums.expected)
     totals = np.array(sums.totals, dtype=object if exact else np.float64)
-    matrix = v.fractions if exact else v.floats
-    h = matrix.dot(totals) * (2 * q * divide(w, sums.expected))
+    if v.n_categories > MANY:
+        between = v.dot(totals, exact=exact)
+    else:
+        between = (v.fractions if exact else v.floats).dot(totals)
+    h = between * (2 * q * divide(w, sums.expected))
     terms = disagreement * (-m * divide((n - 1) * w, sums.expected) / (size - 1))
     u = counts.dot(m * h - m * q * divide(1, n - 1)) + terms
     return Influence(u, freq, terms)
