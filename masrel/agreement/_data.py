@@ -30,6 +30,7 @@ MISSING = -1
 FEW = 200
 """Ratings, or counts of them, that Python goes through about as fast as numpy."""
 
+_MEASURED = 0.8  # of the ratings are different numbers where those are measurements
 _FEW_LABELS = 64  # up to here a list of labels is coded faster than an array
 _FIRST = 100  # items that as a rule show every rater
 
@@ -215,6 +216,20 @@ def complete(coded: CodedRatings) -> CodedRatings:
     if whole.all():
         return coded
     return replace(coded, codes=coded.codes[whole])
+
+
+def refuse_measurements(coded: CodedRatings) -> None:
+    """Refuse numbers of which hardly any two are alike, where only alike ones agree."""
+    known, n_ratings = coded.categories, int((coded.codes >= 0).sum())
+    if coded.declared or isinstance(known[0], str):
+        return
+    if len(known) > _MEASURED * n_ratings:
+        raise RatingsError(
+            f"ratings: {len(known)} different numbers among {n_ratings} ratings are "
+            "measurements, which hardly ever agree without weights: an intraclass "
+            'correlation (ICC) takes them as they are, and so do metric="interval" of '
+            'Krippendorff\'s alpha and weights such as "quadratic"'
+        )
 
 
 Repeated = Literal["error", "first", "last"]

@@ -69,6 +69,30 @@ class Distances:
                 total += of_two
         return 2.0 * total
 
+    def moments(self, codes: Codes) -> Floats:
+        """Return sums over the ratings of each item: of points and of their squares.
+
+        Counts of the categories where v is not made of points.
+        """
+        # -> (n_items, n_dimensions + 1), or (n_items, n_categories)
+        if self.points is None:
+            counts = np.zeros((len(codes), self.n + 1))  # missing, -1, is the last
+            for column in codes.T:
+                counts[np.arange(len(codes)), column] += 1.0
+            return counts[:, :-1]
+        squares = np.einsum("km,km->k", self.points, self.points)
+        padded = np.column_stack([self.points, squares])
+        padded = np.vstack([padded, np.zeros(padded.shape[1])])
+        return np.asarray(sum(padded[column] for column in codes.T))
+
+    def between_moments(self, moments: Floats, mass: Any = 1.0) -> Floats:
+        """Return Σ_kl v_kl m_k m_l of sums of moments, of which the mass is known."""
+        # (..., n_dimensions + 1) -> (...): 2 (M Σ m |e|² - |Σ m e|²)
+        if self.points is None:
+            return np.asarray(np.einsum("...k,...k->...", moments @ self, moments))
+        e = moments[..., :-1]
+        return np.asarray(2.0 * (mass * moments[..., -1] - (e * e).sum(axis=-1)))
+
     def sum(self) -> float:
         """Return Σ_kl v_kl."""
         return float(self.dot(np.ones(self.n)).sum())
@@ -87,7 +111,10 @@ class Differing(Distances):
 
     def dot(self, masses: Floats) -> Floats:
         """Return Σ_l v_kl m_l, (n_categories,)."""
-        return np.asarray(masses.sum() - masses)
+        return np.asarray(masses.sum(axis=-1, keepdims=True) - masses)
+
+    def __rmatmul__(self, masses: Floats) -> Floats:
+        return self.dot(masses)
 
     def pair(self, first: Codes, second: Codes) -> Floats:
         """Return v of pairs of categories."""

@@ -60,6 +60,8 @@ class Kernel:
     # shapes (n, n_rows) and (n, n_raters), to sums of shape (n, n_features); None where
     # rater_sums is
     crossed_sums: Callable[[CodedRatings, Floats], CrossedSums] | None = None
+    # whether v may be `Distances` in place of a matrix
+    takes_many: bool = False
 
 
 def divide(numerator: Floats, denominator: Floats) -> Floats:

@@ -19,7 +19,7 @@ from masrel.agreement._counts import (
     SufficientStatistics,
     item_counts,
 )
-from masrel.agreement._data import CodedRatings
+from masrel.agreement._data import CodedRatings, refuse_measurements
 from masrel.agreement._distances import Codes, Differing, Floats
 from masrel.agreement._weights import ManyWeights, Weights
 from masrel.errors import ParameterError
@@ -62,6 +62,8 @@ class ManyItems:
         """Add the items up."""
         if v.has_matrix:
             return self.counted.sums(v)
+        if v.is_exact:
+            refuse_measurements(self._coded)
         between, is_exact = self._disagreement(v), v.numerators is None
         groups, observed, n_usable = [], 0.0, 0
         shares = np.zeros(self.n_categories)
@@ -84,6 +86,11 @@ class ManyItems:
         return SufficientStatistics(
             groups, n_rated, n_usable, observed, n_usable, marginals, n_rated
         )
+
+    def totals_of_pairs(self) -> Integers:
+        """Count the ratings of each category in items with two or more."""
+        codes = self._codes[self._size > 1]
+        return np.bincount(codes[codes >= 0], minlength=self.n_categories)
 
     def arrays(self, v: Weights, _exact: bool) -> ItemArrays:
         """Return the items as floats."""

@@ -11,7 +11,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from masrel.agreement._counts import CountedRatings, item_counts
+from masrel.agreement._counts import CountedRatings, DistinctItems, item_counts
 from masrel.agreement._data import CodedRatings
 from masrel.agreement._distances import Squared, centred
 from masrel.agreement._kernel import Floats, Kernel, divide
@@ -100,10 +100,9 @@ def _in_range(values: list[Fraction]) -> list[Fraction]:
 
 def _middles_of_many(counted: CountedRatings) -> Floats:
     # as floats, which are exact to 2^52 ratings
-    q = len(counted.categories)
-    groups = counted.items.sums(identity_weights(q)).groups
-    usable = [np.array(group.totals) for group in groups if group.size > 1]
-    totals = sum(usable, np.zeros(q))
+    if isinstance(counted.items, DistinctItems):
+        return np.array(_middles(counted), dtype=np.float64)
+    totals = counted.items.totals_of_pairs()
     return np.cumsum(totals) - totals / 2.0
 
 

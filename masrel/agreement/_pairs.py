@@ -8,7 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from masrel.agreement._counts import bilinear
-from masrel.agreement._data import CodedRatings, pairs_of_raters, raters_who_rate
+from masrel.agreement._data import (
+    CodedRatings,
+    pairs_of_raters,
+    raters_who_rate,
+    refuse_measurements,
+)
 from masrel.agreement._kernel import (
     Array,
     Floats,
@@ -17,8 +22,10 @@ from masrel.agreement._kernel import (
     divide,
 )
 from masrel.agreement._labels import Codes
-from masrel.agreement._weights import Weights
-from masrel.errors import RatingsError
+from masrel.agreement._weights import MANY, ManyWeights, Weights
+from masrel.errors import ParameterError, RatingsError
+
+_MAX_SIDE = 4000  # categories of a table of pairs
 
 
 def two_raters(coded: CodedRatings, title: str) -> CodedRatings:
@@ -33,11 +40,38 @@ def two_raters(coded: CodedRatings, title: str) -> CodedRatings:
 def pair_table(codes: Codes, n_categories: int) -> Integers:
     """Count the pairs of two columns of codes."""
     # codes (n_items, 2) -> (n_categories, n_categories)
+    if n_categories > _MAX_SIDE:
+        raise ParameterError(
+            f"ratings: {n_categories} different grades are too many for a table of "
+            "their pairs, which this statistic needs"
+        )
     side = n_categories + 1
     # Missing, -1, becomes the last row and column, which is cut off.
     flat = codes[:, 0].astype(np.int32) * side + codes[:, 1] + side + 1
     freq = np.bincount(flat, minlength=side * side).reshape(side, side)
     return freq[1:, 1:].astype(np.int64)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SparsePairs:
+    """Pairs of grades so many that a table of them would mostly be zeros."""
+
+    codes: Codes  # (n_items, 2): of the items with both
+    is_whole: Array  # (n_rows,): which these are
+    n_categories: int
+
+
+def pairs_of(
+    coded: CodedRatings, raters: tuple[int, int], v: Weights
+) -> Integers | SparsePairs:
+    """Count the pairs of grades of two raters, or keep them as they are."""
+    codes = coded.codes[:, raters]
+    if v.n_categories <= MANY or v.has_matrix:
+        return pair_table(codes, v.n_categories)
+    if v.is_exact:
+        refuse_measurements(coded)
+    is_whole = np.asarray((codes >= 0).all(axis=1))
+    return SparsePairs(codes[is_whole], is_whole, v.n_categories)
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,19 +82,24 @@ class PairSums:
     # D_o = `observed` / (n w) and D_e = `expected` / (n² w).
 
     n: int
-    observed: int  # Σ_kl v_kl t_kl
-    expected: int  # Σ_kl v_kl t_k. t_.l
+    observed: Any  # Σ_kl v_kl t_kl
+    expected: Any  # Σ_kl v_kl t_k. t_.l
     w: int
 
     @classmethod
-    def of(cls, table: Integers, v: Weights) -> "PairSums":
+    def of(cls, table: Integers | SparsePairs, v: Weights) -> "PairSums":
         """Sum a table of pairs."""
         # Takes table (n_categories, n_categories)
+        if isinstance(table, SparsePairs):
+            return cls._of_many(table, v)
         cells: list[list[int]] = table.tolist()
         first = list(map(sum, cells))
         second = list(map(sum, zip(*cells, strict=True)))
         n = sum(first)
-        if v.numerators is None:
+        observed: Any
+        if isinstance(v, ManyWeights):
+            observed = float((v.floats * table).sum())
+        elif v.numerators is None:
             observed = n - sum([cells[k][k] for k in range(len(cells))])
         else:
             observed = sum(
@@ -70,7 +109,18 @@ class PairSums:
             )
         return cls(n, observed, bilinear(v, first, second), v.denominator)
 
-    def ratios(self) -> tuple[tuple[int, int], tuple[int, int]]:
+    @classmethod
+    def _of_many(cls, pairs: SparsePairs, v: Weights) -> "PairSums":
+        first, second = (
+            np.bincount(column, minlength=v.n_categories) for column in pairs.codes.T
+        )
+        n = len(pairs.codes)
+        observed = v.operator.pair(pairs.codes[:, 0], pairs.codes[:, 1]).sum().item()
+        if v.is_exact:
+            return cls(n, int(observed), n * n - int(first @ second), 1)
+        return cls(n, observed, bilinear(v, first, second), 1)  # type: ignore[arg-type]
+
+    def ratios(self) -> tuple[tuple[Any, int], tuple[Any, int]]:
         """Return D_o and D_e as numerator and denominator."""
         n, w = self.n, self.w
         return (self.observed, n * w), (self.expected, n * n * w)
@@ -85,9 +135,12 @@ class PairSlopes(NamedTuple):
     expected: Array  # (n_categories, n_categories): of D_e
 
     @classmethod
-    def of(cls, table: Integers, v: Weights, exact: bool) -> "PairSlopes":
+    def of(cls, table: Integers | SparsePairs, v: Weights, exact: bool) -> "PairSlopes":
         """Return the slopes at a table that is not empty, in floats or fractions."""
         # Takes table (n_categories, n_categories)
+        if isinstance(table, SparsePairs):
+            return cls._of_many(table, v)
+        exact = exact and v.is_exact
         freq = table.astype(object if exact else np.float64)
         # divided, so that the share of a cell that has all pairs is exactly 1
         p = freq / (Fraction(freq.sum()) if exact else freq.sum())
@@ -97,6 +150,20 @@ class PairSlopes(NamedTuple):
         # D_e = Σ_kl v_kl p_k. p_.l is bilinear: Σ_m (v_km p_.m + v_ml p_m.) - 2 D_e
         expected = to_second[:, None] + (to_first - 2 * d_e)
         return cls(d_o, d_e, matrix - d_o, expected)
+
+    @classmethod
+    def _of_many(cls, pairs: SparsePairs, v: Weights) -> "PairSlopes":
+        # (n_pairs,) in place of cells
+        first, second = pairs.codes.T
+        p, q = (
+            np.bincount(column, minlength=v.n_categories) / len(column)
+            for column in (first, second)
+        )
+        between = v.operator.pair(first, second)
+        to_second, to_first = v.dot(q, exact=False), v.dot(p, exact=False)
+        d_o, d_e = float(between.mean()), float(p @ to_second)
+        expected = to_second[first] + to_first[second] - 2.0 * d_e
+        return cls(d_o, d_e, between - d_o, expected)
 
     def influence(self) -> Array:
         """Return the influence on κ = 1 - D_o/D_e of an item in each cell."""

@@ -16,6 +16,7 @@ import numpy as np
 
 from masrel.agreement._counts import DistinctItems, bilinear, count_ratings, item_counts
 from masrel.agreement._data import CodedRatings
+from masrel.agreement._distances import Distances
 from masrel.agreement._kernel import (
     NO_PAIR,
     VARIANCES,
@@ -202,7 +203,7 @@ def _influence(
     # h_k = ∂D_e/∂p_k,
     #   D_e u_i = (D_o/D_e) Σ_k h_k (x_ik - p_k) - (n/n') (d_i - D_o s_i).
     d_e, over_e = expected
-    exact = exact and isinstance(items, DistinctItems)
+    exact = exact and isinstance(items, DistinctItems) and v.is_exact
     divide: Callable[[int, int], Any] = Fraction if exact else truediv
     sums, (counts, freq, size, disagreement) = items.sums(v), items.arrays(v, exact)
     rate, inverse = divide(sums.n_rated, sums.n_usable), divide(over_e, d_e)
@@ -246,6 +247,8 @@ def _sparse_dot(counts: Any, slopes: Any) -> Any:
 def _features(coded: CodedRatings, v: Floats) -> Floats:
     # (n_items, 3 + n_categories): disagreement of two ratings of an item, whether it
     # has two, whether it has one, shares of the categories
+    if isinstance(v, Distances):
+        return _features_of_many(coded, v)
     counts = item_counts(coded).astype(np.float64)
     n = counts.sum(axis=1)
     features = np.empty((len(counts), 3 + counts.shape[1]))
@@ -255,6 +258,15 @@ def _features(coded: CodedRatings, v: Floats) -> Floats:
     features[:, 2] = n > 0
     features[:, 3:] = counts / np.maximum(n, 1.0)[:, None]
     return features
+
+
+def _features_of_many(coded: CodedRatings, v: Distances) -> Floats:
+    # the same; means of points and of their squares in place of shares, where v is
+    # made of points
+    n = (coded.codes >= 0).sum(axis=1)
+    disagreement = v.of_items(coded.codes) / np.maximum(n * (n - 1), 1)
+    means = v.moments(coded.codes) / np.maximum(n, 1)[:, None]
+    return np.column_stack([disagreement, n > 1, n > 0, means])
 
 
 def pooled_kernel(coefficient: PooledCoefficient) -> Kernel:
@@ -269,7 +281,9 @@ def pooled_kernel(coefficient: PooledCoefficient) -> Kernel:
             return 1.0 - divide(observed, np.asarray(constant / divisor))
         # One category has a share of exactly 1, and so a disagreement of exactly 0.
         shares = divide(sums[..., 3:], sums[..., 2:3])
-        if coefficient.nominal:
+        if isinstance(v, Distances):
+            between = v.between_moments(shares)
+        elif coefficient.nominal:
             between = (shares * (1.0 - shares)).sum(axis=-1)
         else:
             between = weighted_disagreement(shares, v)
@@ -281,6 +295,7 @@ def pooled_kernel(coefficient: PooledCoefficient) -> Kernel:
         value=value,
         rater_sums=resampled_raters,
         crossed_sums=crossed_sums,
+        takes_many=not coefficient.nominal,
     )
 
 
@@ -293,7 +308,7 @@ def complete_kernel(coefficient: PooledCoefficient) -> Kernel:
         every[(coded.codes < 0).any(axis=1)] = 0.0
         return every
 
-    return Kernel(features=features, value=kernel.value)
+    return Kernel(features=features, value=kernel.value, takes_many=True)
 
 
 def resampled_raters(coded: CodedRatings, freq: Integers, v: Floats) -> RaterSums:

@@ -93,6 +93,11 @@ class Weights:
         """Whether every v_kl is held."""
         return self.numerators is not None
 
+    @property
+    def is_exact(self) -> bool:
+        """Whether the v_kl are fractions."""
+        return True
+
     def dot(self, p: NDArray[Any], *, exact: bool) -> NDArray[Any]:
         """Return Σ_l v_kl p_l, (n_categories,)."""
         if self.numerators is None and (exact or self.n_categories > MANY):
@@ -129,7 +134,7 @@ class Weights:
         floats.setflags(write=False)
         return floats
 
-    @cached_property
+    @property
     def fractions(self) -> NDArray[Any]:
         """The v_kl as fractions, (n_categories, n_categories)."""
         q = range(self.n_categories)
@@ -153,6 +158,11 @@ class ManyWeights(Weights):
         """Whether every v_kl is held: no."""
         return False
 
+    @property
+    def is_exact(self) -> bool:
+        """Whether the v_kl are fractions: no."""
+        return False
+
     @cached_property
     def total(self) -> Any:
         """Σ_kl v_kl."""
@@ -167,6 +177,11 @@ class ManyWeights(Weights):
     def floats(self) -> NDArray[np.float64]:
         """The v_kl as floats, (n_categories, n_categories)."""
         return np.eye(self.n_categories) @ self.distances
+
+    @property
+    def fractions(self) -> NDArray[Any]:
+        """The same: there are no fractions of them."""
+        return self.floats
 
     def dot(self, p: NDArray[Any], *, exact: bool) -> NDArray[Any]:  # noqa: ARG002 - floats alone
         """Return Σ_l v_kl p_l, (n_categories,)."""

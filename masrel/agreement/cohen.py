@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from functools import partial
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from masrel.agreement._count_tables import check_table, column_categories
@@ -16,7 +17,8 @@ from masrel.agreement._labels import Label
 from masrel.agreement._pairs import (
     PairSlopes,
     PairSums,
-    pair_table,
+    SparsePairs,
+    pairs_of,
     two_raters,
 )
 from masrel.agreement._pooled import ratio_estimate
@@ -83,7 +85,7 @@ def cohen_kappa(
     """
     coded = two_raters(code_ratings(ratings, categories), "Cohen's kappa")
     v = declared_weights(weights, coded.categories, declared=coded.declared)
-    return _estimate(pair_table(coded.codes, coded.n_categories), v, population)
+    return _estimate(pairs_of(coded, (0, 1), v), v, population)
 
 
 def cohen_kappa_from_table(
@@ -129,7 +131,9 @@ def cohen_kappa_from_table(
     return _estimate(checked, declared_weights(weights, labels), population)
 
 
-def _estimate(table: Integers, v: Weights, population: int | None) -> Estimate:
+def _estimate(
+    table: Integers | SparsePairs, v: Weights, population: int | None
+) -> Estimate:
     # shape of table: (n_categories, n_categories)
     sums = PairSums.of(table, v)
     check_population(population, sums.n)
@@ -146,9 +150,11 @@ def _estimate(table: Integers, v: Weights, population: int | None) -> Estimate:
     )
 
 
-def _influence(table: Integers, v: Weights, exact: bool) -> Influence:
+def _influence(table: Integers | SparsePairs, v: Weights, exact: bool) -> Influence:
     # of the cells of the table
     slopes = PairSlopes.of(table, v, exact)
     u, terms = slopes.influence(), slopes.observed / slopes.d_e
+    if isinstance(table, SparsePairs):
+        return Influence(u, np.ones(len(u)), terms)
     freq = table.astype(u.dtype)
     return Influence(u.ravel(), freq.ravel(), terms.ravel())

@@ -9,7 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from masrel.agreement._counts import DistinctItems, bilinear, distinct_rows, item_counts
+from masrel.agreement._counts import (
+    DistinctItems,
+    bilinear,
+    distinct_rows,
+    item_counts,
+    items_of,
+)
 from masrel.agreement._data import CodedRatings, code_ratings, raters_who_rate
 from masrel.agreement._kernel import (
     CrossedSums,
@@ -25,13 +31,19 @@ from masrel.agreement._kernel import (
     weighted_disagreement,
 )
 from masrel.agreement._labels import Label
+from masrel.agreement._many_grades import ManyItems
 from masrel.agreement._pooled import (
     crossed_sums,
     over,
     ratio_estimate,
     resampled_raters,
 )
-from masrel.agreement._weights import Weights, WeightsLike, declared_weights
+from masrel.agreement._weights import (
+    ManyWeights,
+    Weights,
+    WeightsLike,
+    declared_weights,
+)
 from masrel.estimates import Estimate
 
 
@@ -98,13 +110,14 @@ def conger_kappa(
     v = declared_weights(weights, coded.categories, declared=coded.declared)
     check_variance(variance)
     check_population(population, coded.n_items)
-    sums = DistinctItems.of_codes(coded).sums(v)
+    items = items_of(coded)
+    sums = items.sums(v)
     margins = _Margins.of(coded, v)
-    influence = partial(_influence, coded, v, margins)
+    influence = partial(_influence, coded, items, v, margins)
     if sums.n_usable and margins.numerator:
         d_o, over_o = sums.observed, sums.denominator * v.denominator
         d_e, over_e = margins.numerator, margins.denominator
-        ratio = Fraction(d_o * over_e, d_e * over_o)
+        ratio = Fraction(d_o * over_e) / Fraction(d_e * over_o)
         rate = Fraction(coded.n_items, sums.n_usable)
         influence = partial(influence, ratio, rate, variance == "irrcac")
     return ratio_estimate(
@@ -127,7 +140,7 @@ class _Margins:
     # of the r raters who rated anything
     counts: list[list[int]]  # (n_raters, n_categories)
     n_ratings: list[int]  # how many each, n_g
-    numerator: int
+    numerator: Any  # a float by weights of many categories
     denominator: int
 
     @classmethod
@@ -138,6 +151,8 @@ class _Margins:
             for column in coded.codes.T
         ]
         n_ratings = list(map(sum, counts))
+        if isinstance(v, ManyWeights):
+            return cls._of_many(counts, n_ratings, v)
         multiple = math.lcm(*filter(None, n_ratings))
         shares = [
             [n * (multiple // n_g) for n in row]
@@ -151,9 +166,23 @@ class _Margins:
         denominator = max(r * (r - 1), 1) * multiple**2 * v.denominator
         return cls(counts, n_ratings, numerator, denominator)
 
+    @classmethod
+    def _of_many(
+        cls, counts: list[list[int]], n_ratings: list[int], v: Weights
+    ) -> "_Margins":
+        shares = [
+            np.array(row) / n for row, n in zip(counts, n_ratings, strict=True) if n
+        ]
+        total: Any = sum(shares, np.zeros(v.n_categories))
+        of_each = sum(bilinear(v, p, p) for p in shares)  # type: ignore[arg-type]
+        r = len(shares)
+        numerator = bilinear(v, total, total) - of_each
+        return cls(counts, n_ratings, numerator, max(r * (r - 1), 1))
+
 
 def _influence(
     coded: CodedRatings,
+    items: "DistinctItems | ManyItems",
     v: Weights,
     margins: _Margins,
     ratio: Any,
@@ -165,17 +194,23 @@ def _influence(
     #   D_e u_i = (D_o/D_e) Σ_g moves_g - (n/n') (d_i - D_o s_i).
     # A rating of k by rater g moves D_e by 2 (h_gk - Σ_l p_gl h_gl) / (r (r - 1) n_g),
     # h_gk = Σ_l v_kl Σ_{h≠g} p_hl.
+    is_many = not isinstance(items, DistinctItems)
+    exact = exact and not is_many
     number: Callable[[Fraction], Any] = Fraction if exact else float
-    matrix = v.fractions if exact else v.floats
     dtype = object if exact else np.float64
-    inverse = number(Fraction(margins.denominator, margins.numerator))
+    inverse = number(margins.denominator / Fraction(margins.numerator))
     ratio, rate = number(ratio), number(rate)
-    rows, freq = distinct_rows(coded.codes, coded.n_categories)
-    rated = (rows >= 0).any(axis=1)
-    rows, freq = rows[rated], freq[rated].astype(dtype)
-    counts = item_counts(replace(coded, codes=rows)).astype(dtype)
-    size = counts.sum(axis=1)
-    disagreement = ((counts @ matrix) * counts).sum(axis=1)
+    matrix: Any
+    if is_many:
+        rows, matrix = coded.codes[(coded.codes >= 0).any(axis=1)], v.operator
+        _, freq, size, disagreement = items.arrays(v, False)
+    else:
+        rows, freq = distinct_rows(coded.codes, coded.n_categories)
+        matrix, rated = v.fractions if exact else v.floats, (rows >= 0).any(axis=1)
+        rows, freq = rows[rated], freq[rated].astype(dtype)
+        counts = item_counts(replace(coded, codes=rows)).astype(dtype)
+        size = counts.sum(axis=1)
+        disagreement = ((counts @ matrix) * counts).sum(axis=1)
     terms = disagreement * (rate * inverse / np.maximum(size * (size - 1), 1))
     # irrCAC takes u_i + κ (s_i n/n' - 1)
     u = (size > 1) * (rate * (1 if irrcac else ratio)) - terms

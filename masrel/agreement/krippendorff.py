@@ -20,6 +20,7 @@ from masrel.agreement._counts import (
     item_counts,
 )
 from masrel.agreement._data import CodedRatings
+from masrel.agreement._distances import Distances
 from masrel.agreement._kernel import (
     Floats,
     Influence,
@@ -226,7 +227,7 @@ def _influence(
     # With Q = 1 - α = (n - 1) A / B, the influence of item i among m is
     #   u_i = m Q [2 Σ_k h_k n_ik / B - V_i / ((n_i - 1) A) - n_i / (n - 1)],
     # h_k = Σ_l v_kl n_l.
-    exact = exact and isinstance(items, DistinctItems)
+    exact = exact and isinstance(items, DistinctItems) and v.is_exact
     divide: Callable[[int, int], Any] = Fraction if exact else truediv
     m, n, w = sums.n_items, sums.n_ratings, v.denominator
     counts, freq, size, disagreement = items.arrays(v, exact)
@@ -261,7 +262,15 @@ def _disagreement(
 
 
 def _features(coded: CodedRatings, v: Floats) -> Floats:
-    # (n_items, 1 + n_categories): V_i / (n_i - 1), and counts of items with a pair
+    # (n_items, 1 + n_categories): V_i / (n_i - 1), and counts of items with a pair; of
+    # many grades the number of ratings and sums of points in place of counts
+    if isinstance(v, Distances):
+        codes = coded.codes
+        size = (codes >= 0).sum(axis=1)
+        terms = v.of_items(codes) / np.maximum(size - 1, 1)
+        features = np.column_stack([terms, size, v.moments(codes)]).astype(np.float64)
+        features[size < 2] = 0.0
+        return features
     counts = item_counts(coded).astype(np.float64)
     counts[counts.sum(axis=1) < 2] = 0.0
     others = np.maximum(counts.sum(axis=1) - 1.0, 1.0)
@@ -270,9 +279,13 @@ def _features(coded: CodedRatings, v: Floats) -> Floats:
 
 def _value(sums: Floats, v: Floats) -> Floats:
     # sums (..., 1 + n_categories) -> (...)
+    if isinstance(v, Distances):
+        n, moments = sums[..., 1], sums[..., 2:]
+        expected = v.between_moments(moments, n)
+        return 1.0 - divide((n - 1.0) * sums[..., 0], expected)
     totals = sums[..., 1:]
     expected = weighted_disagreement(totals, v)
     return 1.0 - divide((totals.sum(axis=-1) - 1.0) * sums[..., 0], expected)
 
 
-_KERNEL = Kernel(features=_features, value=_value)
+_KERNEL = Kernel(features=_features, value=_value, takes_many=True)

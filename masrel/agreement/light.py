@@ -23,10 +23,12 @@ from masrel.agreement._labels import Label
 from masrel.agreement._pairs import (
     PairSlopes,
     PairSums,
+    SparsePairs,
     of_pairs,
-    pair_table,
+    pairs_of,
 )
 from masrel.agreement._weights import (
+    MANY,
     NO_CHANCE,
     Weights,
     WeightsLike,
@@ -105,7 +107,7 @@ def light_kappa(
     if n_raters < 2:
         raise RatingsError(f"Light's kappa needs at least two raters, got {n_raters}")
     pairs = list(itertools.combinations(range(n_raters), 2))
-    tables = [pair_table(coded.codes[:, pair], coded.n_categories) for pair in pairs]
+    tables = [pairs_of(coded, pair, v) for pair in pairs]
     sums = [PairSums.of(table, v) for table in tables]
     reason = _reason(pairs, sums, v)
     error: float | Callable[[], float] = math.nan
@@ -129,10 +131,12 @@ def _estimate(
     value = observed = chance = math.nan
     if v.reason is None and all(s.n for s in sums):
         w = v.denominator
-        observed = _mean([1 - Fraction(s.observed, s.n * w) for s in sums])
-        chance = _mean([1 - Fraction(s.expected, s.n * s.n * w) for s in sums])
+        observed = _mean([1 - Fraction(s.observed) / (s.n * w) for s in sums])
+        chance = _mean([1 - Fraction(s.expected) / (s.n * s.n * w) for s in sums])
     if reason is None:
-        value = _mean([1 - Fraction(s.n * s.observed, s.expected) for s in sums])
+        value = _mean(
+            [1 - Fraction(s.n * s.observed) / Fraction(s.expected) for s in sums]
+        )
     return Estimate(
         coefficient="light_kappa",
         weights=v.name,
@@ -171,19 +175,31 @@ def _reason(
 def _influence(
     coded: CodedRatings,
     v: Weights,
-    tables: dict[tuple[int, int], Integers],
+    tables: dict[tuple[int, int], Integers | SparsePairs],
     exact: bool,
 ) -> Influence:
     # An item moves the mean of the pairs' kappas by its influence on each, n / n_pair
     # times as often as one of the n_pair items that both rated, n items with a pair.
-    rows, freq = distinct_rows(coded.codes, coded.n_categories)
+    is_many = v.n_categories > MANY and not v.has_matrix
+    exact = exact and v.is_exact and not is_many
+    if is_many:
+        rows, freq = coded.codes, np.ones(len(coded.codes), dtype=np.int64)
+    else:
+        rows, freq = distinct_rows(coded.codes, coded.n_categories)
     freq = freq.astype(object if exact else np.float64)
     u: Array = np.zeros(len(rows), dtype=freq.dtype)
     terms = u.copy()
     for (g, h), table in tables.items():
         slopes, pairs = PairSlopes.of(table, v, exact), rows[:, [g, h]]
-        often = Fraction(coded.n_items_paired, int(table.sum()) * len(tables))
+        n = len(table.codes) if isinstance(table, SparsePairs) else int(table.sum())
+        often = Fraction(coded.n_items, n * len(tables))
         rate: Any = often if exact else float(often)
-        u += of_pairs(slopes.influence() * rate, pairs)
-        terms += of_pairs(abs(slopes.observed * (rate / slopes.d_e)), pairs)
+        moved, parts = slopes.influence() * rate, abs(slopes.observed)
+        parts = parts * abs(rate / slopes.d_e)
+        if isinstance(table, SparsePairs):
+            u[table.is_whole] += moved
+            terms[table.is_whole] += parts
+        else:
+            u += of_pairs(moved, pairs)
+            terms += of_pairs(parts, pairs)
     return Influence(u, freq, terms)

@@ -13,6 +13,7 @@ import numpy as np
 from masrel.agreement import CodedRatings
 from masrel.agreement._counts import item_counts
 from masrel.agreement._kernel import Floats, Kernel, divide, weighted_disagreement
+from masrel.agreement._weights import MANY
 from masrel.errors import ParameterError
 from masrel.estimates import Interval
 from masrel.intervals._endpoints import DrawnResamples, distribution_of
@@ -33,6 +34,11 @@ def check_alpha(problem: IntervalProblem, kind: str) -> None:
         raise ParameterError(
             f'kind: "{kind}" is a bootstrap of krippendorff_alpha, got '
             f"{problem.entry.name}"
+        )
+    if problem.coded.n_categories > MANY:
+        raise ParameterError(
+            f'kind: "{kind}" needs at most {MANY} different grades, got '
+            f"{problem.coded.n_categories}"
         )
     if problem.target != "items":
         raise ParameterError(

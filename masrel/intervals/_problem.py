@@ -4,7 +4,7 @@ import math
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import NoReturn, get_args
+from typing import Any, NoReturn, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +22,10 @@ from masrel.agreement import (
 from masrel.agreement._count_tables import places_of
 from masrel.agreement._counts import distinct_rows, item_counts
 from masrel.agreement._data import check_scale
+from masrel.agreement._distances import Distances
 from masrel.agreement._kernel import Floats, Kernel, RaterSums, check_level
 from masrel.agreement._labels import shown
+from masrel.agreement._weights import MANY, Weights
 from masrel.errors import (
     ParameterError,
     SmallSampleWarning,
@@ -41,6 +43,7 @@ HELD = (
     "of them"
 )
 
+_MAX_PLACES = 1 << 23  # numbers of features that are held at once
 _MAX_REMADE = 40  # categories up to which that metric is made anew from their pairs
 
 COLUMNS = {"ratings": 1, "pairs": 2}
@@ -117,6 +120,11 @@ class IntervalProblem:
     def rater_sums(self) -> RaterSums:
         """Return sums of features as a function of how often each rater is taken."""
         fewest, most = self.entry.n_raters
+        if isinstance(self.v, Distances):
+            raise ParameterError(
+                f"target: raters of {len(self.v)} different grades are left out, but "
+                "not resampled; use the jackknife"
+            )
         if self.kernel.rater_sums is None or most == fewest:
             raise ParameterError(
                 f"target: raters of {self.entry.title} cannot be resampled without "
@@ -222,8 +230,12 @@ def pose_problem(
     weights: "WeightsLike",
     level: float,
     metric: Metric | None = None,
+    delta: bool = False,
 ) -> IntervalProblem:
-    """Check a question and prepare its data."""
+    """Check a question and prepare its data.
+
+    For the delta method alone, that may be without sums where there are too many.
+    """
     entry = find_entry(statistic, metric)
     if target not in get_args(Target):
         raise ParameterError(
@@ -240,13 +252,11 @@ def pose_problem(
         n_raters = coded.n_raters  # those without any rating are none
     if entry.shape == "ratings" and not fewest <= n_raters <= (most or n_raters):
         _refuse_raters(entry, n_raters)
-    kernel = entry.kernel
-    if kernel is None:
-        raise ParameterError(
-            f"coefficient: {entry.title} is no function of sums over items: there is "
-            "no such interval of it"
-        )
-    v = entry.disagreement(coded, weights).floats
+    kernel = _kernel_of(entry)
+    made = entry.disagreement(coded, weights)
+    v = made.floats if made.n_categories <= MANY else None
+    if v is None:
+        kernel, v = _of_many(kernel, coded, made, delta)
     notes: tuple[str, ...] = ()
     if entry.metric == "ordinal" and coded.n_categories > _MAX_REMADE:
         kernel, notes = coefficient(entry.name).kernel or kernel, (HELD,)
@@ -258,6 +268,8 @@ def pose_problem(
         freq, rows = freq[matters], rows[matters]
     sums = np.asarray(freq @ rows)
     value = float(kernel.value(sums, v))
+    if kernel is NO_SUMS:
+        value = entry(coded, weights=weights).value
     # a pair is of one rater in a test-retest, where rows without one do not matter
     paired = (patterns.codes >= 0).sum(axis=1) >= 2
     return IntervalProblem(
@@ -329,6 +341,48 @@ def _of_counted(
     if categories is not None:
         check_scale(ratings.categories, categories)
     return places_of(ratings)
+
+
+def _kernel_of(entry: Coefficient) -> Kernel:
+    if entry.kernel is None:
+        raise ParameterError(
+            f"coefficient: {entry.title} is no function of sums over items: there is "
+            "no such interval of it"
+        )
+    return entry.kernel
+
+
+def _of_many(
+    kernel: Kernel, coded: CodedRatings, made: Weights, delta: bool
+) -> tuple[Kernel, Any]:
+    # the kernel, and v of many categories as it takes it
+    takes_many = kernel.takes_many and not made.has_matrix
+    if takes_many and made.operator.points is not None:
+        return kernel, made.operator
+    q = made.n_categories
+    fewest = len(coded.codes) if takes_many else max(len(coded.codes), q)
+    if fewest * q <= _MAX_PLACES:
+        return kernel, made.operator if takes_many else made.floats
+    if delta:
+        return NO_SUMS, np.empty((0, 0))
+    raise ParameterError(
+        f"ratings: {len(coded.codes)} items of {q} different grades are too many for "
+        'an interval that counts each of them; method="analytic" counts none, nor do '
+        "Krippendorff's alpha by the interval metric and coefficients that do not tell "
+        "raters from one another with quadratic weights"
+    )
+
+
+def _rated(coded: CodedRatings, _v: Floats) -> Floats:
+    # (n_items, 1): whether an item has a rating
+    rated = (coded.codes >= 0).any(axis=1, keepdims=True)
+    return np.asarray(rated, dtype=np.float64)
+
+
+NO_SUMS = Kernel(
+    features=_rated, value=lambda sums, _v: np.full(sums.shape[:-1], math.nan)
+)
+"""In place of the kernel of a coefficient whose features would be too many."""
 
 
 def find_entry(statistic: Statistic, metric: Metric | None = None) -> Coefficient:

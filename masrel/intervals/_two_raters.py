@@ -8,6 +8,7 @@ from typing import Self
 import numpy as np
 
 from masrel.agreement._kernel import Floats
+from masrel.agreement._weights import MANY
 from masrel.errors import ParameterError
 from masrel.estimates import Interval
 from masrel.intervals._problem import IntervalProblem, recorded_generator
@@ -66,6 +67,8 @@ class TablePrior:
 def applies_to(problem: IntervalProblem) -> bool:
     """Return whether a table of two raters can answer a question."""
     if problem.entry.name not in CHANCE_AGREEMENT or problem.n_raters != 2:
+        return False
+    if problem.coded.n_categories > MANY:
         return False
     if problem.entry.metric == "ordinal":  # not one of a table, but of its ratings
         return False
@@ -196,6 +199,11 @@ def _check(problem: IntervalProblem, n_draws: int) -> None:
         raise ParameterError(
             f'model: "table" applies to {", ".join(CHANCE_AGREEMENT)} of exactly two '
             f"raters; got {name} of {n_raters}"
+        )
+    if problem.coded.n_categories > MANY:
+        raise ParameterError(
+            f"ratings: a posterior of their table needs at most {MANY} different "
+            f"grades, got {problem.coded.n_categories}; use the jackknife"
         )
     if problem.entry.metric == "ordinal":
         raise ParameterError(

@@ -156,6 +156,7 @@ def analytic(
         weights=weights,
         metric=metric,
         level=level,
+        delta=error == "delta" and clusters is None,
     )
     check_error(error, target)
     if problem.entry.metric == "ordinal":

@@ -8,9 +8,14 @@ import numpy as np
 
 from masrel.agreement import Coefficient, CountedRatings, Label
 from masrel.errors import ParameterError
-from masrel.estimates import Estimate, Target
+from masrel.estimates import Estimate, Interval, Target
 from masrel.intervals._clusters import clustered_error, clusters_of
-from masrel.intervals._problem import Statistic, find_entry, pose_problem
+from masrel.intervals._problem import (
+    NO_SUMS,
+    Statistic,
+    find_entry,
+    pose_problem,
+)
 from masrel.intervals.analytic import analytic
 from masrel.intervals.bootstrap import bootstrap
 from masrel.intervals.jackknife import _logit_interval, jackknife
@@ -21,6 +26,8 @@ if TYPE_CHECKING:
 
 _Method = Literal["auto", "analytic", "jackknife", "bootstrap", "posterior"]
 """Kinds of intervals; "auto" chooses one by target and size."""
+
+_TOO_MANY = "too many different grades to leave items out one by one"
 
 _OTHERS = {"items": "items", "raters": "raters", "both": "items and raters"}
 
@@ -120,15 +127,7 @@ def estimate(
     if method == "auto" and entry.has_interval:
         return result
     if method == "auto":
-        # Imported here: the other methods load no scipy.
-        from masrel.intervals._choice import choose_interval
-
-        interval, why = choose_interval(
-            pose_problem(entry, ratings, **options),
-            modelled=entry.is_nominal(weights) and entry.name in _RHO_COEFFICIENTS,
-        )
-        note = f"chosen for other {_OTHERS[target]}: {why}"
-        interval = replace(interval, target=target, notes=(note, *interval.notes))
+        interval = _chosen(entry, ratings, options)
     elif method == "analytic":
         interval = analytic(entry, ratings, **options)
     elif method == "jackknife":
@@ -170,6 +169,22 @@ def _clustered(
     if result.reason is None:
         error = clustered_error(problem, codes)
     return Estimate(**{**vars(result), "standard_error": error, "interval": interval})
+
+
+def _chosen(entry: Coefficient, ratings: object, options: "_Options") -> Interval:
+    # Imported here: the other methods load no scipy.
+    from masrel.intervals._choice import choose_interval
+
+    target = options["target"]
+    problem = pose_problem(entry, ratings, delta=target == "items", **options)
+    if problem.kernel is NO_SUMS:
+        interval, why = analytic(entry, ratings, **options), _TOO_MANY
+    else:
+        nominal = entry.is_nominal(options["weights"])
+        modelled = nominal and entry.name in _RHO_COEFFICIENTS
+        interval, why = choose_interval(problem, modelled=modelled)
+    note = f"chosen for other {_OTHERS[target]}: {why}"
+    return replace(interval, target=target, notes=(note, *interval.notes))
 
 
 def _refuse_target(entry: Coefficient, target: str) -> NoReturn:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from masrel.agreement import CodedRatings, CountedRatings, count_ratings
 from masrel.agreement._counts import DistinctItems
 from masrel.agreement._labels import code_type
+from masrel.agreement._weights import MANY
 from masrel.errors import ParameterError, RatingsError
 from masrel.ratings._grade_texts import coded_texts, is_number
 from masrel.ratings._layout import Layout
@@ -67,7 +68,7 @@ class RatingsPart:
         q = len(self.ratings.categories)
         if isinstance(self.ratings, CodedRatings):
             n_items = len(self.ratings.codes)
-            if n_items * q > _MAX_COUNTED:
+            if q <= MANY and n_items * q > _MAX_COUNTED:
                 raise ParameterError(
                     f"{n_items} items with {q} different grades look like "
                     "measurements, and cannot be counted as categories: "
@@ -318,4 +319,6 @@ def _dense(
     codes = np.full(shape, -1, dtype=code_type(len(scale.grades)))
     codes[item, rater] = grade
     codes.setflags(write=False)
-    return CodedRatings(codes=codes, categories=scale.values)
+    # numbers that nobody declared may be measurements rather than grades
+    declared = scale.name != "observed" or not all(map(is_number, scale.grades))
+    return CodedRatings(codes=codes, categories=scale.values, declared=declared)
