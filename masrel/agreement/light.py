@@ -192,7 +192,7 @@ def _influence(
     for (g, h), table in tables.items():
         slopes, pairs = PairSlopes.of(table, v, exact), rows[:, [g, h]]
         n = len(table.codes) if isinstance(table, SparsePairs) else int(table.sum())
-        often = Fraction(coded.n_items, n * len(tables))
+        often = Fraction(coded.n_items_paired, n * len(tables))
         rate: Any = often if exact else float(often)
         moved, parts = slopes.influence() * rate, abs(slopes.observed)
         parts = parts * abs(rate / slopes.d_e)

@@ -1,0 +1,237 @@
+"""Ratings of so many different grades that no table has a place for every two."""
+
+import math
+import tracemalloc
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from masrel.agreement import (
+    COEFFICIENTS,
+    cohen_kappa,
+    fleiss_kappa,
+    krippendorff_alpha,
+)
+from masrel.errors import ParameterError, RatingsError
+from masrel.intervals import bootstrap, estimate, jackknife
+
+Rows = list[list[float]]
+Distance = Callable[[Fraction, Fraction], Fraction]
+
+POOLED = ["percent_agreement", "fleiss_kappa", "gwet_ac", "brennan_prediger"]
+
+
+def continuous(n_items: int = 70, seed: int = 5) -> NDArray[np.float64]:
+    """Three raters, centred, no two ratings alike; some missing."""
+    rng = np.random.default_rng(seed)
+    ratings = rng.normal(size=(n_items, 1)) + 0.5 * rng.normal(size=(n_items, 3))
+    ratings[0, 0] = ratings[7, 2] = ratings[9, :2] = np.nan
+    return ratings
+
+
+def by_definition(ratings: NDArray[np.float64], distance: Distance) -> Fraction:
+    """Return Krippendorff's alpha in fractions, pair by pair."""
+    rows = [[Fraction(x) for x in row if not math.isnan(x)] for row in ratings.tolist()]
+    rows = [row for row in rows if len(row) > 1]
+    every = [x for row in rows for x in row]
+    n = len(every)
+    observed = sum(
+        sum(distance(x, y) for x in row for y in row) / (len(row) - 1) for row in rows
+    )
+    expected = sum(distance(x, y) for x in every for y in every)
+    return 1 - (n - 1) * Fraction(observed) / expected
+
+
+def rounded(distance: Callable[[float, float], float]) -> Distance:
+    """Return a distance that is no fraction, as the one of its float."""
+    return lambda x, y: Fraction(distance(float(x), float(y)))
+
+
+RANKED = {x: i for i, x in enumerate(sorted(set(continuous().ravel().tolist())))}
+
+
+@pytest.mark.parametrize(
+    ("options", "distance"),
+    [
+        ({"metric": "interval"}, lambda x, y: (x - y) ** 2),
+        ({"weights": "quadratic"}, lambda x, y: (x - y) ** 2),
+        ({"weights": "linear"}, lambda x, y: abs(x - y)),
+    ],
+)
+def test_alpha_of_continuous_ratings_is_that_of_fractions(
+    options: dict[str, Any], distance: Distance
+) -> None:
+    ratings = continuous()
+    exact = float(by_definition(ratings, distance))
+    assert krippendorff_alpha(ratings, **options).value == pytest.approx(
+        exact, rel=1e-13
+    )
+    for factor in (2.0**-500, 2.0**530):
+        scaled = krippendorff_alpha(ratings * factor, **options)
+        assert scaled.value == pytest.approx(exact, rel=1e-13)
+        assert scaled.standard_error > 0.0
+
+
+def test_ratio_of_continuous_ratings_is_the_sum_over_pairs() -> None:
+    for power in (0.05, 1.0, 8.0):  # values of 1 to 1.3, of a few powers of e, of many
+        ratings = np.exp(power * continuous())
+        ratings[3, 1] = 0.0 if power == 1.0 else ratings[3, 1]
+        distance = rounded(lambda x, y: ((x - y) / (x + y or 1.0)) ** 2)
+        exact = float(by_definition(ratings, distance))
+        for signed in (ratings, -ratings):
+            value = krippendorff_alpha(signed, metric="ratio").value
+            assert value == pytest.approx(exact, rel=1e-12)
+        if power != 1.0:
+            value = krippendorff_alpha(ratings, weights="ratio").value
+            assert value == pytest.approx(exact, rel=1e-12)
+
+
+@pytest.mark.parametrize("name", [*POOLED, "conger_kappa", "light_kappa"])
+@pytest.mark.parametrize("weights", ["linear", "quadratic", "ordinal", "circular"])
+def test_many_grades_have_the_value_of_a_matrix(name: str, weights: str) -> None:
+    # Whole numbers from 0 to 149, each once and with what two raters do; the same as
+    # one matrix of weights, which is computed exactly.
+    rng = np.random.default_rng(8)
+    first = rng.permutation(150)
+    ratings = np.column_stack([first, rng.permutation(150), (first + 7) % 150])
+    scale = np.arange(150.0)
+    between = np.abs(scale[:, None] - scale)
+    matrix = {
+        "linear": 1 - between / 149,
+        "quadratic": 1 - (between / 149) ** 2,
+        "ordinal": 1 - between * (between + 1) / (150 * 149),
+        "circular": 1 - np.sin(np.pi * between / 150) ** 2,
+    }[weights]
+    np.fill_diagonal(matrix, 1.0)
+    matrix = np.minimum(np.maximum(matrix, matrix.T), 1.0)
+    entry = COEFFICIENTS[name]
+    result, custom = entry(ratings, weights=weights), entry(ratings, weights=matrix)
+    assert result.value == pytest.approx(custom.value, abs=1e-12)
+    assert result.standard_error == pytest.approx(custom.standard_error, rel=1e-9)
+    assert (result.observed, result.chance) == pytest.approx(
+        (custom.observed, custom.chance), abs=1e-12
+    )
+
+
+def test_cohens_kappa_of_continuous_ratings_by_moments() -> None:
+    # Quadratic: κ = 1 - Σ (x - y)² / Σ_ij (x_i - y_j)² n, so 2 s_xy over
+    # s_x² + s_y² + (x̄ - ȳ)², Lin's concordance over n.
+    ratings = continuous()
+    x, y = ratings[~np.isnan(ratings[:, :2]).any(axis=1), :2].T
+    covariance = ((x - x.mean()) * (y - y.mean())).mean()
+    kappa = 2 * covariance / (x.var() + y.var() + (x.mean() - y.mean()) ** 2)
+    result = cohen_kappa(ratings[:, :2], weights="quadratic")
+    assert result.value == pytest.approx(kappa, rel=1e-13)
+    light = COEFFICIENTS["light_kappa"](ratings[:, :2], weights="quadratic")
+    assert light.value == pytest.approx(kappa, rel=1e-13)
+    assert light.standard_error > 0.0
+
+
+def test_the_ordinal_metric_goes_by_ranks() -> None:
+    ratings = continuous()
+    ratings = ratings[np.isfinite(ratings).all(axis=1)]
+    ranks = ratings.ravel().argsort().argsort().reshape(ratings.shape).astype(float)
+    ordinal = krippendorff_alpha(ratings, metric="ordinal").value
+    exact = by_definition(ranks, lambda x, y: (x - y) ** 2)
+    assert ordinal == pytest.approx(float(exact), rel=1e-13)
+
+
+def test_categories_may_be_many() -> None:
+    # 400 codes, each item one of its own: a count of them is nearly all zeros.
+    rng = np.random.default_rng(2)
+    truth = rng.integers(0, 400, 1500)
+    codes = np.where(
+        rng.random((1500, 3)) < 0.7, truth[:, None], rng.integers(0, 400, (1500, 3))
+    )
+    same = [(codes[:, g] == codes[:, h]).mean() for g, h in ((0, 1), (0, 2), (1, 2))]
+    observed = np.mean(same)
+    shares = np.bincount(codes.ravel()) / codes.size
+    chance = (shares**2).sum()
+    as_text = np.char.add("icd", codes.astype(str))
+    for ratings in (codes, as_text, as_text.tolist()):
+        result = fleiss_kappa(ratings)
+        kappa = (observed - chance) / (1 - chance)
+        assert result.value == pytest.approx(kappa, rel=1e-13)
+    entry = estimate("fleiss_kappa", codes, target="items")
+    assert entry.interval is not None
+    assert entry.interval.low < entry.value < entry.interval.high
+
+
+@pytest.mark.parametrize(
+    "name", ["fleiss_kappa", "krippendorff_alpha", "light_kappa", "conger_kappa"]
+)
+def test_measurements_are_no_categories(name: str) -> None:
+    with pytest.raises(RatingsError) as refusal:
+        COEFFICIENTS[name](continuous())
+    said = str(refusal.value)
+    assert "206 different numbers among 20" in said
+    assert "ICC" in said
+    assert "metric" in said
+    # declared, or text, they are what they are
+    text = [[None if x != x else f"{x:.9f}" for x in row] for row in continuous()]
+    assert COEFFICIENTS[name](text).value <= 0.0
+
+
+def test_weights_that_need_a_matrix_say_so() -> None:
+    for weights in ("radical", "bipolar"):
+        with pytest.raises(ParameterError, match=f"{weights} needs a matrix of every"):
+            fleiss_kappa(continuous(), weights=weights)  # type: ignore[arg-type]
+    with pytest.raises(ParameterError, match="needs values of one sign"):
+        krippendorff_alpha(continuous(), metric="ratio")
+
+
+@pytest.mark.parametrize("options", [{"metric": "interval"}, {"weights": "linear"}])
+def test_the_jackknife_of_continuous_ratings_leaves_items_out(
+    options: dict[str, Any],
+) -> None:
+    ratings = continuous(60)
+    usable = [i for i, row in enumerate(ratings) if np.isfinite(row).sum() > 1]
+    n = len(usable)
+    without = [
+        krippendorff_alpha(np.delete(ratings, i, axis=0), **options).value
+        for i in usable
+    ]
+    variance = (n - 1) ** 2 / n * np.var(without, ddof=1)
+    result = jackknife("krippendorff_alpha", ratings, target="items", **options)
+    value = krippendorff_alpha(ratings, **options).value
+    from scipy.stats import t
+
+    half = t.ppf(0.975, n - 1) * math.sqrt(variance)
+    assert result.low == pytest.approx(value - half, rel=1e-9)
+
+
+def test_continuous_ratings_have_a_bootstrap_by_moments() -> None:
+    ratings = continuous()
+    result = bootstrap(
+        "krippendorff_alpha", ratings, target="items", metric="interval", rng=1
+    )
+    value = krippendorff_alpha(ratings, metric="interval").value
+    assert result.low < value < result.high
+    with pytest.raises(ParameterError, match="raters of 206 different grades are left"):
+        bootstrap("fleiss_kappa", ratings, target="raters", weights="quadratic", rng=1)
+
+
+def test_what_cannot_be_left_out_has_the_delta_method() -> None:
+    rng = np.random.default_rng(2)
+    codes = rng.integers(0, 3000, (6000, 1)).repeat(2, axis=1)
+    codes[::3, 1] = rng.integers(0, 3000, 2000)
+    result = estimate("fleiss_kappa", codes, target="items")
+    assert result.interval is not None
+    assert "delta method" in result.interval.method
+    assert "too many different grades" in result.interval.notes[0]
+    with pytest.raises(ParameterError, match='method="analytic" counts none'):
+        jackknife("fleiss_kappa", codes, target="items")
+
+
+def test_continuous_ratings_take_a_few_times_their_room() -> None:
+    # a matrix of the grades would have 3.6e9 places; nothing is coded, only sorted
+    ratings = np.random.default_rng(0).normal(size=(20_000, 3))
+    tracemalloc.start()
+    krippendorff_alpha(ratings, metric="interval")
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 20 * ratings.nbytes
