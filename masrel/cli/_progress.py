@@ -4,10 +4,12 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Never
+from typing import TYPE_CHECKING, Never
 
 import click
-from tqdm import tqdm
+
+if TYPE_CHECKING:
+    from tqdm import tqdm
 
 _PERIOD_S = 10.0
 
@@ -15,7 +17,9 @@ _PERIOD_S = 10.0
 class Progress:
     """Steps made of those that are expected."""
 
-    def __init__(self, description: str, bar: "tqdm[Never]", *, shows: bool) -> None:
+    def __init__(
+        self, description: str, bar: "tqdm[Never] | None", *, shows: bool
+    ) -> None:
         self._description = description
         self._bar = bar
         self._shows = shows  # lines, where there is no bar
@@ -26,13 +30,15 @@ class Progress:
     def expect(self, n_steps: int) -> None:
         """Say how many steps there will be in all, as far as is known."""
         self._n_expected = n_steps
-        self._bar.total = n_steps
-        self._bar.refresh()
+        if self._bar is not None:
+            self._bar.total = n_steps
+            self._bar.refresh()
 
     def update(self, n_steps: int) -> None:
         """Count steps that were made."""
         self._n_made += n_steps
-        self._bar.update(n_steps)
+        if self._bar is not None:
+            self._bar.update(n_steps)
         now = time.monotonic()
         if self._shows and now - self._last >= _PERIOD_S:
             self._last = now
@@ -47,13 +53,14 @@ class Progress:
 @contextmanager
 def progress(description: str, unit: str, *, is_quiet: bool) -> Iterator[Progress]:
     """Show a bar on stderr, or a line every ten seconds where that is no terminal."""
-    is_terminal = sys.stderr.isatty()
+    if is_quiet or not sys.stderr.isatty():
+        yield Progress(description, None, shows=not is_quiet)
+        return
+    from tqdm import tqdm
+
     # nothing is shown of a call that is refused at once
-    bar = tqdm(
-        desc=description, unit=unit, delay=0.01, disable=is_quiet or not is_terminal
-    )
-    with bar:
-        yield Progress(description, bar, shows=not (is_quiet or is_terminal))
+    with tqdm(desc=description, unit=unit, delay=0.01) as bar:
+        yield Progress(description, bar, shows=False)
 
 
 def duration_words(seconds: float) -> str:

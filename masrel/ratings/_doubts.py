@@ -3,6 +3,7 @@
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import filterfalse
 
 import numpy as np
 from numpy.typing import NDArray
@@ -278,7 +279,7 @@ def doubt_names(kind: str, names: Sequence[str]) -> list[str]:
         for group in alike_texts(names)[:_SHOWN]
     ]
     if kind == "items":
-        odd = [n for n in names if not n.isdigit() and _is_no_item(n)]
+        odd = [n for n in filterfalse(str.isdigit, names) if _is_no_item(n)]
         if 0 < len(odd) < len(names) / 2:
             warnings.append(
                 f"{', '.join(map(repr, odd[:_SHOWN]))} counts as an item: if it is a "

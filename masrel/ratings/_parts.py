@@ -310,7 +310,7 @@ def _first_met(codes: Codes) -> tuple[Codes, Codes]:
 def _names_met(codes: Codes, names: list[str]) -> tuple[Codes, tuple[str, ...]]:
     # codes of the names that occur, in the order in which they do
     met, places = _first_met(codes)
-    return met, tuple(names[place] for place in places)
+    return met, tuple(map(names.__getitem__, places.tolist()))
 
 
 def _dense(

@@ -1,7 +1,9 @@
 """A text as records of cells: its comments, its separator, its lines."""
 
 import csv
+import gc
 import io
+import itertools
 import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -114,6 +116,19 @@ def _rows(text: str, delimiter: str) -> Iterator[list[str]]:
         blanks = delimiter != "\t"
         with _long_cells(text):
             yield from csv.reader(lines, delimiter=delimiter, skipinitialspace=blanks)
+
+
+@contextmanager
+def _collector_off() -> Iterator[None]:
+    # lists of text are no cycles; to look for some in 100 000 of them costs as much as
+    # to read them
+    was_on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_on:
+            gc.enable()
 
 
 @contextmanager
@@ -256,14 +271,16 @@ class _Lines:
             rows = self._checked_records()
             if self.has_row_names:
                 rows[0] = [*rows[0], ""]
-            return self._named(np.array(rows, dtype=object))
+            every = itertools.chain.from_iterable(rows)
+            cells = np.fromiter(every, dtype=object, count=len(rows) * self.width)
+            return self._named(cells.reshape(len(rows), self.width))
         return self._named(self._parsed())
 
     def _checked_records(self) -> list[list[str]]:
         # by the csv module, a quote that is not closed refused
         rows: list[list[str]] = []
         try:
-            with _long_cells(self._body):
+            with _long_cells(self._body), _collector_off():
                 rows = list(self._reader(is_strict=True))
         except csv.Error as error:
             if "unexpected end" in str(error):

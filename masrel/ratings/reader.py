@@ -438,8 +438,9 @@ def _named(sheet: Sheet, role: str, places: tuple[int, ...]) -> tuple[Codes, lis
 def _refuse_unnamed(
     sheet: Sheet, role: str, place: int, codes: Codes, names: list[str]
 ) -> None:
-    for code, name in enumerate(names):
-        if name in USUAL_MISSING:
+    unnamed = set(USUAL_MISSING).intersection(names)
+    for code, name in enumerate(names if unnamed else ()):
+        if name in unnamed:
             row = int(np.argmax(codes == code))
             raise sheet.error(
                 f"{sheet.where(row)}, column {sheet.header[place]!r}: needed the "
