@@ -49,22 +49,27 @@ def item_columns(large: LargeFile, columns: Sequence[Any]) -> list[Any]:
 
 def unnamed_rows(large: LargeFile, items: list[Any]) -> NDArray[np.bool_] | None:
     """Return which rows have no name of the item; None if all have one."""
-    compute = arrow(large.sheet.name, "pyarrow.compute")
     unnamed = None
     for item in items:
         blank = item.is_null() if item.null_count else None
         if not is_whole(item):
-            shortest = compute.min(compute.binary_length(item)).as_py()
-            if shortest is not None and shortest <= 2:  # long names are none of these
-                blank = item.is_null()
-                for usual in USUAL_MISSING:
-                    blank = compute.or_(
-                        blank, compute.equal(item, usual).fill_null(False)
-                    )
-        if blank is not None and compute.any(blank).as_py():
-            mask = numbers_of(blank.fill_null(False)).astype(bool)
+            blank = _blank_texts(large, item, blank)
+        if blank is not None:
+            mask = numbers_of(blank).astype(bool)
             unnamed = mask if unnamed is None else unnamed | mask
-    return unnamed
+    return unnamed if unnamed is not None and unnamed.any() else None
+
+
+def _blank_texts(large: LargeFile, item: Any, blank: Any) -> Any:
+    # which texts are those of a missing name; `blank` if none is as short as these
+    compute = arrow(large.sheet.name, "pyarrow.compute")
+    shortest = compute.min(compute.binary_length(item)).as_py()
+    if shortest is None or shortest > max(map(len, USUAL_MISSING)):
+        return blank
+    blank = item.is_null()
+    for usual in USUAL_MISSING:
+        blank = compute.or_(blank, compute.equal(item, usual).fill_null(False))
+    return blank
 
 
 class Ascending:
