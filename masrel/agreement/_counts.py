@@ -7,7 +7,7 @@ category. Sums over items are whole numbers, and exact.
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from operator import mul
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -116,16 +116,27 @@ class DistinctItems:
     def of_codes(cls, coded: CodedRatings) -> "DistinctItems":
         """Count the raters of each category, and put equal items together."""
         codes, q = coded.codes, len(coded.categories)
-        n_raters = codes.shape[1]
+        n_items, n_raters = codes.shape
         if codes.size <= FEW:
             counter = Counter(map(tuple, item_counts(coded).tolist()))
             counter.pop((0,) * q, None)
             return cls(list(counter), list(counter.values()), q)
-        counted = _count_item_keys(codes, q)
-        if counted is None:
-            return cls.of_arrays(item_counts(coded))
-        keys, freq = counted
+        # An item is one number: Σ over its raters of (n_raters + 1) to the power code.
         base = n_raters + 1
+        n_keys = base**q
+        has_table = n_keys <= min(_MAX_KEYS, 16 * n_items)
+        if not has_table and not (n_keys < 2**62 and n_items <= _MAX_SORTED):
+            return cls.of_arrays(item_counts(coded))
+        most = min(_MAX_SMALL, n_items // 10)  # rows that are counted before items
+        if q**n_raters <= most and (small := _small_rows(codes, q, most)) is not None:
+            return cls.of_patterns(replace(coded, codes=small[0]), small[1])
+        if has_table:
+            counted = _blocks(n_items, lambda at: _item_keys(codes[at], base, q))
+            freq = _table_of_keys(counted, n_keys)
+            keys = np.flatnonzero(freq)
+            freq = freq[keys]
+        else:
+            keys, freq = np.unique(_item_keys(codes, base, q), return_counts=True)
         powers = base ** np.arange(q, dtype=np.int64)
         return cls.of_arrays(keys[:, None] // powers % base, freq)
 
@@ -303,9 +314,11 @@ def distinct_rows(codes: Codes, n_categories: int) -> tuple[Integers, Integers]:
         freq = last + 1
         freq[1:] -= freq[:-1]  # numpy sees that they overlap
         return codes[order[last]].astype(np.int64), freq
-    small = _small_rows(codes, n_categories, n_items // 2)
-    if small is not None:
-        return small
+    most = min(_MAX_SMALL, n_items // 2)
+    if n_categories**n_raters <= most:
+        small = _small_rows(codes, n_categories, most)
+        if small is not None:
+            return small
     if n_keys > min(_MAX_KEYS, 16 * n_items):
         keys, freq = np.unique(_row_keys(codes, base), return_counts=True)
     else:
@@ -316,40 +329,11 @@ def distinct_rows(codes: Codes, n_categories: int) -> tuple[Integers, Integers]:
     return keys[:, None] // powers % base - 1, freq.astype(np.int64)
 
 
-def _count_item_keys(
-    codes: Codes, n_categories: int
-) -> tuple[Integers, Integers] | None:
-    # An item is one number: Σ over its raters of (n_raters + 1) to the power code.
-    # These ascending, and how often each occurs; None if they may be too many.
-    n_items, n_raters = codes.shape
-    base, q = n_raters + 1, n_categories
-    n_keys = base**q
-    is_sorted = n_keys < 2**62 and n_items <= _MAX_SORTED
-    if not (has_table := n_keys <= min(_MAX_KEYS, 16 * n_items)) and not is_sorted:
-        return None
-    small = _small_rows(codes, q, n_items // 10)
-    if small is not None:
-        rows, often = small
-        keys, at = np.unique(_item_keys(rows, base, q), return_inverse=True)
-        return keys, np.bincount(at, often).astype(np.int64)  # floats, exact to 2^53
-    if has_table:
-        table = _table_of_keys(
-            _blocks(n_items, lambda at: _item_keys(codes[at], base, q)), n_keys
-        )
-        keys = np.flatnonzero(table)
-        return keys, table[keys]
-    keys, freq = np.unique(_item_keys(codes, base, q), return_counts=True)
-    return keys, freq
-
-
 def _small_rows(
     codes: Codes, n_categories: int, most: int
 ) -> tuple[Integers, Integers] | None:
     # distinct rows and how often each occurs, by their keys; None if those are many
     n_raters = codes.shape[1]
-    most = min(_MAX_SMALL, most)
-    if n_categories**n_raters > most:
-        return None
     lowest = -1 if codes.min() < 0 else 0  # a missing rating is a digit of its own
     base = n_categories - lowest
     n_keys = base**n_raters
