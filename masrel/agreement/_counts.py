@@ -472,7 +472,8 @@ def count_ratings(
     if isinstance(few, list) and len(few) <= FEW:
         rows, scale = label_rows(few, categories)
         counter = None
-        if categories is not None or not has_doubtful_text(scale):
+        is_text = categories is None and scale and isinstance(scale[0], str)
+        if not (is_text and has_doubtful_text(scale)):
             counter = _count_complete(rows, scale)
         if counter is not None:
             return CountedRatings(

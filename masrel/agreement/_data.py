@@ -153,7 +153,7 @@ def code_ratings(
                 for i, row in enumerate(rows)
             ]
         codes = np.array(of_rows, dtype=code_type(len(known)))
-    if not declared:
+    if not declared and known and isinstance(known[0], str):
         doubt_texts(known, codes)
     codes.setflags(write=False)
     return CodedRatings(codes=codes, categories=known, declared=declared)
@@ -164,7 +164,8 @@ def _table_codes(
 ) -> tuple[Codes, tuple[Label, ...], bool]:
     # of an array or a frame: codes, scale, and whether that was declared
     declared = None if categories is None else check_categories(categories)
-    ratings = plain_array(ratings)
+    if type(ratings) is not np.ndarray:
+        ratings = plain_array(ratings)
     if not isinstance(ratings, np.ndarray):  # a DataFrame, without importing pandas
         return frame_codes(ratings, declared)
     if ratings.ndim != 2:
@@ -343,7 +344,7 @@ def _grades(
             row = int(np.argmax(positions == code))
             lookup(label, position, row, name)
     grades = table[positions]  # missing, -1, is the last
-    if categories is None:
+    if categories is None and declared and isinstance(declared[0], str):
         doubt_texts(declared, grades, name)
     return grades, declared
 

@@ -143,9 +143,7 @@ _TEXTS_OF_NOTHING = frozenset({"nan", "None", "NaT", "<NA>"})
 
 
 def has_doubtful_text(labels: Sequence[Label]) -> bool:
-    """Return whether a scale that nobody declared has texts that may be no grades."""
-    if not labels or not isinstance(labels[0], str):
-        return False
+    """Return whether text that nobody declared may be no grades."""
     return labels[0] == "" or not _TEXTS_OF_NOTHING.isdisjoint(labels)
 
 

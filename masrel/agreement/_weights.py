@@ -272,12 +272,13 @@ def declared_weights(
     """
     if weights is None:
         weights = "identity"
-    if not is_row(categories):
-        raise RatingsError(
-            "categories: needs a sequence of at least one label, got "
-            f"{shown(categories)}"
-        )
-    categories = tuple(categories)
+    if type(categories) is not tuple:
+        if not is_row(categories):
+            raise RatingsError(
+                "categories: needs a sequence of at least one label, got "
+                f"{shown(categories)}"
+            )
+        categories = tuple(categories)
     if isinstance(weights, str):
         return named_weights(weights, categories, declared)
     if isinstance(weights, Weights):

@@ -125,7 +125,9 @@ def _other_items_and_raters(
     # So the variance is below neither; nor is an end inside either interval. With the
     # fewer degrees of freedom of the two, in both, the answer is no surer than either.
     df = min(problem.n_paired_items, problem.n_paired_raters) - 1
-    common = problem.student_t(df) ** 2 * _variance_of_cells(problem)
+    common = _variance_of_cells(problem)
+    # of one item, nothing is known to be in both
+    common = problem.student_t(df) ** 2 * common if df > 0 else 0.0
     items, raters = (
         choose_interval(replace(problem, target=of, max_df=df), modelled=modelled)[0]
         for of in ("items", "raters")

@@ -2,11 +2,13 @@
 
 import math
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from masrel.agreement import Label, Significance, count_ratings
+from masrel.agreement._labels import is_row
 from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
 from masrel.estimates import Estimate
 
@@ -57,7 +59,7 @@ def equality_test(estimates: Sequence[Estimate]) -> Significance:
     >>> print(equality_test([cohen_kappa_from_table(table) for table in tables]))
     equality_test: 7.971, chi-squared(2), p = 0.0186
     """
-    checked = list(estimates) if isinstance(estimates, Iterable) else [estimates]
+    checked: list[Any] = list(estimates) if is_row(estimates) else [estimates]
     if len(checked) < 2 or not all(isinstance(e, Estimate) for e in checked):
         raise ParameterError(
             "estimates: needs two or more of type Estimate, got "
@@ -137,7 +139,7 @@ def donner_test(
     donner_test: 7.047, chi-squared(2), p = 0.0295
     """
     name = "donner_test"
-    if isinstance(groups, str) or not isinstance(groups, Iterable):
+    if not is_row(groups):
         raise ParameterError(
             f"groups: needs the ratings of two groups or more, got {groups!r}"
         )
