@@ -48,7 +48,7 @@ def metric_weights(metric: Metric, counted: CountedRatings) -> Weights:
     """Return the δ² of a metric, exact; they grow without bound."""
     # Krippendorff (2004), Content Analysis, 2nd ed., pp. 232-236
     check_metric(metric)
-    if metric == "nominal" or not counted.categories:  # nobody rated anything
+    if metric == "nominal" or len(counted.categories) == 0:  # nobody rated anything
         return Weights(name=metric, n_categories=len(counted.categories))
     if metric in ("jaccard", "masi"):
         return _of_sets(metric, counted.categories)
