@@ -29,9 +29,16 @@ class FurtherOptions:
     compare: bool
     diagnose: bool
     reference: str | None
+    limits_of_agreement: bool
+    unit: str | None
+
+    @property
+    def has_figure(self) -> bool:
+        """Whether a table has a figure of its own."""
+        return self.diagnose or self.limits_of_agreement
 
     def record(self) -> dict[str, object]:
-        """Return the tables that were chosen, and the reference."""
+        """Return the tables that were chosen, the reference and the unit."""
         values = {field.name: getattr(self, field.name) for field in fields(self)}
         return {name: value for name, value in values.items() if value}
 
@@ -43,6 +50,15 @@ class FurtherOptions:
             options = self._with_clusters(options)
         if self.reference is not None and not self.diagnose:
             raise ParameterError("--reference: belongs to --diagnose, got it alone")
+        if self.unit is not None and not self.limits_of_agreement:
+            raise ParameterError(
+                "--unit: belongs to --limits-of-agreement, got it alone"
+            )
+        if self.diagnose and self.limits_of_agreement:
+            raise ParameterError(
+                "--diagnose and --limits-of-agreement: each has a figure, so needs one "
+                "of them, got both"
+            )
         if self.diagnose and options.target in ("raters", "both"):
             raise ParameterError(
                 "--diagnose: is of these raters, so its intervals generalise to other "
@@ -139,6 +155,17 @@ further_options = grouped(
         metavar="RATER",
         help="With --diagnose, the rater that the others are held against.",
     ),
+    click.option(
+        "--limits-of-agreement",
+        is_flag=True,
+        help="Of two raters, the mean of their differences and Bland and Altman's "
+        "limits, with exact intervals; --figure draws them.",
+    ),
+    click.option(
+        "--unit",
+        metavar="UNIT",
+        help="With --limits-of-agreement, the unit of the ratings, such as deg.",
+    ),
 )
 
 
@@ -176,6 +203,10 @@ def further_tables(
 
             tables += [symmetry_table(file)] if further.symmetry else []
             tables += [index_table(file)] if further.indices else []
+        if further.limits_of_agreement:
+            from masrel.report._limits_table import limits_table
+
+            tables.append(limits_table(file, level=options.level, unit=further.unit))
         between = further.between_raters(file, options)
         if further.compare and between is not None:
             tables += _comparisons(file, between, question)

@@ -54,8 +54,8 @@ if TYPE_CHECKING:
 )
 @output_options(
     json="Write a record of all here; - prints it, and nothing else, on stdout.",
-    figure="Draw the intervals into this .png, .svg or .pdf; needs --target, or "
-    "--diagnose.",
+    figure="Draw the intervals into this .png, .svg or .pdf; needs --target, "
+    "--diagnose or --limits-of-agreement.",
     csv="Print every digit as CSV.",
     latex="Print a LaTeX table.",
     sentence="Print a sentence for a paper instead of the table, one an estimate.",
@@ -77,7 +77,7 @@ def agree(
     """
     output.check_files()
     options = further.checked(options, reading.by, reading.clusters)
-    if output.figure is not None and options.target is None and not further.diagnose:
+    if output.figure is not None and options.target is None and not further.has_figure:
         raise ParameterError(
             "--figure: shows intervals, so it needs --target raters, items or both"
         )

@@ -213,6 +213,28 @@ class RaterPairs:
     level: float  # of the intervals
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DifferencePanel:
+    """How two raters differ on every item."""
+
+    title: str  # of which part, or nothing
+    raters: tuple[str, str]  # the first less the second
+    # (n_items,): of the two ratings of each item
+    averages: "Floats" = field(compare=False, repr=False)
+    differences: "Floats" = field(compare=False, repr=False)
+    # value, low and high of upper limit, mean and lower limit; none if undefined
+    lines: tuple[tuple[float, float, float], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Differences:
+    """Differences against means, with limits of agreement."""
+
+    panels: tuple[DifferencePanel, ...]
+    unit: str  # of the ratings, or nothing
+    level: float  # of the intervals
+
+
 Content = (
     GradeGrid
     | Forest
@@ -225,5 +247,6 @@ Content = (
     | JointFitView
     | FrictionView
     | RaterPairs
+    | Differences
 )
 """Whatever can be drawn."""

@@ -30,7 +30,7 @@ from masrel.report._agreement_table import (
     group_key,
 )
 from masrel.report._estimate_words import surely_reached
-from masrel.report._figure_data import RaterPairs
+from masrel.report._figure_data import Content
 from masrel.report._tables import Table
 
 _SHOWN = 6  # names that a note lists
@@ -44,7 +44,7 @@ class FurtherTable:
     table: Table
     documents: list[dict[str, object]]
     rows: tuple[AgreementRow, ...] = ()  # the estimates in it, for a figure
-    figure: RaterPairs | None = None  # what takes the place of that figure
+    figure: Content | None = None  # what takes the place of that figure
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -133,6 +133,10 @@ def _figure(content: data.Content) -> Figure:
             from masrel.report.figures._rater_pairs import rater_figure
 
             return rater_figure(content)
+        case data.Differences():
+            from masrel.report.figures._limits_figure import limits_figure
+
+            return limits_figure(content)
         case data.LatentScale():
             from masrel.report.figures._latent_scale import latent_figure
 

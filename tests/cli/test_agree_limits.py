@@ -1,0 +1,99 @@
+"""`masrel agree` of measurements: SEM, concordance, and limits of agreement drawn."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from masrel.agreement import limits_of_agreement
+from tests.cli.process import Caller
+
+PAIRS = [(9, 8), (5, 7), (4, 4), (8, 7), (6, 6), (5, 7)]
+ROWS = "".join(f"p{i},{a},{b}\n" for i, (a, b) in enumerate(PAIRS))
+
+
+@pytest.fixture
+def pairs(tmp_path: Path) -> Path:
+    file = tmp_path / "pairs.csv"
+    file.write_text("item,Kim,Lee\n" + ROWS, encoding="utf-8")
+    return file
+
+
+def test_table_and_record_are_those_of_the_library(masrel: Caller, pairs: Path) -> None:
+    call = ("agree", pairs, "--limits-of-agreement", "--unit", "deg")
+    limits = limits_of_agreement(PAIRS)
+    out = masrel(*call).out
+    assert "Limits of agreement (deg)" in out
+    assert f"{limits.upper:.3f}" in out
+    assert "Difference: Kim less Lee." in out
+    (record,) = json.loads(masrel(*call, "--json", "-").out)["limits_of_agreement"]
+    assert (record["first"], record["second"]) == ("Kim", "Lee")
+    assert (record["lower"], record["upper"]) == (limits.lower, limits.upper)
+    assert record["outer"] == list(limits.outer)
+    assert record["upper_interval"]["high"] == limits.upper_interval.high
+
+
+def test_figure_has_the_limits_with_their_unit(masrel: Caller, pairs: Path) -> None:
+    file = pairs.parent / "limits.svg"
+    call = ("agree", pairs, "--limits-of-agreement", "--unit", "deg")
+    done = masrel(*call, "--figure", file)
+    assert done.code == 0
+    assert f"figure: {file}" in done.err
+    assert file.read_text("utf-8").startswith("<?xml")
+
+
+def test_each_group_has_its_limits(masrel: Caller, tmp_path: Path) -> None:
+    file = tmp_path / "clinics.csv"
+    rows = "".join(
+        f"{clinic},{clinic}{i},{a},{b}\n"
+        for clinic in ("North", "South")
+        for i, (a, b) in enumerate(PAIRS)
+    )
+    file.write_text("clinic,item,Kim,Lee\n" + rows, encoding="utf-8")
+    call = ("agree", file, "--by", "clinic", "--limits-of-agreement", "--json", "-")
+    records = json.loads(masrel(*call).out)["limits_of_agreement"]
+    assert [record["clinic"] for record in records] == ["North", "South"]
+
+
+def test_estimates_in_units_have_rows_and_sentences(
+    masrel: Caller, pairs: Path
+) -> None:
+    call = ("agree", pairs, "--coefficients", "lin_ccc,sem,mdc_consistency")
+    out = masrel(*call).out
+    for title in ("Lin's concordance", "SEM", "MDC95, consistency"):
+        assert title in out
+    said = masrel(*call, "--sentence").out
+    assert "SEM = 0." in said  # a number in units keeps its zero
+    assert "Lin's concordance = ." in said
+
+
+@pytest.mark.parametrize(
+    ("more", "why"),
+    [
+        (("--unit", "deg"), "--unit: belongs to --limits-of-agreement, got it alone"),
+        (
+            ("--limits-of-agreement", "--diagnose"),
+            "--diagnose and --limits-of-agreement: each has a figure",
+        ),
+        (
+            ("--coefficients", "sem", "--target", "both", "--figure", "sem.svg"),
+            "--figure: shows coefficients of agreement, got only estimates in",
+        ),
+    ],
+)
+def test_what_does_not_fit_is_one_sentence(
+    masrel: Caller, pairs: Path, more: tuple[str, ...], why: str
+) -> None:
+    done = masrel("agree", pairs, *more)
+    assert done.code != 0
+    assert why in done.err
+
+
+def test_three_raters_and_text_are_refused(masrel: Caller, tmp_path: Path) -> None:
+    three, text = tmp_path / "three.csv", tmp_path / "text.csv"
+    three.write_text("item,A,B,C\nx,1,2,3\ny,2,2,4\n", encoding="utf-8")
+    text.write_text("item,A,B\nx,mild,severe\ny,mild,mild\n", encoding="utf-8")
+    done = masrel("agree", three, "--limits-of-agreement")
+    assert "needs two raters, got 3 (A, B, C); --raters chooses two" in done.err
+    done = masrel("agree", text, "--limits-of-agreement")
+    assert "--limits-of-agreement: needs grades that are numbers" in done.err
