@@ -25,6 +25,7 @@ from masrel.report._further_tables import (
     finite,
     heading,
     label,
+    on_grades,
     part_keys,
     part_names,
 )
@@ -77,7 +78,7 @@ def _diagnosed(
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", MasrelWarning)  # the result says it
             result = diagnose(
-                coded_part(part, "--diagnose"),
+                on_grades(coded_part(part, "--diagnose"), entry, file.scale),
                 coefficient=entry,
                 target=None if question.target is None else "items",
                 raters=part.raters,

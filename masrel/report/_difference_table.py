@@ -20,10 +20,12 @@ from masrel.report._further_tables import (
     data_of,
     finite,
     label,
+    on_grades,
     part_names,
 )
 from masrel.report._group_rows import groups_of, n_shared_items
 from masrel.report._tables import Column, Table, Value, p_text, percent
+from masrel.scales import Scale
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,7 +78,7 @@ def difference_table(
         if skip and entry.kernel is None:
             without.append(entry.title)
         else:
-            differences += _differences(entry, pairs, question)
+            differences += _differences(entry, pairs, question, file.scale)
     return FurtherTable(
         key="differences",
         table=Table(
@@ -113,7 +115,7 @@ def _pairs(file: RatingsFile) -> list[_Pair]:
 
 
 def _differences(
-    entry: Coefficient, pairs: Sequence[_Pair], question: Question
+    entry: Coefficient, pairs: Sequence[_Pair], question: Question, scale: Scale
 ) -> list[_Difference]:
     from masrel.intervals import difference, difference_test
 
@@ -122,10 +124,11 @@ def _differences(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", MasrelWarning)  # the results say it
         for pair in pairs:
+            ratings = [on_grades(of, entry, scale) for of in pair.ratings]
             try:
                 estimate = difference(
                     entry,
-                    *pair.ratings,
+                    *ratings,
                     design=pair.design,
                     weights=weights,
                     level=question.level,
@@ -133,7 +136,7 @@ def _differences(
                 )
                 test = difference_test(
                     entry,
-                    *pair.ratings,
+                    *ratings,
                     design=pair.design,
                     weights=weights,
                     clusters=pair.clusters,

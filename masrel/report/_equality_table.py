@@ -5,7 +5,7 @@ In: a `RatingsFile` whose parts are the groups. Out: a table, and the same for J
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from masrel.agreement import Coefficient, Significance
 from masrel.errors import MasrelWarning
@@ -15,6 +15,7 @@ from masrel.report._further_tables import (
     Question,
     data_of,
     finite,
+    on_grades,
 )
 from masrel.report._group_rows import Groups, groups_of
 from masrel.report._tables import Column, Table, Value, p_text, significant
@@ -56,7 +57,8 @@ def equality_table(
         warnings.simplefilter("ignore", MasrelWarning)  # the results say it
         for entry in entries:
             if entry.kernel is not None:  # else the table of differences says it
-                tests += _tests(entry, groups, question)
+                of_entry = tuple(on_grades(s, entry, file.scale) for s in groups.sets)
+                tests += _tests(entry, replace(groups, sets=of_entry), question)
     names = dict.fromkeys(test.name for test in tests)
     undefined = [
         f"{test.entry.title}: undefined: {test.result.reason}."

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from masrel.agreement import (
     BandScale,
     CodedRatings,
+    Coefficient,
     WeightName,
     category_kappa,
     code_ratings,
@@ -32,6 +33,7 @@ from masrel.report._agreement_table import (
 from masrel.report._estimate_words import surely_reached
 from masrel.report._figure_data import Content
 from masrel.report._tables import Table
+from masrel.scales import Scale
 
 _SHOWN = 6  # names that a note lists
 
@@ -113,6 +115,13 @@ def coded_part(part: RatingsPart, option: str) -> CodedRatings:
         return code_ratings(part.ratings)
     except RatingsError as error:
         raise RatingsError(f"{option}: {error}") from error
+
+
+def on_grades(ratings: CodedRatings, entry: Coefficient, scale: Scale) -> CodedRatings:
+    """Return ratings with the text of their grades if a metric takes sets of labels."""
+    if entry.metric in ("jaccard", "masi"):
+        return replace(ratings, categories=scale.grades)
+    return ratings
 
 
 def _estimate_row(

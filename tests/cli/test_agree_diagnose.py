@@ -169,6 +169,25 @@ def test_options_that_do_not_fit_are_refused(
     assert message in refused(masrel, wide, *ignore, *arguments)
 
 
+@pytest.mark.parametrize("option", ["--diagnose", "--compare"])
+def test_sets_of_labels_are_taken_as_such(
+    masrel: Caller, tmp_path: Path, option: str
+) -> None:
+    rows = [("x", "a;b", "a", "a"), ("x", "b", "b", "b;c"), ("x", "c", "c", "c")]
+    rows += [("y", "b", "b", "b"), ("y", "a;c", "c", "a"), ("y", "c", "c", "c")]
+    path = tmp_path / "sets.csv"
+    lines = [",".join((str(k), *row)) for k, row in enumerate(rows)]
+    path.write_text("item,g,A,B,C\n" + "\n".join(lines) + "\n", encoding="utf-8")
+    document = record(masrel, path, "--by", "g", "--metric", "jaccard", option)
+    values = [row["value"] for row in document["estimates"]]
+    if option == "--compare":
+        (row,) = document["differences"]
+        assert row["value"] == pytest.approx(values[0] - values[1], rel=1e-12)
+    else:
+        first = document["diagnosis_raters"][0]
+        assert first["without"] - first["change"] == pytest.approx(values[0])
+
+
 def test_counts_have_neither_clusters_nor_a_diagnosis(
     masrel: Caller, tmp_path: Path
 ) -> None:
