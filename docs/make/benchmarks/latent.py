@@ -52,6 +52,12 @@ STUDIES = (
         remark=", half positive",
     ),
     Study(n_items=95, n_raters=22, shares=(0.9, 0.1), remark=", a tenth positive"),
+    Study(
+        n_items=95,
+        n_raters=22,
+        shares=(0.99, 0.01),
+        remark=", one in a hundred positive",
+    ),
 )
 
 

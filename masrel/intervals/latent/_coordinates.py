@@ -6,8 +6,13 @@ nothing more. So thresholds are T_k = (τ_k - α) / c from the one of them that 
 ratings, α. The coordinate of an item that its ratings place is how far (θ_i - α) / c is
 from the thresholds between its grades. An item that all raters gave the first or the
 last grade lies anywhere beyond the threshold next to it: its coordinate y, which is
-√(ρ) / c log(1 + e^y) + y beyond it, turns that wall into a slope. The coordinate of an
-item that ratings hardly place is θ_i / √ρ, the unit of its prior.
+√(ρ) / c log(1 + e^y) + y / √n beyond it, turns the wall of n ratings into a slope. The
+coordinate of an item that ratings hardly place is θ_i / √ρ, the unit of its prior.
+
+Raters' biases and noises have scales, √(1 - f) and η, that ratings tell only through
+them. Their coordinates are units of what the scale and the ratings leave open, so that
+they hardly change with it (`Information`); η itself has one that falls to 0 by powers
+of e, since 0 is where raters' noises are alike.
 """
 
 from dataclasses import dataclass, field
