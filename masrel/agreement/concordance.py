@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.agreement._data import complete_values
-from masrel.agreement._kernel import undefined
+from masrel.agreement._kernel import check_level, undefined
 from masrel.agreement._labels import Label
-from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Interval
 
 _FEW = 3
@@ -76,8 +75,7 @@ def lin_ccc(
     >>> round(lin_ccc([[1, 2], [3, 3], [5, 7]]).value, 4)
     0.8
     """
-    if not 0.0 < level < 1.0:
-        raise ParameterError(f"level: needs (0, 1), got {level}")
+    check_level(level)
     values = complete_values(ratings, categories)
     n, k = values.shape
     value, error, interval = math.nan, math.nan, None

@@ -284,7 +284,9 @@ def _marginals(coded: CodedRatings, v: Floats) -> tuple[Floats, Floats]:
     # (n_rows, n_raters n_categories)
     chosen = coded.codes[:, :, None] == np.arange(len(v))
     rated = coded.codes >= 0
-    return rated.astype(np.float64), chosen.reshape(len(rated), -1).astype(np.float64)
+    return rated.astype(np.float64), chosen.reshape(
+        len(rated), rated.shape[1] * len(v)
+    ).astype(np.float64)
 
 
 def _joined(pooled: Floats, n_ratings: Floats, chosen: Floats) -> Floats:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.agreement._data import rating_values
-from masrel.agreement._kernel import undefined
+from masrel.agreement._kernel import check_level, undefined
 from masrel.agreement._labels import Label
 from masrel.agreement._reml import Components, crossed_components, rated_part
 from masrel.agreement.icc import _Anova, _n_categories
@@ -145,8 +145,7 @@ def _error(
         raise ParameterError(
             f"kind: needs one of {', '.join(get_args(ErrorKind))}, got {kind!r}"
         )
-    if not 0.0 < level < 1.0:
-        raise ParameterError(f"level: needs (0, 1), got {level}")
+    check_level(level)
     values = rated_part(rating_values(ratings, categories))
     squares, reason = _squares(values)
     title = {"sem": "the standard error of measurement", "mdc": "MDC95"}[name]
