@@ -113,7 +113,8 @@ def estimate_pooled(
         counted = measurements(ratings, categories, weights)
     if counted is None:
         counted = count_ratings(ratings, categories)
-    if isinstance(weights, str):  # made once for a scale
+    # made once for a scale
+    if isinstance(weights, str) and counted.items.n_categories <= MANY:
         v = named_weights(weights, counted.categories, counted.declared)
     else:
         v = declared_weights(weights, counted.categories, declared=counted.declared)

@@ -280,6 +280,8 @@ def declared_weights(
             )
         categories = tuple(categories)
     if isinstance(weights, str):
+        if len(categories) > MANY:
+            return _named(weights, categories, declared)
         return named_weights(weights, categories, declared)
     if isinstance(weights, Weights):
         return _of_other(weights, categories, declared)
@@ -299,8 +301,13 @@ def _of_other(weights: Weights, categories: Sequence[Label], declared: bool) -> 
     return weights
 
 
+@lru_cache(maxsize=64)
 def named_weights(name: str, categories: tuple[Label, ...], declared: bool) -> Weights:
     """Return the weights of that name, made once for a scale."""
+    return _named(name, categories, declared)
+
+
+def _named(name: str, categories: Sequence[Label], declared: bool) -> Weights:
     n, name = len(categories), plain_name(name)
     if name not in _NAMES:
         raise ParameterError(
@@ -374,8 +381,7 @@ def value_array(categories: Sequence[Label]) -> NDArray[np.float64]:
     return values
 
 
-@lru_cache(maxsize=64)
-def _exact_weights(name: str, categories: tuple[Label, ...]) -> Weights:
+def _exact_weights(name: str, categories: Sequence[Label]) -> Weights:
     # as fractions
     n = len(categories)
     values = category_values(categories)

@@ -253,7 +253,8 @@ def _disagreement(
 ) -> Weights:
     if metric is None:
         weights = "identity" if weights is None else weights
-        if isinstance(weights, str):  # made once for a scale
+        # made once for a scale
+        if isinstance(weights, str) and counted.items.n_categories <= MANY:
             return named_weights(weights, counted.categories, counted.declared)
         return declared_weights(weights, counted.categories, declared=counted.declared)
     if weights is not None:
