@@ -479,3 +479,32 @@ def test_an_end_from_outside_is_one_sentence(
     assert done.code == 1
     assert len(done.err.splitlines()) == 1
     assert done.err.startswith("masrel: ")
+
+
+@pytest.mark.parametrize("end", ["", "1"])  # the last cell missing, or a cell too many
+def test_widths_of_a_large_text_are_those_of_its_first_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, end: str
+) -> None:
+    monkeypatch.setattr("masrel.ratings._text_records._LARGE", 0)
+    assert grades_of(read(tmp_path, WIDE)) == TABLE
+    wrong = WIDE.replace("C,3,,3", "C,3,1" if not end else "C,3,1,3,1")
+    with pytest.raises(RatingsError, match=r"line 4: needed 4 cells.*got [35]: 'C, 3"):
+        read(tmp_path, wrong)
+
+
+def test_a_large_text_may_be_separated_by_blanks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = "patient  Kim Lee\tAnn\nA   1  1 2\nB 2\t2 NA\nC 3 NA   3\n"
+    assert grades_of(read(tmp_path, text)) == TABLE
+    monkeypatch.setattr("masrel.ratings._text_records._LARGE", 0)
+    assert grades_of(read(tmp_path, text)) == TABLE
+
+
+def test_names_numbered_like_the_items_below_may_be_a_row(tmp_path: Path) -> None:
+    # names that are no grades of the other rows
+    text = "P1,mild,severe\nP2,none,none\nP3,none,some\nP4,some,some\n"
+    (warning,) = [w for w in read(tmp_path, text).warnings if "--no-header" in w]
+    assert warning.startswith("the names of the columns, 'mild', 'severe', may be")
+    named = read(tmp_path, text.replace("P1", "patient"))
+    assert not any("--no-header" in w for w in named.warnings)

@@ -46,8 +46,10 @@ EXPECTED_STEPS = 1_000
 """Steps of a chain that studies take, warm-up among them: from 400 to 2300."""
 
 # Gradients of all chains that studies take, about 3000 to 12 000 where ratings place
-# the items and 11 000 to 23 000 where they hardly do; and checks.
-_GRADIENTS = {True: 5_700, False: 15_000}
+# the items, 11 000 to 23 000 where they hardly do, 35 000 where raters disagree on one
+# item alone; and checks.
+_GRADIENTS = {"placed": 5_700, "loose": 15_000, "agreed": 30_000}
+_AGREED = 0.05  # share of items with dissent below which raters agree on nearly all
 _CHECKS = 4
 _N_CURVED = 32  # chains at whose places the curvature is averaged
 _UNKNOWN = 0.3  # deviation in which chains begin around ρ', f' and η
@@ -141,8 +143,16 @@ def expected_run_seconds(density: LatentDensity, items: Items) -> float:
     draws = np.random.default_rng(0).standard_normal((n_chains, _MAX_KEPT // 2))
     check = _timed(lambda: diagnose(draws)) * (density.n_dimensions + 3)
     n_kappas = _MAX_KAPPAS / n_chains if items == "random" else _MAX_KEPT
-    n_gradients = _GRADIENTS[bool(density.coordinates.placed.any())]
+    n_gradients = _GRADIENTS[_kind(density)]
     return n_gradients * gradient + _CHECKS * (check + n_kappas * kappa)
+
+
+def _kind(density: LatentDensity) -> str:
+    # of a study, among those of `_GRADIENTS`
+    placed, beyond = density.coordinates.placed, density.coordinates.beyond
+    if not placed.any():
+        return "loose"
+    return "agreed" if (beyond == 0.0).mean() < _AGREED else "placed"
 
 
 def _timed(call: Callable[[], object]) -> float:
