@@ -503,8 +503,13 @@ def test_a_large_text_may_be_separated_by_blanks(
 
 def test_names_numbered_like_the_items_below_may_be_a_row(tmp_path: Path) -> None:
     # names that are no grades of the other rows
-    text = "P1,mild,severe\nP2,none,none\nP3,none,some\nP4,some,some\n"
+    text = "P1,mild,severe\nP2,no,no\nP3,no,some\nP4,some,some\n"
     (warning,) = [w for w in read(tmp_path, text).warnings if "--no-header" in w]
     assert warning.startswith("the names of the columns, 'mild', 'severe', may be")
     named = read(tmp_path, text.replace("P1", "patient"))
     assert not any("--no-header" in w for w in named.warnings)
+
+
+def test_a_first_column_of_grades_is_refused_as_that(tmp_path: Path) -> None:
+    with pytest.raises(RatingsError, match=r"'Kim', holds grades like.*--no-item if"):
+        read(tmp_path, "Kim,Lee,Ann\n1,1,2\n2,2,1\n1,2,2\n2,2,2\n")
