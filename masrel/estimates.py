@@ -57,6 +57,8 @@ class Interval:
     ----------
     low, high : float
         Endpoints; ``nan`` when undefined.
+    median : float or None
+        Posterior median of a credible interval, which lies inside; None for others.
     level : float
         Nominal level, 0.95 unless stated otherwise.
     kind : {"confidence", "credible"}
@@ -86,6 +88,7 @@ class Interval:
 
     low: float
     high: float
+    median: float | None = None
     level: float
     kind: Literal["confidence", "credible"]
     method: str
@@ -207,8 +210,10 @@ def _interval_lines(interval: Interval) -> _Lines:
     population = _POPULATIONS[interval.target]
     if interval.unit == "clusters":
         population = population.replace("items", "clusters of items")
+    median = [] if interval.median is None else [f"{interval.median:.4g}"]
     return [
         (f"{100.0 * interval.level:.6g} % {interval.kind} interval", ends),
+        *(("posterior median", text) for text in median),
         ("generalises to", population),
         ("method", interval.method),
         *(("note", note) for note in interval.notes),

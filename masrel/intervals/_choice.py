@@ -1,68 +1,103 @@
 """Which interval answers a question at its size, by the study of coverage in the docs.
 
-Where few items, or no disagreement, leave nothing to resample, Fleiss' kappa and what
-estimates the same fall back on the Dirichlet-multinomial posterior, and other
-coefficients of two raters on that of their table.
+Other items. A posterior covers best where there are
+
+- few: less than 10 items, and less than 10 raters;
+- rare categories: less than 30 items, and less than half of all, have a rating outside
+  the commonest category;
+- no spread: leaving out any item changes nothing, or next to nothing.
+
+It is that of the Dirichlet-multinomial model for Fleiss' kappa, Scott's pi and
+Krippendorff's alpha, and for every unweighted coefficient where categories are rare,
+since chance agreement then hardly depends on who the raters are. For others it is that
+of the table of two raters or of the patterns of any number, as it is for all above 2000
+items. Elsewhere the item jackknife on a logit, its upper end lifted below 30 items.
+
+Other raters. The rater jackknife; without spread the posterior, for those of the model.
+
+Both. What the two of them say, joined.
+
+Items and raters are counted that have a pair of ratings.
 """
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from masrel.estimates import Interval
-from masrel.intervals._problem import IntervalProblem
+from masrel.intervals._drawn_posterior import (
+    DEFAULT_DRAWS,
+    SEED,
+    alike_interval,
+    nothing_to_learn,
+    patterns_interval,
+)
+from masrel.intervals._problem import IntervalProblem, warn_small
 from masrel.intervals._rho import (
     DEFAULT_PRIOR,
     RhoPosterior,
     default_rho_interval,
-    lower_bound_of_rho,
+    extended,
 )
+from masrel.intervals._table_quadrature import CHANCE_AGREEMENT
 from masrel.intervals._two_raters import applies_to, default_table_interval
 from masrel.intervals.jackknife import (
     _interval_around_estimate,
     _jackknife_variance,
-    _JackknifeVariance,
     _variance_of_cells,
 )
+from masrel.intervals.posterior import _RHO_COEFFICIENTS
 
 _FEW = 10  # items, and raters, below which a posterior covers best
 _SEVERAL = 30  # items, below which a jackknife alone ends too low
 _ACCIDENT = 0.003  # of (1 - κ) / ratings: a variance below it is no information
+_OUTSIDE = "items with a rating outside the commonest category"
+_MANY = 2_000  # items, above which the model's polynomials take long
 
 
 def choose_interval(
-    problem: IntervalProblem, *, modelled: bool
+    problem: IntervalProblem, *, unweighted: bool
 ) -> tuple[Interval, str]:
     """Compute the interval that covers best, and say what it is and why."""
-    # modelled: whether the Dirichlet-multinomial model answers for the coefficient
-    # Items and raters are counted that have a pair of ratings.
-    target, n_items = problem.target, problem.n_paired_items
-    n_raters = problem.n_paired_raters
     if problem.entry.shape == "pairs":
         why = "items leave with the pairs of all their raters"
         return _interval_around_estimate(problem, _jackknife_variance(problem)), why
-    if n_items == 0:
+    if problem.n_paired_items == 0:
         why = "no item has ratings of two raters"
         return _interval_around_estimate(problem, _jackknife_variance(problem)), why
-    if target == "both":
-        return _other_items_and_raters(problem, modelled)
-    is_small = modelled and n_items < _FEW and n_raters < _FEW
-    if target == "items" and is_small:
-        why = f"few items ({n_items}) and raters, where it covers best"
-        return default_rho_interval(problem), why
-    of_two = target == "items" and problem.n_raters == 2
-    tabular = of_two and not modelled and applies_to(problem)
-    if tabular and n_items < _FEW:
-        why = f"few items ({n_items}), where it covers best"
-        return default_table_interval(problem), why
-    jackknifed = _jackknife_variance(problem)
-    sizes = (problem.patterns.codes >= 0).sum(axis=1)
-    n_ratings = int(problem.freq @ np.where(sizes > 1, sizes, 0))
+    if problem.target == "both":
+        return _other_items_and_raters(problem, unweighted)
+    few = problem.n_paired_items < _FEW and problem.n_paired_raters < _FEW
+    outside = _outside_commonest(problem)
+    rare = not few and outside < _SEVERAL and 2 * outside < problem.n_paired_items
+    if not (few or rare) or problem.target == "raters" or nothing_to_learn(problem):
+        return _jackknife_with_spread(problem, unweighted)
+    interval = _posterior(problem, unweighted, rare)
+    if few:
+        return interval, f"few items ({problem.n_paired_items}), where it covers best"
+    # below so many no method covers everywhere
+    notes = warn_small(outside, 5 if unweighted else _SEVERAL, _OUTSIDE)
+    why = f"categories are rare ({outside} {_OUTSIDE}), where it covers best"
+    return replace(interval, notes=(*notes, *interval.notes)), why
+
+
+def _jackknife_with_spread(
+    problem: IntervalProblem, unweighted: bool
+) -> tuple[Interval, str]:
+    # leave items out, or raters, unless that says nothing
+    n_items, target = problem.n_paired_items, problem.target
+    modelled = unweighted and problem.entry.name in _RHO_COEFFICIENTS
+    jackknifed, n_ratings = _jackknife_variance(problem), _paired_ratings(problem)
     # an accident of few disagreements gives as much
     accident = _ACCIDENT * (1.0 - problem.value) / n_ratings if modelled else 0.0
     if not jackknifed.variance > accident:
-        return _without_spread(problem, modelled, tabular, jackknifed)
+        if (modelled or target == "items") and not nothing_to_learn(problem):
+            why = "leaving any out says next to nothing, so that a model must"
+            return _posterior(problem, unweighted, False), why
+        why = "the spread of the units left out"
+        return _interval_around_estimate(problem, jackknifed), why
     if target == "raters":
         why = "raters left out, one at a time"
         return _interval_around_estimate(problem, jackknifed), why
@@ -84,20 +119,35 @@ def choose_interval(
     return interval, "items left out, on a scale without ends"
 
 
-def _without_spread(
-    problem: IntervalProblem,
-    modelled: bool,
-    tabular: bool,
-    jackknifed: _JackknifeVariance,
-) -> tuple[Interval, str]:
-    if tabular:
-        why = "leaving items out says nothing, so that a model must"
-        return default_table_interval(problem), why
-    if modelled:
-        why = "the ratings hardly disagree, so that a model must say what that can hide"
-        return lower_bound_of_rho(problem), why
-    why = "the spread of the units left out"
-    return _interval_around_estimate(problem, jackknifed), why
+def _outside_commonest(problem: IntervalProblem) -> int:
+    """Count items of two ratings or more, not all of the commonest category."""
+    codes = problem.patterns.codes  # (n_patterns, n_raters)
+    rated = codes >= 0
+    freq = np.broadcast_to(problem.freq[:, None], codes.shape)
+    commonest = np.bincount(codes[rated], weights=freq[rated]).argmax()
+    outside = (rated & (codes != commonest)).any(axis=1)
+    return int(problem.freq @ (outside & (rated.sum(axis=1) >= 2)))
+
+
+def _paired_ratings(problem: IntervalProblem) -> int:
+    sizes = (problem.patterns.codes >= 0).sum(axis=1)
+    return int(problem.freq @ np.where(sizes > 1, sizes, 0))
+
+
+def _posterior(problem: IntervalProblem, unweighted: bool, rare: bool) -> Interval:
+    """Compute the posterior, one-sided where the estimate is perfect or undefined."""
+    name = problem.entry.name
+    chance, small = CHANCE_AGREEMENT.get(name), problem.n_paired_items <= _MANY
+    alike = rare and unweighted and chance is not None and small
+    is_rho = alike and chance in ("pooled", "margins")
+    if is_rho or (small and unweighted and name in _RHO_COEFFICIENTS):
+        return default_rho_interval(problem)
+    if not alike and small and applies_to(problem):
+        return default_table_interval(problem)
+    one_sided = not problem.value < 1.0
+    drawn = partial(alike_interval, prior=DEFAULT_PRIOR) if alike else patterns_interval
+    interval = drawn(problem, n_draws=DEFAULT_DRAWS, rng=SEED, one_sided=one_sided)
+    return interval if one_sided else extended(problem, interval)
 
 
 def _lift(problem: IntervalProblem, interval: Interval) -> Interval:
@@ -117,7 +167,7 @@ def _lift(problem: IntervalProblem, interval: Interval) -> Interval:
 
 
 def _other_items_and_raters(
-    problem: IntervalProblem, modelled: bool
+    problem: IntervalProblem, unweighted: bool
 ) -> tuple[Interval, str]:
     # Either end is as far from the estimate as other items alone, and as other raters
     # alone, would put it: these distances squared and added, less what both hold of the
@@ -128,10 +178,8 @@ def _other_items_and_raters(
     common = _variance_of_cells(problem)
     # of one item, nothing is known to be in both
     common = problem.student_t(df) ** 2 * common if df > 0 else 0.0
-    items, raters = (
-        choose_interval(replace(problem, target=of, max_df=df), modelled=modelled)[0]
-        for of in ("items", "raters")
-    )
+    parts = (replace(problem, target=of, max_df=df) for of in ("items", "raters"))
+    items, raters = (choose_interval(of, unweighted=unweighted)[0] for of in parts)
     why = "what items left out and raters left out move"
     for part in (items, raters):
         if part.reason is not None:

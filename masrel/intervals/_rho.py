@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit
 
+from masrel.agreement._kernel import Floats
 from masrel.errors import ParameterError
 from masrel.estimates import Distribution, Interval
 from masrel.intervals._dirichlet_multinomial import DirichletMultinomial, RhoDensity
@@ -16,6 +17,7 @@ from masrel.intervals._problem import IntervalProblem, recorded_generator
 from masrel.intervals._quadrature import (
     TOLERANCE,
     LineDistribution,
+    integrated_sinc,
     line_distribution,
     solve_quantile,
 )
@@ -86,6 +88,7 @@ class RhoPosterior:
 
     prior: Prior
     low: float  # ends of the central interval
+    median: float
     high: float
     logit: LineDistribution = field(compare=False, repr=False)  # of logit ρ
     log_density: RhoDensity = field(compare=False, repr=False)  # of logit ρ
@@ -104,9 +107,17 @@ class RhoPosterior:
         )
         tail = 0.5 * (1.0 - level)
         first, last = density.logits[[0, -1]].tolist()
-        logit, ends = line_distribution(density, first, last, (tail, 1.0 - tail))
-        low, high = expit(ends).tolist()
-        return cls(prior=prior, low=low, high=high, logit=logit, log_density=density)
+        shares = (tail, 0.5, 1.0 - tail)
+        logit, ends = line_distribution(density, first, last, shares)
+        low, median, high = expit(ends).tolist()
+        return cls(
+            prior=prior,
+            low=low,
+            median=median,
+            high=high,
+            logit=logit,
+            log_density=density,
+        )
 
     def quantile(self, share: float) -> float:
         """Return a quantile of ρ."""
@@ -117,13 +128,23 @@ class RhoPosterior:
             expit(solve_quantile(self.logit.at, share, points[near], ends, TOLERANCE))
         )
 
-    def distribution(self) -> Distribution:
-        """Return the density of ρ at points between its outermost quantiles."""
-        # equally spaced in logit ρ, from about the quantile at 1e-6 to that at 1 - 1e-6
+    def draw(self, n_draws: int, generator: np.random.Generator) -> Floats:
+        """Draw ρ from as many equal parts of its distribution, ascending."""
+        logits, logit = self._logits(), self.logit
+        below = integrated_sinc(logits[:, None] - logit.points, logit.step)
+        shares = (np.arange(n_draws) + generator.random(n_draws)) / n_draws
+        return np.asarray(expit(np.interp(shares, below @ logit.masses, logits)))
+
+    def _logits(self) -> Floats:
+        # equally spaced, from about the quantile at 1e-6 to that at 1 - 1e-6
         cumulative = self.logit.masses.cumsum()
         ends = np.searchsorted(cumulative, (1e-6, 1.0 - 1e-6)) + np.array([-1, 1])
         low, high = self.logit.points[ends.clip(0, cumulative.size - 1)]
-        logits = np.linspace(low, high, _SHOWN)
+        return np.linspace(low, high, _SHOWN)
+
+    def distribution(self) -> Distribution:
+        """Return the density of ρ at points between its outermost quantiles."""
+        logits = self._logits()
         rho, rest = expit(logits), expit(-logits)
         density = np.exp(self.log_density(logits) - self.logit.log_total)
         return Distribution(
@@ -162,30 +183,54 @@ def prior_notes(
 
 
 def default_rho_interval(problem: IntervalProblem) -> Interval:
-    """Compute an interval that holds the estimate."""
+    """Compute an interval that holds the estimate, one-sided where that is perfect."""
     if not problem.value < 1.0:  # perfect, or undefined: one category
-        return lower_bound_of_rho(problem)
-    counts = problem.item_counts()
+        return _lower_bound_of_rho(problem)
+    counts, method = problem.item_counts(), "Dirichlet-multinomial posterior, exact"
     posterior = RhoPosterior.of(counts, DEFAULT_PRIOR, problem.level)
-    low, high = posterior.low, posterior.high
-    notes = prior_notes(counts, DEFAULT_PRIOR, problem.level, low, high)
-    if not low <= problem.value <= high:
-        notes += ("widened to the estimate, which lies outside the posterior's",)
-    interval = problem.confidence(
-        min(low, problem.value),
-        max(high, problem.value),
-        method="Dirichlet-multinomial posterior, exact",
-        unit=None,
+    interval = _central(problem, posterior, method)
+    notes = prior_notes(counts, DEFAULT_PRIOR, problem.level, *_ends(interval))
+    return extended(problem, dataclasses.replace(interval, notes=notes))
+
+
+def extended(problem: IntervalProblem, interval: Interval) -> Interval:
+    """Extend an end to an estimate outside, and say so."""
+    value, (low, high) = problem.value, _ends(interval)
+    if not (value < low or value > high):
+        return interval
+    name, end = ("lower", low) if value < low else ("upper", high)
+    note = (
+        f"the {name} end is extended from {end:.3f}, that of the posterior, to the "
+        f"estimate, {value:.3f}, which lies outside"
     )
     return dataclasses.replace(
         interval,
+        low=min(low, value),
+        high=max(high, value),
+        notes=(note, *interval.notes),
+    )
+
+
+def _ends(interval: Interval) -> tuple[float, float]:
+    return interval.low, interval.high
+
+
+def _central(
+    problem: IntervalProblem, posterior: RhoPosterior, method: str
+) -> Interval:
+    return Interval(
+        low=posterior.low,
+        high=posterior.high,
+        median=posterior.median,
+        level=problem.level,
         kind="credible",
-        notes=(*interval.notes, *notes),
+        method=method,
+        target=problem.target,
         distribution=posterior.distribution(),
     )
 
 
-def lower_bound_of_rho(problem: IntervalProblem) -> Interval:
+def _lower_bound_of_rho(problem: IntervalProblem) -> Interval:
     """Compute the interval of all that is above a lower quantile."""
     counts, prior, share = (
         problem.item_counts(),
@@ -206,6 +251,7 @@ def lower_bound_of_rho(problem: IntervalProblem) -> Interval:
     return Interval(
         low=low,
         high=1.0,
+        median=posterior.median,
         level=problem.level,
         kind="credible",
         method="Dirichlet-multinomial posterior, one-sided",
@@ -235,17 +281,8 @@ def rho_interval(
     if sampled:
         interval = _sampled(problem, counts, prior, method, n_steps, max_steps, rng)
     else:
-        posterior = RhoPosterior.of(counts, prior, level)
-        interval = Interval(
-            low=posterior.low,
-            high=posterior.high,
-            level=level,
-            kind="credible",
-            method=method,
-            target=problem.target,
-            distribution=posterior.distribution(),
-        )
-    notes = prior_notes(counts, prior, level, interval.low, interval.high)
+        interval = _central(problem, RhoPosterior.of(counts, prior, level), method)
+    notes = prior_notes(counts, prior, level, *_ends(interval))
     return dataclasses.replace(interval, notes=notes)
 
 
@@ -286,6 +323,7 @@ def _sampled(
     return Interval(
         low=draws.quantile(tail),
         high=draws.quantile(1.0 - tail),
+        median=draws.quantile(0.5),
         level=problem.level,
         kind="credible",
         method=method,

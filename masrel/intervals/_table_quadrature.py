@@ -184,11 +184,12 @@ class TablePosterior:
     ) -> tuple[float, float]:
         """Return the values below which shares lie."""
         return (
-            self._quantile(shares[0], starts[0]),
-            self._quantile(shares[1], starts[1]),
+            self.quantile(shares[0], starts[0]),
+            self.quantile(shares[1], starts[1]),
         )
 
-    def _quantile(self, share: float, start: float) -> float:
+    def quantile(self, share: float, start: float) -> float:
+        """Return the value below which a share lies, from somewhere near it."""
         low, high = -1.0, 1.0
         while self.probability(low) > share:
             low = 2.0 * low - 1.0  # with weights it can be below -1

@@ -12,7 +12,7 @@ from masrel.agreement._weights import MANY
 from masrel.errors import ParameterError
 from masrel.estimates import Interval
 from masrel.intervals._problem import IntervalProblem, recorded_generator
-from masrel.intervals._rho import FEW_ITEMS
+from masrel.intervals._rho import FEW_ITEMS, extended
 from masrel.intervals._table_quadrature import (
     CHANCE_AGREEMENT,
     TablePosterior,
@@ -82,15 +82,7 @@ def default_table_interval(problem: IntervalProblem) -> Interval:
     interval = table_interval(
         problem, None, n_draws=_DEFAULT_DRAWS, rng=_SEED, one_sided=perfect
     )
-    if perfect or interval.low <= problem.value <= interval.high:
-        return interval
-    note = "widened to the estimate, which lies outside the posterior's"
-    return dataclasses.replace(
-        interval,
-        low=min(interval.low, problem.value),
-        high=max(interval.high, problem.value),
-        notes=(*interval.notes, note),
-    )
+    return interval if perfect else extended(problem, interval)
 
 
 def table_interval(
@@ -179,6 +171,7 @@ def _interval(
     return Interval(
         low=low,
         high=high,
+        median=posterior.quantile(0.5, 0.5 * (low + high)),
         level=problem.level,
         kind="credible",
         method=f"{method}, one-sided" if one_sided else method,

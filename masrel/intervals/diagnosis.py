@@ -31,7 +31,6 @@ from masrel.intervals._problem import (
 )
 from masrel.intervals._shares import ItemShares
 from masrel.intervals.jackknife import _variance_of
-from masrel.intervals.posterior import _RHO_COEFFICIENTS
 
 _MAX_KEYS = 1 << 22  # rows that can differ, up to which equal ones are put together
 
@@ -262,8 +261,8 @@ def diagnose(
     counts = PairCounts.of(codes, freq, everybody.coded.n_categories)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", MasrelWarning)  # the arrays say it
-        modelled = entry.is_nominal(weights) and entry.name in _RHO_COEFFICIENTS
-        pairs = _pairs(everybody, counts, with_intervals, modelled)
+        unweighted = entry.is_nominal(weights)
+        pairs = _pairs(everybody, counts, with_intervals, unweighted)
         arrays = {
             **_of_raters(pairs, others, right),
             **_changes(problem, codes[:, others], freq, with_intervals),
@@ -325,7 +324,7 @@ def _counted_rows(coded: CodedRatings) -> tuple[Integers, Integers]:
 
 
 def _pairs(
-    problem: IntervalProblem, counts: PairCounts, with_intervals: bool, modelled: bool
+    problem: IntervalProblem, counts: PairCounts, with_intervals: bool, unweighted: bool
 ) -> tuple[Floats, Integers]:
     """Return value, low and high of every pair, (3, n_raters, n_raters), and items."""
     r = counts.n_raters
@@ -337,7 +336,7 @@ def _pairs(
         of_pair = rows_problem(problem, *counts.of_pair(one, other))
         pairs[0, one, other] = of_pair.value
         if with_intervals:
-            interval, _ = choose_interval(of_pair, modelled=modelled)
+            interval, _ = choose_interval(of_pair, unweighted=unweighted)
             pairs[1:, one, other] = interval.low, interval.high
     return np.fmax(pairs, pairs.transpose(0, 2, 1)), counts.shared()
 

@@ -1,4 +1,4 @@
-"""Bayesian intervals: of Fleiss' kappa by any raters, of any coefficient by two."""
+"""Bayesian intervals of any coefficient, by three models of how raters rate."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal, get_args
@@ -12,12 +12,13 @@ from masrel.intervals._problem import IntervalProblem, Statistic, pose_problem
 
 if TYPE_CHECKING:
     from masrel.agreement import WeightsLike
-    from masrel.intervals._rho import Prior, PriorName
+    from masrel.intervals._rho import PriorName
 
-# Coefficients whose value in the population is ρ of the Dirichlet-multinomial model.
+# Coefficients whose value in the population is ρ of the Dirichlet-multinomial model,
+# whoever the raters; raters alike share it by other coefficients, too.
 _RHO_COEFFICIENTS = ("fleiss_kappa", "scott_pi", "krippendorff_alpha")
 
-_Model = Literal["auto", "dirichlet-multinomial", "table"]
+_Model = Literal["auto", "dirichlet-multinomial", "table", "patterns"]
 _Method = Literal["exact", "emcee"]
 
 
@@ -43,34 +44,35 @@ def posterior(
     Parameters
     ----------
     coefficient : str or callable
-        "fleiss_kappa", "scott_pi" or "krippendorff_alpha", whose value in the
-        population is the one parameter of agreement ρ of the Dirichlet-multinomial
-        model; of two raters any coefficient but stratified ones.
+        Any coefficient but stratified ones.
     ratings : nested sequence, array_like or DataFrame, shape (n_items, n_raters)
         Labels or numbers; None and ``nan`` are missing. An item of one rating
-        informs the shares of the categories only; it is left out of the table.
+        informs the shares of the categories only; the table leaves it out.
     target : {"items"}
         Items are the sample.
     categories : sequence, optional
         The declared scale in order. Categories nobody used count: the prior spreads
         over all that are declared.
     weights : str or array_like, optional
-        How much two categories agree; identity but for the table of two raters.
+        How much two categories agree; identity for "dirichlet-multinomial".
     level : float, optional
         Level of the central credible interval.
-    model : {"auto", "dirichlet-multinomial", "table"}, optional
-        Any raters who are exchangeable; or exactly two, each with margins of their
-        own. By default the first where it applies to the coefficient.
+    model : {"auto", "dirichlet-multinomial", "table", "patterns"}, optional
+        Raters who are alike; or exactly two, each with margins of their own; or any
+        number. By default the first for "fleiss_kappa", "scott_pi" and
+        "krippendorff_alpha", unweighted, whose value in the population is the model's
+        one parameter of agreement ρ; else the second or the third.
     prior : {"uniform", "jeffreys"}, optional
         ρ ~ U(0, 1), or ρ ~ Beta(1/2, 1/2), the prior of Jeffreys for a probability.
     concentration : float, optional
         Every share of a category is Dirichlet(concentration, ...), 1 unless given;
         with "table" every cell. Unless given, the prior of the table is worth 1.5
-        items, half of it on pairs that agree.
+        items, half of it on pairs that agree; so is that of the patterns.
     method : {"exact", "emcee"}, optional
         Quadrature, which draws nothing; or a sampler, to check it.
     n_draws : int, optional
-        Draws where the table of more than two categories needs them.
+        Draws, where they are needed: by "patterns", by the table of more than two
+        categories, and of what is no function of ρ alone.
     n_steps, max_steps : int, optional
         Steps of every walker at first, and where the sampler gives up; for "emcee".
     rng : Generator or int, optional
@@ -101,12 +103,16 @@ def posterior(
     -----
     Dirichlet-multinomial: an item's category probabilities are Dirichlet(A π) and its
     ratings multinomial; ρ = 1 / (1 + A). π is integrated out in closed form, and ρ by
-    quadrature, to about 1e-12 [1]_.
+    quadrature, to about 1e-12 [1]_. Of raters alike, Cohen's, Conger's and Light's
+    kappa are ρ as well; others depend on ρ and π, which are drawn.
 
     Table: the probabilities of the pairs of categories are Dirichlet. Percent agreement
     and Brennan-Prediger's coefficient, unweighted, are then a Beta; with two categories
     all are integrated by quadrature, to about 1e-10; with more, how often the raters
     agree is integrated and the rest drawn.
+
+    Patterns: what the raters give an item has a Dirichlet, half of its prior on raters
+    who all agree, half on one who dissents.
 
     Where the prior weighs, a note gives the interval under another.
 
@@ -136,22 +142,38 @@ def posterior(
     checked_prior = Prior.of(prior, 1.0 if concentration is None else concentration)
     _check_options(problem, model, method)
     identity = problem.entry.is_nominal(weights)
-    has_rho = problem.entry.name in _RHO_COEFFICIENTS and identity
-    name = problem.entry.name if identity else f"weighted {problem.entry.name}"
-    if model == "table" or (model == "auto" and not has_rho):
-        _check_table(problem, name, model, method, checked_prior)
-        from masrel.intervals._two_raters import table_interval
+    model = _chosen(problem, model, identity)
+    if model == "dirichlet-multinomial" and _is_rho(problem, identity, weights):
+        return rho_interval(
+            problem,
+            checked_prior,
+            sampled=method == "emcee",
+            n_steps=n_steps,
+            max_steps=max_steps,
+            rng=rng,
+        )
+    from masrel.intervals._drawn_posterior import alike_interval, patterns_interval
 
-        return table_interval(problem, concentration, n_draws=n_draws, rng=rng)
-    _check_dirichlet(has_rho, name)
-    return rho_interval(
-        problem,
-        checked_prior,
-        sampled=method == "emcee",
-        n_steps=n_steps,
-        max_steps=max_steps,
-        rng=rng,
-    )
+    if model == "dirichlet-multinomial" and method == "exact":
+        return alike_interval(problem, checked_prior, n_draws=n_draws, rng=rng)
+    options = f'prior="{prior}", method="{method}"'
+    if model == "patterns" and concentration is not None:
+        options += f", concentration={concentration!r}"
+    elif method == "exact" and prior == "uniform":
+        options = ""
+    if options and model == "dirichlet-multinomial":
+        raise ParameterError(
+            f'method: "emcee" samples ρ, which {problem.entry.name} is not'
+        )
+    if options:
+        raise ParameterError(
+            f'model: "{model}" has one prior, and no sampler; got {options}'
+        )
+    if model == "patterns":
+        return patterns_interval(problem, n_draws=n_draws, rng=rng)
+    from masrel.intervals._two_raters import table_interval
+
+    return table_interval(problem, concentration, n_draws=n_draws, rng=rng)
 
 
 def _check_options(problem: IntervalProblem, model: _Model, method: _Method) -> None:
@@ -164,29 +186,28 @@ def _check_options(problem: IntervalProblem, model: _Model, method: _Method) -> 
             "target: a posterior generalises to other items, so "
             f'"items"; for other raters use the jackknife; got "{problem.target}"'
         )
+    if problem.entry.shape == "pairs":
+        raise ParameterError(
+            f"coefficient: there is no posterior of {problem.entry.title}"
+        )
 
 
-def _check_dirichlet(has_rho: bool, name: str) -> None:
-    if not has_rho:
+def _chosen(problem: IntervalProblem, model: _Model, identity: bool) -> _Model:
+    if model != "auto":
+        return model
+    if identity and problem.entry.name in _RHO_COEFFICIENTS:
+        return "dirichlet-multinomial"
+    return "table" if problem.n_raters == 2 else "patterns"
+
+
+def _is_rho(problem: IntervalProblem, identity: bool, weights: "WeightsLike") -> bool:
+    """Return whether a coefficient is ρ where raters are alike, checked."""
+    from masrel.intervals._table_quadrature import CHANCE_AGREEMENT
+
+    name = problem.entry.name
+    if not identity or name not in CHANCE_AGREEMENT:
         raise ParameterError(
             "model: the Dirichlet-multinomial model applies to unweighted "
-            "fleiss_kappa, scott_pi and krippendorff_alpha, which have one value in "
-            f'the population; for two raters "table" applies to others; got {name}'
+            f"{', '.join(CHANCE_AGREEMENT)}; got {name} with weights={weights!r}"
         )
-
-
-def _check_table(
-    problem: IntervalProblem, name: str, model: _Model, method: _Method, prior: "Prior"
-) -> None:
-    n_raters = problem.n_raters
-    if model == "auto" and n_raters != 2:
-        raise ParameterError(
-            "coefficient: a posterior applies to unweighted fleiss_kappa, scott_pi "
-            "and krippendorff_alpha, and to others by exactly two raters; got "
-            f"{name} by {n_raters}"
-        )
-    if method != "exact" or prior.name != "uniform":
-        raise ParameterError(
-            'model: "table" has one prior, Dirichlet(concentration, ...), and no '
-            f'sampler; got prior="{prior.name}", method="{method}"'
-        )
+    return CHANCE_AGREEMENT[name] in ("pooled", "margins")

@@ -21,7 +21,14 @@ from masrel.report._estimate_words import (
 )
 from masrel.report._figure_data import Forest
 from masrel.report._material import Drawing, Material, Paragraph, Section
-from masrel.report._tables import Column, Table, Value, counted, interval_text
+from masrel.report._tables import (
+    Column,
+    Table,
+    Value,
+    counted,
+    interval_text,
+    number,
+)
 
 _LOOKS = (
     "confidence as lines with ends, credible as broad bars, with the posterior density "
@@ -150,7 +157,8 @@ def estimate_table(
     # On a page an interval is one column, marked with a letter; a note below says what
     # each letter means: level, method, and what the interval generalises to.
     marks: dict[str, str] = {}
-    cells, remarks = [], []
+    cells: list[tuple[Value, ...]] = []
+    remarks: dict[str, list[str]] = {}  # a text to the rows it is of
     for row in rows:
         interval, mark = row.interval, ""
         # what a reader must know before relying on it
@@ -161,13 +169,18 @@ def estimate_table(
             )
             nth, again = len(marks) % len(_LETTERS), len(marks) // len(_LETTERS)
             mark = marks.setdefault(note, _LETTERS[nth] * (again + 1))  # a, ..., z, aa
+            if interval.median is not None:
+                texts.append(f"posterior median {number(interval.median, 3)}")
             texts += [*interval.notes, interval.reason]
             if interval.n_undefined:
                 texts.append(f"undefined on {interval.n_undefined} resamples")
         cells.append(_cells(row, mark))
-        once = dict.fromkeys(text for text in texts if text)
-        remarks += [f"{row.name}: {text.rstrip('.')}." for text in once]
-    notes = [*(f"{mark} {note}." for note, mark in marks.items()), *remarks]
+        for text in dict.fromkeys(text.rstrip(".") for text in texts if text):
+            remarks.setdefault(text, []).append(row.name)
+    notes = [
+        *(f"{mark} {note}." for note, mark in marks.items()),
+        *(f"{', '.join(names)}: {text}." for text, names in remarks.items()),
+    ]
     if any(row.estimate is not None for row in rows):
         notes.append(_AGREEMENTS)
     strengths = [column.key for column in _COLUMNS].index("strength")

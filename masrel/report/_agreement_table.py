@@ -17,7 +17,7 @@ from masrel.report._estimate_words import (
     sentence,
 )
 from masrel.report._figure_data import Forest, ForestRow
-from masrel.report._tables import SIMULATED, Column, Table, Value, percent
+from masrel.report._tables import SIMULATED, Column, Table, Value, number, percent
 from masrel.scales import Scale
 
 _POPULATIONS = {"items": "items", "raters": "raters", "both": "items and raters"}
@@ -192,6 +192,8 @@ def _texts(row: AgreementRow, explain: bool) -> list[str]:
         return texts
     if interval.reason is None:
         texts.append(_interval_note(interval, explain))
+        if interval.median is not None:
+            texts.append(f"posterior median {number(interval.median, 3)}")
     elif interval.reason != estimate.reason:
         texts.append(f"no interval ({interval.method}): {interval.reason}")
     brief = filter(None, map(_brief, interval.notes))

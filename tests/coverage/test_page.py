@@ -2,9 +2,11 @@
 
 from pathlib import Path
 
+from docs.make.coverage.careless import count_careless
 from docs.make.coverage.figure import draw
 from docs.make.coverage.methods import DEFAULT, METHODS
-from docs.make.coverage.page import is_within, page
+from docs.make.coverage.page import Rare, is_within, page
+from docs.make.coverage.rare import RareQuestion, count_rare
 from docs.make.coverage.simulate import (
     DESIGNS,
     OTHERS,
@@ -40,7 +42,10 @@ def test_a_page_names_the_cells_that_are_outside() -> None:
     first, *rest = all_cells(DESIGNS)
     cells = [cell(first, 0.874), *(cell(question, 0.951) for question in rest)]
     others = [cell(question, 0.999) for question in all_cells(OTHERS)]
-    text = page(cells, others)
+    rare = count_rare(RareQuestion("alike", (0.96, 0.04), 2, 20, 0.6), 100)
+    skewed = count_rare(RareQuestion("unlike", (0.8, 0.15, 0.05), 2, 20, 0.6), 50)
+    few = [next(iter(count_careless(20)))]
+    text = page(cells, others, Rare(chosen=rare, checked=skewed, careless=few))
     assert "all but 1; cells where no candidate does: 1." in text
     assert (
         "| items | Dirichlet-multinomial | 4 × 8 | 0.2 | **87** | none | 40 % |" in text
@@ -48,6 +53,9 @@ def test_a_page_names_the_cells_that_are_outside() -> None:
     assert f"| {DEFAULT} | 87 | 95 | 35 | 0.25 |" in text
     assert "*100* / *100* / *100*" in text
     assert "$" not in text
+    fleiss = rare[0]
+    assert fleiss.verdict("jackknife") == "low"
+    assert "| Fleiss' κ | 1 | 1 |" in text
 
 
 def test_a_figure_is_drawn(tmp_path: Path) -> None:

@@ -181,7 +181,8 @@ def test_a_posterior_is_widened_to_an_estimate_that_it_leaves_out() -> None:
     found = chosen([["a", "b"], ["b", "a"], ["a", "b"]], "items")
     assert found.low == -1.0
     assert found.high > 0
-    assert any("widened to the estimate" in note for note in found.notes)
+    assert found.notes[1].startswith("the lower end is extended from 0.0")
+    assert "to the estimate, -1.000, which lies outside" in found.notes[1]
 
 
 def test_a_spread_that_is_an_accident_is_none() -> None:
@@ -197,12 +198,16 @@ def test_a_spread_that_is_an_accident_is_none() -> None:
         for r in range(4)
     ]
     assert max(moved) - min(moved) < 1e-3
-    assert chosen(ratings, "raters").high == 1.0
+    central = posterior("fleiss_kappa", ratings, target="items")
+    found = chosen(ratings, "raters")
+    assert (found.low, found.high) == (central.low, central.high)
 
 
 @pytest.mark.parametrize("name", ["gwet_ac", "percent_agreement", "conger_kappa"])
 @pytest.mark.parametrize("target", ["items", "raters", "both"])
-def test_other_coefficients_have_no_model_and_say_so(name: str, target: Target) -> None:
+def test_other_coefficients_have_a_model_of_items_only(
+    name: str, target: Target
+) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", MasrelWarning)
         found = estimate(name, MEDIUM, target=target, categories=LABELS)
@@ -211,6 +216,12 @@ def test_other_coefficients_have_no_model_and_say_so(name: str, target: Target) 
     assert found.interval.low < found.value < found.interval.high
     assert "posterior" not in found.interval.method
     assert none.interval is not None
+    if target == "items":
+        assert 0.0 < none.interval.low < none.interval.high == 1.0
+        assert none.interval.method.endswith(
+            "patterns of ratings, 2000 draws, one-sided"
+        )
+        return
     assert math.isnan(none.interval.low)
     assert "leaves the estimate as it is" in (none.interval.reason or "")
 
@@ -366,7 +377,7 @@ def test_the_interval_of_two_raters_holds_the_estimate() -> None:
     found = estimate("cohen_kappa", rows, target="items")
     assert found.interval is not None
     assert (found.value, found.interval.low) == (-1.0, -1.0)
-    assert any("widened to the estimate" in note for note in found.interval.notes)
+    assert found.interval.notes[1].startswith("the lower end is extended from ")
 
 
 @pytest.mark.parametrize("target", ["items", "raters", "both"])
@@ -382,3 +393,122 @@ def test_a_table_without_a_rating_has_no_interval(
     assert found.interval is not None
     assert math.isnan(found.interval.low)
     assert found.interval.reason == "the estimate itself is undefined"
+
+
+RARE = np.zeros((50, 3), dtype=int)
+RARE[[0, 1, 2], [0, 1, 2]] = 1  # three items on which one of three sees something
+
+
+def quietly(name: str, ratings: object, **options: object) -> Interval:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", MasrelWarning)
+        found = estimate(name, ratings, target="items", **options)  # type: ignore[arg-type]
+    assert found.interval is not None
+    return found.interval
+
+
+def test_rare_categories_have_the_posterior_extended_to_the_estimate() -> None:
+    with pytest.warns(SmallSampleWarning, match="3 items with a rating outside"):
+        found = estimate("fleiss_kappa", RARE, target="items", categories=[0, 1])
+    plain = posterior("fleiss_kappa", RARE, target="items", categories=[0, 1])
+    interval = found.interval
+    assert interval is not None
+    # kappa is 1 - (3 · 2/3 / 50) / (2 · 0.02 · 0.98) = -1/49
+    assert found.value == pytest.approx(-1.0 / 49.0, rel=1e-12)
+    assert interval.low == pytest.approx(found.value, rel=1e-12)
+    assert (interval.high, interval.median) == (plain.high, plain.median)
+    assert plain.low == pytest.approx(0.008, abs=5e-4)
+    assert plain.high == pytest.approx(0.693, abs=5e-4)
+    assert "rare (3 items" in interval.notes[0]
+    assert any("extended from 0.008" in note for note in interval.notes)
+
+
+@pytest.mark.parametrize("name", ["conger_kappa", "krippendorff_alpha", "light_kappa"])
+def test_where_categories_are_rare_raters_alike_share_one_posterior(name: str) -> None:
+    ratings = np.vstack([RARE, [[1, 1, 1], [1, 1, 0]]])
+    fleiss = quietly("fleiss_kappa", ratings)
+    other = quietly(name, ratings)
+    assert (other.low, other.median, other.high) == (
+        fleiss.low,
+        fleiss.median,
+        fleiss.high,
+    )
+
+
+def test_the_rule_counts_items_outside_the_commonest_category() -> None:
+    def method(n_outside: int, n_items: int) -> str:
+        rows = np.zeros((n_items, 3), dtype=int)
+        rows[:n_outside] = 1
+        rows[: n_outside // 2, 0] = 0
+        single = np.full((10, 3), -1.0)  # items of one rating do not count
+        table = np.where(single < 0, np.nan, single)
+        table[:, 0] = 1.0
+        return quietly("fleiss_kappa", np.vstack([rows, table])).method
+
+    assert "posterior" in method(29, 200)
+    assert "jackknife" in method(30, 200)
+    assert "jackknife" in method(20, 40)
+    assert "posterior" in method(19, 40)
+
+
+@pytest.mark.parametrize("name", ["gwet_ac", "percent_agreement", "brennan_prediger"])
+def test_other_coefficients_of_raters_alike_are_drawn_always_the_same(
+    name: str,
+) -> None:
+    ratings = np.vstack([RARE, [[1, 1, 1], [1, 1, 0]]])
+    found = quietly(name, ratings)
+    by_name = posterior(
+        name, ratings, target="items", model="dirichlet-multinomial", rng=2
+    )
+    assert found == quietly(name, ratings)
+    assert found.method == "Dirichlet-multinomial posterior, 2000 draws"
+    assert by_name.monte_carlo_error is not None
+    slack = 5.0 * 3.0 * max(by_name.monte_carlo_error)
+    assert (found.low, found.high) == pytest.approx(
+        (by_name.low, by_name.high), abs=slack
+    )
+
+
+def test_weights_take_the_posterior_of_the_patterns_and_a_warning() -> None:
+    ratings = np.vstack([RARE, [[2, 2, 1], [2, 1, 2]] * 3])
+    with pytest.warns(SmallSampleWarning, match="9 items with a rating outside"):
+        found = estimate("conger_kappa", ratings, target="items", weights="quadratic")
+    assert found.interval is not None
+    assert found.interval.method.startswith("Dirichlet posterior of the patterns")
+
+
+def test_many_items_with_few_outside_take_no_polynomials() -> None:
+    ratings = np.zeros((100_000, 3), dtype=np.int8)
+    ratings[:4] = 1
+    ratings[4:6, 0] = 1
+    found = quietly("fleiss_kappa", ratings)
+    # 4 of 6 items are agreed on, kappa is 9/11
+    small = quietly("fleiss_kappa", ratings[:2_000])
+    assert "patterns" in found.method
+    assert "patterns" not in small.method
+    assert (found.low, found.high) == pytest.approx((small.low, small.high), abs=0.08)
+
+
+@pytest.mark.parametrize("target", ["raters", "both"])
+def test_few_raters_have_a_caution_of_careless_ones(target: Target) -> None:
+    cautions = [
+        [note for note in interval.notes if "careless" in note]
+        for interval in (
+            chosen(MEDIUM, target, categories=LABELS),
+            chosen([row * 3 for row in MEDIUM], target, categories=LABELS),
+            chosen(MEDIUM, "items", categories=LABELS),
+        )
+    ]
+    assert [len(notes) for notes in cautions] == [1, 0, 0]
+
+
+def test_what_hardly_moves_holds_its_estimate() -> None:
+    # leaving raters out of the first says nothing; few disagree in the second
+    first = [[1, 0, 0], [0, 0, 0]]
+    second = [[a, 4] for a in (4, 1, 4, 4, 4, 4, 4, 4, 4, 4, 1, 1)]
+    for ratings, target, scale in ((first, "raters", 2), (second, "items", 5)):
+        found = chosen(ratings, target, categories=range(scale))  # type: ignore[arg-type]
+        value = fleiss_kappa(ratings, categories=range(scale)).value
+        assert found.low == pytest.approx(value, rel=1e-12)
+        assert value < 0.0
+        assert found.high > 0.5

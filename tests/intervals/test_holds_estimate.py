@@ -19,7 +19,7 @@ from masrel.errors import (
     UndefinedStatisticWarning,
 )
 from masrel.estimates import Interval
-from masrel.intervals import analytic, difference, estimate, jackknife
+from masrel.intervals import analytic, difference, estimate, jackknife, posterior
 
 Outcome = tuple[float, Interval]
 Method = Callable[..., Outcome]
@@ -108,8 +108,12 @@ def made(coefficient: str, seed: int) -> tuple[object, int]:
     """Ratings of some size, every second time with gaps, as codes 0 to q - 1; and q."""
     rng = np.random.default_rng(seed)
     n, r, q = rng.integers(3, 30), rng.integers(3, 6), int(rng.integers(2, 5))
-    shares = rng.dirichlet(np.full(q, rng.choice([0.1, 1.0, 10.0])), n).cumsum(axis=1)
+    # every third time most ratings are of one category
+    shape = np.full(q, rng.choice([0.1, 1.0, 10.0]))
+    shape[0] += 20.0 * (seed % 3 == 2)
+    shares = rng.dirichlet(shape, n).cumsum(axis=1)
     codes = (rng.random((n, r, 1)) > shares[:, None, :-1]).sum(axis=2).astype(object)
+    codes[:2] = [0, 1, *[1] * (r - 2)], [1] * r  # so that two categories are used
     entry = COEFFICIENTS[coefficient]
     if entry.n_raters[1] == 2:
         codes = codes[:, :2]
@@ -157,6 +161,34 @@ def test_an_interval_holds_its_estimate(
             outcome = PROMISE[method](coefficient, ratings, **options)
         check(outcome, noted)
         assert outcome[1].level == level
+
+
+@pytest.mark.parametrize("level", [0.5, 0.95, 0.999])
+@pytest.mark.parametrize("coefficient", KERNELS)
+@pytest.mark.parametrize("method", ["posterior", "estimate"])
+def test_a_credible_interval_holds_its_median(
+    method: str, coefficient: str, level: float
+) -> None:
+    # and no other has one
+    if COEFFICIENTS[coefficient].shape == "pairs":
+        return  # there is no posterior of these
+    for seed in range(3):
+        ratings, q = made(coefficient, seed)
+        options = {"target": "items", "categories": range(q), "level": level}
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", MasrelWarning)
+            if method == "posterior":
+                draws = {"n_draws": 400, "rng": 1}
+                interval = posterior(coefficient, ratings, **options, **draws)  # type: ignore[arg-type]
+            else:
+                result = estimate(coefficient, ratings, **options)  # type: ignore[arg-type]
+                assert result.interval is not None
+                interval = result.interval
+        if interval.kind == "confidence" or interval.reason is not None:
+            assert interval.median is None
+        else:
+            assert interval.median is not None
+            assert interval.low <= interval.median <= interval.high
 
 
 @pytest.mark.parametrize("level", [0.5, 0.95, 0.999])

@@ -8,7 +8,7 @@ import numpy as np
 from docs.make.coverage import peers
 from docs.make.coverage.bounds import Bounds, Scale, around, joined, student
 from docs.make.coverage.case import Case
-from docs.make.coverage.studies import Floats, Target
+from docs.make.coverage.studies import Floats, Target, Truths
 
 Method = Callable[[Case], Bounds]
 DEFAULT = "default"
@@ -127,21 +127,38 @@ def default_of_items(case: Case) -> Bounds:
 def _items(case: Case, t: float) -> Bounds:
     if is_small(case):
         return posterior_holding(case)
+    ends = one_way(case, case.spread.of_items, t, "intraclass")
     if case.n < SEVERAL:
-        return lifted(case, t)
-    return one_way(case, case.spread.of_items, t, "intraclass")
+        ends = lifted(case, t)
+    by_model = is_rare(case) | ~case.spreads(case.spread.of_items)
+    return posterior_holding(case).where(by_model, ends)
+
+
+def is_rare(case: Case) -> Truths:
+    """Whether few items have a rating outside the commonest category."""
+    counts = case.studies.counts  # (n_studies, n_items, n_categories)
+    commonest = counts.sum(axis=1).argmax(axis=1)[:, None, None]
+    there = np.take_along_axis(counts, commonest, axis=2)[..., 0]
+    outside = (there < case.r).sum(axis=1)
+    return np.asarray((outside < SEVERAL) & (2 * outside < case.n))
 
 
 def default_of_raters(case: Case) -> Bounds:
     """What is recommended where other raters could have come."""
-    return of_raters(case, "plain")
+    return _raters(case, case.t_raters)
+
+
+def _raters(case: Case, t: float) -> Bounds:
+    variance = case.spread.of_raters
+    ends = one_way(case, variance, t, "plain")
+    return ends.where(case.spreads(variance), posterior_holding(case))
 
 
 def default_of_both(case: Case) -> Bounds:
     """What is recommended where both could have come."""
     t = case.t_fewest
     items = _items(case, t)
-    raters = one_way(case, case.spread.of_raters, t, "plain")
+    raters = _raters(case, t)
     common = t**2 * np.nan_to_num(case.spread.of_cells)
 
     def distance(of_items: Floats, of_raters: Floats) -> Floats:

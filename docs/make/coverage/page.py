@@ -3,16 +3,36 @@
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from string import Template
+from typing import NamedTuple
 
+from docs.make.coverage.careless import CarelessCell
 from docs.make.coverage.methods import DEFAULT, FEW, METHODS, PEERS, SEVERAL
+from docs.make.coverage.rare import RareCell
+from docs.make.coverage.rare_page import (
+    careless_rows,
+    careless_share,
+    rare_cells,
+    rare_failures,
+    rare_summary,
+)
 from docs.make.coverage.simulate import DESIGNS, KAPPAS, MODELS, TARGETS, Cell, Counted
 
 LOWEST, HIGHEST = 93, 98  # %, of coverages rounded to whole numbers
 Cells = Sequence[Cell]
+
+
+class Rare(NamedTuple):
+    """What came of studies with rare categories, and with careless raters."""
+
+    chosen: Sequence[RareCell]
+    checked: Sequence[RareCell]
+    careless: Sequence[CarelessCell]
+
+
 _TEMPLATE = Path(__file__).with_name("page_template.md")
 
 
-def page(cells: Cells, others: Cells) -> str:
+def page(cells: Cells, others: Cells, rare: Rare) -> str:
     """Write the page in Markdown."""
     return Template(_TEMPLATE.read_text(encoding="utf-8")).substitute(
         n_studies=f"{cells[0].n_studies:,}".replace(",", " "),
@@ -29,7 +49,37 @@ def page(cells: Cells, others: Cells) -> str:
         error_of_others=f"{100 * others[0].error(0.95):.1f}",
         others=_of_others(others),
         all_methods="\n\n".join(_of_target(cells)),
+        **_of_rare(rare),
     )
+
+
+def _of_rare(rare: Rare) -> dict[str, str]:
+    head = ["coefficient", "cells", "jackknife fails", "least %", "default fails"]
+    head += ["least %", "higher than need be"]
+    every = [*rare.chosen, *rare.checked]
+    failing = ["coefficient", "raters", "rarer", "items × raters", "κ", "studies"]
+    careful = ["items × raters", "coverage %", "studies without a careless rater %"]
+    return {
+        "n_rare": f"{every[0].n_studies:,}".replace(",", " "),
+        "n_rare_cells": str(len(every)),
+        "n_rare_low": str(len(rare_failures(every))),
+        "n_neither": str(
+            sum(c.verdict() == c.verdict("jackknife") == "low" for c in every)
+        ),
+        "n_rare_before": str(sum(c.verdict("jackknife") == "low" for c in every)),
+        "chosen": markdown_table(head, rare_summary(rare.chosen), n_text=1),
+        "checked": markdown_table(head, rare_summary(rare.checked), n_text=1),
+        "rare_failures": markdown_table(
+            [*failing, "default", "jackknife"], rare_failures(every), n_text=4
+        ),
+        "rare_cells": "\n\n".join(
+            markdown_table(heads, rows, n_text=3)
+            for cells in (rare.chosen, rare.checked)
+            for heads, rows in rare_cells(cells)
+        ),
+        "careless": markdown_table(careful, careless_rows(rare.careless), n_text=1),
+        "careless_share": careless_share(),
+    }
 
 
 def is_within(coverage: float) -> bool:

@@ -1,0 +1,205 @@
+"""Posteriors that are drawn: of any coefficient, by any number of raters.
+
+Raters alike: ρ and the shares of the categories are drawn from their posterior in the
+Dirichlet-multinomial model, and give the chance of any two ratings of an item.
+Patterns: what the raters give an item has a Dirichlet over the patterns that were met
+and over a few that the prior adds. It knows raters by their columns and takes weights.
+"""
+
+import dataclasses
+from itertools import permutations
+
+import numpy as np
+
+from masrel.agreement._kernel import Floats
+from masrel.errors import ParameterError
+from masrel.estimates import Distribution, Interval
+from masrel.intervals._dirichlet_multinomial import DirichletMultinomial
+from masrel.intervals._endpoints import DrawnResamples
+from masrel.intervals._problem import IntervalProblem, recorded_generator
+from masrel.intervals._rho import PRIOR_SHAPES, Prior, RhoPosterior
+from masrel.intervals._units import row_units
+
+MIN_DRAWS = 100
+DEFAULT_DRAWS, SEED = 2_000, 1
+"""Of the default: always the same, so that it repeats."""
+
+_WORTH = 1.5
+"""Items that the prior is worth, as that of a table of two raters."""
+
+_PRIOR = f"a Dirichlet worth {_WORTH:g} items, half of it on raters who all agree"
+_MAX_CATEGORIES = 100  # of which a prior makes pairs
+_SWEEPS = 5  # of Gibbs: given ρ the shares soon forget where they began
+_AT_ONCE = 1 << 21  # numbers drawn at once
+_WITHOUT_END = 1e9  # items of a population, in which corrections for few vanish
+
+
+def alike_interval(
+    problem: IntervalProblem,
+    prior: Prior,
+    *,
+    n_draws: int,
+    rng: np.random.Generator | int | None,
+    one_sided: bool = False,
+) -> Interval:
+    """Compute the credible interval of a coefficient, raters being alike."""
+    method = "Dirichlet-multinomial posterior"
+    reason = nothing_to_learn(problem)
+    if reason is not None:
+        return _undefined(problem, reason, method)
+    generator, seed = recorded_generator(rng)
+    rho, shares = _population(problem, prior, _checked(n_draws), generator)
+    # two ratings of an item are one twice with probability ρ, else drawn anew
+    q = problem.coded.n_categories
+    pairs = np.indices((q, q)).reshape(2, -1)
+    weights = (1.0 - rho) * shares[:, pairs[0]] * shares[:, pairs[1]]
+    weights[:, pairs[0] == pairs[1]] += rho * shares
+    rows = problem.features(dataclasses.replace(problem.coded, codes=pairs.T))
+    values = problem.values(_WITHOUT_END * (weights @ rows))
+    interval = _interval(problem, values, method, prior.description, one_sided)
+    return dataclasses.replace(interval, seed=seed)
+
+
+def patterns_interval(
+    problem: IntervalProblem,
+    *,
+    n_draws: int,
+    rng: np.random.Generator | int | None,
+    one_sided: bool = False,
+) -> Interval:
+    """Compute the credible interval of a coefficient from its patterns of ratings."""
+    method = "Dirichlet posterior of the patterns of ratings"
+    reason = nothing_to_learn(problem)
+    if reason is not None:
+        return _undefined(problem, reason, method)
+    generator, seed = recorded_generator(rng)
+    units = row_units(problem, problem.rows, problem.freq)  # equal features together
+    added, worth = _prior_patterns(problem)
+    shapes = np.concatenate([units.freq, worth])
+    n_left, values, size = _checked(n_draws), [], max(1, _AT_ONCE // shapes.size)
+    while n_left > 0:
+        freq = generator.standard_gamma(shapes, (min(size, n_left), shapes.size))
+        freq *= _WITHOUT_END / problem.n_items
+        sums = (
+            units.sums(freq[:, : units.freq.size]) + freq[:, units.freq.size :] @ added
+        )
+        values.append(problem.values(sums))
+        n_left -= size
+    interval = _interval(problem, np.concatenate(values), method, _PRIOR, one_sided)
+    return dataclasses.replace(interval, seed=seed)
+
+
+def nothing_to_learn(problem: IntervalProblem) -> str | None:
+    """Return why ratings say nothing of a coefficient, or None."""
+    if problem.n_paired_items == 0:
+        return "no item has ratings of two raters"
+    if problem.coded.n_categories < 2:
+        return "one category is declared"
+    if np.isnan(problem.v).any():
+        return "the scale has no such weights"
+    if not problem.v.any():
+        return "the weights count nothing as disagreement"
+    if problem.entry.metric == "ordinal":
+        return "the ordinal metric depends on the ratings"
+    if problem.coded.n_categories > _MAX_CATEGORIES:
+        return f"there are more than {_MAX_CATEGORIES} categories"
+    return None
+
+
+def _checked(n_draws: int) -> int:
+    if n_draws < MIN_DRAWS:
+        raise ParameterError(f"n_draws: needs at least {MIN_DRAWS}, got {n_draws}")
+    return n_draws
+
+
+def _undefined(problem: IntervalProblem, reason: str, method: str) -> Interval:
+    undefined = problem.undefined(reason, method=method, unit=None)
+    return dataclasses.replace(undefined, kind="credible")
+
+
+def _population(
+    problem: IntervalProblem,
+    prior: Prior,
+    n_draws: int,
+    generator: np.random.Generator,
+) -> tuple[Floats, Floats]:
+    """Draw ρ, (n_draws, 1), and the shares of the categories, (n_draws, q)."""
+    # Given ρ, and with A = (1 - ρ)/ρ and x = A π_k, category k's product Π_j (x +
+    # j)^N_kj is a sum of powers of x. Gibbs: how many of its factors give an x is a sum
+    # of binomials with probabilities x / (x + j); given these, the shares are
+    # Dirichlet [1].
+    # [1] Escobar, M. D., West, M. (1995). Bayesian density estimation and inference
+    # using mixtures. JASA, 90(430), 577-588.
+    # https://doi.org/10.1080/01621459.1995.10476550
+    counts = problem.item_counts()
+    rho = RhoPosterior.of(counts, prior, problem.level).draw(n_draws, generator)
+    model = DirichletMultinomial.of_counts(
+        counts, concentration=prior.concentration, shape=PRIOR_SHAPES[prior.name]
+    )
+    powers = np.zeros((counts.shape[1], model.sizes.size), dtype=np.int64)
+    powers[counts.any(axis=0)] = model.powers
+    depth = np.arange(powers.shape[1])
+    whole = ((1.0 - rho) / rho)[:, None]
+    always, powers, depth = powers[:, 0], powers[:, 1:], depth[1:]
+    t = np.broadcast_to(always, (n_draws, len(always)))  # at least
+    for _ in range(_SWEEPS):
+        shares = generator.standard_gamma(prior.concentration + t)
+        shares /= shares.sum(axis=1, keepdims=True)
+        x = np.maximum(whole * shares, np.finfo(float).tiny)[:, :, None]
+        t = always + generator.binomial(powers, x / (x + depth)).sum(axis=2)
+    return rho[:, None], shares
+
+
+def _prior_patterns(problem: IntervalProblem) -> tuple[Floats, Floats]:
+    """Return the features of the patterns of the prior, and what each is worth."""
+    # -> (q², n_features), (q²,): half on raters who all give one category, half on one
+    # of them who gives another, whichever of them it is
+    q, r = problem.coded.n_categories, problem.n_raters
+    alike = np.repeat(np.arange(q)[:, None], r, axis=1)
+    most, one = np.array(list(permutations(range(q), 2))).T
+    codes = np.repeat(alike[most], r, axis=0)  # (q (q - 1) r, r)
+    codes[np.arange(len(codes)), np.tile(np.arange(r), most.size)] = np.repeat(one, r)
+    of_alike, of_one = (
+        problem.features(dataclasses.replace(problem.coded, codes=rows))
+        for rows in (alike, codes)
+    )
+    of_one = of_one.reshape(most.size, r, -1).mean(axis=1)
+    worth = np.repeat([0.5 * _WORTH / q, 0.5 * _WORTH / most.size], [q, most.size])
+    return np.concatenate([of_alike, of_one]), worth
+
+
+def _interval(
+    problem: IntervalProblem,
+    values: Floats,
+    method: str,
+    prior: str,
+    one_sided: bool,
+) -> Interval:
+    drawn = values[np.isfinite(values)]
+    tail = (1.0 - problem.level) * (1.0 if one_sided else 0.5)
+    draws = DrawnResamples(drawn=drawn, values=np.sort(drawn))
+    low, high = (
+        (draws.quantile(share), draws.error(share, 0.0, 0.0))
+        for share in (tail, 1.0 - tail)
+    )
+    if one_sided:
+        high = (1.0, 0.0)
+    method = f"{method}, {drawn.size} draws"
+    return Interval(
+        low=low[0],
+        high=high[0],
+        median=draws.quantile(0.5),
+        level=problem.level,
+        kind="credible",
+        method=f"{method}, one-sided" if one_sided else method,
+        target=problem.target,
+        n_resamples=drawn.size,
+        n_undefined=values.size - drawn.size,
+        monte_carlo_error=(low[1], high[1]),
+        distribution=Distribution(
+            values=draws.values,
+            weights=draws.weights,
+            continuous=False,
+            words=f"posterior of {problem.entry.title}, prior {prior}",
+        ),
+    )
