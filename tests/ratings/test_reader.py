@@ -513,3 +513,29 @@ def test_names_numbered_like_the_items_below_may_be_a_row(tmp_path: Path) -> Non
 def test_a_first_column_of_grades_is_refused_as_that(tmp_path: Path) -> None:
     with pytest.raises(RatingsError, match=r"'Kim', holds grades like.*--no-item if"):
         read(tmp_path, "Kim,Lee,Ann\n1,1,2\n2,2,1\n1,2,2\n2,2,2\n")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (
+            "patient,Kim,Lee\nid,level,level\nA,mild,mild\nB,mild,severe\n"
+            "C,severe,severe\nD,mild,mild\n",
+            "line 2 holds grades that occur nowhere else",
+        ),
+        (
+            "item,rater,grade\nPatient,Observer,1\nA,Kim,1\nA,Lee,1\nB,Kim,2\nB,Lee,2\n",
+            "line 2 names a rater and an item that occur nowhere else",
+        ),
+    ],
+)
+def test_a_second_line_of_names_is_warned_of(
+    tmp_path: Path, text: str, words: str
+) -> None:
+    (warning,) = [w for w in read(tmp_path, text).warnings if "second line" in w]
+    assert words in warning
+    lines = text.splitlines(keepends=True)
+    assert not any(
+        "second line" in w
+        for w in read(tmp_path, lines[0] + "".join(lines[2:])).warnings
+    )
