@@ -539,3 +539,18 @@ def test_a_second_line_of_names_is_warned_of(
         "second line" in w
         for w in read(tmp_path, lines[0] + "".join(lines[2:])).warnings
     )
+
+
+def test_qualtrics_lines_of_questions_are_left_out(tmp_path: Path) -> None:
+    names = 'patient,Kim,Lee\n"Which patient?","How severe?","How severe?"\n'
+    ids = '"{""ImportId"":""Q1""}","{""ImportId"":""Q2""}","{""ImportId"":""Q3""}"\n'
+    file = read(tmp_path, f"{names}{ids}A,1,1\nB,2,1\nC,2,2\n")
+    assert grades_of(file) == [["1", "1"], ["2", "1"], ["2", "2"]]
+    assert file.read["dropped"] == {"second header": 2}
+    assert any("Qualtrics" in w for w in file.warnings)
+
+
+def test_a_cell_of_a_transposed_table_is_named_by_its_column(tmp_path: Path) -> None:
+    text = "rater,A,B,C\nKim,1,2,n/a\nLee,1,2,2\n"
+    with pytest.raises(RatingsError, match=r"r\.csv: column 4, column 'Kim'.*n/a"):
+        read(tmp_path, text, transpose=True)
