@@ -554,3 +554,9 @@ def test_a_cell_of_a_transposed_table_is_named_by_its_column(tmp_path: Path) -> 
     text = "rater,A,B,C\nKim,1,2,n/a\nLee,1,2,2\n"
     with pytest.raises(RatingsError, match=r"r\.csv: column 4, column 'Kim'.*n/a"):
         read(tmp_path, text, transpose=True)
+
+
+def test_an_encoding_that_is_given_outdoes_a_mark(tmp_path: Path) -> None:
+    path = tmp_path / "r.csv"
+    path.write_bytes("ÿþ,Kim,Lee\nA,1,1\nB,2,1\n".encode("latin-1"))  # UTF-16's mark
+    assert read_ratings(path, encoding="latin-1").read["item"] == ["ÿþ"]
