@@ -29,6 +29,7 @@ _WORTH = 1.5
 
 _PRIOR = f"a Dirichlet worth {_WORTH:g} items, half of it on raters who all agree"
 _MAX_CATEGORIES = 100  # of which a prior makes pairs
+_SHOWN = 30  # points of a density
 _SWEEPS = 5  # of Gibbs: given ρ the shares soon forget where they began
 _AT_ONCE = 1 << 21  # numbers drawn at once
 _WITHOUT_END = 1e9  # items of a population, in which corrections for few vanish
@@ -196,10 +197,19 @@ def _interval(
         n_resamples=drawn.size,
         n_undefined=values.size - drawn.size,
         monte_carlo_error=(low[1], high[1]),
-        distribution=Distribution(
-            values=draws.values,
-            weights=draws.weights,
-            continuous=False,
-            words=f"posterior of {problem.entry.title}, prior {prior}",
+        distribution=_density(
+            draws.values, f"posterior of {problem.entry.title}, prior {prior}"
         ),
+    )
+
+
+def _density(values: Floats, words: str) -> Distribution:
+    # from how far apart quantiles are between which equally many draws lie
+    ends = np.quantile(values, np.linspace(0.0, 1.0, _SHOWN + 1))
+    apart = np.maximum(np.diff(ends), np.finfo(float).tiny)
+    return Distribution(
+        values=0.5 * (ends[:-1] + ends[1:]),
+        weights=1.0 / (_SHOWN * apart),
+        continuous=True,
+        words=words,
     )

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import masrel
 from masrel.agreement import COEFFICIENTS, BandScale, benchmark, strength
@@ -17,7 +17,7 @@ from masrel.report._estimate_words import (
     sentence,
 )
 from masrel.report._figure_data import Forest, ForestRow
-from masrel.report._tables import SIMULATED, Column, Table, Value, number, percent
+from masrel.report._tables import SIMULATED, Column, Table, Value, percent
 from masrel.scales import Scale
 
 _POPULATIONS = {"items": "items", "raters": "raters", "both": "items and raters"}
@@ -35,6 +35,7 @@ _COLUMNS = (
     Column(key="weights", heading="Weights", where="csv"),
     Column(key="value", heading="Value", digits=3),
     Column(key="standard_error", heading="SE", digits=3),
+    Column(key="median", heading="Median", digits=3),
     Column(key="low", heading="Low", digits=3),
     Column(key="high", heading="High", digits=3),
     Column(key="level", heading="Level", where="csv"),
@@ -84,6 +85,10 @@ def agreement_table(
     # explain: whether notes say what an interval promises and why it was chosen;
     # in_sentences: whether the notes are for `agreement_sentences`
     columns = list(_COLUMNS)
+    intervals = [row.estimate.interval for row in rows]
+    if not any(of is not None and of.median is not None for of in intervals):
+        at = [column.key for column in columns].index("median")
+        columns[at] = replace(columns[at], where="csv")
     cells = [_cells(row) for row in rows]
     if bands is not None:
         columns.append(Column(key="words", heading="At least", align="left"))
@@ -113,10 +118,10 @@ def agreement_table(
 
 def _cells(row: AgreementRow) -> tuple[Value, ...]:
     estimate, interval = row.estimate, row.estimate.interval
-    ends: tuple[Value, ...] = (None,) * 5
+    ends: tuple[Value, ...] = (None,) * 6
     if interval is not None:
-        method = interval.method
-        ends = (interval.low, interval.high, interval.level, method, interval.target)
+        interval_ends = (interval.median, interval.low, interval.high)
+        ends = (*interval_ends, interval.level, interval.method, interval.target)
     return (
         estimate.coefficient,
         row.title,
@@ -192,8 +197,6 @@ def _texts(row: AgreementRow, explain: bool) -> list[str]:
         return texts
     if interval.reason is None:
         texts.append(_interval_note(interval, explain))
-        if interval.median is not None:
-            texts.append(f"posterior median {number(interval.median, 3)}")
     elif interval.reason != estimate.reason:
         texts.append(f"no interval ({interval.method}): {interval.reason}")
     brief = filter(None, map(_brief, interval.notes))

@@ -456,15 +456,11 @@ def test_a_level_is_that_of_every_interval(masrel: Caller, wide: Path) -> None:
     assert icc["interval"]["method"] == "REML, profile likelihood"
 
 
-def test_what_nobody_named_needs_no_posterior_and_what_was_named_does(
-    masrel: Caller, wide: Path
-) -> None:
+def test_every_coefficient_has_a_posterior_of_items(masrel: Caller, wide: Path) -> None:
     call = ("agree", wide, "--target", "items", "--interval", "posterior")
     done = masrel(*call)
-    assert "Percent agreement: no interval: coefficient: a posterior" in done.out
+    assert "credible interval, Dirichlet posterior of the patterns" in done.out
     assert "95 % credible interval, Dirichlet-multinomial posterior" in done.out
-    named = masrel(*call, "--coefficients", "percent_agreement,fleiss_kappa")
-    assert "got percent_agreement by 3" in refused(named)
     # where nothing has it, the call was wrong
     assert "a posterior generalises to other items" in refused(
         masrel(*call[:3], "raters", *call[4:])

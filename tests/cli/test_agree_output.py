@@ -126,8 +126,8 @@ def test_an_infinite_end_is_null_and_said(masrel: Caller, tmp_path: Path) -> Non
 def test_the_columns_of_a_csv(masrel: Caller, tmp_path: Path) -> None:
     path = written(tmp_path, SESSIONS)
     names = (
-        "coefficient,title,weights,value,standard_error,low,high,level,method,target,"
-        "n_items,n_raters"
+        "coefficient,title,weights,value,standard_error,median,low,high,level,method,"
+        "target,n_items,n_raters"
     )
     call = ("agree", path, "--by", "session", "--target", "raters", "--csv")
     head = masrel(*call).out.splitlines()[0]
