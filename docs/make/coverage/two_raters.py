@@ -15,8 +15,20 @@ from tqdm import tqdm
 from docs.make.coverage.bounds import Bounds
 from docs.make.coverage.methods import FEW
 from docs.make.coverage.page import markdown_table, marked
+from docs.make.coverage.rare_methods import RareStudies
+from docs.make.coverage.rare_methods import held as holding
+from docs.make.coverage.rare_studies import Table
 from docs.make.coverage.simulate import KAPPAS, Counted
-from docs.make.coverage.tables import COEFFICIENTS, MODELS, SHARES, Tables, on_scale
+from docs.make.coverage.studies import Truths
+from docs.make.coverage.tables import (
+    COEFFICIENTS,
+    MODELS,
+    SHARES,
+    Tables,
+    cohen,
+    gwet,
+    on_scale,
+)
 from masrel.intervals._two_raters import TablePrior
 
 DOCS = Path(__file__).parents[2]
@@ -70,14 +82,34 @@ def intervals(tables: Tables) -> dict[str, Bounds]:
         high=np.fmax(posterior.high, tables.value),
     )
     logit = on_scale(tables, logit=True)
-    few = tables.n_items < FEW
+    default = held
+    if tables.n_items >= FEW:
+        rare, ends = _where_rare(tables, held)
+        default = ends.where(rare, logit.where(logit.exist > 0.0, held))
     return {
-        "default": held if few else logit.where(logit.exist > 0.0, held),
+        "default": default,
         "posterior": posterior,
         "even prior": tables.posterior(np.full((q, q), q**-2.0)),
         "jackknife, logit": logit,
         "jackknife": on_scale(tables, logit=False),
     }
+
+
+def _where_rare(tables: Tables, held: Bounds) -> tuple[Truths, Bounds]:
+    """Return where categories are rare, and the intervals there."""
+    q = tables.counts.shape[-1]
+    pairs = Table(
+        patterns=np.indices((q, q)).reshape(2, -1).T,
+        shares=np.full(q * q, q**-2.0),
+        n_categories=q,
+    )
+    freq = tables.counts.reshape(-1, q * q).astype(np.int64)
+    studies = RareStudies(pairs, freq, tables.rng)
+    if tables.formula is cohen:
+        return studies.rare, holding(studies.rho, tables.value)
+    if tables.formula is gwet and q == 2:
+        return studies.rare, holding(studies.grid[1], tables.value)
+    return studies.rare, held  # with four grades hardly any study is
 
 
 def count(question: Question, size: int) -> dict[str, Counted]:
