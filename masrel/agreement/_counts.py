@@ -20,7 +20,7 @@ from masrel.agreement._labels import Codes, Label, has_doubtful_text, label_rows
 from masrel.agreement._weights import MANY, ManyWeights, Weights
 
 if TYPE_CHECKING:
-    from masrel.agreement._many_grades import ManyItems
+    from masrel.agreement._many_grades import ItemsOfManyGrades
 
 Array = NDArray[Any]
 Integers = NDArray[np.int64]
@@ -415,7 +415,7 @@ class CountedRatings:
     """
 
     categories: tuple[Label, ...]
-    items: "DistinctItems | ManyItems"
+    items: "DistinctItems | ItemsOfManyGrades"
     n_raters: int
     source: CodedRatings | Callable[[], CodedRatings] | None
     declared: bool = True
@@ -495,14 +495,14 @@ def count_ratings(
     )
 
 
-def items_of(coded: CodedRatings) -> "DistinctItems | ManyItems":
+def items_of(coded: CodedRatings) -> "DistinctItems | ItemsOfManyGrades":
     """Return the items of coded ratings, counted or as they are."""
     if len(coded.categories) <= MANY:
         return DistinctItems.of_codes(coded)
     # Imported here: it takes the types of this module, and few need it.
-    from masrel.agreement._many_grades import ManyItems
+    from masrel.agreement._many_grades import ItemsOfManyGrades
 
-    return ManyItems(coded)
+    return ItemsOfManyGrades(coded)
 
 
 def _count_complete(

@@ -44,7 +44,7 @@ class SparseCounts:
         return SparseCounts(self.codes[chosen])
 
 
-class ManyItems:
+class ItemsOfManyGrades:
     """Items of many grades; those without ratings go."""
 
     def __init__(self, coded: CodedRatings) -> None:
@@ -168,7 +168,7 @@ def measurements(
     return CountedRatings(
         categories=scale,
         declared=False,
-        items=ManyItems(coded),
+        items=ItemsOfManyGrades(coded),
         n_raters=coded.n_raters,
         source=coded,
     )

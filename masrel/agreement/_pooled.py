@@ -35,7 +35,7 @@ from masrel.agreement._kernel import (
     weighted_disagreement,
 )
 from masrel.agreement._labels import Codes, Label
-from masrel.agreement._many_grades import ManyItems, measurements
+from masrel.agreement._many_grades import ItemsOfManyGrades, measurements
 from masrel.agreement._weights import (
     MANY,
     Weights,
@@ -194,7 +194,7 @@ def ratio_estimate(
 
 def _influence(
     coefficient: PooledCoefficient,
-    items: "DistinctItems | ManyItems",
+    items: "DistinctItems | ItemsOfManyGrades",
     v: Weights,
     expected: tuple[int, int],
     irrcac: bool,

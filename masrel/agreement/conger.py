@@ -31,7 +31,7 @@ from masrel.agreement._kernel import (
     weighted_disagreement,
 )
 from masrel.agreement._labels import Label
-from masrel.agreement._many_grades import ManyItems
+from masrel.agreement._many_grades import ItemsOfManyGrades
 from masrel.agreement._pooled import (
     crossed_sums,
     over,
@@ -182,7 +182,7 @@ class _Margins:
 
 def _influence(
     coded: CodedRatings,
-    items: "DistinctItems | ManyItems",
+    items: "DistinctItems | ItemsOfManyGrades",
     v: Weights,
     margins: _Margins,
     ratio: Any,

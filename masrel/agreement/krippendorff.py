@@ -30,7 +30,7 @@ from masrel.agreement._kernel import (
     weighted_disagreement,
 )
 from masrel.agreement._labels import Label
-from masrel.agreement._many_grades import ManyItems, measurements
+from masrel.agreement._many_grades import ItemsOfManyGrades, measurements
 from masrel.agreement._metrics import Metric, metric_weights
 from masrel.agreement._pooled import ratio_estimate
 from masrel.agreement._weights import (
@@ -222,7 +222,7 @@ def _estimate(counted: CountedRatings, v: Weights, population: int | None) -> Es
 
 
 def _influence(
-    items: "DistinctItems | ManyItems", v: Weights, sums: _Sums, exact: bool
+    items: "DistinctItems | ItemsOfManyGrades", v: Weights, sums: _Sums, exact: bool
 ) -> Influence:
     # With Q = 1 - α = (n - 1) A / B, the influence of item i among m is
     #   u_i = m Q [2 Σ_k h_k n_ik / B - V_i / ((n_i - 1) A) - n_i / (n - 1)],

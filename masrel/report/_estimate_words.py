@@ -14,6 +14,7 @@ Noun = Literal["model", "item"]
 """What is rated: a haptic model in a study, any item elsewhere."""
 
 _SURE = 0.95  # probability with which the true value reaches the word for it
+_SURE_TWO_SIDED = 0.90  # the level of which the lower end alone is as sure
 
 TARGETS = {
     "raters": "other raters",
@@ -150,7 +151,7 @@ def surely_reached(
     if interval.reason is not None:
         return math.nan
     # the lower end of an interval leaves out half of what is outside, a bound all
-    level = _SURE if is_bound(interval) else round(2.0 * _SURE - 1.0, 12)
+    level = _SURE if is_bound(interval) else _SURE_TWO_SIDED
     other = interval if level == interval.level else at_level(level)
     return math.nan if other is None else other.low
 

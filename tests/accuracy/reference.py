@@ -5,6 +5,7 @@ items; its value is that function of the sums, and its standard error follows fr
 function's derivatives, which are taken by arithmetic on dual numbers, not by formulas.
 """
 
+import dataclasses
 import itertools
 import math
 from collections import Counter
@@ -309,6 +310,7 @@ def value(
     if w is None:
         return None
     features, function = COEFFICIENTS[name]
+    items = _of_who_rated(items)
     try:
         return Fraction(function(_sum(items, features, w), w, q))
     except (
@@ -316,6 +318,18 @@ def value(
         KeyError,
     ):  # a key that no item has: nothing to divide by
         return None
+
+
+def _of_who_rated(items: Sequence[Item]) -> list[Item]:
+    """Leave out raters who rated nothing; of one rater or none, there are no pairs."""
+    width = max((len(item.raters) for item in items), default=0)
+    rated = [g for g in range(width) if any(item.raters[g] is not None for item in items)]
+    if len(rated) < 2 or len(rated) == width:
+        return list(items)
+    return [
+        dataclasses.replace(item, raters=tuple(item.raters[g] for g in rated))
+        for item in items
+    ]
 
 
 def _sum(items: Sequence[Item], features: _Features, w: Agreement) -> dict[Any, Any]:
@@ -342,6 +356,7 @@ def standard_error(
     does change, by its n - 1; its squares are taken about 0 too, as Gwet does.
     """
     features, function = COEFFICIENTS[name]
+    items = _of_who_rated(items)
     sums = _sum(items, features, w)
     slopes = {key: _slope(function, sums, key, w, q) for key in sums}
     n, squares = 0, Fraction(0)

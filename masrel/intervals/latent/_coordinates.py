@@ -252,8 +252,8 @@ class Coordinates:
         rho, f, raw_eta, anchor = np.split(position[:, at : at + 4], 4, axis=1)
         share, fraction = expit(rho), expit(f)
         root = np.sqrt(expit(-rho))
-        spread = np.sqrt(expit(-f))
-        b = self.of_bias.scaled(raw_b, spread)
+        bias_scale = np.sqrt(expit(-f))
+        b = self.of_bias.scaled(raw_b, bias_scale)
         eta = NOISE_UNIT * np.logaddexp(0.0, raw_eta)
         w = self.of_noise.scaled(raw_w, eta)
         gap = np.exp(position[:, at + 4 :])
@@ -267,7 +267,7 @@ class Coordinates:
         by_prior = (np.sqrt(share) * raw_item - anchor) / root
         return UnconstrainedPoint(
             item=np.where(self.placed, by_ratings, by_prior),
-            bias=spread * b.value,
+            bias=bias_scale * b.value,
             noise=np.sqrt(fraction) * np.exp(eta * w.value),
             threshold=threshold,
             raw_item=raw_item,

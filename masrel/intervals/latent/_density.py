@@ -368,12 +368,12 @@ class LatentDensity:
         c, d = self.prior.noise_fraction
         f, eta, b, w = point.fraction, point.noise_sd, point.b, point.w
         bias = by.bias * b.value + by_b * b.by_scale
-        spread = bias.sum(axis=1, keepdims=True) + b.jacobian_by_scale
+        bias_slope = bias.sum(axis=1, keepdims=True) + b.jacobian_by_scale
         noise = 0.5 * by.log_noise.sum(axis=1, keepdims=True)
         noises = (by.log_noise * w.value + by_w * w.by_scale).sum(axis=1, keepdims=True)
         return np.hstack(
             [
-                (1.0 - f) * (noise + c) - f * (0.5 * np.sqrt(1.0 - f) * spread + d),
+                (1.0 - f) * (noise + c) - f * (0.5 * np.sqrt(1.0 - f) * bias_slope + d),
                 (noises + w.jacobian_by_scale - eta / self.prior.noise_spread**2)
                 * NOISE_UNIT
                 * expit(point.raw_noise_sd)
