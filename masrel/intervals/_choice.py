@@ -9,9 +9,10 @@ Other items. A posterior covers best where there are
 
 It is that of the Dirichlet-multinomial model for Fleiss' kappa, Scott's pi and
 Krippendorff's alpha, and for every unweighted coefficient where categories are rare,
-since chance agreement then hardly depends on who the raters are. For others it is that
-of the table of two raters or of the patterns of any number, as it is for all above 2000
-items. Elsewhere the item jackknife on a logit, its upper end lifted below 30 items.
+since chance agreement then hardly depends on who the raters are, or where few items are
+graded by more than two, which say more of raters alike than of each pattern. For others
+it is that of the table of two raters or of the patterns of any number, as it is for all
+above 2000 items. Elsewhere the item jackknife on a logit, its upper end lifted below 30 items.
 
 Other raters. The rater jackknife; without spread the posterior, for those of the model.
 
@@ -74,7 +75,9 @@ def choose_interval(
     rare = not few and outside < _SEVERAL and 2 * outside < problem.n_paired_items
     if not (few or rare) or problem.target == "raters" or nothing_to_learn(problem):
         return _jackknife_with_spread(problem, unweighted)
-    interval = _posterior(problem, unweighted, rare)
+    # of more than two raters; two have a table of their own
+    alike = rare or problem.n_paired_raters > 2
+    interval = _posterior(problem, unweighted, alike)
     if few:
         return interval, f"few items ({problem.n_paired_items}), where it covers best"
     # below so many no method covers everywhere
@@ -134,11 +137,11 @@ def _paired_ratings(problem: IntervalProblem) -> int:
     return int(problem.freq @ np.where(sizes > 1, sizes, 0))
 
 
-def _posterior(problem: IntervalProblem, unweighted: bool, rare: bool) -> Interval:
+def _posterior(problem: IntervalProblem, unweighted: bool, alike: bool) -> Interval:
     """Compute the posterior, one-sided where the estimate is perfect or undefined."""
     name = problem.entry.name
     chance, small = CHANCE_AGREEMENT.get(name), problem.n_paired_items <= _MANY
-    alike = rare and unweighted and chance is not None and small
+    alike = alike and unweighted and chance is not None and small
     is_rho = alike and chance in ("pooled", "margins")
     if is_rho or (small and unweighted and name in _RHO_COEFFICIENTS):
         return default_rho_interval(problem)
@@ -175,9 +178,11 @@ def _other_items_and_raters(
     # So the variance is below neither; nor is an end inside either interval. With the
     # fewer degrees of freedom of the two, in both, the answer is no surer than either.
     df = min(problem.n_paired_items, problem.n_paired_raters) - 1
-    common = _variance_of_cells(problem)
-    # of one item, nothing is known to be in both
-    common = problem.student_t(df) ** 2 * common if df > 0 else 0.0
+    if df < 1:
+        reason = "one item with two ratings does not say how items differ"
+        method = "items and raters left out"
+        return problem.undefined(reason, method=method, unit="both"), "one item"
+    common = problem.student_t(df) ** 2 * _variance_of_cells(problem)
     parts = (replace(problem, target=of, max_df=df) for of in ("items", "raters"))
     items, raters = (choose_interval(of, unweighted=unweighted)[0] for of in parts)
     why = "what items left out and raters left out move"

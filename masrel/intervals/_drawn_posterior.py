@@ -206,10 +206,10 @@ def _interval(
 def _density(values: Floats, words: str) -> Distribution:
     # from how far apart quantiles are between which equally many draws lie
     ends = np.quantile(values, np.linspace(0.0, 1.0, _SHOWN + 1))
-    apart = np.maximum(np.diff(ends), np.finfo(float).tiny)
+    widths = np.maximum(np.diff(ends), np.finfo(float).tiny)
     return Distribution(
         values=0.5 * (ends[:-1] + ends[1:]),
-        weights=1.0 / (_SHOWN * apart),
+        weights=1.0 / (_SHOWN * widths),
         continuous=True,
         words=words,
     )

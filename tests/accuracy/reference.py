@@ -323,7 +323,9 @@ def value(
 def _of_who_rated(items: Sequence[Item]) -> list[Item]:
     """Leave out raters who rated nothing; of one rater or none, there are no pairs."""
     width = max((len(item.raters) for item in items), default=0)
-    rated = [g for g in range(width) if any(item.raters[g] is not None for item in items)]
+    rated = [
+        g for g in range(width) if any(item.raters[g] is not None for item in items)
+    ]
     if len(rated) < 2 or len(rated) == width:
         return list(items)
     return [

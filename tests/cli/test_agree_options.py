@@ -166,11 +166,14 @@ def test_weights_are_named_beside_the_coefficient(masrel: Caller, wide: Path) ->
         ("cicchetti", "excellent", "Cicchetti and Sparrow (1981)"),
     ],
 )
-def test_perfect_agreement_earns_the_best_word(
+def test_all_but_perfect_agreement_earns_the_best_word(
     masrel: Caller, tmp_path: Path, scale: BandScale, best: str, who: str
 ) -> None:
     path = tmp_path / "perfect.csv"
-    path.write_text("item,A,B\nx,1,1\ny,2,2\nz,1,1\n", encoding="utf-8")
+    # but for one of 200: without an error, nothing would be known of the true value
+    rows = [f"{item},{item % 2},{item % 2}" for item in range(200)]
+    rows[-1] = "199,1,0"
+    path.write_text("\n".join(["item,A,B", *rows, ""]), encoding="utf-8")
     done = masrel("agree", path, "--words", scale, "--csv")
     percent, kappa = csv.DictReader(io.StringIO(done.out))
     assert kappa["words"] == best

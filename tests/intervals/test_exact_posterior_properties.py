@@ -177,8 +177,8 @@ def test_where_the_prior_alone_would_speak_it_is_undefined(
         ({"target": "raters"}, 'so "items"; for other raters use the jackknife'),
         ({"target": "both"}, 'got "both"'),
         (
-            {"coefficient": "cohen_kappa", "model": "dirichlet-multinomial"},
-            "two raters .* got cohen_kappa",
+            {"weights": "quadratic", "model": "dirichlet-multinomial"},
+            "unweighted .* got fleiss_kappa with weights='quadratic'",
         ),
         ({"coefficient": "gwet_ac", "method": "emcee"}, "and no sampler"),
         ({"coefficient": "kendall_w"}, "coefficient"),

@@ -14,10 +14,12 @@ CODES = np.array(
     [[0, 0, 0], [1, 1, 0], [2, 1, 1], [-1, -1, 2], [-1, -1, 2], [0, 2, -1], [1, 1, -1]],
     dtype=np.int8,
 )
-POOLED = [
+POOLED = [  # the shares of Conger's raters are each rater's own
     name
     for name, entry in COEFFICIENTS.items()
-    if entry.kernel is not None and entry.kernel.rater_sums is not None
+    if entry.kernel is not None
+    and entry.kernel.rater_sums is not None
+    and name != "conger_kappa"
 ]
 
 
