@@ -12,7 +12,8 @@ Krippendorff's alpha, and for every unweighted coefficient where categories are 
 since chance agreement then hardly depends on who the raters are, or where few items are
 graded by more than two, which say more of raters alike than of each pattern. For others
 it is that of the table of two raters or of the patterns of any number, as it is for all
-above 2000 items. Elsewhere the item jackknife on a logit, its upper end lifted below 30 items.
+above 2000 items. Elsewhere the item jackknife on a logit, its upper end lifted below 30
+items.
 
 Other raters. The rater jackknife; without spread the posterior, for those of the model.
 

@@ -14,7 +14,7 @@ N_STUDIES = 150
 @pytest.mark.parametrize(("n_items", "n_raters"), [(4, 8), (6, 3)])
 def test_the_default_of_few_items_covers(n_items: int, n_raters: int) -> None:
     # Items are Dirichlet(A π) with κ = 1/(1 + A) = .9. If 93 % hold the truth, 122 or
-    # fewer of 150 would in one run of 10^6; a jackknife does in 80.
+    # fewer of 150 would in two runs of 10^6; a jackknife does in 80.
     rho = 0.9
     alike = float(SHARES @ SHARES)
     agreement = 1.0 - (1.0 - rho) * (1.0 - alike)
