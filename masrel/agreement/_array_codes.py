@@ -14,8 +14,8 @@ from masrel.agreement._labels import (
     check_categories,
     code_type,
     is_missing,
+    label_rows,
     labels_met,
-    labels_of_rows,
     lookup,
 )
 from masrel.errors import RatingsError
@@ -223,7 +223,7 @@ def _object_codes(
 ) -> tuple[Codes, tuple[Label, ...]]:
     rows, known = labels.tolist(), declared
     if known is None:
-        rows, known = labels_of_rows(rows)
+        rows, known = label_rows(rows, None)
     flat = list(itertools.chain.from_iterable(rows))
     position: dict[object, int] = {label: code for code, label in enumerate(known)}
     position[None] = _MISSING

@@ -117,14 +117,10 @@ def _is_label(label: object) -> bool:
     return isinstance(label, str | int | float | np.number)
 
 
-def labels_of_rows(
+def _sets_as_text(
     rows: list[list[object]],
 ) -> tuple[list[list[object]], tuple[Label, ...]]:
-    """Return rows with sets as text, and the distinct labels in order."""
-    try:
-        return rows, labels_met(itertools.chain.from_iterable(rows))
-    except RatingsError:
-        pass  # sets become text; of anything else, the row and the column are named
+    # rows with sets as text, and the distinct labels in order
     plain = [
         [text_of_set(label) if isinstance(label, Set) else label for label in row]
         for row in rows
@@ -218,9 +214,13 @@ def label_rows(
         rows = _rows(ratings)
     if len(widths := set(map(len, rows))) != 1 or 0 in widths:
         _refuse_shape(rows)
-    if categories is None:
-        return labels_of_rows(rows)
-    return rows, check_categories(categories)
+    if categories is not None:
+        return rows, check_categories(categories)
+    try:
+        return rows, labels_met(itertools.chain.from_iterable(rows))
+    except RatingsError:
+        pass  # sets become text; of anything else, the row and the column are named
+    return _sets_as_text(rows)
 
 
 def _rows(ratings: Any) -> list[list[object]]:

@@ -31,12 +31,7 @@ from masrel.agreement._pooled import (
     complete_kernel,
     pooled_kernel,
 )
-from masrel.agreement._weights import (
-    Weights,
-    WeightsLike,
-    declared_weights,
-    is_identity,
-)
+from masrel.agreement._weights import Weights, WeightsLike, is_identity
 from masrel.agreement.brennan_prediger import brennan_prediger
 from masrel.agreement.cohen import cohen_kappa
 from masrel.agreement.concordance import lin_ccc
@@ -192,15 +187,9 @@ class Coefficient:
         )
 
     def disagreement(self, coded: CodedRatings, weights: "WeightsLike") -> Weights:
-        """Return how much two categories of some ratings disagree."""
-        if self.metric is None:
-            return declared_weights(weights, coded.categories, declared=coded.declared)
+        """Return how much two categories disagree where no weights are taken."""
         self._refuse_weights(weights)
-        return metric_weights(self.metric, count_ratings(coded))
-
-    def is_nominal(self, weights: "WeightsLike") -> bool:
-        """Return whether every miss counts in full."""
-        return is_identity(weights) and self.metric in (None, "nominal")
+        return metric_weights(self.metric or "nominal", count_ratings(coded))
 
     def _refuse_weights(self, weights: "WeightsLike") -> None:
         if not is_identity(weights):

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.agreement import (
+    COEFFICIENTS,
     CodedRatings,
     Coefficient,
     CountedRatings,
@@ -24,8 +25,7 @@ from masrel.agreement._counts import distinct_rows, item_counts
 from masrel.agreement._data import check_scale
 from masrel.agreement._distances import Distances
 from masrel.agreement._kernel import Floats, Kernel, RaterSums, check_level
-from masrel.agreement._labels import shown
-from masrel.agreement._weights import MANY, Weights
+from masrel.agreement._weights import MANY, Weights, declared_weights
 from masrel.errors import (
     ParameterError,
     SmallSampleWarning,
@@ -70,6 +70,7 @@ class IntervalProblem:
     rows: Floats = field(compare=False, repr=False)  # (n_patterns, n_features)
     sums: Floats = field(compare=False, repr=False)  # over all items, (n_features,)
     v: Floats = field(compare=False, repr=False)  # disagreement of two categories
+    unweighted: bool  # whether every miss counts in full
     n_items: int  # that matter: of those, an item of one rating tells of chance only
     # those with a pair of ratings, which degrees of freedom and rules for few count
     n_paired_items: int
@@ -252,8 +253,12 @@ def pose_problem(
         n_raters = coded.n_raters  # those without any rating are none
     if entry.shape == "ratings" and not fewest <= n_raters <= (most or n_raters):
         _refuse_raters(entry, n_raters)
-    kernel = _kernel_of(entry)
-    made = entry.disagreement(coded, weights)
+    kernel = entry.kernel or _refuse_coefficient(entry)
+    made = (
+        declared_weights(weights, coded.categories, declared=coded.declared)
+        if entry.metric is None
+        else entry.disagreement(coded, weights)
+    )
     v = made.floats if made.n_categories <= MANY else None
     if v is None:
         kernel, v = _of_many(kernel, coded, made, delta)
@@ -285,6 +290,7 @@ def pose_problem(
         rows=rows,
         sums=sums,
         v=v,
+        unweighted=made.name in ("identity", "nominal"),
         n_items=int(freq.sum()),
         n_paired_items=int(freq @ paired),
         value=value,
@@ -343,13 +349,11 @@ def _of_counted(
     return places_of(ratings)
 
 
-def _kernel_of(entry: Coefficient) -> Kernel:
-    if entry.kernel is None:
-        raise ParameterError(
-            f"coefficient: {entry.title} is no function of sums over items: there is "
-            "no such interval of it"
-        )
-    return entry.kernel
+def _refuse_coefficient(entry: Coefficient) -> NoReturn:
+    raise ParameterError(
+        f"coefficient: {entry.title} is no function of sums over items: there is no "
+        "such interval of it"
+    )
 
 
 def _of_many(
@@ -388,11 +392,14 @@ NO_SUMS = Kernel(
 def find_entry(statistic: Statistic, metric: Metric | None = None) -> Coefficient:
     """Return the entry of a name or a public function in the register."""
     if isinstance(statistic, Coefficient):
-        return statistic.by_metric(metric)
-    name = statistic
-    if not isinstance(name, str):
-        name = getattr(statistic, "__name__", repr(statistic))
-    return coefficient(name).by_metric(metric)
+        entry = statistic
+    else:
+        name = statistic
+        if not isinstance(name, str):
+            name = getattr(statistic, "__name__", repr(statistic))
+        # another name that it has, or an error, is looked up in full
+        entry = COEFFICIENTS[name] if name in COEFFICIENTS else coefficient(name)
+    return entry if metric is None else entry.by_metric(metric)
 
 
 def _refuse_raters(entry: Coefficient, n_raters: int) -> NoReturn:
@@ -457,15 +464,6 @@ def warn_small(
     # called by what a method calls: the warning points to who called the method
     warnings.warn(note, SmallSampleWarning, stacklevel=4)
     return (note,)
-
-
-def check_whole(name: str, value: int, minimum: int) -> None:
-    """Check a whole number of at least a minimum."""
-    is_whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    if not is_whole or value < minimum:
-        raise ParameterError(
-            f"{name}: needs a whole number of at least {minimum}, got {shown(value)}"
-        )
 
 
 def recorded_generator(

@@ -189,13 +189,14 @@ def default_rho_interval(problem: IntervalProblem) -> Interval:
     counts, method = problem.item_counts(), "Dirichlet-multinomial posterior, exact"
     posterior = RhoPosterior.of(counts, DEFAULT_PRIOR, problem.level)
     interval = _central(problem, posterior, method)
-    notes = prior_notes(counts, DEFAULT_PRIOR, problem.level, *_ends(interval))
+    low, high = interval.low, interval.high
+    notes = prior_notes(counts, DEFAULT_PRIOR, problem.level, low, high)
     return extended(problem, dataclasses.replace(interval, notes=notes))
 
 
 def extended(problem: IntervalProblem, interval: Interval) -> Interval:
     """Extend an end to an estimate outside, and say so."""
-    value, (low, high) = problem.value, _ends(interval)
+    value, low, high = problem.value, interval.low, interval.high
     if not (value < low or value > high):
         return interval
     name, end = ("lower", low) if value < low else ("upper", high)
@@ -209,10 +210,6 @@ def extended(problem: IntervalProblem, interval: Interval) -> Interval:
         high=max(high, value),
         notes=(note, *interval.notes),
     )
-
-
-def _ends(interval: Interval) -> tuple[float, float]:
-    return interval.low, interval.high
 
 
 def _central(
@@ -282,7 +279,7 @@ def rho_interval(
         interval = _sampled(problem, counts, prior, method, n_steps, max_steps, rng)
     else:
         interval = _central(problem, RhoPosterior.of(counts, prior, level), method)
-    notes = prior_notes(counts, prior, level, *_ends(interval))
+    notes = prior_notes(counts, prior, level, interval.low, interval.high)
     return dataclasses.replace(interval, notes=notes)
 
 

@@ -283,8 +283,11 @@ def _numbered(
 
 def row_units(problem: IntervalProblem, rows: Floats, freq: Integers) -> SamplingUnits:
     """Return items or clusters with their features, those with equal ones together."""
-    rows, kind = _distinct(rows)
-    freq = np.bincount(kind, weights=freq).astype(np.int64)
+    if len(rows) <= _MAX_SORTED:
+        rows, kind = np.unique(rows, axis=0, return_inverse=True)
+    else:
+        rows, kind = _distinct_of_many(rows)
+    freq = np.bincount(kind.ravel(), weights=freq).astype(np.int64)
     n = int(freq.sum())
     return SamplingUnits(
         n=n,
@@ -296,11 +299,8 @@ def row_units(problem: IntervalProblem, rows: Floats, freq: Integers) -> Samplin
     )
 
 
-def _distinct(rows: Floats) -> tuple[Floats, Integers]:
+def _distinct_of_many(rows: Floats) -> tuple[Floats, Integers]:
     """Return the distinct rows, and which of them each row is."""
-    if len(rows) <= _MAX_SORTED:
-        distinct, kind = np.unique(rows, axis=0, return_inverse=True)
-        return distinct, kind.ravel()
     # Equal rows have equal polynomials at any place; should different rows too, all
     # are compared column by column.
     key = np.zeros(len(rows))
@@ -313,4 +313,4 @@ def _distinct(rows: Floats) -> tuple[Floats, Integers]:
         for block in blocks(len(rows))
     ):
         distinct, kind = np.unique(rows, axis=0, return_inverse=True)
-    return distinct, kind.ravel()
+    return distinct, kind

@@ -129,7 +129,7 @@ def estimate(
     )
     if clusters is not None:
         return _clustered(entry, ratings, result, method, clusters, options)
-    if method == "auto" and entry.has_interval:
+    if method == "auto" and entry.interval_target == target:
         return result
     if method == "auto":
         interval = _chosen(entry, ratings, options)
@@ -143,9 +143,10 @@ def estimate(
         )
     else:
         interval = posterior(entry, ratings, rng=rng, **options)
-    interval = _cautioned(interval, result.n_raters)
+    few = interval.target != "items" and result.n_raters < _MANY_RATERS
+    notes = (*interval.notes, _CARELESS) if few else interval.notes
     # `vars` has the standard error as it is: still to be computed when it is read.
-    return Estimate(**{**vars(result), "interval": interval})
+    return Estimate(**{**vars(result), "interval": replace(interval, notes=notes)})
 
 
 def _clustered(
@@ -186,17 +187,9 @@ def _chosen(entry: Coefficient, ratings: object, options: "_Options") -> Interva
     if problem.kernel is NO_SUMS:
         interval, why = analytic(entry, ratings, **options), _TOO_MANY
     else:
-        unweighted = entry.is_nominal(options["weights"])
-        interval, why = choose_interval(problem, unweighted=unweighted)
+        interval, why = choose_interval(problem, unweighted=problem.unweighted)
     note = f"chosen for other {_OTHERS[target]}: {why}"
     return replace(interval, target=target, notes=(note, *interval.notes))
-
-
-def _cautioned(interval: Interval, n_raters: int) -> Interval:
-    """Note what few raters cannot show, where an interval generalises to others."""
-    if interval.target == "items" or n_raters >= _MANY_RATERS:
-        return interval
-    return replace(interval, notes=(*interval.notes, _CARELESS))
 
 
 def _refuse_target(entry: Coefficient, target: str) -> NoReturn:

@@ -28,7 +28,6 @@ from masrel.intervals._problem import (
     IntervalProblem,
     Statistic,
     check_rng,
-    check_whole,
     pose_problem,
     recorded_generator,
 )
@@ -259,8 +258,16 @@ def _check_options(kind: _Kind, exact: _Exact, budget: DrawBudget) -> None:
         )
     if not (exact is True or exact is False or exact == "auto"):
         raise ParameterError(f'exact: needs "auto", True or False, got {exact!r}')
-    check_whole("n_resamples", budget.n_resamples, 100)
-    check_whole("max_resamples", budget.max_resamples, 1)
+    for name, count, minimum in (
+        ("n_resamples", budget.n_resamples, 100),
+        ("max_resamples", budget.max_resamples, 1),
+    ):
+        is_whole = isinstance(count, int | np.integer) and not isinstance(count, bool)
+        if not is_whole or count < minimum:
+            raise ParameterError(
+                f"{name}: needs a whole number of at least {minimum}, "
+                f"got {shown(count)}"
+            )
     tolerance = budget.tolerance
     if tolerance is not None and not (
         isinstance(tolerance, int | float | np.number) and tolerance > 0.0

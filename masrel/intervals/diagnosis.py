@@ -261,8 +261,7 @@ def diagnose(
     counts = PairCounts.of(codes, freq, everybody.coded.n_categories)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", MasrelWarning)  # the arrays say it
-        unweighted = entry.is_nominal(weights)
-        pairs = _pairs(everybody, counts, with_intervals, unweighted)
+        pairs = _pairs(everybody, counts, with_intervals)
         arrays = {
             **_of_raters(pairs, others, right),
             **_changes(problem, codes[:, others], freq, with_intervals),
@@ -324,7 +323,7 @@ def _counted_rows(coded: CodedRatings) -> tuple[Integers, Integers]:
 
 
 def _pairs(
-    problem: IntervalProblem, counts: PairCounts, with_intervals: bool, unweighted: bool
+    problem: IntervalProblem, counts: PairCounts, with_intervals: bool
 ) -> tuple[Floats, Integers]:
     """Return value, low and high of every pair, (3, n_raters, n_raters), and items."""
     r = counts.n_raters
@@ -336,7 +335,7 @@ def _pairs(
         of_pair = rows_problem(problem, *counts.of_pair(one, other))
         pairs[0, one, other] = of_pair.value
         if with_intervals:
-            interval, _ = choose_interval(of_pair, unweighted=unweighted)
+            interval, _ = choose_interval(of_pair, unweighted=of_pair.unweighted)
             pairs[1:, one, other] = interval.low, interval.high
     return np.fmax(pairs, pairs.transpose(0, 2, 1)), counts.shared()
 

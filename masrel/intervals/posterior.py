@@ -141,9 +141,8 @@ def posterior(
 
     checked_prior = Prior.of(prior, 1.0 if concentration is None else concentration)
     _check_options(problem, model, method)
-    identity = problem.entry.is_nominal(weights)
-    model = _chosen(problem, model, identity)
-    if model == "dirichlet-multinomial" and _is_rho(problem, identity, weights):
+    model = _chosen(problem, model)
+    if model == "dirichlet-multinomial" and _is_rho(problem, weights):
         return rho_interval(
             problem,
             checked_prior,
@@ -192,20 +191,20 @@ def _check_options(problem: IntervalProblem, model: _Model, method: _Method) -> 
         )
 
 
-def _chosen(problem: IntervalProblem, model: _Model, identity: bool) -> _Model:
+def _chosen(problem: IntervalProblem, model: _Model) -> _Model:
     if model != "auto":
         return model
-    if identity and problem.entry.name in _RHO_COEFFICIENTS:
+    if problem.unweighted and problem.entry.name in _RHO_COEFFICIENTS:
         return "dirichlet-multinomial"
     return "table" if problem.n_raters == 2 else "patterns"
 
 
-def _is_rho(problem: IntervalProblem, identity: bool, weights: "WeightsLike") -> bool:
+def _is_rho(problem: IntervalProblem, weights: "WeightsLike") -> bool:
     """Return whether a coefficient is ρ where raters are alike, checked."""
     from masrel.intervals._table_quadrature import CHANCE_AGREEMENT
 
     name = problem.entry.name
-    if not identity or name not in CHANCE_AGREEMENT:
+    if not problem.unweighted or name not in CHANCE_AGREEMENT:
         raise ParameterError(
             "model: the Dirichlet-multinomial model applies to unweighted "
             f"{', '.join(CHANCE_AGREEMENT)}; got {name} with weights={weights!r}"
