@@ -140,8 +140,7 @@ def posterior(
     from masrel.intervals._rho import Prior, rho_interval
 
     checked_prior = Prior.of(prior, 1.0 if concentration is None else concentration)
-    _check_options(problem, model, method)
-    model = _chosen(problem, model)
+    model = _checked_model(problem, model, method)
     if model == "dirichlet-multinomial" and _is_rho(problem, weights):
         return rho_interval(
             problem,
@@ -175,7 +174,8 @@ def posterior(
     return table_interval(problem, concentration, n_draws=n_draws, rng=rng)
 
 
-def _check_options(problem: IntervalProblem, model: _Model, method: _Method) -> None:
+def _checked_model(problem: IntervalProblem, model: _Model, method: _Method) -> _Model:
+    """Check what was chosen, and return the model, which may be left to the data."""
     for name, value, options in (("model", model, _Model), ("method", method, _Method)):
         if value not in get_args(options):
             known = ", ".join(get_args(options))
@@ -189,9 +189,6 @@ def _check_options(problem: IntervalProblem, model: _Model, method: _Method) -> 
         raise ParameterError(
             f"coefficient: there is no posterior of {problem.entry.title}"
         )
-
-
-def _chosen(problem: IntervalProblem, model: _Model) -> _Model:
     if model != "auto":
         return model
     if problem.unweighted and problem.entry.name in _RHO_COEFFICIENTS:
