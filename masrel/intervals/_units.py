@@ -313,4 +313,4 @@ def _distinct_of_many(rows: Floats) -> tuple[Floats, Integers]:
         for block in blocks(len(rows))
     ):
         distinct, kind = np.unique(rows, axis=0, return_inverse=True)
-    return distinct, kind
+    return distinct, kind.ravel()

@@ -122,11 +122,11 @@ def test_different_rows_that_meet_in_their_key_stay_different() -> None:
     rows = np.array([[1.0, 0.0], [0.0, 0.7390851332151607]] * 1500)
     key = rows[:, 0] * 0.7390851332151607 + rows[:, 1]
     assert np.ptp(key) == 0.0
-    found, kind = _units._distinct(rows)
+    found, kind = _units._distinct_of_many(rows)
     assert len(found) == 2
     np.testing.assert_array_equal(found[kind], rows)
     many = np.random.default_rng(1).integers(0, 3, (5000, 4)) / 7
-    found, kind = _units._distinct(many)
+    found, kind = _units._distinct_of_many(many)
     assert len(found) == 81
     np.testing.assert_array_equal(found[kind], many)
 
