@@ -1,5 +1,6 @@
 """Arrays and frames of labels as codes: positions in the scale."""
 
+import contextlib
 import itertools
 import sys
 from collections.abc import Callable, Iterator
@@ -14,9 +15,9 @@ from masrel.agreement._labels import (
     check_categories,
     code_type,
     is_missing,
-    label_rows,
     labels_met,
     lookup,
+    sets_as_text,
 )
 from masrel.errors import RatingsError
 
@@ -223,7 +224,10 @@ def _object_codes(
 ) -> tuple[Codes, tuple[Label, ...]]:
     rows, known = labels.tolist(), declared
     if known is None:
-        rows, known = label_rows(rows, None)
+        with contextlib.suppress(RatingsError):
+            known = labels_met(itertools.chain.from_iterable(rows))
+    if known is None:
+        rows, known = sets_as_text(rows)
     flat = list(itertools.chain.from_iterable(rows))
     position: dict[object, int] = {label: code for code, label in enumerate(known)}
     position[None] = _MISSING

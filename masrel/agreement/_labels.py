@@ -1,5 +1,6 @@
 """Labels of ratings, the scale they make, and rows of a list of them."""
 
+import contextlib
 import itertools
 import sys
 import warnings
@@ -117,10 +118,11 @@ def _is_label(label: object) -> bool:
     return isinstance(label, str | int | float | np.number)
 
 
-def _sets_as_text(
+def sets_as_text(
     rows: list[list[object]],
 ) -> tuple[list[list[object]], tuple[Label, ...]]:
-    # rows with sets as text, and the distinct labels in order
+    """Return rows with sets as text, and the distinct labels in order."""
+    # of a label that is neither text, number nor set, the row and column are named
     plain = [
         [text_of_set(label) if isinstance(label, Set) else label for label in row]
         for row in rows
@@ -216,11 +218,9 @@ def label_rows(
         _refuse_shape(rows)
     if categories is not None:
         return rows, check_categories(categories)
-    try:
+    with contextlib.suppress(RatingsError):
         return rows, labels_met(itertools.chain.from_iterable(rows))
-    except RatingsError:
-        pass  # sets become text; of anything else, the row and the column are named
-    return _sets_as_text(rows)
+    return sets_as_text(rows)
 
 
 def _rows(ratings: Any) -> list[list[object]]:
