@@ -202,7 +202,7 @@ def _other_items_and_raters(
         method=f"{items.method}, and {raters.method}",
         unit="both",
         notes=[
-            f"{of}: {note}"
+            note if f" {of}: below" in note else f"{of}: {note}"
             for of, part in (("items", items), ("raters", raters))
             for note in part.notes
         ],

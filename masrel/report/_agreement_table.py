@@ -51,6 +51,9 @@ _CHOSEN = "chosen for other "
 _PRIORS = (", so the prior weighs: ", " rests on the prior, too: ")
 """Where a note goes on with the interval under another prior."""
 
+_VARIANCES = "ratings are missing; variances by REML: "
+"""Start of the note on the variances that an ICC is made of."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AgreementRow:
@@ -205,7 +208,7 @@ def _texts(row: AgreementRow, explain: bool) -> list[str]:
 
 def _brief(note: str) -> str:
     """Return a note of an interval without what only `--explain` shows."""
-    if note.startswith(_CHOSEN):
+    if note.startswith((_CHOSEN, _VARIANCES)):
         return ""
     for words in _PRIORS:
         before, words_there, _ = note.partition(words)
