@@ -117,7 +117,7 @@ def check_level(level: float) -> None:
     """Check the level of an interval, or the probability of a word."""
     is_number = isinstance(level, int | float | np.integer | np.floating)
     # a level so near to 1 that its upper quantile is that of 1 has no ends
-    if not (is_number and 0.0 < level and 0.5 + 0.5 * level < 1.0):
+    if not (is_number and 0.0 < level < 1.0 and 0.5 + 0.5 * level < 1.0):
         raise ParameterError(f"level: needs (0, 1), got {shown(level)}")
 
 

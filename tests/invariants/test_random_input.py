@@ -120,10 +120,13 @@ def test_one_item_has_an_interval_or_a_reason(target: str, row: list[Any]) -> No
                 check(_I.estimate(entry.name, [row], target=target, categories=[1, 2]))  # type: ignore[arg-type]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("seed", "n_calls"),
-    [(1, 2500), (2, 2500), pytest.param(3, 100_000, marks=pytest.mark.long)],
+    [
+        pytest.param(1, 2_500, marks=pytest.mark.slow),
+        pytest.param(2, 2_500, marks=pytest.mark.slow),
+        pytest.param(3, 100_000, marks=pytest.mark.long),
+    ],
 )
 def test_odd_input_gives_a_value_a_reason_or_one_sentence(
     seed: int, n_calls: int
