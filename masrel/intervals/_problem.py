@@ -193,8 +193,9 @@ class IntervalProblem:
             space = f"[{self.min_value:g}, 1]"
             notes = (*notes, f"cut at the end of the parameter space {space}")
         return Interval(
-            low=max(low, self.min_value),
-            high=min(high, 1.0),
+            # resamples of items and raters can leave both ends below the space
+            low=min(max(low, self.min_value), 1.0),
+            high=max(min(high, 1.0), self.min_value),
             level=self.level,
             kind="confidence",
             method=method,
