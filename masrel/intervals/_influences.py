@@ -14,6 +14,7 @@ from masrel.intervals._problem import Integers, IntervalProblem, blocks
 
 _STEP = 1e-30  # of a derivative by a complex step, which cancels no digits [1]
 _PLACES = 1 << 20  # complex numbers at once
+_MAX_SLOPES = 1 << 12  # sums whose slopes are found one by one
 
 # [1] Squire, W., Trapp, G. (1998). Using complex variables to estimate derivatives of
 # real functions. SIAM Review, 40(1), 110-112. https://doi.org/10.1137/S003614459631241X
@@ -30,13 +31,18 @@ class UnitInfluences:
 def unit_influences(problem: IntervalProblem, units: Integers) -> UnitInfluences:
     """Return the derivative of the coefficient in the weight of each unit."""
     # units (n_items,): the unit of every row of the ratings, from 0
-    slopes = _slopes(problem)
-    n_items = len(problem.used.codes)
+    n_items, n_features = len(problem.used.codes), len(problem.sums)
+    # of all sums once, or along each item where there are more sums than items
+    slopes = None
+    if n_features <= min(n_items, _MAX_SLOPES):
+        slopes = _derivatives(problem, np.eye(n_features))
     moves, known = np.zeros(n_items), np.zeros(n_items, dtype=bool)
     for block in blocks(n_items):
         part = replace(problem.used, codes=problem.used.codes[block])
         features = problem.features(part)
-        moves[block] = features @ slopes
+        moves[block] = (
+            _derivatives(problem, features) if slopes is None else features @ slopes
+        )
         known[block] = features.any(axis=1)  # without a pair some have none
     n_units = int(units.max(initial=-1)) + 1
     return UnitInfluences(
@@ -51,16 +57,15 @@ def sample_factor(influences: UnitInfluences) -> float:
     return n / (n - 1) if n > 1 else math.nan
 
 
-def _slopes(problem: IntervalProblem) -> Floats:
-    # the derivative of the coefficient in each sum, (n_features,)
-    n = len(problem.sums)
+def _derivatives(problem: IntervalProblem, directions: Floats) -> Floats:
+    # of the coefficient in the sums; directions (n, n_features) -> (n,)
+    n, n_features = directions.shape
+    derivatives = np.full(n, math.nan)
     if math.isnan(problem.value):
-        return np.full(n, math.nan)
-    slopes = np.empty(n)
-    rows = max(1, _PLACES // n)
+        return derivatives
+    rows = max(1, _PLACES // n_features)
     for start in range(0, n, rows):
-        stop = min(start + rows, n)
-        stepped = np.repeat(problem.sums[None].astype(complex), stop - start, axis=0)
-        stepped[np.arange(stop - start), np.arange(start, stop)] += 1j * _STEP
-        slopes[start:stop] = np.imag(problem.values(stepped)) / _STEP
-    return slopes
+        part = slice(start, start + rows)
+        stepped = problem.sums + 1j * _STEP * directions[part]
+        derivatives[part] = np.imag(problem.values(stepped)) / _STEP
+    return derivatives

@@ -4,23 +4,21 @@ import math
 import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from functools import partial
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from masrel.agreement import (
-    CodedRatings,
-    Label,
-    Metric,
-    WeightsLike,
-    specific_agreement,
-)
-from masrel.agreement._counts import distinct_rows, item_counts
-from masrel.agreement._kernel import Floats, Integers, divide
+from masrel.agreement import CodedRatings, Label, Metric, WeightsLike
+from masrel.agreement._counts import distinct_rows
+from masrel.agreement._kernel import Array, Floats, Integers, divide
 from masrel.errors import MasrelWarning, ParameterError
 from masrel.estimates import Estimate
-from masrel.intervals._pair_counts import PairCounts
+from masrel.intervals._confusion import (
+    PairCounts,
+    category_arrays,
+    confusion_arrays,
+)
 from masrel.intervals._problem import (
     IntervalProblem,
     Statistic,
@@ -29,7 +27,6 @@ from masrel.intervals._problem import (
     rows_problem,
     warn_small,
 )
-from masrel.intervals._shares import ItemShares
 from masrel.intervals.jackknife import _variance_of
 
 _MAX_KEYS = 1 << 22  # rows that can differ, up to which equal ones are put together
@@ -231,49 +228,34 @@ def diagnose(
             f"coefficient: needs one of several raters, and {entry.title} is of each "
             "rater's grades of two sessions"
         )
-    problem = pose_problem(
-        entry,
-        ratings,
-        target="items",
-        categories=categories,
-        weights=weights,
-        level=level,
-    )
-    names = _names(ratings, raters, problem.coded.codes.shape[1])
+    pose = partial(pose_problem, entry, target="items", weights=weights, level=level)
+    problem = everybody = pose(ratings, categories=categories)
+    coded = everybody.coded
+    names = _names(ratings, raters, coded.codes.shape[1])
     right = None if reference is None else _place(reference, names)
     others = [place for place in range(len(names)) if place != right]
-    everybody = problem
     if right is not None:
-        rest = replace(problem.coded, codes=problem.coded.codes[:, others])
-        problem = pose_problem(
-            entry,
-            rest,
-            target="items",
-            categories=None,
-            weights=weights,
-            level=level,
-        )
+        rest = replace(coded, codes=coded.codes[:, others])
+        problem = pose(rest, categories=None)
     estimate = entry(problem.coded, weights=weights)
-    with_intervals = target is not None
-    at = level if with_intervals else None
-    notes = warn_small(estimate.n_items, 10, "items") if with_intervals else ()
-    codes, freq = _counted_rows(everybody.coded)
-    counts = PairCounts.of(codes, freq, everybody.coded.n_categories)
+    at = None if target is None else level
+    notes = () if at is None else warn_small(estimate.n_items, 10, "items")
+    codes, freq = _counted_rows(coded)
+    counts = PairCounts.of(codes, freq, coded.n_categories)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", MasrelWarning)  # the arrays say it
-        pairs = _pairs(everybody, counts, with_intervals)
         arrays = {
-            **_of_raters(pairs, others, right),
-            **_changes(problem, codes[:, others], freq, with_intervals),
-            **_of_categories(codes, freq, counts, others, at),
-            **_confusions(codes, freq, counts, others, right, at),
+            **_of_raters(_pairs(everybody, counts, at), others, right),
+            **_changes(problem, codes[:, others], freq, at),
+            **category_arrays(codes, freq, counts, others, at),
+            **confusion_arrays(codes, freq, counts, others, right, at),
         }
     for array in arrays.values():
         array.setflags(write=False)
     return Diagnosis(
         estimate=estimate,
         raters=tuple(names[place] for place in others),
-        categories=problem.coded.categories,
+        categories=coded.categories,
         reference=None if right is None else names[right],
         level=level,
         notes=notes,
@@ -323,18 +305,18 @@ def _counted_rows(coded: CodedRatings) -> tuple[Integers, Integers]:
 
 
 def _pairs(
-    problem: IntervalProblem, counts: PairCounts, with_intervals: bool
+    problem: IntervalProblem, counts: PairCounts, level: float | None
 ) -> tuple[Floats, Integers]:
     """Return value, low and high of every pair, (3, n_raters, n_raters), and items."""
     r = counts.n_raters
     pairs = np.full((3, r, r), math.nan)
-    if with_intervals:
+    if level is not None:
         # Imported here: values alone load no scipy.
         from masrel.intervals._choice import choose_interval
     for one, other in counts.pairs():
         of_pair = rows_problem(problem, *counts.of_pair(one, other))
         pairs[0, one, other] = of_pair.value
-        if with_intervals:
+        if level is not None:
             interval, _ = choose_interval(of_pair, unweighted=of_pair.unweighted)
             pairs[1:, one, other] = interval.low, interval.high
     return np.fmax(pairs, pairs.transpose(0, 2, 1)), counts.shared()
@@ -342,7 +324,7 @@ def _pairs(
 
 def _of_raters(
     pairs: tuple[Floats, Integers], others: Sequence[int], right: int | None
-) -> dict[str, NDArray[Any]]:
+) -> dict[str, Array]:
     """Return what pairs say of the raters, and of each with the reference."""
     values, items = pairs
     among = values[:, others][:, :, others]
@@ -366,21 +348,21 @@ def _of_raters(
 
 
 def _changes(
-    problem: IntervalProblem, codes: Integers, freq: Integers, with_intervals: bool
-) -> dict[str, NDArray[Any]]:
+    problem: IntervalProblem, codes: Integers, freq: Integers, level: float | None
+) -> dict[str, Array]:
     """Return the coefficient without each rater, and how much that differs."""
     r = codes.shape[1]
     without, errors, half = (np.full(r, math.nan) for _ in range(3))
     active = np.flatnonzero((codes >= 0).any(axis=0))
     rows = problem.features(replace(problem.coded, codes=codes[:, active]))
     sums, n_paired = freq @ rows, _n_paired(rows, codes, freq)
-    moved = problem.values_without(sums, rows) if with_intervals else np.empty(0)
+    moved = problem.values_without(sums, rows) if level is not None else np.empty(0)
     for column, rater in enumerate(active if len(active) > 2 else ()):
         rest = np.delete(codes[:, active], column, axis=1)
         others = problem.features(replace(problem.coded, codes=rest))
         of_others = freq @ others
         without[rater] = problem.values(of_others)
-        if with_intervals:
+        if level is not None:
             # as `difference` of the same items, without the rater and with
             change = problem.values_without(of_others, others) - moved
             n = min(n_paired, _n_paired(others, rest, freq))
@@ -401,91 +383,3 @@ def _changes(
 def _n_paired(rows: Floats, codes: Integers, freq: Integers) -> int:
     """Return how many items matter that have a pair of ratings."""
     return int(freq @ (rows.any(axis=1) & ((codes >= 0).sum(axis=1) > 1)))
-
-
-def _of_categories(
-    codes: Integers,
-    freq: Integers,
-    counts: PairCounts,
-    others: Sequence[int],
-    level: float | None,
-) -> dict[str, NDArray[Any]]:
-    """Return how often each category is used, and how often raters agree on it."""
-    chosen = _each_category(codes, others, counts.n_categories)
-    met = chosen.sum(axis=1, keepdims=True) - 1.0  # other raters of the item
-    same, pairs = chosen * (chosen - 1.0), chosen * np.maximum(met, 0.0)
-    table = counts.confusion(_each_other(counts, others))[others].sum(axis=0)
-    values = np.array(specific_agreement(table))
-    ends = np.full((2, len(values)), math.nan)
-    if level is not None:
-        ends[:] = ItemShares(
-            parts=freq @ same,
-            wholes=freq @ pairs,
-            squares=freq @ same**2,
-            products=freq @ (same * pairs),
-            whole_squares=freq @ pairs**2,
-            n_items=freq @ (pairs > 0.0).astype(np.float64),
-        ).interval(level)
-    return {
-        "category_counts": (freq @ chosen).astype(np.int64),
-        "category_values": values,
-        "category_low": ends[0],
-        "category_high": ends[1],
-    }
-
-
-def _each_category(codes: Integers, raters: Sequence[int], q: int) -> Floats:
-    """Return how many of some raters chose each category, (n_rows, n_categories)."""
-    coded = CodedRatings(codes=codes[:, raters], categories=tuple(range(q)))
-    return item_counts(coded).astype(np.float64)
-
-
-def _each_other(counts: PairCounts, others: Sequence[int]) -> NDArray[np.bool_]:
-    # whose ratings each rater's are held against: of all others
-    r = counts.n_raters
-    against = np.zeros((r, r), dtype=bool)
-    against[:, others] = True
-    np.fill_diagonal(against, False)
-    return against
-
-
-def _confusions(
-    codes: Integers,
-    freq: Integers,
-    counts: PairCounts,
-    others: Sequence[int],
-    right: int | None,
-    level: float | None,
-) -> dict[str, NDArray[Any]]:
-    """Return what ratings of others, or of the reference, each rater's ratings met."""
-    q = counts.n_categories
-    against = _each_other(counts, others if right is None else [right])
-    confusion = counts.confusion(against)[others]  # (n_raters, q, q)
-    rows = np.broadcast_to(confusion.sum(axis=2, keepdims=True), confusion.shape)
-    shares = divide(confusion.astype(np.float64), rows.astype(np.float64))
-    ends = np.full((2, len(others), q, q), math.nan)
-    met = _each_category(codes, others if right is None else [right], q)
-    for place, rater in enumerate(others):
-        if level is None:
-            break
-        mine = _each_category(codes, [rater], q)
-        # of other raters, or of the reference: (n_rows, n_categories)
-        of_others = met - mine if right is None else met
-        mine *= freq[:, None]
-        squares = (of_others**2).T @ mine  # Σ a², which is Σ ab
-        n_items = ((of_others > 0).T.astype(np.float64) @ mine).sum(axis=1)
-        wide = (q, q)  # a row of the table has one whole
-        ends[:, place] = ItemShares(
-            parts=confusion[place].astype(np.float64),
-            wholes=rows[place].astype(np.float64),
-            squares=squares,
-            products=squares,
-            whole_squares=np.broadcast_to(squares.sum(axis=1)[:, None], wide),
-            n_items=np.broadcast_to(n_items[:, None], wide),
-        ).interval(level)
-    return {
-        "confusion": confusion,
-        "shares": shares,
-        "share_low": ends[0],
-        "share_high": ends[1],
-    }
