@@ -102,6 +102,11 @@ class Interval:
     reason: str | None = None
     distribution: Distribution | None = field(default=None, compare=False, repr=False)
 
+    @property
+    def is_one_sided(self) -> bool:
+        """Whether only the lower end is a bound, at the whole level."""
+        return self.method.endswith("one-sided")
+
     def __str__(self) -> str:
         return _as_text(_interval_lines(self))
 

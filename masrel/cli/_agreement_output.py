@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING
 
 import click
 
-from masrel.cli._agreement_rows import EstimateOptions
+from masrel.analysis._file_estimates import AgreementRow, EstimateOptions
 from masrel.cli._options import OutputOptions, echo_notes, write_output
 from masrel.cli._reading import ReadingOptions, what_was_read
 
 if TYPE_CHECKING:
     from masrel.estimates import Target
     from masrel.ratings import RatingsFile
-    from masrel.report._agreement_table import AgreementRow
     from masrel.report._figure_data import Content
     from masrel.report._further_tables import FurtherTable
 

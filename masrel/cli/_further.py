@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 import click
 
-from masrel.cli._agreement_rows import EstimateOptions, check_order, entries
+from masrel.analysis._file_estimates import EstimateOptions, check_order, entries
 from masrel.cli._options import grouped
 from masrel.errors import MasrelWarning, ParameterError
 
 if TYPE_CHECKING:
     from masrel.ratings import RatingsFile
-    from masrel.report._further_tables import FurtherTable, Question
+    from masrel.report._further_tables import FurtherTable
 
 _PAIRS = ("stratified_kappa", "pooled_kappa")
 """Coefficients of each rater's grades of two sessions."""
@@ -180,7 +180,6 @@ def further_tables(
     if not further.record():
         return []
     check_order(options, file.scale, file.is_ordered)
-    question = _question(options, explain)
     tables = []
     with warnings.catch_warnings():
         # Every note is in a result, and so below its table or in the JSON.
@@ -188,16 +187,12 @@ def further_tables(
         if further.retest or further.each_category:
             from masrel.report._further_tables import category_table, retest_table
 
-            names = options.coefficients or []
-            pairs = ["stratified_kappa"]
-            if options.takes_all or "pooled_kappa" in names:
-                pairs.append("pooled_kappa")
             if further.retest:
-                tables.append(retest_table(file, question, pairs))
+                tables.append(retest_table(file, options, explain=explain))
             if further.each_category:
-                tables.append(category_table(file, question))
+                tables.append(category_table(file, options, explain=explain))
         if further.diagnose:
-            tables += _diagnosis(file, further, options, question)
+            tables += _diagnosis(file, further, options)
         if further.symmetry or further.indices:
             from masrel.report._two_rater_tables import index_table, symmetry_table
 
@@ -209,7 +204,7 @@ def further_tables(
             tables.append(limits_table(file, level=options.level, unit=further.unit))
         between = further.between_raters(file, options)
         if further.compare and between is not None:
-            tables += _comparisons(file, between, question)
+            tables += _comparisons(file, between)
     return tables
 
 
@@ -217,7 +212,6 @@ def _diagnosis(
     file: "RatingsFile",
     further: FurtherOptions,
     options: EstimateOptions,
-    question: "Question",
 ) -> "list[FurtherTable]":
     from masrel.report._diagnosis_tables import diagnosis_tables
 
@@ -230,33 +224,16 @@ def _diagnosis(
         )
     n_raters = max(len(part.raters) for part in file.parts)
     (entry,) = entries(options, n_raters, file.scale, file.is_ordered)
-    return diagnosis_tables(file, entry, question, further.reference)
+    return diagnosis_tables(file, entry, options, further.reference)
 
 
-def _question(options: EstimateOptions, explain: bool) -> "Question":
-    from masrel.report._further_tables import Question
-
-    return Question(
-        weights=options.weights,
-        target=options.target,
-        interval=options.interval,
-        level=options.level,
-        n_resamples=options.n_resamples,
-        seed=options.seed,
-        explain=explain,
-        bands=options.words,
-    )
-
-
-def _comparisons(
-    file: "RatingsFile", options: EstimateOptions, question: "Question"
-) -> "list[FurtherTable]":
+def _comparisons(file: "RatingsFile", options: EstimateOptions) -> "list[FurtherTable]":
     from masrel.report._difference_table import difference_table
     from masrel.report._equality_table import equality_table
 
     n_raters = max(len(part.raters) for part in file.parts) or file.read["n_raters"]
     of_all = entries(options, n_raters, file.scale, file.is_ordered)
-    tables = [difference_table(file, of_all, question, skip=options.takes_all)]
+    tables = [difference_table(file, of_all, options, skip=options.takes_all)]
     if len(file.parts) > 2:  # of two the difference says it
-        tables.append(equality_table(file, of_all, question))
+        tables.append(equality_table(file, of_all, options))
     return tables

@@ -5,14 +5,10 @@ from typing import TYPE_CHECKING
 
 import click
 
+from masrel.analysis._file_estimates import USUAL, EstimateOptions, estimate_rows
 from masrel.cli._agreement_output import WithArguments, write_agreement
-from masrel.cli._agreement_rows import (
-    EstimateOptions,
-    estimate_options,
-    estimate_rows,
-)
 from masrel.cli._further import FurtherOptions, further_options, further_tables
-from masrel.cli._options import OutputOptions, grouped, output_options
+from masrel.cli._options import OutputOptions, grouped, output_options, split_commas
 from masrel.cli._reading import (
     ReadingOptions,
     read_file,
@@ -22,8 +18,95 @@ from masrel.cli._reading import (
 from masrel.errors import ParameterError, RatingsError
 
 if TYPE_CHECKING:
+    from masrel.analysis._file_estimates import AgreementRow
     from masrel.ratings import RatingsFile
-    from masrel.report._agreement_table import AgreementRow
+
+
+def _list_register(
+    context: click.Context, _: click.Parameter, value: list[str] | None
+) -> list[str] | None:
+    # "list" needs no file: it is seen before the file is missed
+    if value == ["list"] and not context.resilient_parsing:
+        click.echo(_register())
+        context.exit()
+    return value
+
+
+def _plain_weights(name: str) -> str:
+    from masrel.agreement._weights import plain_name
+
+    return plain_name(name)
+
+
+_estimate_options = grouped(
+    "options",
+    EstimateOptions,
+    click.option(
+        "--coefficients",
+        metavar="NAMES",
+        show_default=",".join(USUAL),
+        type=split_commas,
+        is_eager=True,
+        callback=_list_register,
+        help="Names of coefficients, separated by commas; all that fit (but "
+        "lin_ccc, sem and mdc); or list, which prints them and ends.",
+    ),
+    click.option(
+        "--weights",
+        default="identity",
+        type=_plain_weights,
+        metavar="NAME",
+        show_default=True,
+        help="identity, linear, quadratic, ordinal, radical, ratio, circular or "
+        "bipolar.",
+    ),
+    click.option(
+        "--metric",
+        type=click.Choice(
+            ["nominal", "ordinal", "interval", "ratio", "jaccard", "masi"]
+        ),
+        help="Krippendorff's alpha by his difference function in place of weights; "
+        "jaccard and masi take grades of several labels, as a;b.",
+    ),
+    click.option(
+        "--target",
+        type=click.Choice(["items", "raters", "both"]),
+        help="What a new study would draw anew; no interval without it.",
+    ),
+    click.option(
+        "--interval",
+        type=click.Choice(["auto", "analytic", "jackknife", "bootstrap", "posterior"]),
+        default="auto",
+        show_default=True,
+        help="Kind of interval; auto chooses by target and size.",
+    ),
+    click.option(
+        "--level", default=0.95, show_default=True, help="Level of intervals."
+    ),
+    click.option("--resamples", "n_resamples", default=10_000, show_default=True),
+    click.option("--seed", default=0, show_default=True, help="Seed of resampling."),
+    click.option(
+        "--words",
+        type=click.Choice(["landis_koch", "altman", "fleiss", "cicchetti"]),
+        help="Name the best band that the true value reaches with 95 % probability.",
+    ),
+)
+
+
+def _register() -> str:
+    from masrel.agreement import COEFFICIENTS
+    from masrel.report._tables import aligned
+
+    lines = [("name", "title", "raters", "weights", "also called")]
+    for entry in COEFFICIENTS.values():
+        fewest, most = entry.n_raters
+        raters = str(fewest) if most == fewest else f"{fewest} or more"
+        if entry.shape == "pairs":
+            raters += ", each twice (--retest)"
+        weights = "any" if entry.weighted else "none"
+        aliases = ", ".join(entry.aliases)
+        lines.append((entry.name, entry.title, raters, weights, aliases))
+    return "\n".join(aligned(lines, ["left"] * 5, rule=True))
 
 
 @click.command("agree", cls=WithArguments)
@@ -47,7 +130,7 @@ if TYPE_CHECKING:
         "sites: they are left out as a whole.",
     ),
 )
-@estimate_options
+@_estimate_options
 @further_options
 @click.option(
     "--explain", is_flag=True, help="Say in notes what every interval promises."

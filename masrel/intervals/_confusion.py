@@ -133,7 +133,9 @@ def confusion_arrays(
     shares = divide(confusion.astype(np.float64), rows.astype(np.float64))
     low, high = np.full((2, *confusion.shape), np.nan)  # (n_raters, q, q)
     met = _each_category(codes, held_against, q)
-    for place, rater in enumerate(others if level is not None else ()):
+    for place, rater in enumerate(others):
+        if level is None:
+            break
         mine = _each_category(codes, [rater], q)
         # of other raters, or of the reference: (n_rows, n_categories)
         of_others = met - mine if right is None else met

@@ -2,16 +2,16 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import masrel
 from masrel.agreement import COEFFICIENTS, BandScale, benchmark, strength
+from masrel.analysis._file_estimates import AgreementRow
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Interval, Target, as_document
 from masrel.report._estimate_words import (
     aside,
     forest_row,
-    is_bound,
     origin,
     promise,
     sentence,
@@ -53,21 +53,6 @@ _PRIORS = (", so the prior weighs: ", " rests on the prior, too: ")
 
 _VARIANCES = "ratings are missing; variances by REML: "
 """Start of the note on the variances that an ICC is made of."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class AgreementRow:
-    """One estimate, and what to say of it that is not in it."""
-
-    # group, title: of what (such as a session), and which coefficient
-    group: str
-    title: str
-    estimate: Estimate
-    # what it lacks of what was requested, and what was assumed
-    notes: tuple[str, ...] = ()
-    # what the true value reaches with 95 % by its interval; None if there is none, or
-    # no word is to be named
-    lower_bound: float | None = None
 
 
 def agreement_table(
@@ -220,7 +205,7 @@ def _brief(note: str) -> str:
 def _interval_note(interval: Interval, explain: bool) -> str:
     kind = "CI"
     if interval.kind == "credible":
-        kind = "credible bound" if is_bound(interval) else "credible interval"
+        kind = "credible bound" if interval.is_one_sided else "credible interval"
     name = f"{percent(interval.level)} % {kind}, {interval.method}"
     population = _POPULATIONS[interval.target]
     if interval.unit == "clusters":

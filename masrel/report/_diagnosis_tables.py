@@ -13,19 +13,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from masrel.agreement import Coefficient
+from masrel.analysis._file_estimates import EstimateOptions, on_grades
 from masrel.errors import MasrelError, MasrelWarning, ParameterError
 from masrel.intervals import Diagnosis, diagnose
 from masrel.ratings import RatingsFile, RatingsPart
 from masrel.report._figure_data import RaterPairs
 from masrel.report._further_tables import (
     FurtherTable,
-    Question,
     coded_part,
     data_of,
     finite,
     heading,
     label,
-    on_grades,
     part_keys,
     part_names,
 )
@@ -46,13 +45,14 @@ class _Diagnosed:
 
 
 def diagnosis_tables(
-    file: RatingsFile, entry: Coefficient, question: Question, reference: str | None
+    file: RatingsFile,
+    entry: Coefficient,
+    options: EstimateOptions,
+    reference: str | None,
 ) -> list[FurtherTable]:
     """Return raters, pairs, categories and confusions of every part of the ratings."""
-    parts = [_diagnosed(file, part, entry, question, reference) for part in file.parts]
-    title = entry.title
-    if entry.weighted and question.weights != "identity":
-        title = f"{title}, {question.weights}"
+    parts = [_diagnosed(file, part, entry, options, reference) for part in file.parts]
+    title = options.title(entry)
     by = heading(part_names(file, file.parts[0]))
     return [
         _table(file, by, parts, "raters", f"What each rater adds to {title}", title),
@@ -66,7 +66,7 @@ def _diagnosed(
     file: RatingsFile,
     part: RatingsPart,
     entry: Coefficient,
-    question: Question,
+    options: EstimateOptions,
     reference: str | None,
 ) -> _Diagnosed:
     if reference is not None and reference not in part.raters:
@@ -80,11 +80,11 @@ def _diagnosed(
             result = diagnose(
                 on_grades(coded_part(part, "--diagnose"), entry, file.scale),
                 coefficient=entry,
-                target=None if question.target is None else "items",
+                target=None if options.target is None else "items",
                 raters=part.raters,
                 reference=reference,
-                weights=question.weights if entry.weighted else "identity",
-                level=question.level,
+                weights=options.weights_of(entry),
+                level=options.level,
             )
     except MasrelError as error:
         where = f"{group}: " if group else ""

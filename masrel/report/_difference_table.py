@@ -11,16 +11,15 @@ from dataclasses import dataclass
 from typing import Literal
 
 from masrel.agreement import CodedRatings, Coefficient, Significance, holm
+from masrel.analysis._file_estimates import EstimateOptions, on_grades
 from masrel.errors import MasrelError, MasrelWarning, ParameterError
 from masrel.estimates import Estimate, as_document
 from masrel.ratings import RatingsFile
 from masrel.report._further_tables import (
     FurtherTable,
-    Question,
     data_of,
     finite,
     label,
-    on_grades,
     part_names,
 )
 from masrel.report._group_rows import groups_of, n_shared_items
@@ -55,7 +54,7 @@ class _Difference:
 def difference_table(
     file: RatingsFile,
     entries: Sequence[Coefficient],
-    question: Question,
+    options: EstimateOptions,
     *,
     skip: bool = False,
 ) -> FurtherTable:
@@ -66,11 +65,6 @@ def difference_table(
             "--compare: needs two groups or more, so --by with the column that tells "
             "them apart"
         )
-    if question.target not in (None, "items"):
-        raise ParameterError(
-            "--compare: a difference generalises to other items, so it takes "
-            f"--target items, got --target {question.target}"
-        )
     pairs = _pairs(file)
     differences: list[_Difference] = []
     without = []
@@ -78,7 +72,7 @@ def difference_table(
         if skip and entry.kernel is None:
             without.append(entry.title)
         else:
-            differences += _differences(entry, pairs, question, file.scale)
+            differences += _differences(entry, pairs, options, file.scale)
     return FurtherTable(
         key="differences",
         table=Table(
@@ -86,7 +80,7 @@ def difference_table(
             caption="Differences of agreement between groups",
             columns=_COLUMNS,
             rows=tuple(map(_cells, differences)),
-            notes=_notes(differences, pairs, question, without),
+            notes=_notes(differences, pairs, options, without),
             data=data_of(file),
         ),
         documents=list(map(_document, differences)),
@@ -115,11 +109,11 @@ def _pairs(file: RatingsFile) -> list[_Pair]:
 
 
 def _differences(
-    entry: Coefficient, pairs: Sequence[_Pair], question: Question, scale: Scale
+    entry: Coefficient, pairs: Sequence[_Pair], options: EstimateOptions, scale: Scale
 ) -> list[_Difference]:
     from masrel.intervals import difference, difference_test
 
-    weights = question.weights if entry.weighted else "identity"
+    weights = options.weights_of(entry)
     results = []
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", MasrelWarning)  # the results say it
@@ -131,7 +125,7 @@ def _differences(
                     *ratings,
                     design=pair.design,
                     weights=weights,
-                    level=question.level,
+                    level=options.level,
                     clusters=pair.clusters,
                 )
                 test = difference_test(
@@ -147,7 +141,7 @@ def _differences(
                 ) from error
             results.append((pair, estimate, test))
     adjusted = holm([test.p_value for _, _, test in results])
-    title = entry.title if weights == "identity" else f"{entry.title}, {weights}"
+    title = options.title(entry)
     return [
         _Difference(pair=pair, title=title, estimate=estimate, test=test, adjusted=p)
         for (pair, estimate, test), p in zip(results, adjusted, strict=True)
@@ -222,7 +216,7 @@ def _document(difference: _Difference) -> dict[str, object]:
 def _notes(
     differences: Sequence[_Difference],
     pairs: Sequence[_Pair],
-    question: Question,
+    options: EstimateOptions,
     without: Sequence[str],
 ) -> tuple[str, ...]:
     is_clustered = any(pair.clusters is not None for pair in pairs)
@@ -231,7 +225,7 @@ def _notes(
         unit, population = ("cluster", "clusters of items")
     notes = [
         "Difference: the first less the second. SE, "
-        f"{percent(question.level)} % CI and p: {unit} jackknife, t; they generalise "
+        f"{percent(options.level)} % CI and p: {unit} jackknife, t; they generalise "
         f"to other {population} like these, graded by the same raters; raters are "
         "taken as they are, whether groups share them or not.",
         f"p (Holm): adjusted for {len(pairs)} pairs, each coefficient by itself."

@@ -4,18 +4,18 @@ In: a `RatingsFile` whose parts are the groups. Out: a table, and the same for J
 """
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 from masrel.agreement import Coefficient, Significance
+from masrel.analysis._file_estimates import EstimateOptions, on_grades
 from masrel.errors import MasrelWarning
 from masrel.ratings import RatingsFile
 from masrel.report._further_tables import (
     FurtherTable,
-    Question,
     data_of,
     finite,
-    on_grades,
 )
 from masrel.report._group_rows import Groups, groups_of
 from masrel.report._tables import Column, Table, Value, p_text, significant
@@ -40,6 +40,7 @@ class _Test:
     """A test of one coefficient of all groups."""
 
     entry: Coefficient
+    title: str
     weights: str
     name: str
     result: Significance
@@ -48,7 +49,7 @@ class _Test:
 def equality_table(
     file: RatingsFile,
     entries: Sequence[Coefficient],
-    question: Question,
+    options: EstimateOptions,
 ) -> FurtherTable:
     """Return the test that all groups have the same coefficient, for each of them."""
     groups = groups_of(file.parts)
@@ -58,7 +59,7 @@ def equality_table(
         for entry in entries:
             if entry.kernel is not None:  # else the table of differences says it
                 of_entry = tuple(on_grades(s, entry, file.scale) for s in groups.sets)
-                tests += _tests(entry, replace(groups, sets=of_entry), question)
+                tests += _tests(entry, replace(groups, sets=of_entry), options)
     names = dict.fromkeys(test.name for test in tests)
     undefined = [
         f"{test.entry.title}: undefined: {test.result.reason}."
@@ -79,38 +80,31 @@ def equality_table(
     )
 
 
-def _tests(entry: Coefficient, groups: Groups, question: Question) -> list[_Test]:
+def _tests(
+    entry: Coefficient, groups: Groups, options: EstimateOptions
+) -> Iterator[_Test]:
     from masrel.intervals import differences, donner_test, equality_test, estimate
 
-    weights = question.weights if entry.weighted else "identity"
+    weights, clusters = options.weights_of(entry), groups.clusters
+    test = partial(_Test, entry=entry, title=options.title(entry), weights=weights)
     if groups.is_dependent:
-        result = differences(
-            entry, groups.sets, weights=weights, clusters=groups.clusters
-        ).equality
-        return [_Test(entry=entry, weights=weights, name=_HOTELLING, result=result)]
-    if groups.clusters is None:
+        result = differences(entry, groups.sets, weights=weights, clusters=clusters)
+        yield test(name=_HOTELLING, result=result.equality)
+        return
+    if clusters is None:
         estimates = [entry(ratings, weights=weights) for ratings in groups.sets]
     else:
         estimates = [
-            estimate(entry, ratings, target="items", weights=weights, clusters=clusters)
-            for ratings, clusters in zip(groups.sets, groups.clusters, strict=True)
+            estimate(entry, ratings, target="items", weights=weights, clusters=of)
+            for ratings, of in zip(groups.sets, clusters, strict=True)
         ]
-    tests = [
-        _Test(
-            entry=entry,
-            weights=weights,
-            name=_FLEISS,
-            result=equality_test(estimates),
-        )
-    ]
+    yield test(name=_FLEISS, result=equality_test(estimates))
     of_two = all(
         ratings.codes.shape[1] == 2 and len(ratings.categories) == 2
         for ratings in groups.sets
     )
-    if of_two and groups.clusters is None and entry.name in _INTRACLASS:
-        result = donner_test(groups.sets)
-        tests.append(_Test(entry=entry, weights=weights, name=_DONNER, result=result))
-    return tests
+    if of_two and clusters is None and entry.name in _INTRACLASS:
+        yield test(name=_DONNER, result=donner_test(groups.sets))
 
 
 _COLUMNS = (
@@ -127,10 +121,10 @@ _COLUMNS = (
 
 
 def _cells(test: _Test) -> tuple[Value, ...]:
-    result, title = test.result, test.entry.title
+    result = test.result
     return (
         test.entry.name,
-        title if test.weights == "identity" else f"{title}, {test.weights}",
+        test.title,
         test.weights,
         test.name,
         result.statistic,

@@ -13,9 +13,6 @@ from masrel.report._tables import UNDEFINED, counted, interval_text, number, per
 Noun = Literal["model", "item"]
 """What is rated: a haptic model in a study, any item elsewhere."""
 
-_SURE = 0.95  # probability with which the true value reaches the word for it
-_SURE_TWO_SIDED = 0.90  # the level of which the lower end alone is as sure
-
 TARGETS = {
     "raters": "other raters",
     "items": "other models",
@@ -31,9 +28,6 @@ _POPULATIONS = {
 
 NOT_THERE = "not in these data"
 """What is shown where a plan's estimate is not."""
-
-_ONE_SIDED = "one-sided"
-"""End of the method of a bound."""
 
 _WIDENED = "and the spread of raters"
 """End of the method of a posterior that was widened by what raters differ by."""
@@ -83,7 +77,7 @@ def interval_name(interval: Interval) -> str:
 
 def meaning(interval: Interval, noun: Noun) -> str:
     """Return in one sentence what an interval promises and what it was made from."""
-    kind = "bound" if interval.method.endswith(_ONE_SIDED) else "interval"
+    kind = "bound" if interval.is_one_sided else "interval"
     name = f"{interval.kind.capitalize()} {kind}"
     return f"{name}{origin(interval, noun)}: {promise(interval, noun)}."
 
@@ -106,7 +100,7 @@ def promise(interval: Interval, noun: Noun) -> str:
         premises = "these ratings and the prior"
     elif interval.method.startswith("Dirichlet-multinomial"):  # it knows of no rater
         premises = "these ratings, the prior and raters who differ by chance alone"
-    is_one_sided = interval.method.endswith(_ONE_SIDED)
+    is_one_sided = interval.is_one_sided
     where = "above the lower end" if is_one_sided else "inside"
     return (
         f"given {premises}, the value that would be found if {population}, "
@@ -136,30 +130,10 @@ def origin(interval: Interval, noun: Noun) -> str:
     return f" (from leaving out one {one} at a time)"
 
 
-def is_bound(interval: Interval) -> bool:
-    """Return whether only the lower end is a bound, at the whole level."""
-    return interval.method.endswith(_ONE_SIDED)
-
-
-def surely_reached(
-    interval: Interval | None, at_level: Callable[[float], Interval | None]
-) -> float | None:
-    """Return what the true value reaches with 95 %; None without an interval."""
-    # at_level: the same interval at another level
-    if interval is None:
-        return None
-    if interval.reason is not None:
-        return math.nan
-    # the lower end of an interval leaves out half of what is outside, a bound all
-    level = _SURE if is_bound(interval) else _SURE_TWO_SIDED
-    other = interval if level == interval.level else at_level(level)
-    return math.nan if other is None else other.low
-
-
 def aside(interval: Interval) -> str:
     """Return in few words how the ends differ from quantiles of the distribution."""
-    if interval.method.endswith(_ONE_SIDED):
-        return _ONE_SIDED
+    if interval.is_one_sided:
+        return "one-sided"
     if interval.method.endswith(_WIDENED):
         return "posterior, wider by the spread of raters"
     return ""
@@ -191,7 +165,7 @@ def _uncertainty(estimate: Estimate, shown: Callable[[float], str]) -> list[str]
     if interval.reason is not None:
         return [*errors, f"no {name} ({interval.reason})"]
     method = interval.method.split(",")[0]
-    if is_bound(interval):
+    if interval.is_one_sided:
         name = f"{percent(interval.level)} % {interval.kind} lower bound"
         return [f"{name} {shown(interval.low)} ({method})"]
     return [f"{name} [{shown(interval.low)}, {shown(interval.high)}] ({method})"]

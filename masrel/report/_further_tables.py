@@ -7,33 +7,33 @@ plain values for JSON.
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from masrel.agreement import (
-    BandScale,
     CodedRatings,
     Coefficient,
-    WeightName,
     category_kappa,
     code_ratings,
     coefficient,
 )
-from masrel.errors import MasrelError, ParameterError, RatingsError
-from masrel.estimates import Estimate, Interval, Target
+from masrel.analysis._file_estimates import (
+    AgreementRow,
+    EstimateOptions,
+    estimate_row,
+)
+from masrel.errors import ParameterError, RatingsError
+from masrel.estimates import Estimate
 from masrel.ratings import RatingsFile, RatingsPart
 from masrel.report._agreement_table import (
-    AgreementRow,
     agreement_table,
     estimate_documents,
     group_key,
 )
-from masrel.report._estimate_words import surely_reached
 from masrel.report._figure_data import Content
 from masrel.report._tables import Table
-from masrel.scales import Scale
 
 _SHOWN = 6  # names that a note lists
 
@@ -47,23 +47,6 @@ class FurtherTable:
     documents: list[dict[str, object]]
     rows: tuple[AgreementRow, ...] = ()  # the estimates in it, for a figure
     figure: Content | None = None  # what takes the place of that figure
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Question:
-    """How every estimate of a table is made."""
-
-    weights: WeightName = "identity"
-    target: Target | None = None  # no interval when None
-    interval: Literal["auto", "analytic", "jackknife", "bootstrap", "posterior"] = (
-        "auto"
-    )
-    level: float = 0.95
-    # n_resamples, seed: for intervals that draw
-    n_resamples: int = 10_000
-    seed: int = 0
-    explain: bool = False  # whether notes say what an interval promises
-    bands: BandScale | None = None  # whose words for values
 
 
 def data_of(file: RatingsFile) -> str:
@@ -117,82 +100,8 @@ def coded_part(part: RatingsPart, option: str) -> CodedRatings:
         raise RatingsError(f"{option}: {error}") from error
 
 
-def on_grades(ratings: CodedRatings, entry: Coefficient, scale: Scale) -> CodedRatings:
-    """Return ratings with the text of their grades if a metric takes sets of labels."""
-    if entry.metric in ("jaccard", "masi"):
-        return replace(ratings, categories=scale.grades)
-    return ratings
-
-
-def _estimate_row(
-    name: str, ratings: CodedRatings, group: str, question: Question, n_raters: int
-) -> AgreementRow:
-    # one coefficient, with the interval if there is such a one
-    entry, weights = coefficient(name), question.weights
-    notes: tuple[str, ...] = ()
-    bound = None
-    estimate = entry(ratings, weights=weights)
-    if question.target is not None:
-        interval, notes = _interval(name, ratings, question, weights)
-        estimate = _changed(estimate, interval=interval)
-        bound = _lower_bound(name, ratings, question, weights, interval)
-    return AgreementRow(
-        group=group,
-        title=entry.title if weights == "identity" else f"{entry.title}, {weights}",
-        estimate=_changed(estimate, n_raters=min(estimate.n_raters, n_raters)),
-        notes=notes,
-        lower_bound=bound,
-    )
-
-
-def _lower_bound(
-    name: str,
-    ratings: CodedRatings,
-    question: Question,
-    weights: WeightName,
-    interval: Interval | None,
-) -> float | None:
-    # what the true value reaches, where a word is to be named for it
-    if question.bands is None:
-        return None
-
-    def at_level(level: float) -> Interval | None:
-        return _interval(name, ratings, replace(question, level=level), weights)[0]
-
-    return surely_reached(interval, at_level)
-
-
-def _interval(
-    name: str, ratings: CodedRatings, question: Question, weights: WeightName
-) -> tuple[Interval | None, tuple[str, ...]]:
-    # the interval of a coefficient, or None and a note that says why there is none
-    from masrel import intervals  # a coefficient alone loads no interval
-
-    if question.target is None:
-        return None, ()
-    try:
-        estimate = intervals.estimate(
-            name,
-            ratings,
-            target=question.target,
-            method=question.interval,
-            weights=weights,
-            level=question.level,
-            n_resamples=question.n_resamples,
-            rng=question.seed,
-        )
-    except MasrelError as error:
-        return None, (f"no interval: {error}",)
-    return estimate.interval, ()
-
-
-def _changed(estimate: Estimate, **fields: object) -> Estimate:
-    # `vars` has the standard error as it is: still to be computed when it is read
-    return Estimate(**{**vars(estimate), **fields})
-
-
 def retest_table(
-    file: RatingsFile, question: Question, names: Sequence[str] = ("stratified_kappa",)
+    file: RatingsFile, options: EstimateOptions, *, explain: bool
 ) -> FurtherTable:
     """Return how well raters agree with themselves, each and all together."""
     if file.read["session"] is None:
@@ -200,20 +109,23 @@ def retest_table(
             "--retest: needs --session with the column of the two sessions"
         )
     by = None if file.read["by"] is None else str(file.read["by"])
+    entries = [coefficient("stratified_kappa")]
+    if options.takes_all or "pooled_kappa" in options.names:
+        entries.append(coefficient("pooled_kappa"))
     rows: list[AgreementRow] = []
     documents: list[dict[str, object]] = []
     notes: list[str] = []
     for group in dict.fromkeys(part.group for part in file.parts):
         pairs = _retest_pairs(file, [p for p in file.parts if p.group == group])
-        of_group = _retest_rows(group, pairs, question, names)
+        of_group = _retest_rows(group, pairs, options, entries)
         rows += of_group
         notes += pairs.notes
         keys = {} if by is None else {group_key(by): group}
-        raters: list[str | None] = [*pairs.raters, *[None] * len(names)]
+        raters: list[str | None] = [*pairs.raters, *[None] * len(entries)]
         documents += [
             {**keys, "rater": rater, **document}
             for rater, document in zip(
-                raters, estimate_documents(of_group, bands=question.bands), strict=True
+                raters, estimate_documents(of_group, bands=options.words), strict=True
             )
         ]
     table = agreement_table(
@@ -221,8 +133,8 @@ def retest_table(
         caption="Agreement of raters with themselves",
         by=heading(filter(None, (by, "rater"))),
         notes=tuple(notes),
-        explain=question.explain,
-        bands=question.bands,
+        explain=explain,
+        bands=options.words,
         data=data_of(file),
     )
     return FurtherTable(
@@ -231,6 +143,11 @@ def retest_table(
         documents=documents,
         rows=tuple(rows),
     )
+
+
+def _changed(estimate: Estimate, **fields: object) -> Estimate:
+    # `vars` has the standard error as it is: still to be computed when it is read
+    return Estimate(**{**vars(estimate), **fields})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -243,28 +160,26 @@ class _RetestPairs:
 
 
 def _retest_rows(
-    group: str | None, pairs: _RetestPairs, question: Question, names: Sequence[str]
+    group: str | None,
+    pairs: _RetestPairs,
+    options: EstimateOptions,
+    entries: Sequence[Coefficient],
 ) -> list[AgreementRow]:
     head = [] if group is None else [group]
+    every, codes = replace(options, coefficients=None), pairs.ratings.codes
     # a single rater says nothing of other raters
-    alone = question
-    if question.target in ("raters", "both"):
-        alone = replace(question, target=None)
-    codes = pairs.ratings.codes
-    rows = [
-        _estimate_row(
-            "cohen_kappa",
-            replace(pairs.ratings, codes=codes[:, 2 * place : 2 * place + 2]),
-            label([*head, rater]),
-            alone,
-            1,
-        )
-        for place, rater in enumerate(pairs.raters)
-    ]
+    alone = replace(every, target=None if options.target != "items" else "items")
+    rows = []
+    for place, rater in enumerate(pairs.raters):
+        of_rater = codes[:, 2 * place : 2 * place + 2]
+        ratings = replace(pairs.ratings, codes=of_rater)
+        name = label([*head, rater])
+        row, _ = estimate_row(coefficient("cohen_kappa"), ratings, name, alone)
+        estimate = _changed(row.estimate, n_raters=min(row.estimate.n_raters, 1))
+        rows.append(replace(row, estimate=estimate))
     everybody = label([*head, "all"])
     return rows + [
-        _estimate_row(name, pairs.ratings, everybody, question, len(pairs.raters))
-        for name in names
+        estimate_row(entry, pairs.ratings, everybody, every)[0] for entry in entries
     ]
 
 
@@ -356,17 +271,19 @@ def _left_out(
     return tuple(notes)
 
 
-def category_table(file: RatingsFile, question: Question) -> FurtherTable:
+def category_table(
+    file: RatingsFile, options: EstimateOptions, *, explain: bool
+) -> FurtherTable:
     """Return how well raters tell each category from all others."""
     rows: list[AgreementRow] = []
     documents: list[dict[str, object]] = []
     for part in file.parts:
         of_part = [
-            _category_row(file, part, place, question)
+            _category_row(file, part, place, options)
             for place in range(len(file.scale.grades))
         ]
         rows += of_part
-        of_grades = estimate_documents(of_part, bands=question.bands)
+        of_grades = estimate_documents(of_part, bands=options.words)
         documents += [
             {**part_keys(file, part), "category": grade, **document}
             for grade, document in zip(file.scale.grades, of_grades, strict=True)
@@ -375,8 +292,8 @@ def category_table(file: RatingsFile, question: Question) -> FurtherTable:
         rows,
         caption="Agreement on each category against all others",
         by=heading([*part_names(file, file.parts[0]), "category"]),
-        explain=question.explain,
-        bands=question.bands,
+        explain=explain,
+        bands=options.words,
         data=data_of(file),
     )
     return FurtherTable(
@@ -388,29 +305,24 @@ def category_table(file: RatingsFile, question: Question) -> FurtherTable:
 
 
 def _category_row(
-    file: RatingsFile, part: RatingsPart, place: int, question: Question
+    file: RatingsFile, part: RatingsPart, place: int, options: EstimateOptions
 ) -> AgreementRow:
     grade = file.scale.grades[place]
-    notes: tuple[str, ...] = ()
-    bound = None
+    group = label([*part_names(file, part).values(), grade])
     estimate = category_kappa(part.counted, file.scale.values[place])
-    if question.target is not None and estimate.reason is None:
+    row = AgreementRow(group=group, title="Fleiss' κ, category", estimate=estimate)
+    if options.target is not None and estimate.reason is None:
         # that of Fleiss' kappa of the two categories that the scale is folded to
         folded = _folded(part, place)
-        interval = None
         if folded is None:
-            notes = ("no interval: counts do not say who rated what",)
+            none = "no interval: counts do not say who rated what"
+            row = replace(row, notes=(none,))
         else:
-            interval, notes = _interval("fleiss_kappa", folded, question, "identity")
-            bound = _lower_bound("fleiss_kappa", folded, question, "identity", interval)
-        estimate = _changed(estimate, interval=interval)
-    return AgreementRow(
-        group=label([*part_names(file, part).values(), grade]),
-        title="Fleiss' κ, category",
-        estimate=_changed(estimate, weights=grade),
-        notes=notes,
-        lower_bound=bound,
-    )
+            plain = replace(options, coefficients=None, weights="identity")
+            of, _ = estimate_row(coefficient("fleiss_kappa"), folded, group, plain)
+            row = replace(of, title=row.title)
+            estimate = _changed(estimate, interval=of.estimate.interval)
+    return replace(row, estimate=_changed(estimate, weights=grade))
 
 
 def _folded(part: RatingsPart, place: int) -> CodedRatings | None:

@@ -1,14 +1,16 @@
-"""What `masrel agree` estimates: which coefficients, with which interval and bound."""
+"""Estimates of any file of ratings: which coefficients, with which interval and bound.
 
+In: a part of the file, and how estimates are made. Out: a row for every coefficient.
+"""
+
+import math
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, TypeVar
 
-import click
-
-from masrel.cli._options import grouped, split_commas
 from masrel.errors import MasrelError, MasrelWarning, ParameterError
-from masrel.estimates import Estimate, Target
+from masrel.estimates import Estimate, Interval, Target
 
 if TYPE_CHECKING:
     from masrel.agreement import (
@@ -20,20 +22,25 @@ if TYPE_CHECKING:
         WeightName,
     )
     from masrel.ratings import RatingsPart
-    from masrel.report._agreement_table import AgreementRow
     from masrel.scales import Scale
 
-_USUAL = ["percent_agreement", "fleiss_kappa"]
+_Ratings = TypeVar("_Ratings", bound="CodedRatings | CountedRatings")
+
+USUAL = ("percent_agreement", "fleiss_kappa")
+"""The coefficients that are estimated where none are named."""
 
 _OF_METRIC = "krippendorff_alpha"
 """The coefficient that has metrics."""
+
+_SURE = 0.95  # probability with which the true value reaches the word for it
+_SURE_TWO_SIDED = 0.90  # the level of which the lower end alone is as sure
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EstimateOptions:
     """What is estimated of every part of the ratings."""
 
-    coefficients: list[str] | None  # names, or "all" alone; None for `_USUAL`
+    coefficients: list[str] | None  # names, or "all" alone; None for `USUAL`
     weights: "WeightName"  # for coefficients that take any; checked where they are made
     target: Target | None  # what a new study would draw anew; no interval when None
     interval: Literal["auto", "analytic", "jackknife", "bootstrap", "posterior"]
@@ -55,11 +62,20 @@ class EstimateOptions:
         """The coefficients that are named, or the usual ones."""
         if self.coefficients is not None:
             return self.coefficients
-        return _USUAL if self.metric is None else [_OF_METRIC]
+        return list(USUAL) if self.metric is None else [_OF_METRIC]
 
     def by_metric(self, entry: "Coefficient") -> "Coefficient":
         """Return the coefficient by the metric that was chosen, if it has metrics."""
         return entry.by_metric(self.metric) if entry.name == _OF_METRIC else entry
+
+    def weights_of(self, entry: "Coefficient") -> "WeightName":
+        """Return the weights, of a coefficient that takes any."""
+        return self.weights if entry.weighted else "identity"
+
+    def title(self, entry: "Coefficient") -> str:
+        """Return what a coefficient is called with its weights."""
+        weights = self.weights_of(entry)
+        return entry.title if weights == "identity" else f"{entry.title}, {weights}"
 
     def record(self) -> dict[str, object]:
         """Return every option that decides a number."""
@@ -77,91 +93,19 @@ class EstimateOptions:
         }
 
 
-def _list_register(
-    context: click.Context, _: click.Parameter, value: list[str] | None
-) -> list[str] | None:
-    # "list" needs no file: it is seen before the file is missed
-    if value == ["list"] and not context.resilient_parsing:
-        click.echo(_register())
-        context.exit()
-    return value
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AgreementRow:
+    """One estimate, and what to say of it that is not in it."""
 
-
-def _plain_weights(name: str) -> str:
-    from masrel.agreement._weights import plain_name
-
-    return plain_name(name)
-
-
-estimate_options = grouped(
-    "options",
-    EstimateOptions,
-    click.option(
-        "--coefficients",
-        metavar="NAMES",
-        show_default=",".join(_USUAL),
-        type=split_commas,
-        is_eager=True,
-        callback=_list_register,
-        help="Names of coefficients, separated by commas; all that fit (but "
-        "lin_ccc, sem and mdc); or list, which prints them and ends.",
-    ),
-    click.option(
-        "--weights",
-        default="identity",
-        type=_plain_weights,
-        metavar="NAME",
-        show_default=True,
-        help="identity, linear, quadratic, ordinal, radical, ratio, circular or "
-        "bipolar.",
-    ),
-    click.option(
-        "--metric",
-        type=click.Choice(
-            ["nominal", "ordinal", "interval", "ratio", "jaccard", "masi"]
-        ),
-        help="Krippendorff's alpha by his difference function in place of weights; "
-        "jaccard and masi take grades of several labels, as a;b.",
-    ),
-    click.option(
-        "--target",
-        type=click.Choice(["items", "raters", "both"]),
-        help="What a new study would draw anew; no interval without it.",
-    ),
-    click.option(
-        "--interval",
-        type=click.Choice(["auto", "analytic", "jackknife", "bootstrap", "posterior"]),
-        default="auto",
-        show_default=True,
-        help="Kind of interval; auto chooses by target and size.",
-    ),
-    click.option(
-        "--level", default=0.95, show_default=True, help="Level of intervals."
-    ),
-    click.option("--resamples", "n_resamples", default=10_000, show_default=True),
-    click.option("--seed", default=0, show_default=True, help="Seed of resampling."),
-    click.option(
-        "--words",
-        type=click.Choice(["landis_koch", "altman", "fleiss", "cicchetti"]),
-        help="Name the best band that the true value reaches with 95 % probability.",
-    ),
-)
-
-
-def _register() -> str:
-    from masrel.agreement import COEFFICIENTS
-    from masrel.report._tables import aligned
-
-    lines = [("name", "title", "raters", "weights", "also called")]
-    for entry in COEFFICIENTS.values():
-        fewest, most = entry.n_raters
-        raters = str(fewest) if most == fewest else f"{fewest} or more"
-        if entry.shape == "pairs":
-            raters += ", each twice (--retest)"
-        weights = "any" if entry.weighted else "none"
-        aliases = ", ".join(entry.aliases)
-        lines.append((entry.name, entry.title, raters, weights, aliases))
-    return "\n".join(aligned(lines, ["left"] * 5, rule=True))
+    # group, title: of what (such as a session), and which coefficient
+    group: str
+    title: str
+    estimate: Estimate
+    # what it lacks of what was requested, and what was assumed
+    notes: tuple[str, ...] = ()
+    # what the true value reaches with 95 % by its interval; None if there is none, or
+    # no word is to be named
+    lower_bound: float | None = None
 
 
 def estimate_rows(
@@ -182,9 +126,8 @@ def estimate_rows(
         warnings.simplefilter("ignore", MasrelWarning)
         for entry in entries(options, n_raters, scale, is_ordered):
             ratings = part.ratings if entry.kernel is None else part.counted
-            if entry.metric in ("jaccard", "masi"):
-                ratings = _on_grades(ratings, scale)
-            row, refusal = _row(entry, ratings, group, of_part)
+            ratings = on_grades(ratings, entry, scale)
+            row, refusal = estimate_row(entry, ratings, group, of_part)
             rows.append(row)
             refused += [] if refusal is None else [refusal]
     if not options.takes_all and refused and len(refused) == len(rows):
@@ -192,12 +135,12 @@ def estimate_rows(
     return rows
 
 
-def _on_grades(
-    ratings: "CodedRatings | CountedRatings", scale: "Scale"
-) -> "CodedRatings | CountedRatings":
-    """Return ratings with the text of their grades, of which a metric takes sets."""
+def on_grades(ratings: _Ratings, entry: "Coefficient", scale: "Scale") -> _Ratings:
+    """Return ratings with the text of their grades if a metric takes sets of labels."""
     from masrel.agreement import CodedRatings
 
+    if entry.metric not in ("jaccard", "masi"):
+        return ratings
     if isinstance(ratings, CodedRatings):
         return replace(ratings, categories=scale.grades)
     coded = ratings.coded
@@ -206,19 +149,16 @@ def _on_grades(
     return replace(ratings, categories=scale.grades, source=coded)
 
 
-def _row(
+def estimate_row(
     entry: "Coefficient",
     ratings: "CodedRatings | CountedRatings",
     group: str,
     options: EstimateOptions,
 ) -> "tuple[AgreementRow, MasrelError | None]":
     """Return the row of a coefficient, and why it has no interval if it should."""
-    from masrel.report._agreement_table import AgreementRow
-
-    title, notes, refusal = entry.title, [], None
-    if entry.weighted and options.weights != "identity":
-        title += f", {options.weights}"
-    elif options.weights != "identity" and not options.takes_all and not entry.metric:
+    notes, refusal = [], None
+    is_unweighted = options.weights != options.weights_of(entry)
+    if is_unweighted and not options.takes_all and not entry.metric:
         notes.append("unweighted, there are no weights for it")
     has_target = options.target is not None
     try:
@@ -232,9 +172,7 @@ def _row(
         estimate = _estimate(entry, ratings, options, options.level, has_target)
     bound = None
     if options.words and entry.chance_corrected:
-        from masrel.report._estimate_words import surely_reached
-
-        bound = surely_reached(
+        bound = _surely_reached(
             estimate.interval,
             lambda level: (
                 _estimate(entry, ratings, options, level, has_target).interval
@@ -242,7 +180,7 @@ def _row(
         )
     row = AgreementRow(
         group=group,
-        title=title,
+        title=options.title(entry),
         estimate=estimate,
         notes=tuple(notes),
         lower_bound=bound,
@@ -258,7 +196,7 @@ def _estimate(
     has_target: bool,
 ) -> Estimate:
     """Return the coefficient, with the interval that answers for the target."""
-    weights: WeightName = options.weights if entry.weighted else "identity"
+    weights = options.weights_of(entry)
     # Among all that fit, one that comes with an interval has it, whatever its target.
     is_done = entry.has_interval and options.takes_all and not options.clusters
     if options.target is None or not has_target or is_done:
@@ -327,3 +265,18 @@ def entries(
                 f"{', '.join(scale.grades)}"
             )
     return chosen
+
+
+def _surely_reached(
+    interval: Interval | None, at_level: Callable[[float], Interval | None]
+) -> float | None:
+    """Return what the true value reaches with 95 %; None without an interval."""
+    # at_level: the same interval at another level
+    if interval is None:
+        return None
+    if interval.reason is not None:
+        return math.nan
+    # the lower end of an interval leaves out half of what is outside, a bound all
+    level = _SURE if interval.is_one_sided else _SURE_TWO_SIDED
+    other = interval if level == interval.level else at_level(level)
+    return math.nan if other is None else other.low
