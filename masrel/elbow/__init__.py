@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from masrel.elbow.effort import impulse, peak_torque, residual_torque, work
 from masrel.elbow.events import Events, PhaseSpan, StretchEvents, events
+from masrel.elbow.joint_model import MODELS, JointModel, Stepper
 from masrel.elbow.motion import Motion
 from masrel.elbow.motions import (
     ConstantSpeed,
@@ -36,12 +37,14 @@ if TYPE_CHECKING:
     )
 
 __all__ = [
+    "MODELS",
     "STANDARD_MODELS",
     "ConstantSpeed",
     "ElbowParameters",
     "Events",
     "Hold",
     "Joined",
+    "JointModel",
     "MinimumJerk",
     "Motion",
     "Outline",
@@ -51,6 +54,7 @@ __all__ = [
     "Reversed",
     "SampledJoint",
     "SceneTable",
+    "Stepper",
     "StretchEvents",
     "Trace",
     "Trapezoid",

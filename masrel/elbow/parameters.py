@@ -7,8 +7,9 @@ https://doi.org/10.1109/TNSRE.2012.2195330, equations (1)-(6) and Table III.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
+from masrel.elbow.sampled import SampledJoint
 from masrel.errors import ParameterError
 
 __all__ = ["STANDARD_MODELS", "ElbowParameters", "PostCatch", "ResidualReading"]
@@ -107,6 +108,8 @@ class ElbowParameters:
         If a parameter is not finite or outside its range; the message names it.
     """
 
+    kind: ClassVar[str] = "spastic-elbow"
+
     catch_angle_constant: float
     catch_torque_constant: float
     residual_ratio: float
@@ -178,6 +181,93 @@ class ElbowParameters:
             return self.smallest_catch_angle  # third line of (6)
         slowed = max(mean_speed, self.slowest_mean_speed)  # first line of (6)
         return self.catch_angle_constant - self.catch_slope * slowed  # (2)
+
+    @property
+    def is_passive(self) -> bool:
+        """Whether it never gives back more than it took: False, it has a trigger."""
+        # an arm led back slowly in its catch is pushed by the residual torque
+        return False
+
+    def stepper(self, start_angle: float) -> SampledJoint:
+        """Return the joint as a state machine that has not seen a sample yet.
+
+        Parameters
+        ----------
+        start_angle : float
+            Where the stretch starts, rad.
+
+        Returns
+        -------
+        SampledJoint
+            The law as a controller decides it.
+        """
+        return SampledJoint(self, start_angle=start_angle)
+
+    def largest_torque(self, *, start_angle: float, speed: float) -> float:
+        """Return the largest torque of a stretch and the way back.
+
+        Parameters
+        ----------
+        start_angle : float
+            Where the stretch starts, rad; it goes to `range_end` at most.
+        speed : float
+            The largest speed, either way, rad/s.
+
+        Returns
+        -------
+        float
+            A bound of the torque's size, N·m, that no such motion passes; inertia,
+            which is not commanded, left out.
+
+        Examples
+        --------
+        >>> from math import radians
+        >>> from masrel.elbow import STANDARD_MODELS
+        >>> joint = STANDARD_MODELS["HM3"]
+        >>> bound = joint.largest_torque(start_angle=radians(30), speed=radians(92))
+        >>> round(bound, 3)
+        12.039
+        """
+        rest = start_angle if self.rest_angle is None else self.rest_angle
+        end = self.range_end
+        late = self.catch_angle(0.0)  # (6): a slow stretch catches last
+        latest = min(max(late, start_angle), end)
+        earliest = min(max(self.smallest_catch_angle, start_angle), latest)
+        damped = self.damping * speed
+        rise = self.catch_torque_constant * speed  # H·v_c of (3)
+        bounds = [
+            damped + self.stiffness * max(abs(start_angle - rest), abs(end - rest)),
+            damped + self.stiffness * (latest - rest) + rise,
+        ]
+        for catch in (earliest, latest):  # (5) is linear in the catch angle
+            held = end if self.post_catch == "additive" else catch
+            climb = max(end - catch - self.catch_travel, 0.0)
+            bounds.append(
+                damped
+                + self.stiffness * (held - rest)
+                + self.residual_share * rise
+                + self.post_catch_stiffness * climb
+            )
+        return max(bounds)
+
+    def largest_slope(self, *, speed: float) -> tuple[float, float]:
+        """Return the largest slopes of the torque where it does not jump.
+
+        Parameters
+        ----------
+        speed : float
+            The largest speed, rad/s; the slopes do not depend on it.
+
+        Returns
+        -------
+        tuple of two floats
+            Over angle, N·m/rad, and over angular velocity, N·m·s/rad.
+        """
+        del speed
+        after = self.post_catch_stiffness
+        if self.post_catch == "additive":
+            after += self.stiffness
+        return max(self.stiffness, after), self.damping
 
 
 def _table_iii(

@@ -5,8 +5,10 @@ https://doi.org/10.1109/TNSRE.2012.2195330, Fig. 7 and equations (1)-(6).
 """
 
 import math
+from typing import TYPE_CHECKING
 
-from masrel.elbow.parameters import ElbowParameters
+if TYPE_CHECKING:
+    from masrel.elbow.parameters import ElbowParameters
 
 __all__ = ["SampledJoint"]
 
@@ -63,7 +65,7 @@ class SampledJoint:
         "phase",
     )
 
-    def __init__(self, parameters: ElbowParameters, *, start_angle: float) -> None:
+    def __init__(self, parameters: "ElbowParameters", *, start_angle: float) -> None:
         rest = parameters.rest_angle
         self._parameters = parameters
         self._rest = start_angle if rest is None else rest
