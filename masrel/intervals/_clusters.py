@@ -1,14 +1,14 @@
 """Items that come in clusters, such as sites of a patient: what leaves is a cluster."""
 
 import math
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from masrel.agreement._kernel import Floats
-from masrel.agreement._labels import is_missing
+from masrel.agreement._labels import is_missing, is_row
 from masrel.errors import ParameterError
 from masrel.intervals._influences import sample_factor, unit_influences
 from masrel.intervals._problem import Integers, IntervalProblem, blocks
@@ -69,7 +69,7 @@ def clustered_error(problem: IntervalProblem, codes: Integers) -> float:
 def cluster_codes(clusters: object, n_items: int) -> Integers:
     """Return which cluster every item belongs to, as numbers from 0."""
     # -> (n_items,)
-    if isinstance(clusters, str | bytes) or not isinstance(clusters, Iterable):
+    if not is_row(clusters):
         raise ParameterError(
             f"clusters: needs one label an item, got {type(clusters).__name__}"
         )

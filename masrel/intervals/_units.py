@@ -1,16 +1,14 @@
 """What a bootstrap draws: items, clusters of items, or raters, and how each matters."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from masrel.agreement._kernel import Floats
-from masrel.agreement._labels import is_row, shown
-from masrel.errors import ParameterError
+from masrel.intervals._clusters import ClusterSums, clusters_of
 from masrel.intervals._lattice import Lattice, lattice_of
 from masrel.intervals._problem import Integers, IntervalProblem, blocks, warn_small
 
@@ -170,30 +168,23 @@ class CrossedUnits:
 
 
 def sampling_units(
-    problem: IntervalProblem, clusters: Sequence[object] | NDArray[Any] | None
+    problem: IntervalProblem, clusters: object
 ) -> SamplingUnits | CrossedUnits:
     """Return what is resampled, with a warning where there is little of it."""
-    if problem.target != "items" and clusters is not None:
-        raise ParameterError('clusters: are of items, and need target="items"')
-    if problem.target == "both":
-        both = crossed_units(problem)
-        few = warn_small(problem.n_paired_items, 16, "items", problem.n_items)
-        few += warn_small(problem.n_paired_raters, 5, "raters", problem.n_raters)
-        return replace(both, notes=few)
-    if problem.target == "raters":
-        units, name, minimum = rater_units(problem), "raters", 5
-        n_paired = problem.n_paired_raters
-    elif clusters is None:
-        units, name, minimum = (
-            row_units(problem, problem.rows, problem.freq),
-            "items",
-            16,
-        )
-        n_paired = problem.n_paired_items
+    if clusters is not None:
+        units, n_clusters = cluster_units(problem, clusters)
+        return replace(units, notes=warn_small(n_clusters, 16, "clusters", units.n))
+    drawn: SamplingUnits | CrossedUnits
+    if problem.target == "items":
+        drawn = row_units(problem, problem.rows, problem.freq)
     else:
-        units, n_paired = cluster_units(problem, clusters)
-        name, minimum = "clusters", 16
-    return replace(units, notes=warn_small(n_paired, minimum, name, units.n))
+        drawn = (rater_units if problem.target == "raters" else crossed_units)(problem)
+    few: tuple[str, ...] = ()
+    if problem.target != "raters":
+        few += warn_small(problem.n_paired_items, 16, "items", problem.n_items)
+    if problem.target != "items":
+        few += warn_small(problem.n_paired_raters, 5, "raters", problem.n_raters)
+    return replace(drawn, notes=few)
 
 
 def crossed_units(problem: IntervalProblem) -> CrossedUnits:
@@ -217,22 +208,14 @@ def crossed_units(problem: IntervalProblem) -> CrossedUnits:
 
 
 def cluster_units(
-    problem: IntervalProblem, clusters: Sequence[object] | NDArray[Any]
+    problem: IntervalProblem, clusters: object
 ) -> tuple[SamplingUnits, int]:
     """Return clusters of items, those alike together, and how many have a pair."""
     # Takes clusters (n_items,)
-    numbers = _numbered(problem, clusters)
-    codes = problem.used.codes
-    sums = np.zeros((max(1, int(numbers.max()) + 1), problem.rows.shape[1]))
-    paired = np.zeros(len(sums), dtype=bool)
-    for block in blocks(len(codes)):
-        features = problem.features(replace(problem.used, codes=codes[block]))
-        np.add.at(sums, numbers[block], features)
-        has_pair = features.any(axis=1) & ((codes[block] >= 0).sum(axis=1) >= 2)
-        paired[numbers[block][has_pair]] = True
-    matters = sums.any(axis=1)
-    units = row_units(problem, sums[matters], np.ones(matters.sum(), dtype=np.int64))
-    return replace(units, words=f" of {units.n} clusters"), int(paired.sum())
+    sums = ClusterSums.of(problem, clusters_of(problem, clusters))
+    rows = sums.sums[sums.known]
+    units = row_units(problem, rows, np.ones(len(rows), dtype=np.int64))
+    return replace(units, words=f" of {units.n} clusters"), sums.n_paired
 
 
 def rater_units(problem: IntervalProblem) -> SamplingUnits:
@@ -247,38 +230,6 @@ def rater_units(problem: IntervalProblem) -> SamplingUnits:
         sums=sums,
         values=problem.values,
     )
-
-
-def _numbered(
-    problem: IntervalProblem, clusters: Sequence[object] | NDArray[Any]
-) -> Integers:
-    """Return each item's number of cluster, -1 without ratings."""
-    if not isinstance(clusters, str) and not is_row(clusters):
-        raise ParameterError(
-            f"clusters: needs one label for each item, got {shown(clusters)}"
-        )
-    labels = list(clusters)
-    n_items = problem.coded.codes.shape[0]
-    if len(labels) != n_items:
-        raise ParameterError(
-            f"clusters: needs one label for each of {n_items} items, got {len(labels)}"
-        )
-    rated = np.any(problem.coded.codes >= 0, axis=1).tolist()
-    number: dict[object, int] = {}
-    try:
-        numbers = np.fromiter(
-            (
-                number.setdefault(label, len(number)) if is_rated else -1
-                for label, is_rated in zip(labels, rated, strict=True)
-            ),
-            dtype=np.int64,
-            count=n_items,
-        )
-    except TypeError as error:
-        raise ParameterError(f"clusters: needs plain labels, {error}") from error
-    if any(label is None or label != label for label in number):
-        raise ParameterError("clusters: every item needs a label, got a missing one")
-    return numbers
 
 
 def row_units(problem: IntervalProblem, rows: Floats, freq: Integers) -> SamplingUnits:

@@ -4,10 +4,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from masrel.agreement import Label, Metric, WeightsLike
 from masrel.agreement._labels import shown
@@ -53,7 +52,7 @@ def bootstrap(
     n_resamples: int = 10_000,
     kind: _Kind = "percentile",
     exact: _Exact = "auto",
-    clusters: Sequence[object] | NDArray[Any] | None = None,
+    clusters: object = None,
     tolerance: float | None = None,
     max_resamples: int = 10_000_000,
     rng: np.random.Generator | int | None = None,
@@ -88,9 +87,9 @@ def bootstrap(
         drawing some: then nothing is random. "auto" does so up to 300 000 resamples, or
         different sums of features; 60 000 resamples for "studentized". True also takes
         up to a million resamples, 300 000 for "studentized".
-    clusters : sequence, shape (n_items,), optional
-        Label of the cluster each item belongs to, for target "items": clusters are
-        drawn whole. Several stretches of one haptic model are such a cluster.
+    clusters : sequence of labels, length n_items, optional
+        The cluster of every item, for target "items": clusters are drawn whole.
+        Several stretches of one haptic model are such a cluster.
     tolerance : float, optional
         The largest Monte Carlo error of an end: resamples are drawn until it is met.
     max_resamples : int, optional

@@ -151,7 +151,11 @@ def test_few_of_either_are_warned_of() -> None:
     [
         ("krippendorff_alpha", {}, "pairing a rater with a copy of itself"),
         ("light_kappa", {}, "pairing a rater with a copy of itself"),
-        ("fleiss_kappa", {"clusters": [1, 2, 3]}, "clusters: are of items"),
+        (
+            "fleiss_kappa",
+            {"clusters": [1, 2, 3]},
+            "clusters: what is left out, or drawn anew",
+        ),
         ("fleiss_kappa", {"kind": "studentized"}, "the standard error of every resam"),
     ],
 )

@@ -262,10 +262,12 @@ def test_an_item_without_ratings_is_in_no_cluster() -> None:
 @pytest.mark.parametrize(
     ("clusters", "said"),
     [
-        ("abc", "one label for each of 5 items, got 3"),
-        ([1, 2, 3, 4, None], "got a missing one"),
-        ([1, 2, 3, 4, math.nan], "got a missing one"),
-        ([[1], [2], [3], [4], [5]], "plain labels"),
+        ("abcde", "one label an item, got str"),
+        (["a", "b", "c"], "one label an item, 5, got 3"),
+        ({1, 2, 3, 4, 5}, "one label an item, got set"),
+        ([1, 2, 3, 4, None], "item 4 needs the label of its cluster, got None"),
+        ([1, 2, 3, 4, math.nan], "item 4 needs the label of its cluster, got nan"),
+        ([[1], [2], [3], [4], [5]], r"item 0 needs the label of its cluster, got \[1"),
     ],
 )
 def test_wrong_clusters_are_named(clusters: object, said: str) -> None:
@@ -274,7 +276,7 @@ def test_wrong_clusters_are_named(clusters: object, said: str) -> None:
 
 
 def test_clusters_are_of_items() -> None:
-    with pytest.raises(ParameterError, match='need target="items"'):
+    with pytest.raises(ParameterError, match='so target "items"; got "raters"'):
         exact("fleiss_kappa", FIVE, target="raters", clusters=range(5))
 
 
