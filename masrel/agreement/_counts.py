@@ -6,7 +6,7 @@ category. Sums over items are whole numbers, and exact.
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from operator import mul
@@ -106,10 +106,9 @@ class DistinctItems:
         # Takes counts (n_items, n_categories)
         base = int(counts.max()) + 1
         if counts.size > FEW and base ** counts.shape[1] <= _MAX_KEYS:
-            powers = base ** np.arange(counts.shape[1], dtype=np.int64)
-            freq = np.bincount(counts @ powers)
+            freq = np.bincount(counts @ base ** np.arange(counts.shape[1]))
             keys = np.flatnonzero(freq)
-            return cls.of_arrays(keys[:, None] // powers % base, freq[keys])
+            return cls.of_arrays(_digits(keys, base, counts.shape[1]), freq[keys])
         return cls.of_arrays(counts)
 
     @classmethod
@@ -124,21 +123,16 @@ class DistinctItems:
         # An item is one number: Σ over its raters of (n_raters + 1) to the power code.
         base = n_raters + 1
         n_keys = base**q
-        has_table = n_keys <= min(_MAX_KEYS, 16 * n_items)
-        if not has_table and not (n_keys < 2**62 and n_items <= _MAX_SORTED):
+        is_sorted = n_keys < 2**62 and n_items <= _MAX_SORTED
+        if not is_sorted and n_keys > _max_keys(n_items):
             return cls.of_arrays(item_counts(coded))
         most = min(_MAX_SMALL, n_items // 10)  # rows that are counted before items
         if q**n_raters <= most and (small := _small_rows(codes, q, most)) is not None:
             return cls.of_patterns(replace(coded, codes=small[0]), small[1])
-        if has_table:
-            counted = _blocks(n_items, lambda at: _item_keys(codes[at], base, q))
-            freq = _table_of_keys(counted, n_keys)
-            keys = np.flatnonzero(freq)
-            freq = freq[keys]
-        else:
-            keys, freq = np.unique(_item_keys(codes, base, q), return_counts=True)
-        powers = base ** np.arange(q, dtype=np.int64)
-        return cls.of_arrays(keys[:, None] // powers % base, freq)
+        keys, freq = _count_keys(
+            n_items, lambda at: _item_keys(codes[at], base, q), n_keys
+        )
+        return cls.of_arrays(_digits(keys, base, q), freq)
 
     @classmethod
     def of_patterns(cls, coded: CodedRatings, often: Integers) -> "DistinctItems":
@@ -149,8 +143,7 @@ class DistinctItems:
             return cls.of_arrays(item_counts(coded), often)
         keys, at = np.unique(_item_keys(codes, base, q), return_inverse=True)
         freq = np.bincount(at, often).astype(np.int64)  # floats, exact to 2^53
-        powers = base ** np.arange(q, dtype=np.int64)
-        return cls.of_arrays(keys[:, None] // powers % base, freq)
+        return cls.of_arrays(_digits(keys, base, q), freq)
 
     def sums(self, v: Weights) -> SufficientStatistics:
         """Add the items up."""
@@ -303,8 +296,8 @@ def distinct_rows(codes: Codes, n_categories: int) -> tuple[Integers, Integers]:
     if n_keys > 2**62:
         rows, freq = np.unique(codes, axis=0, return_counts=True)
         return rows.astype(np.int64), freq.astype(np.int64)
-    powers = base ** np.arange(n_raters, dtype=np.int64)
     if n_items <= _FEW_ROWS:
+        powers = base ** np.arange(n_raters, dtype=np.int64)
         keys = (codes.astype(np.int64) + 1) @ powers
         order = keys.argsort()
         ascending = keys[order]
@@ -319,14 +312,8 @@ def distinct_rows(codes: Codes, n_categories: int) -> tuple[Integers, Integers]:
         small = _small_rows(codes, n_categories, most)
         if small is not None:
             return small
-    if n_keys > min(_MAX_KEYS, 16 * n_items):
-        keys, freq = np.unique(_row_keys(codes, base), return_counts=True)
-    else:
-        counted = _blocks(n_items, lambda at: _row_keys(codes[at], base))
-        table = _table_of_keys(counted, n_keys)
-        keys = np.flatnonzero(table)
-        freq = table[keys]
-    return keys[:, None] // powers % base - 1, freq.astype(np.int64)
+    keys, freq = _count_keys(n_items, lambda at: _row_keys(codes[at], base), n_keys)
+    return _digits(keys, base, n_raters) - 1, freq
 
 
 def _small_rows(
@@ -339,14 +326,10 @@ def _small_rows(
     n_keys = base**n_raters
     if n_keys > most:
         return None
-    freq = np.zeros(n_keys, dtype=np.int64)
-    block = max(_BLOCK, n_keys)
-    for start in range(0, len(codes), block):
-        keys = _small_keys(codes[start : start + block], lowest, base)
-        freq += np.bincount(keys, minlength=n_keys)
-    powers = base ** np.arange(n_raters, dtype=np.int64)
-    present = np.flatnonzero(freq)
-    return present[:, None] // powers % base + lowest, freq[present]
+    keys, freq = _count_keys(
+        len(codes), lambda at: _small_keys(codes[at], lowest, base), n_keys
+    )
+    return _digits(keys, base, n_raters) + lowest, freq
 
 
 def _small_keys(codes: Codes, lowest: int, base: int) -> Integers:
@@ -363,16 +346,28 @@ def _small_keys(codes: Codes, lowest: int, base: int) -> Integers:
     return keys
 
 
-def _blocks(n_items: int, keys: Callable[[slice], Integers]) -> Iterable[Integers]:
-    return (keys(slice(at, at + _BLOCK)) for at in range(0, n_items, _BLOCK))
+def _count_keys(
+    n_items: int, keys_of: Callable[[slice], Integers], n_keys: int
+) -> tuple[Integers, Integers]:
+    # distinct keys, which are less than n_keys, and how often each occurs
+    if n_keys > _max_keys(n_items):
+        keys, freq = np.unique(keys_of(slice(None)), return_counts=True)
+        return keys, freq.astype(np.int64)
+    table = np.zeros(n_keys, dtype=np.int64)
+    for at in range(0, n_items, _BLOCK):
+        table += np.bincount(keys_of(slice(at, at + _BLOCK)), minlength=n_keys)
+    present = np.flatnonzero(table)
+    return present, table[present]
 
 
-def _table_of_keys(blocks: Iterable[Integers], n_keys: int) -> Integers:
-    # how often each key from 0 to n_keys - 1 occurs
-    freq = np.zeros(n_keys, dtype=np.int64)
-    for keys in blocks:
-        freq += np.bincount(keys, minlength=n_keys)
-    return freq
+def _max_keys(n_items: int) -> int:
+    # that are counted in a table rather than sorted
+    return min(_MAX_KEYS, 16 * n_items)
+
+
+def _digits(keys: Integers, base: int, n_digits: int) -> Integers:
+    # (n_keys,) -> (n_keys, n_digits), the last digit the most significant
+    return keys[:, None] // base ** np.arange(n_digits, dtype=np.int64) % base
 
 
 def _item_keys(codes: Codes, base: int, n_categories: int) -> Integers:
@@ -484,25 +479,20 @@ def count_ratings(
                 source=partial(code_ratings, rows, categories),
             )
     coded = code_ratings(ratings, categories)
+    items: DistinctItems | ItemsOfManyGrades
+    if len(coded.categories) <= MANY:
+        items = DistinctItems.of_codes(coded)
+    else:
+        from masrel.agreement import _many_grades  # it takes the types of this module
+
+        items = _many_grades.ItemsOfManyGrades(coded)
     return CountedRatings(
         categories=coded.categories,
         declared=coded.declared,
-        items=DistinctItems.of_codes(coded)
-        if len(coded.categories) <= MANY
-        else items_of(coded),
+        items=items,
         n_raters=coded.n_raters,
         source=coded,
     )
-
-
-def items_of(coded: CodedRatings) -> "DistinctItems | ItemsOfManyGrades":
-    """Return the items of coded ratings, counted or as they are."""
-    if len(coded.categories) <= MANY:
-        return DistinctItems.of_codes(coded)
-    # Imported here: it takes the types of this module, and few need it.
-    from masrel.agreement._many_grades import ItemsOfManyGrades
-
-    return ItemsOfManyGrades(coded)
 
 
 def _count_complete(
@@ -517,10 +507,6 @@ def _count_complete(
         for row in rows:
             item = tuple(map(row.count, scale))
             freq[item] = freq.get(item, 0) + 1
-    except (
-        ArithmeticError,
-        TypeError,
-        ValueError,
-    ):  # something that is neither equal nor unequal
+    except (ArithmeticError, TypeError, ValueError):  # neither equal nor unequal
         return None
     return freq if set(map(sum, freq)) == {n_raters} else None

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement._counts import CountedRatings, count_ratings, item_counts
-from masrel.agreement._data import code_ratings
+from masrel.agreement._counts import DistinctItems, count_ratings, item_counts
+from masrel.agreement._data import code_ratings, complete, raters_who_rate
 from masrel.agreement._kernel import undefined
-from masrel.agreement._labels import Label
-from masrel.agreement.fleiss import fleiss_kappa_from_counts
+from masrel.agreement._labels import Label, shown
+from masrel.agreement.fleiss import fleiss_kappa, fleiss_kappa_from_counts
 from masrel.agreement.significance import Significance
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate
@@ -67,27 +67,30 @@ def category_kappa(
     >>> category_kappa(ratings, "c").value
     1.0
     """
-    if isinstance(ratings, CountedRatings):  # counts are enough
-        counted = count_ratings(ratings, categories)
-        scale, n_raters = counted.categories, counted.n_raters
-        counts = np.array(counted.items.rows, dtype=np.int64).reshape(-1, len(scale))
-        counts = counts.repeat(np.array(counted.items.freq, dtype=np.int64), axis=0)
-    else:
-        coded = code_ratings(ratings, categories)
-        scale, n_raters = coded.categories, coded.n_raters
-        counts = item_counts(coded)
+    counted = count_ratings(ratings, categories)
+    place, items = _place(category, counted.categories), counted.items
+    rows = np.array(items.rows, np.int64).reshape(-1, items.n_categories)
+    chosen = rows[:, place]
+    two = np.column_stack([chosen, rows.sum(axis=1) - chosen])
+    of_two = replace(
+        counted,
+        categories=(True, False),
+        items=DistinctItems.of_arrays(two, np.array(items.freq, np.int64)),
+        source=None,
+    )
+    return replace(
+        fleiss_kappa(of_two), coefficient="category_kappa", weights=str(category)
+    )
+
+
+def _place(category: Label, scale: Sequence[Label]) -> int:
+    # of a category in the scale
     if category not in scale:
         raise ParameterError(
-            f"category: needs one of {', '.join(map(repr, scale))}, got {category!r}"
+            f"category: needs one of {', '.join(map(repr, scale))}, got "
+            f"{shown(category)}"
         )
-    chosen = counts[:, scale.index(category)]
-    two = np.column_stack([chosen, counts.sum(axis=1) - chosen])
-    return replace(
-        fleiss_kappa_from_counts(two),
-        coefficient="category_kappa",
-        weights=str(category),
-        n_raters=n_raters,
-    )
+    return scale.index(category)
 
 
 def fleiss_null(
@@ -101,7 +104,8 @@ def fleiss_null(
     Parameters
     ----------
     ratings : nested sequence, array_like or DataFrame, shape (n_items, n_raters)
-        Labels or numbers; items with a missing rating are left out.
+        Labels or numbers; items with a missing rating are left out, and so are raters
+        without any.
     category : str, int or float, optional
         Test the kappa of this category against the others instead.
     categories : sequence of str, int or float, optional
@@ -136,22 +140,17 @@ def fleiss_null(
     >>> print(fleiss_null([["a", "a"], ["b", "b"], ["a", "b"], ["b", "b"]]))
     fleiss_null: 0.9333, normal, p = 0.351
     """
-    coded = code_ratings(ratings, categories)
-    if category is not None and category not in coded.categories:
-        raise ParameterError(
-            f"category: needs one of {', '.join(map(repr, coded.categories))}, "
-            f"got {category!r}"
-        )
-    counts = item_counts(coded)
-    n_raters = coded.codes.shape[1]
-    counts = counts[counts.sum(axis=1) == n_raters]
+    coded = complete(raters_who_rate(code_ratings(ratings, categories)))
+    counts, n_raters = item_counts(coded), coded.codes.shape[1]
     if category is not None:
-        chosen = counts[:, coded.categories.index(category)]
+        chosen = counts[:, _place(category, coded.categories)]
         counts = np.column_stack([chosen, n_raters - chosen])
     statistic = p = math.nan
     reason = None
-    if len(counts) == 0 or n_raters < 2:
-        reason = undefined("fleiss_null", "no item has ratings of two or more raters")
+    if n_raters < 2:
+        reason = undefined("fleiss_null", "fewer than two raters")
+    elif len(counts) == 0:
+        reason = undefined("fleiss_null", "no item is rated by every rater")
     elif (counts.sum(axis=0) > 0).sum() < 2:
         reason = undefined("fleiss_null", "0/0: all ratings are in one category")
     else:

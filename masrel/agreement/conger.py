@@ -12,9 +12,9 @@ import numpy as np
 from masrel.agreement._counts import (
     DistinctItems,
     bilinear,
+    count_ratings,
     distinct_rows,
     item_counts,
-    items_of,
 )
 from masrel.agreement._data import CodedRatings, code_ratings, raters_who_rate
 from masrel.agreement._kernel import (
@@ -110,7 +110,7 @@ def conger_kappa(
     v = declared_weights(weights, coded.categories, declared=coded.declared)
     check_variance(variance)
     check_population(population, coded.n_items)
-    items = items_of(coded)
+    items = count_ratings(coded).items
     sums = items.sums(v)
     margins = _Margins.of(coded, v)
     influence = partial(_influence, coded, items, v, margins)

@@ -162,6 +162,13 @@ def test_items_with_a_missing_rating_are_not_tested() -> None:
     assert fleiss_null(holed, category="a") == fleiss_null(whole, category="a")
 
 
+def test_a_rater_without_any_rating_is_none() -> None:
+    # the null needs as many ratings of every item, and those who rated gave them
+    for category in (None, "a"):
+        found = fleiss_null([[*row, None] for row in SMALL], category=category)
+        assert found == fleiss_null(SMALL, category=category)
+
+
 def test_the_error_of_the_test_is_not_that_of_the_estimate() -> None:
     # and so no interval can come of it: the result has a z and nothing to make one
     estimate, test = fleiss_kappa(RATINGS), fleiss_null(RATINGS)
@@ -175,8 +182,8 @@ def test_the_error_of_the_test_is_not_that_of_the_estimate() -> None:
     ("ratings", "why"),
     [
         ([["a", "a"], ["a", "a"]], "0/0: all ratings are in one category"),
-        ([["a"], ["b"]], "two or more raters"),
-        ([["a", None], [None, "b"]], "two or more raters"),
+        ([["a"], ["b"]], "fewer than two raters"),
+        ([["a", None], [None, "b"]], "no item is rated by every rater"),
     ],
 )
 def test_nothing_to_test_is_said(ratings: Table, why: str) -> None:
