@@ -193,7 +193,7 @@ def _is_among(text: str, numbers: set[float]) -> bool:
 
 def _unlike(codes: NDArray[np.int64], scale: Scale) -> set[int]:
     # columns without a grade, or a value, in common with any other
-    rated = [np.unique(column[column >= 0]) for column in codes.T]
+    rated = [_distinct(column[column >= 0]) for column in codes.T]
     known = np.flatnonzero([len(grades) for grades in rated])
     if len(known) < 2:
         return set()
@@ -204,6 +204,11 @@ def _unlike(codes: NDArray[np.int64], scale: Scale) -> set[int]:
         return set(known[n_like == 1].tolist())  # each is like itself
     n_columns = np.bincount(np.concatenate(rated), minlength=len(scale.grades))
     return {int(k) for k in known if (n_columns[rated[k]] == 1).all()}
+
+
+def _distinct(codes: NDArray[np.int64]) -> NDArray[np.int64]:
+    ascending = np.sort(codes)  # `np.unique` loads masked arrays, which takes longer
+    return np.concatenate([ascending[:1], ascending[1:][np.diff(ascending) > 0]])
 
 
 def _looks_counted(
