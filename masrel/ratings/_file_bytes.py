@@ -80,8 +80,9 @@ def unpacked(name: str, data: bytes, *, is_export: bool) -> tuple[str, bytes]:
     return name, data
 
 
-def decoded(name: str, data: bytes, encoding: str | None) -> str:
+def decoded(name: str, data: bytes, encoding: str | None, n_before: int = 0) -> str:
     """Return bytes as text, by the encoding, or by their mark, or as UTF-8."""
+    # n_before: lines of the file before these
     marked = next((e for bom, e in _BOMS if data.startswith(bom)), None)
     encoding = encoding or marked or "utf-8"
     for mark, suffix in _MARKS.items():
@@ -90,7 +91,7 @@ def decoded(name: str, data: bytes, encoding: str | None) -> str:
     try:
         text = data.decode("utf-8-sig" if encoding == "utf-8" else encoding)
     except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
+        line = n_before + len((data[: error.start] + b"x").splitlines())
         likely = "utf-16" if 0 in data[:100] else "cp1252 or latin-1"
         raise RatingsError(
             f"{name}: line {line}: needed {encoding} text, got the byte "

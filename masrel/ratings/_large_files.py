@@ -11,8 +11,9 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +28,13 @@ from masrel.ratings._text_cells import (
     named_sheet,
     value_text,
 )
-from masrel.ratings._text_records import DELIMITERS, text_records
+from masrel.ratings._text_records import (
+    DELIMITERS,
+    long_cells,
+    numbered_records,
+    text_records,
+    width_error,
+)
 
 _LARGE_TEXT = 256 << 20  # bytes of text from which a file is read as a stream
 _LARGE_TABLE = 20_000_000  # cells of a Parquet file from which it is
@@ -35,7 +42,7 @@ _HEAD_ROWS = 10_000  # rows that show which column is what
 _HEAD_BYTES = 1 << 20
 _BATCH = 1 << 20  # cells of a batch
 _BUFFER = 1 << 20  # bytes of a column that are read at once
-_BLOCK = 1 << 24  # bytes of text in a batch, and of a file that is hashed
+_BLOCK = 1 << 24  # bytes of text in a batch
 
 STRINGS = ("string", "large_string", "string_view")
 """Types of text."""
@@ -61,6 +68,10 @@ class LargeFile:
     span: Callable[[int], tuple[int, int] | None]
 
 
+class NoStreamError(RatingsError):
+    """What a stream cannot count, and a file that is read as a whole can."""
+
+
 def large_file(
     path: Path | str, options: SheetOptions, stream: bool | None
 ) -> LargeFile | None:
@@ -72,8 +83,7 @@ def large_file(
     is_plain = not (options.transpose or options.source or options.sheet)
     if str(path) != "-" and path.is_file() and is_plain:
         if kind == ".parquet" and options.encoding is None and not options.no_header:
-            if (large := _parquet(path, stream)) is not None:
-                return large
+            return _parquet(path, stream)
         elif kind in TEXT_FORMATS and (stream or path.stat().st_size >= _LARGE_TEXT):
             if (large := _text(path, options)) is not None:
                 return large
@@ -84,11 +94,6 @@ def large_file(
             "--transpose, --sheet and --from"
         )
     return None
-
-
-def arrow(name: str, module: str) -> Any:
-    """Import a module of pyarrow, or say how to get it."""
-    return library(name, module)
 
 
 def is_whole(array: Any) -> bool:
@@ -124,9 +129,11 @@ def cell_texts(values: Any) -> list[str]:
 @contextmanager
 def _damage(name: str, suffix: str) -> Iterator[None]:
     # errors of pyarrow in one sentence
-    lib = arrow(name, "pyarrow")
+    lib = library(name, "pyarrow")
     try:
         yield
+    except MemoryError:  # pyarrow's is also one of its own
+        raise
     except (lib.ArrowException, OSError) as error:
         line = (str(error).strip().splitlines() or ["damaged"])[0][:200].rstrip(". ")
         raise RatingsError(
@@ -135,15 +142,8 @@ def _damage(name: str, suffix: str) -> Iterator[None]:
 
 
 def _parquet(path: Path, stream: bool | None) -> LargeFile | None:
-    name, parquet = str(path), arrow(str(path), "pyarrow.parquet")
-
-    def opened(**options: Any) -> Any:
-        # a buffer, so that no column of a row group is in memory as a whole
-        return parquet.ParquetFile(
-            path, buffer_size=_BUFFER, pre_buffer=False, **options
-        )
-
-    with _damage(name, ".parquet"), opened() as file:
+    name = str(path)
+    with _damage(name, ".parquet"), _opened(path) as file:
         about, schema = file.metadata, file.schema_arrow
         fields = _shown_fields(schema)
         if not stream and about.num_rows * len(fields) < _LARGE_TABLE:
@@ -151,35 +151,6 @@ def _parquet(path: Path, stream: bool | None) -> LargeFile | None:
         first = next(file.iter_batches(_HEAD_ROWS), None)
         if first is None or len({*schema.names}) < len(schema.names):
             return None  # refused like any other
-    n_bytes = path.stat().st_size
-
-    def batches(places: Sequence[int], n_plain: int) -> Iterator[Batch]:
-        columns = [fields[place] for place in places]
-        texts = [c for c in columns[n_plain:] if str(schema.field(c).type) in STRINGS]
-        with _damage(name, ".parquet"), opened(read_dictionary=texts) as file:
-            n_done = 0
-            size = max(1, _BATCH // len(columns))
-            for batch in file.iter_batches(size, columns=columns):
-                n_done += len(batch)
-                yield (
-                    [batch.column(column) for column in columns],
-                    n_bytes * n_done // about.num_rows,
-                )
-
-    def span(place: int) -> tuple[int, int] | None:
-        if not str(schema.field(fields[place]).type).startswith(("int", "uint")):
-            return None
-        column = next(
-            k
-            for k in range(about.num_columns)
-            if about.schema.column(k).path == fields[place]
-        )
-        groups = [about.row_group(k) for k in range(about.num_row_groups)]
-        limits = [group.column(column).statistics for group in groups]
-        if not all(limit is not None and limit.has_min_max for limit in limits):
-            return None
-        return min(x.min for x in limits), max(x.max for x in limits)
-
     header = [name if name in schema.names else "" for name in fields]
     header = ["" if re.fullmatch(r"__index_level_\d+__", n) else n for n in header]
     records = np.empty((len(first) + 1, len(fields)), dtype=object)
@@ -190,18 +161,53 @@ def _parquet(path: Path, stream: bool | None) -> LargeFile | None:
     return LargeFile(
         sheet=named_sheet(
             name,
-            sha256_of(path),
+            _sha256_of(path),
             records,
             {"format": "parquet"},
             SheetOptions(),
             lambda number: f"row {number + 1}",
         ),
-        n_bytes=n_bytes,
+        n_bytes=path.stat().st_size,
         is_text=False,
         where=lambda row: f"row {row + 2}",  # the names are the first
-        batches=batches,
-        span=span,
+        batches=partial(_parquet_batches, path, fields),
+        span=lambda place: (
+            _span(about, fields[place]) if is_whole(first[fields[place]]) else None
+        ),
     )
+
+
+def _opened(path: Path, **options: Any) -> Any:
+    # by a buffer, so that no column of a row group is in memory as a whole
+    parquet = library(str(path), "pyarrow.parquet")
+    return parquet.ParquetFile(path, buffer_size=_BUFFER, pre_buffer=False, **options)
+
+
+def _parquet_batches(
+    path: Path, fields: Sequence[str], places: Sequence[int], n_plain: int
+) -> Iterator[Batch]:
+    columns, n_bytes, n_done = [fields[p] for p in places], path.stat().st_size, 0
+    size = max(1, _BATCH // len(columns))
+    with _damage(str(path), ".parquet"):
+        with _opened(path) as file:
+            types = {c: str(file.schema_arrow.field(c).type) for c in columns}
+        texts = [column for column in columns[n_plain:] if types[column] in STRINGS]
+        with _opened(path, read_dictionary=texts) as file:
+            n_rows = file.metadata.num_rows
+            for batch in file.iter_batches(size, columns=columns):
+                n_done += len(batch)
+                yield [batch.column(c) for c in columns], n_bytes * n_done // n_rows
+
+
+def _span(about: Any, field: str) -> tuple[int, int] | None:
+    # least and greatest of a column of whole numbers, by the metadata of its groups
+    paths = [about.schema.column(k).path for k in range(about.num_columns)]
+    column = paths.index(field)
+    groups = [about.row_group(k) for k in range(about.num_row_groups)]
+    limits = [group.column(column).statistics for group in groups]
+    if not all(limit is not None and limit.has_min_max for limit in limits):
+        return None
+    return min(x.min for x in limits), max(x.max for x in limits)
 
 
 def _column_texts(column: Any) -> list[str]:
@@ -243,92 +249,123 @@ def _text(path: Path, options: SheetOptions) -> LargeFile | None:
     delimiter = {title: mark for mark, title in DELIMITERS.items()}.get(
         facts["delimiter"], facts["delimiter"]
     )
-    # pyarrow takes blanks before a quote for the beginning of an unquoted cell
-    if delimiter == " " or re.search(rf'{re.escape(delimiter)} +"', text):
+    if delimiter == " ":
         return None
     first = int(line_of(0).split()[-1]) - int(options.no_header)  # lines before rows
-    batches = partial(
-        _text_batches, path, delimiter, facts["encoding"], first, records.shape[1]
-    )
-    sheet = named_sheet(name, sha256_of(path), records, facts, options, line_of)
+    lines = _TextLines(path, delimiter, facts["encoding"], first, records.shape[1])
+    sheet = named_sheet(name, _sha256_of(path), records, facts, options, line_of)
     return LargeFile(
         sheet=replace(sheet, is_simulated=simulated),
         n_bytes=size,
         is_text=True,
-        where=partial(_line_of, path, delimiter, facts["encoding"], first),
-        batches=batches,
+        where=lines.where,
+        batches=lines.batches,
         span=lambda _: None,
     )
 
 
 def _whole_lines(name: str, head: bytes, options: SheetOptions) -> str:
     # the records at the beginning: no quote that is opened there is closed behind
-    end = len(head)
-    while (end := head.rfind(b"\n", 0, end)) >= 0:
+    end, mark = len(head), b"\n" if b"\n" in head else b"\r"
+    while (end := head.rfind(mark, 0, end)) >= 0:
         if head.count(b'"', 0, end) % 2 == 0:
             return decoded(name, head[: end + 1], options.encoding)
     return ""
 
 
-def _line_of(
-    path: Path, delimiter: str, encoding: str, n_skipped: int, row: int
-) -> str:
-    # the line where a record begins, looked up only for a message
-    with path.open(encoding=encoding, newline="") as file:
-        for _ in range(n_skipped):
-            file.readline()
-        begins = 1
-        reader = csv.reader(file, delimiter=delimiter)
-        for record in reader:
-            if record and row == 0:
-                return f"line {n_skipped + begins}"
-            row -= bool(record)
-            begins = reader.line_num + 1
-    return "the end"
+@dataclass(frozen=True, slots=True)
+class _TextLines:
+    """Records of a text, from the line after `n_skipped` on."""
 
+    path: Path
+    delimiter: str
+    encoding: str
+    n_skipped: int
+    width: int
 
-def _text_batches(
-    path: Path,
-    delimiter: str,
-    encoding: str,
-    n_skipped: int,
-    width: int,
-    places: Sequence[int],
-    n_plain: int,
-) -> Iterator[Batch]:
-    lib, text = arrow(str(path), "pyarrow"), arrow(str(path), "pyarrow.csv")
-    names = [str(place) for place in range(width)]
-    # cells as they are written; of few different ones each is kept once
-    types = {
-        names[place]: lib.dictionary(lib.int32(), lib.string()) for place in places
-    }
-    types |= {names[place]: lib.string() for place in places[:n_plain]}
-    with _damage(str(path), "text"), path.open("rb") as file:
-        reader = text.open_csv(
+    def batches(self, places: Sequence[int], n_plain: int) -> Iterator[Batch]:
+        """Yield columns as `LargeFile.batches`."""
+        lib = library(str(self.path), "pyarrow")
+        try:
+            with self.path.open("rb") as file:
+                for batch in self._reader(file, places, n_plain):
+                    columns = [batch.column(str(place)) for place in places]
+                    self._refuse_late_quotes(columns)
+                    yield columns, file.tell()
+        except MemoryError:
+            raise
+        except lib.ArrowException:
+            self._refuse()
+
+    def _reader(self, file: Any, places: Sequence[int], n_plain: int) -> Any:
+        lib = library(str(self.path), "pyarrow")
+        text = library(str(self.path), "pyarrow.csv")
+        # cells as they are written; of few different ones each is kept once
+        kinds = [lib.string(), lib.dictionary(lib.int32(), lib.string())]
+        types = {str(p): kinds[k >= n_plain] for k, p in enumerate(places)}
+        return text.open_csv(
             file,
             text.ReadOptions(
                 block_size=_BLOCK,
-                skip_rows=n_skipped,
-                column_names=names,
-                encoding=encoding,
+                skip_rows=self.n_skipped,
+                column_names=list(map(str, range(self.width))),
+                encoding=self.encoding,
             ),
             text.ParseOptions(
-                delimiter=delimiter, newlines_in_values=True, ignore_empty_lines=True
+                delimiter=self.delimiter,
+                newlines_in_values=True,
+                ignore_empty_lines=True,
             ),
             text.ConvertOptions(
                 column_types=types,
-                include_columns=[names[place] for place in places],
+                include_columns=list(types),
                 strings_can_be_null=False,
             ),
         )
-        for batch in reader:
-            yield [batch.column(names[place]) for place in places], file.tell()
+
+    def _refuse_late_quotes(self, columns: Sequence[Any]) -> None:
+        # pyarrow takes blanks before a quote for the beginning of an unquoted cell
+        compute = library(str(self.path), "pyarrow.compute")
+        for column in columns if self.delimiter != "\t" else ():
+            texts = getattr(column, "dictionary", column)
+            if compute.any(compute.starts_with(texts, " ")).as_py():
+                if compute.any(compute.match_substring_regex(texts, '^ +"')).as_py():
+                    raise NoStreamError("blanks before quotes")
+
+    def _records(self) -> Iterator[tuple[int, list[str]]]:
+        # looked up only for a message; pyarrow reads no cell longer than a block
+        with (
+            self.path.open(encoding=self.encoding, newline="") as file,
+            long_cells(_BLOCK),
+        ):
+            for _ in range(self.n_skipped):
+                file.readline()
+            yield from numbered_records(file, self.delimiter, self.n_skipped)
+
+    def where(self, row: int) -> str:
+        """Return the line of a row."""
+        found = next(islice(self._records(), row, None), None)
+        return "the end" if found is None else f"line {found[0]}"
+
+    def _refuse(self) -> NoReturn:
+        # the first record that is none of the table
+        name, line = str(self.path), self.n_skipped
+        try:
+            for line, record in self._records():
+                if len(record) != self.width:
+                    raise width_error(name, line, self.width, record)
+        except csv.Error as error:
+            raise RatingsError(
+                f"{name}: below line {line}: a quote that is opened is not closed "
+                f"({error})"
+            ) from error
+        except UnicodeDecodeError:
+            with self.path.open("rb") as file:
+                for number, data in enumerate(file):
+                    decoded(name, data, self.encoding, number)
+        raise NoStreamError("records that only a whole file can have")
 
 
-def sha256_of(path: Path) -> str:
-    """Return the hash of a file's bytes."""
-    digest = hashlib.sha256()
+def _sha256_of(path: Path) -> str:
     with path.open("rb") as file:
-        while block := file.read(_BLOCK):
-            digest.update(block)
-    return digest.hexdigest()
+        return hashlib.file_digest(file, "sha256").hexdigest()

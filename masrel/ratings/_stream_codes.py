@@ -7,9 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.agreement._counts import distinct_rows
-from masrel.errors import RatingsError
 from masrel.ratings._grade_texts import coded_texts
-from masrel.ratings._large_files import cell_texts, is_whole, numbers_of
+from masrel.ratings._large_files import (
+    NoStreamError,
+    cell_texts,
+    is_whole,
+    numbers_of,
+)
 
 StreamCodes = NDArray[np.signedinteger[Any]]
 
@@ -17,10 +21,6 @@ _MAX_BYTE = 120  # texts whose numbers have a byte each
 _MAX_PENDING = 1 << 18  # distinct rows before those alike are put together
 _MAX_KEPT = 100_000_000  # codes of distinct rows
 _SPAN = 1 << 16  # of whole numbers that are looked up in a table
-
-
-class TooManyError(RatingsError):
-    """Ratings that a stream cannot count, and a whole file can."""
 
 
 class TextCodes:
@@ -109,7 +109,7 @@ class TextCodes:
         return code
 
     def _refuse(self) -> NoReturn:
-        raise TooManyError(
+        raise NoStreamError(
             f"more than {self._most} different {self._what}, more than a stream counts"
         )
 
@@ -156,7 +156,7 @@ class DistinctRows:
         freq = np.concatenate([np.empty(0, np.int64), *self._freq])
         rows, freq = merged_rows(rows, freq)
         if rows.size > _MAX_KEPT:
-            raise TooManyError(
+            raise NoStreamError(
                 f"{len(rows)} items that differ, more than a stream counts"
             )
         return rows, freq

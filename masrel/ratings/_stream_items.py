@@ -10,11 +10,11 @@ from masrel.ratings._grade_texts import USUAL_MISSING
 from masrel.ratings._large_files import (
     STRINGS,
     LargeFile,
-    arrow,
     cell_texts,
     is_whole,
     numbers_of,
 )
+from masrel.ratings._text_cells import library
 
 MAX_HASHED = 40_000_000
 """Items whose names are told apart by their hashes."""
@@ -26,7 +26,7 @@ class UnorderedError(Exception):
 
 def item_columns(large: LargeFile, columns: Sequence[Any]) -> list[Any]:
     """Return columns that name items, as whole numbers or as text without blanks."""
-    lib = arrow(large.sheet.name, "pyarrow")
+    lib = library(large.sheet.name, "pyarrow")
     items = []
     for column in columns:
         if is_whole(column):
@@ -41,7 +41,7 @@ def item_columns(large: LargeFile, columns: Sequence[Any]) -> list[Any]:
             texts = texts.take(column.indices)
         letters = np.frombuffer(texts.buffers()[2] or b"", dtype=np.uint8)
         if letters.size and (letters.min() <= 0x20 or letters.max() >= 0x7F):
-            compute = arrow(large.sheet.name, "pyarrow.compute")
+            compute = library(large.sheet.name, "pyarrow.compute")
             texts = compute.utf8_normalize(compute.utf8_trim_whitespace(texts), "NFC")
         items.append(texts)
     return items
@@ -62,7 +62,7 @@ def unnamed_rows(large: LargeFile, items: list[Any]) -> NDArray[np.bool_] | None
 
 def _blank_texts(large: LargeFile, item: Any, blank: Any) -> Any:
     # which texts are those of a missing name; `blank` if none is as short as these
-    compute = arrow(large.sheet.name, "pyarrow.compute")
+    compute = library(large.sheet.name, "pyarrow.compute")
     shortest = compute.min(compute.binary_length(item)).as_py()
     if shortest is None or shortest > max(map(len, USUAL_MISSING)):
         return blank
@@ -102,7 +102,7 @@ class Ascending:
             raise UnorderedError
 
     def _texts_ascend(self, item: Any) -> bool:
-        compute = arrow(self._name, "pyarrow.compute")
+        compute = library(self._name, "pyarrow.compute")
         one, other = item.slice(0, len(item) - 1), item.slice(1)
         above = compute.less(one, other)
         first = item[0].as_py()
@@ -152,8 +152,7 @@ class Hashed:
 
 
 def hashes(items: list[Any]) -> NDArray[np.uint64]:
-    """Return a number of 64 bits for every item."""
-    # one number an item: -> (n,)
+    """Return a number of 64 bits for every item, (n,)."""
     from pandas.util import hash_array
 
     total = np.zeros(len(items[0]), dtype=np.uint64)
@@ -166,9 +165,3 @@ def hashes(items: list[Any]) -> NDArray[np.uint64]:
             values, categorize=False
         )
     return total
-
-
-def item_names(item: Any) -> list[Any]:
-    """Return the names of items."""
-    names: list[Any] = item.to_pylist()
-    return names

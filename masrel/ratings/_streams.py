@@ -16,13 +16,12 @@ from numpy.typing import NDArray
 
 from masrel.errors import RatingsError
 from masrel.ratings._grade_texts import USUAL_MISSING
-from masrel.ratings._large_files import LargeFile, arrow, numbers_of
+from masrel.ratings._large_files import LargeFile, NoStreamError, numbers_of
 from masrel.ratings._layout import Layout
 from masrel.ratings._stream_codes import (
     DistinctRows,
     StreamCodes,
     TextCodes,
-    TooManyError,
     widened,
 )
 from masrel.ratings._stream_items import (
@@ -32,9 +31,9 @@ from masrel.ratings._stream_items import (
     UnorderedError,
     hashes,
     item_columns,
-    item_names,
     unnamed_rows,
 )
+from masrel.ratings._text_cells import library
 
 Progress = Callable[[int, int], None]
 """Takes how many bytes of how many are behind."""
@@ -124,7 +123,7 @@ class _Wide:
             self.n_rows += codes.shape[1]
             if keep is not None:
                 self.n_blank += int((~keep).sum())
-                mask = arrow(self.large.sheet.name, "pyarrow").array(keep)
+                mask = library(self.large.sheet.name, "pyarrow").array(keep)
                 items, codes = [item.filter(mask) for item in items], codes[:, keep]
             if self.first is None and codes.shape[1]:
                 self.first = codes[:, 0].copy()
@@ -216,7 +215,7 @@ def _refuse_twice(large: LargeFile, layout: Layout, twice: NDArray[np.uint64]) -
     for columns, _ in large.batches(list(layout.item), len(layout.item)):
         items = item_columns(large, columns)
         (places,) = np.isin(hashes(items), twice).nonzero()
-        names = [item_names(item.take(places)) for item in items]
+        names = [item.take(places).to_pylist() for item in items]
         for place, name in zip(places.tolist(), zip(*names, strict=True), strict=True):
             if name in met and "" not in name:
                 rows = [large.where(row) for row in (met[name], n_rows + place)]
@@ -342,7 +341,7 @@ def _unordered(long: _Long, rows: DistinctRows) -> int:
 
 def _of_runs(long: _Long, rows: DistinctRows, order: Ascending) -> int:
     # of items whose rows follow each other: how many there are
-    lib = arrow(long.large.sheet.name, "pyarrow")
+    lib = library(long.large.sheet.name, "pyarrow")
     n_items = 0
     rest: tuple[list[Any], StreamCodes, NDArray[np.int64]] | None = None
     for items, grade, rater in long.batches():
@@ -388,7 +387,7 @@ def _count_runs(
     table[keys] = grade + np.int8(1)
     if np.count_nonzero(table) < len(keys):
         twice = int(np.argmax(np.bincount(keys)[keys] > 1))
-        name = [item_names(column.slice(twice, 1))[0] for column in items]
+        name = [column[twice].as_py() for column in items]
         _refuse_rating(long, name)
     table -= 1
     rows.add(table.reshape(n_items, n_raters), len(long.grades.texts))
@@ -397,7 +396,7 @@ def _count_runs(
 
 def _array(long: _Long, numbers: NDArray[np.int64]) -> Any:
     # as an array of pyarrow, without its way from numpy, which loads pandas
-    lib = arrow(long.large.sheet.name, "pyarrow")
+    lib = library(long.large.sheet.name, "pyarrow")
     data = lib.py_buffer(np.ascontiguousarray(numbers))
     return lib.Array.from_buffers(lib.int64(), len(numbers), [None, data])
 
@@ -407,7 +406,7 @@ def _starts(long: _Long, items: list[Any]) -> NDArray[np.int64]:
     n = len(items[0])
     changes = np.zeros(n, dtype=bool)
     changes[0] = True
-    compute = arrow(long.large.sheet.name, "pyarrow.compute")
+    compute = library(long.large.sheet.name, "pyarrow.compute")
     for item in items:
         other = compute.not_equal(item.slice(1), item.slice(0, n - 1))
         changes[1:] |= numbers_of(other).astype(bool)
@@ -416,19 +415,22 @@ def _starts(long: _Long, items: list[Any]) -> NDArray[np.int64]:
 
 def _refuse_rating(long: _Long, name: Sequence[Any]) -> NoReturn:
     # where the ratings are that an item has by one rater
+    lib = library(long.large.sheet.name, "pyarrow")
+    compute = library(long.large.sheet.name, "pyarrow.compute")
     met: dict[int, int] = {}
     for items, _, raters in long.batches():
-        n = long.n_rows - len(raters)
-        same = np.ones(len(raters), dtype=bool)
+        n, start = len(raters), long.n_rows - len(raters)
+        same = np.ones(n, dtype=bool)
         for item, part in zip(items, name, strict=True):
-            same &= np.array([text == part for text in item_names(item)])
+            equal = compute.equal(item, lib.scalar(part, item.type))
+            same &= numbers_of(equal).astype(bool)
         for k in np.flatnonzero(same).tolist():
             rater = int(raters[k])
             if rater in met:
-                rows = [long.large.where(row) for row in (met[rater], n + k)]
+                rows = [long.large.where(row) for row in (met[rater], start + k)]
                 who = long.raters.texts[rater]
                 raise repeated_error(long.large, long.layout, rows, name, who)
-            met[rater] = n + k
+            met[rater] = start + k
     raise long.large.sheet.error("changed while it was read")
 
 
@@ -442,11 +444,7 @@ def _of_table(
             if n_places * 2 * long.n_raters > _MAX_TABLE:
                 return _of_engine(long, rows)
             return _of_table(long, rows, lowest, n_places, 2 * long.n_raters)
-        keys = numbers_of(items[0]).astype(np.int64)
-        keys -= lowest
-        keys *= n_columns
-        keys += rater
-        table[keys] = grade + np.int8(1)
+        table[_table_places(items[0], rater, lowest, n_columns)] = grade + np.int8(1)
     if int(np.count_nonzero(table)) < long.n_rows:
         _refuse_of_table(long, lowest, n_columns, len(table))
     n_items = 0
@@ -461,22 +459,27 @@ def _of_table(
     return n_items
 
 
+def _table_places(
+    item: Any, rater: NDArray[np.int64], lowest: int, n_columns: int
+) -> NDArray[np.int64]:
+    # without signs, so that the difference is right whatever the type
+    above = numbers_of(item).astype(np.uint64) - np.uint64(lowest % 2**64)
+    places = above.view(np.int64)
+    places *= n_columns
+    places += rater
+    return places
+
+
 def _refuse_of_table(long: _Long, lowest: int, n_columns: int, size: int) -> NoReturn:
     seen = np.zeros(size, dtype=bool)
-    twice = -1
     for items, _, rater in long.batches():
-        keys = (numbers_of(items[0]).astype(np.int64) - lowest) * n_columns + rater
-        again = seen[keys]
+        keys = _table_places(items[0], rater, lowest, n_columns)
+        keys, freq = np.unique(keys, return_counts=True)
+        twice = keys[seen[keys] | (freq > 1)]
+        if len(twice):
+            _refuse_rating(long, [lowest + int(twice[0]) // n_columns])
         seen[keys] = True
-        if not again.any():
-            unique, freq = np.unique(keys, return_counts=True)
-            if len(unique) == len(keys):
-                continue
-            twice = int(unique[freq.argmax()])
-        else:
-            twice = int(keys[again.argmax()])
-        break
-    _refuse_rating(long, [lowest + twice // n_columns])
+    raise long.large.sheet.error("changed while it was read")
 
 
 def _of_engine(long: _Long, rows: DistinctRows) -> int:
@@ -484,7 +487,7 @@ def _of_engine(long: _Long, rows: DistinctRows) -> int:
     from masrel.ratings._spilling import packed_items
 
     if find_spec("duckdb") is None:
-        raise TooManyError(
+        raise NoStreamError(
             "items in no order, which a stream puts together by DuckDB: pip install "
             "'masrel[big]'"
         )

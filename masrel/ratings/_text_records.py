@@ -5,7 +5,7 @@ import gc
 import io
 import itertools
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -112,10 +112,37 @@ def _rows(text: str, delimiter: str) -> Iterator[list[str]]:
         for line in re.split(r"\r\n|\n|\r", text):
             yield re.findall(r'"(?:[^"]|"")*"|[^ \t]+', line)
     else:
-        lines = io.StringIO(text, newline="")
-        blanks = delimiter != "\t"
-        with _long_cells(text):
-            yield from csv.reader(lines, delimiter=delimiter, skipinitialspace=blanks)
+        with long_cells(len(text)):
+            yield from _csv_reader(io.StringIO(text, newline=""), delimiter)
+
+
+def _csv_reader(lines: Iterable[str], delimiter: str, *, strict: bool = False) -> Any:
+    return csv.reader(
+        lines,
+        delimiter=delimiter,
+        skipinitialspace=delimiter != "\t",
+        strict=strict,
+    )
+
+
+def numbered_records(
+    lines: Iterable[str], delimiter: str, n_before: int
+) -> Iterator[tuple[int, list[str]]]:
+    """Return the line where each record begins, and its cells, without blank lines."""
+    # n_before: lines of the file before these
+    reader, begins = _csv_reader(lines, delimiter), n_before + 1
+    for record in reader:
+        if record and (len(record) > 1 or record[0].strip(" \t")):
+            yield begins, record
+        begins = n_before + reader.line_num + 1
+
+
+def width_error(name: str, line: int, width: int, record: list[str]) -> RatingsError:
+    """Return the error of a record that has another number of cells."""
+    return RatingsError(
+        f"{name}: line {line}: needed {width} cells, as the first line has, got "
+        f"{len(record)}: {', '.join(record)[:60]!r}"
+    )
 
 
 @contextmanager
@@ -132,10 +159,11 @@ def _collector_off() -> Iterator[None]:
 
 
 @contextmanager
-def _long_cells(text: str) -> Iterator[None]:
-    # cells as long as the text, while it is read: the limit is one for all readers
+def long_cells(most: int) -> Iterator[None]:
+    """Let the csv module read cells of as many letters."""
+    # the limit is one for all readers
     limit = csv.field_size_limit()
-    csv.field_size_limit(max(limit, len(text)))
+    csv.field_size_limit(max(limit, most))
     try:
         yield
     finally:
@@ -220,15 +248,6 @@ class _Lines:
         self.has_row_names = len(first) > 1 and set(first[1:]) == {first[0] + 1}
         self.width = first[0] + self.has_row_names
 
-    def _reader(self, *, is_strict: bool = False) -> Any:
-        # the csv module's reader of the text
-        return csv.reader(
-            io.StringIO(self._body, newline=""),
-            delimiter=self._delimiter,
-            skipinitialspace=self._delimiter != "\t",
-            strict=is_strict,
-        )
-
     def _records(self) -> Iterator[tuple[int, list[str]]]:
         # -> line where it begins, cells; records of blank lines are left out
         if self._delimiter == _BLANKS:
@@ -236,12 +255,9 @@ class _Lines:
                 if record:
                     yield number + self._n_before, record
             return
-        reader, begins = self._reader(), 1
-        with _long_cells(self._body):
-            for record in reader:
-                if record and (len(record) > 1 or record[0].strip(" \t")):
-                    yield begins + self._n_before, record
-                begins = reader.line_num + 1
+        with long_cells(len(self._body)):
+            lines = io.StringIO(self._body, newline="")
+            yield from numbered_records(lines, self._delimiter, self._n_before)
 
     def line_of(self, number: int) -> str:
         """Return the line of a record."""
@@ -280,8 +296,9 @@ class _Lines:
         # by the csv module, a quote that is not closed refused
         rows: list[list[str]] = []
         try:
-            with _long_cells(self._body), _collector_off():
-                rows = list(self._reader(is_strict=True))
+            with long_cells(len(self._body)), _collector_off():
+                lines = io.StringIO(self._body, newline="")
+                rows = list(_csv_reader(lines, self._delimiter, strict=True))
         except csv.Error as error:
             if "unexpected end" in str(error):
                 raise self._unclosed(error) from error
@@ -340,8 +357,4 @@ class _Lines:
         # refuse the first record that has another number of cells
         for place, (line, record) in enumerate(self._records()):
             if len(record) != self.width and (place or not self.has_row_names):
-                shown = ", ".join(record)[:60]
-                raise RatingsError(
-                    f"{self._name}: line {line}: needed {self.width} cells, as the "
-                    f"first line has, got {len(record)}: {shown!r}"
-                )
+                raise width_error(self._name, line, self.width, record)

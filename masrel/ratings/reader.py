@@ -32,7 +32,7 @@ from masrel.ratings._grade_texts import (
     is_number,
     read_grades,
 )
-from masrel.ratings._large_files import LargeFile, large_file
+from masrel.ratings._large_files import LargeFile, NoStreamError, large_file
 from masrel.ratings._layout import Layout, LayoutOptions, find_layout
 from masrel.ratings._parts import (
     Codes,
@@ -45,7 +45,7 @@ from masrel.ratings._parts import (
     put_together,
     without_repeats,
 )
-from masrel.ratings._stream_codes import TooManyError, merged_rows
+from masrel.ratings._stream_codes import merged_rows
 from masrel.ratings._streams import Streamed, stream_long, stream_wide
 from masrel.ratings._text_cells import Sheet, SheetOptions, read_sheet
 from masrel.scales import Scale
@@ -250,7 +250,7 @@ def _streamed(
     read = stream_long if layout.kind == "long" else stream_wide
     try:
         ratings = read(large, layout, progress or (lambda _, __: None))
-    except TooManyError as error:
+    except NoStreamError as error:
         if stream:
             raise sheet.error(f"{error}; --no-stream reads it as a whole") from error
         return None

@@ -242,12 +242,83 @@ def test_a_second_line_of_names_is_refused(
         read_ratings(path, stream=True)
 
 
-def test_a_cell_too_many_is_one_sentence(tmp_path: Path) -> None:
+HEAD = "id,A,B\n" + "".join(f"p{k},{k % 3},{k // 2 % 3}\n" for k in range(500))
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])  # \r is that of an old Mac
+@pytest.mark.parametrize("comment", ["", "# of a trial\n"])
+def test_a_text_with_lines_that_end_so(tmp_path: Path, end: str, comment: str) -> None:
     path = tmp_path / "wide.csv"
-    rows = "".join(f"p{k},1,2\n" for k in range(100_000))
-    path.write_text(f"id,A,B\n{rows}p,1,2,3\n")
-    with pytest.raises(RatingsError, match=r"is damaged, or no text file .*Expected 3"):
+    path.write_bytes((comment + HEAD).replace("\n", end).encode())
+    streamed, whole = both(path)
+    assert whole.read["n_ratings"] == 1000
+    assert_same(streamed, whole)
+
+
+@pytest.mark.parametrize("end", ["\n", "\r"])
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("p,1,2,3", "line 502: needed 3 cells, as the first line has, got 4: 'p, 1"),
+        ("p,1", "line 502: needed 3 cells, as the first line has, got 2: 'p, 1'"),
+        ("p\xe9,1,2", "line 502: needed utf-8 text, got the byte 0xe9"),
+        ("p,1,n/a", "line 502, column 'B': 'n/a' looks like a missing grade"),
+        (f"{'p' * 140_000},1,n/a", "line 502, column 'B': 'n/a' looks like a missing"),
+    ],
+)
+def test_a_wrong_line_of_a_text_is_refused_where_it_stands(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, line: str, words: str, end: str
+) -> None:
+    monkeypatch.setattr(_large_files, "_HEAD_BYTES", 1000)
+    monkeypatch.setattr(_large_files, "_BLOCK", 1 << 18)
+    path = tmp_path / "wide.csv"
+    path.write_bytes(f"{HEAD}{line}\nq,1,2\n".replace("\n", end).encode("latin-1"))
+    for stream in (True, False):
+        with pytest.raises(RatingsError, match=words):
+            read_ratings(path, stream=stream)
+
+
+@pytest.mark.parametrize(
+    ("n_below", "words"),
+    [
+        (1, "line 502: needed 3 cells, as the first line has, got 1: 'p,1,2.+q,1,2"),
+        (30_000, "below line 501: a quote that is opened is not closed"),
+    ],
+)
+def test_a_quote_that_is_not_closed_is_one_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, n_below: int, words: str
+) -> None:
+    monkeypatch.setattr(_large_files, "_HEAD_BYTES", 1000)
+    path = tmp_path / "wide.csv"
+    path.write_text(f'{HEAD}"p,1,2\n' + "q,1,2\n" * n_below)
+    with pytest.raises(RatingsError, match=words):
         read_ratings(path, stream=True)
+
+
+def test_blanks_before_a_quote_are_no_stream(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(_large_files, "_HEAD_BYTES", 1000)
+    path = tmp_path / "wide.csv"
+    path.write_text(f'{HEAD}p, 1, "2"\n')
+    with pytest.raises(RatingsError, match="blanks before quotes; --no-stream reads"):
+        read_ratings(path, stream=True)
+    monkeypatch.setattr(_large_files, "_LARGE_TEXT", 1000)
+    assert read_ratings(path).read["n_ratings"] == 1002
+
+
+@pytest.mark.parametrize("ending", ["parquet", "csv"])
+def test_too_little_memory_is_said_to_be_that(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ending: str
+) -> None:
+    def full(*_: Any, **__: Any) -> None:
+        raise pyarrow.ArrowMemoryError("malloc of size 64 failed")
+
+    path = written(tmp_path / f"wide.{ending}", {"A": [1, 2], "B": [1, 1]})
+    monkeypatch.setattr("pyarrow.parquet.ParquetFile.iter_batches", full)
+    monkeypatch.setattr("pyarrow.csv.open_csv", full)
+    with pytest.raises(MemoryError, match="64"):
+        read_ratings(path, stream=True, no_item=True)
 
 
 @pytest.mark.parametrize(
