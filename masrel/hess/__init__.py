@@ -17,6 +17,7 @@ from masrel.hess.friction import Friction, FrictionCompensation
 from masrel.hess.hand import Hand, SimulatedHand, YieldingHand
 from masrel.hess.limits import DeviceLimits
 from masrel.hess.loop import run_presentation
+from masrel.hess.rendering import MotionHand, Rendering, render
 
 __all__ = [
     "BackendOptions",
@@ -31,9 +32,11 @@ __all__ = [
     "FrictionCompensation",
     "Hand",
     "IdleCommand",
+    "MotionHand",
     "Presented",
     "Reading",
     "RealClock",
+    "Rendering",
     "ReplayOptions",
     "SimulatedClock",
     "SimulatedHand",
@@ -41,5 +44,6 @@ __all__ = [
     "cut_off",
     "device_names",
     "open_device",
+    "render",
     "run_presentation",
 ]

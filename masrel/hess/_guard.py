@@ -200,6 +200,43 @@ class Dropouts:
             )
 
 
+class ActiveGuard:
+    """Check the torque and the energy of a model that is not passive by nature."""
+
+    # The device holds a torque τ until the next one, so that an arm that meanwhile goes
+    # from θ to θ' takes -τ (θ' - θ) of energy: exactly, but for the motor's lag. It is
+    # the model's torque that counts: what compensates friction is eaten by friction.
+    # Hannaford, B., Ryu, J.-H. (2002). IEEE Trans. Robot. Autom. 18(1), 1-10 (passivity
+    # observer): https://doi.org/10.1109/70.988969
+
+    __slots__ = ("_angle", "_held", "_max_energy", "_max_torque", "energy_given")
+
+    def __init__(self, limits: DeviceLimits) -> None:
+        self._max_torque = limits.active_torque
+        self._max_energy = limits.active_energy
+        self._angle = self._held = 0.0  # of the last tick: rad, N·m
+        self.energy_given = 0.0  # to the arm, less what was taken from it, J
+
+    def check(self, angle: float, torque: float) -> None:
+        """Check what a model asks for before it is sent."""
+        self.energy_given -= self._held * (angle - self._angle)
+        if self.energy_given > self._max_energy:
+            raise LimitExceededError(
+                f"energy: needs a model that has given the arm at most "
+                f"{self._max_energy:g} J more than it took, got "
+                f"{self.energy_given:.3f} J",
+                "energy",
+            )
+        if not -self._max_torque <= torque <= self._max_torque:
+            raise LimitExceededError(
+                f"active torque: needs at most {self._max_torque:g} N·m of a model "
+                f"that is not passive, got {torque:.3f} N·m",
+                "active-torque",
+            )
+        self._angle = angle
+        self._held = torque
+
+
 def check_overrun(limits: DeviceLimits, n_missed: int, gap_s: float) -> None:
     """Check how many ticks have been missed so far, and how many at once."""
     if gap_s >= limits.watchdog_time:

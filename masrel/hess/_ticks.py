@@ -2,8 +2,8 @@
 
 import math
 
-from masrel.errors import ControllerError, DeviceTimeoutError
-from masrel.hess._guard import Guard, SoftStops, check_overrun
+from masrel.errors import ControllerError, DeviceTimeoutError, LimitExceededError
+from masrel.hess._guard import ActiveGuard, Guard, SoftStops, check_overrun
 from masrel.hess._spool import Samples
 from masrel.hess._stop import EmergencyStop
 from masrel.hess._velocity import VelocityEstimate
@@ -27,6 +27,7 @@ class Ticks:
     """The loop proper, in plain numbers: a numpy scalar would cost more than a tick."""
 
     __slots__ = (
+        "_active_guard",
         "_controller",
         "_end_angle",
         "_estimate",
@@ -64,6 +65,7 @@ class Ticks:
     ) -> None:
         self.device = device
         self._controller = controller
+        self._active_guard = ActiveGuard(limits) if controller.is_guarded else None
         self.clock = clock
         self._n_ticks = n_ticks
         self.period_ns = round(1e9 / rate_hz)
@@ -139,6 +141,8 @@ class Ticks:
         guard.speed(velocity)
         controller = self._controller
         torque = self._decide(time_s, angle, velocity) + self._stops.torque(angle)
+        if self._active_guard is not None:
+            self._active_guard.check(angle, controller.model_torque)
         guard.torque(time_s, torque)
         self.device.command(torque)
         self.sent = torque
@@ -155,6 +159,8 @@ class Ticks:
     def _decide(self, time_s: float, angle: float, velocity: float) -> float:
         try:
             return self._controller.step(time_s, angle, velocity)
+        except LimitExceededError:  # a lost grip
+            raise
         except Exception as error:
             # Whatever a model does wrong, the torque has to be taken back slowly
             raise ControllerError(

@@ -4,17 +4,19 @@ import math
 
 from masrel.errors import ParameterError
 
+CUTOFF_RAD_S = 180.0
+"""Of the low-pass, rad/s: that of the filter inside the source's motor amplifier."""
+
 
 class VelocityEstimate:
     """Differentiate the encoder and pass it through a first-order low-pass."""
 
-    # At 1 kHz one encoder step of 0.005 deg is 5 deg/s from sample to sample. A
-    # low-pass at 180 rad/s, the cut-off of the filter inside the motor amplifier,
-    # leaves 0.8 deg/s of it and delays the speed by 1/180 s = 5.6 ms.
+    # At 1 kHz one encoder step of 0.005 deg is 5 deg/s from sample to sample. The
+    # low-pass leaves 0.8 deg/s of it and delays the speed by 1/180 s = 5.6 ms.
 
     __slots__ = ("_angle", "_cutoff", "_gain", "_interval", "_time", "_velocity")
 
-    def __init__(self, cutoff: float = 180.0) -> None:
+    def __init__(self, cutoff: float = CUTOFF_RAD_S) -> None:
         if not 0.0 < cutoff < math.inf:
             raise ParameterError(f"cutoff: needs more than 0 rad/s, got {cutoff}")
         self._cutoff = cutoff

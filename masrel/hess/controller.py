@@ -6,9 +6,9 @@ https://doi.org/10.1109/TNSRE.2012.2195330, section III.B and Fig. 7.
 
 import math
 
+from masrel.elbow.joint_model import JointModel
 from masrel.elbow.parameters import ElbowParameters
-from masrel.elbow.sampled import SampledJoint
-from masrel.errors import ParameterError
+from masrel.errors import LimitExceededError, ParameterError
 from masrel.hess.friction import Friction, FrictionCompensation
 from masrel.recording import PHASES
 
@@ -26,10 +26,14 @@ class Controller:
     moved back, faster than ν_th. A fall of speed within 3 deg of the end of range does
     not count: there it is the joint that stops the arm.
 
+    A model that is not passive is guarded: such a fall of speed is a fault in every
+    phase, while the model resists extension; moving the arm backwards is not. The
+    paper's own law has a trigger too, and is released as the paper has it instead.
+
     Parameters
     ----------
-    parameters : ElbowParameters
-        The joint model. Its inertial term is not commanded: the mannequin has it.
+    model : JointModel
+        The joint model. An inertial term is not commanded: the mannequin has it.
     start_angle : float
         Where the stretch starts, rad.
     friction : Friction or None, optional
@@ -57,6 +61,8 @@ class Controller:
         Its phase, a position in `masrel.recording.PHASES`.
     grip_lost : bool
         Whether grip has been lost since the beginning.
+    is_guarded : bool
+        Whether the model runs behind `DeviceLimits.active_energy` and `active_torque`.
     is_new : bool
         Whether it has never been stepped: one controller makes one presentation.
     rate_hz : int
@@ -91,6 +97,7 @@ class Controller:
         "_past_index",
         "_slip_speed_drop",
         "grip_lost",
+        "is_guarded",
         "is_new",
         "model_torque",
         "phase",
@@ -100,7 +107,7 @@ class Controller:
 
     def __init__(
         self,
-        parameters: ElbowParameters,
+        model: JointModel,
         *,
         start_angle: float,
         friction: Friction | None = None,
@@ -116,7 +123,8 @@ class Controller:
             )
         if rate_hz < 1:
             raise ParameterError(f"rate_hz: needs 1 or more, got {rate_hz}")
-        self._joint = SampledJoint(parameters, start_angle=start_angle)
+        self._joint = model.stepper(start_angle)
+        self.is_guarded = not (model.is_passive or isinstance(model, ElbowParameters))
         self._compensation = FrictionCompensation(
             friction or Friction(),
             share=compensation,
@@ -124,10 +132,10 @@ class Controller:
             full_speed=full_speed,
         )
         self._slip_speed_drop = slip_speed_drop
-        self._free_end = parameters.range_end - _RANGE_END_MARGIN
+        self._free_end = model.range_end - _RANGE_END_MARGIN
         self._past = [0.0] * max(1, round(_SLIP_WINDOW_S * rate_hz))
         self._past_index = 0
-        self.speed_threshold = parameters.speed_threshold
+        self.speed_threshold = model.speed_threshold
         self.grip_lost = False
         self.model_torque = 0.0
         self.phase = _PRE_CATCH
@@ -152,6 +160,11 @@ class Controller:
         -------
         float
             Torque to command, N·m; positive resists extension.
+
+        Raises
+        ------
+        LimitExceededError
+            If the grip on a guarded model is lost.
         """
         self.is_new = False
         index = self._past_index
@@ -159,7 +172,14 @@ class Controller:
         self._past[index] = velocity
         self._past_index = index + 1 if index + 1 < len(self._past) else 0
         joint = self._joint
-        if joint.phase != _PRE_CATCH and (
+        if self.is_guarded:
+            if (
+                drop > self._slip_speed_drop
+                and angle < self._free_end
+                and self.model_torque > 0.0
+            ):
+                self._stop_for_slip(drop)
+        elif joint.phase != _PRE_CATCH and (
             velocity < -self.speed_threshold
             or (drop > self._slip_speed_drop and angle < self._free_end)
         ):
@@ -169,3 +189,13 @@ class Controller:
         self.model_torque = torque
         self.phase = joint.phase
         return torque - self._compensation.torque(velocity)
+
+    def _stop_for_slip(self, drop: float) -> None:
+        self._joint.release()
+        self.grip_lost = True
+        raise LimitExceededError(
+            f"slip: needs an arm whose speed falls by at most "
+            f"{math.degrees(self._slip_speed_drop):g} deg/s in "
+            f"{_SLIP_WINDOW_S * 1e3:g} ms, got {math.degrees(drop):.0f} deg/s",
+            "slip",
+        )

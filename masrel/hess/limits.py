@@ -13,6 +13,8 @@ _MAX_RAMP_S = 0.1  # a fault's torque is zero after this at the latest
 _POSITIVE = (
     "torque",
     "torque_rate",
+    "active_torque",
+    "active_energy",
     "speed",
     "soft_stop_width",
     "stale_time",
@@ -43,6 +45,11 @@ class DeviceLimits:
     torque_rate : float, optional
         Fastest build-up of torque from one tick to the next, N·m/s. Torque may be
         taken away as suddenly as it likes.
+    active_torque : float, optional
+        Largest torque of a model behind the guard (`Controller.is_guarded`), N·m.
+    active_energy : float, optional
+        Energy that such a model may have given to the arm on balance, J: what it gave
+        less what it took since the presentation began.
     speed : float, optional
         Speed at which the presentation is stopped, either way, rad/s.
     lowest_angle, highest_angle : float, optional
@@ -87,6 +94,8 @@ class DeviceLimits:
 
     torque: float = 20.0
     torque_rate: float = 12_000.0
+    active_torque: float = 10.0
+    active_energy: float = 1.0
     speed: float = math.radians(400.0)
     lowest_angle: float = _LOWEST_ANGLE
     highest_angle: float = _HIGHEST_ANGLE

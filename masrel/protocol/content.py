@@ -90,13 +90,16 @@ def _joint_of(model: Model, shared: ElbowConstants) -> ElbowParameters:
 _PRESENTED = ("scale", "elbow", "models", "schedule", "stretch", "device")
 """The tables that decide what a rater meets, besides the study's id."""
 
-_LATER: dict[str, object] = {
-    "catch_rise_s": 0.0,
-    "residual_reading": "residual",
-    "rest_angle_deg": None,
+_LATER: dict[str, dict[str, object]] = {
+    "elbow": {
+        "catch_rise_s": 0.0,
+        "residual_reading": "residual",
+        "rest_angle_deg": None,
+    },
+    "device": {"active_torque_limit_nm": 10.0, "active_energy_limit_j": 1.0},
 }
-"""Constants that protocols had no key for, with the defaults they then had: these do
-not enter, so that no schedule drawn before turns stale."""
+"""Keys that protocols once had not, by table, with the defaults they then had: these
+do not enter, so that no schedule drawn before turns stale."""
 
 
 def protocol_hash(protocol: Protocol) -> str:
@@ -148,7 +151,7 @@ def _content_hash(content: object, ignored: tuple[str, ...] = ()) -> str:
     for model in plain["models"]:
         constants = {k: v for k, v in model.pop("constants").items() if v is not None}
         # what a model repeats of the shared constants does not enter twice
-        for key in ("post_catch", *_LATER):
+        for key in ("post_catch", *_LATER["elbow"]):
             if key in constants and constants[key] == elbow[key]:
                 del constants[key]
         if constants:
@@ -156,8 +159,9 @@ def _content_hash(content: object, ignored: tuple[str, ...] = ()) -> str:
         for key, absent in (("file", None), ("simulated", False)):
             if model[key] is absent or key in ignored:
                 del model[key]
-    for key, default in _LATER.items():
-        if elbow[key] == default:
-            del elbow[key]
+    for table, defaults in _LATER.items():
+        for key, default in defaults.items():
+            if plain[table][key] == default:
+                del plain[table][key]
     canonical = msgspec.json.encode(plain, order="sorted")
     return hashlib.sha256(canonical).hexdigest()

@@ -129,6 +129,8 @@ class DeviceSettings(_Table, frozen=True, kw_only=True):
     rate_hz: Annotated[int, Meta(ge=100, le=4000)] = 1000
     torque_limit_nm: Annotated[float, Meta(gt=0, le=28)] = 20.0
     torque_rate_limit_nm_s: _Positive = 12_000.0
+    active_torque_limit_nm: Annotated[float, Meta(gt=0, le=28)] = 10.0
+    active_energy_limit_j: Annotated[float, Meta(gt=0, le=100)] = 1.0
     speed_limit_deg_s: Annotated[float, Meta(gt=0, le=600)] = 400.0
     lowest_angle_deg: Annotated[float, Meta(ge=-30, lt=180)] = -5.0
     highest_angle_deg: Annotated[float, Meta(gt=0, le=210)] = 185.0

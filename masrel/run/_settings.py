@@ -35,6 +35,8 @@ def device_limits(settings: DeviceSettings) -> DeviceLimits:
     return DeviceLimits(
         torque=settings.torque_limit_nm,
         torque_rate=settings.torque_rate_limit_nm_s,
+        active_torque=settings.active_torque_limit_nm,
+        active_energy=settings.active_energy_limit_j,
         speed=math.radians(settings.speed_limit_deg_s),
         lowest_angle=math.radians(settings.lowest_angle_deg),
         highest_angle=math.radians(settings.highest_angle_deg),

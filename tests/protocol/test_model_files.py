@@ -164,6 +164,8 @@ def test_a_protocol_without_files_has_the_hash_it_had_before_there_were_any() ->
     assert content["elbow"].pop("rest_angle_deg") is None
     assert content["elbow"].pop("residual_reading") == "residual"
     assert content["elbow"].pop("catch_rise_s") == 0.0
+    assert content["device"].pop("active_torque_limit_nm") == 10.0
+    assert content["device"].pop("active_energy_limit_j") == 1.0
     canonical = msgspec.json.encode(content, order="sorted")
     assert protocol_hash(protocol) == hashlib.sha256(canonical).hexdigest()
 

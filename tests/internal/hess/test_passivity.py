@@ -13,7 +13,14 @@ import numpy as np
 import pytest
 
 from masrel.elbow import STANDARD_MODELS
-from masrel.hess import Controller, Friction, SimulatedClock, SimulatedHand
+from masrel.hess import (
+    Controller,
+    DeviceLimits,
+    Friction,
+    SimulatedClock,
+    SimulatedHand,
+    run_presentation,
+)
 from masrel.hess._simulated import SimulatedDevice
 from masrel.hess._velocity import VelocityEstimate
 
@@ -110,3 +117,45 @@ def test_an_arm_that_nobody_holds_comes_to_rest(model: str, command_nm: float) -
     assert max(angles) - min(angles) > radians(1.0)  # it was moved
     assert len(set(angles[-1000:])) == 1
     assert abs(torque) <= Friction().coulomb
+
+
+@pytest.mark.parametrize("speed_deg_s", [40.0, 90.0, 131.0])
+def test_an_arm_that_slips_under_the_guards_torque_stays_below_the_limit(
+    speed_deg_s: float,
+) -> None:
+    # 10 N·m on 0.06 kg·m² for the 10 ms until it is noticed and half of the 50 ms of
+    # the ramp make 336 deg/s; what they brake first, and friction, take some off that.
+    class Active:
+        kind, is_passive, phase = "test", False, 0
+        range_end, speed_threshold = radians(146.0), radians(20.0)
+
+        def stepper(self, _start_angle: float) -> "Active":
+            return self
+
+        def step(self, time_s: float, _angle: float, _velocity: float) -> float:
+            return min(1.0 + 30.0 * time_s, limits.active_torque)
+
+        def release(self) -> None:
+            pass
+
+    limits = DeviceLimits()
+    clock = SimulatedClock()
+    hand = SimulatedHand(
+        start=radians(30.0),
+        end=radians(146.0),
+        mean_speed=radians(speed_deg_s),
+        slip_time=0.5,
+    )
+    device = SimulatedDevice(clock=clock, hand=hand)
+    device.open()
+    presented = run_presentation(
+        device,
+        Controller(Active(), start_angle=radians(30.0)),
+        clock=clock,
+        limits=limits,
+    )
+    assert presented.fault is not None
+    assert presented.fault.kind == "slip"
+    assert presented.fault.time_s < 0.515
+    assert presented.fault.torque_nm > 9.5
+    assert radians(150.0) < -device._plant.velocity < limits.speed

@@ -1,0 +1,217 @@
+"""The guard of models that are not passive: energy, torque, lost grip, and the ramp."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from math import radians
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+from masrel.elbow import STANDARD_MODELS, MinimumJerk
+from masrel.hess import (
+    Controller,
+    DeviceLimits,
+    MotionHand,
+    Presented,
+    SimulatedClock,
+    run_presentation,
+)
+from masrel.hess import render as rendered
+
+from .rig import LIMITS, START, ScriptedDevice, present
+
+OUT = MinimumJerk(start=START, end=radians(130.0), mean_speed=radians(80.0))
+SPEED = radians(90.0)
+
+Law = Callable[[float, float, float], float]
+
+
+@dataclass
+class Joint:
+    """Any law of time, angle and speed, as a model and its own stepper."""
+
+    law: Law
+    is_passive: bool = False
+    releases: list[float] = field(default_factory=list)
+    phase: int = 0
+
+    kind: ClassVar[str] = "test"
+    range_end: ClassVar[float] = radians(146.0)
+    speed_threshold: ClassVar[float] = radians(20.0)
+
+    def stepper(self, start_angle: float) -> "Joint":
+        self.start = start_angle
+        return self
+
+    def step(self, time_s: float, angle: float, velocity: float) -> float:
+        return self.law(time_s, angle, velocity)
+
+    def release(self) -> None:
+        self.releases.append(1.0)
+
+    def largest_torque(self, **_stretch: float) -> float:
+        return 1.0
+
+    def largest_slope(self, **_stretch: float) -> tuple[float, float]:
+        return 0.0, 0.0
+
+
+def helping(_time_s: float, _angle: float, velocity: float) -> float:
+    return -0.8 * velocity  # drives whatever moves
+
+
+def at_constant_speed(
+    joint: Joint, *, limits: DeviceLimits = LIMITS, duration_s: float = 1.1
+) -> tuple[ScriptedDevice, Presented]:
+    clock = SimulatedClock()
+    device = ScriptedDevice(clock, lambda time_s: START + SPEED * time_s)
+    controller = Controller(joint, start_angle=START, compensation=0.0)
+    device.open()
+    presented = run_presentation(
+        device, controller, clock=clock, limits=limits, max_duration_s=duration_s
+    )
+    device.close()
+    return device, presented
+
+
+def there_and_back(joint: Joint) -> Presented:
+    # 100 deg of extension in a second, and back in another
+    clock = SimulatedClock()
+    device = ScriptedDevice(
+        clock, lambda t: START + radians(50.0) * (1.0 - math.cos(math.pi * t))
+    )
+    with device:
+        return run_presentation(
+            device,
+            Controller(joint, start_angle=START),
+            clock=clock,
+            limits=LIMITS,
+            max_duration_s=2.0,
+            end_angle=4.0,
+        )
+
+
+def assert_ramps_to_zero(device: ScriptedDevice, presented: Presented) -> None:
+    # in a straight line within 50 ms from what was sent last; then it is let go
+    fault = presented.fault
+    assert fault is not None
+    after = [(t * 1e-9, x) for t, x in device.commands if t * 1e-9 > fault.time_s]
+    times, torques = np.array(after[:50]).T
+    line = fault.torque_nm * (1.0 - (times - fault.time_s) / 0.05)
+    np.testing.assert_allclose(torques, line, atol=1e-9)
+    assert times[-1] <= fault.time_s + 0.05 + 1e-9
+    assert torques[-1] == pytest.approx(0.0, abs=1e-9)
+    assert {torque for _, torque in after[50:]} <= {0.0}
+    assert not device.is_open
+
+
+# Energy
+
+
+def test_energy_beyond_the_tank_is_a_fault_with_the_ramp() -> None:
+    # By hand: at a speed v the model gives 0.8 v² = 1.974 W, so 1 J takes 0.507 s;
+    # the filtered speed comes 5.6 ms late.
+    device, presented = at_constant_speed(Joint(helping))
+    fault = presented.fault
+    assert fault is not None
+    assert fault.kind == "energy"
+    assert fault.message.startswith(
+        "energy: needs a model that has given the arm at most 1 J more than it took, "
+        "got 1.00"
+    )
+    assert fault.time_s == pytest.approx(1.0 / (0.8 * SPEED**2) + 1 / 180, abs=0.002)
+    assert fault.torque_nm == pytest.approx(-0.8 * SPEED, rel=1e-3)
+    assert_ramps_to_zero(device, presented)
+
+
+def test_the_balance_counts_so_that_a_spring_may_give_back_what_it_took() -> None:
+    # 3 N·m/rad over 100 deg hold 4.6 J, four times the tank; led back without a fault.
+    spring = Joint(lambda _t, angle, _v: 3.0 * (angle - START))
+    presented = there_and_back(spring)
+    assert presented.fault is None
+    # ... and one that gives back half as much again is one
+    joint = Joint(lambda t, angle, _v: (3.0 if t < 1.0 else 4.5) * (angle - START))
+    presented = there_and_back(joint)
+    assert presented.fault is not None
+    assert presented.fault.kind == "energy"
+    assert presented.fault.time_s > 1.0
+
+
+def test_a_larger_tank_lets_more_pass() -> None:
+    limits = replace(LIMITS, active_energy=3.0)
+    _, presented = at_constant_speed(Joint(helping), limits=limits)
+    assert presented.fault is None
+
+
+# Torque
+
+
+def test_a_torque_beyond_that_of_active_models_is_not_sent_nor_cut_off() -> None:
+    device, presented = at_constant_speed(Joint(lambda t, _a, _v: 1.5 + 20.0 * t))
+    fault = presented.fault
+    assert fault is not None
+    assert fault.kind == "active-torque"
+    assert fault.message == (
+        "active torque: needs at most 10 N·m of a model that is not passive, got "
+        "10.020 N·m"
+    )
+    assert max(torque for _, torque in device.commands) == pytest.approx(10.0)
+    assert_ramps_to_zero(device, presented)
+
+
+def test_no_number_is_not_sent() -> None:
+    device, presented = at_constant_speed(
+        Joint(lambda t, _a, _v: 1.0 if t < 0.1 else math.nan)
+    )
+    assert presented.fault is not None
+    assert presented.fault.kind == "active-torque"
+    assert all(math.isfinite(torque) for _, torque in device.commands)
+
+
+# Slip
+
+
+def test_a_lost_grip_is_a_fault_with_the_ramp_in_every_phase() -> None:
+    joint = Joint(lambda t, _a, _v: min(1.0 + 20.0 * t, 6.0))
+    rendering = rendered(joint, OUT, hand=MotionHand(OUT, slip_time=0.6))
+    fault, columns = rendering.presented.fault, rendering.presented.recording.columns
+    assert fault is not None
+    assert fault.kind == "slip"
+    assert fault.message.startswith(
+        "slip: needs an arm whose speed falls by at most 40 deg/s in 10 ms, got 4"
+    )
+    assert 0.6 < fault.time_s < 0.62
+    assert joint.releases == [1.0]
+    assert rendering.presented.recording.facts["grip_lost"] is True
+    after = columns["time_s"] > fault.time_s + 1e-9
+    line = fault.torque_nm * (1.0 - (columns["time_s"][after] - fault.time_s) / 0.05)
+    np.testing.assert_allclose(columns["command_torque_nm"][after], line, atol=1e-6)
+
+
+def test_moving_the_arm_back_is_no_lost_grip() -> None:
+    joint = Joint(lambda _t, angle, velocity: 2.0 * (angle - START) + 0.2 * velocity)
+    joint.phase = 1
+    presented = there_and_back(joint)
+    assert presented.fault is None
+    assert presented.recording.facts["grip_lost"] is False
+
+
+# Who is guarded
+
+
+def test_a_passive_model_is_not_guarded() -> None:
+    joint = Joint(helping, is_passive=True)
+    assert not Controller(joint, start_angle=START).is_guarded
+    _, presented = at_constant_speed(joint)
+    assert presented.fault is None
+
+
+@pytest.mark.parametrize("name", sorted(STANDARD_MODELS))
+def test_the_papers_own_law_keeps_the_papers_own_release(name: str) -> None:
+    assert not Controller(STANDARD_MODELS[name], start_angle=START).is_guarded
+    limits = replace(LIMITS, active_torque=0.1, active_energy=1e-6)
+    presented = present(name, 92.0, limits=limits, slip_time=0.9)
+    assert presented.fault is None
+    assert presented.recording.facts["grip_lost"] is True
