@@ -29,6 +29,9 @@ _Ratings = TypeVar("_Ratings", bound="CodedRatings | CountedRatings")
 USUAL = ("percent_agreement", "fleiss_kappa")
 """The coefficients that are estimated where none are named."""
 
+OF_MEASUREMENTS = ("icc_a1", "lin_ccc")
+"""The same where limits of agreement show that grades are measurements."""
+
 _OF_METRIC = "krippendorff_alpha"
 """The coefficient that has metrics."""
 
@@ -40,7 +43,7 @@ _SURE_TWO_SIDED = 0.90  # the level of which the lower end alone is as sure
 class EstimateOptions:
     """What is estimated of every part of the ratings."""
 
-    coefficients: list[str] | None  # names, or "all" alone; None for `USUAL`
+    coefficients: list[str] | None  # names, or "all" alone; None for `usual`
     weights: "WeightName"  # for coefficients that take any; checked where they are made
     target: Target | None  # what a new study would draw anew; no interval when None
     interval: Literal["auto", "analytic", "jackknife", "bootstrap", "posterior"]
@@ -51,6 +54,7 @@ class EstimateOptions:
     words: "BandScale | None"  # whose words for values
     metric: "Metric | None" = None  # of Krippendorff's alpha
     clusters: tuple[str, ...] = ()  # that of every item of the part, if items have any
+    usual: tuple[str, ...] = USUAL  # estimated where none are named
 
     @property
     def takes_all(self) -> bool:
@@ -58,11 +62,16 @@ class EstimateOptions:
         return self.coefficients == ["all"]
 
     @property
+    def are_named(self) -> bool:
+        """Whether the coefficients were named one by one."""
+        return self.coefficients is not None and not self.takes_all
+
+    @property
     def names(self) -> list[str]:
         """The coefficients that are named, or the usual ones."""
         if self.coefficients is not None:
             return self.coefficients
-        return list(USUAL) if self.metric is None else [_OF_METRIC]
+        return list(self.usual) if self.metric is None else [_OF_METRIC]
 
     def by_metric(self, entry: "Coefficient") -> "Coefficient":
         """Return the coefficient by the metric that was chosen, if it has metrics."""
@@ -164,8 +173,8 @@ def estimate_row(
     try:
         estimate = _estimate(entry, ratings, options, options.level, has_target)
     except MasrelError as error:
-        if not has_target or not (options.coefficients is None or options.takes_all):
-            raise  # just these were named: each must have the interval
+        if not has_target or options.are_named:
+            raise  # each of them must have the interval
         none = "it is no function of sums over items" if entry.kernel is None else error
         notes.append(f"no interval: {none}")
         refusal, has_target = error, False
@@ -197,8 +206,8 @@ def _estimate(
 ) -> Estimate:
     """Return the coefficient, with the interval that answers for the target."""
     weights = options.weights_of(entry)
-    # Among all that fit, one that comes with an interval has it, whatever its target.
-    is_done = entry.has_interval and options.takes_all and not options.clusters
+    # Unless it was named, one that comes with an interval has it, whatever its target.
+    is_done = entry.has_interval and not (options.are_named or options.clusters)
     if options.target is None or not has_target or is_done:
         result = entry(
             ratings, categories=ratings.categories, weights=weights, level=level

@@ -6,7 +6,12 @@ from typing import TYPE_CHECKING
 
 import click
 
-from masrel.analysis._file_estimates import EstimateOptions, check_order, entries
+from masrel.analysis._file_estimates import (
+    OF_MEASUREMENTS,
+    EstimateOptions,
+    check_order,
+    entries,
+)
 from masrel.cli._options import grouped
 from masrel.errors import MasrelWarning, ParameterError
 
@@ -65,6 +70,10 @@ class FurtherOptions:
                 f"items: --target items or none, got --target {options.target}"
             )
         if not self.compare:
+            # weights are those of a kappa
+            is_plain = options.weights == "identity"
+            if self.limits_of_agreement and is_plain:
+                options = replace(options, usual=OF_MEASUREMENTS)
             return options
         if by is None:
             raise ParameterError(

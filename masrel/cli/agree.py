@@ -5,7 +5,12 @@ from typing import TYPE_CHECKING
 
 import click
 
-from masrel.analysis._file_estimates import USUAL, EstimateOptions, estimate_rows
+from masrel.analysis._file_estimates import (
+    OF_MEASUREMENTS,
+    USUAL,
+    EstimateOptions,
+    estimate_rows,
+)
 from masrel.cli._agreement_output import WithArguments, write_agreement
 from masrel.cli._further import FurtherOptions, further_options, further_tables
 from masrel.cli._options import OutputOptions, grouped, output_options, split_commas
@@ -44,7 +49,8 @@ _estimate_options = grouped(
     click.option(
         "--coefficients",
         metavar="NAMES",
-        show_default=",".join(USUAL),
+        show_default=f"{','.join(USUAL)}; with --limits-of-agreement "
+        f"{','.join(OF_MEASUREMENTS)}",
         type=split_commas,
         is_eager=True,
         callback=_list_register,
@@ -166,6 +172,7 @@ def agree(
         )
     ratings = read_file(file, reading)
     by, groups = _groups(ratings, further, file)
+    tables = further_tables(ratings, further, options, explain=explain)
     write_agreement(
         _estimate(ratings, groups, further.between_raters(ratings, options)),
         output,
@@ -174,7 +181,7 @@ def agree(
         options=options,
         by=by,
         explain=explain,
-        further=further_tables(ratings, further, options, explain=explain),
+        further=tables,
     )
 
 

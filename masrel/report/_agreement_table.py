@@ -1,5 +1,6 @@
 """The agreement in a file of ratings: its table, its figure and its record."""
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -13,6 +14,7 @@ from masrel.report._estimate_words import (
     aside,
     forest_row,
     origin,
+    pair_words,
     promise,
     sentence,
 )
@@ -84,9 +86,7 @@ def agreement_table(
         cells = [(*rest, word) for rest, word in zip(cells, words, strict=True)]
     if by is not None:
         key = group_key(by)
-        columns.insert(
-            0, Column(key=key, heading=by[:1].upper() + by[1:], align="left")
-        )
+        columns.insert(0, Column(key=key, heading=_capital(by), align="left"))
         cells = [(row.group, *rest) for row, rest in zip(rows, cells, strict=True)]
     return Table(
         name="agreement",
@@ -97,7 +97,8 @@ def agreement_table(
         notes=(
             *notes,
             *_errors_note(rows, in_sentences),
-            *_notes(rows, explain),
+            *(() if in_sentences else _paired_note(rows)),
+            *_notes(rows, by, explain),
             *_words_note(rows, bands),
         ),
         data=data,
@@ -160,20 +161,43 @@ def _is_clustered(estimate: Estimate) -> bool:
     return estimate.interval is not None and estimate.interval.unit == "clusters"
 
 
-def _notes(rows: Sequence[AgreementRow], explain: bool) -> tuple[str, ...]:
+def _paired_note(rows: Sequence[AgreementRow]) -> tuple[str, ...]:
+    # how many items the values rest on, where some have no pair of ratings
+    fewer = {
+        row.group: row.estimate
+        for row in rows
+        if row.estimate.n_items_paired < row.estimate.n_items
+    }
+    if not fewer:
+        return ()
+    counts = [f"{of.n_items_paired} of {of.n_items}" for of in fewer.values()]
+    pair = pair_words(next(iter(fewer.values())))
+    if len({row.group for row in rows}) == 1:
+        return (f"{counts[0]} items have {pair}.",)
+    of_groups = map("{} ({})".format, counts, fewer)
+    return (f"Items that have {pair}: {', '.join(of_groups)}.",)
+
+
+def _notes(
+    rows: Sequence[AgreementRow], by: str | None, explain: bool
+) -> tuple[str, ...]:
     # How each interval was made, what to know of it, and why a value is undefined.
-    # A note names its rows, unless it holds for all that it could be of.
+    # A note names its rows, unless it holds for all that it could be of; what there is
+    # to say of the same rows is one note.
     rows_of: dict[str, list[AgreementRow]] = {}
     for row in rows:
         for text in _texts(row, explain):
             rows_of.setdefault(text, []).append(row)
     with_interval = [row for row in rows if row.estimate.interval is not None]
-    notes = []
+    texts_of: dict[str, list[str]] = {}
     for text, subset in rows_of.items():
         is_of_all = subset == with_interval or len(subset) == len(rows)
-        names = "" if is_of_all else f"{'; '.join(_names(subset, rows))}: "
-        notes.append(f"{names}{text}.")
-    return tuple(notes)
+        start = text if is_of_all else _names(subset, rows, by)
+        texts_of.setdefault(start, []).extend([] if is_of_all else [text])
+    return tuple(
+        f"{start}: {'; '.join(texts)}." if texts else f"{start}."
+        for start, texts in texts_of.items()
+    )
 
 
 def _texts(row: AgreementRow, explain: bool) -> list[str]:
@@ -238,14 +262,37 @@ def _words_note(
     )
 
 
-def _names(subset: Sequence[AgreementRow], rows: Sequence[AgreementRow]) -> list[str]:
-    # the coefficients, with the groups where a note does not hold for all of them
-    names = []
-    for title in dict.fromkeys(row.title for row in subset):
-        every = [row.group for row in rows if row.title == title]
-        groups = [row.group for row in subset if row.title == title]
-        names.append(title if groups == every else f"{title} ({', '.join(groups)})")
-    return names
+def _names(
+    subset: Sequence[AgreementRow], rows: Sequence[AgreementRow], by: str | None
+) -> str:
+    # The coefficients that a note holds for, with their groups unless it holds for all;
+    # three or more that follow each other in the table by the first and the last. The
+    # groups alone where it holds for every coefficient of them.
+    every, some = _groups_by_title(rows), _groups_by_title(subset)
+    names: list[str] = []
+    for groups, of_groups in itertools.groupby(every, key=some.get):
+        titles = list(of_groups)
+        if groups is None:
+            continue
+        if by is not None and len(titles) == len(every):
+            return f"{_capital(by)} {', '.join(groups)}"
+        is_of_all = all(every[title] == groups for title in titles)
+        which = "" if is_of_all else f" ({', '.join(groups)})"
+        if len(titles) > 2:
+            titles = [f"{titles[0]} to {titles[-1]}"]
+        names += [f"{title}{which}" for title in titles]
+    return "; ".join(names)
+
+
+def _groups_by_title(rows: Sequence[AgreementRow]) -> dict[str, list[str]]:
+    groups: dict[str, list[str]] = {}
+    for row in rows:
+        groups.setdefault(row.title, []).append(row.group)
+    return groups
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
 
 
 def agreement_sentences(
@@ -257,9 +304,7 @@ def agreement_sentences(
 ) -> str:
     """Return a sentence for every estimate, one a line."""
     stamp = f"{SIMULATED}. " if data == "simulated" else ""
-    heads = [
-        "" if by is None else f"{by[:1].upper()}{by[1:]} {row.group}: " for row in rows
-    ]
+    heads = ["" if by is None else f"{_capital(by)} {row.group}: " for row in rows]
     return "\n".join(
         f"{stamp}{head}{sentence(row.estimate, word=_reached(row, bands))}"
         for head, row in zip(heads, rows, strict=True)

@@ -221,7 +221,8 @@ def _confusion_table(
             for row, grade in enumerate(grades):
                 times = int(result.confusion[place, row].sum())
                 shares = map(_cell, result.shares[place, row].tolist())
-                cells.append((part.group, rater, grade, times, *shares))
+                if times:  # else there is nothing to tell; --json has all
+                    cells.append((part.group, rater, grade, times, *shares))
             documents += [
                 {**part.keys, **document}
                 for document in _confusion(result, place, grades)
@@ -277,7 +278,8 @@ def _interval_notes(
     }
     yield f"{methods[kind]} They generalise to other items, rated by these raters."
     if kind == "raters":
-        yield from dict.fromkeys(note for part in parts for note in part.result.notes)
+        notes = dict.fromkeys(note for part in parts for note in part.result.notes)
+        yield from (f"{note}." for note in notes)
 
 
 def _rows(

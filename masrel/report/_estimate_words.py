@@ -139,6 +139,13 @@ def aside(interval: Interval) -> str:
     return ""
 
 
+def pair_words(estimate: Estimate) -> str:
+    """Return what an item needs to count among those with a pair of ratings."""
+    entry = COEFFICIENTS.get(estimate.coefficient)  # none of kappa of a category
+    is_retest = entry is not None and entry.shape == "pairs"
+    return "both ratings of a rater" if is_retest else "two ratings or more"
+
+
 def sentence(estimate: Estimate, *, word: str = "") -> str:
     """Return an estimate of items as a sentence for a paper, in the style of APA."""
     # word: the one that it earns, and whose it is
@@ -146,7 +153,10 @@ def sentence(estimate: Estimate, *, word: str = "") -> str:
     name = entry.title
     if entry.weighted and estimate.weights != "identity":
         name = f"{name} ({estimate.weights} weights)"
-    sizes = (counted(estimate.n_items, "item"), counted(estimate.n_raters, "rater"))
+    items = counted(estimate.n_items, "item")
+    if estimate.n_items_paired < estimate.n_items:
+        items += f" ({estimate.n_items_paired} with {pair_words(estimate)})"
+    sizes = (items, counted(estimate.n_raters, "rater"))
     if estimate.reason is not None:
         return f"{name} is undefined ({estimate.reason}), {', '.join(sizes)}."
     shown = partial(number, digits=2) if entry.in_units else _apa
