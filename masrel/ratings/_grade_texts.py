@@ -42,6 +42,7 @@ _LOOK_ALIKE = str.maketrans(
 _SHOWN = 6  # texts that a message lists
 _LONGEST = 60  # letters of a text that it shows
 _SCALE = 10  # widest span of grades of a scale, rather than of measurements
+_MANY_GRADES = 15  # of the longest usual scale: Borg's, from 6 to 20
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -358,7 +359,7 @@ def _doubts_of_grades(
     numbers = [text for text in met if as_number[text] is not None]
     others = [text for text in met if as_number[text] is None]
     if not others:
-        warnings += _same_floats(list(freq))
+        warnings += _same_floats(list(freq)) + _measurements(freq)
     if all(map(_HALF_GRADE.fullmatch, others)):
         return warnings + _far_codes([g for g in freq if is_number(g)], freq)
     return warnings + _stray(numbers, others, met, stands)
@@ -375,6 +376,19 @@ def _same_floats(grades: Sequence[str]) -> list[str]:
                 "that grades weigh by their place in the scale"
             ]
     return []
+
+
+def _measurements(freq: Mapping[str, int]) -> list[str]:
+    # more numbers than a scale has grades, most of which hardly ever come again
+    n_ratings = sum(freq.values())
+    if len(freq) <= _MANY_GRADES or 2 * len(freq) <= n_ratings:
+        return []
+    return [
+        f"{len(freq)} different numbers in {n_ratings} ratings look like measurements: "
+        "percent agreement and unweighted kappas count only those that are equal; "
+        "--coefficients icc_a1 or --metric interval weigh how far they lie from each "
+        "other"
+    ]
 
 
 def _far_codes(grades: Sequence[str], freq: Mapping[str, int]) -> list[str]:

@@ -265,3 +265,16 @@ def test_an_item_is_in_one_cluster(masrel: Caller, tmp_path: Path) -> None:
     message = refused(masrel, path, "--item", "item", "--clusters", "patient")
     assert "line 4 and line 5: needed one cluster of item '2'" in message
     assert "got 'p' and 'q'" in message
+
+
+def test_a_category_that_nobody_met_has_no_row_of_confusions(
+    masrel: Caller, wide: Path
+) -> None:
+    call = (wide, "--ignore", "site", "--categories", "a,b,c,d", "--diagnose")
+    cells = record(masrel, *call)["diagnosis_confusion"]
+    assert sum(cell["of"] == "d" for cell in cells) == 4 * len(NAMES)
+    _, below = masrel("agree", *call).out.split("What each rater said")
+    rows = [line.split()[:2] for line in below.splitlines()[3:]]
+    assert [row for row in rows if row[0] in NAMES] == [
+        [name, grade] for name in NAMES for grade in "abc"
+    ]

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from masrel.agreement import limits_of_agreement
+from masrel.agreement import limits_of_agreement, lin_ccc
 from tests.cli.process import Caller
 
 PAIRS = [(9, 8), (5, 7), (4, 4), (8, 7), (6, 6), (5, 7)]
@@ -31,6 +31,26 @@ def test_table_and_record_are_those_of_the_library(masrel: Caller, pairs: Path) 
     assert (record["lower"], record["upper"]) == (limits.lower, limits.upper)
     assert record["outer"] == list(limits.outer)
     assert record["upper_interval"]["high"] == limits.upper_interval.high
+
+
+def test_limits_come_with_coefficients_of_measurements(
+    masrel: Caller, pairs: Path
+) -> None:
+    def names(*more: str) -> list[str]:
+        call = ("agree", pairs, "--limits-of-agreement", "--json", "-", *more)
+        document = json.loads(masrel(*call).out)
+        return [estimate["coefficient"] for estimate in document["estimates"]]
+
+    for target in ((), ("--target", "items"), ("--target", "both")):
+        assert names(*target) == ["icc_a1", "lin_ccc"]
+    assert names("--coefficients", "scott_pi") == ["scott_pi"]
+    assert names("--metric", "interval") == ["krippendorff_alpha"]
+    assert names("--weights", "linear") == ["percent_agreement", "fleiss_kappa"]
+    concordance = json.loads(
+        masrel("agree", pairs, "--limits-of-agreement", "--json", "-").out
+    )["estimates"][1]
+    assert concordance["value"] == lin_ccc(PAIRS).value
+    assert concordance["interval"]["low"] == lin_ccc(PAIRS).interval.low
 
 
 def test_figure_has_the_limits_with_their_unit(masrel: Caller, pairs: Path) -> None:

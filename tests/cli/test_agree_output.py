@@ -281,6 +281,49 @@ def test_notes_are_no_longer_than_the_table(masrel: Caller, wide: Path) -> None:
         assert "chosen for" not in below
 
 
+# Items 1 to 4 of each clinic have one rating, of A; the others have two or three.
+SPARSE = "clinic,item,A,B,C\n" + "".join(
+    f"{clinic},{clinic}{k},{k % 2},{'' if k < 5 else k % 2},{'' if k < 9 else k % 3}\n"
+    for clinic, items in (("North", range(1, 11)), ("South", range(1, 12)))
+    for k in items
+)
+
+
+def test_items_without_a_pair_of_ratings_are_told(
+    masrel: Caller, tmp_path: Path
+) -> None:
+    sparse = written(tmp_path, SPARSE)
+    call = ("agree", sparse, "--raters", "A,B,C")
+    done = masrel(*call)
+    n_items, n_paired = 10 + 11, 6 + 7
+    note = f"{n_paired} of {n_items} items have two ratings or more."
+    assert note in done.out.splitlines()
+    assert all(
+        (e["n_items"], e["n_items_paired"]) == (n_items, n_paired)
+        for e in document(masrel(*call, "--json", "-"))["estimates"]
+    )
+    sentence = masrel(*call, "--sentence")
+    assert f"{n_items} items ({n_paired} with two ratings or more)" in sentence.out
+    assert note not in sentence.out + sentence.err
+    note = "Items that have two ratings or more: 6 of 10 (North), 7 of 11 (South)."
+    assert note in masrel(*call, "--by", "clinic").out.splitlines()
+    assert "two ratings" not in masrel("agree", written(tmp_path, WIDE, "w.csv")).out
+
+
+def test_a_note_names_rows_that_follow_each_other_by_the_first_and_the_last(
+    masrel: Caller, tmp_path: Path
+) -> None:
+    sparse = written(tmp_path, SPARSE)
+    call = ("agree", sparse, "--raters", "A,B,C", "--coefficients", "all")
+    text = " ".join(masrel(*call, "--target", "both").out.split())
+    assert "Percent agreement to Krippendorff's α: 3 raters: below 5 " in text
+    assert "Kendall's W; Robinson's A: no interval: " in text
+    call = ("agree", sparse, "--by", "clinic", "--target", "items")
+    by = " ".join(masrel(*call, "--interval", "jackknife").out.split())
+    for clinic, df in (("North", 5), ("South", 6)):
+        assert f"Clinic {clinic}: 95 % CI, item jackknife, t({df}): " in by
+
+
 def test_standard_errors_are_explained_where_there_are_any(
     masrel: Caller, wide: Path
 ) -> None:

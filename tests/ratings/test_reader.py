@@ -560,3 +560,30 @@ def test_an_encoding_that_is_given_outdoes_a_mark(tmp_path: Path) -> None:
     path = tmp_path / "r.csv"
     path.write_bytes("ÿþ,Kim,Lee\nA,1,1\nB,2,1\n".encode("latin-1"))  # UTF-16's mark
     assert read_ratings(path, encoding="latin-1").read["item"] == ["ÿþ"]
+
+
+def test_measurements_are_told_from_grades(tmp_path: Path) -> None:
+    def measured(rows: list[tuple[float, float]], **options: Any) -> list[str]:
+        text = "item,A,B\n" + "".join(
+            f"i{k},{a},{b}\n" for k, (a, b) in enumerate(rows)
+        )
+        return [w for w in read(tmp_path, text, **options).warnings if "measure" in w]
+
+    angles = [(k + 0.25, k + 0.5) for k in range(40)]
+    (warning,) = measured(angles)
+    assert warning.startswith(
+        "80 different numbers in 80 ratings look like measurements"
+    )
+    long = "item,rater,grade\n" + "".join(
+        f"i{k},{rater},{angle}\n"
+        for k, pair in enumerate(angles)
+        for rater, angle in zip("AB", pair, strict=True)
+    )
+    assert warning in read(tmp_path, long).warnings
+    declared = [str(angle) for pair in angles for angle in pair]
+    assert not measured(angles, categories=declared)
+    # 15 grades of Borg's scale once or twice each, from 0 to 10, and 40 of 80 ratings
+    assert not measured([(k, k + 1) for k in range(6, 20)])
+    assert not measured([(k, 10 - k) for k in range(6)])
+    assert not measured([(k, k) for k in range(40)])
+    assert measured([(k, k) for k in range(40)] + [(100, 101)])
