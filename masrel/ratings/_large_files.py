@@ -118,6 +118,8 @@ def cell_texts(values: Any) -> list[str]:
     kind = str(values.type)
     if kind in STRINGS:
         return [text or "" for text in values.to_pylist()]
+    if kind in _WHOLE:
+        return ["" if number is None else str(number) for number in values.to_pylist()]
     if kind in ("halffloat", "float", "double"):  # numpy's know their precision
         numbers = values.to_numpy(zero_copy_only=False)
         return ["" if x != x else value_text(x) for x in numbers]
@@ -211,7 +213,8 @@ def _span(about: Any, field: str) -> tuple[int, int] | None:
 
 
 def _column_texts(column: Any) -> list[str]:
-    if str(column.type).partition("<")[0] in _NESTED:
+    # to look for different values would load pyarrow.compute
+    if is_whole(column) or str(column.type).partition("<")[0] in _NESTED:
         return cell_texts(column)
     if not hasattr(column, "dictionary"):
         column = column.dictionary_encode()
