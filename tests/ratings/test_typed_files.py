@@ -1,6 +1,7 @@
 """Files whose cells have types: what each cell says, and what is refused."""
 
 import datetime
+import gzip
 import io
 import json
 import sys
@@ -358,6 +359,26 @@ class TestStatistical:
         file = read_ratings(path)
         assert grades(file) == EXPECTED
         assert file.read["format"] == ending
+
+    def test_a_table_of_sas(self, tmp_path: Path) -> None:
+        pytest.importorskip("pyreadstat")
+        packed = Path(__file__).parent / "sas" / "hadley.sas7bdat.gz"
+        path = tmp_path / "r.sas7bdat"
+        path.write_bytes(gzip.decompress(packed.read_bytes()))
+        rows = ("1151", "2141", "2243", "31 3", "4524", "5455", "5344", "4555")
+        answers = {
+            (f"{item}", f"q{k}"): None if cell == " " else cell
+            for item, row in enumerate(rows, start=1)
+            for k, cell in enumerate(row, start=1)
+        }
+        for form in (packed, path):
+            file = read_ratings(form, item="id", ignore=["workshop", "gender"])
+            assert grades(file) == answers
+            assert file.read["format"] == "sas7bdat"
+        for end in (300, 70_000, 131_000):
+            path.write_bytes(gzip.decompress(packed.read_bytes())[:end])
+            with pytest.raises(RatingsError, match=r"r\.sas7bdat: is damaged"):
+                read_ratings(path, item="id", ignore=["workshop", "gender"])
 
     def test_labels_of_spss_are_noted_and_its_missing_codes_missing(
         self, tmp_path: Path
