@@ -14,6 +14,7 @@ MODULES = (
     "masrel.agreement",
     "masrel.intervals",
     "masrel.elbow",
+    "masrel.elbow.tone",
     "masrel.elbow.identification",
     "masrel.hess",
     "masrel.hess.puck",

@@ -25,6 +25,7 @@ from masrel.elbow.outline import Outline, outline
 from masrel.elbow.parameters import STANDARD_MODELS, ElbowParameters
 from masrel.elbow.sampled import SampledJoint
 from masrel.elbow.scenes import SceneTable, evaluate, torque_traces
+from masrel.elbow.tardieu import Tardieu, tardieu
 from masrel.elbow.torque import times_at, torque, torque_at
 from masrel.elbow.trace import Trace, trace
 
@@ -56,6 +57,7 @@ __all__ = [
     "SceneTable",
     "Stepper",
     "StretchEvents",
+    "Tardieu",
     "Trace",
     "Trapezoid",
     "evaluate",
@@ -69,6 +71,7 @@ __all__ = [
     "peak_torque",
     "read_movement",
     "residual_torque",
+    "tardieu",
     "times_at",
     "torque",
     "torque_at",
