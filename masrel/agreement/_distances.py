@@ -5,6 +5,8 @@ disagreement would, product by product, in a time that hardly grows faster than 
 categories do.
 """
 
+import math
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from typing import Any
 
@@ -16,25 +18,24 @@ Codes = NDArray[np.signedinteger[Any]]
 
 _BLOCK = 1 << 16  # categories at once
 _ITEMS = 1 << 14  # items at once
-_MAX_EXPONENT = 400  # of two, of numbers whose squares and sums of them are floats
+MAX_EXPONENT = 400  # of two, of numbers whose squares and sums of them are floats
 _NODES, _WIDTH = 12, 0.5  # per bin of logarithms: the error is below 25^-12
 
 
 def centred(values: Floats) -> tuple[Floats, float]:
     """Return values from the middle of their range, in a unit that can be squared."""
     exponent = int(np.frexp(np.abs(values).max(initial=0.0))[1])
-    if abs(exponent) > _MAX_EXPONENT:
+    if abs(exponent) > MAX_EXPONENT:
         values = np.ldexp(values, -exponent)
     low, high = float(values.min()), float(values.max())
     # a difference of floats is rounded by its own last digit, and no other
     return values - (low + 0.5 * (high - low)), high - low
 
 
-class Distances:
+class Distances(ABC):
     """v as an operator: (n_categories, n_categories), symmetric, 0 on its diagonal."""
 
     __array_ufunc__ = None  # `counts @ v` is left to `__rmatmul__`
-    points: Floats | None = None  # (n_categories, n_dimensions): v = |e_k - e_l|²
 
     def __init__(self, n_categories: int) -> None:
         self.n = n_categories
@@ -42,17 +43,17 @@ class Distances:
     def __len__(self) -> int:
         return self.n
 
+    @abstractmethod
     def dot(self, masses: Floats) -> Floats:
         """Return Σ_l v_kl m_l, (n_categories,)."""
-        raise NotImplementedError
 
     def between(self, first: Floats, second: Floats) -> float:
         """Return Σ_kl v_kl m_k m'_l."""
         return float(first @ self.dot(second))
 
+    @abstractmethod
     def pair(self, first: Codes, second: Codes) -> Floats:
         """Return v of pairs of categories."""
-        raise NotImplementedError
 
     def of_items(self, codes: Codes) -> Floats:
         """Return Σ_kl v_kl n_ik n_il of each row of codes; -1 is no rating."""
@@ -70,38 +71,30 @@ class Distances:
         return 2.0 * total
 
     def moments(self, codes: Codes) -> Floats:
-        """Return sums over the ratings of each item: of points and of their squares.
+        """Return what `between_moments` needs of items: counts of the categories."""
+        # -> (n_items, n_categories)
+        counts = np.zeros((len(codes), self.n + 1))  # missing, -1, is the last
+        for column in codes.T:
+            counts[np.arange(len(codes)), column] += 1.0
+        return counts[:, :-1]
 
-        Counts of the categories where v is not made of points.
-        """
-        # -> (n_items, n_dimensions + 1), or (n_items, n_categories)
-        if self.points is None:
-            counts = np.zeros((len(codes), self.n + 1))  # missing, -1, is the last
-            for column in codes.T:
-                counts[np.arange(len(codes)), column] += 1.0
-            return counts[:, :-1]
-        squares = np.einsum("km,km->k", self.points, self.points)
-        padded = np.column_stack([self.points, squares])
-        padded = np.vstack([padded, np.zeros(padded.shape[1])])
-        return np.asarray(sum(padded[column] for column in codes.T))
-
-    def between_moments(self, moments: Floats, mass: Any = 1.0) -> Floats:
+    def between_moments(self, moments: Floats, mass: Any = 1.0) -> Floats:  # noqa: ARG002 - it is in the counts
         """Return Σ_kl v_kl m_k m_l of sums of moments, of which the mass is known."""
-        # (..., n_dimensions + 1) -> (...): 2 (M Σ m |e|² - |Σ m e|²)
-        if self.points is None:
-            return np.asarray(np.einsum("...k,...k->...", moments @ self, moments))
-        e = moments[..., :-1]
-        return np.asarray(2.0 * (mass * moments[..., -1] - (e * e).sum(axis=-1)))
+        # (..., n_categories) -> (...)
+        return np.asarray(np.einsum("...k,...k->...", moments @ self, moments))
 
     def sum(self) -> float:
         """Return Σ_kl v_kl."""
-        return float(self.dot(np.ones(self.n)).sum())
+        ones = np.ones(self.n)
+        return self.between(ones, ones)
 
     def any(self) -> bool:
         """Return whether any two categories disagree."""
         return self.n > 1
 
     def __rmatmul__(self, masses: Floats) -> Floats:
+        if np.iscomplexobj(masses):  # with a derivative by a complex step
+            return np.asarray(masses.real @ self + 1j * (masses.imag @ self))
         rows = masses.reshape(-1, self.n)
         return np.asarray([self.dot(row) for row in rows]).reshape(masses.shape)
 
@@ -112,6 +105,11 @@ class Differing(Distances):
     def dot(self, masses: Floats) -> Floats:
         """Return Σ_l v_kl m_l, (n_categories,)."""
         return np.asarray(masses.sum(axis=-1, keepdims=True) - masses)
+
+    def between(self, first: Floats, second: Floats) -> float:
+        """Return Σ_kl v_kl m_k m'_l."""
+        # few of the pairs are alike, so that the rounding of these does not matter
+        return float(first.sum() * second.sum() - first @ second)
 
     def __rmatmul__(self, masses: Floats) -> Floats:
         return self.dot(masses)
@@ -126,15 +124,14 @@ class Squared(Distances):
 
     def __init__(self, points: Floats) -> None:
         super().__init__(len(points))
-        self.points = points
-        self._points = points
+        self.points = points  # (n_categories, n_dimensions): v = |e_k - e_l|²
 
     def dot(self, masses: Floats) -> Floats:
         """Return Σ_l v_kl m_l, (n_categories,)."""
         # Σ_l m_l |e_k - e_l|² by moments about the mean, so that no digits cancel
         mass = masses.sum()
-        mean = masses @ self._points / (mass if mass else 1.0)
-        e = self._points - mean
+        mean = masses @ self.points / (mass if mass else 1.0)
+        e = self.points - mean
         squares = np.einsum("km,km->k", e, e)
         return np.asarray(mass * squares + masses @ squares - 2.0 * (e @ (masses @ e)))
 
@@ -142,7 +139,7 @@ class Squared(Distances):
         """Return Σ_kl v_kl m_k m'_l."""
         of_first, of_second = float(first.sum()), float(second.sum())
         total = 0.0
-        for x in self._points.T:
+        for x in self.points.T:
             e = x - float(first @ x) / (of_first if of_first else 1.0)
             offset, squares = float(second @ e), e * e  # of the first there is none
             total += of_second * float(first @ squares)
@@ -154,7 +151,7 @@ class Squared(Distances):
     def pair(self, first: Codes, second: Codes) -> Floats:
         """Return v of pairs of categories."""
         total = np.zeros(len(first))
-        for x in self._points.T:
+        for x in self.points.T:
             total += (x[first] - x[second]) ** 2
         return total
 
@@ -171,7 +168,7 @@ class Squared(Distances):
         is_rated = codes >= 0
         size = is_rated.sum(axis=1)
         total = np.zeros(len(codes))
-        for x in self._points.T:
+        for x in self.points.T:
             values = x[codes]
             if not is_rated.all():
                 values[~is_rated] = 0.0
@@ -181,6 +178,20 @@ class Squared(Distances):
             total += np.einsum("ij,ij->i", values, values)
         return np.asarray(2.0 * size * total)
 
+    def moments(self, codes: Codes) -> Floats:
+        """Return sums over the ratings of items: of points and of their squares."""
+        # -> (n_items, n_dimensions + 1)
+        squares = np.einsum("km,km->k", self.points, self.points)
+        padded = np.column_stack([self.points, squares])
+        padded = np.vstack([padded, np.zeros(padded.shape[1])])
+        return np.asarray(sum(padded[column] for column in codes.T))
+
+    def between_moments(self, moments: Floats, mass: Any = 1.0) -> Floats:
+        """Return Σ_kl v_kl m_k m_l of sums of moments, of which the mass is known."""
+        # (..., n_dimensions + 1) -> (...): 2 (M Σ m |e|² - |Σ m e|²)
+        e = moments[..., :-1]
+        return np.asarray(2.0 * (mass * moments[..., -1] - (e * e).sum(axis=-1)))
+
 
 class Linear(Distances):
     """Distances on a line, times a factor."""
@@ -188,20 +199,40 @@ class Linear(Distances):
     def __init__(self, values: Floats, factor: float) -> None:
         super().__init__(len(values))
         self.values, self.factor = values, factor
-        self._order = np.argsort(values, kind="stable")
+        self._order = np.argsort(values)
 
     def dot(self, masses: Floats) -> Floats:
         """Return Σ_l v_kl m_l, (n_categories,)."""
         # Σ_l m_l |x_k - x_l| = x_k (2 M_k - M) + S - 2 S_k of sums up to x_k
         x, m = self.values[self._order], masses[self._order]
-        up_to, moment = np.cumsum(m), np.cumsum(m * x)
+        up_to, moment = _running_sums(m), _running_sums(m * x)
         between = np.empty(self.n)
         between[self._order] = x * (2.0 * up_to - up_to[-1]) + moment[-1] - 2.0 * moment
         return between * self.factor
 
+    def between(self, first: Floats, second: Floats) -> float:
+        """Return Σ_kl v_kl m_k m'_l."""
+        # each gap is crossed by the masses on its sides
+        gaps = np.diff(self.values[self._order])
+        below = other = _running_sums(first[self._order])
+        if second is not first:
+            other = _running_sums(second[self._order])
+        crossing = below * (other[-1] - other) + (below[-1] - below) * other
+        return float(gaps @ crossing[:-1]) * self.factor
+
     def pair(self, first: Codes, second: Codes) -> Floats:
         """Return v of pairs of categories."""
         return np.abs(self.values[first] - self.values[second]) * self.factor
+
+
+def _running_sums(x: Floats) -> Floats:
+    # in blocks, so that few roundings add up
+    width = math.isqrt(len(x)) + 1
+    blocks = np.zeros((width, width))
+    blocks.ravel()[: len(x)] = x
+    np.cumsum(blocks, axis=1, out=blocks)
+    blocks[1:] += np.cumsum(blocks[:-1, -1])[:, None]
+    return blocks.ravel()[: len(x)]
 
 
 class Both(Distances):
@@ -236,7 +267,9 @@ class Ratio(Distances):
         u = np.log(self.values[self._positive])
         low, high = float(u.min()), float(u.max())
         width = max((high - low) / max(1.0, np.ceil((high - low) / _WIDTH)), 1e-300)
-        used, self._bin = np.unique(((u - low) // width), return_inverse=True)
+        bins = (u - low) // width
+        used = np.unique(bins)
+        self._bin = np.searchsorted(used, bins)  # faster than the inverse of `unique`
         centres = low + (used + 0.5) * width
         self._u = (u - centres[self._bin]) * (2.0 / width)  # within [-1, 1]
         angles = (2 * np.arange(_NODES) + 1) * np.pi / (2 * _NODES)

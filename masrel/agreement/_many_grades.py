@@ -155,14 +155,14 @@ def measurements(
     if ratings.size < _MEASURED or len(np.unique(first)) < _MEASURED // 2:
         return None
     rated = ~np.isnan(ratings)
-    values = ratings[rated].astype(np.float64)
+    values = ratings[rated].astype(np.float64, copy=False)
     if not np.isfinite(values).all():
         return None
     ordered = np.sort(values)
     if (ordered[1:] == ordered[:-1]).any():
         return None
     codes = np.full(ratings.shape, -1, dtype=np.int32)
-    codes[rated] = np.arange(values.size)
+    codes[rated] = np.arange(values.size, dtype=np.int32)
     scale: Any = values
     coded = CodedRatings(codes=codes, categories=scale, declared=False)
     return CountedRatings(

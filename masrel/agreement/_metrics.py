@@ -13,7 +13,7 @@ import numpy as np
 
 from masrel.agreement._counts import CountedRatings, DistinctItems, item_counts
 from masrel.agreement._data import CodedRatings
-from masrel.agreement._distances import Squared, centred
+from masrel.agreement._distances import MAX_EXPONENT, Squared, centred
 from masrel.agreement._kernel import Floats, Kernel, divide
 from masrel.agreement._labels import EMPTY_SET, SET_SEPARATOR, Label
 from masrel.agreement._weights import (
@@ -32,8 +32,6 @@ from masrel.errors import ParameterError
 
 Metric = Literal["nominal", "ordinal", "interval", "ratio", "jaccard", "masi"]
 """Names of the difference functions; the last two are of sets of labels."""
-
-_MAX_EXPONENT = 400  # of two, of differences whose squares and sums of them are floats
 
 
 def check_metric(metric: str) -> None:
@@ -93,7 +91,7 @@ def _in_range(values: list[Fraction]) -> list[Fraction]:
     if range_ == 0:
         return values
     exponent = range_.numerator.bit_length() - range_.denominator.bit_length()
-    if abs(exponent) <= _MAX_EXPONENT:
+    if abs(exponent) <= MAX_EXPONENT:
         return values
     return [value / Fraction(2) ** exponent for value in values]
 

@@ -64,30 +64,31 @@ class PooledCoefficient(NamedTuple):
     name: str
     title: str
     # the number of categories q, T = Σ_kl v_kl times the denominator w of the weights,
-    # and w, to D_e: in integers, or in floats with w = 1
-    chance: Callable[[int, Any, Any], Chance]
+    # which many categories take long to add up, and w, to D_e: in integers, or in
+    # floats with w = 1
+    chance: Callable[[int, Callable[[], Any], Any], Chance]
     # whether chance counts any two categories as different, whatever the weights
     nominal: bool = False
 
 
-def _nothing(_q: int, _total: Any, _w: Any) -> Chance:
+def _nothing(_q: int, _total: Callable[[], Any], _w: Any) -> Chance:
     return Chance(1, 0, 1)  # 1 - D_o / 1: what is observed, as it is
 
 
-def _shared_margins(_q: int, _total: Any, _w: Any) -> Chance:
+def _shared_margins(_q: int, _total: Callable[[], Any], _w: Any) -> Chance:
     return Chance(0, 1, 1)  # Σ_kl v_kl p_k p_l, 1 - P̄_e of Fleiss (1971)
 
 
-def _every_category_alike(q: int, total: Any, w: Any) -> Chance:
-    return Chance(total, 0, q * q * w)  # 1 - Σ_kl w_kl / q² = Σ_kl v_kl / q²
+def _every_category_alike(q: int, total: Callable[[], Any], w: Any) -> Chance:
+    return Chance(total(), 0, q * q * w)  # 1 - Σ_kl w_kl / q² = Σ_kl v_kl / q²
 
 
-def _hard_items(q: int, total: Any, w: Any) -> Chance:
+def _hard_items(q: int, total: Callable[[], Any], w: Any) -> Chance:
     # 1 - p_e with p_e = T_w / (q (q - 1)) Σ_k p_k (1 - p_k), T_w = Σ_kl w_kl
     if q == 1:
         return Chance(0, 0, 1)  # one category leaves no room for chance: 0/0
     divisor = q * (q - 1) * w
-    return Chance(divisor, total - q * q * w, divisor)
+    return Chance(divisor, total() - q * q * w, divisor)
 
 
 PERCENT = PooledCoefficient("percent_agreement", "percent agreement", _nothing)
@@ -124,7 +125,7 @@ def estimate_pooled(
         check_population(population, sums.n_rated)
     p, total = sums.marginals, sums.total
     q = counted.items.n_categories
-    d_e, factor, over_e = coefficient.chance(q, v.total, v.denominator)
+    d_e, factor, over_e = coefficient.chance(q, lambda: v.total, v.denominator)
     if factor:
         of_chance = identity_weights(q) if coefficient.nominal else v
         scale = total * total * of_chance.denominator
@@ -219,7 +220,7 @@ def _influence(
         # with a κ of 0.
         u = u + (size > 1) * (rate * (1 if irrcac else ratio))
     q = len(sums.marginals)
-    _, factor, divisor = coefficient.chance(q, v.total, v.denominator)
+    _, factor, divisor = coefficient.chance(q, lambda: v.total, v.denominator)
     if factor:
         if isinstance(sums.marginals, np.ndarray):
             p = sums.marginals / sums.total
@@ -277,7 +278,7 @@ def pooled_kernel(coefficient: PooledCoefficient) -> Kernel:
         if not len(v):  # nobody rated anything
             return np.full(sums.shape[:-1], np.nan)
         observed = divide(sums[..., 0], sums[..., 1])
-        constant, factor, divisor = coefficient.chance(len(v), v.sum(), 1.0)
+        constant, factor, divisor = coefficient.chance(len(v), v.sum, 1.0)
         if factor == 0:
             return 1.0 - divide(observed, np.asarray(constant / divisor))
         # One category has a share of exactly 1, and so a disagreement of exactly 0.

@@ -278,11 +278,12 @@ def declared_weights(
                 "categories: needs a sequence of at least one label, got "
                 f"{shown(categories)}"
             )
-        categories = tuple(categories)
+        if not isinstance(categories, np.ndarray):  # which may hold millions
+            categories = tuple(categories)
     if isinstance(weights, str):
         if len(categories) > MANY:
             return _named(weights, categories, declared)
-        return named_weights(weights, categories, declared)
+        return named_weights(weights, tuple(categories), declared)
     if isinstance(weights, Weights):
         return _of_other(weights, categories, declared)
     _check_order(categories, declared)

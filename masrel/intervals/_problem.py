@@ -23,7 +23,7 @@ from masrel.agreement import (
 from masrel.agreement._count_tables import places_of
 from masrel.agreement._counts import distinct_rows, item_counts
 from masrel.agreement._data import check_scale
-from masrel.agreement._distances import Distances
+from masrel.agreement._distances import Distances, Squared
 from masrel.agreement._kernel import Floats, Kernel, RaterSums, check_level
 from masrel.agreement._weights import MANY, Weights, declared_weights
 from masrel.errors import (
@@ -362,7 +362,7 @@ def _of_many(
 ) -> tuple[Kernel, Any]:
     # the kernel, and v of many categories as it takes it
     takes_many = kernel.takes_many and not made.has_matrix
-    if takes_many and made.operator.points is not None:
+    if takes_many and isinstance(made.operator, Squared):
         return kernel, made.operator
     q = made.n_categories
     fewest = len(coded.codes) if takes_many else max(len(coded.codes), q)

@@ -16,7 +16,7 @@ from masrel.agreement import (
     fleiss_kappa,
     krippendorff_alpha,
 )
-from masrel.errors import ParameterError, RatingsError
+from masrel.errors import ParameterError, RatingsError, SmallSampleWarning
 from masrel.intervals import bootstrap, estimate, jackknife
 
 Rows = list[list[float]]
@@ -117,6 +117,19 @@ def test_many_grades_have_the_value_of_a_matrix(name: str, weights: str) -> None
     )
 
 
+@pytest.mark.parametrize("weights", ["linear", "quadratic"])
+def test_many_ratings_round_no_more_than_few(weights: str) -> None:
+    # Where all rated everything, Fleiss' D_e is Krippendorff's times (n - 1)/n, and all
+    # counts of alpha are whole; where no two ratings are alike, Gwet's is Fleiss'.
+    ratings = continuous(200_000)[10:]
+    n = ratings.size
+    alpha = krippendorff_alpha(ratings, weights=weights).value  # type: ignore[arg-type]
+    expected = 1.0 - (1.0 - alpha) * n / (n - 1)
+    for name in ("fleiss_kappa", "gwet_ac", "brennan_prediger"):
+        value = COEFFICIENTS[name](ratings, weights=weights).value
+        assert value == pytest.approx(expected, rel=1e-13)
+
+
 def test_cohens_kappa_of_continuous_ratings_by_moments() -> None:
     # Quadratic: κ = 1 - Σ (x - y)² / Σ_ij (x_i - y_j)² n, so 2 s_xy over
     # s_x² + s_y² + (x̄ - ȳ)², Lin's concordance over n.
@@ -202,6 +215,37 @@ def test_the_jackknife_of_continuous_ratings_leaves_items_out(
 
     half = t.ppf(0.975, n - 1) * math.sqrt(variance)
     assert result.low == pytest.approx(value - half, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["fleiss_kappa", "krippendorff_alpha"])
+def test_a_bootstrap_of_many_grades_is_that_of_a_matrix(name: str) -> None:
+    # all resamples of six items, on a scale of 150
+    ratings = [
+        [0, 149, 75],
+        [75, 3, 149],
+        [8, 1, 21],
+        [40, 52, 44],
+        [90] * 3,
+        [9, 8, 7],
+    ]
+    scale = np.arange(150.0)
+    matrix = 1.0 - np.abs(scale[:, None] - scale) / 149.0
+    with pytest.warns(SmallSampleWarning):
+        by_name, custom = (
+            bootstrap(
+                name,
+                ratings,
+                target="items",
+                categories=range(150),
+                weights=weights,  # type: ignore[arg-type]
+                kind="studentized",
+                exact=True,
+            )
+            for weights in ("linear", matrix)
+        )
+    assert (by_name.low, by_name.high) == pytest.approx(
+        (custom.low, custom.high), rel=1e-9
+    )
 
 
 def test_continuous_ratings_have_a_bootstrap_by_moments() -> None:
