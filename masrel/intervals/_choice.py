@@ -19,6 +19,9 @@ Other raters. The rater jackknife; without spread the posterior, for those of th
 
 Both. What the two of them say, joined.
 
+Other clusters of items. The cluster jackknife on a logit; that it may cover less where
+categories are rare is noted.
+
 Items and raters are counted that have a pair of ratings.
 """
 
@@ -36,7 +39,7 @@ from masrel.intervals._drawn_posterior import (
     nothing_to_learn,
     patterns_interval,
 )
-from masrel.intervals._problem import IntervalProblem, warn_small
+from masrel.intervals._problem import Integers, IntervalProblem, of_them, warn_small
 from masrel.intervals._rho import (
     DEFAULT_PRIOR,
     RhoPosterior,
@@ -48,6 +51,7 @@ from masrel.intervals._two_raters import applies_to, default_table_interval
 from masrel.intervals.jackknife import (
     _interval_around_estimate,
     _jackknife_variance,
+    _logit_interval,
     _variance_of_cells,
 )
 from masrel.intervals.posterior import _RHO_COEFFICIENTS
@@ -73,7 +77,7 @@ def choose_interval(
         return _other_items_and_raters(problem, unweighted)
     few = problem.n_paired_items < _FEW and problem.n_paired_raters < _FEW
     outside = _outside_commonest(problem)
-    rare = not few and outside < _SEVERAL and 2 * outside < problem.n_paired_items
+    rare = not few and _is_rare(problem, outside)
     if not (few or rare) or problem.target == "raters" or nothing_to_learn(problem):
         return _jackknife_with_spread(problem, unweighted)
     # of more than two raters; two have a table of their own
@@ -83,8 +87,20 @@ def choose_interval(
         return interval, f"few items ({problem.n_paired_items}), where it covers best"
     # below so many no method covers everywhere
     notes = warn_small(outside, 5 if unweighted else _SEVERAL, _OUTSIDE)
-    why = f"categories are rare ({outside} {_OUTSIDE}), where it covers best"
+    why = f"categories are rare ({of_them(outside, _OUTSIDE)}), where it covers best"
     return replace(interval, notes=(*notes, *interval.notes)), why
+
+
+def choose_of_clusters(problem: IntervalProblem, codes: Integers) -> Interval:
+    """Compute the interval of other clusters of items, which no posterior knows of."""
+    interval = _logit_interval(problem, codes)
+    if interval.reason is not None:
+        return interval
+    outside = _outside_commonest(problem)
+    if not _is_rare(problem, outside):
+        return interval
+    notes = warn_small(outside, _SEVERAL, _OUTSIDE)
+    return replace(interval, notes=(*notes, *interval.notes))
 
 
 def _jackknife_with_spread(
@@ -131,6 +147,10 @@ def _outside_commonest(problem: IntervalProblem) -> int:
     commonest = np.bincount(codes[rated], weights=freq[rated]).argmax()
     outside = (rated & (codes != commonest)).any(axis=1)
     return int(problem.freq @ (outside & (rated.sum(axis=1) >= 2)))
+
+
+def _is_rare(problem: IntervalProblem, outside: int) -> bool:
+    return outside < _SEVERAL and 2 * outside < problem.n_paired_items
 
 
 def _paired_ratings(problem: IntervalProblem) -> int:

@@ -18,7 +18,7 @@ from masrel.intervals._problem import (
 )
 from masrel.intervals.analytic import analytic
 from masrel.intervals.bootstrap import bootstrap
-from masrel.intervals.jackknife import _logit_interval, jackknife
+from masrel.intervals.jackknife import jackknife
 from masrel.intervals.posterior import posterior
 
 if TYPE_CHECKING:
@@ -169,7 +169,10 @@ def _clustered(
     elif method == "jackknife":
         interval = jackknife(entry, ratings, clusters=codes, **options)
     else:
-        interval = _logit_interval(problem, codes)
+        # imported here: the other methods load no scipy
+        from masrel.intervals._choice import choose_of_clusters
+
+        interval = choose_of_clusters(problem, codes)
         note = "chosen for other clusters of items: left out, on a scale without ends"
         interval = replace(interval, notes=(note, *interval.notes))
     error = result.standard_error
@@ -179,7 +182,6 @@ def _clustered(
 
 
 def _chosen(entry: Coefficient, ratings: object, options: "_Options") -> Interval:
-    # Imported here: the other methods load no scipy.
     from masrel.intervals._choice import choose_interval
 
     target = options["target"]

@@ -477,6 +477,16 @@ def test_weights_take_the_posterior_of_the_patterns_and_a_warning() -> None:
     assert found.interval.method.startswith("Dirichlet posterior of the patterns")
 
 
+def test_one_item_outside_is_said_in_the_singular() -> None:
+    ratings = np.zeros((30, 3))
+    ratings[0, 0] = 1.0
+    one = "1 item with a rating outside the commonest category"
+    with pytest.warns(SmallSampleWarning, match=f"^{one}: below 5"):
+        found = estimate("fleiss_kappa", ratings, target="items")
+    assert found.interval is not None
+    assert f"rare ({one})" in found.interval.notes[0]
+
+
 def test_many_items_with_few_outside_take_no_polynomials() -> None:
     ratings = np.zeros((100_000, 3), dtype=np.int8)
     ratings[:4] = 1

@@ -2,6 +2,7 @@
 
 import json
 import math
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -230,6 +231,26 @@ def test_few_clusters_are_warned_of_and_one_says_nothing() -> None:
             )
         assert found.reason is not None
         assert math.isnan(found.low)
+
+
+@pytest.mark.parametrize(("n_outside", "is_rare"), [(4, True), (30, False)])
+def test_rare_categories_in_clusters_are_warned_of(
+    n_outside: int, is_rare: bool
+) -> None:
+    # of so few the item jackknife gives way to a posterior
+    ratings = np.zeros((90, 3))
+    outside = np.arange(n_outside) * 3
+    ratings[outside, 0] = ratings[outside[1:], 1] = 1.0
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        interval = estimate(
+            "fleiss_kappa", ratings, target="items", clusters=np.arange(90) // 6
+        ).interval
+    assert interval is not None
+    notes = [str(warning.message) for warning in caught]
+    assert notes == list(interval.notes[1:])
+    expected = "4 items with a rating outside the commonest category: below 30 the"
+    assert [note.startswith(expected) for note in notes] == [True] * is_rare
 
 
 @pytest.mark.slow
