@@ -5,7 +5,7 @@ In: a part of the file, and how estimates are made. Out: a row for every coeffic
 
 import math
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, TypeVar
 
@@ -195,6 +195,62 @@ def estimate_row(
         lower_bound=bound,
     )
     return row, refusal
+
+
+def category_rows(
+    part: "RatingsPart", names: Iterable[str], scale: "Scale", options: EstimateOptions
+) -> "list[AgreementRow]":
+    """Estimate how well raters tell each category of a part from all others."""
+    # names: what tells the part from others
+    head = tuple(names)
+    return [
+        _category_row(part, place, ": ".join((*head, grade)), scale, options)
+        for place, grade in enumerate(scale.grades)
+    ]
+
+
+def _category_row(
+    part: "RatingsPart",
+    place: int,
+    group: str,
+    scale: "Scale",
+    options: EstimateOptions,
+) -> AgreementRow:
+    from masrel.agreement import category_kappa, coefficient
+
+    estimate = category_kappa(part.counted, scale.values[place])
+    row = AgreementRow(group=group, title="Fleiss' κ, category", estimate=estimate)
+    if options.target is not None and estimate.reason is None:
+        # that of Fleiss' kappa of the two categories that the scale is folded to
+        folded = _folded(part, place)
+        if folded is None:
+            none = "no interval: counts do not say who rated what"
+            row = replace(row, notes=(none,))
+        else:
+            plain = replace(options, coefficients=None, weights="identity")
+            of, _ = estimate_row(coefficient("fleiss_kappa"), folded, group, plain)
+            row = replace(of, title=row.title)
+            estimate = changed(estimate, interval=of.estimate.interval)
+    return replace(row, estimate=changed(estimate, weights=scale.grades[place]))
+
+
+def _folded(part: "RatingsPart", place: int) -> "CodedRatings | None":
+    """Return the ratings on a scale of one category and the rest."""
+    import numpy as np
+
+    from masrel.agreement import CodedRatings
+
+    coded = part.counted.coded
+    if coded is None:
+        return None
+    codes = np.where(coded.codes < 0, -1, coded.codes != place)
+    return CodedRatings(codes=codes, categories=("this", "other"))
+
+
+def changed(estimate: Estimate, **fields: object) -> Estimate:
+    """Return an estimate with other fields, and its standard error as it is."""
+    # `vars` has one that is still to be computed as that, `replace` computes it
+    return Estimate(**{**vars(estimate), **fields})
 
 
 def _estimate(

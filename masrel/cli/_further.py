@@ -116,10 +116,10 @@ class FurtherOptions:
 
     def part_labels(self, file: "RatingsFile") -> tuple[str | None, list[str]]:
         """Return what tells groups and sessions apart, and what each is called."""
-        from masrel.report._further_tables import heading, label, part_names
+        from masrel.analysis._file_parts import label, part_names
 
         names = [part_names(file, part) for part in file.parts]
-        return heading(names[0]) or None, [label(of.values()) for of in names]
+        return ", ".join(names[0]) or None, [label(of.values()) for of in names]
 
 
 further_options = grouped(
@@ -237,12 +237,11 @@ def _diagnosis(
 
 
 def _comparisons(file: "RatingsFile", options: EstimateOptions) -> "list[FurtherTable]":
-    from masrel.report._difference_table import difference_table
-    from masrel.report._equality_table import equality_table
+    from masrel.report._comparison_tables import difference_table, equality_table
 
     n_raters = max(len(part.raters) for part in file.parts) or file.read["n_raters"]
     of_all = entries(options, n_raters, file.scale, file.is_ordered)
-    tables = [difference_table(file, of_all, options, skip=options.takes_all)]
+    tables = [difference_table(file, of_all, options)]
     if len(file.parts) > 2:  # of two the difference says it
         tables.append(equality_table(file, of_all, options))
     return tables

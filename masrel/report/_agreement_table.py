@@ -1,6 +1,5 @@
 """The agreement in a file of ratings: its table, its figure and its record."""
 
-import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -19,7 +18,8 @@ from masrel.report._estimate_words import (
     sentence,
 )
 from masrel.report._figure_data import Forest, ForestRow
-from masrel.report._tables import SIMULATED, Column, Table, Value, percent
+from masrel.report._row_notes import NotedRow, row_notes
+from masrel.report._tables import SIMULATED, Column, Table, Value, capital, percent
 from masrel.scales import Scale
 
 _POPULATIONS = {"items": "items", "raters": "raters", "both": "items and raters"}
@@ -86,7 +86,7 @@ def agreement_table(
         cells = [(*rest, word) for rest, word in zip(cells, words, strict=True)]
     if by is not None:
         key = group_key(by)
-        columns.insert(0, Column(key=key, heading=_capital(by), align="left"))
+        columns.insert(0, Column(key=key, heading=capital(by), align="left"))
         cells = [(row.group, *rest) for row, rest in zip(rows, cells, strict=True)]
     return Table(
         name="agreement",
@@ -98,7 +98,7 @@ def agreement_table(
             *notes,
             *_errors_note(rows, in_sentences),
             *(() if in_sentences else _paired_note(rows)),
-            *_notes(rows, by, explain),
+            *row_notes([_noted(row, explain) for row in rows], by),
             *_words_note(rows, bands),
         ),
         data=data,
@@ -178,41 +178,24 @@ def _paired_note(rows: Sequence[AgreementRow]) -> tuple[str, ...]:
     return (f"Items that have {pair}: {', '.join(of_groups)}.",)
 
 
-def _notes(
-    rows: Sequence[AgreementRow], by: str | None, explain: bool
-) -> tuple[str, ...]:
-    # How each interval was made, what to know of it, and why a value is undefined.
-    # A note names its rows, unless it holds for all that it could be of; what there is
-    # to say of the same rows is one note.
-    rows_of: dict[str, list[AgreementRow]] = {}
-    for row in rows:
-        for text in _texts(row, explain):
-            rows_of.setdefault(text, []).append(row)
-    with_interval = [row for row in rows if row.estimate.interval is not None]
-    texts_of: dict[str, list[str]] = {}
-    for text, subset in rows_of.items():
-        is_of_all = subset == with_interval or len(subset) == len(rows)
-        start = text if is_of_all else _names(subset, rows, by)
-        texts_of.setdefault(start, []).extend([] if is_of_all else [text])
-    return tuple(
-        f"{start}: {'; '.join(texts)}." if texts else f"{start}."
-        for start, texts in texts_of.items()
-    )
-
-
-def _texts(row: AgreementRow, explain: bool) -> list[str]:
-    # what there is to say of one row, without the end of the sentence
+def _noted(row: AgreementRow, explain: bool) -> NotedRow:
+    # how its interval was made, what to know of it, and why a value is undefined
     estimate, interval = row.estimate, row.estimate.interval
     texts = [] if estimate.reason is None else [f"undefined: {estimate.reason}"]
     texts += row.notes
-    if interval is None:
-        return texts
-    if interval.reason is None:
-        texts.append(_interval_note(interval, explain))
-    elif interval.reason != estimate.reason:
-        texts.append(f"no interval ({interval.method}): {interval.reason}")
-    brief = filter(None, map(_brief, interval.notes))
-    return [*texts, *(interval.notes if explain else brief)]
+    if interval is not None:
+        if interval.reason is None:
+            texts.append(_interval_note(interval, explain))
+        elif interval.reason != estimate.reason:
+            texts.append(f"no interval ({interval.method}): {interval.reason}")
+        brief = filter(None, map(_brief, interval.notes))
+        texts += interval.notes if explain else brief
+    return NotedRow(
+        title=row.title,
+        group=row.group,
+        texts=tuple(texts),
+        has_interval=interval is not None,
+    )
 
 
 def _brief(note: str) -> str:
@@ -262,39 +245,6 @@ def _words_note(
     )
 
 
-def _names(
-    subset: Sequence[AgreementRow], rows: Sequence[AgreementRow], by: str | None
-) -> str:
-    # The coefficients that a note holds for, with their groups unless it holds for all;
-    # three or more that follow each other in the table by the first and the last. The
-    # groups alone where it holds for every coefficient of them.
-    every, some = _groups_by_title(rows), _groups_by_title(subset)
-    names: list[str] = []
-    for groups, of_groups in itertools.groupby(every, key=some.get):
-        titles = list(of_groups)
-        if groups is None:
-            continue
-        if by is not None and len(titles) == len(every):
-            return f"{_capital(by)} {', '.join(groups)}"
-        is_of_all = all(every[title] == groups for title in titles)
-        which = "" if is_of_all else f" ({', '.join(groups)})"
-        if len(titles) > 2:
-            titles = [f"{titles[0]} to {titles[-1]}"]
-        names += [f"{title}{which}" for title in titles]
-    return "; ".join(names)
-
-
-def _groups_by_title(rows: Sequence[AgreementRow]) -> dict[str, list[str]]:
-    groups: dict[str, list[str]] = {}
-    for row in rows:
-        groups.setdefault(row.title, []).append(row.group)
-    return groups
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
-
-
 def agreement_sentences(
     rows: Sequence[AgreementRow],
     *,
@@ -304,7 +254,7 @@ def agreement_sentences(
 ) -> str:
     """Return a sentence for every estimate, one a line."""
     stamp = f"{SIMULATED}. " if data == "simulated" else ""
-    heads = ["" if by is None else f"{_capital(by)} {row.group}: " for row in rows]
+    heads = ["" if by is None else f"{capital(by)} {row.group}: " for row in rows]
     return "\n".join(
         f"{stamp}{head}{sentence(row.estimate, word=_reached(row, bands))}"
         for head, row in zip(heads, rows, strict=True)

@@ -14,21 +14,18 @@ import numpy as np
 
 from masrel.agreement import Coefficient
 from masrel.analysis._file_estimates import EstimateOptions, on_grades
+from masrel.analysis._file_parts import coded_part, label, part_names
 from masrel.errors import MasrelError, MasrelWarning, ParameterError
 from masrel.intervals import Diagnosis, diagnose
 from masrel.ratings import RatingsFile, RatingsPart
 from masrel.report._figure_data import RaterPairs
 from masrel.report._further_tables import (
     FurtherTable,
-    coded_part,
     data_of,
     finite,
-    heading,
-    label,
     part_keys,
-    part_names,
 )
-from masrel.report._tables import Column, Table, Value, percent
+from masrel.report._tables import Column, Table, Value, capital, percent
 
 _MANY = 8  # raters beyond which only the pairs that agree least are shown
 _SHOWN = 20  # of these pairs
@@ -53,7 +50,7 @@ def diagnosis_tables(
     """Return raters, pairs, categories and confusions of every part of the ratings."""
     parts = [_diagnosed(file, part, entry, options, reference) for part in file.parts]
     title = options.title(entry)
-    by = heading(part_names(file, file.parts[0]))
+    by = ", ".join(part_names(file, file.parts[0]))
     return [
         _table(file, by, parts, "raters", f"What each rater adds to {title}", title),
         _table(file, by, parts, "pairs", f"{title} of every two raters", title),
@@ -74,11 +71,12 @@ def _diagnosed(
             f"--reference: needs one of {', '.join(part.raters)}, got {reference!r}"
         )
     group = label(part_names(file, part).values())
+    ratings = on_grades(coded_part(part, "--diagnose"), entry, file.scale)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", MasrelWarning)  # the result says it
             result = diagnose(
-                on_grades(coded_part(part, "--diagnose"), entry, file.scale),
+                ratings,
                 coefficient=entry,
                 target=None if options.target is None else "items",
                 raters=part.raters,
@@ -184,7 +182,7 @@ def _with_group(
     notes: Sequence[str],
 ) -> Table:
     # the first of the cells names the group, where there are any
-    first = [Column(key="group", heading=by[:1].upper() + by[1:], align="left")]
+    first = [Column(key="group", heading=capital(by), align="left")]
     return Table(
         name=name,
         caption=caption,

@@ -4,27 +4,21 @@ In: a `RatingsFile`. Out: a table, the same as plain values for JSON, and the fi
 """
 
 import math
-import warnings
 
-from masrel.agreement import LimitsOfAgreement, limits_of_agreement
-from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
+from masrel.agreement import LimitsOfAgreement
+from masrel.analysis._file_parts import label, part_names
+from masrel.analysis._file_two_raters import difference_limits
 from masrel.estimates import Interval
 from masrel.ratings import RatingsFile, RatingsPart
-from masrel.report._agreement_table import group_key
 from masrel.report._figure_data import DifferencePanel, Differences
 from masrel.report._further_tables import (
     FurtherTable,
-    coded_part,
     data_of,
     finite,
-    label,
-    named,
+    name_columns,
     part_keys,
-    part_names,
 )
 from masrel.report._tables import Column, Table, Value, percent
-
-_OPTION = "--limits-of-agreement"
 
 _COLUMNS = (
     Column(key="quantity", heading="Difference", align="left"),
@@ -44,7 +38,7 @@ def limits_table(file: RatingsFile, *, level: float, unit: str | None) -> Furthe
     notes: dict[str, None] = {}
     panels = []
     for part in file.parts:
-        limits = _limits(file, part, level)
+        limits = difference_limits(file, part, level)
         names = tuple(part_names(file, part).values())
         cells += [(*names, *row) for row in _rows(limits)]
         documents.append({**part_keys(file, part), **_document(part, limits)})
@@ -54,17 +48,13 @@ def limits_table(file: RatingsFile, *, level: float, unit: str | None) -> Furthe
             notes[f"{of_part}undefined: {limits.reason}."] = None
         panels.append(_panel(label(names), part, limits))
     notes |= dict.fromkeys(_explanation(level))
-    columns = [
-        Column(key=group_key(name), heading=name[:1].upper() + name[1:], align="left")
-        for name in part_names(file, file.parts[0])
-    ]
     of_unit = f" ({unit})" if unit else ""
     return FurtherTable(
         key="limits_of_agreement",
         table=Table(
             name="limits_of_agreement",
             caption=f"Limits of agreement{of_unit}",
-            columns=(*columns, *_COLUMNS),
+            columns=(*name_columns(file), *_COLUMNS),
             rows=tuple(cells),
             notes=tuple(notes),
             data=data_of(file),
@@ -72,24 +62,6 @@ def limits_table(file: RatingsFile, *, level: float, unit: str | None) -> Furthe
         documents=documents,
         figure=Differences(panels=tuple(panels), unit=unit or "", level=level),
     )
-
-
-def _limits(file: RatingsFile, part: RatingsPart, level: float) -> LimitsOfAgreement:
-    if not file.is_ordered:
-        raise ParameterError(
-            f"{_OPTION}: needs grades that are numbers or --categories with every "
-            f"grade in order, the grades met are text: {named(file.scale.grades)}"
-        )
-    coded = coded_part(part, _OPTION)
-    if coded.codes.shape[1] != 2:
-        of_part = "".join(f"{name}: " for name in part_names(file, part).values())
-        raise RatingsError(
-            f"{_OPTION}: {of_part}needs two raters, got {coded.codes.shape[1]} "
-            f"({named(part.raters)}); --raters chooses two"
-        )
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UndefinedStatisticWarning)  # the result says it
-        return limits_of_agreement(coded, level=level)
 
 
 def _rows(limits: LimitsOfAgreement) -> list[tuple[Value, ...]]:

@@ -129,6 +129,11 @@ def p_text(p: float) -> str:
     return "<0.001" if p < 0.0005 else number(p, 3)
 
 
+def capital(text: str) -> str:
+    """Return a text with a capital at its start."""
+    return text[:1].upper() + text[1:]
+
+
 def counted(count: int, noun: str) -> str:
     """Return a count with its noun, in the plural unless there is one."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
