@@ -4,7 +4,7 @@ import shlex
 import shutil
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,10 +15,10 @@ from masrel.cli._options import OutputOptions, echo_notes, write_output
 from masrel.cli._reading import ReadingOptions, what_was_read
 
 if TYPE_CHECKING:
-    from masrel.estimates import Target
     from masrel.ratings import RatingsFile
     from masrel.report._figure_data import Content
     from masrel.report._further_tables import FurtherTable
+    from masrel.report._tables import Table
 
 
 _WIDTHS = (88, 100)
@@ -37,92 +37,137 @@ class WithArguments(click.Command):
         return super().parse_args(ctx, args)
 
 
-def write_agreement(
-    rows: "Sequence[AgreementRow]",
-    output: OutputOptions,
-    *,
-    ratings: "RatingsFile",
-    reading: ReadingOptions,
-    options: EstimateOptions,
-    by: str | None,
-    explain: bool,
-    further: "Sequence[FurtherTable]",
-) -> None:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FileAgreement:
+    """The agreement in a file of ratings: what was read and what was estimated."""
+
+    ratings: "RatingsFile"
+    reading: ReadingOptions
+    options: EstimateOptions
+    by: str | None  # what tells groups apart
+    rows: "Sequence[AgreementRow]"
+    # tables below that of the estimates, or in its place if there are none
+    further: "Sequence[FurtherTable]"
+    explain: bool  # whether notes say what every interval promises
+
+    @property
+    def data(self) -> str:
+        """Where the ratings come from, as tables have it."""
+        return "simulated" if self.ratings.simulated else "foreign"
+
+    def notes(self) -> tuple[str, ...]:
+        """Return what may have been read wrongly, and what is left out of it."""
+        from masrel.ratings._grade_texts import MEASUREMENTS
+
+        is_warned = not self._weighs_distances()
+        warnings = tuple(
+            f"warning: {text}"
+            for text in self.ratings.warnings
+            if is_warned or MEASUREMENTS not in text
+        )
+        if self.ratings.is_ordered or not self.options.takes_all:
+            return warnings
+        return (
+            *warnings,
+            "Left out: the six forms of ICC, Kendall's W and Robinson's A, which need "
+            "grades that are numbers or --categories with every grade in order.",
+        )
+
+    def tables(self, *, in_sentences: bool) -> "list[Table]":
+        """Return the table of the estimates and those below it."""
+        # in_sentences: whether sentences take the place of the first
+        from masrel.report._agreement_table import agreement_table
+
+        read, notes = tuple(what_was_read(self.ratings)), self.notes()
+        more = [other.table for other in self.further]
+        if more and not self.rows:
+            first, *more = more
+            return [replace(first, read=read, notes=(*notes, *first.notes)), *more]
+        table = agreement_table(
+            self.rows,
+            caption=f"Agreement of the raters in {self.ratings.read['file']}",
+            by=self.by,
+            bands=self.options.words,
+            read=read,
+            notes=notes,
+            explain=self.explain,
+            in_sentences=in_sentences,
+            data=self.data,
+        )
+        return [table, *more]
+
+    def sentences(self) -> str:
+        """Return a sentence for every estimate."""
+        from masrel.report._agreement_table import agreement_sentences
+
+        words = self.options.words
+        return agreement_sentences(self.rows, by=self.by, bands=words, data=self.data)
+
+    def record(self) -> dict[str, object]:
+        """Return everything for JSON."""
+        from masrel.report._agreement_table import agreement_record
+
+        read = self.ratings.read
+        record = agreement_record(
+            self.rows,
+            read={**read, "options": self.reading.record()},
+            options={**self.options.record(), "by": read["by"]},
+            scale=self.ratings.scale,
+            notes=self.notes(),
+            by=self.by,
+            bands=self.options.words,
+        )
+        return record | {other.key: other.documents for other in self.further}
+
+    def figure(self) -> "Callable[[], Content] | None":
+        """Return what makes the figure: that of a table, else of the estimates."""
+        from masrel.report._agreement_table import agreement_forest
+
+        for other in self.further:
+            if other.figure is not None:
+                content = other.figure
+                return lambda: content
+        target = self.options.target
+        if target is None:
+            return None
+        drawn = self.rows or [row for other in self.further for row in other.rows]
+        return lambda: agreement_forest(drawn, target)
+
+    def _weighs_distances(self) -> bool:
+        """Whether every coefficient weighs how far grades lie from each other."""
+        from masrel.agreement import COEFFICIENTS
+
+        estimates = [row.estimate for row in self.rows]
+        return bool(estimates) and all(
+            COEFFICIENTS[estimate.coefficient].needs_order
+            or estimate.weights not in ("identity", "nominal")
+            for estimate in estimates
+        )
+
+
+def write_agreement(agreement: FileAgreement, output: OutputOptions) -> None:
     """Print and write estimates in the forms that were chosen."""
-    # by: what tells groups apart; further: tables below that of the estimates, or in
-    # its place if there are none
-    from masrel.report import _agreement_table as shown
     from masrel.report._tables import SIMULATED
 
-    target, bands = options.target, options.words
-    is_sentence = output.sentence and bool(rows)
-    data = "simulated" if ratings.simulated else "foreign"
-    read_lines, notes = tuple(what_was_read(ratings)), _notes(ratings, options)
-    table = shown.agreement_table(
-        rows,
-        caption=f"Agreement of the raters in {ratings.read['file']}",
-        by=by,
-        bands=bands,
-        read=read_lines,
-        notes=notes,
-        explain=explain,
-        in_sentences=output.sentence,
-        data=data,
-    )
-    more = [other.table for other in further]
-    if more and not rows:
-        first, *more = more
-        table = replace(first, read=read_lines, notes=(*notes, *first.notes))
-    figure = _figure(rows, further, target)
+    ratings, is_sentence = agreement.ratings, output.sentence and bool(agreement.rows)
+    table, *more = agreement.tables(in_sentences=output.sentence)
+    read_lines = table.read
     write_output(
         output,
-        document=lambda: {
-            **shown.agreement_record(
-                rows,
-                read={**ratings.read, "options": reading.record()},
-                options={**options.record(), "by": ratings.read["by"]},
-                scale=ratings.scale,
-                notes=notes,
-                by=by,
-                bands=bands,
-            ),
-            **{other.key: other.documents for other in further},
-        },
-        text=lambda: (
-            shown.agreement_sentences(rows, by=by, bands=bands, data=data)
-            if is_sentence
-            else table
-        ),
-        figure=figure,
+        document=agreement.record,
+        text=lambda: agreement.sentences() if is_sentence else table,
+        figure=agreement.figure(),
         stamp=SIMULATED if ratings.simulated else "",
-        notes=(*read_lines, *notes),
+        notes=(*read_lines, *agreement.notes()),
         more=more,
         width=_screen_width(),
     )
     if is_sentence:
         echo_notes((*read_lines, *table.notes))
-    offer = _interval_offer(rows, options)
+    offer = _interval_offer(agreement.rows, agreement.options)
     # what came through a pipe is gone
     if offer is not None and Path(ratings.read["file"]).is_file():
         click.echo(offer, err=True)
-
-
-def _figure(
-    rows: "Sequence[AgreementRow]",
-    further: "Sequence[FurtherTable]",
-    target: "Target | None",
-) -> "Callable[[], Content] | None":
-    """Return what makes the figure: of the table that has one, else of estimates."""
-    from masrel.report._agreement_table import agreement_forest
-
-    for other in further:
-        if other.figure is not None:
-            pairs = other.figure
-            return lambda: pairs
-    if target is None:
-        return None
-    drawn = rows or [row for other in further for row in other.rows]
-    return lambda: agreement_forest(drawn, target)
 
 
 def _screen_width() -> int:
@@ -131,18 +176,6 @@ def _screen_width() -> int:
     if not sys.stdout.isatty():
         return elsewhere
     return min(shutil.get_terminal_size((elsewhere, 24)).columns, most)
-
-
-def _notes(ratings: "RatingsFile", options: EstimateOptions) -> tuple[str, ...]:
-    """Return what may have been read wrongly, and what is left out of it."""
-    warnings = tuple(f"warning: {text}" for text in ratings.warnings)
-    if ratings.is_ordered or not options.takes_all:
-        return warnings
-    return (
-        *warnings,
-        "Left out: the six forms of ICC, Kendall's W and Robinson's A, which need "
-        "grades that are numbers or --categories with every grade in order.",
-    )
 
 
 def _interval_offer(

@@ -11,7 +11,7 @@ from masrel.analysis._file_estimates import (
     EstimateOptions,
     estimate_rows,
 )
-from masrel.cli._agreement_output import WithArguments, write_agreement
+from masrel.cli._agreement_output import FileAgreement, WithArguments, write_agreement
 from masrel.cli._further import FurtherOptions, further_options, further_tables
 from masrel.cli._options import OutputOptions, grouped, output_options, split_commas
 from masrel.cli._reading import (
@@ -172,17 +172,18 @@ def agree(
         )
     ratings = read_file(file, reading)
     by, groups = _groups(ratings, further, file)
+    # what does not fit these tables is said first: it says most
     tables = further_tables(ratings, further, options, explain=explain)
-    write_agreement(
-        _estimate(ratings, groups, further.between_raters(ratings, options)),
-        output,
+    agreement = FileAgreement(
         ratings=ratings,
         reading=reading,
         options=options,
         by=by,
-        explain=explain,
+        rows=_estimate(ratings, groups, further.between_raters(ratings, options)),
         further=tables,
+        explain=explain,
     )
+    write_agreement(agreement, output)
 
 
 def _groups(

@@ -44,6 +44,9 @@ _LONGEST = 60  # letters of a text that it shows
 _SCALE = 10  # widest span of grades of a scale, rather than of measurements
 _MANY_GRADES = 15  # of the longest usual scale: Borg's, from 6 to 20
 
+MEASUREMENTS = "look like measurements"
+"""What a warning says that concerns only coefficients of equal grades."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GradeOptions:
@@ -384,7 +387,7 @@ def _measurements(freq: Mapping[str, int]) -> list[str]:
     if len(freq) <= _MANY_GRADES or 2 * len(freq) <= n_ratings:
         return []
     return [
-        f"{len(freq)} different numbers in {n_ratings} ratings look like measurements: "
+        f"{len(freq)} different numbers in {n_ratings} ratings {MEASUREMENTS}: "
         "percent agreement and unweighted kappas count only those that are equal; "
         "--coefficients icc_a1 or --metric interval weigh how far they lie from each "
         "other"

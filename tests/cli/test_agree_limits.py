@@ -53,6 +53,24 @@ def test_limits_come_with_coefficients_of_measurements(
     assert concordance["interval"]["low"] == lin_ccc(PAIRS).interval.low
 
 
+def test_measurements_are_warned_of_where_equal_numbers_are_counted(
+    masrel: Caller, tmp_path: Path
+) -> None:
+    file = tmp_path / "angles.csv"
+    rows = "".join(f"p{k},{k + 0.25},{k + 0.5}\n" for k in range(20))
+    file.write_text("item,Kim,Lee\n" + rows, encoding="utf-8")
+    warning = "40 different numbers in 40 ratings look like measurements"
+    for call in ((), ("--coefficients", "icc_a1,scott_pi"), ("--metric", "nominal")):
+        assert warning in masrel("agree", file, *call).out
+    for call in (
+        ("--limits-of-agreement",),
+        ("--coefficients", "icc_a1"),
+        ("--metric", "interval"),
+        ("--weights", "quadratic"),
+    ):
+        assert warning not in masrel("agree", file, *call).out
+
+
 def test_figure_has_the_limits_with_their_unit(masrel: Caller, pairs: Path) -> None:
     file = pairs.parent / "limits.svg"
     call = ("agree", pairs, "--limits-of-agreement", "--unit", "deg")
