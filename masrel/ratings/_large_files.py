@@ -347,8 +347,8 @@ class _TextLines:
 
     def where(self, row: int) -> str:
         """Return the line of a row."""
-        found = next(islice(self._records(), row, None), None)
-        return "the end" if found is None else f"line {found[0]}"
+        line, _ = next(islice(self._records(), row, None), (None, ()))
+        return "the end" if line is None else f"line {line}"
 
     def _refuse(self) -> NoReturn:
         # the first record that is none of the table

@@ -214,50 +214,59 @@ def _long(
 ) -> tuple[tuple[int, ...], int, int] | None:
     # item, rater and grade, or None where the table is not long
     header = sheet.header
-    named = {header.index(name) for name in options.item}
-    named |= {
-        header.index(name)
-        for name in (options.rater, options.grade)
-        if name is not None
-    }
-    rater = _role(sheet, "rater", options.rater, taken | named)
-    grade = _role(sheet, "grade", options.grade, taken | named)
-    if rater is None and grade is None:
-        return None
     item = tuple(header.index(name) for name in options.item)
-    if not item and set(STUDY_COLUMNS) <= set(header):
-        item = (header.index("model"), header.index("repeat"))
-    if not item:
-        used = taken | {place for place in (rater, grade) if place is not None}
-        place = _role(sheet, "item", None, used)
-        item = () if place is None else (place,)
-    roles = {"item": item[0] if item else None, "rater": rater, "grade": grade}
-    unknown = [role for role, place in roles.items() if place is None]
-    used = taken | set(item) | {p for p in roles.values() if p is not None}
-    left = [place for place in range(len(header)) if place not in used]
-    if len(unknown) == 1 and len(left) == 1:
-        roles[unknown[0]] = left[0]
-        item = item or (left[0],)
-        unknown = []
+    named = {header.index(n) for n in (options.rater, options.grade) if n is not None}
+    taken = taken | named | {*item}
+    rater = _places(_role(sheet, "rater", options.rater, taken))
+    grade = _places(_role(sheet, "grade", options.grade, taken))
+    if not rater and not grade:
+        return None
+    taken = taken | {*rater, *grade}
+    roles = {
+        "item": item or _usual_item(sheet, taken),
+        "rater": rater,
+        "grade": grade,
+    }
+    unknown = [role for role, places in roles.items() if not places]
+    taken = taken | {*roles["item"]}
+    left = [place for place in range(len(header)) if place not in taken]
+    if len(unknown) == len(left) == 1:
+        roles[unknown.pop()] = (left[0],)
     if unknown:
-        known = ", ".join(
-            f"the {role} is {header[place]!r}"
-            for role, place in roles.items()
-            if place is not None
-        )
-        options_needed = " and ".join(f"--{role}" for role in unknown)
-        raise sheet.error(
-            f"{sheet.line_of(0)}: looks like one row a rating ({known}): needs "
-            f"{options_needed}, {_listed(sheet)}; if its columns are raters, --raters "
-            "names them, if they are items, --transpose"
-        )
-    rater, grade = roles["rater"], roles["grade"]
-    if rater is None or grade is None or len({*item, rater, grade}) < len(item) + 2:
+        raise _unknown_roles(sheet, roles)
+    every = [place for places in roles.values() for place in places]
+    if len({*every}) < len(every):
         raise sheet.error(
             "needed different columns for item, rater and grade, got "
-            + ", ".join(header[p] for p in (*item, rater, grade) if p is not None)
+            + ", ".join(header[place] for place in every)
         )
-    return item, rater, grade
+    return roles["item"], roles["rater"][0], roles["grade"][0]
+
+
+def _places(place: int | None) -> tuple[int, ...]:
+    return () if place is None else (place,)
+
+
+def _usual_item(sheet: Sheet, taken: set[int]) -> tuple[int, ...]:
+    # the columns of the items where nobody named them
+    if set(STUDY_COLUMNS) <= set(sheet.header):
+        return sheet.header.index("model"), sheet.header.index("repeat")
+    return _places(_role(sheet, "item", None, taken))
+
+
+def _unknown_roles(sheet: Sheet, roles: dict[str, tuple[int, ...]]) -> RatingsError:
+    # the error of a long table some columns of which are not known
+    known = ", ".join(
+        f"the {role} is {sheet.header[places[0]]!r}"
+        for role, places in roles.items()
+        if places
+    )
+    needed = " and ".join(f"--{role}" for role, places in roles.items() if not places)
+    return sheet.error(
+        f"{sheet.line_of(0)}: looks like one row a rating ({known}): needs "
+        f"{needed}, {_listed(sheet)}; if its columns are raters, --raters "
+        "names them, if they are items, --transpose"
+    )
 
 
 def _wide(

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from masrel.agreement._counts import DistinctItems
 from masrel.agreement._labels import code_type
 from masrel.agreement._weights import MANY
 from masrel.errors import ParameterError, RatingsError
-from masrel.ratings._grade_texts import coded_texts, is_number
+from masrel.ratings._grade_texts import Grades, coded_texts, is_number
 from masrel.ratings._layout import Layout
 from masrel.ratings._text_cells import Sheet
 from masrel.scales import Scale
@@ -75,6 +75,24 @@ class RatingsPart:
                     "--coefficients icc_a1 or icc_c1"
                 )
         return count_ratings(self.ratings)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Contents:
+    """What a file of ratings holds, on a scale."""
+
+    parts: list[RatingsPart]
+    grades: Grades
+    scale: Scale  # of these grades, or of means of them
+    freq: Codes  # (n_grades,): how often each grade of the scale is there
+    raters: list[str]  # none where they have no names
+    n_items: int
+    n_raters: int
+    n_missing: int | None  # None where counts do not say
+    doubts: list[str]
+    n_repeated: int = 0
+    facts: dict[str, Any] = field(default_factory=dict)  # what else the record has
+    is_simulated: bool = False  # whether a row says so
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -3,7 +3,8 @@
 In: a path and what the caller says of it. Out: a `RatingsFile` with what was read. The
 stages: `_text_cells` (bytes to cells of text), `_layout` (which column is what),
 `_grade_texts` (which grade a text is), `_doubts` (what looks like something else),
-`_parts` (ratings put together item by rater).
+`_parts` (ratings put together item by rater). `_tables_of_counts` reads tables without
+ratings one by one, `_stream_contents` files larger than memory.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,11 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement._count_tables import count_items, count_table
 from masrel.errors import ParameterError, RatingsError
 from masrel.ratings._doubts import (
     doubt_columns,
-    doubt_counts,
     doubt_errors,
     doubt_long,
     doubt_names,
@@ -29,24 +28,23 @@ from masrel.ratings._grade_texts import (
     GradeOptions,
     Grades,
     coded_texts,
-    is_number,
     read_grades,
 )
 from masrel.ratings._large_files import LargeFile, NoStreamError, large_file
 from masrel.ratings._layout import Layout, LayoutOptions, find_layout
 from masrel.ratings._parts import (
     Codes,
+    Contents,
     RatingsPart,
     Repeated,
     Triples,
     part_clusters,
     part_codes,
-    patterns_part,
     put_together,
     without_repeats,
 )
-from masrel.ratings._stream_codes import merged_rows
-from masrel.ratings._streams import Streamed, stream_long, stream_wide
+from masrel.ratings._stream_contents import stream_contents
+from masrel.ratings._tables_of_counts import counts_contents
 from masrel.ratings._text_cells import Sheet, SheetOptions, read_sheet
 from masrel.scales import Scale
 
@@ -198,17 +196,19 @@ def read_ratings(
     )
     large = large_file(path, form, _may_stream(stream, columns, repeated))
     if large is not None:
-        streamed = _streamed(large, columns, options, stream, progress)
-        if streamed is not None:
-            return streamed
+        file = _streamed(large, columns, options, stream, progress)
+        if file is not None:
+            return file
     cells, warnings = without_second_header(read_sheet(path, form))
     if not len(cells.cells):
         raise cells.error("needed rows of ratings below the names, got none")
     warnings += doubt_errors(cells)
     layout = find_layout(cells, columns)
     if layout.kind in ("counts", "table"):
-        return _counted(cells, layout, options, warnings)
-    return _rated(cells, layout, options, repeated, warnings)
+        contents = counts_contents(cells, layout, options)
+    else:
+        contents = _rated(cells, layout, options, repeated)
+    return _file(cells, layout, options, contents, warnings)
 
 
 def _may_stream(
@@ -240,101 +240,27 @@ def _streamed(
     stream: bool | None,
     progress: Callable[[int, int], None] | None,
 ) -> RatingsFile | None:
-    # of a long or a wide table, batch by batch; None if it is to be read as a whole
+    # batch by batch; None if the file is to be read as a whole
     sheet, warnings = without_second_header(large.sheet)
     if warnings or not len(sheet.cells):
         return None
     layout = find_layout(sheet, columns)
     if layout.session is not None:
         return None
-    read = stream_long if layout.kind == "long" else stream_wide
     try:
-        ratings = read(large, layout, progress or (lambda _, __: None))
+        contents = stream_contents(
+            large, layout, options, progress or (lambda _, __: None)
+        )
     except NoStreamError as error:
         if stream:
             raise sheet.error(f"{error}; --no-stream reads it as a whole") from error
         return None
-    codes, grades = _streamed_grades(large, ratings, options)
-    rows, freq = merged_rows(codes, ratings.freq)
-    scale = grades.scale
-    doubts = [*ratings.doubts, *doubt_names("raters", ratings.raters)]
-    if layout.kind == "wide":
-        doubts = [*_doubts_of_rows(sheet, layout, ratings, grades, rows, freq), *doubts]
-    doubts.append(
-        "read as a stream: names of items that differ by spelling alone, or sum up "
-        "others, are not looked for"
-    )
-    rated = rows >= 0
-    counted = [
-        int(freq @ (rows == code).sum(axis=1)) for code in range(len(scale.grades))
-    ]
-    record = _record(sheet, layout, options, grades, scale, np.array(counted))
-    n_cells = int(ratings.freq @ (ratings.rows >= 0).sum(axis=1))
-    record |= {
-        "raters": ratings.raters,
-        "n_items": ratings.n_items,
-        "n_raters": len(ratings.raters),
-        "n_ratings": int(freq @ rated.sum(axis=1)),
-        "n_missing": n_cells - int(freq @ rated.sum(axis=1)),
-        "n_repeated": 0,
-        "repeated": None,
-        "dropped": {"blank": ratings.n_blank} if ratings.n_blank else {},
-    }
-    part = patterns_part(rows, freq, ratings.raters, scale)
-    file = _file(sheet, [part], scale, grades, record, doubts)
-    return replace(file, simulated=file.simulated or ratings.is_simulated)
-
-
-def _streamed_grades(
-    large: LargeFile, ratings: Streamed, options: GradeOptions
-) -> tuple[NDArray[np.int8], Grades]:
-    # the rows on the scale, (n_distinct, n_raters)
-    sheet, n = large.sheet, len(ratings.texts)
-    freq = np.array(
-        [int(ratings.freq @ (ratings.rows == k).sum(axis=1)) for k in range(n)],
-        dtype=np.int64,
-    )
-
-    def where(text: int) -> str:
-        row, column = ratings.places[text]
-        return f"{large.where(row)}, column {sheet.header[column]!r}"
-
-    try:
-        grades = read_grades(ratings.texts, freq, options, where)
-    except RatingsError as error:
-        raise sheet.error(str(error)) from None
-    codes = np.append(grades.codes, -1).astype(np.int8)
-    return codes[ratings.rows], grades
-
-
-def _doubts_of_rows(
-    sheet: Sheet,
-    layout: Layout,
-    ratings: Streamed,
-    grades: Grades,
-    rows: NDArray[np.int8],
-    freq: NDArray[np.int64],
-) -> list[str]:
-    # of a wide table whose rows are counted: its first row, and the others
-    first = np.append(grades.codes, -1)[ratings.first]
-    others = freq - (rows == first).all(axis=1)
-    codes = np.concatenate([first[None, :], rows[others > 0]]).astype(np.int64)
-    weights = np.append(1, others[others > 0])
-    doubts = doubt_columns(sheet, layout, codes, grades.scale, weights)
-    unrated = (rows < 0).all(axis=0)
-    doubts += [
-        f"{ratings.raters[k]!r} has no grade" for k in np.flatnonzero(unrated)[:6]
-    ]
-    return doubts
+    return _file(sheet, layout, options, contents, ())
 
 
 def _rated(
-    sheet: Sheet,
-    layout: Layout,
-    options: GradeOptions,
-    repeated: Repeated,
-    warnings: list[str],
-) -> RatingsFile:
+    sheet: Sheet, layout: Layout, options: GradeOptions, repeated: Repeated
+) -> Contents:
     # of a long or a wide table
     read = _long if layout.kind == "long" else _wide
     triples, grades, doubts = read(sheet, layout, options)
@@ -345,37 +271,44 @@ def _rated(
         sheet, layout, triples, part_of, grades.scale, repeated
     )
     rated = triples.grade[triples.grade >= 0]
-    freq = np.bincount(rated, minlength=len(scale.grades))
-    record = _record(sheet, layout, options, grades, scale, freq)
+    of_parts = [triples]
+    if len(names) > 1:
+        of_parts = [triples[part_of == k] for k in range(len(names))]
     parts = [
-        put_together(triples if len(names) == 1 else triples[part_of == k], scale, name)
-        for k, name in enumerate(names)
+        put_together(part, scale, name)
+        for part, name in zip(of_parts, names, strict=True)
     ]
+    facts: dict[str, Any] = {"repeated": repeated if n_repeated else None}
     if layout.clusters is not None:
-        of_row, clusters = _named(sheet, "cluster", (layout.clusters,))
-        record |= {
+        parts = _clustered(sheet, layout.clusters, of_parts, parts)
+        facts |= {
             "clusters": sheet.header[layout.clusters],
-            "n_clusters": len(np.unique(of_row[triples.row])),
+            "n_clusters": len({name for part in parts for name in part.clusters}),
         }
-        parts = [
-            replace(
-                part,
-                clusters=part_clusters(
-                    sheet, triples[part_of == k], of_row, clusters, layout.clusters
-                ),
-            )
-            for k, part in enumerate(parts)
-        ]
-    record |= {
-        "raters": triples.rater_names,
-        "n_items": len(triples.item_names),
-        "n_raters": len(triples.rater_names),
-        "n_ratings": len(rated),
-        "n_missing": n_missing,
-        "n_repeated": n_repeated,
-        "repeated": repeated if n_repeated else None,
-    }
-    return _file(sheet, parts, scale, grades, record, [*warnings, *doubts])
+    return Contents(
+        parts=parts,
+        grades=grades,
+        scale=scale,
+        freq=np.bincount(rated, minlength=len(scale.grades)),
+        raters=triples.rater_names,
+        n_items=len(triples.item_names),
+        n_raters=len(triples.rater_names),
+        n_missing=n_missing,
+        doubts=doubts,
+        n_repeated=n_repeated,
+        facts=facts,
+    )
+
+
+def _clustered(
+    sheet: Sheet, column: int, of_parts: list[Triples], parts: list[RatingsPart]
+) -> list[RatingsPart]:
+    # the parts with the cluster of every item
+    of_row, names = _named(sheet, "cluster", (column,))
+    return [
+        replace(part, clusters=part_clusters(sheet, triples, of_row, names, column))
+        for triples, part in zip(of_parts, parts, strict=True)
+    ]
 
 
 def _grades_of(
@@ -475,134 +408,37 @@ def _wide(
     return triples, grades, doubts
 
 
-def _counted(
-    sheet: Sheet, layout: Layout, options: GradeOptions, warnings: list[str]
+def _file(
+    sheet: Sheet,
+    layout: Layout,
+    options: GradeOptions,
+    contents: Contents,
+    warnings: Sequence[str],
 ) -> RatingsFile:
-    # of a table of counts, or a contingency table
-    if options.missing_codes:
-        raise ParameterError(
-            f"--missing: names grades that are missing, and cells of --{layout.kind} "
-            f"are numbers of ratings; got {', '.join(options.missing_codes)}"
-        )
-    names = [sheet.header[place] for place in layout.raters]
-    table = _whole_numbers(sheet, layout)
-    warnings = [*warnings, *doubt_counts(sheet, layout, table)]
-    if not table.any():
-        raise sheet.error(f"--{layout.kind}: needed at least one rating, got none")
-    order = _order_of(sheet, names, options)
-    scale = Scale(
-        name="observed" if options.categories is None else "declared",
-        grades=tuple(names[k] for k in order),
-    )
-    grades = Grades(scale=scale, codes=np.arange(len(names)))
-    part_of, parts_named = part_codes(sheet, layout, np.arange(len(table)))
-    warnings += doubt_names("groups", sorted({group or "" for group, _ in parts_named}))
-    n_raters = 2
-    if layout.kind == "table":
-        rows = _table_rows(sheet, layout, names)
-        table = table[np.ix_([rows.index(names[k]) for k in order], order)]
-        parts = [_table_part(table, scale)]
-        freq = table.sum(axis=0) + table.sum(axis=1)
-        n_items = int(table.sum())
-    else:
-        table = table[:, order]
-        parts = [
-            _counts_part(table[part_of == k], scale, name)
-            for k, name in enumerate(parts_named)
-        ]
-        freq, n_items = table.sum(axis=0), int((table.sum(axis=1) > 0).sum())
-        n_raters = int(table.sum(axis=1).max(initial=0))
-    record = _record(sheet, layout, options, grades, scale, freq)
-    record |= {
-        "raters": [],
-        "n_items": n_items,
-        "n_raters": n_raters,
-        "n_ratings": int(freq.sum()),
-        "n_missing": None,
-        "n_repeated": 0,
-        "repeated": None,
-    }
-    return _file(sheet, parts, scale, grades, record, warnings)
-
-
-def _whole_numbers(sheet: Sheet, layout: Layout) -> NDArray[np.int64]:
-    # -> (n_rows, n_categories)
-    cells = sheet.cells[:, list(layout.raters)]
-    codes, texts = coded_texts(cells.ravel())
-    values = []
-    for code, text in enumerate(texts):
-        number = float(text) if is_number(text) else -1.0
-        if text and not (number >= 0 and number.is_integer() and number < 2**53):
-            row = int(np.argmax(codes == code)) // cells.shape[1]
-            raise sheet.error(
-                f"{sheet.where(row)}: --{layout.kind} needs whole numbers from 0, got "
-                f"{text!r}"
-            )
-        values.append(int(number) if text else 0)
-    return np.array(values, dtype=np.int64)[codes].reshape(cells.shape)
-
-
-def _order_of(sheet: Sheet, names: list[str], options: GradeOptions) -> list[int]:
-    # places of the categories in the order of the scale
-    if options.categories is not None:
-        if set(options.categories) != set(names):
-            raise sheet.error(
-                f"--categories: needed those of the columns, {', '.join(names)}, in "
-                f"order, got {', '.join(options.categories)}"
-            )
-        return [names.index(category) for category in options.categories]
-    if all(map(is_number, names)):
-        return sorted(range(len(names)), key=lambda k: float(names[k]))
-    return list(range(len(names)))
-
-
-def _table_rows(sheet: Sheet, layout: Layout, names: list[str]) -> list[str]:
-    # the categories of the rows of a contingency table
-    if len(sheet.cells) != len(names):
-        raise sheet.error(
-            f"--table: needed as many rows as categories, {len(names)}, got "
-            f"{len(sheet.cells)}; --no-item if no column names the rows"
-        )
-    if not layout.item:
-        return names
-    rows = [str(cell).strip() for cell in sheet.column(layout.item[0])]
-    if set(rows) != set(names):
-        raise sheet.error(
-            f"--table: needed rows and columns of the same categories, got "
-            f"{', '.join(map(repr, rows))} and {', '.join(map(repr, names))}"
-        )
-    return rows
-
-
-def _table_part(table: NDArray[np.int64], scale: Scale) -> RatingsPart:
-    ratings = count_table(table, categories=scale.values)
-    return RatingsPart(
-        group=None, session=None, items=(), raters=("rows", "columns"), ratings=ratings
-    )
-
-
-def _counts_part(
-    table: NDArray[np.int64], scale: Scale, name: tuple[str | None, str | None]
-) -> RatingsPart:
-    ratings = count_items(table, categories=scale.values)
-    return RatingsPart(
-        group=name[0], session=name[1], items=(), raters=(), ratings=ratings
+    messages = (*warnings, *contents.doubts, *contents.grades.warnings)
+    return RatingsFile(
+        parts=tuple(contents.parts),
+        scale=contents.scale,
+        is_ordered=contents.grades.is_ordered,
+        read={
+            "file": sheet.name,
+            "sha256": sheet.sha256,
+            **_record(sheet, layout, options, contents),
+            "warnings": list(messages),
+        },
+        warnings=messages,
+        simulated=contents.is_simulated or _is_simulated(sheet),
     )
 
 
 def _record(
-    sheet: Sheet,
-    layout: Layout,
-    options: GradeOptions,
-    grades: Grades,
-    scale: Scale,
-    freq: NDArray[np.int64],
+    sheet: Sheet, layout: Layout, options: GradeOptions, contents: Contents
 ) -> dict[str, Any]:
-    # what was read, as far as every kind of table has it
     names = [sheet.header[place] for place in layout.item]
     used = {*layout.item, *layout.raters, layout.rater, layout.grade}
     used |= {layout.session, layout.by, layout.clusters}
-    counted = zip(scale.grades, freq.tolist(), strict=True)
+    scale = contents.scale
+    counted = zip(scale.grades, contents.freq.tolist(), strict=True)
     return {
         **sheet.facts,
         "layout": layout.kind,
@@ -613,43 +449,27 @@ def _record(
         "by": _name(sheet, layout.by),
         "ignored": [n for p, n in enumerate(sheet.header) if p not in used],
         "grades": {grade: n for grade, n in counted if n},
-        "missing": grades.n_missing,
-        "merged": grades.merged,
+        "missing": contents.grades.n_missing,
+        "merged": contents.grades.merged,
         "dropped": sheet.dropped,
         "scale": {
             "name": scale.name,
             "grades": list(scale.grades),
             "declared": options.categories is not None,
         },
+        "raters": contents.raters,
+        "n_items": contents.n_items,
+        "n_raters": contents.n_raters,
+        "n_ratings": int(contents.freq.sum()),
+        "n_missing": contents.n_missing,
+        "n_repeated": contents.n_repeated,
+        "repeated": None,
+        **contents.facts,
     }
 
 
 def _name(sheet: Sheet, place: int | None) -> str | None:
     return None if place is None else sheet.header[place]
-
-
-def _file(
-    sheet: Sheet,
-    parts: Sequence[RatingsPart],
-    scale: Scale,
-    grades: Grades,
-    record: dict[str, Any],
-    warnings: Sequence[str],
-) -> RatingsFile:
-    messages = (*warnings, *grades.warnings)
-    return RatingsFile(
-        parts=tuple(parts),
-        scale=scale,
-        is_ordered=grades.is_ordered,
-        read={
-            "file": sheet.name,
-            "sha256": sheet.sha256,
-            **record,
-            "warnings": list(messages),
-        },
-        warnings=messages,
-        simulated=_is_simulated(sheet),
-    )
 
 
 def _is_simulated(sheet: Sheet) -> bool:
