@@ -15,7 +15,7 @@ import numpy as np
 from tqdm import tqdm
 
 from masrel.elbow import STANDARD_MODELS, fit, fit_friction
-from masrel.elbow.identification.quantities import QUANTITIES
+from masrel.elbow.identification._quantities import QUANTITIES
 from masrel.report._figure_data import FrictionView, JointFitView
 from masrel.report.figures import draw
 from tests.elbow.identification.synthesis import Scatter, recording, study

@@ -4,13 +4,20 @@ Source: Park, Kim and Damiano (2012), IEEE TNSRE 20(3), 361-370,
 https://doi.org/10.1109/TNSRE.2012.2195330, equations (1) to (6).
 """
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.elbow.identification.catch import Catch
-from masrel.elbow.identification.law import PreCatchLaw
-from masrel.elbow.identification.levels import CatchLevels, catch_levels
-from masrel.elbow.identification.results import ElbowFit
+from masrel.elbow.identification import ElbowFit
+from masrel.elbow.identification._catches import (
+    Arm,
+    Catch,
+    CatchLevels,
+    PreCatchLaw,
+    catch_levels,
+)
 
 Floats = NDArray[np.float64]
 
@@ -71,6 +78,14 @@ def catches(fit: ElbowFit) -> list[Catch]:
 def catch_readings(fit: ElbowFit) -> list[tuple[Catch, CatchLevels]]:
     """Return the catches whose peak and residual of (3) can be read off the torque."""
     values = {e.name: e.value for e in fit.estimates}
+    names = [trial.name for trial in fit.trials]
+    terms: dict[str, Any] = {
+        name: values[name] if term == "fitted" else term
+        for name, term in fit.arm.items()
+        if name not in ("offset", "drift") and term != "off"
+    }
+    drifts = dict(zip(names, fit.drifts, strict=True))
+    arm = replace(Arm(drifts=drifts), **terms)
     law = PreCatchLaw(
         damping=values["damping"],
         stiffness=values["stiffness"],
@@ -78,7 +93,7 @@ def catch_readings(fit: ElbowFit) -> list[tuple[Catch, CatchLevels]]:
     )
     readings = []
     for trial in fit.trials:
-        levels = catch_levels(trial, law, fit.constants)
+        levels = catch_levels(trial, law, fit.constants, arm)
         if trial.catch is not None and levels is not None:
             readings.append((trial.catch, levels))
     return readings

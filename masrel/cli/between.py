@@ -158,7 +158,7 @@ def _model_between(
     name: str, joint: "ElbowParameters", neighbours: Sequence[_Source], fraction: str
 ) -> _Between:
     from masrel.elbow.identification import model_document
-    from masrel.elbow.identification.model_file import MODEL_KEYS
+    from masrel.elbow.identification._model_file import MODEL_KEYS
 
     first, second = neighbours
     simulated = first.simulated or second.simulated
@@ -221,8 +221,8 @@ def _document(placed: list[_Between], files: list[Path]) -> dict[str, object]:
 
 
 def _table(placed: list[_Between]) -> "Table":
-    from masrel.elbow.identification.model_file import MODEL_KEYS
-    from masrel.elbow.identification.quantities import QUANTITIES
+    from masrel.elbow.identification._model_file import MODEL_KEYS
+    from masrel.elbow.identification._quantities import QUANTITIES
     from masrel.report._tables import Column, Table
 
     quantities = [q for q in QUANTITIES.values() if q.key in MODEL_KEYS]

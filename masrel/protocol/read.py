@@ -8,7 +8,7 @@ from typing import Any
 
 import msgspec
 
-from masrel.elbow.identification.model_file import (
+from masrel.elbow.identification._model_file import (
     CONSTANT_KEYS,
     FORMAT,
     MODEL_KEYS,

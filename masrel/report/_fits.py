@@ -3,10 +3,14 @@
 import math
 from collections.abc import Sequence
 
-from masrel.elbow.identification.friction import FrictionFit
-from masrel.elbow.identification.quantities import QUANTITIES, Quantity
-from masrel.elbow.identification.results import ElbowFit, FittedParameter
-from masrel.elbow.identification.trials import Trial
+from masrel.elbow.identification import (
+    ElbowFit,
+    FittedParameter,
+    FrictionFit,
+    LackOfFit,
+)
+from masrel.elbow.identification._catches import Trial
+from masrel.elbow.identification._quantities import ALL_QUANTITIES, Quantity
 from masrel.report._figure_data import Content, Form, FrictionView, JointFitView
 from masrel.report._tables import (
     ABSENT,
@@ -33,10 +37,13 @@ def fit_table(fit: ElbowFit | FrictionFit) -> Table:
 
 def _joint_table(fit: ElbowFit) -> Table:
     alone = {e.name: e for step in fit.steps for e in step.estimates}
-    rows = tuple(_row(e, alone.get(e.name), QUANTITIES[e.name]) for e in fit.estimates)
+    rows = tuple(
+        _row(e, alone.get(e.name), ALL_QUANTITIES[e.name]) for e in fit.estimates
+    )
     slow = sum(trial.pace == "slow" for trial in fit.trials)
     fast = len(fit.trials) - slow
     notes = (
+        *_lack_of_fit_notes(fit.lack_of_fit),
         f"{slow} slow and {fast} fast trials; intervals are clustered by trial.",
         f"Slow trials differ from (1) by {number(100.0 * fit.relative_error, 1)} % of "
         f"their mean torque; all trials from the law by {number(fit.torque_sd, 3)} N·m "
@@ -45,6 +52,27 @@ def _joint_table(fit: ElbowFit) -> Table:
         *fit.remarks,
     )
     return _table("joint", "Parameters of the joint", rows, notes, fit)
+
+
+def _lack_of_fit_notes(lack: LackOfFit) -> list[str]:
+    phases = "; ".join(
+        f"{p.phase} {number(p.sd, 3)}, {number(p.runs, 2)}, "
+        f"{number(p.autocorrelation, 2)}"
+        for p in lack.phases
+    )
+    notes = [
+        lack.sentence,
+        "Left over (N·m, root mean square; runs of one sign over those of independent "
+        f"samples; autocorrelation of neighbours): {phases}.",
+    ]
+    if not math.isnan(lack.after_to_before):
+        notes.append(
+            f"From the catch on {number(lack.after_to_before, 2)} times what is left "
+            "before it."
+        )
+    if not math.isnan(lack.rest_sd):
+        notes.append(f"Noise at rest {number(lack.rest_sd, 3)} N·m.")
+    return notes
 
 
 def _friction_table(fit: FrictionFit) -> Table:
@@ -122,20 +150,60 @@ def fit_document(fit: ElbowFit | FrictionFit) -> dict[str, object]:
         "level": fit.level,
         "relative_error": _finite(fit.relative_error),
         "torque_sd_nm": fit.torque_sd,
-        "estimates": [_estimate(e, QUANTITIES[e.name]) for e in fit.estimates],
+        "lack_of_fit": _lack_of_fit(fit.lack_of_fit),
+        "arm": dict(fit.arm),
+        "estimates": [_estimate(e, ALL_QUANTITIES[e.name]) for e in fit.estimates],
         "correlation": _matrix(fit.correlation.tolist()),
         "steps": [
             {
                 "name": step.name,
-                "estimates": [_estimate(e, QUANTITIES[e.name]) for e in step.estimates],
+                "estimates": [
+                    _estimate(e, ALL_QUANTITIES[e.name]) for e in step.estimates
+                ],
             }
             for step in fit.steps
         ],
-        "trials": [_trial(trial) for trial in fit.trials],
+        "trials": [
+            _trial(trial) | {"offset_nm": offset, "drift_nm_s": drift}
+            for trial, offset, drift in zip(
+                fit.trials, fit.offsets, fit.drifts, strict=True
+            )
+        ],
         "recordings": [
             {"name": name, "sha256": sha256} for name, sha256 in fit.sources.items()
         ],
         "remarks": list(fit.remarks),
+    }
+
+
+def _lack_of_fit(lack: LackOfFit) -> dict[str, object]:
+    return {
+        "verdict": lack.verdict,
+        "sentence": lack.sentence,
+        "level": lack.level,
+        "tests": [
+            {
+                "structure": test.name,
+                "t": test.t,
+                "degrees_of_freedom": test.df,
+                "p_value": test.p_value,
+                "adjusted_p_value": test.adjusted,
+            }
+            for test in lack.tests
+        ],
+        "explained": _finite(lack.explained),
+        "phases": [
+            {
+                "phase": phase.phase,
+                "n_samples": phase.n_samples,
+                "sd_nm": phase.sd,
+                "runs": phase.runs,
+                "autocorrelation": phase.autocorrelation,
+            }
+            for phase in lack.phases
+        ],
+        "after_to_before": _finite(lack.after_to_before),
+        "rest_sd_nm": _finite(lack.rest_sd),
     }
 
 
@@ -157,7 +225,7 @@ def _estimate(estimate: FittedParameter, quantity: Quantity) -> dict[str, object
         "key": quantity.key,
         "value": _finite(estimate.value * factor),
         "standard_error": _finite(estimate.standard_error * factor),
-        "degrees_of_freedom": _finite(estimate.freedom),
+        "degrees_of_freedom": _finite(estimate.df),
         "low": _finite(estimate.low * factor),
         "high": _finite(estimate.high * factor),
         "n_trials": estimate.n_trials,

@@ -1,26 +1,34 @@
 """Joints identified from recordings, with the uncertainty of every parameter.
 
 In: recordings of slow and fast stretches (CSV, npz, or masrel's own). Out: a joint
-with intervals, a model file that a protocol can name, the friction of a device.
+with intervals and whether it fits, a model file that a protocol can name, the friction
+of a device.
 """
 
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from masrel.elbow.identification.between import intermediate_models
-    from masrel.elbow.identification.friction import FrictionFit, fit_friction
-    from masrel.elbow.identification.identify import fit
-    from masrel.elbow.identification.model_file import as_toml, model_document
-    from masrel.elbow.identification.movement import Movement
-    from masrel.elbow.identification.reading import read_movement
-    from masrel.elbow.identification.results import ElbowFit, FittedParameter, Step
+    from masrel.elbow.identification._between import intermediate_models
+    from masrel.elbow.identification._friction import FrictionFit, fit_friction
+    from masrel.elbow.identification._identify import fit
+    from masrel.elbow.identification._lack_of_fit import (
+        LackOfFit,
+        PhaseResidual,
+        StructureTest,
+    )
+    from masrel.elbow.identification._model_file import as_toml, model_document
+    from masrel.elbow.identification._reading import Movement, read_movement
+    from masrel.elbow.identification._results import ElbowFit, FittedParameter, Step
 
 __all__ = [
     "ElbowFit",
     "FittedParameter",
     "FrictionFit",
+    "LackOfFit",
     "Movement",
+    "PhaseResidual",
     "Step",
+    "StructureTest",
     "as_toml",
     "fit",
     "fit_friction",
@@ -30,14 +38,17 @@ __all__ = [
 ]
 
 _HOMES = {
-    "FrictionFit": "friction",
-    "Movement": "movement",
-    "as_toml": "model_file",
-    "fit": "identify",
-    "fit_friction": "friction",
-    "intermediate_models": "between",
-    "model_document": "model_file",
-    "read_movement": "reading",
+    "FrictionFit": "_friction",
+    "LackOfFit": "_lack_of_fit",
+    "Movement": "_reading",
+    "PhaseResidual": "_lack_of_fit",
+    "StructureTest": "_lack_of_fit",
+    "as_toml": "_model_file",
+    "fit": "_identify",
+    "fit_friction": "_friction",
+    "intermediate_models": "_between",
+    "model_document": "_model_file",
+    "read_movement": "_reading",
 }
 
 
@@ -47,5 +58,5 @@ def __getattr__(name: str) -> object:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     import importlib
 
-    home = _HOMES.get(name, "results")
+    home = _HOMES.get(name, "_results")
     return getattr(importlib.import_module(f"{__name__}.{home}"), name)

@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 
 from masrel.analysis import _fit_residuals as residuals
 from masrel.elbow.identification import ElbowFit, FrictionFit
-from masrel.elbow.identification.catch import Catch
-from masrel.elbow.identification.quantities import QUANTITIES
-from masrel.elbow.identification.trials import Trial
+from masrel.elbow.identification._catches import Catch, Trial
+from masrel.elbow.identification._quantities import QUANTITIES
 from masrel.report._figure_data import FrictionView, JointFitView
 from masrel.report._fits import FRICTION
 from masrel.report._tables import interval_text, number

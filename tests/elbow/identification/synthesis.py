@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from masrel.elbow.identification import Movement
 from masrel.elbow.parameters import ElbowParameters
@@ -40,6 +41,18 @@ class Scatter:
     catch_angle: float = 0.0  # rad
     catch_torque: float = 0.0  # relative
     catch_travel: float = 0.0  # rad
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Arm:
+    """What an arm and a sensor add to the law; the paper has nothing of it."""
+
+    gravity: float = 0.0  # N·m, times the sine of the angle
+    inertia: float = 0.0  # kg·m², in every phase
+    drift: float = 0.0  # N·m/s
+    lag: float = 0.0  # s, of a sensor of first order
+    rise: float = 0.0  # s, from the catch to its peak
+    noise_time: float = 0.0  # s, over which noise is correlated; 0 is white
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,10 +86,12 @@ def recording(
     rest: float = 0.2,
     duration: float | None = None,
     offset: float = 0.0,
+    arm: Arm | None = None,
     name: str = "simulated",
 ) -> tuple[Movement, Truth]:
     """One stretch with `rest` seconds of rest before and after it."""
-    hand, scatter = hand or Hand(), scatter or Scatter()
+    hand, scatter, arm = hand or Hand(), scatter or Scatter(), arm or Arm()
+    joint = replace(joint, catch_rise=arm.rise)
     speed = _speed(end - start, mean_speed, hand, rng)
     joint = replace(
         joint,
@@ -96,8 +111,14 @@ def recording(
     at = np.arange(round(length * rate)) / rate
     inside = np.clip(at - rest, 0.0, time[-1])
     sampled = np.interp(inside, time, angle)
-    torque, truth = _torque(joint, time, angle, speed, catch, inside, free)
-    felt = torque + offset + noise * rng.standard_normal(at.size)
+    motion = time, angle, speed
+    torque, truth = _torque(joint, *motion, catch, inside, free)
+    if arm != Arm():
+        fine = np.arange(at[0], at[-1] + STEP, STEP) - rest
+        within = np.clip(fine, 0.0, time[-1])
+        law, _ = _torque(joint, *motion, catch, within, free)
+        torque = np.interp(at - rest, fine, _sensed(arm, law, *motion, fine))
+    felt = torque + offset + noise * _noise(rng, at.size, arm.noise_time * rate)
     if encoder:
         sampled = np.round(sampled / encoder) * encoder
     made = Movement(name=name, time=at, angle=sampled, torque=felt, simulated=True)
@@ -113,10 +134,13 @@ def study(
     scatter: Scatter | None = None,
     noise: float = 0.1,
     fast: tuple[float, float] = (60.0, 120.0),
+    arm: Arm | None = None,
+    rate: float = 1000.0,
 ) -> list[Movement]:
     """Slow stretches of part of the range and fast ones of all of it."""
     rng = np.random.default_rng(seed)
     made = []
+    sensors = {"noise": noise, "arm": arm, "rate": rate}
     for i in range(n_slow):
         start = math.radians(rng.uniform(25.0, 105.0))
         mean = math.radians(rng.uniform(5.0, 8.5))
@@ -127,8 +151,8 @@ def study(
                 end=start + math.radians(18.0),
                 mean_speed=mean,
                 rng=rng,
-                noise=noise,
                 name=f"slow {i}",
+                **sensors,
             )[0]
         )
     for i in range(n_fast):
@@ -140,11 +164,35 @@ def study(
                 mean_speed=math.radians(rng.uniform(*fast)),
                 rng=rng,
                 scatter=scatter,
-                noise=noise,
                 name=f"fast {i}",
+                **sensors,
             )[0]
         )
     return made
+
+
+def _sensed(
+    arm: Arm, law: Floats, time: Floats, angle: Floats, speed: Floats, at: Floats
+) -> Floats:
+    # what a sensor reads of the law and the arm at fine times, from rest to rest
+    within = np.clip(at, 0.0, time[-1])
+    pushed = np.interp(at, time, np.gradient(speed, STEP), left=0.0, right=0.0)
+    torque = law + arm.gravity * np.sin(np.interp(within, time, angle))
+    torque = torque + arm.inertia * pushed + arm.drift * at
+    if arm.lag:
+        keep = math.exp(-STEP / arm.lag)
+        torque = lfilter([1 - keep], [1, -keep], torque, zi=[keep * torque[0]])[0]
+    return np.asarray(torque)
+
+
+def _noise(rng: np.random.Generator, size: int, time: float) -> Floats:
+    # of standard deviation 1; `time` in samples is that of its correlation
+    white = rng.standard_normal(size)
+    if not time:
+        return white
+    keep = math.exp(-1.0 / time)
+    grown = math.sqrt(1.0 - keep**2) * white
+    return np.asarray(lfilter([1.0], [1.0, -keep], grown, zi=[keep * white[0]])[0])
 
 
 def _speed(travel: float, mean: float, hand: Hand, rng: np.random.Generator) -> Floats:
@@ -223,7 +271,11 @@ def _torque(
     )
     rise = joint.catch_torque_constant * catch_speed
     in_peak = at < min(catch + joint.peak_duration, catch_end)
-    level = np.where(in_peak, rise, joint.residual_ratio * rise)
+    share = 1.0
+    if joint.catch_rise:
+        x = np.clip((at - catch) / joint.catch_rise, 0.0, 1.0)
+        share = x**2 * (3 - 2 * x)
+    level = np.where(in_peak, share * rise, joint.residual_ratio * rise)
     climb = np.maximum(np.interp(at, time, angle) - released, 0.0)
     added = level + joint.post_catch_stiffness * climb
     pushed = joint.inertia * np.interp(at, time, np.gradient(speed, STEP))

@@ -5,12 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from masrel.elbow.identification.catch import Catch
-from masrel.elbow.identification.catch_line import (
-    fit_catch_line,
-    line_row,
-    on_the_line,
-)
+from masrel.elbow.identification._catches import Catch
+from masrel.elbow.identification._equations import line_row
+from masrel.elbow.identification._steps import fit_catch_line, on_the_line
 from masrel.elbow.parameters import STANDARD_MODELS
 
 HM3 = STANDARD_MODELS["HM3"]

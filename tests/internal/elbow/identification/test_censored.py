@@ -10,9 +10,13 @@ from hypothesis import strategies as st
 from scipy import stats
 from scipy.special import stdtrit
 
-from masrel.elbow.identification.censored import TravelFit, beyond, fit_censored
-from masrel.elbow.identification.horizon import Horizon
-from masrel.elbow.identification.travels import CensoredTravels
+from masrel.elbow.identification._travels import (
+    CensoredTravels,
+    DetectionLimit,
+    TravelFit,
+    beyond,
+    fit_censored,
+)
 
 SEEN = [0.81, 0.83, 0.86, 0.84, 0.88]
 LIMITS = [0.82, 0.85, 0.9, 0.87]
@@ -21,7 +25,7 @@ LIMITS = [0.82, 0.85, 0.9, 0.87]
 def travels(
     seen: list[float], limits: list[float], softness: float = 0.0
 ) -> CensoredTravels:
-    behind = [Horizon(travel=limit, softness=softness) for limit in limits]
+    behind = [DetectionLimit(travel=limit, sd=softness) for limit in limits]
     return CensoredTravels.of(seen, behind)
 
 
@@ -35,7 +39,7 @@ def test_where_everything_is_seen_it_is_students_interval() -> None:
     half = float(stdtrit(n - 1, 0.975)) * sd / math.sqrt(n)
     assert found.mean == mean
     assert found.standard_error == pytest.approx(sd / math.sqrt(n), rel=1e-12)
-    assert found.freedom == n - 1
+    assert found.df == n - 1
     assert found.low == pytest.approx(mean - half, rel=1e-12)
     assert found.high == pytest.approx(mean + half, rel=1e-12)
 
@@ -126,7 +130,7 @@ def test_shifting_and_scaling_travels_does_the_same_to_the_answer(
         [shift + scale * c for c in limits],
         0.01 * scale,
     )
-    assert two.freedom == one.freedom
+    assert two.df == one.df
     assert two.standard_error == pytest.approx(scale * one.standard_error, rel=1e-6)
     size = 1e-6 * scale * one.standard_error
     for name in ("mean", "low", "high"):
@@ -138,7 +142,7 @@ def test_a_horizon_far_below_says_nothing() -> None:
     alone, far = fitted(SEEN, []), fitted(SEEN, [-50.0])
     assert far.mean == pytest.approx(alone.mean, rel=1e-14)
     assert far.sd == pytest.approx(alone.sd, rel=1e-12)
-    assert beyond(1.0, Horizon(travel=-50.0, softness=0.0), 0.01) == (0.0, 0.0, 0.0)
+    assert beyond(1.0, DetectionLimit(travel=-50.0, sd=0.0), 0.01) == (0.0, 0.0, 0.0)
 
 
 def test_a_later_horizon_moves_the_answer_up() -> None:
@@ -151,7 +155,7 @@ def test_the_row_of_the_last_fit_has_the_slope_and_curvature_of_the_chance(
     distance: float,
 ) -> None:
     # half the square of the residual is -ln Φ; its derivatives by 40 digits
-    at, horizon = 0.9, Horizon(travel=0.9 - 0.05 * distance, softness=0.03)
+    at, horizon = 0.9, DetectionLimit(travel=0.9 - 0.05 * distance, sd=0.03)
     left, slope, root = beyond(at, horizon, 0.04)  # √(0.04² + 0.03²) is 0.05
     with mpmath.workdps(40):
 

@@ -10,8 +10,19 @@ import statsmodels.api as sm
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from masrel.elbow.identification.clusters import Rows, solve, without_own
-from masrel.elbow.identification.results import fitted
+from masrel.elbow.identification._clusters import (
+    Rows,
+    left_out_errors,
+    partial_out,
+    solve,
+    triangle,
+)
+from masrel.elbow.identification._results import fitted
+
+
+def without_own(own: np.ndarray, design: np.ndarray, target: np.ndarray) -> Rows:
+    rest = partial_out(np.column_stack([own, design, target]), own.shape[1])
+    return Rows(design=rest[:, :-1], target=rest[:, -1])
 
 
 def trials(seed: int, sizes: Sequence[int], n_parameters: int = 2) -> list[Rows]:
@@ -60,7 +71,7 @@ def test_reduced_and_whole_matrices_agree(seed: int, sizes: list[int]) -> None:
     fit, (values, covariance, freedom) = solve(rows), dense(rows)
     np.testing.assert_allclose(fit.values, values, rtol=1e-9)
     np.testing.assert_allclose(fit.covariance, covariance, rtol=1e-6, atol=1e-12)
-    np.testing.assert_allclose(fit.freedom, freedom, rtol=1e-6)
+    np.testing.assert_allclose(fit.df, freedom, rtol=1e-6)
 
 
 def test_with_one_row_a_trial_it_is_hc2_of_statsmodels() -> None:
@@ -71,6 +82,7 @@ def test_with_one_row_a_trial_it_is_hc2_of_statsmodels() -> None:
     fit = solve(rows)
     np.testing.assert_allclose(fit.values, peer.params, rtol=1e-12)
     np.testing.assert_allclose(fit.covariance, peer.cov_params(), rtol=1e-9)
+    assert fit.residual_sd == pytest.approx(math.sqrt(peer.mse_resid), rel=1e-12)
 
 
 def test_values_and_residuals_are_those_of_statsmodels_with_a_dummy_a_trial() -> None:
@@ -81,9 +93,30 @@ def test_values_and_residuals_are_those_of_statsmodels_with_a_dummy_a_trial() ->
     dummies = (which[:, None] == np.arange(4)).astype(float)
     peer = sm.OLS(y, np.hstack([x, dummies])).fit()
     own = [without_own(np.ones((r.target.size, 1)), r.design, r.target) for r in rows]
-    fit = solve(own, n_own=4)
+    fit = solve(own)
     np.testing.assert_allclose(fit.values, peer.params[:2], rtol=1e-10)
-    assert fit.residual_sd == pytest.approx(math.sqrt(peer.mse_resid), rel=1e-10)
+    left = sum(float(((r.target - r.design @ fit.values) ** 2).sum()) for r in own)
+    assert left == pytest.approx(peer.ssr, rel=1e-10)
+
+
+@pytest.mark.parametrize("n_rows", [3, 9, 256, 257, 5000])
+def test_the_triangle_of_blocks_is_that_of_the_whole(n_rows: int) -> None:
+    table = np.random.default_rng(n_rows).standard_normal((n_rows, 5))
+    r = triangle(table)
+    np.testing.assert_allclose(r.T @ r, table.T @ table, rtol=1e-10, atol=1e-10)
+    assert r.shape == (min(n_rows, 5), 5)
+
+
+def test_what_others_give_a_trial_is_that_of_a_fit_without_it() -> None:
+    rows = trials(6, [7, 9, 6, 8])
+    fit = solve(rows)
+    errors = [r.target - r.design @ fit.values for r in rows]
+    without = left_out_errors([r.design for r in rows], errors)
+    for i, row in enumerate(rows):
+        others = solve([r for j, r in enumerate(rows) if j != i])
+        np.testing.assert_allclose(
+            without[i], row.target - row.design @ others.values, rtol=1e-9
+        )
 
 
 def test_a_mean_of_trials_of_unlike_size_by_hand() -> None:
@@ -134,7 +167,7 @@ def test_what_own_parameters_explain_but_for_rounding_tells_nothing() -> None:
         design = np.stack([np.full(40, speed), angle], axis=1)
         own = np.ones((40, 1))
         rows.append(without_own(own, design, 1.26 * speed + 3.15 * angle))
-    fit = solve(rows, n_own=3)
+    fit = solve(rows)
     assert math.isnan(fit.values[0])
     assert fit.values[1] == pytest.approx(3.15, rel=1e-12)
 
@@ -143,7 +176,7 @@ def test_one_trial_has_values_and_no_covariance() -> None:
     fit = solve(trials(4, [8]))
     assert np.isfinite(fit.values).all()
     assert np.isnan(fit.covariance).all()
-    assert np.isnan(fit.freedom).all()
+    assert np.isnan(fit.df).all()
 
 
 def test_intervals_of_few_unlike_trials_hold_what_they_say() -> None:
@@ -160,7 +193,7 @@ def test_intervals_of_few_unlike_trials_hold_what_they_say() -> None:
             error = rng.standard_normal() + 0.3 * rng.standard_normal(size)
             rows.append(Rows(design=design, target=design @ [1.0, 2.0] + error))
         fit = solve(rows)
-        half = stdtrit(fit.freedom[1], 0.975) * math.sqrt(fit.covariance[1, 1])
+        half = stdtrit(fit.df[1], 0.975) * math.sqrt(fit.covariance[1, 1])
         covered += abs(fit.values[1] - 2.0) <= half
     assert 361 <= covered <= 396
 

@@ -10,7 +10,7 @@ import math
 import pytest
 
 from masrel.elbow import STANDARD_MODELS, ElbowParameters, fit
-from masrel.elbow.identification.quantities import QUANTITIES
+from masrel.elbow.identification._quantities import QUANTITIES
 from tests.elbow.identification.synthesis import Scatter, study
 
 HM2, HM3 = STANDARD_MODELS["HM2"], STANDARD_MODELS["HM3"]

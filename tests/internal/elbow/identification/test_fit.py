@@ -15,7 +15,7 @@ from masrel.elbow import (
     trace,
 )
 from masrel.elbow.identification import ElbowFit, Movement
-from masrel.elbow.identification.quantities import QUANTITIES
+from masrel.elbow.identification._quantities import QUANTITIES
 from masrel.errors import (
     ParameterError,
     RecordingError,
@@ -203,7 +203,7 @@ def test_catches_that_outlast_their_stretch_count_as_longer(
     assert made.value > np.mean(seen) + math.radians(1.0)
     assert made.covers(HM2.catch_travel)
     assert made.high - made.value > made.value - made.low
-    assert (made.n_trials, made.freedom) == (16, 2.0)
+    assert (made.n_trials, made.df) == (16, 2.0)
     assert made.reason is None
     assert outlasting.remarks == (
         "13 of 16 catches do not end within their stretch: D counts each as longer "
@@ -333,11 +333,17 @@ def test_a_torque_of_the_wrong_sign_is_noticed(movements: list[Movement]) -> Non
         Movement(name=m.name, time=m.time, angle=m.angle, torque=-m.torque)
         for m in movements[:8]
     ]
-    with pytest.warns(RecordingWarning) as caught:
+    with pytest.raises(
+        RecordingError, match=r"this is not the law: b is -1.*are both signs right"
+    ):
         fit(turned)
-    said = [str(warning.message) for warning in caught]
-    assert any("damping is negative" in message for message in said)
-    assert any("stiffness is negative" in message for message in said)
+
+
+def test_b_below_0_within_its_error_is_a_caution() -> None:
+    joint = replace(HM3, damping=0.0)
+    with pytest.warns(RecordingWarning, match="damping is negative"):
+        made = fit(study(joint, seed=1, noise=0.3, n_slow=4, n_fast=0))
+    assert made["damping"].covers(0.0)
 
 
 def test_a_velocity_that_is_not_the_angles_is_refused(

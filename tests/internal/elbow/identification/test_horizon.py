@@ -7,13 +7,10 @@ import numpy as np
 import pytest
 
 from masrel.elbow import STANDARD_MODELS
-from masrel.elbow.identification.catch import Catch
-from masrel.elbow.identification.horizon import horizon
-from masrel.elbow.identification.law import PreCatchLaw
-from masrel.elbow.identification.part import Part
-from masrel.elbow.identification.samples import even_samples
-from masrel.elbow.identification.stretches import find_stretches
-from masrel.elbow.identification.trials import Trial, fast_trial
+from masrel.elbow.identification._catches import Catch, PreCatchLaw, Trial, fast_trial
+from masrel.elbow.identification._reading import even_samples
+from masrel.elbow.identification._stretches import Part, find_stretches
+from masrel.elbow.identification._travels import detection_limit
 from tests.elbow.identification.synthesis import recording
 
 HM2 = STANDARD_MODELS["HM2"]
@@ -29,6 +26,7 @@ def trial(n_samples: int, residual_sd: float, speed: float = 1.0) -> Trial:
         angle=angle,
         velocity=zero + speed,
         acceleration=zero,
+        jerk=zero,
         torque=zero,
         measured=zero,
     )
@@ -51,6 +49,7 @@ def trial(n_samples: int, residual_sd: float, speed: float = 1.0) -> Trial:
         start=0.0,
         duration=float(time[-1]),
         peak_speed=speed,
+        rest_angle=1.0,
         pre_catch=part,
         after=part,
         catch=catch,
@@ -73,33 +72,33 @@ def test_a_climb_at_constant_speed_by_hand() -> None:
         return t >= max(math.sqrt(50.0), slope_t)
 
     least = next(m for m in range(1, after) if is_seen(m))
-    found = horizon(made, k, HM2)
+    found = detection_limit(made, k, HM2)
     assert found is not None
     # candidates are some 4 samples apart, and between them t is taken as straight
     expected = float(made.after.angle[-1]) - 1.0 - least * h  # type: ignore[union-attr]
     assert found.travel == pytest.approx(expected, abs=1.5 * h)
-    assert 0.0 < found.softness < 10.0 * h
+    assert 0.0 < found.sd < 10.0 * h
 
 
 def test_more_noise_or_less_stiffness_hides_more() -> None:
-    limits = [horizon(trial(1000, sd), 5.8, HM2) for sd in (0.02, 0.1, 0.5)]
+    limits = [detection_limit(trial(1000, sd), 5.8, HM2) for sd in (0.02, 0.1, 0.5)]
     travels = [made.travel for made in limits if made is not None]
     assert len(travels) == 3
     assert travels == sorted(travels, reverse=True)
-    half = horizon(trial(1000, 0.1), 2.9, HM2)
-    twice = horizon(trial(1000, 0.2), 5.8, HM2)
+    half = detection_limit(trial(1000, 0.1), 2.9, HM2)
+    twice = detection_limit(trial(1000, 0.2), 5.8, HM2)
     assert half is not None
     assert twice is not None
     assert half.travel <= twice.travel + 1e-12
 
 
 def test_where_no_end_could_be_seen_there_is_none() -> None:
-    assert horizon(trial(1000, 1e3), 5.8, HM2) is None  # noise
-    assert horizon(trial(1000, 0.1), math.nan, HM2) is None  # no k_post
-    assert horizon(trial(1000, 0.1), -1.0, HM2) is None
-    assert horizon(trial(20, 0.1), 5.8, HM2) is None  # shorter than its peak
-    assert horizon(replace(trial(1000, 0.1), after=None), 5.8, HM2) is None
-    assert horizon(replace(trial(1000, 0.1), catch=None), 5.8, HM2) is None
+    assert detection_limit(trial(1000, 1e3), 5.8, HM2) is None  # noise
+    assert detection_limit(trial(1000, 0.1), math.nan, HM2) is None  # no k_post
+    assert detection_limit(trial(1000, 0.1), -1.0, HM2) is None
+    assert detection_limit(trial(20, 0.1), 5.8, HM2) is None  # shorter than its peak
+    assert detection_limit(replace(trial(1000, 0.1), after=None), 5.8, HM2) is None
+    assert detection_limit(replace(trial(1000, 0.1), catch=None), 5.8, HM2) is None
 
 
 def test_the_search_finds_ends_before_and_none_behind() -> None:
@@ -117,14 +116,14 @@ def test_the_search_finds_ends_before_and_none_behind() -> None:
             mean_speed=math.radians(rng.uniform(70.0, 130.0)),
             rng=rng,
         )
-        (stretch,) = find_stretches(
+        (stretch,), _ = find_stretches(
             even_samples(movement), window=0.06, slow_below=math.radians(20.0)
         )
         made = fast_trial(stretch, "trial", HM2, law, 0.06)
-        found = horizon(made, HM2.post_catch_stiffness, HM2)
+        found = detection_limit(made, HM2.post_catch_stiffness, HM2)
         if made.catch is None or found is None:
             continue
-        ahead = (joint.catch_travel - found.travel) / found.softness
+        ahead = (joint.catch_travel - found.travel) / found.sd
         if abs(ahead) > 4.0:
             sides.append((ahead < 0.0, made.catch.end is not None))
     assert len(sides) >= 45

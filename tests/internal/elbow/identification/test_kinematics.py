@@ -1,12 +1,9 @@
 """The filters: what they keep, what they pass, and where a hand's speed breaks."""
 
-import math
-
 import numpy as np
 import pytest
 
-from masrel.elbow.identification.kinematics import (
-    bandwidth,
+from masrel.elbow.identification._stretches import (
     differentiate,
     filter_alike,
     state_at_break,
@@ -24,16 +21,6 @@ def test_a_cubic_is_kept_with_its_derivatives_up_to_the_ends() -> None:
     np.testing.assert_allclose(angle, cubic(TIME), atol=1e-12)
     np.testing.assert_allclose(velocity, cubic.deriv()(TIME), atol=1e-9)
     np.testing.assert_allclose(acceleration, cubic.deriv(2)(TIME), atol=1e-6)
-
-
-def test_a_sine_at_the_stated_bandwidth_comes_out_at_half_its_power() -> None:
-    frequency = bandwidth(0.06, PERIOD)
-    turn = 2.0 * math.pi * frequency
-    _, velocity, _ = differentiate(np.sin(turn * TIME), PERIOD, 0.06)
-    inner = slice(100, 500)
-    ratio = velocity[inner] @ np.cos(turn * TIME[inner])
-    ratio /= turn * (np.cos(turn * TIME[inner]) @ np.cos(turn * TIME[inner]))
-    assert ratio == pytest.approx(math.sqrt(0.5), rel=2e-3)
 
 
 def test_neither_filter_delays() -> None:

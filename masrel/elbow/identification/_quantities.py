@@ -3,23 +3,14 @@
 import math
 from dataclasses import dataclass
 
-__all__ = ["DEGREES", "QUANTITIES", "Quantity"]
+DEGREES = 180.0 / math.pi  # of a radian
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Quantity:
-    """How a parameter is written in files and tables.
+    """A symbol, a key with the unit for files, that unit in words, and its size.
 
-    Attributes
-    ----------
-    symbol : str
-        Its symbol in the paper.
-    key : str
-        Its key in a model or protocol file, with the unit.
-    unit : str
-        That unit, in words for tables.
-    factor : float
-        What a value in SI units is multiplied by to be in it.
+    A value in SI units times `factor` is in the unit.
     """
 
     symbol: str
@@ -27,9 +18,6 @@ class Quantity:
     unit: str
     factor: float = 1.0
 
-
-DEGREES = 180.0 / math.pi
-"""Of a radian."""
 
 QUANTITIES: dict[str, Quantity] = {
     "damping": Quantity(symbol="b", key="damping_nms_rad", unit="N·m·s/rad"),
@@ -50,4 +38,14 @@ QUANTITIES: dict[str, Quantity] = {
         symbol="k_post", key="post_catch_stiffness_nm_rad", unit="N·m/rad"
     ),
 }
-"""What can be fitted, by the name it has in `ElbowParameters`."""
+"""The law's parameters, by the names they have in `ElbowParameters`."""
+
+ARM_QUANTITIES: dict[str, Quantity] = {
+    "gravity": Quantity(symbol="G", key="gravity_nm", unit="N·m"),
+    "arm_inertia": Quantity(symbol="J", key="arm_inertia_kg_m2", unit="kg·m²"),
+    "lag": Quantity(symbol="T", key="lag_s", unit="s"),
+    "catch_rise": Quantity(symbol="rise", key="catch_rise_s", unit="s"),
+}
+"""What an arm and a sensor have beside the law."""
+
+ALL_QUANTITIES = QUANTITIES | ARM_QUANTITIES

@@ -5,14 +5,14 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import TYPE_CHECKING
 
-from masrel.elbow.identification.quantities import DEGREES, QUANTITIES
+from masrel.elbow.identification._quantities import ALL_QUANTITIES, DEGREES, QUANTITIES
 from masrel.elbow.parameters import ElbowParameters
 from masrel.errors import ParameterError
 
 if TYPE_CHECKING:
-    from masrel.elbow.identification.results import ElbowFit
+    from masrel.elbow.identification._lack_of_fit import LackOfFit
+    from masrel.elbow.identification._results import ElbowFit
 
-__all__ = ["FORMAT", "as_toml", "model_document"]
 
 FORMAT = "masrel joint model 1"
 """What the key ``format`` of a model file says."""
@@ -93,7 +93,8 @@ def model_document(
         "constants": _constants(joint),
     }
     if fit is not None:
-        document["remarks"] = list(fit.remarks)
+        document["remarks"] = [fit.lack_of_fit.sentence, *fit.remarks]
+        document["lack_of_fit"] = _lack_of_fit(fit.lack_of_fit)
         document["estimates"] = _estimates(fit)
         document["recordings"] = [
             {"name": name, **({} if sha256 is None else {"sha256": sha256})}
@@ -115,17 +116,31 @@ def _constants(joint: ElbowParameters) -> Document:
     return made
 
 
+def _lack_of_fit(lack: "LackOfFit") -> Document:
+    document: Document = {"verdict": lack.verdict, "level": lack.level}
+    numbers = {
+        "explained": lack.explained,
+        "after_to_before": lack.after_to_before,
+        "rest_sd_nm": lack.rest_sd,
+    }
+    document |= {key: value for key, value in numbers.items() if math.isfinite(value)}
+    if lack.tests:
+        first = lack.tests[0]
+        document |= {"structure": first.name, "p_value": first.adjusted}
+    return document
+
+
 def _estimates(fit: "ElbowFit") -> list[Document]:
     made = []
     for estimate in fit.estimates:
-        quantity = QUANTITIES[estimate.name]
+        quantity = ALL_QUANTITIES[estimate.name]
         factor = quantity.factor
         numbers = {
             "value": estimate.value * factor,
             "standard_error": estimate.standard_error * factor,
             "low": estimate.low * factor,
             "high": estimate.high * factor,
-            "degrees_of_freedom": estimate.freedom,
+            "degrees_of_freedom": estimate.df,
         }
         entry: Document = {"key": quantity.key, "level": estimate.level}
         entry.update({k: v for k, v in numbers.items() if math.isfinite(v)})

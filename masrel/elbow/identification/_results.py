@@ -2,21 +2,22 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import dataclass, field, fields, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-from masrel.elbow.identification.clusters import ClusteredFit
-from masrel.elbow.identification.trials import Trial
+from masrel.elbow.identification._clusters import ClusteredFit
 from masrel.elbow.parameters import ElbowParameters
 from masrel.errors import ParameterError
 
-__all__ = ["ElbowFit", "FittedParameter", "Step", "fitted"]
+if TYPE_CHECKING:
+    from masrel.elbow.identification._catches import Trial
+    from masrel.elbow.identification._lack_of_fit import LackOfFit
 
-Floats = NDArray[np.float64]
+_Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,12 +27,12 @@ class FittedParameter:
     Attributes
     ----------
     name : str
-        Its name in `ElbowParameters` or in the friction law.
+        Its name in `ElbowParameters`, among what an arm has, or in the friction law.
     value : float
         SI units; ``nan`` when these trials do not determine it.
     standard_error : float
         Clustered by trial; ``nan`` when undefined.
-    freedom : float
+    df : float
         Degrees of freedom of its t.
     low, high : float
         Confidence interval; ``nan`` when undefined.
@@ -46,7 +47,7 @@ class FittedParameter:
     name: str
     value: float
     standard_error: float
-    freedom: float
+    df: float
     low: float
     high: float
     level: float
@@ -98,7 +99,8 @@ class ElbowFit:
     Attributes
     ----------
     estimates : tuple of FittedParameter
-        Every parameter, from all trials together; in the order of `QUANTITIES`.
+        Every parameter, from all trials together: those of the law, in the order of
+        the source's equations, and what else of an arm was fitted.
     correlation : ndarray, shape (n_estimates, n_estimates)
         Of the estimates' errors; ``nan`` where one is undefined.
     steps : tuple of Step
@@ -108,12 +110,22 @@ class ElbowFit:
         torque, both absolute.
     torque_sd : float
         Standard deviation of torque about the law in all trials, N·m.
+    lack_of_fit : LackOfFit
+        Whether the law is that of these recordings.
+    cross_validation : ndarray, shape (n_trials,)
+        Per trial, the mean square distance of its torque from what the other trials'
+        parameters give, (N·m)²; ``nan`` where they do not determine one.
     trials : tuple of Trial
         What was used.
     fitted_torque : tuple of ndarray
         Per trial the law's torque at the samples of `pre_catch` and then `after`.
     constants : ElbowParameters
         What was held: ν_th, ν_L, θ_L, ΔT_peak, end of range, reading of (5).
+    arm : mapping of str to float or str
+        What the arm and the sensor have beside the law: "off", "fitted" or the fixed
+        value, SI units.
+    offsets, drifts : tuple of float
+        Per trial its constant torque (N·m) and what that gains a second (N·m/s).
     n_evaluations : int
         How often the last fit evaluated the law.
     level : float
@@ -127,13 +139,18 @@ class ElbowFit:
     """
 
     estimates: tuple[FittedParameter, ...]
-    correlation: Floats = field(compare=False, repr=False)
+    correlation: _Floats = field(compare=False, repr=False)
     steps: tuple[Step, ...]
     relative_error: float
     torque_sd: float
-    trials: tuple[Trial, ...] = field(repr=False)
-    fitted_torque: tuple[Floats, ...] = field(compare=False, repr=False)
+    lack_of_fit: "LackOfFit"
+    cross_validation: _Floats = field(compare=False, repr=False)
+    trials: "tuple[Trial, ...]" = field(repr=False)
+    fitted_torque: tuple[_Floats, ...] = field(compare=False, repr=False)
     constants: ElbowParameters
+    arm: Mapping[str, float | str]
+    offsets: tuple[float, ...] = field(repr=False)
+    drifts: tuple[float, ...] = field(repr=False)
     n_evaluations: int
     level: float
     simulated: bool
@@ -141,11 +158,11 @@ class ElbowFit:
     remarks: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> FittedParameter:
-        found = [e for e in self.estimates if e.name == name]
-        if not found:
-            known = ", ".join(e.name for e in self.estimates)
-            raise ParameterError(f"name: needs one of {known}, got {name!r}")
-        return found[0]
+        for estimate in self.estimates:
+            if estimate.name == name:
+                return estimate
+        known = ", ".join(e.name for e in self.estimates)
+        raise ParameterError(f"name: needs one of {known}, got {name!r}")
 
     def joint(self, *, missing: ElbowParameters | None = None) -> ElbowParameters:
         """Make the joint of the fitted values.
@@ -158,7 +175,8 @@ class ElbowFit:
         Returns
         -------
         ElbowParameters
-            The fitted values, with `constants` for all that was held.
+            The fitted values, with `constants` for all that was held. The weight and
+            the inertia of the arm and the lag of the sensor are no part of a joint.
 
         Raises
         ------
@@ -166,8 +184,14 @@ class ElbowFit:
             If a parameter is undetermined and `missing` is not given, or a value is
             none that a joint can have.
         """
+        of_joint = {each.name for each in fields(ElbowParameters)}
         values: dict[str, Any] = {}
+        rise = self.arm["catch_rise"]
+        if not isinstance(rise, str):
+            values["catch_rise"] = rise
         for estimate in self.estimates:
+            if estimate.name not in of_joint:
+                continue
             if not math.isnan(estimate.value):
                 values[estimate.name] = estimate.value
             elif missing is not None:
@@ -183,44 +207,27 @@ def fitted(
     level: float,
     reasons: Mapping[str, str] | None = None,
 ) -> tuple[FittedParameter, ...]:
-    """Give values of a clustered fit their intervals.
-
-    Parameters
-    ----------
-    names : sequence of str, length n_parameters
-        What the values are.
-    fit : ClusteredFit
-        The fit.
-    level : float
-        Level of the intervals.
-    reasons : mapping of str to str, optional
-        Why a parameter cannot be determined, where it is not.
-
-    Returns
-    -------
-    tuple of FittedParameter
-        With intervals from t.
-    """
-    made = []
+    """Return the values of a clustered fit with intervals from t."""
+    estimates = []
     for place, name in enumerate(names):
         value = float(fit.values[place])
         error = math.sqrt(fit.covariance[place, place])
-        freedom = float(fit.freedom[place])
-        half = float(stdtrit(freedom, 0.5 + 0.5 * level)) * error
+        df = float(fit.df[place])
+        half = float(stdtrit(df, 0.5 + 0.5 * level)) * error
         reason = None
         if math.isnan(value):
             reason = (reasons or {}).get(name, "these trials do not determine it")
         elif fit.n_trials[place] < 2 or not half > 0.0:
-            error = half = freedom = math.nan
+            error = half = df = math.nan
             reason = "an interval by trial needs two trials that differ"
             if fit.n_trials[place] >= 2:
                 reason = "these trials fit exactly: an interval needs more that differ"
-        made.append(
+        estimates.append(
             FittedParameter(
                 name=name,
                 value=value,
                 standard_error=error,
-                freedom=freedom,
+                df=df,
                 low=value - half,
                 high=value + half,
                 level=level,
@@ -228,4 +235,22 @@ def fitted(
                 reason=reason,
             )
         )
-    return tuple(made)
+    return tuple(estimates)
+
+
+def undetermined(
+    name: str, level: float, reason: str | None, n_trials: int = 0
+) -> FittedParameter:
+    """Return a parameter without a value."""
+    nan = math.nan
+    return FittedParameter(
+        name=name,
+        value=nan,
+        standard_error=nan,
+        df=nan,
+        low=nan,
+        high=nan,
+        level=level,
+        n_trials=n_trials,
+        reason=reason or "these trials do not determine it",
+    )

@@ -4,27 +4,75 @@ Source: Park, Kim and Damiano (2012), IEEE TNSRE 20(3), 361-370,
 https://doi.org/10.1109/TNSRE.2012.2195330, section III.B.2 and Fig. 8.
 """
 
+import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.elbow.identification.clusters import Rows, solve, without_own
-from masrel.elbow.identification.movement import Movement
-from masrel.elbow.identification.reading import read_movement
-from masrel.elbow.identification.results import FittedParameter, fitted
-from masrel.elbow.identification.samples import even_samples
-from masrel.elbow.identification.strokes import Moved, Stroke, find_strokes
+from masrel.elbow.identification._clusters import Rows, solve
+from masrel.elbow.identification._reading import (
+    Movement,
+    Samples,
+    even_samples,
+    read_movement,
+)
+from masrel.elbow.identification._results import FittedParameter, fitted
+from masrel.elbow.identification._stretches import filter_alike, window_length
 from masrel.errors import RecordingError, RecordingWarning
 
-__all__ = ["FrictionFit", "fit_friction"]
+_Floats = NDArray[np.float64]
 
-Floats = NDArray[np.float64]
+# Slower, the direction of motion is not certain and the device may stick, rad/s.
+_MOVING = math.radians(5.0)
 
-NAMES = ("inertia", "viscous", "coulomb")
+_WINDOW = 0.1  # of the filter of angle and torque, s
+_MIN_STROKE = 0.1  # a stroke lasts at least this long, s
+_NAMES = ("inertia", "viscous", "coulomb")
+
+# Time, velocity, acceleration and torque of a stroke, SI units.
+_Moved = tuple[_Floats, _Floats, _Floats, _Floats]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stroke:
+    """A movement in one direction: filtered columns (n_samples,), and the law."""
+
+    recording: str
+    time: _Floats = field(compare=False, repr=False)
+    velocity: _Floats = field(compare=False, repr=False)
+    acceleration: _Floats = field(compare=False, repr=False)
+    torque: _Floats = field(compare=False, repr=False)
+    fitted: _Floats = field(compare=False, repr=False)
+
+
+def _find_strokes(samples: Samples) -> list[_Moved]:
+    # movements in one direction that last long enough and hold no gap
+    margin = window_length(_WINDOW, samples.period) // 2 + 1
+    _, velocity, acceleration, torque = filter_alike(
+        samples.angle, samples.torque, samples.period, _WINDOW
+    )
+    time = samples.time[margin:-margin]
+    unusable = np.convolve(
+        samples.missing | samples.saturated, np.ones(2 * margin + 1), mode="valid"
+    )
+    # sgn of (7) is one number within the window of the filter, or it is not used
+    direction = np.where(np.abs(velocity) > _MOVING, np.sign(velocity), 0.0)
+    direction[unusable > 0.5] = 0.0
+    edges = np.flatnonzero(np.diff(direction, prepend=0.0, append=0.0))
+    strokes = []
+    for start, stop in pairwise(edges):
+        inner = slice(start + margin, stop - margin)
+        long = (stop - start - 2 * margin) * samples.period >= _MIN_STROKE
+        if direction[start] != 0.0 and long:
+            strokes.append(
+                (time[inner], velocity[inner], acceleration[inner], torque[inner])
+            )
+    return strokes
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,7 +98,7 @@ class FrictionFit:
     """
 
     estimates: tuple[FittedParameter, ...]
-    correlation: Floats = field(compare=False, repr=False)
+    correlation: _Floats = field(compare=False, repr=False)
     relative_error: float
     torque_sd: float
     strokes: tuple[Stroke, ...] = field(repr=False)
@@ -99,7 +147,7 @@ def fit_friction(
     parts = _parts(movements)
     rows = _rows(parts)
     fit = solve(rows, n_own=len(movements))
-    estimates = fitted(NAMES, fit, level)
+    estimates = fitted(_NAMES, fit, level)
     _warn_of_negative(estimates)
     strokes = _fitted_strokes(parts, rows, fit.values)
     far = np.concatenate([stroke.torque - stroke.fitted for stroke in strokes])
@@ -116,12 +164,12 @@ def fit_friction(
     )
 
 
-def _parts(movements: Sequence[Movement]) -> list[tuple[str, Moved]]:
+def _parts(movements: Sequence[Movement]) -> list[tuple[str, _Moved]]:
     # strokes with the name of their recording
     parts = [
         (movement.name, stroke)
         for movement in movements
-        for stroke in find_strokes(even_samples(movement))
+        for stroke in _find_strokes(even_samples(movement))
     ]
     forward = sum(stroke[1].mean() > 0.0 for _, stroke in parts)
     if min(forward, len(parts) - forward) < 2:
@@ -143,31 +191,24 @@ def _warn_of_negative(estimates: Sequence[FittedParameter]) -> None:
             )
 
 
-def _rows(parts: Sequence[tuple[str, Moved]]) -> list[Rows]:
+def _rows(parts: Sequence[tuple[str, _Moved]]) -> list[Rows]:
     # the constant of a recording is taken out of all its strokes together
-    made: list[Rows] = []
+    rows: list[Rows] = []
     for name in dict.fromkeys(name for name, _ in parts):
-        own = [part for other, part in parts if other == name]
-        designs = [
-            np.stack([part[2], part[1], np.sign(part[1])], axis=1) for part in own
+        strokes = [part for other, part in parts if other == name]
+        tables = [
+            np.stack([part[2], part[1], np.sign(part[1]), part[3]], axis=1)
+            for part in strokes
         ]
-        whole = without_own(
-            np.ones((sum(part[0].size for part in own), 1)),
-            np.concatenate(designs),
-            np.concatenate([part[3] for part in own]),
-        )
-        ends = np.cumsum([part[0].size for part in own])[:-1]
-        made += [
-            Rows(design=design, target=target)
-            for design, target in zip(
-                np.split(whole.design, ends), np.split(whole.target, ends), strict=True
-            )
+        mean = np.concatenate(tables).mean(axis=0)
+        rows += [
+            Rows(design=(t - mean)[:, :3], target=(t - mean)[:, 3]) for t in tables
         ]
-    return made
+    return rows
 
 
 def _fitted_strokes(
-    parts: Sequence[tuple[str, Moved]], rows: Sequence[Rows], values: Floats
+    parts: Sequence[tuple[str, _Moved]], rows: Sequence[Rows], values: _Floats
 ) -> tuple[Stroke, ...]:
     return tuple(
         Stroke(

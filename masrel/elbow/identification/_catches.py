@@ -1,0 +1,568 @@
+"""The catch of a stretch: when it begins and ends, and what is read off it.
+
+Source: Park, Kim and Damiano (2012), IEEE TNSRE 20(3), 361-370,
+https://doi.org/10.1109/TNSRE.2012.2195330, section II and equations (1) to (5).
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from masrel.elbow.identification._clusters import Rows
+from masrel.elbow.identification._stretches import (
+    Pace,
+    Part,
+    Stretch,
+    filtered_part,
+    part_of,
+    state_at_break,
+)
+from masrel.elbow.parameters import ElbowParameters
+
+_Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
+
+_COARSE = 150
+"""Candidates of the first search, whatever the number of samples."""
+
+MIN_SIGNAL = 3.0
+"""A rise or climb of less than so many standard deviations of the residuals is none."""
+
+MIN_GAIN = 50.0
+"""An end that takes less than so many residual variances off the sum of squares is
+none: of the ends of white noise the best takes 2 ln n, about 15."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Changes:
+    """The changes of one stretch, as places of its samples."""
+
+    catch: int | None
+    end: int | None
+    residual_sd: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Sums:
+    # Sums of products over samples before each place: any stretch of samples in O(1)
+    torque: _Floats
+    torque2: _Floats
+    rest: _Floats  # torque - pre-catch law
+    rest2: _Floats
+    angle: _Floats
+    angle2: _Floats
+    later: _Floats  # torque - inertial torque, after the catch
+    later2: _Floats
+    later_angle: _Floats
+
+
+def find_changes(
+    torque: _Floats,
+    pre_catch: _Floats,
+    angle: _Floats,
+    *,
+    first: int,
+    peak: int,
+    additive: bool,
+    pushed: _Floats | None = None,
+) -> Changes:
+    """Return the catch of a stretch, by least squares over all pairs of instants.
+
+    Every level is free: the pre-catch law up to a constant, one level for the `peak`
+    samples of the peak, one after it, and a climb in proportion to the angle travelled
+    after the end of the catch. No catch is before sample `first`. `additive` says that
+    post-catch adds to the pre-catch law instead of going on from the residual torque;
+    `pushed` is m·θ̈ of (5), which post-catch has and the catch has not.
+
+    A catch whose rise, or an end whose climb, is below `MIN_SIGNAL` standard deviations
+    of the residuals is none; nor is an end that takes less than `MIN_GAIN` residual
+    variances off the sum of squares. If post-catch is additive, that gain alone decides
+    of an end.
+    """
+    angle = angle - angle.mean()
+    torque, pre_catch = torque - torque.mean(), pre_catch - pre_catch.mean()
+    # After the catch the level goes on, and with it, of what the law adds there:
+    # m·θ̈ of (5), or the pre-catch law less what it was at the catch.
+    offset = pre_catch if additive else np.zeros_like(torque)
+    later = torque - pre_catch if additive else torque
+    if pushed is not None and not additive:
+        later = torque - pushed
+    sums = _sums(torque, torque - pre_catch, later, angle)
+    if torque.size - 2 <= first + 1:
+        return Changes(catch=None, end=None, residual_sd=math.nan)
+    best = _search(sums, angle, first, peak, offset)
+    catch, end, n = best.catch, best.end, torque.size
+    if not math.isfinite(best.squares) or best.catch >= best.end:
+        return Changes(catch=None, end=None, residual_sd=math.nan)
+    sd = math.sqrt(max(best.squares, 0.0) / max(n - 6, 1))
+    if _rise(torque, pre_catch, catch, min(catch + peak, end)) < MIN_SIGNAL * sd:
+        return Changes(catch=None, end=None, residual_sd=sd)
+    if end == n:
+        return Changes(catch=catch, end=None, residual_sd=sd)
+    starts = best.starts
+    endless = _squares(sums, angle, starts, np.array([n]), (peak, 0), offset)[:, 0]
+    climbs = additive or (
+        _climb(sums, angle, min(catch + peak, end), end) >= MIN_SIGNAL * sd
+    )
+    if climbs and float(endless.min()) - best.squares >= MIN_GAIN * sd**2:
+        return Changes(catch=catch, end=end, residual_sd=sd)
+    catch = int(starts[int(np.argmin(endless))])
+    return Changes(catch=catch, end=None, residual_sd=sd)
+
+
+@dataclass(frozen=True, slots=True)
+class _Best:
+    # the pair of least squares, and the starts near it
+    catch: int
+    end: int
+    squares: float
+    starts: _Ints
+
+
+def _search(
+    sums: _Sums, angle: _Floats, first: int, peak: int, offset: _Floats
+) -> _Best:
+    # First both coarsely, then the catch to the sample, then the end to the sample.
+    n = angle.size
+    step = max(1, n // _COARSE)
+    starts = np.arange(first + 1, n - 2, step)
+    ends = np.append(np.arange(first + 2, n - 1, step), n)
+    gap = step
+    for finer in (False, True, True):
+        squares = _squares(sums, angle, starts, ends, (peak, gap), offset)
+        place = np.unravel_index(int(np.argmin(squares)), squares.shape)
+        catch, end = int(starts[place[0]]), int(ends[place[1]])
+        reach = 2 if finer else 3 * step
+        starts = np.arange(max(catch - reach, first + 1), min(catch + reach, n - 3) + 1)
+        if finer:
+            ends = np.append(np.arange(first + 2, n - 1), n)
+        gap = 0
+    return _Best(catch, end, float(squares[place]), starts)
+
+
+def _sums(torque: _Floats, rest: _Floats, later: _Floats, angle: _Floats) -> _Sums:
+    def before(values: _Floats) -> _Floats:
+        return np.concatenate([[0.0], np.cumsum(values)])
+
+    return _Sums(
+        torque=before(torque),
+        torque2=before(torque**2),
+        rest=before(rest),
+        rest2=before(rest**2),
+        angle=before(angle),
+        angle2=before(angle**2),
+        later=before(later),
+        later2=before(later**2),
+        later_angle=before(later * angle),
+    )
+
+
+def _about_mean(one: _Floats, two: _Floats, low: _Ints, high: _Ints) -> _Floats:
+    # Σ(x - mean)² over the samples from low to before high; 0 of none
+    count = np.maximum(high - low, 1)
+    return np.asarray(two[high] - two[low] - (one[high] - one[low]) ** 2 / count)
+
+
+def _squares(
+    sums: _Sums,
+    angle: _Floats,
+    starts: _Ints,
+    ends: _Ints,
+    lengths: tuple[int, int],
+    offset: _Floats,
+) -> _Floats:
+    # residual sum of squares of every pair, shape (n_starts, n_ends); without `gap`
+    # samples after a step, which then may be anywhere between two candidates, and
+    # without the two around the end of the peak, whose length is no whole number
+    n = angle.size
+    peak, gap = lengths
+    i, e = starts[:, None], ends[None, :]
+    step = np.minimum(i + peak, e)  # down, from the peak
+    low = np.minimum(i + gap, step)
+    total = _about_mean(sums.rest, sums.rest2, np.zeros_like(i), i)
+    total = total + _about_mean(
+        sums.torque, sums.torque2, low, np.maximum(step - 1, low)
+    )
+    after = np.minimum(step + max(gap, 1), n)
+    end = np.maximum(e, after)
+    total = total + _hinge(sums, angle, (after, end), offset[i])
+    # an end just before that of the peak is the same as one just after it
+    separate = (e > i + gap) & ((e < i + peak - 3) | (e > i + peak + 1))
+    return np.where(separate, total, np.inf)
+
+
+def _hinge(
+    sums: _Sums, angle: _Floats, ends: tuple[_Ints, _Ints], offset: _Floats | float
+) -> _Floats:
+    # residuals of a level from `low` on that climbs with the angle from `end` on
+    low, end = ends
+    n = angle.size
+    count, m = np.maximum(n - low, 1), n - end
+    at = angle[np.minimum(end, n - 1)]
+    later = sums.later[n] - sums.later[end]
+    squares = sums.later2[n] - sums.later2[end] + offset * (2.0 * later + offset * m)
+    later = later + offset * m
+    total = sums.torque[end] - sums.torque[low] + later
+    squares = squares + sums.torque2[end] - sums.torque2[low]
+    moved = sums.angle[n] - sums.angle[end]
+    h = moved - m * at  # Σ max(θ - θ_e, 0)
+    h2 = sums.angle2[n] - sums.angle2[end] - 2.0 * at * moved + m * at**2
+    cross = sums.later_angle[n] - sums.later_angle[end] + offset * moved - at * later
+    whole = squares - total**2 / count
+    return _left(whole, cross - total * h / count, h2 - h**2 / count)
+
+
+def _left(whole: _Floats, along: _Floats, spread: _Floats) -> _Floats:
+    usable = (spread > 0.0) & (along > 0.0)
+    return whole - np.where(usable, along**2 / np.where(usable, spread, 1.0), 0.0)
+
+
+def _rise(torque: _Floats, pre_catch: _Floats, catch: int, end: int) -> float:
+    before = float((torque - pre_catch)[:catch].mean()) + float(pre_catch[catch])
+    return float(torque[catch:end].mean()) - before
+
+
+def _climb(sums: _Sums, angle: _Floats, low: int, end: int) -> float:
+    # what the climb of a level from `low` on adds up to by the last sample
+    h = np.maximum(angle[low:] - angle[end], 0.0)
+    torque = np.append(np.diff(sums.torque[low : end + 1]), np.diff(sums.later[end:]))
+    centred = h - h.mean()
+    spread = float(centred @ centred)
+    return float(h[-1]) * float(centred @ torque) / spread if spread else 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Arm:
+    """What an arm and a sensor have beside the law, SI units; 0 is not there.
+
+    `gravity` is m·g·l, whose torque is 0 at `gravity_angle`; `arm_inertia` acts in
+    every phase; `lag` is the sensor's time constant; `drift` is N·m/s, of single trials
+    in `drifts`.
+    """
+
+    gravity: float = 0.0
+    gravity_angle: float = 0.0
+    arm_inertia: float = 0.0
+    lag: float = 0.0
+    catch_rise: float = 0.0
+    drift: float = 0.0
+    drifts: Mapping[str, float] = field(default_factory=dict)
+
+    def torque(self, part: Part, trial: str) -> _Floats:
+        """Return what weight, inertia and drift add to the torque, N·m."""
+        weight = self.gravity * np.sin(part.angle - self.gravity_angle)
+        drift = self.drifts.get(trial, self.drift) * part.time
+        return np.asarray(weight + self.arm_inertia * part.acceleration + drift)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PreCatchLaw:
+    """b, k and m of (1)."""
+
+    damping: float
+    stiffness: float
+    inertia: float
+
+    def torque(self, part: Part) -> _Floats:
+        """Return the torque of (1) without the constant k·θ_rest, N·m."""
+        law = self.damping * part.velocity + self.stiffness * part.angle
+        return np.asarray(law + self.inertia * part.acceleration)
+
+    def at(self, catch: "Catch") -> float:
+        """Return the torque of (1) at the start of a catch, without the constant."""
+        law = self.damping * catch.speed + self.stiffness * catch.angle
+        return law + self.inertia * catch.acceleration
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Catch:
+    """The catch of one stretch; SI units, its start between two samples."""
+
+    time: float
+    angle: float
+    speed: float
+    acceleration: float  # just before it
+    mean_speed: float  # from movement onset, v̄ of (2)
+    speed_gain: float  # dv̄/dθ, 1/s
+    end: float | None  # None if the stretch ends within it
+    travel: float  # up to its end or the stretch's
+    mean_catch_speed: float  # v̄_c of (4)
+    within_peak: bool  # it ends before the peak does
+    residual_sd: float  # of torque about the law of the change points, N·m
+
+
+# Samples this near to a step of torque are left out: it falls between two, s.
+_GUARD = 0.002
+
+# Windows of the filter of angle and torque before a catch, s. An encoder's steps take
+# long when the joint moves slowly.
+_SLOW_WINDOW, _FAST_WINDOW = 0.25, 0.1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trial:
+    """One stretch, as the fits see it; SI units.
+
+    `pre_catch` holds samples before the catch, `after` those from it until the hand is
+    slow again (None if unusable); `remark` says what is not used of it, and why.
+    """
+
+    name: str
+    pace: Pace
+    start: float
+    duration: float
+    peak_speed: float
+    rest_angle: float
+    pre_catch: Part
+    after: Part | None = None
+    catch: Catch | None = None
+    remark: str = ""
+
+
+def slow_trial(stretch: Stretch, name: str) -> Trial:
+    """Return a slow stretch as one pre-catch phase (section II.B)."""
+    unusable = stretch.missing | stretch.saturated
+    lost = int(unusable.sum())
+    whole = filtered_part(stretch, unusable, (0, stretch.time.size), _SLOW_WINDOW)
+    remark = f"{lost} samples missing or saturated" if lost else ""
+    return _trial(stretch, name, whole, remark=remark)
+
+
+def fast_trial(
+    stretch: Stretch,
+    name: str,
+    constants: ElbowParameters,
+    law: PreCatchLaw,
+    window: float,
+    arm: Arm | None = None,
+    instants: tuple[float, float | None] | None = None,
+) -> Trial:
+    """Return a fast stretch with its catch, or a remark that says why it has none.
+
+    The catch is looked for, unless its start and end are given as `instants`.
+    """
+    arm = arm or Arm()
+    nothing = part_of(stretch, slice(0, 0))
+    onset, stop = _fast_part(stretch, constants.speed_threshold, window)
+    if stretch.missing[:stop].any():
+        why = "not used: a gap in the recording"
+        return _trial(stretch, name, nothing, remark=why)
+    changes = _changes(stretch, name, constants, law, arm, (onset, stop))
+    if changes.catch is not None and instants is None:
+        half = 0.5 * stretch.samples.period  # between two samples
+        ends = [
+            None if at is None else float(stretch.time[at]) - half
+            for at in (changes.catch, changes.end)
+        ]
+        instants = ends[0] or 0.0, ends[1]
+    catch = None
+    if instants is not None and changes.catch is not None:
+        catch = _catch_at(stretch, (onset, stop), instants, constants, changes)
+    if catch is None:
+        why = "not used: no catch that stands out of the noise"
+        return _trial(stretch, name, nothing, remark=why)
+    first = int(np.searchsorted(stretch.time, catch.time))
+    before = filtered_part(stretch, stretch.saturated, (0, first), _FAST_WINDOW)
+    if stretch.saturated[:stop].any():
+        why = "torque is saturated: nothing after the catch is used"
+    elif before.time.size == 0:
+        why = "it catches at once: no torque before the catch to compare with"
+    else:
+        smooth_end = constants.post_catch == "additive" or law.inertia != 0.0
+        after = _after(stretch, (first, stop), catch, constants, arm, smooth_end)
+        return _trial(stretch, name, before, after=after, catch=catch)
+    return _trial(stretch, name, before, catch=catch, remark=why)
+
+
+def _trial(
+    stretch: Stretch,
+    name: str,
+    pre_catch: Part,
+    *,
+    after: Part | None = None,
+    catch: Catch | None = None,
+    remark: str = "",
+) -> Trial:
+    return Trial(
+        name=name,
+        pace=stretch.pace,
+        start=float(stretch.time[0]),
+        duration=float(stretch.time[-1] - stretch.time[0]),
+        peak_speed=stretch.peak_speed,
+        rest_angle=stretch.rest_angle,
+        pre_catch=pre_catch,
+        after=after,
+        catch=catch,
+        remark=remark,
+    )
+
+
+def _fast_part(stretch: Stretch, limit: float, window: float) -> tuple[int, int]:
+    # sample of movement onset, and the first at which the hand is slow again
+    velocity = stretch.velocity
+    fastest = int(np.argmax(velocity))
+    slow = np.flatnonzero(velocity[fastest:] < limit)
+    stop = fastest + int(slow[0]) if slow.size else velocity.size
+    # the filter sees a hand stop half a window late or early
+    stop = max(fastest, stop - round(0.5 * window / stretch.samples.period))
+    return int(np.argmax(velocity >= limit)), stop
+
+
+def _changes(
+    stretch: Stretch,
+    name: str,
+    constants: ElbowParameters,
+    law: PreCatchLaw,
+    arm: Arm,
+    ends: tuple[int, int],
+) -> Changes:
+    onset, stop = ends
+    part = part_of(stretch, slice(0, stop))
+    if stop == 0:
+        return Changes(catch=None, end=None, residual_sd=math.nan)
+    return find_changes(
+        part.torque - arm.torque(part, name),
+        law.torque(part),
+        part.angle,
+        first=onset,
+        peak=round(constants.peak_duration / stretch.samples.period),
+        additive=constants.post_catch == "additive",
+        pushed=law.inertia * part.acceleration if law.inertia else None,
+    )
+
+
+def _catch_at(
+    stretch: Stretch,
+    ends: tuple[int, int],
+    instants: tuple[float, float | None],
+    constants: ElbowParameters,
+    changes: Changes,
+) -> Catch | None:
+    # motion and travel of a catch; None if the joint hardly moves there
+    time, period = stretch.time, stretch.samples.period
+    instant, end = instants
+    reach = slice(stretch.start, stretch.start + ends[1])
+    angle, speed, acceleration = state_at_break(
+        stretch.samples.time[reach], stretch.samples.angle[reach], instant
+    )
+    onset, onset_angle = _crossing(stretch, ends[0], constants.speed_threshold)
+    if not (instant > onset and angle > onset_angle and speed > 0.0):
+        return None
+    mean_speed = (angle - onset_angle) / (instant - onset)
+    last = float(time[ends[1] - 1]) if end is None else end
+    if not last > instant:
+        return None
+    travel = float(np.interp(last, time, stretch.angle)) - angle
+    peak_end = instant + constants.peak_duration
+    return Catch(
+        time=instant,
+        angle=angle,
+        speed=speed,
+        acceleration=acceleration,
+        mean_speed=mean_speed,
+        # d/dθ of (θ - θ_on)/(t - t_on), with dt = dθ/ω
+        speed_gain=(1.0 - mean_speed / speed) / (instant - onset),
+        end=end,
+        travel=travel,
+        mean_catch_speed=travel / (last - instant),
+        within_peak=end is not None and end < peak_end - 2.0 * period,
+        residual_sd=changes.residual_sd,
+    )
+
+
+def _crossing(stretch: Stretch, place: int, limit: float) -> tuple[float, float]:
+    # time and angle at which the speed reaches the limit, between two samples
+    if place == 0:
+        return float(stretch.time[0]), float(stretch.angle[0])
+    low, high = stretch.velocity[place - 1], stretch.velocity[place]
+    time = float(stretch.time[place]) - stretch.samples.period * float(
+        (high - limit) / (high - low)
+    )
+    return time, float(np.interp(time, stretch.time, stretch.angle))
+
+
+def _after(
+    stretch: Stretch,
+    ends: tuple[int, int],
+    catch: Catch,
+    constants: ElbowParameters,
+    arm: Arm,
+    smooth_end: bool,
+) -> Part:
+    # samples from the catch on, without those next to a step of torque
+    part = part_of(stretch, slice(*ends), smoothed_anew=True)
+    if catch.end is not None and smooth_end:
+        # speed and acceleration are regressors here, as they are before the catch
+        first = int(np.searchsorted(stretch.time, catch.end))
+        later = filtered_part(
+            stretch, stretch.saturated, (first, ends[1]), _FAST_WINDOW
+        )
+        part = part.keep(part.time < catch.end).then(later)
+    if arm.lag > 0.0:  # no step passes a sensor that lags
+        return part
+    steps = [catch.time + constants.peak_duration]
+    if arm.catch_rise == 0.0:
+        steps.append(catch.time)
+    if catch.end is not None:
+        steps[0] = min(steps[0], catch.end)
+        if constants.post_catch == "additive":
+            steps.append(catch.end)
+    near = np.min([np.abs(part.time - step) for step in steps], axis=0) < _GUARD
+    return part.keep(~near)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CatchLevels:
+    """Peak and residual above the end of pre-catch (N·m), and the climb after it.
+
+    The residual is ``nan`` if nothing was recorded after the peak; the climb is torque
+    above the residual against the angle travelled since.
+    """
+
+    peak: float
+    residual: float
+    climb: Rows = field(repr=False)
+
+
+def catch_levels(
+    trial: Trial, law: PreCatchLaw, constants: ElbowParameters, arm: Arm | None = None
+) -> CatchLevels | None:
+    """Return what is read off the torque of a trial; None without a usable catch."""
+    arm = arm or Arm()
+    catch, after, pre = trial.catch, trial.after, trial.pre_catch
+    if catch is None or after is None or pre.torque.size == 0 or after.torque.size == 0:
+        return None
+    before = pre.torque - arm.torque(pre, trial.name)
+    measured = after.torque - arm.torque(after, trial.name)
+    offset = float((before - law.torque(pre)).mean())  # -k·θ_rest
+    above = measured - (offset + law.at(catch))  # over τ_pre_end of (3)
+    end = math.inf if catch.end is None else catch.end
+    in_peak = after.time < min(catch.time + constants.peak_duration, end)
+    risen = in_peak & (after.time >= catch.time + arm.catch_rise + 3.0 * arm.lag)
+    later = after.time >= end
+    past = np.where(later, after.angle - (catch.angle + catch.travel), 0.0)
+    torque = above - np.where(later, law.inertia * after.acceleration, 0.0)
+    if constants.post_catch == "additive":
+        torque = np.where(later, measured - law.torque(after) - offset, above)
+    climb, residual = _residual_and_climb(past[~in_peak], torque[~in_peak])
+    return CatchLevels(
+        peak=float(above[risen].mean()) if risen.any() else math.nan,
+        residual=residual,
+        climb=climb,
+    )
+
+
+def _residual_and_climb(past: _Floats, torque: _Floats) -> tuple[Rows, float]:
+    # a level and a slope; the level alone is the residual torque
+    nothing = Rows(design=np.zeros((1, 1)), target=np.zeros(1))
+    if torque.size == 0:
+        return nothing, math.nan
+    if not past.any():
+        return nothing, float(torque.mean())
+    moved, left = past - past.mean(), torque - torque.mean()
+    slope = float(moved @ left) / float(moved @ moved)
+    rows = Rows(design=moved[:, None], target=left)
+    return rows, float(torque.mean()) - slope * float(past.mean())

@@ -1,0 +1,353 @@
+"""Whether the law is that of the recordings: what is left, and what it goes with.
+
+Each test adds one structure to the law that a real arm or sensor may have, and asks
+whether its size differs from 0 by more than trials differ (CR2 with Satterthwaite's
+degrees of freedom, clustered by trial: noise may have any colour within a trial). All
+tests together are held to one level by Holm's method.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import stdtr
+
+from masrel.elbow.identification._catches import Trial
+from masrel.elbow.identification._clusters import Rows, partial_out, solve
+from masrel.elbow.identification._equations import Equations
+
+_Floats = NDArray[np.float64]
+
+LEVEL = 0.01
+"""Of all tests together: how often a fit of the right law is called a wrong one."""
+
+# What is tried for lag and rise, s: of the size that a sensor and a muscle have.
+_LAG, _RISE = 0.005, 0.04
+
+_MIN_DF = 2.0  # a test with fewer says nothing
+
+STRUCTURES = {
+    "gravity": ("the weight of the arm", "--gravity fitted"),
+    "bent stiffness": ("a stiffness that changes with the angle", ""),
+    "bent damping": ("a damping that changes with the speed", ""),
+    "arm_inertia": ("the inertia of the arm", "--arm-inertia fitted"),
+    "drift": ("a drift of the torque", "--drift fitted"),
+    "lag": ("a lag of the sensor", "--lag fitted"),
+    "catch_rise": ("a catch that takes time to rise", "--rise fitted"),
+    "residual slope": ("a torque that changes within the catch", ""),
+    "bent climb": ("a stiffness after the catch that changes", ""),
+    "catch angle": ("catch angles that bend with the speed", ""),
+    "peak": ("peaks that are not in proportion to the speed", ""),
+    "residual": ("residual torques that are not in proportion to the peaks", ""),
+    "travel": ("travels that change with the speed", ""),
+}
+"""What is added to the law: in words, and the option that fits it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StructureTest:
+    """One structure that was added to the law.
+
+    Attributes
+    ----------
+    name : str
+        Which.
+    t, df : float
+        Its size over its standard error, and degrees of freedom.
+    p_value : float
+        Two-sided, of this test alone.
+    adjusted : float
+        The same, held to all tests by Holm's method.
+    """
+
+    name: str
+    t: float
+    df: float
+    p_value: float
+    adjusted: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PhaseResidual:
+    """What is left of the torque in one phase of all trials.
+
+    Attributes
+    ----------
+    phase : {"slow", "pre-catch", "peak", "catch", "post-catch"}
+        Of slow trials, or of fast ones.
+    n_samples : int
+        Samples.
+    sd : float
+        Root mean square of measured less fitted torque, N·m.
+    runs : float
+        Runs of one sign over those that independent samples would have.
+    autocorrelation : float
+        Of neighbouring samples; 0 if they are independent.
+    """
+
+    phase: str
+    n_samples: int
+    sd: float
+    runs: float
+    autocorrelation: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LackOfFit:
+    """Whether the law is that of the recordings.
+
+    Attributes
+    ----------
+    verdict : {"fits", "does not fit", "undecided"}
+        Undecided with so few trials that no test has two degrees of freedom.
+    level : float
+        Of all tests together: how often the right law is called wrong.
+    tests : tuple of StructureTest
+        The most telling first.
+    explained : float
+        Share of the torque's variation within trials that the law explains.
+    phases : tuple of PhaseResidual
+        What is left in each phase.
+    after_to_before : float
+        Root mean square residual after the catch over that before it; ``nan`` without
+        a catch.
+    rest_sd : float
+        Noise of the torque at rest, N·m; ``nan`` if no recording rests.
+    """
+
+    verdict: Literal["fits", "does not fit", "undecided"]
+    level: float
+    tests: tuple[StructureTest, ...]
+    explained: float
+    phases: tuple[PhaseResidual, ...]
+    after_to_before: float
+    rest_sd: float
+
+    @property
+    def sentence(self) -> str:
+        """Return the verdict as one sentence."""
+        share = f"the law explains {100.0 * self.explained:.1f} % of the torque"
+        if self.verdict == "undecided":
+            return f"Fit undecided: too few trials to tell; {share}."
+        first = self.tests[0]
+        p = f"p {'< 0.0001' if first.adjusted < 1e-4 else f'= {first.adjusted:.2g}'}"
+        words, option = STRUCTURES[first.name]
+        if self.verdict == "fits":
+            return (
+                f"Fits: nothing left goes with any of {len(self.tests)} structures "
+                f"({p} at least); {share}."
+            )
+        remedy = f"; try {option}" if option else ""
+        return (
+            f"DOES NOT FIT: what is left goes with {words} ({p}), so that intervals "
+            f"need not hold the truth; {share}{remedy}."
+        )
+
+
+def lack_of_fit(
+    equations: Sequence[Equations],
+    shared: _Floats,
+    own: Sequence[_Floats],
+    tables: Sequence[_Floats],
+    laws: Sequence[_Floats],
+    rest_sd: float,
+) -> LackOfFit:
+    """Return what a fit leaves over, and whether that goes with anything.
+
+    `tables` are the equations' whole ones, `laws` their torques.
+    """
+    missing = [
+        _missing(e, shared, mine) for e, mine in zip(equations, own, strict=True)
+    ]
+    names = [name for name in STRUCTURES if any(name in each for each in missing)]
+    tests = _holm(
+        [t for name in names if (t := _test(name, equations, tables, missing))]
+    )
+    phases = _phases(equations, laws)
+    before = [p for p in phases if p.phase in ("slow", "pre-catch")]
+    after = [p for p in phases if p.phase not in ("slow", "pre-catch")]
+    verdict: Literal["fits", "does not fit", "undecided"] = "undecided"
+    if tests:
+        verdict = "does not fit" if tests[0].adjusted < LEVEL else "fits"
+    left = sum(
+        float(((e.measured - law) ** 2).sum())
+        for e, law in zip(equations, laws, strict=True)
+    )
+    whole = sum(float(((e.measured - e.measured.mean()) ** 2).sum()) for e in equations)
+    return LackOfFit(
+        verdict=verdict,
+        level=LEVEL,
+        tests=tests,
+        explained=1.0 - left / whole if whole > 0.0 else math.nan,
+        phases=phases,
+        after_to_before=_pooled(after) / _pooled(before)
+        if after and before
+        else math.nan,
+        rest_sd=rest_sd,
+    )
+
+
+def _pooled(phases: Sequence[PhaseResidual]) -> float:
+    squares = sum(p.n_samples * p.sd**2 for p in phases)
+    return math.sqrt(squares / sum(p.n_samples for p in phases))
+
+
+def _test(
+    name: str,
+    equations: Sequence[Equations],
+    tables: Sequence[_Floats],
+    missing: Sequence[Mapping[str, _Floats]],
+) -> StructureTest | None:
+    rows = []
+    for e, table, columns in zip(equations, tables, missing, strict=True):
+        column = columns.get(name, np.zeros(table.shape[0]))
+        added = np.column_stack([table[:, :-1], column, table[:, -1]])
+        rest = partial_out(added, len(e.own))
+        rows.append(Rows(design=rest[:, :-1], target=-rest[:, -1]))
+    fit = solve(rows)
+    value, df = float(fit.values[-1]), float(fit.df[-1])
+    error = math.sqrt(fit.covariance[-1, -1])
+    if not (error > 0.0 and df >= _MIN_DF):
+        return None
+    p = 2.0 * float(stdtr(df, -abs(value / error)))
+    return StructureTest(name=name, t=value / error, df=df, p_value=p, adjusted=p)
+
+
+def _holm(tests: Sequence[StructureTest]) -> tuple[StructureTest, ...]:
+    ordered = sorted(tests, key=lambda test: test.p_value)
+    adjusted, last = [], 0.0
+    for i, test in enumerate(ordered):
+        last = max(last, min(1.0, (len(ordered) - i) * test.p_value))
+        adjusted.append(
+            StructureTest(
+                name=test.name,
+                t=test.t,
+                df=test.df,
+                p_value=test.p_value,
+                adjusted=last,
+            )
+        )
+    return tuple(adjusted)
+
+
+def _missing(e: Equations, shared: _Floats, own: _Floats) -> dict[str, _Floats]:
+    # columns of what the law has not, over the rows of the whole table
+    now = dict(zip(e.known.names, shared.tolist(), strict=True))
+    mine = dict(zip(e.own, own.tolist(), strict=True))
+    rows = list(e.catch_rows(now, mine))
+    columns = {
+        name: np.append(column / e.known.spreads.torque, np.zeros(len(rows)))
+        for name, column in (_before(e) | _from_catch(e, now, mine)).items()
+        if name not in now and name not in mine and column.any()
+    }
+    catch = e.trial.catch
+    size = {"catch angle": 0.0, "peak": 1.0, "residual": 1.0, "travel": 0.0}
+    if catch is not None:
+        size |= {"catch angle": catch.mean_speed**2, "travel": catch.mean_catch_speed}
+    for name, value in size.items():
+        if name in rows and (name != "travel" or e.known.limit is None):
+            column = np.zeros(e.torque.size + len(rows))
+            column[e.torque.size + rows.index(name)] = value
+            columns[name] = column
+    return columns
+
+
+def _before(e: Equations) -> dict[str, _Floats]:
+    # what acts in every phase, and what the law holds from the catch on
+    parts = [e.trial.pre_catch]
+    if e.catch is not None and e.trial.after is not None:
+        parts.append(e.trial.after)
+    angle = np.concatenate([part.angle for part in parts])
+    speed = np.concatenate([part.velocity for part in parts])
+    held_angle, held_speed = angle.copy(), speed.copy()
+    if e.catch is not None:
+        held_angle[e.n_pre :] = e.catch.angle
+        held_speed[e.n_pre :] = e.catch.speed
+    return {
+        "gravity": np.sin(angle - e.known.arm.gravity_angle),
+        "arm_inertia": np.concatenate([part.acceleration for part in parts]),
+        "drift": e.time - e.time.mean() if e.time.size else e.time,
+        "bent stiffness": held_angle**2,
+        "bent damping": held_speed**2,
+    }
+
+
+def _from_catch(
+    e: Equations, now: Mapping[str, float], mine: Mapping[str, float]
+) -> dict[str, _Floats]:
+    catch, after = e.catch, e.trial.after
+    if catch is None or after is None:
+        return {}
+    since = np.concatenate([np.zeros(e.n_pre), after.time - catch.time])
+    peak_end = e.known.constants.peak_duration
+    end = math.inf if catch.end is None else catch.end - catch.time
+    slope = np.where(since < end, np.maximum(since - peak_end, 0.0), 0.0)
+    travel = mine.get("travel", catch.travel)
+    past = np.concatenate([np.zeros(e.n_pre), after.angle - catch.angle - travel])
+    past = np.where(since >= end, np.maximum(past, 0.0), 0.0)
+    if math.isfinite(end):
+        slope[since >= end] = slope.max(initial=0.0)
+    made = {"residual slope": slope, "bent climb": past**2}
+    law = e.law_at(now, mine)
+    if "lag" not in now:
+        made["lag"] = e.law_at({**now, "lag": e.known.arm.lag + _LAG}, mine) - law
+    if "catch_rise" not in now:
+        rise = {**now, "catch_rise": e.known.arm.catch_rise + _RISE}
+        made["catch_rise"] = e.law_at(rise, mine) - law
+    return made
+
+
+def _phases(
+    equations: Sequence[Equations], laws: Sequence[_Floats]
+) -> tuple[PhaseResidual, ...]:
+    pieces: dict[str, list[_Floats]] = {}
+    for e, law in zip(equations, laws, strict=True):
+        left = e.measured - law
+        for phase, which in _phase_masks(e.trial, e):
+            if which.sum() > 2:
+                pieces.setdefault(phase, []).append(left[which])
+    order = ("slow", "pre-catch", "peak", "catch", "post-catch")
+    return tuple(_phase(name, pieces[name]) for name in order if name in pieces)
+
+
+def _phase_masks(trial: Trial, e: Equations) -> list[tuple[str, NDArray[np.bool_]]]:
+    before = np.arange(e.time.size) < e.n_pre
+    if trial.pace == "slow":
+        return [("slow", before)]
+    masks = [("pre-catch", before)]
+    if e.catch is not None:
+        end = math.inf if e.catch.end is None else e.catch.end
+        peak = ~before & (
+            e.time < min(e.catch.time + e.known.constants.peak_duration, end)
+        )
+        over = ~before & ~peak & (e.time >= end)
+        masks += [
+            ("peak", peak),
+            ("catch", ~before & ~peak & ~over),
+            ("post-catch", over),
+        ]
+    return masks
+
+
+def _phase(phase: str, pieces: Sequence[_Floats]) -> PhaseResidual:
+    runs = expected = products = squares = raw = 0.0
+    for left in pieces:
+        positive = left > 0.0
+        n, n_up = left.size, int(positive.sum())
+        runs += 1.0 + float((positive[1:] != positive[:-1]).sum())
+        expected += 1.0 + 2.0 * n_up * (n - n_up) / n
+        about = left - left.mean()
+        products += float((about[1:] * about[:-1]).sum())
+        squares += float((about**2).sum())
+        raw += float((left**2).sum())
+    count = sum(left.size for left in pieces)
+    return PhaseResidual(
+        phase=phase,
+        n_samples=count,
+        sd=math.sqrt(raw / count),
+        runs=runs / expected,
+        autocorrelation=products / squares if squares > 0.0 else 0.0,
+    )
