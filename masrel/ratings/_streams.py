@@ -298,12 +298,7 @@ def stream_long(large: LargeFile, layout: Layout, progress: Progress) -> Streame
         rows = DistinctRows()
         n_items = _unordered(long, rows)
     _refuse_header(large, [int(layout.rater or 0)], long.raters)
-    for name, (row, place) in zip(long.raters.texts, long.raters.places, strict=True):
-        if name in USUAL_MISSING:
-            column = large.sheet.header[place]
-            raise large.sheet.error(
-                f"{large.where(row)}, column {column!r}: needed the rater, got {name!r}"
-            )
+    _refuse_unnamed_raters(large, long.raters)
     distinct, freq = rows.merged()
     distinct = widened(distinct, long.n_raters)
     doubts = []
@@ -325,6 +320,15 @@ def stream_long(large: LargeFile, layout: Layout, progress: Progress) -> Streame
         doubts=doubts,
         is_simulated=long.is_simulated,
     )
+
+
+def _refuse_unnamed_raters(large: LargeFile, raters: TextCodes) -> None:
+    for name, (row, place) in zip(raters.texts, raters.places, strict=True):
+        if name in USUAL_MISSING:
+            column = large.sheet.header[place]
+            raise large.sheet.error(
+                f"{large.where(row)}, column {column!r}: needed the rater, got {name!r}"
+            )
 
 
 def _unordered(long: _Long, rows: DistinctRows) -> int:

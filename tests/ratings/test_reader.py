@@ -462,9 +462,25 @@ def test_options_are_repeated_on_the_command_line(
     assert read_of_file["missing"] == {"9": 1, "x": 1}
 
 
-@pytest.mark.parametrize("error", [KeyboardInterrupt(), MemoryError("2 GiB")])
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (KeyboardInterrupt(), "stopped by Ctrl-C"),
+        (MemoryError("2 GiB"), "needs more memory than there is. 2 GiB"),
+    ],
+)
+@pytest.mark.parametrize(
+    ("place", "options"),
+    [
+        ("masrel.ratings.read_ratings", ()),
+        ("masrel.ratings._stream_codes.DistinctRows.add", ("--stream",)),
+    ],
+)
 def test_an_end_from_outside_is_one_sentence(
     error: BaseException,
+    words: str,
+    place: str,
+    options: tuple[str, ...],
     tmp_path: Path,
     masrel: Caller,
     monkeypatch: pytest.MonkeyPatch,
@@ -472,13 +488,14 @@ def test_an_end_from_outside_is_one_sentence(
     def interrupted(*_: object, **__: object) -> None:
         raise error
 
-    monkeypatch.setattr("masrel.ratings.read_ratings", interrupted)
+    if options:
+        pytest.importorskip("pyarrow")
+    monkeypatch.setattr(place, interrupted)
     path = tmp_path / "r.csv"
     path.write_text(WIDE)
-    done = masrel("agree", path)
+    done = masrel("agree", path, *options)
     assert done.code == 1
-    assert len(done.err.splitlines()) == 1
-    assert done.err.startswith("masrel: ")
+    assert done.err.splitlines() == [f"masrel: {words}"]
 
 
 @pytest.mark.parametrize("end", ["", "1"])  # the last cell missing, or a cell too many
