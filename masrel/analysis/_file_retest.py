@@ -30,7 +30,8 @@ class Retest:
     group: str | None
     raters: tuple[str, ...]  # those of the first rows
     rows: list[AgreementRow]  # of each rater, then of all together
-    notes: tuple[str, ...]  # which sessions, and what was left out
+    sessions: tuple[str, str]
+    left_out: tuple[str, ...]  # raters and items of one session alone, in words
 
 
 def retests(file: RatingsFile, options: EstimateOptions) -> list[Retest]:
@@ -48,16 +49,38 @@ def retests(file: RatingsFile, options: EstimateOptions) -> list[Retest]:
 def _retest(
     file: RatingsFile, parts: Sequence[RatingsPart], options: EstimateOptions
 ) -> Retest:
+    # by the names of raters and of items, those of both sessions alone
     group = parts[0].group
-    pairs = _retest_pairs(file, parts)
-    head = [] if group is None else [group]
-    every, codes = replace(options, coefficients=None), pairs.ratings.codes
+    of_group = "" if group is None else f"{group}: "
+    first, second = _check_sessions(file, parts, of_group)
+    raters = _of_both(parts, "a rater", [part.raters for part in parts], of_group)
+    items = _of_both(parts, "an item", [part.items for part in parts], of_group)
+    codes = np.stack([_aligned(part, items, raters) for part in parts], axis=2)
+    ratings = CodedRatings(
+        codes=codes.reshape(len(items), 2 * len(raters)), categories=file.scale.values
+    )
+    return Retest(
+        group=group,
+        raters=raters,
+        rows=_rows([] if group is None else [group], raters, ratings, options),
+        sessions=(first, second),
+        left_out=_left_out(parts, raters, items),
+    )
+
+
+def _rows(
+    head: Sequence[str],
+    raters: Sequence[str],
+    pairs: CodedRatings,
+    options: EstimateOptions,
+) -> list[AgreementRow]:
+    # of both sessions of each rater in pairs, (n_items, 2 n_raters)
+    every = replace(options, coefficients=None)
     # a single rater says nothing of other raters
     alone = replace(every, target=None if options.target != "items" else "items")
     rows = []
-    for place, rater in enumerate(pairs.raters):
-        of_rater = codes[:, 2 * place : 2 * place + 2]
-        ratings = replace(pairs.ratings, codes=of_rater)
+    for place, rater in enumerate(raters):
+        ratings = replace(pairs, codes=pairs.codes[:, 2 * place : 2 * place + 2])
         name = label([*head, rater])
         row, _ = estimate_row(coefficient("cohen_kappa"), ratings, name, alone)
         estimate = changed(row.estimate, n_raters=min(row.estimate.n_raters, 1))
@@ -66,54 +89,28 @@ def _retest(
     if options.takes_all or "pooled_kappa" in options.names:
         of_all.append("pooled_kappa")
     everybody = label([*head, "all"])
-    rows += [
-        estimate_row(coefficient(name), pairs.ratings, everybody, every)[0]
-        for name in of_all
+    return rows + [
+        estimate_row(coefficient(name), pairs, everybody, every)[0] for name in of_all
     ]
-    return Retest(group=group, raters=pairs.raters, rows=rows, notes=pairs.notes)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _RetestPairs:
-    """The ratings of two sessions, side by side."""
-
-    raters: tuple[str, ...]
-    ratings: CodedRatings  # (n_items, 2 n_raters): both sessions of each rater
-    notes: tuple[str, ...]  # which sessions, and what was left out
-
-
-def _retest_pairs(file: RatingsFile, parts: Sequence[RatingsPart]) -> _RetestPairs:
-    # by the names of raters and of items, those of both sessions alone
-    of_group = "" if parts[0].group is None else f"{parts[0].group}: "
-    _check_sessions(file, parts, of_group)
-    raters = _of_both(parts, "a rater", [part.raters for part in parts], of_group)
-    items = _of_both(parts, "an item", [part.items for part in parts], of_group)
-    codes = np.stack([_aligned(part, items, raters) for part in parts], axis=2)
-    return _RetestPairs(
-        raters=raters,
-        ratings=CodedRatings(
-            codes=codes.reshape(len(items), 2 * len(raters)),
-            categories=file.scale.values,
-        ),
-        notes=_left_out(of_group, parts, raters, items),
-    )
 
 
 def _check_sessions(
     file: RatingsFile, parts: Sequence[RatingsPart], of_group: str
-) -> None:
+) -> tuple[str, str]:
     column = file.read["session"]
     if parts[0].session is None:
         raise ParameterError(
             f"--retest: compares the sessions of column {column!r}, so that --by must "
             "not take them apart"
         )
-    if len(parts) != 2:
-        sessions = [str(part.session) for part in parts]
+    sessions = [str(part.session) for part in parts]
+    if len(sessions) != 2:
         raise RatingsError(
             f"--retest: {of_group}needs two sessions in column {column!r}, got "
             f"{len(sessions)} ({named(sessions)})"
         )
+    first, second = sessions
+    return first, second
 
 
 def _of_both(
@@ -150,21 +147,11 @@ def _aligned(
 
 
 def _left_out(
-    of_group: str,
-    parts: Sequence[RatingsPart],
-    raters: Sequence[str],
-    items: Sequence[str],
+    parts: Sequence[RatingsPart], raters: Sequence[str], items: Sequence[str]
 ) -> tuple[str, ...]:
-    # which sessions these are, and who and what is of one of them only
-    first, second = parts
-    notes = [
-        f"{of_group}Each rater's grades of {first.session} and of {second.session}."
-    ]
     texts, of_both = [], {"rater": set(raters), "item": set(items)}
     for part in parts:
         for noun, names in (("rater", part.raters), ("item", part.items)):
             lone = [name for name in names if name not in of_both[noun]]
             texts += [f"{noun} {named(lone)} ({part.session} only)"] if lone else []
-    if texts:
-        notes.append(f"{of_group}Left out: {'; '.join(texts)}.")
-    return tuple(notes)
+    return tuple(texts)

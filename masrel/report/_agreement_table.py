@@ -170,11 +170,13 @@ def _paired_note(rows: Sequence[AgreementRow]) -> tuple[str, ...]:
     }
     if not fewer:
         return ()
-    counts = [f"{of.n_items_paired} of {of.n_items}" for of in fewer.values()]
-    pair = pair_words(next(iter(fewer.values())))
+    of, *_ = fewer.values()
+    pair = pair_words(of)
     if len({row.group for row in rows}) == 1:
-        return (f"{counts[0]} items have {pair}.",)
-    of_groups = map("{} ({})".format, counts, fewer)
+        return (f"{of.n_items_paired} of {of.n_items} items have {pair}.",)
+    of_groups = (
+        f"{of.n_items_paired} of {of.n_items} ({group})" for group, of in fewer.items()
+    )
     return (f"Items that have {pair}: {', '.join(of_groups)}.",)
 
 

@@ -5,6 +5,7 @@ In: a `RatingsFile` whose parts are the groups. Out: tables, and the same for JS
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from masrel.agreement import Coefficient
 from masrel.analysis._file_comparisons import (
@@ -44,7 +45,7 @@ def difference_table(
         table=Table(
             name="differences",
             caption="Differences of agreement between groups",
-            columns=_DIFFERENCE_COLUMNS,
+            columns=_difference_columns(len(comparison.pairs)),
             rows=tuple(map(_difference_cells, differences)),
             notes=_difference_notes(comparison, options),
             data=data_of(file),
@@ -72,6 +73,16 @@ _DIFFERENCE_COLUMNS = (
     Column(key="p_shown_holm", heading="p (Holm)", where="page"),
     Column(key="p_holm", heading="p (Holm)", where="csv"),
 )
+
+
+def _difference_columns(n_pairs: int) -> tuple[Column, ...]:
+    # of one pair there is nothing to adjust
+    return tuple(
+        replace(column, where="csv")
+        if n_pairs == 1 and column.key == "p_shown_holm"
+        else column
+        for column in _DIFFERENCE_COLUMNS
+    )
 
 
 def _name(difference: Difference) -> str:
@@ -131,10 +142,11 @@ def _difference_notes(
         f"{percent(options.level)} % CI and p: {unit} jackknife, t; they generalise "
         f"to other {population} like these, graded by the same raters; raters are "
         "taken as they are, whether groups share them or not.",
-        f"p (Holm): adjusted for {len(pairs)} pairs, each coefficient by itself."
-        if len(pairs) > 1
-        else "p (Holm): there is one pair, so nothing to adjust.",
     ]
+    if len(pairs) > 1:
+        notes.append(
+            f"p (Holm): adjusted for {len(pairs)} pairs, each coefficient by itself."
+        )
     if any(pair.design == "dependent" for pair in pairs) and is_clustered:
         notes.append(
             "Groups have clusters in common, which are left out of both at once."

@@ -8,7 +8,7 @@ import itertools
 import math
 import warnings
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -121,16 +121,13 @@ _COLUMNS: dict[str, tuple[Column, ...]] = {
     ),
 }
 
+# the column that each is of
 _NOTES = {
-    "raters": (
-        "Change: of all without the rater, less that of all: above 0 the others agree "
-        "better without. SE: item jackknife.",
-    ),
-    "pairs": (),
-    "categories": (
-        "Agreement: of the ratings in the category, the part that meets the same of "
-        "another rater.",
-    ),
+    "change": "Change: of all without the rater, less that of all: above 0 the others "
+    "agree better without.",
+    "standard_error": "SE: item jackknife.",
+    "agreement": "Agreement: of the ratings in the category, the part that meets the "
+    "same of another rater.",
 }
 
 
@@ -143,12 +140,17 @@ def _table(
     title: str,
 ) -> FurtherTable:
     rows = [(part, row) for part in parts for row in _rows(file, part.result, kind)]
-    columns = _COLUMNS[kind]
     reference = parts[0].result.reference
-    shown, notes = rows, list(_NOTES[kind])
-    if kind == "raters" and reference is None:
-        columns = tuple(column for column in columns if "reference" not in column.key)
-    elif kind == "raters":
+    columns = [
+        replace(column, where="csv")
+        if all(row[column.key] is None for _, row in rows)
+        else column
+        for column in _COLUMNS[kind]
+        if reference is not None or "reference" not in column.key
+    ]
+    on_page = [column.key for column in columns if column.where != "csv"]
+    shown, notes = rows, [note for key, note in _NOTES.items() if key in on_page]
+    if kind == "raters" and reference is not None:
         notes.append(f"{reference} is the reference, and in none of the other columns.")
     elif kind == "pairs" and len(parts[0].result.raters) > _MANY:
         shown = sorted(rows, key=_agreement)[:_SHOWN]
@@ -168,7 +170,7 @@ def _table(
             {**part.keys, **{key: finite(value) for key, value in row.items()}}
             for part, row in rows
         ],
-        figure=_figure(parts[0].result, title) if kind == "pairs" else None,
+        figure=_figure(parts[0], title) if kind == "pairs" else None,
     )
 
 
@@ -336,7 +338,8 @@ def _cell(value: float) -> float | None:
     return None if math.isnan(value) else float(value)
 
 
-def _figure(result: Diagnosis, title: str) -> RaterPairs:
+def _figure(part: _Diagnosed, title: str) -> RaterPairs:
+    result = part.result
     # the raters who agree best with the others come first
     means = np.where(np.isnan(result.mean_values), -math.inf, result.mean_values)
     order = np.argsort(-means, kind="stable")
@@ -345,7 +348,7 @@ def _figure(result: Diagnosis, title: str) -> RaterPairs:
         pairs = np.column_stack([pairs, result.reference_values[order]])
     ends = np.column_stack([result.change_low, result.change_high])[order]
     return RaterPairs(
-        title=title,
+        title=f"{title} ({part.group})" if part.group else title,
         raters=tuple(result.raters[place] for place in order),
         pairs=tuple(map(tuple, pairs.tolist())),
         reference=result.reference,

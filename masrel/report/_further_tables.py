@@ -5,6 +5,7 @@ plain values for JSON.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from masrel.analysis._file_estimates import (
@@ -13,7 +14,7 @@ from masrel.analysis._file_estimates import (
     category_rows,
 )
 from masrel.analysis._file_parts import part_names
-from masrel.analysis._file_retest import retests
+from masrel.analysis._file_retest import Retest, retests
 from masrel.ratings import RatingsFile, RatingsPart
 from masrel.report._agreement_table import (
     agreement_table,
@@ -66,10 +67,9 @@ def retest_table(
     by = None if file.read["by"] is None else str(file.read["by"])
     rows: list[AgreementRow] = []
     documents: list[dict[str, object]] = []
-    notes: list[str] = []
-    for retest in retests(file, options):
+    of_groups = retests(file, options)
+    for retest in of_groups:
         rows += retest.rows
-        notes += retest.notes
         keys = {} if by is None else {group_key(by): retest.group}
         n_of_all = len(retest.rows) - len(retest.raters)
         raters: list[str | None] = [*retest.raters, *[None] * n_of_all]
@@ -82,7 +82,7 @@ def retest_table(
         rows,
         caption="Agreement of raters with themselves",
         by="rater" if by is None else f"{by}, rater",
-        notes=tuple(notes),
+        notes=_retest_notes(of_groups),
         explain=explain,
         bands=options.words,
         data=data_of(file),
@@ -93,6 +93,21 @@ def retest_table(
         documents=documents,
         rows=tuple(rows),
     )
+
+
+def _retest_notes(retests: Sequence[Retest]) -> tuple[str, ...]:
+    # which sessions these are, and who and what is of one of them only
+    sessions: list[str] = []
+    left_out: list[str] = []
+    are_alike = len({retest.sessions for retest in retests}) == 1
+    for retest in retests:
+        of_group = "" if retest.group is None else f"{retest.group}: "
+        first, second = retest.sessions
+        text = f"Each rater's grades of {first} and of {second}."
+        sessions.append(text if are_alike else f"{of_group}{text}")
+        if retest.left_out:
+            left_out.append(f"{of_group}Left out: {'; '.join(retest.left_out)}.")
+    return (*dict.fromkeys(sessions), *left_out)
 
 
 def category_table(

@@ -49,7 +49,10 @@ def _names(subset: Sequence[NotedRow], rows: Sequence[NotedRow], by: str | None)
         if groups is None:
             continue
         if by is not None and len(titles) == len(every):
-            return f"{capital(by)} {', '.join(groups)}"
+            # of several levels, as North: test, the names say enough
+            return (
+                "; ".join(groups) if "," in by else f"{capital(by)} {', '.join(groups)}"
+            )
         is_of_all = all(every[title] == groups for title in titles)
         which = "" if is_of_all else f" ({', '.join(groups)})"
         if len(titles) > 2:

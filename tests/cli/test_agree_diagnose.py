@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -104,6 +105,8 @@ def test_groups_are_diagnosed_each_and_without_a_target_there_are_no_intervals(
     assert all(row["low"] is None for row in document["diagnosis_raters"])
     out = masrel("agree", wide, "--by", "site", "--diagnose").out
     assert "No intervals: --target items has them." in out
+    below = out.split("What each rater adds", 1)[1]
+    assert re.search(r" (SE|Low|High)\b", below) is None
     tables = [
         list(csv.DictReader(part.splitlines()))
         for part in masrel(

@@ -183,6 +183,28 @@ def test_a_rater_and_an_item_of_one_session_are_left_out_and_named(
     assert "Left out: rater R9 (test only); item I7 (retest only)." in out
 
 
+def test_sessions_are_named_once_unless_groups_have_others(
+    masrel: Caller, tmp_path: Path
+) -> None:
+    def notes(sessions: dict[str, str]) -> list[str]:
+        rows = [
+            (clinic, sessions.get(clinic + session, session), rater, item, grade)
+            for clinic in ("North", "South")
+            for session, rater, item, grade in retest_rows()
+        ]
+        path = write(tmp_path / "c.csv", "clinic,session,rater,item,grade", rows)
+        out = masrel(
+            *("agree", path, "--by", "clinic", "--session", "session", "--retest")
+        ).out
+        return [line for line in out.splitlines() if "Each rater's grades" in line]
+
+    assert notes({}) == ["Each rater's grades of test and of retest."]
+    assert notes({"Southretest": "late"}) == [
+        "North: Each rater's grades of test and of retest.",
+        "South: Each rater's grades of test and of late.",
+    ]
+
+
 def test_the_first_table_estimates_each_session(masrel: Caller, sessions: Path) -> None:
     found = record(masrel, sessions, "--session", "session", "--retest")
     expected = record(masrel, sessions, "--by", "session")
@@ -530,6 +552,8 @@ def test_groups_of_the_same_items_are_compared_item_by_item(
     assert row["p_holm"] == row["p_value"]
     out = masrel("agree", path, *names).out
     assert "Items the same" in out
+    assert "Holm" not in out  # of one pair there is nothing to adjust
+    assert ",p_holm" in masrel("agree", path, *names, "--csv").out
 
 
 def test_a_few_items_of_one_name_are_different_ones_and_that_is_said(
