@@ -142,6 +142,28 @@ class Stretches:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ToneLine:
+    """One joint along a motion."""
+
+    label: str  # what tells it from the others, such as its grade
+    # (n_points,): s, deg, N·m; where the torque jumps, two points are near
+    time: "Floats" = field(compare=False, repr=False)
+    angle: "Floats" = field(compare=False, repr=False)
+    torque: "Floats" = field(compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ToneView:
+    """A law of tone along one motion: torque against angle, and both against time."""
+
+    lines: tuple[ToneLine, ...]  # at most five, of one motion
+    shown: int  # which of them has its events marked
+    parts: tuple[tuple[str, float, float], ...]  # name, first and last time, s
+    events: tuple[tuple[str, float], ...]  # name, time, s
+    rendered: ToneLine  # that line as a device made it, its angle the arm's
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class CatchCurve:
     """Catches of one model in motions of many speeds."""
 
@@ -244,6 +266,7 @@ Content = (
     | Stretches
     | CatchCurves
     | CatchSchematic
+    | ToneView
     | JointFitView
     | FrictionView
     | RaterPairs

@@ -145,7 +145,17 @@ def _figure(content: data.Content) -> Figure:
             from masrel.report.figures._scene_figures import scene_figure
 
             return scene_figure(content)
-        case data.JointFitView() | data.FrictionView():
-            from masrel.report.figures._fit_figures import fit_figure
+        case _:
+            return _joint_figure(content)
 
-            return fit_figure(content)
+
+def _joint_figure(
+    content: data.ToneView | data.JointFitView | data.FrictionView,
+) -> Figure:
+    if isinstance(content, data.ToneView):
+        from masrel.report.figures._tone_figures import tone_figure
+
+        return tone_figure(content)
+    from masrel.report.figures._fit_figures import fit_figure
+
+    return fit_figure(content)

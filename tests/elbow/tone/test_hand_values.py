@@ -6,12 +6,12 @@ expected values come from arrays stepped in numpy, written before the models and
 from them; the comments derive one of each by hand.
 """
 
-from math import degrees, radians
+from math import degrees, exp, radians
 
 import numpy as np
 import pytest
 
-from masrel.elbow import ConstantSpeed, Hold, Joined
+from masrel.elbow import ConstantSpeed, Hold, Joined, Reversed
 from masrel.elbow.tone import (
     ClaspKnife,
     Clonus,
@@ -75,8 +75,27 @@ def test_clonus() -> None:
     # 0.34: the middle of a beat, 1.5 + 4·exp(-0.04/2); 0.38: its end
     expected = (1.5, 5.4208, 1.5, 4.4046, 3.0941)
     assert model.torque(motion, times) == pytest.approx(expected, abs=5e-5)
+    # a quarter of a beat: sin²(45 deg) is a half
+    assert model.torque(motion, [0.32]) == pytest.approx(1.5 + 2 * exp(-0.01))
     beats = [e.time for e in model.events(motion) if e.name == "beat"]
     assert beats[:4] == pytest.approx([0.3, 0.5, 0.7, 0.9], abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("speed", "angle"), [(60, 130.0), (10, 90.0)], ids=["briskly", "slowly"]
+)
+def test_clonus_stops_where_the_arm_is_moved_back(speed: float, angle: float) -> None:
+    """At once at 20 deg/s or more, else at the angle that set the beats off."""
+    there = ConstantSpeed(start=START, end=END, speed=radians(90))
+    back = ConstantSpeed(start=START, end=END, speed=radians(speed))
+    motion = Joined([there, Reversed(motion=back)])
+    model = Clonus.of_tardieu(4)
+    (stop,) = (e for e in model.events(motion) if e.name == "stop")
+    assert degrees(stop.angle) == pytest.approx(angle, abs=1e-9)
+    times, torque, phase = stepped(model, motion)
+    assert times[np.flatnonzero(phase)[-1]] == pytest.approx(stop.time, abs=2e-3)
+    assert np.all(torque[times > stop.time + 1e-3] == 1.5)
+    assert np.all(model.torque(motion, times[times > stop.time]) == 1.5)
 
 
 PEAKS = [
@@ -141,6 +160,14 @@ def test_gaps_of_the_cogwheel() -> None:
     assert gaps[7] == pytest.approx(back + 0.1, abs=1e-9)
     ends = [e.time for e in Cogwheel().events(m1()) if e.name == "gap ends"]
     assert ends[:7] == pytest.approx([*((n + 1) / 6 for n in range(6)), 10 / 9])
+
+
+def test_a_gap_closes_softly_where_the_movement_ends() -> None:
+    """M1 stops in a gap that is wholly open; half an edge later it is half open."""
+    at_rest = 1.4 * radians(70) + 1.6
+    times = [10 / 9 + share * 0.010 for share in (1e-6, 0.5, 1.0)]
+    expected = [at_rest - 0.5 * 1.6 * gap for gap in (1.0, 0.5, 0.0)]
+    assert Cogwheel().torque(m1(), times) == pytest.approx(expected, abs=1e-6)
 
 
 WORK = [  # J, at 1 and 5 Hz

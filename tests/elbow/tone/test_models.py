@@ -3,13 +3,15 @@
 import dataclasses
 import inspect
 import re
+from collections.abc import Iterator
 from math import inf, nan, radians
 
 import numpy as np
 import pytest
 
 from masrel.elbow import MODELS, ConstantSpeed, Hold, Joined
-from masrel.elbow.tone import Dystonia, ToneModel
+from masrel.elbow.motion import Floats
+from masrel.elbow.tone import Dystonia, LeadPipe, ToneModel
 from masrel.errors import ParameterError
 from tests.elbow.tone.joints import (
     JOINTS,
@@ -172,6 +174,31 @@ def test_events_are_in_order_and_at_their_angles(model: ToneModel) -> None:
         for event in events:
             assert 0.0 <= event.time <= motion.duration
             assert event.angle == float(motion.angle(event.time))
+
+
+class Wave:
+    """60 deg and a cubic in time on it, one piece that turns twice."""
+
+    start, end, duration = radians(60), radians(60), 6.0
+    length = 6.0
+
+    def pieces(self) -> Iterator["Wave"]:
+        yield self
+
+    def angle(self, time: Floats | float, origin: float = 0.0) -> Floats:
+        x = np.asarray(time) / self.duration
+        return radians(60) - origin + radians(300) * x * (x - 0.5) * (x - 1.0)
+
+    def velocity(self, time: Floats | float) -> Floats:
+        x = np.asarray(time) / self.duration
+        return radians(300) * (3.0 * x * x - 3.0 * x + 0.5) / self.duration
+
+
+def test_a_piece_may_turn() -> None:
+    model, motion = LeadPipe.of_updrs(3), Wave()
+    times, torque, _ = stepped(model, motion, 2000.0)
+    assert np.abs(torque - model.torque(motion, times)).max() < 1e-3
+    assert [e.name for e in model.events(motion)] == ["slip", "stick"] * 2 + ["slip"]
 
 
 @EVERY
