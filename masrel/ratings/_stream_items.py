@@ -66,10 +66,9 @@ def _blank_texts(large: LargeFile, item: Any, blank: Any) -> Any:
     shortest = compute.min(compute.binary_length(item)).as_py()
     if shortest is None or shortest > max(map(len, USUAL_MISSING)):
         return blank
-    blank = item.is_null()
-    for usual in USUAL_MISSING:
-        blank = compute.or_(blank, compute.equal(item, usual).fill_null(False))
-    return blank
+    lib = library(large.sheet.name, "pyarrow")
+    usual = lib.array([*USUAL_MISSING, None], item.type)
+    return compute.is_in(item, value_set=usual)
 
 
 class Ascending:

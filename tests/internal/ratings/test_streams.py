@@ -194,6 +194,11 @@ def test_simulated_ratings_are_labelled(tmp_path: Path) -> None:
         ({"id": ["b", "a", "b"], "A": [1, 1, 2], "B": [1, 2, 2]}, "row 2 and row 4"),
         ({"id": [1, None], "A": [1, 1], "B": [1, 2]}, "row 3, column 'id': needed the"),
         (
+            {"id": ["p", "NA"], "A": [1, 1], "B": [1, 2]},
+            "row 3, column 'id': .*got 'NA",
+        ),
+        ({"id": ["p", None], "A": [1, 1], "B": [1, 2]}, "row 3, column 'id': .*got ''"),
+        (
             {"id": [1, 2], "A": ["1", "n/a"], "B": ["1", "2"]},
             "row 3, column 'A'.*--miss",
         ),
