@@ -32,6 +32,12 @@ from masrel.ratings import RatingsFile, RatingsPart
 
 _T = TypeVar("_T")
 
+_OF_TABLE = {
+    "prevalence_index": ("Prevalence index", prevalence_index),
+    "bias_index": ("Bias index", bias_index),
+    "kappa_max": ("Largest κ", kappa_max),
+}
+
 
 def symmetry_tests(file: RatingsFile, part: RatingsPart) -> dict[str, Significance]:
     """Return tests of whether changes between categories go both ways alike often."""
@@ -64,50 +70,35 @@ class TableIndex:
 def table_indices(file: RatingsFile, part: RatingsPart) -> list[TableIndex]:
     """Return what the margins of two raters and two categories do to kappa."""
     coded, grades = two_raters(file, part, "--indices"), file.scale.grades
-    table = contingency_table(coded)
     if len(grades) != 2:
         raise RatingsError(
             f"--indices: needs a scale of two categories, got {len(grades)} "
             f"({named(grades)})"
         )
-    n_items = int(table.sum())
+    table = contingency_table(coded)
+    made = partial(TableIndex, n_items=int(table.sum()))
     estimate, why = _with_reason(lambda: brennan_prediger(part.counted))
-    pabak = TableIndex(
-        index="pabak",
-        title="PABAK",
-        value=estimate.value,
-        standard_error=estimate.standard_error,
-        n_items=n_items,
-        reason=why,
-    )
-    of_table: list[TableIndex] = []
-    for name, title, function in (
-        ("prevalence_index", "Prevalence index", prevalence_index),
-        ("bias_index", "Bias index", bias_index),
-        ("kappa_max", "Largest κ", kappa_max),
-    ):
-        value, why = _with_reason(partial(function, table))
-        of_table.append(
-            TableIndex(
-                index=name, title=title, value=value, n_items=n_items, reason=why
-            )
+    value, error = estimate.value, estimate.standard_error
+    indices = [
+        made(
+            index="pabak", title="PABAK", value=value, standard_error=error, reason=why
         )
-    shares, why = _with_reason(lambda: specific_agreement(table))
-    return [
-        pabak,
-        *of_table,
-        *(
-            TableIndex(
-                index="specific_agreement",
-                title=f"Agreement on {grade}",
-                category=grade,
-                value=share,
-                n_items=n_items,
-                reason=why if math.isnan(share) else None,
-            )
-            for grade, share in zip(grades, shares, strict=True)
-        ),
     ]
+    for name, (title, function) in _OF_TABLE.items():
+        value, why = _with_reason(partial(function, table))
+        indices.append(made(index=name, title=title, value=value, reason=why))
+    shares, why = _with_reason(lambda: specific_agreement(table))
+    indices += [
+        made(
+            index="specific_agreement",
+            title=f"Agreement on {grade}",
+            category=grade,
+            value=share,
+            reason=why if math.isnan(share) else None,
+        )
+        for grade, share in zip(grades, shares, strict=True)
+    ]
+    return indices
 
 
 def _with_reason(call: Callable[[], _T]) -> tuple[_T, str | None]:

@@ -51,8 +51,17 @@ class FurtherOptions:
         self, options: EstimateOptions, by: str | None, clusters: str | None
     ) -> EstimateOptions:
         """Return what is estimated between raters, with the defaults of its tables."""
+        self._check_own(options)
         if clusters is not None:
             options = self._with_clusters(options)
+        if self.compare:
+            return self._with_comparison(options, by)
+        if self.limits_of_agreement and options.weights == "identity":
+            # weights are those of a kappa
+            return replace(options, usual=OF_MEASUREMENTS)
+        return options
+
+    def _check_own(self, options: EstimateOptions) -> None:
         if self.reference is not None and not self.diagnose:
             raise ParameterError("--reference: belongs to --diagnose, got it alone")
         if self.unit is not None and not self.limits_of_agreement:
@@ -69,12 +78,10 @@ class FurtherOptions:
                 "--diagnose: is of these raters, so its intervals generalise to other "
                 f"items: --target items or none, got --target {options.target}"
             )
-        if not self.compare:
-            # weights are those of a kappa
-            is_plain = options.weights == "identity"
-            if self.limits_of_agreement and is_plain:
-                options = replace(options, usual=OF_MEASUREMENTS)
-            return options
+
+    def _with_comparison(
+        self, options: EstimateOptions, by: str | None
+    ) -> EstimateOptions:
         if by is None:
             raise ParameterError(
                 "--compare: needs --by with the column that tells the groups apart"

@@ -213,20 +213,6 @@ def _confusion_table(
         Column(key="n", heading="Times"),
         *(Column(key=f"said_{g}", heading=g, digits=2) for g in grades),
     ]
-    cells: list[tuple[Value, ...]] = []
-    documents: list[dict[str, object]] = []
-    for part in parts:
-        result = part.result
-        for place, rater in enumerate(result.raters):
-            for row, grade in enumerate(grades):
-                times = int(result.confusion[place, row].sum())
-                shares = map(_cell, result.shares[place, row].tolist())
-                if times:  # else there is nothing to tell; --json has all
-                    cells.append((part.group, rater, grade, times, *shares))
-            documents += [
-                {**part.keys, **document}
-                for document in _confusion(result, place, grades)
-            ]
     notes = [
         "The columns: which share of these times the rater said so.",
         "Intervals are in --json: exact at the effective number of items.",
@@ -239,19 +225,33 @@ def _confusion_table(
             "diagnosis_confusion",
             f"What each rater said where {other} said the first",
             columns,
-            cells,
+            [row for part in parts for row in _confusion_rows(part, grades)],
             notes[: 1 if np.isnan(parts[0].result.share_low).all() else 2],
         ),
-        documents=documents,
+        documents=[
+            document for part in parts for document in _confusions(part, grades)
+        ],
     )
 
 
-def _confusion(
-    result: Diagnosis, place: int, grades: Sequence[str]
-) -> Iterator[dict[str, object]]:
-    for row, column in itertools.product(range(len(grades)), repeat=2):
-        at = place, row, column
+def _confusion_rows(
+    part: _Diagnosed, grades: Sequence[str]
+) -> Iterator[tuple[Value, ...]]:
+    result = part.result
+    for place, rater in enumerate(result.raters):
+        for row, grade in enumerate(grades):
+            times = int(result.confusion[place, row].sum())
+            shares = map(_cell, result.shares[place, row].tolist())
+            if times:  # else there is nothing to tell; --json has all
+                yield (part.group, rater, grade, times, *shares)
+
+
+def _confusions(part: _Diagnosed, grades: Sequence[str]) -> Iterator[dict[str, object]]:
+    result, places = part.result, range(len(grades))
+    for at in itertools.product(range(len(result.raters)), places, places):
+        place, row, column = at
         yield {
+            **part.keys,
             "rater": result.raters[place],
             "of": grades[row],
             "said": grades[column],
