@@ -230,13 +230,15 @@ def _predictor_table(
         if name == "speed":
             table[name] = table[key]
             continue
+        of_model = {m: getattr(selected[m], key) for m in selected}
         if name == "Q":  # one meaning, whichever way a model reads its Q
             of_model = {
-                m: elbow_parameters(protocol, m).residual_share for m in selected
+                m: None if q is None else elbow_parameters(protocol, m).residual_share
+                for m, q in of_model.items()
             }
-        else:
-            of_model = {m: float(getattr(selected[m], key)) for m in selected}
-        table[name] = [of_model[model] for model in table["model"]]
+        # none of them is any of a model of another kind than the spastic elbow
+        values = [of_model[model] for model in table["model"]]
+        table[name] = np.array(values, dtype=np.float64)
     complete = table.dropna(subset=["grade", *predictors])
     return complete, len(table) - len(complete)
 

@@ -48,12 +48,14 @@ def _plan_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
 
 
 def _device_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
-    from masrel.run._settings import check_backend  # loads numpy
+    from masrel.run._settings import check_backend, torque_problems  # loads numpy
 
     try:
         check_backend(protocol.device)
     except ParameterError as error:
         yield f"{study.protocol}: {error}"
+    for problem in torque_problems(protocol):
+        yield f"{study.protocol}: {problem}"
 
 
 def _ratings_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:

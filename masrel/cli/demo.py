@@ -16,12 +16,11 @@ from masrel.protocol import StudyPaths, copy_template, read_protocol
 @click.option(
     "--study",
     "template",
-    default="hess2012",
-    show_default=True,
-    help="Bundled study to run.",
+    metavar="NAME",
+    help="Bundled study to run.  [default: hess2012, and tone after it]",
 )
 @output_options(quiet="No progress bars.")
-def demo(out: Path, template: str, output: OutputOptions) -> None:
+def demo(out: Path, template: str | None, output: OutputOptions) -> None:
     """Run a complete simulated study in OUT and report it, and the published one.
 
     OUT must not exist or be empty. The same seed gives the same schedules, ratings,
@@ -29,17 +28,23 @@ def demo(out: Path, template: str, output: OutputOptions) -> None:
     """
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise ParameterError(f"{out}: needs a new or empty folder for the demo")
-    study = StudyPaths(out / "study")
-    copy_template(template, study.root)
+    studies = {"study": template or "hess2012"}
+    if template is None:
+        studies["tone"] = "tone"
+    pages = []
     with warnings.catch_warnings():
         # Every note on an interval is in its result, and so in the report.
         warnings.simplefilter("ignore", MasrelWarning)
-        _simulate(study, output)
-        pages = [_report(study, study.ratings_file, out / "report-simulated", output)]
-        if study.published_file.is_file():
-            published = out / "report-published"
-            pages.append(_report(study, study.published_file, published, output))
-    click.echo(f"The simulated study is in {study.root}.")
+        for folder, name in studies.items():
+            study = StudyPaths(out / folder)
+            copy_template(name, study.root)
+            _simulate(study, output)
+            report = "simulated" if folder == "study" else folder
+            pages.append(_report(study, study.ratings_file, report, output))
+            if study.published_file.is_file():
+                pages.append(_report(study, study.published_file, "published", output))
+    for folder in studies:
+        click.echo(f"A simulated study is in {out / folder}.")
     click.echo("Open these in a browser:")
     for page in pages:
         click.echo(f"  {page}")
@@ -75,11 +80,13 @@ def _simulate(study: StudyPaths, output: OutputOptions) -> None:
 
 
 def _report(
-    study: StudyPaths, ratings_file: Path, destination: Path, output: OutputOptions
+    study: StudyPaths, ratings_file: Path, name: str, output: OutputOptions
 ) -> Path:
+    # beside the study, in a folder of this name
     from masrel.analysis import analyze, write_analysis
     from masrel.report import write_report
 
+    destination = study.root.parent / f"report-{name}"
     data = read_study(study.root, ratings_file)
     analysis = analyze(data.protocol, data.ratings, in_person=data.in_person)
     is_simulated = ratings_file == study.ratings_file

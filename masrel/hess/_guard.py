@@ -201,7 +201,7 @@ class Dropouts:
 
 
 class ActiveGuard:
-    """Check the torque and the energy of a model that is not passive by nature."""
+    """Check torque, energy and speed of a model that is not passive."""
 
     # The device holds a torque τ until the next one, so that an arm that meanwhile goes
     # from θ to θ' takes -τ (θ' - θ) of energy: exactly, but for the motor's lag. It is
@@ -209,15 +209,23 @@ class ActiveGuard:
     # Hannaford, B., Ryu, J.-H. (2002). IEEE Trans. Robot. Autom. 18(1), 1-10 (passivity
     # observer): https://doi.org/10.1109/70.988969
 
-    __slots__ = ("_angle", "_held", "_max_energy", "_max_torque", "energy_given")
+    __slots__ = (
+        "_angle",
+        "_held",
+        "_max_energy",
+        "_max_speed",
+        "_max_torque",
+        "energy_given",
+    )
 
     def __init__(self, limits: DeviceLimits) -> None:
         self._max_torque = limits.active_torque
         self._max_energy = limits.active_energy
+        self._max_speed = limits.active_speed
         self._angle = self._held = 0.0  # of the last tick: rad, N·m
         self.energy_given = 0.0  # to the arm, less what was taken from it, J
 
-    def check(self, angle: float, torque: float) -> None:
+    def check(self, angle: float, velocity: float, torque: float) -> None:
         """Check what a model asks for before it is sent."""
         self.energy_given -= self._held * (angle - self._angle)
         if self.energy_given > self._max_energy:
@@ -232,6 +240,13 @@ class ActiveGuard:
                 f"active torque: needs at most {self._max_torque:g} N·m of a model "
                 f"that is not passive, got {torque:.3f} N·m",
                 "active-torque",
+            )
+        if torque * velocity < 0.0 and abs(velocity) > self._max_speed:
+            raise LimitExceededError(
+                f"slip: needs an arm that moves at most "
+                f"{math.degrees(self._max_speed):.0f} deg/s the way a model pushes it "
+                f"that is not passive, got {math.degrees(velocity):.0f} deg/s",
+                "slip",
             )
         self._angle = angle
         self._held = torque

@@ -142,7 +142,7 @@ class Ticks:
         controller = self._controller
         torque = self._decide(time_s, angle, velocity) + self._stops.torque(angle)
         if self._active_guard is not None:
-            self._active_guard.check(angle, controller.model_torque)
+            self._active_guard.check(angle, velocity, controller.model_torque)
         guard.torque(time_s, torque)
         self.device.command(torque)
         self.sent = torque

@@ -15,6 +15,7 @@ _POSITIVE = (
     "torque_rate",
     "active_torque",
     "active_energy",
+    "active_speed",
     "speed",
     "soft_stop_width",
     "stale_time",
@@ -50,6 +51,9 @@ class DeviceLimits:
     active_energy : float, optional
         Energy that such a model may have given to the arm on balance, J: what it gave
         less what it took since the presentation began.
+    active_speed : float, optional
+        Speed at which an arm may move the way such a model pushes it, rad/s: faster
+        it is not led by a hand, but thrown.
     speed : float, optional
         Speed at which the presentation is stopped, either way, rad/s.
     lowest_angle, highest_angle : float, optional
@@ -96,6 +100,7 @@ class DeviceLimits:
     torque_rate: float = 12_000.0
     active_torque: float = 10.0
     active_energy: float = 1.0
+    active_speed: float = math.radians(180.0)
     speed: float = math.radians(400.0)
     lowest_angle: float = _LOWEST_ANGLE
     highest_angle: float = _HIGHEST_ANGLE

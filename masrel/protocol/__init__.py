@@ -6,6 +6,7 @@ the joint parameters of each model in SI units, and two hashes.
 
 from masrel.protocol.content import (
     elbow_parameters,
+    joint_model,
     presented_hash,
     protocol_hash,
     scale_of,
@@ -49,6 +50,7 @@ __all__ = [
     "StudyPaths",
     "copy_template",
     "elbow_parameters",
+    "joint_model",
     "presented_hash",
     "protocol_hash",
     "read_model_file",

@@ -49,8 +49,14 @@ def decode_table(
         elif info.required:
             decoded.problems.append(f"{where}: needed {_form(info, where)}, got none")
         else:
-            decoded.values[key] = msgspec.to_builtins(info.default)
+            decoded.values[key] = _default(info)
     return decoded
+
+
+def _default(info: FieldInfo) -> object:
+    if info.default_factory is not msgspec.NODEFAULT:
+        return info.default_factory()
+    return msgspec.to_builtins(info.default)
 
 
 def _decode_value(

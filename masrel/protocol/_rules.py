@@ -4,7 +4,11 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from masrel.protocol._decode import got, with_id
+import msgspec
+
+from masrel.protocol._decode import got, needed, with_id
+from masrel.protocol._kinds import DEFAULT_KIND, kind_problem, value_problems
+from masrel.protocol.definition import Model
 
 Values = dict[str, Any]
 
@@ -26,6 +30,7 @@ def broken_rules(values: Values) -> tuple[str, ...]:
         *_references(values),
         *_schedules(values),
         *_device(values),
+        *kind_rules(values),
         *joint_rules(values),
         *_plan(values),
     )
@@ -170,6 +175,55 @@ def _device(values: Values) -> Iterator[str]:
             f"stretch.end_deg: needed at most device.highest_angle_deg less the soft "
             f"stop before it ({high:g} - {width:g}), got {end:g}"
         )
+
+
+_ELBOW_KEYS = (
+    "catch_angle_constant_deg",
+    "catch_torque_nms_rad",
+    "residual_ratio",
+    "catch_travel_deg",
+)
+
+
+def kind_rules(values: Values) -> Iterator[str]:
+    """Check that models have the keys of their kind, each with a value it can have."""
+    for index, model in _entries(values, "models"):
+        where, kind = f"models[{index}]", model.get("kind")
+        if kind is None:
+            continue
+        problems: Iterator[str]
+        if (problem := kind_problem(kind)) is not None:
+            problems = iter([f"{where}.kind: {problem}"])
+        elif kind == DEFAULT_KIND:
+            problems = _elbow_keys(model, where)
+        else:
+            problems = _tone_keys(model, kind, where)
+        yield from (f"{problem}{with_id(model)}" for problem in problems)
+
+
+def _elbow_keys(model: Values, where: str) -> Iterator[str]:
+    annotations = {info.name: info.type for info in msgspec.structs.fields(Model)}
+    for key in _ELBOW_KEYS:
+        if model.get(key, "unusable") is None:
+            yield f"{where}.{key}: needed {needed(annotations[key])}, got none"
+    if model.get("parameters"):
+        yield (
+            f"{where}.parameters: needed a kind of model that has some, got "
+            f"{got(DEFAULT_KIND)}, whose numbers stand beside its id and in constants"
+        )
+
+
+def _tone_keys(model: Values, kind: str, where: str) -> Iterator[str]:
+    constants = model.get("constants") or {}
+    foreign = [key for key in (*_ELBOW_KEYS, "file") if model.get(key) is not None]
+    foreign += [f"constants.{k}" for k, value in constants.items() if value is not None]
+    for key in foreign:
+        yield (
+            f"{where}.{key}: needed for kind {got(DEFAULT_KIND)} only, got it for "
+            f"{got(kind)}; its numbers stand in [models.parameters]"
+        )
+    for key, problem in value_problems(kind, model.get("parameters") or {}):
+        yield f"{where}.parameters{'.' if key else ''}{key}: {problem}"
 
 
 def joint_rules(values: Values) -> Iterator[str]:

@@ -6,8 +6,10 @@ from typing import Any
 
 import msgspec
 
+from masrel.elbow.joint_model import JointModel
 from masrel.elbow.parameters import ElbowParameters
 from masrel.errors import ParameterError
+from masrel.protocol._kinds import DEFAULT_KIND, model_of_kind, without_defaults
 from masrel.protocol.definition import ElbowConstants, Model, Protocol
 from masrel.scales import Scale
 
@@ -28,8 +30,35 @@ def scale_of(protocol: Protocol) -> Scale:
     return Scale(name=protocol.scale.name, grades=protocol.scale.grades)
 
 
+def joint_model(protocol: Protocol, model_id: str) -> JointModel:
+    """Return the law of one haptic model, in SI units.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        A protocol; its angles are degrees.
+    model_id : str
+        Id of one of its models.
+
+    Returns
+    -------
+    JointModel
+        Of the model's kind, with its parameters; of a spastic elbow its L, H, Q and D
+        and constants, with those of ``[elbow]`` for the rest.
+
+    Raises
+    ------
+    ParameterError
+        If the protocol has no such model; the message names those there are.
+    """
+    model = _model_of(protocol, model_id)
+    if model.kind == DEFAULT_KIND:
+        return _joint_of(model, protocol.elbow)
+    return model_of_kind(model.kind, model.parameters)
+
+
 def elbow_parameters(protocol: Protocol, model_id: str) -> ElbowParameters:
-    """Return the joint parameters of one haptic model, in SI units.
+    """Return the joint parameters of one spastic elbow, in SI units.
 
     Parameters
     ----------
@@ -47,17 +76,30 @@ def elbow_parameters(protocol: Protocol, model_id: str) -> ElbowParameters:
     Raises
     ------
     ParameterError
-        If the protocol has no such model; the message names those there are.
+        If the protocol has no such model, or it is of another kind; the message names
+        those there are.
     """
+    model = _model_of(protocol, model_id)
+    if model.kind != DEFAULT_KIND:
+        elbows = [m.id for m in protocol.models if m.kind == DEFAULT_KIND]
+        raise ParameterError(
+            f"model: needed one of kind {DEFAULT_KIND!r} "
+            f"({', '.join(elbows) or 'there is none'}), got {model_id!r} of kind "
+            f"{model.kind!r}"
+        )
+    return _joint_of(model, protocol.elbow)
+
+
+def _model_of(protocol: Protocol, model_id: str) -> Model:
     models = {model.id: model for model in protocol.models}
     if model_id not in models:
         known = ", ".join(models)
         raise ParameterError(f"model: needed one of {known}, got {model_id!r}")
-    return _joint_of(models[model_id], protocol.elbow)
+    return models[model_id]
 
 
 def _joint_of(model: Model, shared: ElbowConstants) -> ElbowParameters:
-    """Return the joint of one model, in SI units."""
+    """Return the joint of one spastic elbow, in SI units."""
     overrides = {
         key: value
         for key in model.constants.__struct_fields__
@@ -66,10 +108,11 @@ def _joint_of(model: Model, shared: ElbowConstants) -> ElbowParameters:
     elbow = msgspec.structs.replace(shared, **overrides)
     rest = elbow.rest_angle_deg
     return ElbowParameters(
-        catch_angle_constant=math.radians(model.catch_angle_constant_deg),
-        catch_torque_constant=model.catch_torque_nms_rad,
-        residual_ratio=model.residual_ratio,
-        catch_travel=math.radians(model.catch_travel_deg),
+        # none is missing in a protocol that was read
+        catch_angle_constant=math.radians(model.catch_angle_constant_deg or 0.0),
+        catch_torque_constant=model.catch_torque_nms_rad or 0.0,
+        residual_ratio=model.residual_ratio or 0.0,
+        catch_travel=math.radians(model.catch_travel_deg or 0.0),
         inertia=elbow.inertia_kg_m2,
         damping=elbow.damping_nms_rad,
         stiffness=elbow.stiffness_nm_rad,
@@ -96,10 +139,27 @@ _LATER: dict[str, dict[str, object]] = {
         "residual_reading": "residual",
         "rest_angle_deg": None,
     },
-    "device": {"active_torque_limit_nm": 10.0, "active_energy_limit_j": 1.0},
+    "stretch": {"largest_speed_deg_s": 131.0},
+    "device": {
+        "active_torque_limit_nm": 10.0,
+        "active_energy_limit_j": 1.0,
+        "active_speed_limit_deg_s": 180.0,
+    },
 }
 """Keys that protocols once had not, by table, with the defaults they then had: these
 do not enter, so that no schedule drawn before turns stale."""
+
+
+_ABSENT: dict[str, object] = {
+    "file": None,
+    "simulated": False,
+    "kind": DEFAULT_KIND,
+    "catch_angle_constant_deg": None,
+    "catch_torque_nms_rad": None,
+    "residual_ratio": None,
+    "catch_travel_deg": None,
+}
+"""Keys of models that do not enter where they are these."""
 
 
 def protocol_hash(protocol: Protocol) -> str:
@@ -147,21 +207,29 @@ def presented_hash(protocol: Protocol) -> str:
 def _content_hash(content: object, ignored: tuple[str, ...] = ()) -> str:
     # ignored: keys of models that do not enter
     plain: dict[str, Any] = msgspec.to_builtins(content)
-    elbow = plain["elbow"]
     for model in plain["models"]:
-        constants = {k: v for k, v in model.pop("constants").items() if v is not None}
-        # what a model repeats of the shared constants does not enter twice
-        for key in ("post_catch", *_LATER["elbow"]):
-            if key in constants and constants[key] == elbow[key]:
-                del constants[key]
-        if constants:
-            model["constants"] = constants
-        for key, absent in (("file", None), ("simulated", False)):
-            if model[key] is absent or key in ignored:
-                del model[key]
+        _drop_defaults(model, plain["elbow"])
+        for key in ignored:
+            model.pop(key, None)
     for table, defaults in _LATER.items():
         for key, default in defaults.items():
             if plain[table][key] == default:
                 del plain[table][key]
     canonical = msgspec.json.encode(plain, order="sorted")
     return hashlib.sha256(canonical).hexdigest()
+
+
+def _drop_defaults(model: dict[str, Any], elbow: dict[str, Any]) -> None:
+    # takes out of a model what no protocol could say before, where nothing is said
+    constants = {k: v for k, v in model.pop("constants").items() if v is not None}
+    # what a model repeats of the shared constants does not enter twice
+    for key in ("post_catch", *_LATER["elbow"]):
+        if key in constants and constants[key] == elbow[key]:
+            del constants[key]
+    parameters = without_defaults(model["kind"], model.pop("parameters"))
+    for key, values in (("constants", constants), ("parameters", parameters)):
+        if values:
+            model[key] = values
+    for key, absent in _ABSENT.items():
+        if model[key] == absent:
+            del model[key]

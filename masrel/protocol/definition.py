@@ -21,6 +21,7 @@ _Text = Annotated[str, Meta(min_length=1)]
 _Angle = Annotated[float, Meta(gt=0, le=180)]
 _RestAngle = Annotated[float, Meta(ge=0, le=180)]
 _Positive = Annotated[float, Meta(gt=0, le=_LARGEST)]
+_Finite = Annotated[float, Meta(ge=-_LARGEST, le=_LARGEST)]
 _NonNegative = Annotated[float, Meta(ge=0, le=_LARGEST)]
 
 
@@ -78,18 +79,24 @@ class ModelConstants(_Table, frozen=True, kw_only=True):
 
 
 class Model(_Table, frozen=True, kw_only=True):
-    """``[[models]]``: one haptic model."""
+    """``[[models]]``: one haptic model.
+
+    L, H, Q, D and `constants` are those of a spastic elbow, which has no `parameters`;
+    every other kind has these alone.
+    """
 
     id: _Identifier
     role: Literal["standard", "dummy"] = "standard"
     intended_grade: str | None = None
-    catch_angle_constant_deg: _Angle  # L
-    catch_torque_nms_rad: _NonNegative  # H
-    residual_ratio: Annotated[float, Meta(ge=0, lt=1)]  # Q
-    catch_travel_deg: _Angle  # D
+    kind: str = "spastic-elbow"
+    catch_angle_constant_deg: _Angle | None = None  # L
+    catch_torque_nms_rad: _NonNegative | None = None  # H
+    residual_ratio: Annotated[float, Meta(ge=0, lt=1)] | None = None  # Q
+    catch_travel_deg: _Angle | None = None  # D
     file: _Text | None = None
     simulated: bool = False
     constants: ModelConstants = ModelConstants()
+    parameters: dict[str, _Finite] = {}
 
 
 class Rater(_Table, frozen=True, kw_only=True):
@@ -120,6 +127,7 @@ class Stretch(_Table, frozen=True, kw_only=True):
 
     start_deg: Annotated[float, Meta(ge=0, lt=180)] = 30.0
     end_deg: _Angle = 146.0
+    largest_speed_deg_s: Annotated[float, Meta(gt=0, le=600)] = 131.0
 
 
 class DeviceSettings(_Table, frozen=True, kw_only=True):
@@ -131,6 +139,7 @@ class DeviceSettings(_Table, frozen=True, kw_only=True):
     torque_rate_limit_nm_s: _Positive = 12_000.0
     active_torque_limit_nm: Annotated[float, Meta(gt=0, le=28)] = 10.0
     active_energy_limit_j: Annotated[float, Meta(gt=0, le=100)] = 1.0
+    active_speed_limit_deg_s: Annotated[float, Meta(gt=0, le=600)] = 180.0
     speed_limit_deg_s: Annotated[float, Meta(gt=0, le=600)] = 400.0
     lowest_angle_deg: Annotated[float, Meta(ge=-30, lt=180)] = -5.0
     highest_angle_deg: Annotated[float, Meta(gt=0, le=210)] = 185.0

@@ -18,7 +18,7 @@ from masrel.elbow.identification._model_file import (
 from masrel.elbow.parameters import ElbowParameters
 from masrel.errors import ProtocolError
 from masrel.protocol._decode import decode_table, got
-from masrel.protocol._rules import broken_rules, joint_rules
+from masrel.protocol._rules import broken_rules, joint_rules, kind_rules
 from masrel.protocol.content import _joint_of
 from masrel.protocol.definition import ElbowConstants, Model, Protocol
 
@@ -72,10 +72,9 @@ def read_protocol(path: Path) -> Protocol:
         *resolved.problems,
         *(
             problem
-            for problem in decoded.problems
+            for problem in (*decoded.problems, *broken_rules(decoded.values))
             if not (problem.startswith(unread) and ", got none" in problem)
         ),
-        *broken_rules(decoded.values),
     ]
     if problems:
         raise ProtocolError(*(f"{path}: {problem}" for problem in problems))
@@ -144,7 +143,8 @@ def read_model_file(path: Path) -> ElbowParameters:
     decoded = decode_table({"id": "model", **raw}, Model)
     elbow = ElbowConstants()
     numbers = {key: value for key, value in decoded.values.items() if key != "id"}
-    rules = joint_rules({"elbow": msgspec.to_builtins(elbow), "models": [numbers]})
+    values = {"elbow": msgspec.to_builtins(elbow), "models": [numbers]}
+    rules = (*kind_rules(values), *joint_rules(values))
     problems = [*decoded.problems, *(rule.removeprefix("models[0].") for rule in rules)]
     if problems:
         raise ProtocolError(*(f"{path}: {problem}" for problem in problems))

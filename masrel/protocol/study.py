@@ -97,7 +97,7 @@ def template_names() -> tuple[str, ...]:
     Examples
     --------
     >>> template_names()
-    ('hess2012', 'small')
+    ('hess2012', 'small', 'tone')
     """
     return tuple(sorted(file.parent.name for file in _home().glob("*/protocol.toml")))
 

@@ -4,6 +4,7 @@ from typing import Any
 
 import msgspec
 
+from masrel.protocol._kinds import DEFAULT_KIND, all_values
 from masrel.report._material import Material, Paragraph, Section
 from masrel.report._tables import (
     Column,
@@ -87,19 +88,24 @@ def design_section(material: Material) -> Section:
             f"{settings.seed}). They show that the study runs; they say nothing about "
             "people or about the models."
         )
-    tables = (_models(material), *_constants(material), _sessions(material))
+    tables = (
+        _models(material),
+        *_constants(material),
+        *_other_kinds(material),
+        _sessions(material),
+    )
     paragraphs = (Paragraph(text=text) for text in texts)
     return Section(name="design", title="Design", blocks=(*paragraphs, *tables))
 
 
 def _models(material: Material) -> Table:
     models = material.protocol.models
-    parameters = [
-        [float(getattr(model, key)) for model in models] for key, _ in _PARAMETERS
-    ]
+    parameters = [[getattr(model, key) for model in models] for key, _ in _PARAMETERS]
     # as many decimals as the number with most was entered with
     decimals = [
-        max(len(as_entered(value).partition(".")[2]) for value in values)
+        max(
+            len(as_entered(v).partition(".")[2]) if v is not None else 0 for v in values
+        )
         for values in parameters
     ]
     shared = material.protocol.elbow.residual_reading
@@ -154,6 +160,8 @@ def _constants(material: Material) -> list[Table]:
                 shown = _VARIANT_NAMES.get(value) or float(value)
                 single.append((model.id, *_CONSTANTS[key], shown))
     caption = "Constants all models share"
+    if any(model.kind != DEFAULT_KIND for model in protocol.models):
+        caption = "Constants all spastic elbows share"
     if single:
         caption += ", but for those in the table below"
     tables = [
@@ -177,6 +185,39 @@ def _constants(material: Material) -> list[Table]:
             )
         )
     return tables
+
+
+def _other_kinds(material: Material) -> list[Table]:
+    # every number of the models that are no spastic elbows, if there are any
+    rows: list[tuple[Value, ...]] = []
+    for model in material.protocol.models:
+        if model.kind == DEFAULT_KIND:
+            continue
+        numbers = "; ".join(
+            f"{key} {'none' if value is None else as_entered(value)}"
+            for key, value in all_values(model.kind, model.parameters).items()
+        )
+        rows.append((model.id, model.kind, numbers))
+    if not rows:
+        return []
+    return [
+        Table(
+            name="other_kinds",
+            caption="Models of other kinds than the spastic elbow",
+            columns=(
+                Column(key="model", heading="Model", align="left"),
+                Column(key="kind", heading="Kind", align="left"),
+                Column(
+                    key="numbers",
+                    heading="Numbers, by the keys of the protocol",
+                    align="left",
+                ),
+            ),
+            rows=tuple(rows),
+            notes=("Keys end in their units; what each is stands in docs/tone.md.",),
+            data=material.data,
+        )
+    ]
 
 
 def _sessions(material: Material) -> Table:

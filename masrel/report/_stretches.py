@@ -5,10 +5,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from masrel.analysis import Speed, Speeds, SpeedSummary
-from masrel.elbow import ConstantSpeed, Trace, evaluate, trace
-from masrel.protocol import Protocol, elbow_parameters
+from masrel.elbow import ConstantSpeed, ElbowParameters, JointModel, evaluate, trace
+from masrel.protocol import Protocol, joint_model
+from masrel.protocol._kinds import DEFAULT_KIND
 from masrel.report._figure_data import (
     SpeedColumn,
     SpeedDots,
@@ -123,11 +125,15 @@ def _speed_drawing(material: Material, speeds: Speeds) -> Drawing:
     )
 
 
+_Line = tuple[NDArray[np.generic], ...]  # time, s; angle, deg; torque, N·m; phase
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Stretch:
     speed: Speed  # whose it is, and how fast
-    trace: Trace  # what the controller commands, at the device's rate
-    peak: float  # the largest torque of the exact law, N·m
+    line: _Line  # what the controller commands, at the device's rate
+    # the largest torque, N·m: of the exact law, or of the samples of another kind
+    peak: float
 
 
 def traces_section(material: Material) -> Section:
@@ -176,32 +182,46 @@ def _stretches(
     protocol: Protocol, speeds: Sequence[Speed], end_deg: float
 ) -> list[tuple[str, list[_Stretch]]]:
     # by model, in the protocol's order: each at constant speed over the whole range
-    start, end = math.radians(protocol.stretch.start_deg), math.radians(end_deg)
     stretches = []
     for model in protocol.models:
         of_model = [speed for speed in speeds if speed.model == model.id]
-        if not of_model:
-            continue
-        joint = elbow_parameters(protocol, model.id)
-        motions = [
-            ConstantSpeed(
-                start=start, end=end, speed=math.radians(speed.mean_speed_deg_s)
-            )
-            for speed in of_model
-        ]
-        peaks = evaluate(joint, motions, ["peak_torque"]).column("peak_torque")
-        made = [
-            _Stretch(
-                speed=speed,
-                trace=trace(joint, motion, rate_hz=protocol.device.rate_hz),
-                peak=peak,
-            )
-            for speed, motion, peak in zip(
-                of_model, motions, peaks.tolist(), strict=True
-            )
-        ]
-        stretches.append((model.id, made))
+        if of_model:
+            joint = joint_model(protocol, model.id)
+            stretches.append((model.id, _of_model(protocol, joint, of_model, end_deg)))
     return stretches
+
+
+def _of_model(
+    protocol: Protocol, joint: JointModel, speeds: Sequence[Speed], end_deg: float
+) -> list[_Stretch]:
+    start, rate_hz = math.radians(protocol.stretch.start_deg), protocol.device.rate_hz
+    end = min(math.radians(end_deg), joint.range_end)
+    motions = [
+        ConstantSpeed(start=start, end=end, speed=math.radians(speed.mean_speed_deg_s))
+        for speed in speeds
+    ]
+    lines = [_line(joint, motion, rate_hz) for motion in motions]
+    peaks = [float(torque.max()) for _, _, torque, _ in lines]
+    if isinstance(joint, ElbowParameters):
+        peaks = evaluate(joint, motions, ["peak_torque"]).column("peak_torque").tolist()
+    return [
+        _Stretch(speed=speed, line=line, peak=peak)
+        for speed, line, peak in zip(speeds, lines, peaks, strict=True)
+    ]
+
+
+def _line(joint: JointModel, motion: ConstantSpeed, rate_hz: int) -> _Line:
+    if isinstance(joint, ElbowParameters):
+        made = trace(joint, motion, rate_hz=rate_hz)
+        return made.time, np.degrees(made.angle), made.torque, made.phase
+    time = np.arange(math.floor(motion.duration * rate_hz) + 1) / rate_hz
+    angle, velocity = motion.angle(time), motion.velocity(time)
+    stepper, torque, phase = joint.stepper(motion.start), [], []
+    samples = zip(time.tolist(), angle.tolist(), velocity.tolist(), strict=True)
+    for sample in samples:
+        torque.append(stepper.step(*sample))
+        phase.append(stepper.phase)
+    return time, np.degrees(angle), np.array(torque), np.array(phase, dtype=np.int8)
 
 
 def _trace_drawing(
@@ -217,16 +237,19 @@ def _trace_drawing(
         grade = ""
         if intended[model] is not None:
             grade = f" ({material.protocol.scale.name} {intended[model]})"
-        traces = [stretch.trace for stretch in made]
         panels.append(
             TracePanel(
                 title=f"{model}{grade}\n{slowest} to {fastest} deg/s",
-                stretches=tuple(
-                    (t.time, np.degrees(t.angle), t.torque, t.phase) for t in traces
-                ),
+                stretches=tuple(stretch.line for stretch in made),
             )
         )
     listed = ", ".join(model for model, _ in stretches)
+    shape = (
+        "Torque rises slowly, jumps at the catch, falls to a residual, and rises again "
+        "after the catch; the"
+    )
+    if _of_other_kinds(material) & {model for model, _ in stretches}:
+        shape = "The"
     return Drawing(
         name=f"traces_{nth}",
         caption=(
@@ -235,13 +258,16 @@ def _trace_drawing(
             "after the catch; a dot marks where a phase begins."
         ),
         alt=(
-            f"Torque and angle against time for {listed}. Torque rises slowly, jumps "
-            "at the catch, falls to a residual, and rises again after the catch; the "
+            f"Torque and angle against time for {listed}. {shape} "
             "peaks are in the table of peak torques."
         ),
         content=TraceColumns(panels=tuple(panels)),
         stamp=material.trace_stamp,
     )
+
+
+def _of_other_kinds(material: Material) -> set[str]:
+    return {m.id for m in material.protocol.models if m.kind != DEFAULT_KIND}
 
 
 def _peak_table(
@@ -263,6 +289,9 @@ def _peak_table(
         has_repeats = has_repeats or len(peaks) < len(made)
         of_raters = [peaks.get(rater) for rater in raters]
         rows.append((model, *of_raters, min(peaks.values()), max(peaks.values())))
+    others = [model for model, _ in stretches if model in _of_other_kinds(material)]
+    if others:
+        notes.append(f"Of {', '.join(others)} it is the largest sample.")
     if has_repeats:
         notes.append("Of repeated presentations the largest peak is given.")
     return Table(

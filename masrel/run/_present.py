@@ -24,7 +24,7 @@ from masrel.hess import (
 )
 from masrel.hess._stop import stop_on_key, stop_on_signals
 from masrel.hess._watchdog import watched
-from masrel.protocol import Protocol, elbow_parameters
+from masrel.protocol import Protocol, joint_model
 from masrel.recording import RECORDING_COLUMNS, Recording, _Fact, write_recording
 from masrel.run._grade_sources import GradeRequest
 from masrel.run._settings import (
@@ -107,19 +107,21 @@ def _on_device(
     spool: Path,
 ) -> Presented:
     settings, stretch = protocol.device, protocol.stretch
-    start, end = math.radians(stretch.start_deg), math.radians(stretch.end_deg)
+    model = request.presentation.model
+    range_end = joint_model(protocol, model).range_end
+    start = math.radians(stretch.start_deg)
+    end = min(math.radians(stretch.end_deg), range_end)  # of a contracture sooner
     speed = _hand_speed(protocol, request)
     hand = (
         None if speed is None else SimulatedHand(start=start, end=end, mean_speed=speed)
     )
-    model = request.presentation.model
     with contextlib.ExitStack() as stack:
         device = stack.enter_context(
             open_device(
                 settings.backend,
                 clock=clock,
                 hand=hand,
-                range_end=elbow_parameters(protocol, model).range_end,
+                range_end=range_end,
                 options=backend_options(settings, hand),
             )
         )

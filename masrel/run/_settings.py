@@ -1,6 +1,7 @@
 """What the protocol's ``[device]`` means to the driver."""
 
 import math
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from masrel.errors import ParameterError
@@ -12,7 +13,7 @@ from masrel.hess import (
     Hand,
     device_names,
 )
-from masrel.protocol import DeviceSettings, Protocol, elbow_parameters
+from masrel.protocol import DeviceSettings, Protocol, joint_model
 
 if TYPE_CHECKING:
     from masrel.hess.puck import PuckOptions
@@ -30,6 +31,42 @@ def check_backend(settings: DeviceSettings) -> None:
     backend_options(settings)
 
 
+def torque_problems(protocol: Protocol) -> Iterator[str]:
+    """Yield what is wrong with models that ask for more than the device may send."""
+    settings, stretch = protocol.device, protocol.stretch
+    start = math.radians(stretch.start_deg)
+    speed = math.radians(stretch.largest_speed_deg_s)
+    for index, model in enumerate(protocol.models):
+        where, name = f"models[{index}]", f'(id "{model.id}")'
+        key, limit = "torque_limit_nm", settings.torque_limit_nm
+        if model_controller(protocol, model.id).is_guarded:
+            active = settings.active_torque_limit_nm
+            if active < limit:
+                key, limit = "active_torque_limit_nm", active
+        joint = joint_model(protocol, model.id)
+        if joint.range_end <= start:
+            yield (
+                f"{where}: needed an end of range beyond stretch.start_deg "
+                f"({stretch.start_deg:g}), got {math.degrees(joint.range_end):g} deg "
+                f"{name}"
+            )
+            continue
+        largest = joint.largest_torque(start_angle=start, speed=speed)
+        if not largest <= limit:
+            yield (
+                f"{where}: needed at most device.{key} ({limit:g} N·m) at "
+                f"stretch.largest_speed_deg_s ({stretch.largest_speed_deg_s:g} deg/s), "
+                f"got {largest:.3f} N·m {name}"
+            )
+        first = abs(joint.stepper(start).step(0.0, start, 0.0))
+        if not first <= settings.standing_torque_nm:
+            yield (
+                f"{where}: needed at most device.standing_torque_nm "
+                f"({settings.standing_torque_nm:g} N·m) where the stretch starts, got "
+                f"{first:.3f} N·m {name}"
+            )
+
+
 def device_limits(settings: DeviceSettings) -> DeviceLimits:
     """Return the limits that a protocol sets."""
     return DeviceLimits(
@@ -37,6 +74,7 @@ def device_limits(settings: DeviceSettings) -> DeviceLimits:
         torque_rate=settings.torque_rate_limit_nm_s,
         active_torque=settings.active_torque_limit_nm,
         active_energy=settings.active_energy_limit_j,
+        active_speed=math.radians(settings.active_speed_limit_deg_s),
         speed=math.radians(settings.speed_limit_deg_s),
         lowest_angle=math.radians(settings.lowest_angle_deg),
         highest_angle=math.radians(settings.highest_angle_deg),
@@ -77,7 +115,7 @@ def model_controller(protocol: Protocol, model: str) -> Controller:
     """
     settings = protocol.device
     return Controller(
-        elbow_parameters(protocol, model),
+        joint_model(protocol, model),
         start_angle=math.radians(protocol.stretch.start_deg),
         friction=Friction(
             viscous=settings.friction_viscous_nms_rad,

@@ -113,9 +113,15 @@ def severity(protocol: Protocol, model: Model) -> float:
     scale = scale_of(protocol)
     if model.intended_grade is not None:
         return float(scale.code(model.intended_grade))
+    height = model.catch_torque_nms_rad
+    if height is None:
+        raise ProtocolError(
+            f"models: simulated raters need an intended_grade for a model of kind "
+            f"{model.kind}, got none for {model.id}"
+        )
     ranks: dict[float, list[int]] = {}
     for other in protocol.models:
-        if other.intended_grade is not None:
+        if other.intended_grade is not None and other.catch_torque_nms_rad is not None:
             of_height = ranks.setdefault(other.catch_torque_nms_rad, [])
             of_height.append(scale.code(other.intended_grade))
     if not ranks:
@@ -123,7 +129,7 @@ def severity(protocol: Protocol, model: Model) -> float:
             "models: simulated raters need a model with an intended_grade, got none"
         )
     anchors = sorted((height, statistics.fmean(of)) for height, of in ranks.items())
-    return _interpolated(model.catch_torque_nms_rad, anchors)
+    return _interpolated(height, anchors)
 
 
 def intended_speed(

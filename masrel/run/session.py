@@ -8,12 +8,17 @@ import hashlib
 from collections.abc import Callable
 from datetime import datetime
 
-from masrel.errors import ParameterError, ScheduleError, SessionLogError
+from masrel.errors import (
+    ParameterError,
+    ProtocolError,
+    ScheduleError,
+    SessionLogError,
+)
 from masrel.protocol import Protocol, StudyPaths
 from masrel.run._grade_sources import GradeSource
 from masrel.run._log import SessionLog, utc_now
 from masrel.run._runner import CLOCKS, ClockName, SessionRunner, SessionSummary
-from masrel.run._settings import check_backend, has_simulated_hand
+from masrel.run._settings import check_backend, has_simulated_hand, torque_problems
 from masrel.run._state import replay
 from masrel.schedule import Presentation, check_schedule, read_schedule
 
@@ -61,6 +66,8 @@ def run_session(
     SessionLogError
         If the log is damaged, of another schedule or protocol, was begun with
         another source of grades or device, or is open elsewhere.
+    ProtocolError
+        If a model asks for more torque than the device may send.
     ParameterError
         If the device or `clock` is unknown or they do not fit each other, or the
         source gives a grade that is not of the scale.
@@ -102,6 +109,9 @@ def _check_device(clock: str, protocol: Protocol) -> None:
         raise ParameterError(
             f"clock: needed the real one for device {device.backend!r}, got 'simulated'"
         )
+    problems = tuple(torque_problems(protocol))
+    if problems:
+        raise ProtocolError(*problems)
 
 
 def record_correction(

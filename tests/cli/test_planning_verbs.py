@@ -48,6 +48,63 @@ def test_a_device_that_there_is_not_is_a_problem(study: Path) -> None:
     assert "protocol.toml: device.backend: needed one of puck, simulated, got" in err
 
 
+def test_a_model_that_asks_for_too_much_torque_is_a_problem(study: Path) -> None:
+    # HM4 at 131 deg/s, by hand: caught at 60 deg, with b·v + k·30 deg + Q·H·v and the
+    # climb over 76 deg of k_post, 2.881 + 1.649 + 6.950 + 7.693 N·m.
+    protocol = study / "protocol.toml"
+    text = protocol.read_text(encoding="utf-8")
+    limited = text.replace("torque_limit_nm = 20.0", "torque_limit_nm = 19.1")
+    protocol.write_text(limited, encoding="utf-8")
+    _, err = masrel("check", study, code=2)
+    assert err.splitlines()[0] == (
+        f"{protocol}: models[3]: needed at most device.torque_limit_nm (19.1 N·m) at "
+        'stretch.largest_speed_deg_s (131 deg/s), got 19.174 N·m (id "HM4")'
+    )
+    slower = limited.replace("end_deg = 146.0\n", "end_deg = 146.0\n@")
+    slower = slower.replace("@", "largest_speed_deg_s = 130.0\n")
+    protocol.write_text(slower, encoding="utf-8")
+    masrel("check", study)
+
+
+def test_a_guarded_model_is_checked_against_the_torque_of_the_guard(
+    tmp_path: Path,
+) -> None:
+    masrel("init", tmp_path / "new", "--study", "tone")
+    protocol = tmp_path / "new" / "protocol.toml"
+    text = protocol.read_text(encoding="utf-8")
+    strong = text.replace("beat_rate_hz = 5.0", "beat_torque_nm = 9.0")
+    protocol.write_text(strong, encoding="utf-8")
+    _, err = masrel("check", tmp_path / "new", code=2)
+    # 9 N·m beside the 1.5 that it has by itself. F3, which is passive, may have its 12.
+    assert (
+        "models[9]: needed at most device.active_torque_limit_nm (10 N·m) at "
+        'stretch.largest_speed_deg_s (131 deg/s), got 10.500 N·m (id "B3")'
+    ) in err
+    assert err.count("needed") == 1
+
+
+def test_a_model_that_pulls_where_the_stretch_starts_is_a_problem(
+    tmp_path: Path,
+) -> None:
+    masrel("init", tmp_path / "new", "--study", "tone")
+    protocol = tmp_path / "new" / "protocol.toml"
+    text = protocol.read_text(encoding="utf-8")
+    pulling = text.replace("beat_rate_hz = 5.0", "base_torque_nm = 2.1")
+    early = pulling.replace("start_deg = 30.0", "start_deg = 126.0")
+    protocol.write_text(pulling, encoding="utf-8")
+    _, err = masrel("check", tmp_path / "new", code=2)
+    assert (
+        "models[9]: needed at most device.standing_torque_nm (2 N·m) where the stretch "
+        'starts, got 2.100 N·m (id "B3")'
+    ) in err
+    protocol.write_text(early, encoding="utf-8")
+    _, err = masrel("check", tmp_path / "new", code=2)
+    assert (
+        "models[7]: needed an end of range beyond stretch.start_deg (126), got 126 deg "
+        '(id "F3")'
+    ) in err
+
+
 def test_the_published_study_is_a_template(tmp_path: Path) -> None:
     masrel("init", tmp_path / "new", "--study", "hess2012")
     out, _ = masrel("check", tmp_path / "new")

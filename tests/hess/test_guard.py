@@ -9,13 +9,23 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from masrel.elbow import STANDARD_MODELS, MinimumJerk
+from masrel.elbow import (
+    MODELS,
+    STANDARD_MODELS,
+    ElbowParameters,
+    Hold,
+    Joined,
+    MinimumJerk,
+    Reversed,
+)
 from masrel.hess import (
     Controller,
     DeviceLimits,
+    Friction,
     MotionHand,
     Presented,
     SimulatedClock,
+    open_device,
     run_presentation,
 )
 from masrel.hess import render as rendered
@@ -190,6 +200,21 @@ def test_a_lost_grip_is_a_fault_with_the_ramp_in_every_phase() -> None:
     np.testing.assert_allclose(columns["command_torque_nm"][after], line, atol=1e-6)
 
 
+def test_an_arm_that_is_thrown_the_way_it_is_pushed_is_a_lost_grip() -> None:
+    # Too weak for a sudden fall of speed: 1.5 N·m on 0.06 kg·m² gain 14 deg/s in 10 ms.
+    weak = Joint(lambda _t, _a, _v: 1.5)
+    presented = rendered(weak, OUT, hand=MotionHand(OUT, slip_time=0.6)).presented
+    assert presented.fault is not None
+    assert presented.fault.kind == "slip"
+    assert presented.fault.message.startswith(
+        "slip: needs an arm that moves at most 180 deg/s the way a model pushes it "
+        "that is not passive, got -18"
+    )
+    # By hand, without friction: from 149 deg/s to -180 at 1.5/0.0597 = 25.1 rad/s²
+    # takes 0.229 s, and the speed comes 5.6 ms late.
+    assert presented.fault.time_s == pytest.approx(0.6 + 0.229 + 0.0056, abs=0.01)
+
+
 def test_moving_the_arm_back_is_no_lost_grip() -> None:
     joint = Joint(lambda _t, angle, velocity: 2.0 * (angle - START) + 0.2 * velocity)
     joint.phase = 1
@@ -215,3 +240,124 @@ def test_the_papers_own_law_keeps_the_papers_own_release(name: str) -> None:
     presented = present(name, 92.0, limits=limits, slip_time=0.9)
     assert presented.fault is None
     assert presented.recording.facts["grip_lost"] is True
+
+
+# Every registered model that is not passive: guard and ramp
+
+GUARDED = {
+    kind: model()
+    for kind, model in MODELS.items()
+    if kind != ElbowParameters.kind and not model().is_passive
+}
+FULL = Joined(
+    [
+        OUT,
+        Hold(start=OUT.end, duration=1.0),
+        Reversed(motion=MinimumJerk(start=START, end=OUT.end, mean_speed=SPEED)),
+    ]
+)
+
+
+def assert_rendered_a_ramp(presented: Presented, kind: str) -> None:
+    fault, columns = presented.fault, presented.recording.columns
+    assert fault is not None
+    assert fault.kind == kind
+    since = columns["time_s"] - fault.time_s
+    ramp = since > -1e-9
+    line = np.maximum(fault.torque_nm * (1.0 - since[ramp] / 0.05), -math.inf)
+    np.testing.assert_allclose(columns["command_torque_nm"][ramp], line, atol=1e-6)
+    assert since[-1] == pytest.approx(0.05, abs=1e-6) or fault.torque_nm == 0.0
+    assert columns["command_torque_nm"][-1] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_the_guarded_models_are_those_with_a_delay_a_trigger_or_a_change_in_time() -> (
+    None
+):
+    assert sorted(GUARDED) == [
+        "clasp-knife",
+        "clonus",
+        "cogwheel-rigidity",
+        "dystonia",
+        "threshold-stretch-reflex",
+    ]
+
+
+@pytest.mark.parametrize("kind", GUARDED)
+def test_with_the_default_limits_it_is_rendered_there_and_back(kind: str) -> None:
+    rendering = rendered(GUARDED[kind], FULL)
+    assert rendering.presented.fault is None
+    assert rendering.presented.recording.facts["grip_lost"] is False
+    assert rendering.max_angle_error < radians(0.5)
+    assert rendering.rms_torque_error < 0.25
+    assert rendering.energy_given < 0.02  # of the 1 J that it might
+    assert rendering.damping_needed < Friction().viscous
+
+
+@pytest.mark.parametrize("kind", GUARDED)
+def test_a_tank_too_small_is_a_fault_with_the_ramp(kind: str) -> None:
+    # Begun in the middle and flexed, each of them pushes the arm the way it goes.
+    flexed = Reversed(
+        motion=MinimumJerk(start=START, end=radians(85.0), mean_speed=radians(30.0))
+    )
+    limits = DeviceLimits(active_energy=0.002)
+    presented = rendered(GUARDED[kind], flexed, limits=limits).presented
+    assert_rendered_a_ramp(presented, "energy")
+    columns, fault = presented.recording.columns, presented.fault
+    sent = columns["time_s"] < fault.time_s - 1e-9
+    torques = columns["model_torque_nm"][sent]
+    angles = np.radians(columns["angle_deg"][sent])
+    given = -float((torques[:-1] * np.diff(angles)).sum())
+    assert 0.001 < given <= 0.002  # what was given until the tick before the fault
+
+
+@pytest.mark.parametrize("kind", GUARDED)
+def test_a_torque_above_that_of_active_models_is_a_fault_with_the_ramp(
+    kind: str,
+) -> None:
+    peak = rendered(GUARDED[kind], FULL).peak_torque
+    limits = DeviceLimits(active_torque=0.8 * peak)
+    presented = rendered(GUARDED[kind], FULL, limits=limits).presented
+    assert_rendered_a_ramp(presented, "active-torque")
+    asked = presented.recording.columns["model_torque_nm"]
+    fault_s = presented.fault.time_s
+    sent = presented.recording.columns["time_s"] < fault_s - 1e-9
+    assert float(np.abs(asked[sent]).max()) <= 0.8 * peak
+
+
+@pytest.mark.parametrize("kind", GUARDED)
+def test_an_arm_that_slips_where_it_resists_most_is_a_fault_with_the_ramp(
+    kind: str,
+) -> None:
+    clean = rendered(GUARDED[kind], FULL).presented.recording.columns
+    top = int(np.argmax(clean["model_torque_nm"]))
+    slip = float(clean["time_s"][top]) - 0.002
+    clock = SimulatedClock()
+    controller = Controller(
+        GUARDED[kind], start_angle=START, slip_speed_drop=radians(20.0)
+    )
+    hand = MotionHand(FULL, slip_time=slip)
+    with open_device("simulated", clock=clock, hand=hand) as device:
+        presented = run_presentation(
+            device,
+            controller,
+            clock=clock,
+            limits=LIMITS,
+            max_duration_s=FULL.duration,
+            end_angle=4.0,
+        )
+    assert_rendered_a_ramp(presented, "slip")
+    assert slip < presented.fault.time_s < slip + 0.03
+
+
+@pytest.mark.parametrize("slip_s", [0.2, 0.5, 0.8, 1.1, 1.5, 2.0, 2.5])
+@pytest.mark.parametrize("kind", GUARDED)
+def test_an_arm_that_is_let_go_anywhere_stays_slow_or_is_stopped(
+    kind: str, slip_s: float
+) -> None:
+    hand = MotionHand(FULL, slip_time=slip_s)
+    presented = rendered(GUARDED[kind], FULL, hand=hand).presented
+    assert presented.fault is None or presented.fault.kind == "slip"
+    speeds = presented.recording.columns["velocity_deg_s"]
+    assert float(np.abs(speeds).max()) < 183.0
+    if kind == "clonus":  # whose constant torque goes on pulling
+        assert presented.fault is not None

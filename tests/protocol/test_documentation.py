@@ -49,7 +49,7 @@ def said(field: msgspec.structs.FieldInfo) -> str:
         return "none"
     if field.name == "sections":
         return 'all but `"in-person"`'
-    if isinstance(field.default, msgspec.Struct):
+    if isinstance(field.default, msgspec.Struct) or field.default_factory is dict:
         return "`{}`"
     return f"`{json.dumps(field.default)}`"
 

@@ -161,11 +161,15 @@ def test_a_protocol_without_files_has_the_hash_it_had_before_there_were_any() ->
         assert model.pop("file") is None
         assert model.pop("simulated") is False
         assert set(model.pop("constants").values()) == {None}
+        assert model.pop("kind") == "spastic-elbow"
+        assert model.pop("parameters") == {}
+    assert content["stretch"].pop("largest_speed_deg_s") == 131.0
     assert content["elbow"].pop("rest_angle_deg") is None
     assert content["elbow"].pop("residual_reading") == "residual"
     assert content["elbow"].pop("catch_rise_s") == 0.0
     assert content["device"].pop("active_torque_limit_nm") == 10.0
     assert content["device"].pop("active_energy_limit_j") == 1.0
+    assert content["device"].pop("active_speed_limit_deg_s") == 180.0
     canonical = msgspec.json.encode(content, order="sorted")
     assert protocol_hash(protocol) == hashlib.sha256(canonical).hexdigest()
 

@@ -336,7 +336,10 @@ def test_an_unknown_key_comes_with_the_closest_known_one(tmp_path: Path) -> None
 
 def test_an_unknown_key_near_none_comes_with_all_known_ones(tmp_path: Path) -> None:
     found = problems_of(changed("stretch", "zzz", to=1), tmp_path)
-    assert found == ['stretch.zzz: needed a known key (start_deg, end_deg), got "zzz"']
+    assert found == [
+        "stretch.zzz: needed a known key (start_deg, end_deg, largest_speed_deg_s), "
+        'got "zzz"'
+    ]
 
 
 @pytest.mark.parametrize(
