@@ -22,6 +22,9 @@ _RANGES: dict[Needs, tuple[str, Callable[[float], bool]]] = {
 }
 
 
+_AT_THE_END = 1e-12  # s: nearer to the end of a motion is its end, but for rounding
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Quantity:
     """What is known of a parameter besides its value.
@@ -227,11 +230,14 @@ class ToneModel(ABC):
 def events_at(
     motion: Motion, times: Iterable[tuple[str, float]]
 ) -> tuple[ToneEvent, ...]:
-    """Return events of these names and times, in order, those of the motion only."""
+    """Return events of these names and times, in order.
+
+    What would begin at the very end of the motion, or later, is none.
+    """
     return tuple(
         ToneEvent(name=name, time=time, angle=float(motion.angle(time)))
         for name, time in sorted(times, key=lambda event: event[1])
-        if time < motion.duration
+        if time < motion.duration - _AT_THE_END
     )
 
 

@@ -129,6 +129,8 @@ EVENTS: list[tuple[ToneModel, str, list[tuple[float, float]]]] = [
     (ClaspKnife(), "reflex", [(0.04189, 33.77)]),
     (ClaspKnife(), "fire", [(0.61715, 85.5433)]),
     (ClaspKnife(), "release", [(0.66715, 90.0433)]),
+    (ClaspKnife(), "reflex ends", [(29 / 18 + 73.73 / 60, 56.27)]),
+    (ClaspKnife(), "arm", [(29 / 18 + 80 / 60, 50.0)]),
     (Contracture(), "cap", [(95.1235 / 90, 125.1235)]),
     (ThresholdReflex.of_mas("2"), "threshold", [(0.10522, 39.470)]),
     (ThresholdReflex.of_mas("2"), "reflex", [(0.13522, 42.170)]),

@@ -9,11 +9,12 @@ from math import inf, nan, radians
 import numpy as np
 import pytest
 
-from masrel.elbow import MODELS, ConstantSpeed, Hold, Joined
+from masrel.elbow import MODELS, ConstantSpeed, Hold, Joined, MinimumJerk
 from masrel.elbow.motion import Floats
 from masrel.elbow.tone import Dystonia, LeadPipe, ToneModel
 from masrel.errors import ParameterError
 from tests.elbow.tone.joints import (
+    END,
     JOINTS,
     START,
     m1,
@@ -167,12 +168,12 @@ def test_the_phase_catch_begins_at_the_catch_event(model: ToneModel) -> None:
 
 @EVERY
 def test_events_are_in_order_and_at_their_angles(model: ToneModel) -> None:
-    for seed in range(4):
-        motion = random_motion(np.random.default_rng(seed))
+    short = MinimumJerk(start=START, end=END, mean_speed=1.3)  # ends triggered
+    for motion in (short, *(random_motion(np.random.default_rng(n)) for n in range(4))):
         events = model.events(motion)
         assert [e.time for e in events] == sorted(e.time for e in events)
         for event in events:
-            assert 0.0 <= event.time <= motion.duration
+            assert 0.0 <= event.time < motion.duration - 1e-12
             assert event.angle == float(motion.angle(event.time))
 
 
