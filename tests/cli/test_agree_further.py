@@ -720,7 +720,7 @@ def test_without_the_options_nothing_of_them_is_loaded(clinics: Path) -> None:
         "except SystemExit: pass\n"
         "print([name for name in sys.modules if name.startswith('scipy')\n"
         "       or name.endswith(('_further_tables', '_two_rater_tables',\n"
-        "                         '_difference_table', 'masrel.intervals'))])"
+        "                         '_comparison_tables', 'masrel.intervals'))])"
     )
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
