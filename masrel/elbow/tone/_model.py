@@ -234,10 +234,12 @@ def events_at(
 
     What would begin at the very end of the motion, or later, is none.
     """
+    last = motion.duration - _AT_THE_END
+    inside = sorted((e for e in times if e[1] < last), key=lambda event: event[1])
+    angles = motion.angle(np.array([time for _, time in inside])).tolist()
     return tuple(
-        ToneEvent(name=name, time=time, angle=float(motion.angle(time)))
-        for name, time in sorted(times, key=lambda event: event[1])
-        if time < motion.duration - _AT_THE_END
+        ToneEvent(name=name, time=time, angle=angle)
+        for (name, time), angle in zip(inside, angles, strict=True)
     )
 
 
