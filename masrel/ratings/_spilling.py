@@ -96,7 +96,7 @@ def _answer(
     name: str, duckdb: Any, database: Any, keys: Keys, query: str
 ) -> dict[str, NDArray[Any]]:
     # the columns of a query of ratings that come batch by batch
-    stopped, done = Event(), Event()
+    started, stopped, done = Event(), Event(), Event()
     errors: list[BaseException] = []  # DuckDB would say them in its own words
     answers: list[dict[str, NDArray[Any]]] = []
     stream = _batches(name, keys, stopped, errors)
@@ -108,21 +108,27 @@ def _answer(
 
     def work() -> None:
         try:
-            answers.append(database.execute(query).fetchnumpy())
-        except (duckdb.Error, RuntimeError) as error:
+            started.wait()
+            if not stopped.is_set():
+                answers.append(database.execute(query).fetchnumpy())
+        except (duckdb.Error, RuntimeError, MemoryError) as error:
             errors.append(error)
         finally:
             done.set()
 
-    # in a thread, because DuckDB holds Ctrl-C back until all is read
-    Thread(target=work, daemon=True).start()
+    # in a thread, because DuckDB holds Ctrl-C back until all is read; it waits to be
+    # started, so that Ctrl-C before that leaves no query at work
     try:
+        Thread(target=work, daemon=True).start()
+        started.set()
         while not done.wait(0.1):
             pass
     except KeyboardInterrupt:
         stopped.set()
-        database.interrupt()
-        done.wait()
+        if started.is_set():
+            database.interrupt()
+            done.wait()
+        started.set()
         raise
     if answers:
         database.unregister("ratings")

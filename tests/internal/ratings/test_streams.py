@@ -2,6 +2,8 @@
 
 import csv
 import gzip
+import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -424,6 +426,24 @@ def test_ctrl_c_leaves_no_file_behind(
     with pytest.raises(KeyboardInterrupt):
         read_ratings(path, stream=True, progress=interrupt)
     assert list(folder.iterdir()) == []
+
+
+def test_ctrl_c_while_duckdb_is_started_is_no_other_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("duckdb")
+
+    class Interrupted(threading.Thread):
+        def start(self) -> None:
+            super().start()
+            time.sleep(0.1)
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("masrel.ratings._spilling.Thread", Interrupted)
+    columns = long_columns(ORDER, [f"p{k}" for k in range(400)])
+    path = written(tmp_path / "long.parquet", columns)
+    with pytest.raises(KeyboardInterrupt):
+        read_ratings(path, stream=True, progress=lambda *_: time.sleep(0.2))
 
 
 def test_rows_that_are_merged_are_counted_once() -> None:
