@@ -72,7 +72,7 @@ class Clonus(ToneModel):
     kind: ClassVar[str] = "clonus"
     catch_event: ClassVar[str | None] = "trigger"
 
-    beat_rate: float = quantity(5.0, "Hz", "positive")
+    beat_rate: float = quantity(5.0, "Hz", "frequency")
     beat_torque: float = quantity(4.0, "N·m", "not negative")
     beat_share: float = quantity(0.4, "", "share")
     base_torque: float = quantity(1.5, "N·m", "not negative")

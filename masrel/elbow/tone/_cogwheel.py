@@ -58,7 +58,7 @@ class Cogwheel(LeadPipe):
     kind: ClassVar[str] = "cogwheel-rigidity"
     is_passive: ClassVar[bool] = False  # a gap that ends while it sticks pushes
 
-    gap_rate: float = quantity(6.0, "Hz", "positive")
+    gap_rate: float = quantity(6.0, "Hz", "frequency")
     gap_depth: float = quantity(0.5, "", "share")
     gap_share: float = quantity(0.4, "", "share")
     gap_edge: float = quantity(0.010, "s", "not negative")

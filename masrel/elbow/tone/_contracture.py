@@ -90,7 +90,8 @@ class Contracture(ToneModel):
     @property
     def cap_angle(self) -> float:
         """θ_cap, from which on the torque grows with K_max, rad."""
-        rises = math.log(self.end_stiffness / (self.end_torque * self.end_steepness))
+        logs = map(math.log, (self.end_torque, self.end_steepness))
+        rises = math.log(self.end_stiffness) - sum(logs)
         return self.end_angle + rises / self.end_steepness
 
     def stepper(self, start_angle: float) -> "ContractureStepper":

@@ -12,13 +12,14 @@ from masrel.elbow.motion import Floats, Motion
 from masrel.elbow.tone._stepper import Stepper
 from masrel.errors import ParameterError
 
-Needs = Literal["positive", "not negative", "share", "angle"]
+Needs = Literal["positive", "not negative", "share", "angle", "frequency"]
 
 _RANGES: dict[Needs, tuple[str, Callable[[float], bool]]] = {
     "positive": ("more than 0", lambda value: value > 0.0),
     "not negative": ("0 or more", lambda value: value >= 0.0),
     "share": ("0 to 1", lambda value: 0.0 <= value <= 1.0),
     "angle": ("0 to 180 degrees", lambda value: 0.0 <= value <= math.pi),
+    "frequency": ("more than 0, at most 100", lambda value: 0.0 < value <= 100.0),
 }
 
 
@@ -33,7 +34,7 @@ class Quantity:
     ----------
     unit : str
         Its unit in Python: "rad", "N·m/rad"; "" for a plain number.
-    needs : {"positive", "not negative", "share", "angle"}
+    needs : {"positive", "not negative", "share", "angle", "frequency"}
         The range that it has to lie in.
     is_choice : bool
         Whether its default is a choice of ours, not from a source.

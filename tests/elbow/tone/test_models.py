@@ -32,6 +32,7 @@ OUTSIDE = {
     "not negative": (-1e-9,),
     "share": (-0.1, 1.1),
     "angle": (-0.1, 3.2),
+    "frequency": (0.0, 101.0),
 }
 
 
@@ -54,6 +55,23 @@ def test_a_parameter_outside_its_range_is_refused_by_name(law: type[ToneModel]) 
             with pytest.raises(ParameterError, match=f"^{name}: needs .*got ") as error:
                 law(**{name: value})
             assert "\n" not in str(error.value)
+
+
+@EVERY_KIND
+def test_numbers_far_out_of_a_joint_give_a_torque_all_the_same(
+    law: type[ToneModel],
+) -> None:
+    for name, known in law.quantities().items():
+        for value in (1e-300, 1e300):
+            if known.needs in ("share", "angle", "frequency") and value > 1.0:
+                continue
+            try:
+                model = law(**{name: value})
+            except ParameterError:  # with the others it makes no sense
+                continue
+            _, torque, _ = stepped(model, m1(), 100.0)
+            assert not np.isnan(torque).any(), name
+            assert model.events(m1()) is not None
 
 
 @EVERY_KIND
