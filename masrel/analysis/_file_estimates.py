@@ -167,8 +167,10 @@ def estimate_row(
     """Return the row of a coefficient, and why it has no interval if it should."""
     notes, refusal = [], None
     is_unweighted = options.weights != options.weights_of(entry)
-    if is_unweighted and not options.takes_all and not entry.metric:
-        notes.append("unweighted, there are no weights for it")
+    if is_unweighted and not options.takes_all:
+        by_metric = f"by its metric, without {options.weights} weights"
+        unweighted = "unweighted, there are no weights for it"
+        notes.append(by_metric if entry.metric else unweighted)
     has_target = options.target is not None
     try:
         estimate = _estimate(entry, ratings, options, options.level, has_target)

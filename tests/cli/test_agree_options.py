@@ -537,7 +537,8 @@ def test_beside_a_metric_others_keep_their_weights(
     call = ("--coefficients", names, "--weights", "linear", "--metric", "interval")
     done = masrel("agree", path, *call)
     assert "Fleiss' κ, linear" in done.out
-    assert "unweighted" not in done.out
+    alpha = "Krippendorff's α, interval metric"
+    assert f"{alpha}: by its metric, without linear weights." in done.out
     text = tmp_path / "text.csv"
     text.write_text("item,A,B\nx,a,a\ny,b,a\n", encoding="utf-8")
     said = refused(masrel("agree", text, "--metric", "interval"))
