@@ -84,7 +84,7 @@ SCENES = {
     "tone_threshold_reflex": Scene(
         models={
             f"MAS {grade}": ThresholdReflex.of_mas(grade)
-            for grade in ("1", "1+", "2", "3", "4")
+            for grade in ("1", "2", "3", "4")
         },
         shown="MAS 2",
         events=(("threshold", 0), ("reflex ends", 0)),

@@ -156,7 +156,7 @@ class ToneLine:
 class ToneView:
     """A law of tone along one motion: torque against angle, and both against time."""
 
-    lines: tuple[ToneLine, ...]  # at most five, of one motion
+    lines: tuple[ToneLine, ...]  # at most four, of one motion
     shown: int  # which of them has its events marked
     parts: tuple[tuple[str, float, float], ...]  # name, first and last time, s
     events: tuple[tuple[str, float], ...]  # name, time, s

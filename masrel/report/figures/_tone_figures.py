@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from masrel.report._figure_data import ToneView
 from masrel.report.figures._style import BLACK, BLUE, GREY, ORANGE, SHADES, VERMILLION
 
-_COLOURS = (BLUE, VERMILLION, ORANGE, GREY, BLACK)
+_COLOURS = (BLUE, VERMILLION, ORANGE, GREY)
 _BACK = (0, (4, 1.6))  # line style of the way back
 _LETTERS = "abcdefgh"
 

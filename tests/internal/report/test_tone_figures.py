@@ -1,0 +1,28 @@
+"""The figures of tone: every law has one, and each is drawn in the same bytes."""
+
+from pathlib import Path
+
+import pytest
+
+from docs.make.tone import FIGURES, SCENES, view
+from masrel.elbow import MODELS
+from masrel.elbow.tone import ToneModel
+from masrel.report.figures import draw
+
+PAGES = Path(FIGURES).parent / "tone"
+
+
+def test_every_law_has_a_figure_in_its_page() -> None:
+    drawn = {model.kind for s in SCENES.values() for model in s.models.values()}
+    assert drawn == {k for k, law in MODELS.items() if issubclass(law, ToneModel)}
+    pages = "".join(page.read_text(encoding="utf-8") for page in PAGES.glob("*.md"))
+    for name in SCENES:
+        assert (FIGURES / f"{name}.png").is_file()
+        assert f"](../figures/{name}.png)" in pages
+
+
+@pytest.mark.parametrize("name", ["tone_clonus", "tone_contracture"])
+def test_a_figure_is_drawn_twice_in_the_same_bytes(name: str) -> None:
+    one, other = (draw(view(SCENES[name]), stamp="SIMULATED DATA") for _ in range(2))
+    assert one["png"].startswith(b"\x89PNG")
+    assert one == other
