@@ -2,8 +2,6 @@
 
 from pathlib import Path
 
-import pytest
-
 from docs.make.tone import FIGURES, SCENES, view
 from masrel.elbow import MODELS
 from masrel.elbow.tone import ToneModel
@@ -21,8 +19,8 @@ def test_every_law_has_a_figure_in_its_page() -> None:
         assert f"](../figures/{name}.png)" in pages
 
 
-@pytest.mark.parametrize("name", ["tone_clonus", "tone_contracture"])
-def test_a_figure_is_drawn_twice_in_the_same_bytes(name: str) -> None:
-    one, other = (draw(view(SCENES[name]), stamp="SIMULATED DATA") for _ in range(2))
+def test_a_figure_is_drawn_twice_in_the_same_bytes() -> None:
+    content = view(SCENES["tone_contracture"])
+    one, other = (draw(content, stamp="SIMULATED DATA", forms=("png",)) for _ in "ab")
     assert one["png"].startswith(b"\x89PNG")
     assert one == other
