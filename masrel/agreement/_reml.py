@@ -6,8 +6,10 @@ after one pass over the ratings a step costs what a few matrices of raters by ra
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from statistics import NormalDist
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,11 +22,17 @@ _EXACT = 1e-24
 _STEPS = 100
 """Newton's steps; as a rule some eight."""
 
-_CONVERGED = 1e-11
-"""Relative step at which the components are what they are."""
+_LAST = 1e-10
+"""Fall of the deviance that a step promises, at which it is the last."""
+
+_TINY = 1e-30
+"""Imaginary step of which the square is nothing: slopes then have no rounding."""
 
 _MANY = 100
 """Raters from which on the profile is taken to have one valley: looking costs much."""
+
+_LOW, _LOWEST = -7.0, -50.0
+"""Logits of a correlation of next to nothing, and of one as good as 0."""
 
 _RATIOS = (0.0, *np.geomspace(1e-3, 1e3, 10))
 """Ratios of raters to the residual, among which the way down to a valley begins."""
@@ -67,13 +75,16 @@ class Components:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Sums:
-    # Sums over items with as many ratings; the last of each of the k + 1 rows and
-    # columns is the ratings themselves.
+    # Sums over items with as many ratings, (k + 1) by (k + 3): of raters, and of the
+    # ratings less the levels of raters, with these, with μ and with the ratings. Raters
+    # are the k contrasts of `axes`, the first of which is their mean, so that nothing
+    # large cancels.
     sizes: _Floats  # (g,): ratings of an item
     freq: _Floats  # (g,): items of that size
-    # (g, (k + 1)²): Σ_i z_i z_i', where z_i are the sums over an item
+    # (g, (k + 1) (k + 3)): Σ_i z_i z_i', where z_i are the sums over an item
     products: _Floats
-    total: _Floats  # (k + 1, k + 1): the same of single ratings
+    within: _Floats  # (k + 1, k + 3): the same of ratings less the mean of their item
+    levels: _Floats  # (k, 2): of μ, and of the raters as they were taken off
     n_ratings: int
 
 
@@ -119,16 +130,16 @@ def _components(values: _Floats, *, has_raters: bool) -> Components:
     unit = math.ldexp(1.0, int(np.frexp(np.abs(centred).max())[1]))
     centred = centred / unit
     blank = replace(blank, unit=unit)
-    squares, df = _residual(centred, rated, has_raters)
-    if df < 1:
+    fixed = _fixed(centred, rated, has_raters)
+    if fixed.df < 1:
         what = "raters" if has_raters else "items"
         return replace(
             blank, reason=f"too few ratings to tell {what} from the residual"
         )
-    if squares <= _EXACT * float((centred**2).sum()):
-        return _without_residual(blank, centred, rated, has_raters)
-    sums = _sums(centred, rated)
-    ratios = _maximum(sums, 1.0 / (squares / df), has_raters)
+    if fixed.squares <= _EXACT * float((centred**2).sum()):
+        return _without_residual(blank, centred, rated, fixed)
+    sums = _sums(centred, rated, fixed)
+    ratios = _maximum(sums, fixed.df / fixed.squares, has_raters)
     return _estimated(blank, sums, ratios, has_raters)
 
 
@@ -163,61 +174,77 @@ def _too_few(rated: NDArray[np.bool_]) -> str | None:
     return None
 
 
-def _residual(
-    centred: _Floats, rated: NDArray[np.bool_], has_raters: bool
-) -> tuple[float, int]:
-    # sum of squares and its degrees of freedom with items, and raters, as fixed
-    sizes = rated.sum(axis=1)
-    means = centred.sum(axis=1) / sizes
-    within = np.where(rated, centred - means[:, None], 0.0)
-    squares, df = float((within**2).sum()), int(rated.sum()) - len(rated)
-    if not has_raters:
-        return squares, df
-    weight = rated / sizes[:, None]
-    # (k, k): the Laplacian of raters who are linked by items
+class _Fixed(NamedTuple):
+    # ratings with items, and with raters where these are told, as fixed effects
+    laplacian: _Floats  # (k, k): of raters who are linked by items
+    levels: _Floats  # (k,): of raters, 0 where they are not told
+    within: _Floats  # (k,): what is left of their ratings
+    squares: float  # residual sum of squares
+    df: int
+    is_linked: bool
+
+
+def _fixed(centred: _Floats, rated: NDArray[np.bool_], has_raters: bool) -> _Fixed:
+    weight = rated / rated.sum(axis=1)[:, None]
     laplacian = np.diag(rated.sum(axis=0).astype(float)) - rated.T @ weight
-    levels, *_ = np.linalg.lstsq(laplacian, within.sum(axis=0), rcond=1e-10)
-    fitted = np.where(rated, levels - (weight @ levels)[:, None], 0.0)
-    rank = np.linalg.matrix_rank(laplacian, tol=1e-10 * rated.sum(), hermitian=True)
-    return float(((within - fitted) ** 2).sum()), df - int(rank)
-
-
-def _without_residual(
-    blank: Components, centred: _Floats, rated: NDArray[np.bool_], has_raters: bool
-) -> Components:
-    # items and raters are then known but for a constant, and their variances simple
-    sizes = rated.sum(axis=1)
-    items = centred.sum(axis=1) / sizes
-    levels = np.zeros(rated.shape[1])
-    within = np.where(rated, centred - items[:, None], 0.0)
-    if has_raters and (within**2).sum() > _EXACT * (centred**2).sum():
-        weight = rated / sizes[:, None]
-        laplacian = np.diag(rated.sum(axis=0).astype(float)) - rated.T @ weight
-        if np.linalg.matrix_rank(laplacian, hermitian=True) < len(levels) - 1:
-            return replace(blank, reason="no residual, and raters whom no item links")
-        levels, *_ = np.linalg.lstsq(laplacian, within.sum(axis=0), rcond=None)
-        items = items - weight @ levels
-    return replace(
-        blank,
-        items=float(items.var(ddof=1)),
-        raters=float(levels.var(ddof=1)),
-        residual=0.0,
+    means = (weight * centred).sum(axis=1)
+    rest = np.where(rated, centred - means[:, None], 0.0)
+    within, levels = rest.sum(axis=0), np.zeros(rated.shape[1])
+    rank = 0
+    if has_raters:
+        levels, *_ = np.linalg.lstsq(laplacian, within, rcond=1e-10)
+        within = np.zeros(len(levels))
+        tol = 1e-10 * rated.sum()
+        rank = int(np.linalg.matrix_rank(laplacian, tol=tol, hermitian=True))
+        rest -= np.where(rated, levels - (weight @ levels)[:, None], 0.0)
+    return _Fixed(
+        laplacian=laplacian,
+        levels=levels,
+        within=within,
+        squares=float((rest**2).sum()),
+        df=int(rated.sum()) - len(rated) - rank,
+        is_linked=rank == len(levels) - 1,
     )
 
 
-def _sums(centred: _Floats, rated: NDArray[np.bool_]) -> _Sums:
-    sizes = rated.sum(axis=1)
-    z = np.column_stack([rated.astype(float), centred.sum(axis=1)])  # (n, k + 1)
+def _without_residual(
+    blank: Components, centred: _Floats, rated: NDArray[np.bool_], fixed: _Fixed
+) -> Components:
+    # items and raters are then known but for a constant, and their variances simple
+    levels, none = fixed.levels, _EXACT * float((centred**2).sum())
+    if float(levels @ fixed.laplacian @ levels) <= none:
+        levels = np.zeros(len(levels))
+    elif not fixed.is_linked:
+        return replace(blank, reason="no residual, and raters whom no item links")
+    rest = np.where(rated, centred - levels, 0.0).sum(axis=1) / rated.sum(axis=1)
+    of_items, of_raters = float(rest.var(ddof=1)), float(levels.var(ddof=1))
+    if of_items <= none:
+        of_items = 0.0
+    return replace(blank, items=of_items, raters=of_raters, residual=0.0)
+
+
+def _sums(centred: _Floats, rated: NDArray[np.bool_], fixed: _Fixed) -> _Sums:
+    sizes, k = rated.sum(axis=1), rated.shape[1]
+    axes, _ = np.linalg.qr(np.column_stack([np.ones(k), np.eye(k)[:, 1:]]))
+    rest = np.where(rated, centred - fixed.levels, 0.0).sum(axis=1)
+    z = np.column_stack([rated @ axes, rest, sizes, centred.sum(axis=1)])
     met = np.unique(sizes)
-    total = np.diag([*rated.sum(axis=0).astype(float), float((centred**2).sum())])
-    total[-1, :-1] = total[:-1, -1] = centred.sum(axis=0)
+    of_size = [z[sizes == size] for size in met]
+    laplacian = axes.T @ fixed.laplacian @ axes
+    laplacian[0] = laplacian[:, 0] = 0.0  # items have no mean of raters within
+    levels = axes.T @ np.column_stack([np.ones(k), fixed.levels])
+    within = np.zeros((k + 1, k + 3))
+    within[:k, :k] = laplacian
+    within[:k, k] = within[k, :k] = axes.T @ fixed.within
+    within[:, k + 2] = within[:, k]
+    within[:k, k + 2] += laplacian @ levels[:, 1]
+    within[k, [k, k + 2]] = fixed.squares + np.array([0.0, fixed.within @ fixed.levels])
     return _Sums(
         sizes=met.astype(float),
-        freq=np.array([float((sizes == size).sum()) for size in met]),
-        products=np.stack(
-            [(z[sizes == size].T @ z[sizes == size]).ravel() for size in met]
-        ),
-        total=total,
+        freq=np.array([float(len(items)) for items in of_size]),
+        products=np.stack([(items[:, :-2].T @ items).ravel() for items in of_size]),
+        within=within,
+        levels=levels,
         n_ratings=int(sizes.sum()),
     )
 
@@ -225,191 +252,153 @@ def _sums(centred: _Floats, rated: NDArray[np.bool_]) -> _Sums:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Point:
     # The deviance, -2 log of the restricted likelihood, at two ratios of variances: of
-    # items and of raters to the residual. With slopes (2,) and curvatures (2, 2), also
-    # of its part that is a logarithm of determinants.
+    # items and of raters to the residual.
     deviance: float
-    slopes: _Floats
-    curvatures: _Floats
-    determinant_slopes: _Floats
-    determinant_curvatures: _Floats
     squares: float  # y' P y, the residual variance times n_ratings - 1
+    # of its two parts, the logarithms of determinants and of squares
+    slopes: _Floats  # (2, 2): part, ratio
+    curvatures: _Floats  # (2, 2, m): part, ratio, way
 
 
-def _point(sums: _Sums, of_items: float, of_raters: float) -> _Point:
-    """Return the deviance and its slopes."""
-    n, freq = sums.sizes, sums.freq
-    k = len(sums.total) - 1
-    shrink = 1.0 + n * of_items
-    # (k + 1, k + 1): Z' W Z and its slopes in the ratio of items, where Z has the
-    # raters and the ratings, and W is the inverse variance of items and residual
-    shares = np.array([-of_items / shrink, -(shrink**-2), 2.0 * n * shrink**-3])
-    z, z1, z2 = (shares @ sums.products).reshape(3, k + 1, k + 1)
-    z += sums.total
-    a, a1, a2 = z[:k, :k], z1[:k, :k], z2[:k, :k]
-    between = np.eye(k) + of_raters * a
-    inverse = np.linalg.inv(between)
-    # B = Z' V⁻¹ Z, with V⁻¹ by Woodbury's formula, and its slopes
-    t = np.eye(k + 1)
-    t[:, :k] -= of_raters * z[:, :k] @ inverse
-    b = t @ z
-    b = 0.5 * (b + b.T)
-    bj = b.copy()
-    bj[:, k] = 0.0  # B J: J leaves the ratings out
-    b_a, b_b = t @ z1 @ t.T, -bj @ b
-    t_a = np.zeros_like(t)
-    t_a[:, :k] = -of_raters * b_a[:, :k]
-    half = t_a @ z1 @ t.T
-    b_aa = t @ z2 @ t.T + half + half.T
-    half = bj @ b_a
-    b_ab, b_bb = -(half + half.T), 2.0 * bj @ bj @ b
-    e = np.zeros((k + 1, 2))
-    e[:k, 0] = e[k, 1] = 1.0  # the raters' columns add up to that of μ
-    s, s_a, s_b, s_aa, s_ab, s_bb = e.T @ np.array([b, b_a, b_b, b_aa, b_ab, b_bb]) @ e
-    m_a1 = inverse @ a1
-    slopes = np.array(
-        [
-            (freq * n / shrink).sum() + of_raters * np.trace(m_a1),
-            np.trace(inverse @ a),
-        ]
-    )
-    curve_ab = np.trace(m_a1 @ inverse)
-    curvatures = np.array(
-        [
-            [
-                -(freq * (n / shrink) ** 2).sum()
-                + of_raters * np.trace(inverse @ a2)
-                - of_raters**2 * np.trace(m_a1 @ m_a1),
-                curve_ab,
-            ],
-            [curve_ab, -np.trace(b[:k, :k] @ b[:k, :k])],
-        ]
-    )
-    _, log_det = np.linalg.slogdet(between)
-    value = float((freq * np.log(shrink)).sum()) + float(log_det)
-    # the fixed mean, and what is left of the ratings around it
-    xx, x1 = s[0, 0], np.array([s_a[0, 0], s_b[0, 0]])
-    x2 = np.array([[s_aa[0, 0], s_ab[0, 0]], [s_ab[0, 0], s_bb[0, 0]]])
-    log_x1, log_x2 = x1 / xx, x2 / xx - np.outer(x1, x1) / xx**2
-    slopes, curvatures = slopes + log_x1, curvatures + log_x2
-    value += math.log(xx)
-    mean = s[0, 1] / xx
-    lean = np.array([-mean, 1.0])  # ratings less their mean
-    squares = float(lean @ s @ lean)
-    first = [s_a @ lean, s_b @ lean]
-    q1 = np.array([lean @ f for f in first])
-    q2 = np.array(
-        [
-            [
-                lean @ second @ lean - 2.0 * first[i][0] * first[j][0] / xx
-                for j, second in enumerate(row)
-            ]
-            for i, row in enumerate([[s_aa, s_ab], [s_ab, s_bb]])
-        ]
-    )
-    df = sums.n_ratings - 1
+def _point(sums: _Sums, ratios: _Floats, ways: _Floats) -> _Point:
+    """Return the deviance, its slopes, and how these change in some ways."""
+    # the ratios (2,), and m ways from there, (2, m)
+    bent = ratios + 1j * _TINY * ways.T if ways.size else ratios[None]
+    deviances, squares, slopes = _with_slopes(sums, bent)
     return _Point(
-        deviance=value + df * math.log(squares),
-        slopes=slopes + df * q1 / squares,
-        curvatures=curvatures + df * (q2 / squares - np.outer(q1, q1) / squares**2),
-        determinant_slopes=slopes,
-        determinant_curvatures=curvatures,
-        squares=squares,
+        deviance=float(deviances[0]),
+        squares=float(squares[0]),
+        slopes=slopes[0].real,
+        curvatures=np.moveaxis(slopes.imag, 0, -1) / _TINY,
     )
 
 
-def _maximum(sums: _Sums, precision: float, has_raters: bool) -> _Floats:
-    """Return the ratios, of items and raters to the residual, of highest likelihood."""
-    ratios = _start(sums, precision, has_raters)
-    point = _point(sums, *ratios)
+def _with_slopes(
+    sums: _Sums, ratios: NDArray[Any]
+) -> tuple[_Floats, _Floats, NDArray[Any]]:
+    # ratios (m, 2), real or complex -> deviances (m,), y' P y (m,) and slopes
+    # (m, 2, 2): of the logarithms of determinants and of squares, in both ratios
+    m, k = len(ratios), len(sums.levels)
+    of_items, of_raters = ratios.T[:, :, None]  # (m, 1) each
+    shrink = 1.0 + of_items * sums.sizes
+    # Z' W Z, where W is the inverse variance of items and residual, and its slope in
+    # the ratio of items
+    shares = np.stack([1.0 / (sums.sizes * shrink), -(shrink**-2)])
+    z, z_a = (shares @ sums.products).reshape(2, m, k + 1, k + 3)
+    z = z + sums.within
+    raters, z_a = z[:, :k, :k], z_a[..., : k + 1]
+    between = np.eye(k) + of_raters[..., None] * raters
+    inverse = np.linalg.inv(between)
+    # by Woodbury's formula: s = (μ, y)' V⁻¹ (μ, y)
+    left = np.empty((m, k + 1, 2), dtype=z.dtype)
+    left[:, :k] = sums.levels
+    left[:, :k, 1] -= of_raters * z[:, :k, k]
+    left[:, :k] = inverse @ left[:, :k]
+    left[:, k] = 0.0, 1.0
+    right = inverse @ z[:, :k, k + 1 :]
+    s = left.mT @ z[..., k + 1 :]
+    of_mean, mean = s[:, 0, 0], s[:, 0, 1] / s[:, 0, 0]
+    squares = s[:, 1, 1] - mean * s[:, 0, 1]
+    # slopes of μ' V⁻¹ μ, and of y' P y, which is that of y less its mean
+    left[..., 1] -= mean[:, None] * left[..., 0]
+    right[..., 1] -= mean[:, None] * right[..., 0]
+    df = sums.n_ratings - 1
+    slopes = np.empty((m, 2, 2), dtype=z.dtype)
+    slopes[..., 0] = (z_a @ left * left).sum(axis=1)
+    slopes[..., 1] = -(right**2).sum(axis=1)
+    slopes[:, 0] /= of_mean[:, None]
+    slopes[:, 1] *= df / squares[:, None]
+    slopes[:, 0, 0] += (sums.freq * sums.sizes / shrink).sum(axis=1)
+    slopes[:, 0, 0] += of_raters[:, 0] * (inverse.mT * z_a[:, :k, :k]).sum(axis=(1, 2))
+    slopes[:, 0, 1] += (inverse.mT * raters).sum(axis=(1, 2))
+    deviances = (
+        np.log(shrink.real) @ sums.freq
+        + np.linalg.slogdet(between)[1]
+        + np.log(of_mean.real)
+        # not above 0 where raters are so far from the likeliest that all is rounding
+        + df * np.log(np.where(squares.real > 0.0, squares.real, np.inf))
+    )
+    return deviances, squares.real, slopes
+
+
+def _lowest(
+    sums: _Sums, base: _Floats, way: _Floats, x: _Floats
+) -> tuple[_Floats, _Point]:
+    """Return x, 0 or more, where the deviance of `base + way @ x` is lowest."""
+
+    # base (2,), way (2, m), x (m,): the ratios are base + way @ x
+    def at(x: _Floats) -> _Point:
+        return _point(sums, base + way @ x, way)
+
+    point = at(x)
     for _ in range(_STEPS):
-        at_zero = ratios == 0.0
-        lifted = at_zero & (point.slopes < 0.0) & np.array([True, has_raters])
+        slopes = way.T @ point.slopes.sum(axis=0)
+        lifted = (x == 0.0) & (slopes < 0.0)
         if lifted.any():  # the likelihood rises away from 0
-            ratios = np.where(lifted, 1e-6 / sums.sizes.max(), ratios)
-            point = _point(sums, *ratios)
-            at_zero &= ~lifted
-        if at_zero.all():
+            x = np.where(lifted, 1e-6 / sums.sizes.max(), x)
+            point = at(x)
+            slopes = way.T @ point.slopes.sum(axis=0)
+        if not x.any():
             break
-        step = _newton(point, ratios, ~at_zero)
-        following, ahead = _along(sums, ratios, point, step)
-        if ahead is None or np.abs(step).max() < _CONVERGED:
+        step = _newton(slopes, way.T @ point.curvatures.sum(axis=0), x)
+        if -(slopes * x) @ step < _LAST and (step >= _TO_ZERO).all():
+            x = x * np.exp(step)
             break
-        ratios, point = following, ahead
-    return ratios
+        limit = point.deviance + 1e-13 * abs(point.deviance)
+        for ahead in _ahead(x, step):
+            there = at(ahead)
+            if there.deviance <= limit:
+                break
+        else:  # no way down
+            break
+        x, point = ahead, there
+    return x, point
 
 
-def _newton(point: _Point, ratios: _Floats, free: NDArray[np.bool_]) -> _Floats:
-    # Newton's step of the logarithms, downhill whatever the curvature
-    slopes = point.slopes * ratios
-    curvatures = point.curvatures * np.outer(ratios, ratios) + np.diag(slopes)
-    step = np.zeros(2)
+def _newton(slopes: _Floats, curvatures: _Floats, x: _Floats) -> _Floats:
+    # Newton's step of the logarithms, downhill whatever the curvature, 3 at most
+    slopes = slopes * x
+    curvatures = curvatures * np.outer(x, x) + np.diag(slopes)
+    step, free = np.zeros(len(x)), x > 0.0
     bends, axes = np.linalg.eigh(curvatures[np.ix_(free, free)])
     floor = 1e-12 * max(1.0, float(np.abs(bends).max()))
     step[free] = -axes @ ((axes.T @ slopes[free]) / np.maximum(np.abs(bends), floor))
     return np.asarray(step / max(1.0, float(np.abs(step).max()) / 3.0))
 
 
-def _along(
-    sums: _Sums, ratios: _Floats, point: _Point, step: _Floats
-) -> tuple[_Floats, _Point | None]:
-    # the first of ever shorter steps that does not lower the likelihood, or None
+def _ahead(x: _Floats, step: _Floats) -> Iterator[_Floats]:
+    # where the step leads, as far as it goes and ever less far
     if (step < _TO_ZERO).any():
-        following = np.where(step < _TO_ZERO, 0.0, ratios)  # as far as it goes
-        ahead = _point(sums, *following)
-        if ahead.deviance <= point.deviance:
-            return following, ahead
+        yield np.where(step < _TO_ZERO, 0.0, x)
     for halvings in range(40):
-        following = ratios * np.exp(step * 0.5**halvings)
-        ahead = _point(sums, *following)
-        if ahead.deviance <= point.deviance + 1e-13 * abs(point.deviance):
-            return following, ahead
-    return ratios, None
+        yield x * np.exp(step * 0.5**halvings)
 
 
-def _start(sums: _Sums, precision: float, has_raters: bool) -> _Floats:
-    # the best of a grid
-    grid = np.concatenate([[0.0], np.geomspace(1e-3, 30.0 * max(1.0, precision), 12)])
+def _maximum(sums: _Sums, precision: float, has_raters: bool) -> _Floats:
+    """Return the ratios, of items and raters to the residual, of highest likelihood."""
+    # from the best of a grid
+    grid = np.concatenate([[0.0], np.geomspace(1e-3, 30.0 * max(1.0, precision), 6)])
     others = grid if has_raters else np.zeros(1)
-    at = _deviances(sums, grid, others)
-    of_items, of_raters = np.unravel_index(np.argmin(at), at.shape)
-    return np.array([grid[of_items], others[of_raters]])
-
-
-def _deviances(sums: _Sums, of_items: _Floats, of_raters: _Floats) -> _Floats:
-    # (m, l): the deviance at m ratios of items and l of raters
-    shrink = 1.0 + np.outer(of_items, sums.sizes)
-    z = sums.total - (of_items[:, None] / shrink @ sums.products).reshape(
-        -1, *sums.total.shape
-    )
-    levels, axes = np.linalg.eigh(z[:, :-1, :-1])
-    levels = np.maximum(levels, 0.0)[:, None]  # (m, 1, k)
-    ones = axes.sum(axis=1)[:, None]
-    ratings = z[:, None, -1, :-1] @ axes  # (m, 1, k)
-    stretch = 1.0 + of_raters[:, None] * levels  # (m, l, k)
-    xx = (ones**2 * levels / stretch).sum(axis=-1)
-    xy = (ones * ratings / stretch).sum(axis=-1)
-    yy = z[:, -1, -1, None] - of_raters * (ratings**2 / stretch).sum(axis=-1)
-    squares = np.maximum(yy - xy**2 / xx, np.finfo(float).tiny)
-    return np.asarray(
-        (np.log(shrink) @ sums.freq)[:, None]
-        + np.log(stretch).sum(axis=-1)
-        + np.log(xx)
-        + (sums.n_ratings - 1) * np.log(squares)
-    )
+    starts = np.array([(a, b) for a in grid for b in others])
+    start = starts[np.argmin(_with_slopes(sums, starts)[0])]
+    way = np.eye(2)[:, : 1 + has_raters]
+    x, _ = _lowest(sums, np.zeros(2), way, start @ way)
+    return way @ x
 
 
 def _estimated(
     blank: Components, sums: _Sums, ratios: _Floats, has_raters: bool
 ) -> Components:
     """Return the components with their covariance."""
-    point = _point(sums, *ratios)
+    point = _point(sums, ratios, np.eye(2))
     residual = point.squares / (sums.n_ratings - 1)
     # tr(P V_i P V_j) of items, raters and residual: P V P = P gives those of the last
     # from slopes and curvatures of the determinants
     traces = np.empty((3, 3))
-    traces[:2, :2] = -point.determinant_curvatures
-    traces[2, :2] = traces[:2, 2] = point.determinant_slopes - traces[:2, :2] @ ratios
-    trace = sums.n_ratings - 1 - ratios @ point.determinant_slopes
+    slopes = point.slopes[0]
+    traces[:2, :2] = -point.curvatures[0]
+    traces[2, :2] = traces[:2, 2] = slopes - traces[:2, :2] @ ratios
+    trace = sums.n_ratings - 1 - ratios @ slopes
     traces[2, 2] = trace - ratios @ traces[:2, 2]
     rows = [0, 1, 2] if has_raters else [0, 2]
     covariance = np.zeros((3, 3))
@@ -439,8 +428,7 @@ def icc_ends(
         last=float(fit.ratios[1]),
     )
     height = NormalDist().inv_cdf(0.5 + 0.5 * level)
-    low, high = profile.end(height, -1.0), profile.end(height, 1.0)
-    return low, high
+    return profile.end(height, -1.0), profile.end(height, 1.0)
 
 
 def _ends_without_residual(
@@ -470,99 +458,48 @@ class _Profile:
 
     def end(self, height: float, side: float) -> float:
         """Return ρ where the root of the deviance above the least is so high."""
-        of_items, raters = self.fit.ratios
-        best = of_items / (1.0 + raters * self.absolute)
         if side < 0.0 and self._root(-math.inf)[0] <= height:
             return 0.0
         # from where the likelihood is highest, outwards until it is low enough
+        of_items, of_raters = self.fit.ratios
+        best = of_items / (1.0 + of_raters * self.absolute)
         inner = math.log(best) if best > 0.0 else -math.inf
-        step = 1.0
-        outer = (inner if best > 0.0 else math.log(1e-3)) + side * step
+        outer = max(inner, _LOW) + 1.0 if side > 0.0 else inner - 1.0
         root, slope = self._root(outer)
+        step = side
         while root < height:
             inner, step = outer, 2.0 * step
-            outer += side * step
+            outer += step
             root, slope = self._root(outer)
-        return self._between(inner, outer, root, slope, height, side)
-
-    def _between(
-        self,
-        inner: float,
-        outer: float,
-        root: float,
-        slope: float,
-        height: float,
-        side: float,
-    ) -> float:
         # Newton's steps, and halves where they leave the bracket
-        at = outer
-        for _ in range(60):
-            following = at - (root - height) / slope if slope else math.nan
-            if not min(inner, outer) < following < max(inner, outer):
-                following = (
-                    0.5 * (inner + outer) if math.isfinite(inner) else outer - side
-                )
-            if abs(following - at) < 1e-7:  # the next would be some 1e-14
-                at = following
+        at, inner = outer, max(inner, _LOWEST)
+        for _ in range(_STEPS):
+            step = (height - root) / slope if slope else math.nan
+            if abs(step) < 1e-7:  # the next would be some 1e-14
+                at += step
                 break
-            at = following
+            if not min(inner, outer) < at + step < max(inner, outer):
+                step = 0.5 * (inner + outer) - at
+            at += step
             root, slope = self._root(at)
             inner, outer = (inner, at) if root >= height else (at, outer)
         return 1.0 / (1.0 + math.exp(-at))
 
     def _root(self, logit: float) -> tuple[float, float]:
-        # √(deviance - least) and its slope, whatever raters are likeliest
+        # √(deviance - least), whatever raters are likeliest, and its slope
         odds = math.exp(logit)
-        ratio = self._start(odds)
-        point = self._at(odds, ratio)
-        for _ in range(_STEPS if self.has_raters else 0):
-            lean, bend = self._along_raters(point, odds)
-            if ratio == 0.0:
-                if lean >= 0.0:
-                    break
-                ratio = 1e-6 / self.fit.sums.sizes.max()
-                point = self._at(odds, ratio)
-                continue
-            step = -lean * ratio / max(abs(bend * ratio**2 + lean * ratio), 1e-12)
-            if abs(step) < 1e-6:  # which moves the deviance by its square
-                break
-            ahead, point = self._shorter(odds, ratio, point, step)
-            if ahead == ratio:
-                break
-            ratio = ahead
-        self.last = ratio
+        base = np.array([odds, 0.0])
+        way = np.array([[odds * self.absolute], [1.0]])[:, : int(self.has_raters)]
+        x, point = _lowest(self.fit.sums, base, way, self._start(base, way))
+        self.last = float((base + way @ x)[1])
         above = math.sqrt(max(point.deviance - self.fit.deviance, 0.0))
-        slope = point.slopes[0] * self._of_items(odds, ratio)
+        slope = point.slopes[:, 0].sum() * (base + way @ x)[0]
         return above, slope / (2.0 * above) if above else 0.0
 
-    def _start(self, odds: float) -> float:
+    def _start(self, base: _Floats, way: _Floats) -> _Floats:
         # the best of some ratios of raters: there may be more than one valley
-        if not self.has_raters or len(self.fit.sums.total) > _MANY:
-            return self.last
-        grid = np.array([*_RATIOS, self.last])
-        if self.absolute:
-            heights = np.diag(_deviances(self.fit.sums, odds * (1.0 + grid), grid))
-        else:
-            heights = _deviances(self.fit.sums, np.array([odds]), grid)[0]
-        return float(grid[np.argmin(heights)])
-
-    def _of_items(self, odds: float, ratio: float) -> float:
-        return odds * (1.0 + ratio * self.absolute)
-
-    def _at(self, odds: float, ratio: float) -> _Point:
-        return _point(self.fit.sums, self._of_items(odds, ratio), ratio)
-
-    def _along_raters(self, point: _Point, odds: float) -> tuple[float, float]:
-        way = np.array([odds * self.absolute, 1.0])
-        return float(way @ point.slopes), float(way @ point.curvatures @ way)
-
-    def _shorter(
-        self, odds: float, ratio: float, point: _Point, step: float
-    ) -> tuple[float, _Point]:
-        # the first of ever shorter steps that does not lower the likelihood
-        steps = [max(-3.0, min(3.0, step)) * 0.5**i for i in range(30)]
-        for factor in [0.0] * int(step < _TO_ZERO) + [math.exp(x) for x in steps]:
-            ahead = self._at(odds, ratio * factor)
-            if ahead.deviance <= point.deviance + 1e-13 * abs(point.deviance):
-                return ratio * factor, ahead
-        return ratio, point
+        if not self.has_raters or len(self.fit.sums.levels) > _MANY:
+            return np.full(way.shape[1], self.last)
+        starts = np.array([[*_RATIOS, self.last]]).T
+        heights, *_ = _with_slopes(self.fit.sums, base + starts @ way.T)
+        return np.asarray(starts[np.argmin(heights)])

@@ -220,7 +220,8 @@ def _equivalent(components: Components) -> _Squares:
     c, v = components, components.covariance
     n, df_raters, df_residual = 1.0, c.n_raters - 1.0, math.inf
     if c.residual > 0.0:
-        n = -float(v[2, 2] / v[1, 2])
+        # no more than all items, whatever rounding leaves of a tiny V_re
+        n = float(v[2, 2] / max(-v[1, 2], v[2, 2] / c.n_items))
         df_residual = float(2.0 * c.residual**2 / v[2, 2])
         noise = float(n**2 * v[1, 1] - v[2, 2])
         df_raters = 2.0 * (c.residual + n * c.raters) ** 2 / noise

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy import optimize, stats
 
-from masrel.agreement import IccForm, icc
+from masrel.agreement import IccForm, icc, sem
 from masrel.errors import UndefinedStatisticWarning
 from masrel.intervals import estimate
 
@@ -127,6 +127,40 @@ def test_without_residual_by_hand() -> None:
     assert interval is not None
     odds = 8.0 / stats.f.ppf(0.975, 2, 1)
     assert interval.low == pytest.approx(odds / (1.0 + odds), rel=1e-9)
+
+
+def test_raters_alone_leave_nothing_to_correlate() -> None:
+    # every rating is its rater's level: items differ by rounding at most
+    levels = np.array([0.1, 0.7, 1.3, 0.4])
+    ratings = np.where(np.random.default_rng(3).random((6, 4)) < 0.3, np.nan, levels)
+    assert icc(ratings, form="ICC(A,1)").value == 0.0
+    with pytest.warns(UndefinedStatisticWarning, match="0/0"):
+        assert math.isnan(icc(ratings, form="ICC(C,1)").value)
+
+
+@pytest.mark.parametrize("of_raters", [0.5, 0.0, 300.0])
+def test_errors_may_be_as_small_as_floats_tell(of_raters: float) -> None:
+    # With a residual ε times as large, 1 - ICC(C,1) becomes ε² times as large, and the
+    # rest tends to what it is of items and raters alone.
+    g = np.random.default_rng(7)
+    items, raters = g.normal(size=(40, 1)), of_raters * g.normal(size=4)
+    residual, lacks = g.normal(size=(40, 4)), g.random((40, 4)) < 0.2
+    found = {}
+    for size in (1e-3, 1e-4, 1e-6, 1e-8):
+        ratings = np.where(lacks, np.nan, items + raters + size * residual)
+        error = sem(ratings, kind="consistency")
+        agreement = icc(ratings, form="ICC(A,1)")
+        assert error.interval is not None
+        assert agreement.interval is not None
+        ends = error.interval.low, error.interval.high
+        found[size] = [e / size for e in (error.value, *ends)] + [
+            (1.0 - v) / size ** (0.0 if of_raters else 2.0)
+            for v in (agreement.value, agreement.interval.low, agreement.interval.high)
+        ]
+    for size in (1e-4, 1e-6):
+        assert found[size] == pytest.approx(found[1e-3], rel=2e-3)
+    # of an ICC of 1 - 1e-16 no digit is left
+    assert found[1e-8][:3] == pytest.approx(found[1e-3][:3], rel=2e-3)
 
 
 def test_one_way_by_hand() -> None:
