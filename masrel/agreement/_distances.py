@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Codes = NDArray[np.signedinteger[Any]]
 
-_BLOCK = 1 << 16  # categories at once
+_BLOCK = 1 << 13  # categories at once
 _ITEMS = 1 << 14  # items at once
 MAX_EXPONENT = 400  # of two, of numbers whose squares and sums of them are floats
 _NODES, _WIDTH = 12, 0.5  # per bin of logarithms: the error is below 25^-12
@@ -290,9 +290,9 @@ class Ratio(Distances):
                 moments[:, j] += np.bincount(bins, weighed, minlength=n)
         return moments
 
-    def _potential(self, masses: Floats) -> Floats:
+    def _potential(self, moments: Floats) -> Floats:
         # Σ_l m_l tanh²((u - u_l)/2) of positive ones: its polynomial in each bin
-        at_nodes = (self._moments(masses) @ self._to_nodes).ravel()
+        at_nodes = (moments @ self._to_nodes).ravel()
         places = self._places
         there = [
             np.tanh(0.5 * (places[at : at + _NODES, None] - places)) ** 2 @ at_nodes
@@ -302,20 +302,23 @@ class Ratio(Distances):
 
     def between(self, first: Floats, second: Floats) -> float:
         """Return Σ_kl v_kl m_k m'_l."""
-        of_positive = float((self._moments(first) * self._potential(second)).sum())
+        moments = others = self._moments(first)
+        if second is not first:
+            others = self._moments(second)
+        of_positive = float((moments * self._potential(others)).sum())
         x, y = (float(m[self._positive].sum()) for m in (first, second))
         zeros = (float(first.sum()) - x) * y + x * (float(second.sum()) - y)
         return (of_positive + zeros) * self.factor
 
     def dot(self, masses: Floats) -> Floats:
         """Return Σ_l v_kl m_l, (n_categories,)."""
-        potential = self._potential(masses)
+        potential = self._potential(self._moments(masses)).T
         positive = masses[self._positive].sum()
         of_zero = masses.sum() - positive  # 1 from all others
         between = np.full(self.n, positive)
         for start in range(0, len(self._u), _BLOCK):
             block = slice(start, start + _BLOCK)
-            here = potential[self._bin[block]].T
+            here = potential.take(self._bin[block], axis=1)
             parts = _chebyshev(self._u[block], np.ones(here.shape[1]))
             of_others = sum(c * t for c, t in zip(here, parts, strict=True))
             between[self._positive[block]] = of_zero + of_others
@@ -330,10 +333,10 @@ class Ratio(Distances):
 
 def _chebyshev(u: Floats, masses: Floats) -> Iterator[Floats]:
     # m T_j(u) of the first polynomials
-    before, this = masses * u, masses
+    before, this, twice = masses * u, masses, 2.0 * u
     for _ in range(_NODES):
         yield this
-        before, this = this, 2.0 * u * this - before
+        before, this = this, twice * this - before
 
 
 def on_a_circle(values: Floats) -> Squared:

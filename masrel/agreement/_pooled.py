@@ -14,7 +14,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from masrel.agreement._counts import DistinctItems, bilinear, count_ratings, item_counts
+from masrel.agreement._counts import (
+    DistinctItems,
+    SufficientStatistics,
+    bilinear,
+    count_ratings,
+    item_counts,
+)
 from masrel.agreement._data import CodedRatings
 from masrel.agreement._distances import Distances
 from masrel.agreement._kernel import (
@@ -138,7 +144,7 @@ def estimate_pooled(
         v,
         (sums.observed, sums.denominator * v.denominator),
         (d_e, over_e),
-        partial(_influence, coefficient, counted.items, v, (d_e, over_e), irrcac),
+        partial(_influence, coefficient, counted.items, sums, v, (d_e, over_e), irrcac),
         population,
         sums.n_rated,
         sums.n_usable,
@@ -196,6 +202,7 @@ def ratio_estimate(
 def _influence(
     coefficient: PooledCoefficient,
     items: "DistinctItems | ItemsOfManyGrades",
+    sums: SufficientStatistics,
     v: Weights,
     expected: tuple[int, int],
     irrcac: bool,
@@ -207,7 +214,7 @@ def _influence(
     d_e, over_e = expected
     exact = exact and isinstance(items, DistinctItems) and v.is_exact
     divide: Callable[[int, int], Any] = Fraction if exact else truediv
-    sums, (counts, freq, size, disagreement) = items.sums(v), items.arrays(v, exact)
+    counts, freq, size, disagreement = items.arrays(v, exact)
     rate, inverse = divide(sums.n_rated, sums.n_usable), divide(over_e, d_e)
     ratio = divide(sums.observed * over_e, d_e * sums.denominator * v.denominator)
     pairs = size * (size - 1)

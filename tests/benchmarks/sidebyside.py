@@ -5,7 +5,10 @@ import statistics
 import time
 import tracemalloc
 from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
+
+from tests.benchmarks.peers import present
 
 Work = Callable[[], object]
 
@@ -80,3 +83,12 @@ def peak_megabytes(work: Work) -> float:
         return tracemalloc.get_traced_memory()[1] / 1e6
     finally:
         tracemalloc.stop()
+
+
+def one_thread() -> AbstractContextManager[object]:
+    """Keep linear algebra to one thread, where a package for that is installed."""
+    if not present(["threadpoolctl"]):
+        return nullcontext()
+    from threadpoolctl import threadpool_limits
+
+    return threadpool_limits(1)  # type: ignore[no-any-return]

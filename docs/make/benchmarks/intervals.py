@@ -7,7 +7,6 @@
 import argparse
 import platform
 import warnings
-from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
 import masrel
@@ -16,17 +15,9 @@ from tests.benchmarks.bootstrap import by_items, exact_cost, gains, memory, race
 from tests.benchmarks.jackknives import jackknives
 from tests.benchmarks.peers import present
 from tests.benchmarks.posteriors import posteriors
+from tests.benchmarks.sidebyside import one_thread
 
 DOCS = Path(__file__).parents[2]
-
-
-def one_thread() -> AbstractContextManager[object]:
-    """Keep linear algebra to one thread, where a package for that is installed."""
-    if not present(["threadpoolctl"]):
-        return nullcontext()
-    from threadpoolctl import threadpool_limits
-
-    return threadpool_limits(1)  # type: ignore[no-any-return]
 
 
 def main() -> None:

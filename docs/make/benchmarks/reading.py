@@ -2,6 +2,7 @@
 
 ``python -m docs.make.benchmarks.reading [--quick]`` writes its part of
 ``docs/benchmarks.md``. Every run is a process of its own: imports, reading, estimates.
+Memory of this process counts for its children: what writes is loaded late.
 """
 
 import argparse
@@ -13,9 +14,6 @@ import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-
-import numpy as np
-import pandas as pd
 
 from docs.make.benchmarks.parts import write_part
 
@@ -91,6 +89,9 @@ QUESTIONS = (
 
 def write_files(folder: Path, scale: int) -> None:
     """Write the files that are read, their sizes divided by `scale`."""
+    import numpy as np
+    import pandas as pd
+
     rng = np.random.default_rng(20120831)
     n = 5_000_000 // scale
     order = rng.permutation(n)
