@@ -11,6 +11,13 @@ from typing import TYPE_CHECKING, Any, TextIO
 import click
 from tqdm import tqdm
 
+from masrel.cli._joint_options import (
+    JointOptions,
+    LawOptions,
+    joint_options,
+    joints_of,
+    law_options,
+)
 from masrel.cli._options import (
     OutputOptions,
     check_folder,
@@ -20,9 +27,17 @@ from masrel.cli._options import (
     write_output,
 )
 from masrel.errors import ParameterError
+from masrel.report._tone_scenes import (
+    ToneScene,
+    stepped,
+    tardieu_document,
+    tardieu_text,
+    tone_document,
+)
 from masrel.report._traced_scenes import (
     SCENE_OUTPUTS,
     SCENE_VIEWS,
+    AnyScene,
     Scene,
     check_view,
     scene_document,
@@ -32,7 +47,9 @@ from masrel.report._traced_scenes import (
 )
 
 if TYPE_CHECKING:
-    from masrel.elbow import ElbowParameters, Motion
+    from numpy.typing import NDArray
+
+    from masrel.elbow import JointModel, Motion
 
 _KINDS = ("constant", "minimum-jerk", "trapezoid", "recording")
 _COLUMNS = ("time_s", "angle_deg", "velocity_deg_s", "torque_nm", "phase")
@@ -92,6 +109,20 @@ class _MotionOptions:
         start = 30.0 if self.start is None else self.start
         return start, 146.0 if self.end is None else self.end
 
+    def within(self, range_end: float) -> "_MotionOptions":
+        """Return the same, by default ended where the range of a joint is (rad)."""
+        limit = math.degrees(range_end)
+        if self.recording is not None:
+            return self
+        if self.end is None:
+            return replace(self, end=min(146.0, limit))
+        if self.end > limit + 1e-9:
+            raise ParameterError(
+                f"--to-deg: needs at most the end of range of every model, {limit:g} "
+                f"deg, got {self.end:g}"
+            )
+        return self
+
 
 _motion_options = grouped(
     "stretch",
@@ -122,48 +153,6 @@ _motion_options = grouped(
         "--repeat", "repeats", type=int, default=1, show_default=True,
         help="Stretch so often, flexing in between as the stretch was made.",
     ),
-)  # fmt: skip
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _LawOptions:
-    """What the command line changes of every joint; None changes nothing."""
-
-    rest: float | None  # θ_rest, deg
-    post_catch: str | None  # reading of (5)
-    reading: str | None  # reading of Q
-    rise: float | None  # how long torque takes to its peak, s
-    inertia: float | None  # m of (1) and (5), kg·m²
-
-    def change(self, joint: "ElbowParameters") -> "ElbowParameters":
-        """Return a joint with these changes."""
-        changes: dict[str, object] = {
-            "rest_angle": None if self.rest is None else math.radians(self.rest),
-            "post_catch": self.post_catch,
-            "residual_reading": self.reading,
-            "catch_rise": self.rise,
-            "inertia": self.inertia,
-        }
-        changes = {name: value for name, value in changes.items() if value is not None}
-        return replace(joint, **changes)  # type: ignore[arg-type]
-
-
-_law_options = grouped(
-    "law",
-    _LawOptions,
-    click.option("--rest-deg", "rest", type=float, help="θ_rest; default: the start."),
-    click.option(
-        "--post-catch", type=click.Choice(["continuous", "additive"]),
-        help="How (5) is read.",
-    ),
-    click.option(
-        "--q-reading", "reading", type=click.Choice(["residual", "decrease"]),
-        help="What Q is a share of the peak for.",
-    ),
-    click.option(
-        "--catch-rise-s", "rise", type=float, help="Smooth the catch's onset."
-    ),
-    click.option("--inertia-kg-m2", "inertia", type=float, help="m of (1) and (5)."),
 )  # fmt: skip
 
 
@@ -221,10 +210,7 @@ _quantity_options = grouped(
 
 
 @click.command("trace")
-@click.option(
-    "--model", "models", required=True, multiple=True,
-    help="HM1 to HM4, a model of --study, or a model file (.toml); may be given again.",
-)  # fmt: skip
+@joint_options
 @click.option(
     "--speed-deg-s", "speeds", type=float, multiple=True,
     help="Mean speed, deg/s; of a trapezoid that of its level. May be given again.",
@@ -235,12 +221,7 @@ _quantity_options = grouped(
     metavar="LOW HIGH N", help="N speeds from LOW to HIGH.",
 )  # fmt: skip
 @_motion_options
-@click.option(
-    "--study",
-    type=click.Path(path_type=Path),
-    help="Take models from this study's protocol.",
-)
-@_law_options
+@law_options
 @_quantity_options
 @_sample_options
 @output_options(
@@ -252,28 +233,38 @@ _quantity_options = grouped(
     help="What --figure shows: torque by angle or time, the catches, or one of "
     "them.  [default: angle]",
 )  # fmt: skip
+@click.option(
+    "--tardieu", is_flag=True,
+    help="Say R2, R1 and their difference instead, at --speed-deg-s V1, V2 and V3 or "
+    "10, 100 and 150.",
+)  # fmt: skip
 @click.option("--quiet", is_flag=True, help="Show no progress.")  # of the output
 def trace(
-    models: tuple[str, ...],
+    names: JointOptions,
     speeds: tuple[float, ...],
     speed_range: tuple[float, float, int] | None,
     stretch: _MotionOptions,
-    study: Path | None,
-    law: _LawOptions,
+    law: LawOptions,
     quantities: _QuantityOptions,
     samples: _SampleOptions,
     output: OutputOptions,
     view: str | None,
+    tardieu: bool,
 ) -> None:
     """Phases, peak torque and samples of stretches of models.
 
     Events and outputs are exact; the samples of --csv are what the controller commands
     at --rate-hz for that motion. Several models or speeds make one scene of each pair.
     """
+    joints = joints_of(names, law)
+    speeds = (*speeds, *_spaced(speed_range))
+    if tardieu:
+        _refuse_more(stretch, quantities, samples, output)
+        _write_tardieu(joints, stretch.ends_deg[0], speeds, output)
+        return
     if view is not None and output.figure is None:
         raise ParameterError("--view: goes with --figure, whose contents it chooses")
-    joints = _joints_of(models, study, law)
-    scenes = _scenes(joints, stretch, [*speeds, *_spaced(speed_range)])
+    scenes = _scenes(joints, stretch, speeds)
     if samples.csv_file is not None:
         check_folder("--csv", samples.csv_file)
     output.check_files()
@@ -281,12 +272,7 @@ def trace(
     if output.figure is not None:
         check_view(scenes, view)
     documents = [
-        scene_document(
-            scene,
-            outputs=quantities.outputs,
-            times=quantities.times,
-            angles=quantities.angles,
-        )
+        _document(scene, quantities)
         for scene in tqdm(
             scenes, desc="scenes", delay=1.0, disable=output.hides_progress
         )
@@ -308,6 +294,65 @@ def trace(
     )
 
 
+def _refuse_more(
+    stretch: _MotionOptions,
+    quantities: _QuantityOptions,
+    samples: _SampleOptions,
+    output: OutputOptions,
+) -> None:
+    # what --tardieu says nothing of
+    plain = (
+        stretch.kind == "constant" and stretch.repeats == 1,
+        (stretch.end, stretch.stop) == (None, None),
+        not (quantities.outputs or quantities.times or quantities.angles),
+        samples.csv_file is None and output.figure is None,
+    )
+    if not all(plain):
+        raise ParameterError(
+            "--tardieu: stretches at constant speed to the end of range and says "
+            "angles alone; it goes with --from-deg, --speed-deg-s and --json"
+        )
+
+
+def _write_tardieu(
+    joints: "dict[str, JointModel]",
+    start_deg: float,
+    speeds: Sequence[float],
+    output: OutputOptions,
+) -> None:
+    if speeds and len(speeds) != 3:
+        raise ParameterError(
+            f"--speed-deg-s: needs V1, V2 and V3 with --tardieu, got {len(speeds)}"
+        )
+    output.check_files()
+    documents = [
+        tardieu_document(name, joint, start_deg, speeds)
+        for name, joint in joints.items()
+    ]
+    write_output(
+        output,
+        document=lambda: (
+            documents[0] if len(documents) == 1 else {"tardieu": documents}
+        ),
+        text=lambda: tardieu_text(documents),
+    )
+
+
+def _document(scene: AnyScene, quantities: _QuantityOptions) -> dict[str, Any]:
+    if isinstance(scene, ToneScene):
+        if quantities.outputs:
+            raise ParameterError(
+                f"--output: needs spastic elbows, got {scene.joint.kind}"
+            )
+        return tone_document(scene, times=quantities.times, angles=quantities.angles)
+    return scene_document(
+        scene,
+        outputs=quantities.outputs,
+        times=quantities.times,
+        angles=quantities.angles,
+    )
+
+
 def _spaced(speed_range: tuple[float, float, int] | None) -> list[float]:
     if speed_range is None:
         return []
@@ -316,72 +361,61 @@ def _spaced(speed_range: tuple[float, float, int] | None) -> list[float]:
 
 
 def _scenes(
-    joints: "dict[str, ElbowParameters]",
+    joints: "dict[str, JointModel]",
     stretch: _MotionOptions,
     speeds: Sequence[float],
-) -> list[Scene]:
+) -> list[AnyScene]:
     # one of each model and speed, however often an option repeats it
-    motions = {speed: _motion_of(stretch, speed) for speed in speeds or (None,)}
-    scenes = []
-    for model, joint in joints.items():
-        for speed, motion in motions.items():
-            start, end = stretch.ends_deg
-            if stretch.recording is not None:
-                start, end = math.degrees(motion.start), math.degrees(motion.end)
-            scene = Scene(
-                model=model,
-                kind=stretch.kind,
-                speed_deg_s=speed,
-                start_deg=start,
-                end_deg=end,
-                parameters=joint,
-                motion=motion,
-            )
-            scenes.append(scene)
+    from masrel.elbow.tone import ToneModel
+
+    scenes: list[AnyScene] = []
+    motions: dict[tuple[float | None, float], Motion] = {}  # by speed and end
+    for name, joint in joints.items():
+        made = stretch
+        if isinstance(joint, ToneModel):
+            made = stretch.within(joint.range_end)
+        for speed in dict.fromkeys(speeds or (None,)):
+            key = (speed, made.ends_deg[1])
+            if key not in motions:
+                motions[key] = _motion_of(made, speed)
+            scenes.append(_scene(name, joint, made, speed, motions[key]))
     return scenes
 
 
-def _joints_of(
-    models: Sequence[str], study: Path | None, law: _LawOptions
-) -> dict[str, "ElbowParameters"]:
-    joints: dict[str, ElbowParameters] = {}
-    for model in dict.fromkeys(models):
-        is_file = model.endswith(".toml")
-        name = Path(model).stem if is_file else model
-        if name in joints:
-            raise ParameterError(
-                f"--model: needs models whose names differ, got two called {name}"
-            )
-        joints[name] = law.change(
-            _joint_in_file(model, study) if is_file else _named_joint(model, study)
+def _scene(
+    name: str,
+    joint: "JointModel",
+    stretch: _MotionOptions,
+    speed: float | None,
+    motion: "Motion",
+) -> AnyScene:
+    from masrel.elbow import ElbowParameters
+    from masrel.elbow.tone import ToneModel
+
+    start, end = stretch.ends_deg
+    if stretch.recording is not None:
+        start, end = math.degrees(motion.start), math.degrees(motion.end)
+    if isinstance(joint, ToneModel):
+        return ToneScene(
+            model=name,
+            kind=stretch.kind,
+            speed_deg_s=speed,
+            start_deg=start,
+            end_deg=end,
+            joint=joint,
+            motion=motion,
         )
-    return joints
-
-
-def _joint_in_file(model: str, study: Path | None) -> "ElbowParameters":
-    from masrel.protocol import read_model_file
-
-    if study is not None:
-        raise ParameterError(
-            f"--model: needs a model of --study, got the file {model}; without --study "
-            "it is read with the usual constants"
-        )
-    return read_model_file(Path(model))
-
-
-def _named_joint(model: str, study: Path | None) -> "ElbowParameters":
-    from masrel.elbow import STANDARD_MODELS
-
-    if study is not None:
-        from masrel.protocol import StudyPaths, elbow_parameters, read_protocol
-
-        return elbow_parameters(read_protocol(StudyPaths(study).protocol), model)
-    if model not in STANDARD_MODELS:
-        raise ParameterError(
-            f"--model: needs one of {', '.join(STANDARD_MODELS)}, or a model file "
-            f"(.toml), or --study to name a study's own, got {model!r}"
-        )
-    return STANDARD_MODELS[model]
+    if not isinstance(joint, ElbowParameters):
+        raise ParameterError(f"--model: needs a kind with exact events, got {name}")
+    return Scene(
+        model=name,
+        kind=stretch.kind,
+        speed_deg_s=speed,
+        start_deg=start,
+        end_deg=end,
+        parameters=joint,
+        motion=motion,
+    )
 
 
 def _motion_of(stretch: _MotionOptions, speed_deg_s: float | None) -> "Motion":
@@ -431,7 +465,7 @@ def _plain_motion(stretch: _MotionOptions, speed_deg_s: float | None) -> "Motion
 
 def _write_samples(
     samples: _SampleOptions,
-    scenes: Sequence[Scene],
+    scenes: Sequence[AnyScene],
     documents: Sequence[dict[str, Any]],
     hides_progress: bool | None,
 ) -> None:
@@ -458,7 +492,7 @@ def _n_samples(documents: Sequence[dict[str, Any]], rate_hz: float) -> int:
 
 
 def _write_rows(
-    out: TextIO, scenes: Sequence[Scene], rate_hz: float, bar: "tqdm[Any]"
+    out: TextIO, scenes: Sequence[AnyScene], rate_hz: float, bar: "tqdm[Any]"
 ) -> None:
     # what the controller commands; columns name the scene where there are several
     several = len(scenes) > 1
@@ -473,20 +507,29 @@ def _write_rows(
             bar.update(len(block))
 
 
-def _rows(scene: Scene, rate_hz: float) -> Iterator[tuple[object, ...]]:
+def _rows(scene: AnyScene, rate_hz: float) -> Iterator[tuple[object, ...]]:
+    import numpy as np
+
+    from masrel.recording import PHASES
+
+    time, angle, velocity, torque, codes = _sampled(scene, rate_hz)
+    columns = (time, np.degrees(angle), np.degrees(velocity), torque)
+    for start in range(0, time.size, _N_AT_ONCE):
+        block = slice(start, start + _N_AT_ONCE)
+        phases = [PHASES[code] for code in codes[block].tolist()]
+        yield from zip(*(c[block].tolist() for c in columns), phases, strict=True)
+
+
+def _sampled(scene: AnyScene, rate_hz: float) -> "tuple[NDArray[Any], ...]":
+    # time, angle, velocity, torque and phase of every sample, SI units
     import numpy as np
 
     from masrel import elbow
-    from masrel.recording import PHASES
 
-    samples = elbow.trace(scene.parameters, scene.motion, rate_hz=rate_hz)
-    columns = (
-        samples.time,
-        np.degrees(samples.angle),
-        np.degrees(samples.velocity),
-        samples.torque,
-    )
-    for start in range(0, samples.time.size, _N_AT_ONCE):
-        block = slice(start, start + _N_AT_ONCE)
-        phases = [PHASES[code] for code in samples.phase[block].tolist()]
-        yield from zip(*(c[block].tolist() for c in columns), phases, strict=True)
+    if isinstance(scene, Scene):
+        made = elbow.trace(scene.parameters, scene.motion, rate_hz=rate_hz)
+        return made.time, made.angle, made.velocity, made.torque, made.phase
+    motion = scene.motion
+    time = np.arange(math.floor(motion.duration * rate_hz) + 1) / rate_hz
+    torque, phase = stepped(scene.joint, motion, time)
+    return time, motion.angle(time), motion.velocity(time), torque, phase

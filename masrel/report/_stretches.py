@@ -32,6 +32,7 @@ from masrel.report._tables import (
     number,
     whole_or_tenths,
 )
+from masrel.report._tone_scenes import stepped
 
 _PANELS_PER_FIGURE = 4
 
@@ -215,13 +216,8 @@ def _line(joint: JointModel, motion: ConstantSpeed, rate_hz: int) -> _Line:
         made = trace(joint, motion, rate_hz=rate_hz)
         return made.time, np.degrees(made.angle), made.torque, made.phase
     time = np.arange(math.floor(motion.duration * rate_hz) + 1) / rate_hz
-    angle, velocity = motion.angle(time), motion.velocity(time)
-    stepper, torque, phase = joint.stepper(motion.start), [], []
-    samples = zip(time.tolist(), angle.tolist(), velocity.tolist(), strict=True)
-    for sample in samples:
-        torque.append(stepper.step(*sample))
-        phase.append(stepper.phase)
-    return time, np.degrees(angle), np.array(torque), np.array(phase, dtype=np.int8)
+    torque, phase = stepped(joint, motion, time)
+    return time, np.degrees(motion.angle(time)), torque, phase
 
 
 def _trace_drawing(

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from masrel.errors import ParameterError
 from masrel.report._figure_data import (
@@ -17,6 +17,7 @@ from masrel.report._figure_data import (
     StretchPanel,
 )
 from masrel.report._tables import aligned, fixed_or_significant, significant
+from masrel.report._tone_scenes import ToneScene, event_lines, tone_line
 
 if TYPE_CHECKING:
     from masrel.elbow import ElbowParameters, Events, Motion
@@ -60,6 +61,10 @@ class Scene:
         if self.speed_deg_s is None:
             return f"{self.model}, {self.kind}"
         return f"{self.model}, {self.kind} {significant(self.speed_deg_s)} deg/s"
+
+
+AnyScene = Scene | ToneScene
+"""Of a spastic elbow, or of a joint of another kind."""
 
 
 def scene_document(
@@ -144,6 +149,7 @@ def scene_text(document: dict[str, Any], title: str) -> str:
             fixed_or_significant(span[key], 2) for key in ("start_deg", "end_deg")
         ]
         lines.append(_phase_line([span["name"], *times, *angles]))
+    lines += event_lines(document)
     lines.append(
         f"peak torque {fixed_or_significant(document['peak_torque_nm'], 3)} N·m"
     )
@@ -206,7 +212,7 @@ def scenes_text(documents: Sequence[dict[str, Any]]) -> str:
     return "\n".join(aligned(rows, ["left", *numeric]))
 
 
-def check_view(scenes: Sequence[Scene], view: str) -> None:
+def check_view(scenes: Sequence[AnyScene], view: str) -> None:
     """Refuse a figure that cannot be drawn, before anything is computed for it."""
     models = _by_model(scenes)
     max_speeds = max(map(len, models.values()))
@@ -215,14 +221,19 @@ def check_view(scenes: Sequence[Scene], view: str) -> None:
             "--figure: shows 4 models at 5 speeds at most, or with --view catch 5 "
             f"models, got {len(models)} and {max_speeds}"
         )
+    elbows = [scene for scene in scenes if isinstance(scene, Scene)]
+    if view in ("catch", "schematic") and len(elbows) < len(scenes):
+        raise ParameterError(
+            f"--view {view}: shows the catch of a spastic elbow, got other kinds too"
+        )
     if view == "catch":
-        _check_catches(models)
+        _check_catches(_by_model(elbows))
     if view == "schematic":
         if len(scenes) != 1:
             raise ParameterError(
                 f"--view schematic: shows one scene, got {len(scenes)}"
             )
-        if not _n_caught(scenes):
+        if not _n_caught(elbows):
             raise ParameterError("--view schematic: needs a stretch that catches")
 
 
@@ -249,7 +260,7 @@ def _n_caught(scenes: Sequence[Scene]) -> int:
     return int(np.isfinite(outputs.column("catch")).sum())
 
 
-def scenes_figure(scenes: Sequence[Scene], view: str, *, form: Form) -> bytes:
+def scenes_figure(scenes: Sequence[AnyScene], view: str, *, form: Form) -> bytes:
     """Return a figure of scenes as a file."""
     # Imported here: a text loads nothing that draws.
     from masrel.report.figures import draw
@@ -257,43 +268,51 @@ def scenes_figure(scenes: Sequence[Scene], view: str, *, form: Form) -> bytes:
     return draw(_content(scenes, view), stamp=_STAMP, forms=(form,))[form]
 
 
-def _content(scenes: Sequence[Scene], view: str) -> Content:
-    models = _by_model(scenes).items()
+def _content(scenes: Sequence[AnyScene], view: str) -> Content:
+    elbows = [scene for scene in scenes if isinstance(scene, Scene)]
     if view == "catch":
-        return CatchCurves(curves=tuple(_curve(*of_model) for of_model in models))
+        curves = (_curve(*of_model) for of_model in _by_model(elbows).items())
+        return CatchCurves(curves=tuple(curves))
     if view == "schematic":
-        return _schematic(scenes[0])
+        return _schematic(elbows[0])
+    models = _by_model(scenes).items()
     against: Literal["angle", "time"] = "angle" if view == "angle" else "time"
     panels = tuple(_panel(*of_model) for of_model in models)
     return Stretches(panels=panels, against=against)
 
 
-def _by_model(scenes: Sequence[Scene]) -> dict[str, list[Scene]]:
-    models: dict[str, list[Scene]] = {}
+_S = TypeVar("_S", bound=AnyScene)
+
+
+def _by_model(scenes: Sequence[_S]) -> dict[str, list[_S]]:
+    models: dict[str, list[_S]] = {}
     for scene in scenes:
         models.setdefault(scene.model, []).append(scene)
     return models
 
 
-def _panel(name: str, scenes: Sequence[Scene]) -> StretchPanel:
+def _panel(name: str, scenes: Sequence[AnyScene]) -> StretchPanel:
+    lines = (
+        tone_line(scene) if isinstance(scene, ToneScene) else _elbow_line(scene)
+        for scene in scenes
+    )
+    return StretchPanel(title=name, lines=tuple(lines))
+
+
+def _elbow_line(scene: Scene) -> StretchLine:
     import numpy as np
 
     from masrel.elbow import outline
 
-    lines = []
-    for scene in scenes:
-        line = outline(scene.parameters, scene.motion, n_points=_N_PIXELS)
-        speed = scene.speed_deg_s
-        lines.append(
-            StretchLine(
-                label=scene.kind if speed is None else f"{significant(speed)} deg/s",
-                time=line.time,
-                angle=np.degrees(line.angle),
-                torque=line.torque,
-                phases=tuple((s.name, s.start, s.end) for s in line.events.phases),
-            )
-        )
-    return StretchPanel(title=name, lines=tuple(lines))
+    line = outline(scene.parameters, scene.motion, n_points=_N_PIXELS)
+    speed = scene.speed_deg_s
+    return StretchLine(
+        label=scene.kind if speed is None else f"{significant(speed)} deg/s",
+        time=line.time,
+        angle=np.degrees(line.angle),
+        torque=line.torque,
+        phases=tuple((s.name, s.start, s.end) for s in line.events.phases),
+    )
 
 
 def _schematic(scene: Scene) -> CatchSchematic:

@@ -1,0 +1,218 @@
+"""The JSON and the text of scenes of other kinds of joints, and Tardieu's angles.
+
+In: a joint that is no spastic elbow, and a motion. Out: its events and its torque along
+the motion; of any joint the angles of the Tardieu scale.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from typing import TYPE_CHECKING, Any, Literal
+
+from masrel.errors import ParameterError
+from masrel.recording import PHASES
+from masrel.report._figure_data import StretchLine
+from masrel.report._tables import aligned, fixed_or_significant, significant
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from masrel.elbow import JointModel, Motion
+    from masrel.elbow.tone import ToneModel
+
+_RATE_HZ = 1000  # of the samples that phases and lines are made of
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ToneScene:
+    """A joint of another kind than the spastic elbow, and a motion."""
+
+    model: str  # name of the model
+    kind: str  # kind of the motion
+    speed_deg_s: float | None  # its speed, if it is named after one
+    # start_deg, end_deg: where it starts and ends
+    start_deg: float
+    end_deg: float
+    joint: "ToneModel"
+    motion: "Motion"
+
+    @property
+    def title(self) -> str:
+        """Name of the scene."""
+        if self.speed_deg_s is None:
+            return f"{self.model}, {self.kind}"
+        return f"{self.model}, {self.kind} {significant(self.speed_deg_s)} deg/s"
+
+
+def tone_document(
+    scene: ToneScene, *, times: Sequence[float] = (), angles: Sequence[float] = ()
+) -> dict[str, object]:
+    """Return the events of a scene, its peak torque, and torques at places."""
+    # times, angles: where torque is computed, s, deg
+    import numpy as np
+
+    from masrel.elbow import times_at
+
+    joint, motion = scene.joint, scene.motion
+    events = joint.events(motion)
+    caught = [event for event in events if event.name == joint.catch_event]
+    line = tone_line(scene)
+    at_events = joint.torque(motion, [event.time for event in events])
+    document: dict[str, object] = {
+        "model": scene.model,
+        "kind": joint.kind,
+        "motion": scene.kind,
+        "speed_deg_s": scene.speed_deg_s,
+        "from_deg": scene.start_deg,
+        "to_deg": scene.end_deg,
+        "catch_angle_deg": math.degrees(caught[0].angle) if caught else None,
+        "mean_speed_deg_s": None,
+        # of every millisecond and every event
+        "peak_torque_nm": float(np.concatenate((line.torque, at_events)).max()),
+        "phases": [
+            {
+                "name": name,
+                "start_s": start,
+                "end_s": end,
+                "start_deg": math.degrees(motion.angle(start)),
+                "end_deg": math.degrees(motion.angle(end)),
+            }
+            for name, start, end in line.phases
+        ],
+        "events": [
+            {
+                "name": event.name,
+                "time_s": event.time,
+                "angle_deg": math.degrees(event.angle),
+            }
+            for event in events
+        ],
+    }
+    if times:
+        late = [time for time in times if not 0.0 <= time <= motion.duration]
+        if late:
+            raise ParameterError(
+                f"--at-s: needs times within the motion, 0 to {motion.duration:g} s, "
+                f"got {late[0]:g}"
+            )
+        values = joint.torque(motion, list(times)).tolist()
+        document["torque_at_s"] = _torques("time_s", times, values)
+    if angles:
+        reached = times_at(motion, [math.radians(angle) for angle in angles])
+        values = joint.torque(motion, reached).tolist()
+        document["torque_at_deg"] = _torques("angle_deg", angles, values)
+    return document
+
+
+def _torques(
+    key: str, places: Sequence[float], values: Sequence[float]
+) -> list[dict[str, float]]:
+    return [
+        {key: place, "torque_nm": value}
+        for place, value in zip(places, values, strict=True)
+    ]
+
+
+def tone_line(scene: ToneScene) -> StretchLine:
+    """Return the exact torque of every millisecond, and the phases at these."""
+    import numpy as np
+
+    joint, motion = scene.joint, scene.motion
+    n_steps = math.floor(motion.duration * _RATE_HZ)
+    time = np.append(np.arange(n_steps + 1) / _RATE_HZ, motion.duration)
+    phases = stepped(joint, motion, time)[1].tolist()
+    spans, first = [], 0
+    for code, group in groupby(phases):
+        n = len(list(group))
+        last = min(first + n, time.size - 1)
+        spans.append((PHASES[code], float(time[first]), float(time[last])))
+        first += n
+    speed = scene.speed_deg_s
+    return StretchLine(
+        label=scene.kind if speed is None else f"{significant(speed)} deg/s",
+        time=time,
+        angle=np.degrees(motion.angle(time)),
+        torque=joint.torque(motion, time),
+        phases=tuple(spans),
+    )
+
+
+def stepped(
+    joint: "JointModel", motion: "Motion", time: "NDArray[Any]"
+) -> "tuple[NDArray[Any], NDArray[Any]]":
+    """Return the torque (N·m) and the phase at samples of a motion, (n,) each."""
+    import numpy as np
+
+    stepper = joint.stepper(motion.start)
+    torque, phase = np.empty(time.size), np.empty(time.size, dtype=np.int8)
+    columns = (time, motion.angle(time), motion.velocity(time))
+    samples = zip(*(column.tolist() for column in columns), strict=True)
+    for i, sample in enumerate(samples):
+        torque[i] = stepper.step(*sample)
+        phase[i] = stepper.phase
+    return torque, phase
+
+
+def event_lines(document: Mapping[str, Any]) -> list[str]:
+    """Return the events of a document for a person."""
+    return [
+        f"{event['name']} at {fixed_or_significant(event['time_s'], 3)} s, "
+        f"{fixed_or_significant(event['angle_deg'], 2)} deg"
+        for event in document.get("events", ())
+    ]
+
+
+def tardieu_document(
+    model: str, joint: "JointModel", start_deg: float, speeds: Sequence[float]
+) -> dict[str, object]:
+    """Return R2, R1, their difference and the catch at V1, V2 and V3 of a joint."""
+    # speeds: V1, V2 and V3, deg/s; none for the usual ones
+    from masrel.elbow import tardieu
+
+    start = math.radians(start_deg)
+    if speeds:
+        first, second, third = map(math.radians, speeds)
+        made = tardieu(joint, start_angle=start, speeds=(first, second, third))
+    else:
+        made = tardieu(joint, start_angle=start)
+    return {
+        "model": model,
+        "kind": joint.kind,
+        "from_deg": start_deg,
+        "r2_deg": math.degrees(made.range_angle),
+        "r1_deg": math.degrees(made.catch_angle),
+        "difference_deg": math.degrees(made.difference),
+        "catches": [
+            {
+                "name": f"V{nth}",
+                "speed_deg_s": math.degrees(speed),
+                "catch_angle_deg": None if angle is None else math.degrees(angle),
+            }
+            for nth, (speed, angle) in enumerate(
+                zip(made.speeds, made.catch_angles, strict=True), start=1
+            )
+        ],
+    }
+
+
+def tardieu_text(documents: Sequence[dict[str, Any]]) -> str:
+    """Return Tardieu's angles for a person, a joint a line."""
+    heads = [
+        f"{catch['name']} {significant(catch['speed_deg_s'])} deg/s"
+        for catch in documents[0]["catches"]
+    ]
+    rows = [["model", "R2 deg", "R1 deg", "R2 - R1", *heads]]
+    for document in documents:
+        angles = [document[key] for key in ("r2_deg", "r1_deg", "difference_deg")]
+        angles += [catch["catch_angle_deg"] for catch in document["catches"]]
+        cells = ["–" if a is None else fixed_or_significant(a, 2) for a in angles]
+        rows.append([document["model"], *cells])
+    numeric: list[Literal["right"]] = ["right"] * (len(rows[0]) - 1)
+    return "\n".join(
+        (
+            *aligned(rows, ["left", *numeric]),
+            "R2: where the range ends at V1. R1: the catch at V3, or R2 without one. "
+            "Then the catch at each speed.",
+        )
+    )
