@@ -23,6 +23,8 @@ from masrel.protocol import StudyPaths, copy_template, read_protocol
 def demo(out: Path, template: str | None, output: OutputOptions) -> None:
     """Run a complete simulated study in OUT and report it, and the published one.
 
+    After it comes a small study of other tone than spasticity.
+
     OUT must not exist or be empty. The same seed gives the same schedules, ratings,
     analysis and reports, byte for byte.
     """

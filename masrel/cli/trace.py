@@ -11,13 +11,6 @@ from typing import TYPE_CHECKING, Any, TextIO
 import click
 from tqdm import tqdm
 
-from masrel.cli._joint_options import (
-    JointOptions,
-    LawOptions,
-    joint_options,
-    joints_of,
-    law_options,
-)
 from masrel.cli._options import (
     OutputOptions,
     check_folder,
@@ -26,14 +19,14 @@ from masrel.cli._options import (
     output_options,
     write_output,
 )
-from masrel.errors import ParameterError
-from masrel.report._tone_scenes import (
-    ToneScene,
-    stepped,
-    tardieu_document,
-    tardieu_text,
-    tone_document,
+from masrel.cli._tone_traces import (
+    end_within,
+    joint_of_kind,
+    tone_scene,
+    write_tardieu,
 )
+from masrel.errors import ParameterError
+from masrel.report._tone_scenes import stepped
 from masrel.report._traced_scenes import (
     SCENE_OUTPUTS,
     SCENE_VIEWS,
@@ -49,7 +42,7 @@ from masrel.report._traced_scenes import (
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from masrel.elbow import JointModel, Motion
+    from masrel.elbow import ElbowParameters, JointModel, Motion
 
 _KINDS = ("constant", "minimum-jerk", "trapezoid", "recording")
 _COLUMNS = ("time_s", "angle_deg", "velocity_deg_s", "torque_nm", "phase")
@@ -108,20 +101,6 @@ class _MotionOptions:
         """Where it starts and ends unless it is a recording, deg."""
         start = 30.0 if self.start is None else self.start
         return start, 146.0 if self.end is None else self.end
-
-    def within(self, range_end: float) -> "_MotionOptions":
-        """Return the same, by default ended where the range of a joint is (rad)."""
-        limit = math.degrees(range_end)
-        if self.recording is not None:
-            return self
-        if self.end is None:
-            return replace(self, end=min(146.0, limit))
-        if self.end > limit + 1e-9:
-            raise ParameterError(
-                f"--to-deg: needs at most the end of range of every model, {limit:g} "
-                f"deg, got {self.end:g}"
-            )
-        return self
 
 
 _motion_options = grouped(
@@ -209,8 +188,90 @@ _quantity_options = grouped(
 )  # fmt: skip
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _LawOptions:
+    """What the command line changes of every joint; None changes nothing."""
+
+    rest: float | None  # θ_rest, deg
+    post_catch: str | None  # reading of (5)
+    reading: str | None  # reading of Q
+    rise: float | None  # how long torque takes to its peak, s
+    inertia: float | None  # m of (1) and (5), kg·m²
+
+    def change(self, joint: "JointModel") -> "JointModel":
+        """Return a joint with these changes, which only a spastic elbow can have."""
+        from masrel.elbow import ElbowParameters
+
+        changes: dict[str, object] = {
+            "rest_angle": None if self.rest is None else math.radians(self.rest),
+            "post_catch": self.post_catch,
+            "residual_reading": self.reading,
+            "catch_rise": self.rise,
+            "inertia": self.inertia,
+        }
+        changes = {name: value for name, value in changes.items() if value is not None}
+        if not changes:
+            return joint
+        if not isinstance(joint, ElbowParameters):
+            raise ParameterError(
+                "--rest-deg, --post-catch, --q-reading, --catch-rise-s, "
+                f"--inertia-kg-m2: need a spastic elbow, got {joint.kind}"
+            )
+        return replace(joint, **changes)  # type: ignore[arg-type]
+
+
+_law_options = grouped(
+    "law",
+    _LawOptions,
+    click.option("--rest-deg", "rest", type=float, help="θ_rest; default: the start."),
+    click.option(
+        "--post-catch", type=click.Choice(["continuous", "additive"]),
+        help="How (5) is read.",
+    ),
+    click.option(
+        "--q-reading", "reading", type=click.Choice(["residual", "decrease"]),
+        help="What Q is a share of the peak for.",
+    ),
+    click.option(
+        "--catch-rise-s", "rise", type=float, help="Smooth the catch's onset."
+    ),
+    click.option("--inertia-kg-m2", "inertia", type=float, help="m of (1) and (5)."),
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _JointOptions:
+    """The joints, however they are named."""
+
+    models: tuple[str, ...]
+    study: Path | None
+    kinds: tuple[str, ...]
+    parameters: tuple[str, ...]  # KEY=VALUE each
+
+
+_joint_options = grouped(
+    "names",
+    _JointOptions,
+    click.option(
+        "--model", "models", multiple=True,
+        help="HM1 to HM4, a model of --study, or a model file (.toml); may be given "
+        "again.",
+    ),
+    click.option("--study", type=_PATH, help="Take models from this study's protocol."),
+    click.option(
+        "--kind", "kinds", multiple=True,
+        help="Another kind of joint with its defaults, as in a protocol; may be given "
+        "again.",
+    ),
+    click.option(
+        "--parameter", "parameters", multiple=True, metavar="KEY=VALUE",
+        help="One of its numbers, as in [models.parameters]; may be given again.",
+    ),
+)  # fmt: skip
+
+
 @click.command("trace")
-@joint_options
+@_joint_options
 @click.option(
     "--speed-deg-s", "speeds", type=float, multiple=True,
     help="Mean speed, deg/s; of a trapezoid that of its level. May be given again.",
@@ -221,7 +282,7 @@ _quantity_options = grouped(
     metavar="LOW HIGH N", help="N speeds from LOW to HIGH.",
 )  # fmt: skip
 @_motion_options
-@law_options
+@_law_options
 @_quantity_options
 @_sample_options
 @output_options(
@@ -240,11 +301,11 @@ _quantity_options = grouped(
 )  # fmt: skip
 @click.option("--quiet", is_flag=True, help="Show no progress.")  # of the output
 def trace(
-    names: JointOptions,
+    names: _JointOptions,
     speeds: tuple[float, ...],
     speed_range: tuple[float, float, int] | None,
     stretch: _MotionOptions,
-    law: LawOptions,
+    law: _LawOptions,
     quantities: _QuantityOptions,
     samples: _SampleOptions,
     output: OutputOptions,
@@ -256,11 +317,15 @@ def trace(
     Events and outputs are exact; the samples of --csv are what the controller commands
     at --rate-hz for that motion. Several models or speeds make one scene of each pair.
     """
-    joints = joints_of(names, law)
+    joints = _joints_of(names, law)
     speeds = (*speeds, *_spaced(speed_range))
     if tardieu:
-        _refuse_more(stretch, quantities, samples, output)
-        _write_tardieu(joints, stretch.ends_deg[0], speeds, output)
+        plain = (
+            (stretch.kind, stretch.repeats) == ("constant", 1),
+            (stretch.end, stretch.stop, samples.csv_file) == (None, None, None),
+            not (quantities.outputs or quantities.times or quantities.angles),
+        )
+        write_tardieu(joints, stretch.ends_deg[0], speeds, output, plain=all(plain))
         return
     if view is not None and output.figure is None:
         raise ParameterError("--view: goes with --figure, whose contents it chooses")
@@ -272,7 +337,12 @@ def trace(
     if output.figure is not None:
         check_view(scenes, view)
     documents = [
-        _document(scene, quantities)
+        scene_document(
+            scene,
+            outputs=quantities.outputs,
+            times=quantities.times,
+            angles=quantities.angles,
+        )
         for scene in tqdm(
             scenes, desc="scenes", delay=1.0, disable=output.hides_progress
         )
@@ -294,65 +364,6 @@ def trace(
     )
 
 
-def _refuse_more(
-    stretch: _MotionOptions,
-    quantities: _QuantityOptions,
-    samples: _SampleOptions,
-    output: OutputOptions,
-) -> None:
-    # what --tardieu says nothing of
-    plain = (
-        stretch.kind == "constant" and stretch.repeats == 1,
-        (stretch.end, stretch.stop) == (None, None),
-        not (quantities.outputs or quantities.times or quantities.angles),
-        samples.csv_file is None and output.figure is None,
-    )
-    if not all(plain):
-        raise ParameterError(
-            "--tardieu: stretches at constant speed to the end of range and says "
-            "angles alone; it goes with --from-deg, --speed-deg-s and --json"
-        )
-
-
-def _write_tardieu(
-    joints: "dict[str, JointModel]",
-    start_deg: float,
-    speeds: Sequence[float],
-    output: OutputOptions,
-) -> None:
-    if speeds and len(speeds) != 3:
-        raise ParameterError(
-            f"--speed-deg-s: needs V1, V2 and V3 with --tardieu, got {len(speeds)}"
-        )
-    output.check_files()
-    documents = [
-        tardieu_document(name, joint, start_deg, speeds)
-        for name, joint in joints.items()
-    ]
-    write_output(
-        output,
-        document=lambda: (
-            documents[0] if len(documents) == 1 else {"tardieu": documents}
-        ),
-        text=lambda: tardieu_text(documents),
-    )
-
-
-def _document(scene: AnyScene, quantities: _QuantityOptions) -> dict[str, Any]:
-    if isinstance(scene, ToneScene):
-        if quantities.outputs:
-            raise ParameterError(
-                f"--output: needs spastic elbows, got {scene.joint.kind}"
-            )
-        return tone_document(scene, times=quantities.times, angles=quantities.angles)
-    return scene_document(
-        scene,
-        outputs=quantities.outputs,
-        times=quantities.times,
-        angles=quantities.angles,
-    )
-
-
 def _spaced(speed_range: tuple[float, float, int] | None) -> list[float]:
     if speed_range is None:
         return []
@@ -366,50 +377,39 @@ def _scenes(
     speeds: Sequence[float],
 ) -> list[AnyScene]:
     # one of each model and speed, however often an option repeats it
-    from masrel.elbow.tone import ToneModel
+    from masrel.elbow import ElbowParameters
 
     scenes: list[AnyScene] = []
     motions: dict[tuple[float | None, float], Motion] = {}  # by speed and end
     for name, joint in joints.items():
-        made = stretch
-        if isinstance(joint, ToneModel):
-            made = stretch.within(joint.range_end)
+        start, end = stretch.ends_deg
+        if stretch.recording is None and not isinstance(joint, ElbowParameters):
+            end = end_within(joint, stretch.end)
         for speed in dict.fromkeys(speeds or (None,)):
-            key = (speed, made.ends_deg[1])
-            if key not in motions:
-                motions[key] = _motion_of(made, speed)
-            scenes.append(_scene(name, joint, made, speed, motions[key]))
+            motion = motions.get((speed, end)) or _motion_of(stretch, speed, end)
+            motions[speed, end] = motion
+            if stretch.recording is not None:
+                start, end = math.degrees(motion.start), math.degrees(motion.end)
+            scenes.append(_scene(name, joint, stretch.kind, speed, start, end, motion))
     return scenes
 
 
 def _scene(
     name: str,
     joint: "JointModel",
-    stretch: _MotionOptions,
+    kind: str,
     speed: float | None,
+    start: float,
+    end: float,
     motion: "Motion",
 ) -> AnyScene:
     from masrel.elbow import ElbowParameters
-    from masrel.elbow.tone import ToneModel
 
-    start, end = stretch.ends_deg
-    if stretch.recording is not None:
-        start, end = math.degrees(motion.start), math.degrees(motion.end)
-    if isinstance(joint, ToneModel):
-        return ToneScene(
-            model=name,
-            kind=stretch.kind,
-            speed_deg_s=speed,
-            start_deg=start,
-            end_deg=end,
-            joint=joint,
-            motion=motion,
-        )
     if not isinstance(joint, ElbowParameters):
-        raise ParameterError(f"--model: needs a kind with exact events, got {name}")
+        return tone_scene(name, joint, kind, speed, start, end, motion)
     return Scene(
         model=name,
-        kind=stretch.kind,
+        kind=kind,
         speed_deg_s=speed,
         start_deg=start,
         end_deg=end,
@@ -418,10 +418,61 @@ def _scene(
     )
 
 
-def _motion_of(stretch: _MotionOptions, speed_deg_s: float | None) -> "Motion":
+def _joints_of(names: _JointOptions, law: _LawOptions) -> dict[str, "JointModel"]:
+    if not names.models and not names.kinds:
+        raise click.UsageError("Missing option '--model' or '--kind'.")
+    if names.parameters and len(names.kinds) != 1:
+        raise ParameterError("--parameter: goes with one --kind, whose it is")
+    joints: dict[str, JointModel] = {}
+    for model in dict.fromkeys(names.models):
+        is_file = model.endswith(".toml")
+        name = Path(model).stem if is_file else model
+        if name in joints:
+            raise ParameterError(
+                f"--model: needs models whose names differ, got two called {name}"
+            )
+        joints[name] = law.change(
+            _joint_in_file(model, names.study)
+            if is_file
+            else _named_joint(model, names.study)
+        )
+    for kind in dict.fromkeys(names.kinds):
+        joints[kind] = law.change(joint_of_kind(kind, names.parameters))
+    return joints
+
+
+def _joint_in_file(model: str, study: Path | None) -> "ElbowParameters":
+    from masrel.protocol import read_model_file
+
+    if study is not None:
+        raise ParameterError(
+            f"--model: needs a model of --study, got the file {model}; without --study "
+            "it is read with the usual constants"
+        )
+    return read_model_file(Path(model))
+
+
+def _named_joint(model: str, study: Path | None) -> "JointModel":
+    from masrel.elbow import STANDARD_MODELS
+
+    if study is not None:
+        from masrel.protocol import StudyPaths, joint_model, read_protocol
+
+        return joint_model(read_protocol(StudyPaths(study).protocol), model)
+    if model not in STANDARD_MODELS:
+        raise ParameterError(
+            f"--model: needs one of {', '.join(STANDARD_MODELS)}, or a model file "
+            f"(.toml), or --study to name a study's own, got {model!r}"
+        )
+    return STANDARD_MODELS[model]
+
+
+def _motion_of(
+    stretch: _MotionOptions, speed_deg_s: float | None, end_deg: float
+) -> "Motion":
     from masrel.elbow import Joined, Reversed, interrupted
 
-    once = _plain_motion(stretch, speed_deg_s)
+    once = _plain_motion(stretch, speed_deg_s, end_deg)
     motion = once
     if stretch.stop is not None and stretch.pause is not None:
         if not 0.0 < stretch.stop < once.duration:
@@ -438,7 +489,9 @@ def _motion_of(stretch: _MotionOptions, speed_deg_s: float | None) -> "Motion":
     return Joined(parts)
 
 
-def _plain_motion(stretch: _MotionOptions, speed_deg_s: float | None) -> "Motion":
+def _plain_motion(
+    stretch: _MotionOptions, speed_deg_s: float | None, end_deg: float
+) -> "Motion":
     from masrel.elbow import ConstantSpeed, MinimumJerk, Trapezoid
     from masrel.elbow.motions.file import read_motion
 
@@ -453,7 +506,7 @@ def _plain_motion(stretch: _MotionOptions, speed_deg_s: float | None) -> "Motion
         raise ParameterError(
             f"--speed-deg-s: needs a speed for --motion {stretch.kind}"
         )
-    start, end = map(math.radians, stretch.ends_deg)
+    start, end = math.radians(stretch.ends_deg[0]), math.radians(end_deg)
     speed = math.radians(speed_deg_s)
     if stretch.kind == "constant":
         return ConstantSpeed(start=start, end=end, speed=speed)

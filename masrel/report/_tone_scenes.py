@@ -5,7 +5,7 @@ the motion; of any joint the angles of the Tardieu scale.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from typing import TYPE_CHECKING, Any, Literal
@@ -46,10 +46,16 @@ class ToneScene:
 
 
 def tone_document(
-    scene: ToneScene, *, times: Sequence[float] = (), angles: Sequence[float] = ()
+    scene: ToneScene,
+    *,
+    outputs: Sequence[str] = (),
+    times: Sequence[float] = (),
+    angles: Sequence[float] = (),
 ) -> dict[str, object]:
     """Return the events of a scene, its peak torque, and torques at places."""
-    # times, angles: where torque is computed, s, deg
+    # times, angles: where torque is computed, s, deg; outputs: those of an elbow
+    if outputs:
+        raise ParameterError(f"--output: needs spastic elbows, got {scene.joint.kind}")
     import numpy as np
 
     from masrel.elbow import times_at
@@ -152,15 +158,6 @@ def stepped(
         torque[i] = stepper.step(*sample)
         phase[i] = stepper.phase
     return torque, phase
-
-
-def event_lines(document: Mapping[str, Any]) -> list[str]:
-    """Return the events of a document for a person."""
-    return [
-        f"{event['name']} at {fixed_or_significant(event['time_s'], 3)} s, "
-        f"{fixed_or_significant(event['angle_deg'], 2)} deg"
-        for event in document.get("events", ())
-    ]
 
 
 def tardieu_document(

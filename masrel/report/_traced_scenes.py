@@ -17,7 +17,7 @@ from masrel.report._figure_data import (
     StretchPanel,
 )
 from masrel.report._tables import aligned, fixed_or_significant, significant
-from masrel.report._tone_scenes import ToneScene, event_lines, tone_line
+from masrel.report._tone_scenes import ToneScene, tone_document, tone_line
 
 if TYPE_CHECKING:
     from masrel.elbow import ElbowParameters, Events, Motion
@@ -68,7 +68,7 @@ AnyScene = Scene | ToneScene
 
 
 def scene_document(
-    scene: Scene,
+    scene: AnyScene,
     *,
     outputs: Sequence[str] = (),
     times: Sequence[float] = (),
@@ -76,6 +76,8 @@ def scene_document(
 ) -> dict[str, object]:
     """Return the events of a scene, its peak torque, and what else was requested."""
     # outputs: of `SCENE_OUTPUTS`; times, angles: where torque is computed, s, deg
+    if isinstance(scene, ToneScene):
+        return tone_document(scene, outputs=outputs, times=times, angles=angles)
     from masrel import elbow
 
     joint, motion = scene.parameters, scene.motion
@@ -149,7 +151,11 @@ def scene_text(document: dict[str, Any], title: str) -> str:
             fixed_or_significant(span[key], 2) for key in ("start_deg", "end_deg")
         ]
         lines.append(_phase_line([span["name"], *times, *angles]))
-    lines += event_lines(document)
+    lines += [
+        f"{event['name']} at {fixed_or_significant(event['time_s'], 3)} s, "
+        f"{fixed_or_significant(event['angle_deg'], 2)} deg"
+        for event in document.get("events", ())  # of another kind of joint
+    ]
     lines.append(
         f"peak torque {fixed_or_significant(document['peak_torque_nm'], 3)} N·m"
     )

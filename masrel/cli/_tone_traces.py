@@ -1,0 +1,111 @@
+"""What ``masrel trace`` does for other kinds of joints, and the angles of Tardieu."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from masrel.cli._options import OutputOptions, write_output
+from masrel.errors import ParameterError
+from masrel.report._tone_scenes import ToneScene, tardieu_document, tardieu_text
+
+if TYPE_CHECKING:
+    from masrel.elbow import JointModel, Motion
+
+
+def joint_of_kind(kind: str, settings: Sequence[str]) -> "JointModel":
+    """Return a joint of a kind with numbers, each KEY=VALUE."""
+    from masrel.protocol._kinds import (
+        DEFAULT_KIND,
+        kind_problem,
+        model_of_kind,
+        value_problems,
+    )
+
+    if (problem := kind_problem(kind)) is not None:
+        raise ParameterError(f"--kind: {problem}")
+    if kind == DEFAULT_KIND:
+        raise ParameterError(
+            f"--kind: needs another kind than {kind}, whose models --model names"
+        )
+    values: dict[str, float] = {}
+    for setting in settings:
+        key, _, text = setting.partition("=")
+        try:
+            values[key] = float(text)
+        except ValueError as error:
+            raise ParameterError(
+                f"--parameter: needs KEY=VALUE with a number, got {setting!r}"
+            ) from error
+    for key, problem in value_problems(kind, values):
+        raise ParameterError(f"--parameter {key}: {problem}")
+    return model_of_kind(kind, values)
+
+
+def end_within(joint: "JointModel", end_deg: float | None) -> float:
+    """Return where a stretch ends, deg: at most where the range of the joint does."""
+    limit = math.degrees(joint.range_end)
+    if end_deg is None:
+        return min(146.0, limit)
+    if end_deg > limit + 1e-9:
+        raise ParameterError(
+            f"--to-deg: needs at most the end of range of every model, {limit:g} deg, "
+            f"got {end_deg:g}"
+        )
+    return end_deg
+
+
+def tone_scene(
+    name: str,
+    joint: "JointModel",
+    kind: str,
+    speed: float | None,
+    start: float,
+    end: float,
+    motion: "Motion",
+) -> ToneScene:
+    """Return the scene of a joint that is no spastic elbow; kind: of the motion."""
+    from masrel.elbow.tone import ToneModel
+
+    if not isinstance(joint, ToneModel):
+        raise ParameterError(f"--model: needs a law with exact events, got {name}")
+    return ToneScene(
+        model=name,
+        kind=kind,
+        speed_deg_s=speed,
+        start_deg=start,
+        end_deg=end,
+        joint=joint,
+        motion=motion,
+    )
+
+
+def write_tardieu(
+    joints: "Mapping[str, JointModel]",
+    start_deg: float,
+    speeds: Sequence[float],
+    output: OutputOptions,
+    *,
+    plain: bool,
+) -> None:
+    """Write R2, R1 and the catches of joints; plain: nothing else is requested."""
+    if not plain or output.figure is not None:
+        raise ParameterError(
+            "--tardieu: stretches at constant speed to the end of range and says "
+            "angles alone; it goes with --from-deg, --speed-deg-s and --json"
+        )
+    if speeds and len(speeds) != 3:
+        raise ParameterError(
+            f"--speed-deg-s: needs V1, V2 and V3 with --tardieu, got {len(speeds)}"
+        )
+    output.check_files()
+    documents = [
+        tardieu_document(name, joint, start_deg, speeds)
+        for name, joint in joints.items()
+    ]
+    write_output(
+        output,
+        document=lambda: (
+            documents[0] if len(documents) == 1 else {"tardieu": documents}
+        ),
+        text=lambda: tardieu_text(documents),
+    )
