@@ -39,7 +39,7 @@ from masrel.intervals._drawn_posterior import (
     nothing_to_learn,
     patterns_interval,
 )
-from masrel.intervals._problem import Integers, IntervalProblem, of_them, warn_small
+from masrel.intervals._problem import Integers, IntervalProblem, singular, warn_small
 from masrel.intervals._rho import (
     DEFAULT_PRIOR,
     RhoPosterior,
@@ -87,7 +87,8 @@ def choose_interval(
         return interval, f"few items ({problem.n_paired_items}), where it covers best"
     # below so many no method covers everywhere
     notes = warn_small(outside, 5 if unweighted else _SEVERAL, _OUTSIDE)
-    why = f"categories are rare ({of_them(outside, _OUTSIDE)}), where it covers best"
+    what = singular(_OUTSIDE) if outside == 1 else _OUTSIDE
+    why = f"categories are rare ({outside} {what}), where it covers best"
     return replace(interval, notes=(*notes, *interval.notes)), why
 
 

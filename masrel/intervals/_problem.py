@@ -462,17 +462,17 @@ def warn_small(
         return ()
     if of is not None and of > count:  # as many are there, few of them with a pair
         what += " with a pair of ratings"
-    what = of_them(count, what)
-    note = f"{what}: below {minimum} the interval may cover less than it says"
+    if count == 1:
+        what = singular(what)
+    note = f"{count} {what}: below {minimum} the interval may cover less than it says"
     # called by what a method calls: the warning points to who called the method
     warnings.warn(note, SmallSampleWarning, stacklevel=4)
     return (note,)
 
 
-def of_them(count: int, what: str) -> str:
-    """Return a count and of what, whose first plural goes for one."""
-    one = re.sub(r"s\b", "", what, count=1)
-    return f"{count} {one if count == 1 else what}"
+def singular(what: str) -> str:
+    """Return for one what is said in the plural."""
+    return re.sub(r"s\b", "", what, count=1)  # "items with ratings": the first alone
 
 
 def recorded_generator(
