@@ -6,7 +6,6 @@ what moving the arm takes, or the trace a controller would command.
 
 from typing import TYPE_CHECKING
 
-from masrel.elbow.effort import impulse, peak_torque, residual_torque, work
 from masrel.elbow.events import Events, PhaseSpan, StretchEvents, events
 from masrel.elbow.joint_model import MODELS, JointModel, Stepper
 from masrel.elbow.motion import Motion
@@ -24,9 +23,17 @@ from masrel.elbow.motions import (
 from masrel.elbow.outline import Outline, outline
 from masrel.elbow.parameters import STANDARD_MODELS, ElbowParameters
 from masrel.elbow.sampled import SampledJoint
-from masrel.elbow.scenes import SceneTable, evaluate, torque_traces
+from masrel.elbow.scenes import Columns, SceneTable, evaluate
 from masrel.elbow.tardieu import Tardieu, tardieu
-from masrel.elbow.torque import times_at, torque, torque_at
+from masrel.elbow.torque import (
+    impulse,
+    peak_torque,
+    residual_torque,
+    times_at,
+    torque,
+    torque_at,
+    work,
+)
 from masrel.elbow.trace import Trace, trace
 
 if TYPE_CHECKING:
@@ -40,6 +47,7 @@ if TYPE_CHECKING:
 __all__ = [
     "MODELS",
     "STANDARD_MODELS",
+    "Columns",
     "ConstantSpeed",
     "ElbowParameters",
     "Events",
@@ -75,7 +83,6 @@ __all__ = [
     "times_at",
     "torque",
     "torque_at",
-    "torque_traces",
     "trace",
     "work",
 ]

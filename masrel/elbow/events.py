@@ -1,20 +1,34 @@
-"""The events of a motion, as roots of it: no time stepping.
+"""The events of a motion, as roots of its pieces: no time stepping.
 
 Source: Park, Kim and Damiano (2012), IEEE TNSRE 20(3), 361-370,
 https://doi.org/10.1109/TNSRE.2012.2195330, equations (2), (4), (6) and Fig. 7.
 """
 
-from dataclasses import dataclass, field
-from decimal import Decimal
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
 
-from masrel.elbow.course import course
-from masrel.elbow.moments import Course, Moment, Stretch
+from masrel.elbow import _law
+from masrel.elbow._polynomials import (
+    NOTHING,
+    TIE,
+    Polynomial,
+    derivative,
+    first_above,
+    refined,
+    shifted,
+    split_at_roots,
+    value,
+)
 from masrel.elbow.motion import Motion
 from masrel.elbow.parameters import ElbowParameters
-from masrel.elbow.polynomial import exactly
-from masrel.recording import Phase
+from masrel.errors import ParameterError
+from masrel.recording import PHASES, Phase
 
-__all__ = ["Events", "PhaseSpan", "StretchEvents", "events", "events_of"]
+__all__ = ["Events", "PhaseSpan", "StretchEvents", "events"]
+
+_PRE_CATCH, _CATCH, _POST_CATCH = range(3)  # positions in PHASES
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,8 +98,6 @@ class Events:
         The motion ends, at its own end or at the end of range, s.
     phases : tuple of PhaseSpan
         The phases in order.
-    course : Course
-        The same in 50 digits; torque, work and impulse are computed from it.
 
     Notes
     -----
@@ -96,7 +108,6 @@ class Events:
     stretches: tuple[StretchEvents, ...]
     end: float
     phases: tuple[PhaseSpan, ...]
-    course: Course = field(repr=False, compare=False)
 
     @property
     def _first(self) -> StretchEvents | None:
@@ -157,8 +168,8 @@ def events(parameters: ElbowParameters, motion: Motion) -> Events:
     Returns
     -------
     Events
-        Each time and angle is the float nearest to the exact one; what the motion
-        does not reach is None.
+        Times within some units in their last place; what the motion does not reach
+        is None.
 
     Raises
     ------
@@ -167,7 +178,9 @@ def events(parameters: ElbowParameters, motion: Motion) -> Events:
 
     Notes
     -----
-    Times that agree to 30 digits of the piece of motion they are in count as one.
+    Two instants of a piece of the motion that are nearer than 1e-13 of its length are
+    one: what would begin at the very end of a piece does so in the next, or not at all.
+    A speed that differs from ν_th by rounding alone is ν_th.
 
     Examples
     --------
@@ -176,75 +189,286 @@ def events(parameters: ElbowParameters, motion: Motion) -> Events:
     >>> from math import degrees, radians
     >>> from masrel.elbow import STANDARD_MODELS, ConstantSpeed
     >>> stretch = ConstantSpeed(start=radians(30), end=radians(146), speed=radians(92))
-    >>> found = events(STANDARD_MODELS["HM3"], stretch)
-    >>> round(degrees(found.catch_angle), 6)
+    >>> result = events(STANDARD_MODELS["HM3"], stretch)
+    >>> round(degrees(result.catch_angle), 6)
     82.8
-    >>> [span.name for span in found.phases]
+    >>> [span.name for span in result.phases]
     ['pre-catch', 'catch', 'post-catch']
     """
-    return events_of(parameters, course(parameters, motion))
-
-
-def events_of(parameters: ElbowParameters, found: Course) -> Events:
-    """Round a course to events.
-
-    Parameters
-    ----------
-    parameters : ElbowParameters
-        The joint.
-    found : Course
-        What happens in a motion.
-
-    Returns
-    -------
-    Events
-        The same, in floats.
-    """
-    with exactly():
-        stretches = tuple(
-            _stretch(stretch, Decimal(parameters.peak_duration), found.end)
-            for stretch in found.stretches
-        )
-    return Events(
-        stretches=stretches,
-        end=float(found.end.time),
-        phases=_phases(found),
-        course=found,
-    )
-
-
-def _stretch(stretch: Stretch, peak: Decimal, end: Moment) -> StretchEvents:
-    catch, ended = stretch.catch, stretch.catch_end
-    if catch is None:
-        return StretchEvents(onset=float(stretch.onset.time))
-    last = end if ended is None else ended
-    return StretchEvents(
-        onset=float(stretch.onset.time),
-        catch=float(catch.time),
-        catch_angle=float(catch.angle),
-        catch_speed=float(catch.velocity),
-        mean_speed=None if stretch.mean_speed is None else float(stretch.mean_speed),
-        peak_end=float(min(catch.time + peak, last.time)),
-        catch_end=_time(ended),
-        post_catch_end=_time(stretch.post_catch_end),
-    )
-
-
-def _time(moment: Moment | None) -> float | None:
-    return None if moment is None else float(moment.time)
-
-
-def _phases(found: Course) -> tuple[PhaseSpan, ...]:
-    # one of no length is left out
-    ends = [change.moment for change in found.changes[1:]] + [found.end]
-    return tuple(
+    line = timeline(parameters, motion)
+    origin, end = motion.origin, line.end
+    ends = [state for _, state, _ in line.changes[1:]] + [end]
+    phases = [
         PhaseSpan(
-            name=change.phase,
-            start=float(change.moment.time),
-            end=float(end.time),
-            start_angle=float(change.moment.angle),
-            end_angle=float(end.angle),
+            name=PHASES[code],
+            start=start.time,
+            end=until.time,
+            start_angle=origin + start.angle,
+            end_angle=origin + until.angle,
         )
-        for change, end in zip(found.changes, ends, strict=True)
-        if end.time > change.moment.time
+        for (code, start, _), until in zip(line.changes, ends, strict=True)
+        if until.time > start.time  # one of no length is left out
+    ]
+    stretches = [rounded(stretch, origin, end) for stretch in line.stretches]
+    return Events(stretches=tuple(stretches), end=end.time, phases=tuple(phases))
+
+
+def first_stretch(line: "Timeline") -> "Stretch | None":
+    """Return the first stretch that catches, or the first if none does."""
+    caught = [stretch for stretch in line.stretches if stretch.catch is not None]
+    return next(iter(caught or line.stretches), None)
+
+
+def rounded(stretch: "Stretch", origin: float, end: "State") -> StretchEvents:
+    """Return what the API says of a stretch."""
+    if stretch.catch is None:
+        return StretchEvents(onset=stretch.onset.time)
+    left, slowed = stretch.catch_end, stretch.post_catch_end
+    return StretchEvents(
+        onset=stretch.onset.time,
+        catch=stretch.catch.time,
+        catch_angle=origin + stretch.catch.angle,
+        catch_speed=stretch.catch_speed,
+        mean_speed=stretch.mean_speed,
+        peak_end=min(stretch.peak_end, (end if left is None else left).time),
+        catch_end=None if left is None else left.time,
+        post_catch_end=None if slowed is None else slowed.time,
     )
+
+
+class State(NamedTuple):
+    """An instant of a motion."""
+
+    time: float  # s
+    angle: float  # rad from the motion's origin
+
+
+@dataclass(slots=True)
+class Stretch:
+    """A movement in extension that reached ν_th, as far as it has got."""
+
+    onset: State
+    catch: State | None = None
+    catch_speed: float = 0.0  # v_c of (3)
+    mean_speed: float = 0.0  # v̄ of (2)
+    pre_end: float = 0.0  # τ_pre_end of (3)
+    rise: float = 0.0  # H·v_c of (3)
+    peak_end: float = 0.0  # s; the catch may end before
+    catch_end: State | None = None  # by the angle travelled, or as the arm is flexed
+    post_catch: State | None = None
+    post_catch_end: State | None = None
+
+
+class Timeline(NamedTuple):
+    """What happens in a motion."""
+
+    # phases in order, each with the stretch whose catch or post-catch it is
+    changes: list[tuple[int, State, Stretch | None]]
+    stretches: list[Stretch]
+    end: State  # of the motion, or of the range of motion
+
+
+def rest_angle(p: ElbowParameters, motion: Motion) -> float:
+    """θ_rest of (1), rad from the motion's origin."""
+    return (motion.start if p.rest_angle is None else p.rest_angle) - motion.origin
+
+
+def timeline(p: ElbowParameters, motion: Motion) -> Timeline:
+    """Find out what happens in a motion, piece by piece."""
+    if motion.start >= p.range_end:
+        raise ParameterError(
+            "start: needs less than the end of range, "
+            f"{math.degrees(p.range_end):g} degrees, got "
+            f"{math.degrees(motion.start):g} degrees"
+        )
+    machine, limit = _PhaseMachine(p, motion), p.range_end - motion.origin
+    near = limit + NOTHING * abs(limit)
+    for start, length, angle, slowest, fastest in motion.pieces():
+        if not machine.changes:
+            machine.change(_PRE_CATCH, State(0.0, angle[0]))
+        last, end = None, value(angle, length)
+        if (end if slowest >= 0.0 else angle[0] + fastest * length) > near:
+            last = first_above([angle[0] - limit, *angle[1:]], 0.0, length)
+        until = length if last is None else last
+        if until > 0.0:
+            machine.piece(start, angle, until, slowest, fastest)
+        if last is not None:
+            break
+    end = State(motion.duration, motion.end - motion.origin)
+    if last is not None:
+        end = State(start + last, limit)
+    return Timeline(machine.changes, machine.stretches, end)
+
+
+class _PhaseMachine:
+    """The state machine of Fig. 7, led from piece to piece instead of sampled."""
+
+    def __init__(self, p: ElbowParameters, motion: Motion) -> None:
+        self.p = p
+        self.law = _law.pre_catch(p, rest_angle(p, motion))
+        self.constant = p.catch_angle_constant - motion.origin  # L
+        smallest, largest = _law.catch_bounds(p, motion.origin)
+        # θ_catch jumps at ν_H where ν_L is above that
+        self.jumps = smallest - largest > NOTHING
+        self.lowest, self.highest = sorted((smallest, largest))
+        self.phase = _PRE_CATCH
+        self.goal = math.inf  # angle at which the catch ends, rad from the origin
+        self.is_armed = True
+        self.since: float | None = None  # time since onset, of a movement in pre-catch
+        self.changes: list[tuple[int, State, Stretch | None]] = []
+        self.stretches: list[Stretch] = []
+
+    def change(self, phase: int, state: State) -> None:
+        stretch = None if phase == _PRE_CATCH else self.stretches[-1]
+        self.phase = phase
+        self.changes.append((phase, state, stretch))
+
+    def piece(
+        self,
+        start: float,
+        angle: Polynomial,
+        length: float,
+        slowest: float,
+        fastest: float,
+    ) -> None:
+        """Go through a piece, cut where its speed passes ν_th either way."""
+        threshold = self.p.speed_threshold
+        if slowest > threshold:
+            self.fast(start, angle, length, may_catch=True)
+        elif fastest <= -threshold:
+            self.flexed(State(start, angle[0]))
+        elif -threshold < slowest and fastest < threshold:
+            self.slow(start, angle, 0.0, length, fastest)
+        else:
+            speed = derivative(angle)
+            cuts = split_at_roots(speed, length, (threshold, -threshold))
+            for low, high in pairwise(cuts):
+                middle = value(speed, 0.5 * (low + high))
+                if (
+                    len(speed) > 1
+                    and abs(abs(middle) - threshold) < NOTHING * threshold
+                ):
+                    middle = math.copysign(threshold, middle)
+                if middle <= -threshold:
+                    self.flexed(State(start + low, value(angle, low)))
+                elif middle < threshold:
+                    self.slow(start, angle, low, high, fastest)
+                else:
+                    part = shifted(angle, low) if low else angle
+                    may_catch = middle > threshold
+                    self.fast(start + low, part, high - low, may_catch=may_catch)
+
+    def flexed(self, state: State) -> None:
+        # the stretch is over, and the next may catch
+        if self.phase == _CATCH:
+            self.stretches[-1].catch_end = state
+        if self.phase == _POST_CATCH:
+            self.stretches[-1].post_catch_end = state
+        if self.phase != _PRE_CATCH:
+            self.change(_PRE_CATCH, state)
+        self.is_armed, self.since = True, None
+
+    def slow(
+        self, start: float, angle: Polynomial, low: float, high: float, fastest: float
+    ) -> None:
+        if (
+            self.phase == _CATCH
+            and value(angle, low) + fastest * (high - low) > self.goal
+        ):
+            low = self.leave_catch(start, angle, low, high, grows=False)
+        if self.phase == _POST_CATCH:  # ends below ν_th, Fig. 7
+            state = State(start + low, value(angle, low))
+            self.stretches[-1].post_catch_end = state
+            self.change(_PRE_CATCH, state)
+        self.since = None
+
+    def fast(
+        self, start: float, angle: Polynomial, length: float, *, may_catch: bool
+    ) -> None:
+        at = 0.0
+        if self.phase == _PRE_CATCH:
+            if self.since is None:
+                self.since = 0.0
+                self.stretches.append(Stretch(State(start, angle[0])))
+            place = None
+            if may_catch and self.is_armed:
+                place = self.catch_place(angle, length)
+            if place is None:
+                self.since += length
+                return
+            self.catch(start, angle, place)
+            at = place
+        if self.phase == _CATCH:
+            self.leave_catch(start, angle, at, length, grows=True)
+
+    def catch_place(self, angle: Polynomial, length: float) -> float | None:
+        """Where a piece of a movement first passes the catch angle; θ only grows."""
+        end = value(angle, length)
+        if end <= self.lowest:
+            return None
+        p, onset = self.p, self.stretches[-1].onset.angle
+        way, since = angle[1:], [1.0]  # both over the time, in the piece of the onset
+        if self.since:
+            top = end + p.catch_slope * (end - onset) / self.since
+            if not self.jumps and end <= self.highest and top <= self.constant:
+                return None  # even at its end, with the mean speed too large
+            way, since = [angle[0] - onset, *angle[1:]], [self.since, 1.0]
+        if self.jumps:
+            line = _law.slow_line(p, way, since)
+        else:
+            line = _law.catch_line(p, self.constant, angle, way, since)
+        place = first_above(line, 0.0, length)
+        if place is not None and value(angle, place) < self.lowest:
+            least = _reach(angle, self.lowest, place, length)
+            place = first_above(line, least, length)
+        if end > self.highest and (place is None or value(angle, place) > self.highest):
+            place = _reach(angle, self.highest, 0.0, length)
+        is_tie = place is not None and length - place <= TIE * length
+        return None if is_tie else place
+
+    def catch(self, start: float, angle: Polynomial, at: float) -> None:
+        p, stretch = self.p, self.stretches[-1]
+        speeds = derivative(angle)
+        state, speed = State(start + at, value(angle, at)), value(speeds, at)
+        if self.since:
+            way = state.angle - stretch.onset.angle
+            stretch.mean_speed = way / (self.since + at)
+        else:
+            stretch.mean_speed = value(angle[1:], at)
+        stretch.catch, stretch.catch_speed = state, speed
+        stretch.pre_end = self.law.commanded(state.angle, speed)
+        if p.inertia:
+            stretch.pre_end += p.inertia * value(derivative(speeds), at)
+        stretch.rise = p.catch_torque_constant * speed
+        stretch.peak_end = state.time + p.peak_duration
+        self.goal = state.angle + p.catch_travel
+        self.is_armed, self.since = False, None
+        self.change(_CATCH, state)
+
+    def leave_catch(
+        self, start: float, angle: Polynomial, low: float, high: float, *, grows: bool
+    ) -> float:
+        # (4): the catch ends when the angle travelled exceeds D
+        place: float | None
+        if grows:
+            if value(angle, high) <= self.goal:
+                return low
+            place = _reach(angle, self.goal, low, high)
+        else:
+            place = first_above([angle[0] - self.goal, *angle[1:]], low, high)
+        if place is None or high - place <= TIE * high:
+            return low
+        state = State(start + place, value(angle, place))
+        self.stretches[-1].catch_end = self.stretches[-1].post_catch = state
+        self.change(_POST_CATCH, state)
+        return place
+
+
+def _reach(angle: Polynomial, goal: float, low: float, high: float) -> float:
+    # where a growing angle reaches a goal that its end is beyond
+    left = goal - value(angle, low)
+    if left <= 0.0:
+        return low
+    share = left / (left + value(angle, high) - goal)
+    line = [angle[0] - goal, *angle[1:]]
+    return refined(line, low, high, guess=low + share * (high - low))

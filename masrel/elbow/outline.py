@@ -1,20 +1,17 @@
 """A motion as a line to draw: few points, every jump as a jump."""
 
 import math
+from bisect import bisect_right
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.elbow.course import course
-from masrel.elbow.events import Events, events_of
-from masrel.elbow.legs import legs
+from masrel.elbow.events import Events, events, timeline
 from masrel.elbow.motion import Floats, Motion
 from masrel.elbow.parameters import ElbowParameters
-from masrel.elbow.polynomial import exactly
-from masrel.elbow.torque import leg_torque
+from masrel.elbow.torque import segment_torque, segments
 from masrel.errors import ParameterError
-from masrel.recording import PHASES
 
 __all__ = ["Outline", "outline"]
 
@@ -82,25 +79,22 @@ def outline(
     """
     if n_points < 2:
         raise ParameterError(f"n_points: needs 2 or more, got {n_points}")
-    found = course(parameters, motion)
+    line = timeline(parameters, motion)
     times, torques, codes = [], [], []
-    starts = [float(change.moment.time) for change in found.changes]
-    phases = [PHASES.index(change.phase) for change in found.changes]
-    end = float(found.end.time)
-    with exactly():
-        for leg in legs(parameters, motion, found):
-            low, high = float(leg.start), float(leg.end)
-            n = max(2, math.ceil(n_points * (high - low) / end) + 1)
-            at = np.linspace(low, high, n)
-            times.append(at)
-            torques.append(leg_torque(leg, motion, at))
-            code = phases[int(np.searchsorted(starts, low, side="right")) - 1]
-            codes.append(np.full(n, code, dtype=np.int8))
+    starts = [state.time for _, state, _ in line.changes]
+    for segment in segments(parameters, motion, line):
+        low, high = segment.start, segment.end
+        n = max(2, math.ceil(n_points * (high - low) / line.end.time) + 1)
+        at = np.linspace(low, high, n)
+        times.append(at)
+        torques.append(segment_torque(segment, motion, at))
+        code = line.changes[bisect_right(starts, low) - 1][0]
+        codes.append(np.full(n, code, dtype=np.int8))
     time = np.concatenate(times)
     return Outline(
         time=time,
         angle=motion.angle(time),
         torque=np.concatenate(torques),
         phase=np.concatenate(codes),
-        events=events_of(parameters, found),
+        events=events(parameters, motion),
     )

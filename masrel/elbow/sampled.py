@@ -1,11 +1,14 @@
-"""The sampled law: what a controller decides at every sample of a motion.
+"""The sampled joint: what a controller decides at every sample of a motion.
 
 Source: Park, Kim and Damiano (2012), IEEE TNSRE 20(3), 361-370,
-https://doi.org/10.1109/TNSRE.2012.2195330, Fig. 7 and equations (1)-(6).
+https://doi.org/10.1109/TNSRE.2012.2195330, Fig. 7; its equations are in `_law`.
 """
 
 import math
 from typing import TYPE_CHECKING
+
+from masrel.elbow import _law
+from masrel.elbow._law import TorqueLaw
 
 if TYPE_CHECKING:
     from masrel.elbow.parameters import ElbowParameters
@@ -49,16 +52,15 @@ class SampledJoint:
     """
 
     __slots__ = (
-        "_additive",
         "_armed",
-        "_catch_speed",
+        "_law",
         "_moving",
         "_onset_angle",
         "_onset_time",
         "_parameters",
-        "_post_angle",
+        "_pre_catch",
         "_pre_end",
-        "_rest",
+        "_rise",
         "catch_angle",
         "catch_time",
         "mean_speed",
@@ -68,8 +70,10 @@ class SampledJoint:
     def __init__(self, parameters: "ElbowParameters", *, start_angle: float) -> None:
         rest = parameters.rest_angle
         self._parameters = parameters
-        self._rest = start_angle if rest is None else rest
-        self._additive = parameters.post_catch == "additive"
+        self._pre_catch = _law.pre_catch(
+            parameters, start_angle if rest is None else rest
+        )
+        self._law: TorqueLaw = self._pre_catch  # the one that holds
         self.phase = PRE_CATCH
         self.catch_time = math.nan
         self.catch_angle = math.nan
@@ -78,14 +82,12 @@ class SampledJoint:
         self._moving = False
         self._onset_time = 0.0
         self._onset_angle = start_angle
-        self._catch_speed = 0.0  # v_c of (3)
         self._pre_end = 0.0  # τ_pre_end of (3)
-        self._post_angle = 0.0  # θ_post of (5)
+        self._rise = 0.0  # H·v_c of (3)
 
     def release(self) -> None:
         """Return to pre-catch at once, as when the grip is lost (section III.B.3)."""
-        self.phase = PRE_CATCH
-        self._moving = False
+        self._to_pre_catch()
         self._armed = False
 
     def step(self, time_s: float, angle: float, velocity: float) -> float:
@@ -107,20 +109,19 @@ class SampledJoint:
         """
         threshold = self._parameters.speed_threshold
         if velocity <= -threshold:  # flexed again: the stretch is over
-            self.phase = PRE_CATCH
+            self._to_pre_catch()
             self._armed = True
-            self._moving = False
         elif self.phase == PRE_CATCH:
             self._watch_for_catch(time_s, angle, velocity)
         elif self.phase == CATCH:
             # (4): t - t_c > D / v̄_c, the angle travelled exceeds D
             if angle - self.catch_angle > self._parameters.catch_travel:
-                self.phase = POST_CATCH
-                self._post_angle = angle
+                self._to_post_catch(angle)
         elif velocity < threshold:  # post-catch ends, Fig. 7
-            self.phase = PRE_CATCH
-            self._moving = False
-        return self._torque(time_s, angle, velocity)
+            self._to_pre_catch()
+        if self.phase == CATCH:
+            return self._catch_torque(time_s - self.catch_time)
+        return float(self._law.commanded(angle, velocity))
 
     def _watch_for_catch(self, time_s: float, angle: float, velocity: float) -> None:
         parameters = self._parameters
@@ -141,30 +142,24 @@ class SampledJoint:
             self._armed = False
             self.catch_time = time_s
             self.catch_angle = angle
-            self._catch_speed = velocity
-            self._pre_end = self._pre_catch_torque(angle, velocity)
+            self._pre_end = self._pre_catch.commanded(angle, velocity)
+            self._rise = parameters.catch_torque_constant * velocity
 
-    def _pre_catch_torque(self, angle: float, velocity: float) -> float:
-        parameters = self._parameters  # (1) without m·θ̈
-        return parameters.damping * velocity + parameters.stiffness * (
-            angle - self._rest
+    def _catch_torque(self, since: float) -> float:
+        parameters = self._parameters
+        if since < parameters.catch_rise:
+            share = _law.onset_share(since / parameters.catch_rise)
+            return float(self._pre_end + self._rise * share)
+        peak, residual = _law.catch(parameters, self._pre_end, self._rise)
+        return float((peak if since < parameters.peak_duration else residual).level)
+
+    def _to_post_catch(self, angle: float) -> None:
+        self.phase = POST_CATCH
+        self._law = _law.post_catch(
+            self._parameters, self._pre_end, self._rise, angle, self._pre_catch.origin
         )
 
-    def _torque(self, time_s: float, angle: float, velocity: float) -> float:
-        if self.phase == PRE_CATCH:
-            return self._pre_catch_torque(angle, velocity)
-        parameters = self._parameters
-        rise = parameters.catch_torque_constant * self._catch_speed  # H·v_c
-        if self.phase == CATCH:
-            since = time_s - self.catch_time
-            if since < parameters.catch_rise:  # a smoothed onset
-                share = since / parameters.catch_rise
-                return self._pre_end + rise * (share * share * (3.0 - 2.0 * share))
-            if since < parameters.peak_duration:
-                return self._pre_end + rise  # (3), first line
-            return self._pre_end + parameters.residual_share * rise  # (3), second line
-        residual = parameters.residual_share * rise
-        climb = parameters.post_catch_stiffness * (angle - self._post_angle)
-        if self._additive:  # (5) as Table III's footnote reads it
-            return self._pre_catch_torque(angle, velocity) + residual + climb
-        return self._pre_end + residual + climb  # (5), continuous
+    def _to_pre_catch(self) -> None:
+        self.phase = PRE_CATCH
+        self._law = self._pre_catch
+        self._moving = False

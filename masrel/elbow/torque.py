@@ -1,34 +1,50 @@
-"""Torque of a motion at given times or angles, from the exact events.
+"""Torque of a motion at times or angles, and what it asks of whoever moves the arm.
+
+Everything comes from the events and from polynomials, piece by piece: no trace.
 
 Source: Park, Kim and Damiano (2012), IEEE TNSRE 20(3), 361-370,
 https://doi.org/10.1109/TNSRE.2012.2195330, equations (1), (3) and (5).
 """
 
 import math
-from decimal import Decimal
-from itertools import pairwise
+from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from masrel.elbow.events import Events, events
-from masrel.elbow.legs import Leg, legs
+from masrel.elbow import _law
+from masrel.elbow._law import TorqueLaw
+from masrel.elbow._polynomials import (
+    Number,
+    Polynomial,
+    derivative,
+    first_above,
+    integral,
+    product,
+    shifted,
+    split_at_roots,
+    value,
+)
+from masrel.elbow.events import Timeline, rest_angle, timeline
 from masrel.elbow.motion import Floats, Motion
 from masrel.elbow.parameters import ElbowParameters
-from masrel.elbow.polynomial import ONE, ZERO, exactly, value
-from masrel.elbow.roots import cuts
 from masrel.errors import ParameterError
 
-__all__ = ["leg_torque", "times_at", "torque", "torque_at"]
+__all__ = [
+    "impulse",
+    "peak_torque",
+    "residual_torque",
+    "times_at",
+    "torque",
+    "torque_at",
+    "work",
+]
+
+_SAME_ANGLE = 1e-15  # rad: the end of a motion, of which `end` is the nearest float
 
 
-def torque(
-    parameters: ElbowParameters,
-    motion: Motion,
-    times: ArrayLike,
-    *,
-    found: Events | None = None,
-) -> Floats:
+def torque(parameters: ElbowParameters, motion: Motion, times: ArrayLike) -> Floats:
     """Return the torque of a motion at given times.
 
     Parameters
@@ -39,8 +55,6 @@ def torque(
         The motion, SI units.
     times : array_like, shape (n_times,)
         Times within the motion, s.
-    found : Events, optional
-        Its events, when they are known already.
 
     Returns
     -------
@@ -65,57 +79,20 @@ def torque(
     4.5522
     """
     at = np.atleast_1d(np.asarray(times, dtype=np.float64))
-    found = events(parameters, motion) if found is None else found
-    if at.size and not (at.min() >= 0.0 and at.max() <= found.end):
+    line = timeline(parameters, motion)
+    end = line.end.time
+    if at.size and not (at.min() >= 0.0 and at.max() <= end):
         raise ParameterError(
-            f"times: need 0 to {found.end:g} s, the end of the stretch, "
+            f"times: need 0 to {end:g} s, the end of the stretch, "
             f"got {at.min():g} to {at.max():g} s"
         )
     values = np.empty(at.shape)
-    with exactly():
-        laid = legs(parameters, motion, found.course)
-        starts = np.array([float(leg.start) for leg in laid])
-        which = np.searchsorted(starts, at, side="right") - 1
-        for i, leg in enumerate(laid):
-            mine = which == i
-            if mine.any():
-                values[mine] = leg_torque(leg, motion, at[mine])
-    return values
-
-
-def leg_torque(leg: Leg, motion: Motion, at: Floats) -> Floats:
-    """Return the torque of one law, also at the instant at which the next begins.
-
-    Parameters
-    ----------
-    leg : Leg
-        The law; read within `masrel.elbow.polynomial.exactly`.
-    motion : Motion
-        The motion.
-    at : ndarray, shape (n_times,)
-        Times of the leg, s.
-
-    Returns
-    -------
-    ndarray, shape (n_times,)
-        Torque that resists extension, N·m.
-    """
-    # The origin is a root, known better than a float: what is left of it is taken off
-    # the difference of angles, which is small.
-    values = np.full(at.shape, float(leg.level))
-    if leg.stiffness:
-        origin = float(leg.origin)
-        left = float(leg.origin - Decimal(origin))
-        values += float(leg.stiffness) * (motion.angle(at, origin) - left)
-    if leg.damping:
-        values += float(leg.damping) * motion.velocity(at)
-    if leg.inertia:
-        values += float(leg.inertia) * motion.acceleration(at)
-    if leg.rise:
-        start = float(leg.start)
-        since = (at - start) - float(leg.start - Decimal(start))
-        share = np.clip(since / float(leg.rise_time), 0.0, 1.0)
-        values += float(leg.rise) * (share * share * (3.0 - 2.0 * share))
+    laid = segments(parameters, motion, line)
+    which = np.searchsorted([segment.start for segment in laid], at, side="right") - 1
+    for i, segment in enumerate(laid):
+        mine = which == i
+        if mine.any():
+            values[mine] = segment_torque(segment, motion, at[mine])
     return values
 
 
@@ -150,15 +127,15 @@ def torque_at(parameters: ElbowParameters, motion: Motion, angles: ArrayLike) ->
     >>> torque_at(STANDARD_MODELS["HM3"], stretch, [radians(146)]).round(3)
     array([10.984])
     """
-    found = events(parameters, motion)
-    times = np.minimum(times_at(motion, angles), found.end)
-    beyond = np.asarray(angles, dtype=np.float64) > parameters.range_end
-    if beyond.any():
+    goals = np.asarray(angles, dtype=np.float64)
+    times = times_at(motion, goals)
+    if (goals > parameters.range_end).any():
         raise ParameterError(
             f"angles: need {math.degrees(parameters.range_end):g} degrees, the end of "
             "range, or less"
         )
-    return torque(parameters, motion, times, found=found)
+    end = timeline(parameters, motion).end.time
+    return torque(parameters, motion, np.minimum(times, end))
 
 
 def times_at(motion: Motion, angles: ArrayLike) -> Floats:
@@ -174,7 +151,7 @@ def times_at(motion: Motion, angles: ArrayLike) -> Floats:
     Returns
     -------
     ndarray, shape (n_angles,)
-        Times, s, each the float nearest to the exact one.
+        Times, s.
 
     Raises
     ------
@@ -188,26 +165,277 @@ def times_at(motion: Motion, angles: ArrayLike) -> Floats:
     array([0., 1., 2.])
     """
     goals = np.atleast_1d(np.asarray(angles, dtype=np.float64)).tolist()
-    with exactly():
-        return np.array([_first_time(motion, goal) for goal in goals])
+    return np.array([_first_time(motion, goal) for goal in goals])
 
 
 def _first_time(motion: Motion, goal: float) -> float:
-    if goal == motion.start:
-        return 0.0
-    time, angle = ZERO, Decimal(goal)
-    for piece in motion.pieces() if math.isfinite(goal) else ():
-        above = (piece.angle[0] - angle, *piece.angle[1:])
-        for low, high in pairwise(cuts((above,), ZERO, ONE)):
-            if high < 1 or (value(above, low) > 0) != (value(above, high) > 0):
-                return float(time + high * piece.length)
-        time += piece.length
-        if abs(value(above, ONE)) < _NEAR:
-            return float(time)
+    # where goal - θ has not the sign any more that it has at the start
+    sign = 1.0 if goal > motion.start else -1.0
+    for start, length, angle, _, _ in motion.pieces() if math.isfinite(goal) else ():
+        if goal == motion.start:
+            return 0.0
+        left = (goal - motion.origin) - angle[0]
+        place = first_above([-sign * left, *[sign * c for c in angle[1:]]], 0.0, length)
+        if place is not None:
+            return start + place
+        if abs(value(angle, length) - angle[0] - left) < _SAME_ANGLE:
+            return min(start + length, motion.duration)
     raise ParameterError(
         f"angles: need ones that the motion reaches, got {math.degrees(goal):g} degrees"
     )
 
 
-_NEAR = Decimal("1e-15")
-# rad: the end of a motion, of which `end` is the nearest float
+def peak_torque(parameters: ElbowParameters, motion: Motion) -> float:
+    """Return the largest torque of a motion, without a trace.
+
+    Parameters
+    ----------
+    parameters : ElbowParameters
+        The joint.
+    motion : Motion
+        The motion, SI units.
+
+    Returns
+    -------
+    float
+        The largest torque, N·m: at an event, at an end, or where a phase's torque
+        turns.
+
+    Raises
+    ------
+    ParameterError
+        If the motion starts at or beyond the end of range.
+
+    Examples
+    --------
+    >>> from math import radians
+    >>> from masrel.elbow import STANDARD_MODELS, ConstantSpeed
+    >>> stretch = ConstantSpeed(start=radians(30), end=radians(146), speed=radians(92))
+    >>> round(peak_torque(STANDARD_MODELS["HM3"], stretch), 3)
+    10.984
+    """
+    return loads(parameters, motion, timeline(parameters, motion), "peak_torque")
+
+
+def residual_torque(parameters: ElbowParameters, motion: Motion) -> float:
+    """Return the torque after the peak of the first catch, (3), second line.
+
+    Parameters
+    ----------
+    parameters : ElbowParameters
+        The joint.
+    motion : Motion
+        The motion, SI units.
+
+    Returns
+    -------
+    float
+        The torque, N·m, also where the catch ends before its peak does; ``nan``
+        without a catch.
+
+    Raises
+    ------
+    ParameterError
+        If the motion starts at or beyond the end of range.
+
+    Examples
+    --------
+    >>> from math import radians
+    >>> from masrel.elbow import STANDARD_MODELS, ConstantSpeed
+    >>> stretch = ConstantSpeed(start=radians(30), end=radians(146), speed=radians(92))
+    >>> round(residual_torque(STANDARD_MODELS["HM3"], stretch), 3)
+    7.624
+    """
+    return loads(parameters, motion, timeline(parameters, motion), "residual_torque")
+
+
+def work(parameters: ElbowParameters, motion: Motion) -> float:
+    """Return the work done against the joint, ∫ τ dθ.
+
+    Parameters
+    ----------
+    parameters : ElbowParameters
+        The joint.
+    motion : Motion
+        The motion, SI units.
+
+    Returns
+    -------
+    float
+        The work, J; less than 0 where the joint gave back more than it took.
+
+    Raises
+    ------
+    ParameterError
+        If the motion starts at or beyond the end of range.
+
+    Examples
+    --------
+    A slow stretch of 1 rad works against the damper and the spring alone,
+    1.26 x 0.2 x 1 + 3.15 / 2 x 1² J:
+
+    >>> from masrel.elbow import STANDARD_MODELS, ConstantSpeed
+    >>> stretch = ConstantSpeed(start=0.5, end=1.5, speed=0.2)
+    >>> round(work(STANDARD_MODELS["HM3"], stretch), 12)
+    1.827
+    """
+    return loads(parameters, motion, timeline(parameters, motion), "work")
+
+
+def impulse(parameters: ElbowParameters, motion: Motion) -> float:
+    """Return the angular impulse of the joint's torque, ∫ τ dt.
+
+    Parameters
+    ----------
+    parameters : ElbowParameters
+        The joint.
+    motion : Motion
+        The motion, SI units.
+
+    Returns
+    -------
+    float
+        The impulse, N·m·s.
+
+    Raises
+    ------
+    ParameterError
+        If the motion starts at or beyond the end of range.
+
+    Examples
+    --------
+    A slow stretch of 1 rad in 5 s, 1.26 x 1 + 3.15 / 2 x 5 N·m·s:
+
+    >>> from masrel.elbow import STANDARD_MODELS, ConstantSpeed
+    >>> stretch = ConstantSpeed(start=0.5, end=1.5, speed=0.2)
+    >>> round(impulse(STANDARD_MODELS["HM3"], stretch), 12)
+    9.135
+    """
+    return loads(parameters, motion, timeline(parameters, motion), "impulse")
+
+
+class TorqueSegment(NamedTuple):
+    """A time in which one law of torque holds."""
+
+    # start, end: s
+    start: Number
+    end: Number
+    law: TorqueLaw  # angles count from the motion's origin
+    onset: tuple[Number, Number] | None = None
+    # of a smoothed onset: what it adds along 3y² - 2y³, N·m, and in which time, s
+
+
+def segments(p: ElbowParameters, motion: Motion, line: Timeline) -> list[TorqueSegment]:
+    """Return the laws of a motion in order, without those that hold for no time."""
+    rest = rest_angle(p, motion)
+    ends = [state.time for _, state, _ in line.changes[1:]] + [line.end.time]
+    laid = []
+    for (_, state, stretch), end in zip(line.changes, ends, strict=True):
+        start = state.time
+        if stretch is None:
+            laid.append(TorqueSegment(start, end, _law.pre_catch(p, rest)))
+        elif state is stretch.catch:
+            peak, residual = _law.catch(p, stretch.pre_end, stretch.rise)
+            risen = min(start + p.catch_rise, end)
+            fallen = min(stretch.peak_end, end)
+            flat = TorqueLaw(stretch.pre_end)
+            laid += [
+                TorqueSegment(start, risen, flat, (stretch.rise, p.catch_rise)),
+                TorqueSegment(risen, fallen, peak),
+                TorqueSegment(fallen, end, residual),
+            ]
+        else:
+            law = _law.post_catch(p, stretch.pre_end, stretch.rise, state.angle, rest)
+            laid.append(TorqueSegment(start, end, law))
+    return [segment for segment in laid if segment.end > segment.start]
+
+
+def segment_torque(segment: TorqueSegment, motion: Motion, at: Floats) -> Floats:
+    """Return the torque of one law at times, also where the next begins, N·m."""
+    law = segment.law
+    values = law.commanded(motion.angle(at, motion.origin), motion.velocity(at))
+    if law.inertia:
+        values = values + law.inertia * motion.acceleration(at)
+    if segment.onset is not None:
+        rise, time = segment.onset
+        share = np.clip((at - segment.start) / time, 0.0, 1.0)
+        values = values + rise * _law.onset_share(share)
+    return np.asarray(values)
+
+
+class Section(NamedTuple):
+    """What a law and a piece of the motion have in common."""
+
+    length: Number  # s
+    angle: Polynomial  # rad, over s since the section began
+    torque: Polynomial  # N·m
+
+
+def sections(laid: list[TorqueSegment], motion: Motion) -> Iterator[Section]:
+    """Cut a motion where its law or its polynomial changes."""
+    waiting = iter(laid)
+    segment = next(waiting, None)
+    for start, length, angle, _, _ in motion.pieces():
+        while segment is not None and segment.start < start + length:
+            low = max(segment.start - start, 0.0)
+            high = min(segment.end - start, length)
+            if low < high:
+                part = shifted(angle, low) if low else angle
+                since = start + low - segment.start
+                yield Section(high - low, part, along(segment, part, since))
+            if segment.end > start + length:
+                break
+            segment = next(waiting, None)
+        if segment is None:
+            return
+
+
+def along(segment: TorqueSegment, angle: Polynomial, since: Number) -> Polynomial:
+    """Return the torque along an angle that begins some time after the segment."""
+    torque = segment.law.along(angle)
+    if segment.onset is None:
+        return torque
+    rise, time = segment.onset
+    y = [since / time, 1.0 / time]
+    share = product(product(y, y), [3.0 - 2.0 * y[0], -2.0 * y[1]])  # _law.onset_share
+    total = [*torque, *[0.0] * (len(share) - len(torque))]
+    for i, c in enumerate(share):
+        total[i] = total[i] + rise * c
+    return total
+
+
+def loads(p: ElbowParameters, motion: Motion, line: Timeline, name: str) -> float:
+    """Return one of the loads, by the name of its function."""
+    if name == "residual_torque":
+        caught = [stretch for stretch in line.stretches if stretch.catch is not None]
+        if not caught:
+            return math.nan
+        return float(_law.catch(p, caught[0].pre_end, caught[0].rise)[1].level)
+    parts = sections(segments(p, motion, line), motion)
+    if name == "peak_torque":
+        return max(map(section_peak, parts))
+    return math.fsum(map(section_work if name == "work" else section_impulse, parts))
+
+
+def section_peak(section: Section) -> float:
+    """Return the largest torque, N·m: at an end, or where it turns."""
+    length, _, torque = section
+    if not math.isfinite(sum(map(abs, torque))):
+        return math.inf  # more than a float can hold
+    peak = float(max(torque[0], value(torque, length)))
+    slope = derivative(torque)
+    if len(slope) < 2:
+        return peak
+    turns = split_at_roots(slope, length)[1:-1]
+    return float(max([peak, *[value(torque, x) for x in turns]]))
+
+
+def section_work(section: Section) -> Number:
+    """Return ∫ τ θ̇ dt, J."""
+    power = product(section.torque, derivative(section.angle))
+    return value(integral(power), section.length)
+
+
+def section_impulse(section: Section) -> Number:
+    """Return ∫ τ dt, N·m·s."""
+    return value(integral(section.torque), section.length)

@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.elbow.columns import sampled_columns
-from masrel.elbow.course import end_time
+from masrel.elbow.events import timeline
 from masrel.elbow.motion import Motion
 from masrel.elbow.parameters import ElbowParameters
+from masrel.elbow.sampled import SampledJoint
 from masrel.errors import ParameterError
 
 __all__ = ["Trace", "trace"]
@@ -79,9 +79,15 @@ def trace(
     """
     if not 0.0 < rate_hz < math.inf:
         raise ParameterError(f"rate_hz: needs more than 0, got {rate_hz}")
-    time = np.arange(math.floor(end_time(parameters, motion) * rate_hz) + 1) / rate_hz
+    end = timeline(parameters, motion).end.time
+    time = np.arange(math.floor(end * rate_hz) + 1) / rate_hz
     angle, velocity = motion.angle(time), motion.velocity(time)
-    torque, phase = sampled_columns(parameters, motion.start, time, angle, velocity)
+    joint = SampledJoint(parameters, start_angle=motion.start)
+    torque, phase = np.empty(time.size), np.empty(time.size, dtype=np.int8)
+    samples = zip(time.tolist(), angle.tolist(), velocity.tolist(), strict=True)
+    for i, sample in enumerate(samples):
+        torque[i] = joint.step(*sample)
+        phase[i] = joint.phase
     columns = (time, angle, velocity, torque, phase)
     for column in columns:
         column.setflags(write=False)

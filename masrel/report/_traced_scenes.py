@@ -102,7 +102,7 @@ def scene_document(
         value = functions[name](joint, motion)
         document[SCENE_OUTPUTS[name]] = None if math.isnan(value) else value
     if times:
-        values = elbow.torque(joint, motion, times, found=events).tolist()
+        values = elbow.torque(joint, motion, times).tolist()
         document["torque_at_s"] = _torques("time_s", times, values)
     if angles:
         values = elbow.torque_at(joint, motion, [math.radians(a) for a in angles])

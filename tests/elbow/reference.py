@@ -28,6 +28,8 @@ from masrel.elbow import (
 
 N_GRID = 400
 
+TIE = mpf("1e-13")  # of a time: what is nearer to its end is at its end
+
 Number = Any  # mpf, float, or an array of floats
 Law = Callable[[Number], Number]
 
@@ -305,6 +307,8 @@ class Reference:
                 mpf(0),
                 one.length,
             )
+            if stop is not None and one.length - stop <= TIE * one.length:
+                stop = None
             self.segment(one, rough, one.length if stop is None else stop)
             self.end += one.length if stop is None else stop
             if stop is not None:
@@ -322,7 +326,7 @@ class Reference:
             marks += self.crossings(one, rough, stop, limit)
         marks = [*sorted(marks), stop]
         for low, high in itertools.pairwise(marks):
-            if high - low <= mpf("1e-28") * one.length:
+            if high - low <= TIE * one.length:
                 continue
             speed = one.velocity((low + high) / 2)
             if speed <= -threshold:
@@ -411,9 +415,11 @@ class Reference:
             held = np.where(fast, least, top - slope * np.maximum(mean, slowest))
             return law.angle(u) - held
 
-        return first_above(
+        place = first_above(
             lambda u: excess(u, one, mpf), lambda u: excess(u, rough, float), low, high
         )
+        is_late = place is not None and high - place <= TIE * (high - low)
+        return None if is_late else place
 
     def begin_catch(self, one: Segment, at: mpf) -> None:
         joint, stretch = self.joint, self.stretches[-1]
@@ -443,7 +449,7 @@ class Reference:
             low,
             high,
         )
-        if place is None:
+        if place is None or high - place <= TIE * high:
             return low
         stretch.catch_end = self.end + place
         stretch.post_angle = one.angle(place)
@@ -461,6 +467,16 @@ class Reference:
     def rest(self) -> mpf:
         rest = self.joint.rest_angle
         return mpf(self.motion.start if rest is None else rest)
+
+    def steepness(self, time: float) -> float:
+        """How fast the torque grows in a smoothed onset, N·m/s: its steepest."""
+        for stretch in self.stretches:
+            if stretch.catch is not None and self.joint.catch_rise > 0.0:
+                since = time - float(stretch.catch)
+                if 0.0 <= since <= 1.01 * self.joint.catch_rise:
+                    rise = self.joint.catch_torque_constant * float(stretch.catch_speed)
+                    return 1.5 * rise / self.joint.catch_rise
+        return 0.0
 
     def terms(self, time: mpf) -> list[mpf]:
         """The terms of the torque at a time; their sum is the torque."""

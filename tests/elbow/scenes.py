@@ -153,7 +153,7 @@ def corner_cases() -> dict[str, Scene]:
             start=d(30), end=d(146), speed=nextafter(hm1.fastest_mean_speed, 9.0))),
         "speed just above ν_th": (hm3, ConstantSpeed(
             start=d(30), end=d(146), speed=nextafter(hm3.speed_threshold, 9.0))),
-        "peak speed just above ν_th": (hm3, reach(20.0 / 1.875 * (1 + 1e-12))),
+        "peak speed just above ν_th": (hm3, reach(20.0 / 1.875 * (1 + 1e-6))),
         "D tiny": (replace(hm3, catch_travel=1e-12), reach(92.0)),
         "D longer than the stretch": (replace(hm3, catch_travel=3.0), reach(92.0)),
         "peak tiny": (replace(hm3, peak_duration=1e-12), reach(92.0)),

@@ -1,18 +1,15 @@
 """Stretches, joints and counters that the tests of the elbow share."""
 
 import csv
-from collections.abc import Iterator
-from contextlib import contextmanager
 from math import radians
 from pathlib import Path
-from types import ModuleType
 from typing import NamedTuple
 
 import numpy as np
 from hypothesis import strategies as st
 
 from masrel.elbow import ConstantSpeed, ElbowParameters, MinimumJerk, Motion
-from masrel.elbow.piece import Piece
+from masrel.elbow.motion import Piece
 
 PUBLISHED = Path(__file__).parents[2] / "studies/hess2012/ratings/published.csv"
 
@@ -78,7 +75,7 @@ def motions(draw: st.DrawFn) -> Motion:
     return kind(draw(st.floats(5.0, 200.0)), start_deg=start, end_deg=end)
 
 
-class CountedMotion:
+class CountedMotion(Motion):
     """A motion that counts how often, and at how many times, it is asked."""
 
     def __init__(self, motion: Motion) -> None:
@@ -87,21 +84,14 @@ class CountedMotion:
         self.n_pieces = 0
         self.largest = 0  # times in one call
 
+    def __getattribute__(self, name: str) -> object:
+        if name in ("start", "end", "duration", "origin"):
+            return getattr(self._motion, name)
+        return super().__getattribute__(name)
+
     def _count(self, time: object) -> None:
         self.n_calls += 1
         self.largest = max(self.largest, int(np.size(time)))
-
-    @property
-    def start(self) -> float:
-        return self._motion.start
-
-    @property
-    def end(self) -> float:
-        return self._motion.end
-
-    @property
-    def duration(self) -> float:
-        return self._motion.duration
 
     def angle(self, time, origin=0.0):
         self._count(time)
@@ -115,23 +105,7 @@ class CountedMotion:
         self._count(time)
         return self._motion.acceleration(time)
 
-    def pieces(self) -> Iterator[Piece]:
-        for piece in self._motion.pieces():
-            self.n_pieces += 1
-            yield piece
-
-
-@contextmanager
-def counted(module: ModuleType, name: str) -> Iterator[list[int]]:
-    """Count the calls that a module makes of one of its functions."""
-    whole, calls = getattr(module, name), [0]
-
-    def count(*arguments, **options):
-        calls[0] += 1
-        return whole(*arguments, **options)
-
-    setattr(module, name, count)
-    try:
-        yield calls
-    finally:
-        setattr(module, name, whole)
+    def pieces(self) -> list[Piece]:
+        pieces = list(self._motion.pieces())
+        self.n_pieces += len(pieces)
+        return pieces

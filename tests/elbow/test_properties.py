@@ -187,7 +187,7 @@ def test_torque_is_continuous_but_for_the_documented_steps(
         steps += [s.catch, s.peak_end, s.catch_end, s.post_catch_end]
     marks = np.array([mark for mark in steps if mark is not None])
     times = np.linspace(0.0, found.end, 1001)
-    values = torque(joint, motion, times, found=found)
+    values = torque(joint, motion, times)
     width = times[1] - times[0]
     near = (np.abs(times[:-1, None] - marks) <= 1.01 * width).any(axis=1)
     near |= (np.abs(times[1:, None] - marks) <= 1.01 * width).any(axis=1)

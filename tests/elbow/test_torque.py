@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from masrel.elbow import (
     STANDARD_MODELS,
     ElbowParameters,
-    Events,
     MinimumJerk,
     Motion,
     events,
@@ -183,8 +182,8 @@ def test_higher_grades_resist_more_catch_sooner_and_shorter(speed_deg_s: float) 
 # Jumps and continuity
 
 
-def jump(joint: ElbowParameters, motion: Motion, found: Events, time: float) -> float:
-    before, after = torque(joint, motion, [nextafter(time, 0.0), time], found=found)
+def jump(joint: ElbowParameters, motion: Motion, time: float) -> float:
+    before, after = torque(joint, motion, [nextafter(time, 0.0), time])
     return float(after - before)
 
 
@@ -200,9 +199,9 @@ def test_torque_jumps_at_catch_and_end_of_peak_as_the_law_says(
     rise = joint.catch_torque_constant * found.catch_speed  # H·v_c
     fall = -(1.0 - joint.residual_ratio) * rise
     if found.catch > 0.0:
-        assert jump(joint, motion, found, found.catch) == pytest.approx(rise, abs=1e-9)
+        assert jump(joint, motion, found.catch) == pytest.approx(rise, abs=1e-9)
     if found.peak_end == found.catch + joint.peak_duration:
-        falls = jump(joint, motion, found, found.peak_end)
+        falls = jump(joint, motion, found.peak_end)
         if found.peak_end != found.catch_end:
             assert falls == pytest.approx(fall, abs=1e-9)
     if found.catch_end is None or found.post_catch_end == found.catch_end:
@@ -213,9 +212,7 @@ def test_torque_jumps_at_catch_and_end_of_peak_as_the_law_says(
         speed = float(motion.velocity(found.catch_end))
         expected += joint.stiffness * joint.catch_travel
         expected += joint.damping * (speed - found.catch_speed)
-    assert jump(joint, motion, found, found.catch_end) == pytest.approx(
-        expected, abs=1e-9
-    )
+    assert jump(joint, motion, found.catch_end) == pytest.approx(expected, abs=1e-9)
 
 
 def steepest(joint: ElbowParameters, motion: Motion) -> float:
@@ -241,7 +238,7 @@ def test_torque_is_continuous_within_the_phases(
         marks.add(found.peak_end)
     for start, end in pairwise(sorted(marks)):
         times = np.linspace(start, end, 102)[1:-1]
-        values = torque(joint, motion, times, found=found)
+        values = torque(joint, motion, times)
         step = (end - start) / 101
         bound = steepest(joint, motion) * step
         assert np.abs(np.diff(values)).max() <= bound + 1e-12
@@ -260,7 +257,7 @@ def test_peak_torque_is_the_largest_of_a_dense_grid(
     marks = (found.catch, found.peak_end, found.catch_end, found.post_catch_end)
     grid = np.linspace(0.0, found.end, 2001)
     times = np.append(grid, [time for time in marks if time is not None])
-    largest = float(torque(joint, motion, times, found=found).max())
+    largest = float(torque(joint, motion, times).max())
     peak = peak_torque(joint, motion)
     assert peak >= largest - 1e-12
     assert peak <= largest + steepest(joint, motion) * found.end / 2000 + 1e-12
@@ -288,14 +285,6 @@ def test_peak_torque_makes_no_trace(kind, speed_deg_s: float) -> None:
 
 
 # Calls
-
-
-def test_known_events_give_the_same_torque() -> None:
-    motion = minimum_jerk(83.0)
-    found = events(HM3, motion)
-    times = np.linspace(0.0, found.end, 50)
-    alone = torque(HM3, motion, times)
-    assert torque(HM3, motion, times, found=found).tolist() == alone.tolist()
 
 
 def test_at_an_event_the_later_phase_holds() -> None:

@@ -1,4 +1,4 @@
-"""The joint model: thousands of scenes, traces, and run time against error.
+"""The joint model: one scene, thousands of scenes, and run time against error.
 
 ``python -m docs.make.benchmarks.elbow [--quiet]`` prints the tables of docs/elbow.md
 and draws its figures. Times are of the processor, so that other load counts for less;
@@ -7,25 +7,28 @@ all functions of a table are timed in turn in one run.
 
 import argparse
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass, fields
 from math import radians
 
 import numpy as np
 from mpmath import mp
 from tqdm import tqdm
 
+from docs.make.benchmarks.elbow_stepped import places, step_together
 from masrel.elbow import (
     STANDARD_MODELS,
+    Columns,
     ConstantSpeed,
     ElbowParameters,
     MinimumJerk,
     Motion,
+    Recorded,
     SampledJoint,
+    Trapezoid,
     evaluate,
     events,
     peak_torque,
-    torque_traces,
     trace,
 )
 from masrel.elbow.scenes import EVENTS
@@ -33,117 +36,140 @@ from tests.benchmarks.sidebyside import Timing, side_by_side
 from tests.elbow.ode import Ode
 from tests.elbow.reference import solved
 
-N_SCENES, N_STEPPED = 10_000, 100
-N_TRACES, N_SAMPLES = 1000, 1500
+N_SCENES = 10_000
 RATES_HZ = (100.0, 1e3, 1e4, 1e5)
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
+KINDS: dict[str, type] = {
+    "constant": ConstantSpeed,
+    "minimum jerk": MinimumJerk,
+    "trapezoid": Trapezoid,
+}
 
-Scenes = tuple[list[ElbowParameters], list[Motion]]
+
+def one_scene(turns: int) -> list[str]:
+    """Events of one stretch of HM3, and of a recording of it, beside the plain loop."""
+    joint, whole = STANDARD_MODELS["HM3"], reach(92.0)
+    times = np.linspace(0.0, whole.duration, 1500)
+    motions: dict[str, Motion] = {
+        "constant": stretch(ConstantSpeed, speed=radians(92.0)),
+        "minimum jerk": whole,
+        "trapezoid": stretch(
+            Trapezoid, speed=radians(92.0), acceleration_rate=radians(600.0)
+        ),
+        "recorded, 1500 samples": Recorded(time=times, angle=whole.angle(times)),
+    }
+    rows = []
+    for name, motion in motions.items():
+        timings = side_by_side(
+            {
+                "step": lambda motion=motion: step(joint, motion, 1000.0),
+                "events": lambda motion=motion: events(joint, motion),
+                "evaluate": lambda motion=motion: evaluate(joint, motion, EVENTS),
+                "both": lambda motion=motion: evaluate(joint, motion),
+            },
+            turns=turns,
+            clock=time.process_time,
+        )
+        found, table, both, stepped = (
+            f"{1e6 * timings[key].median:.0f} µs"
+            for key in ("events", "evaluate", "both", "step")
+        )
+        share = ratio(timings, "step", "events")
+        rows.append(f"| {name} | {found} | {table} | {both} | {stepped} | {share} |")
+    return rows
 
 
-def scenes(kind: str, n: int, *, samples: int | None = None) -> Scenes:
-    """Joints between the standard models, stretched at the speeds of Table V.
+def stretch(kind: type, **speeds: float) -> Motion:
+    return kind(start=radians(30.0), end=radians(146.0), **speeds)
 
-    With `samples` every stretch lasts that many milliseconds.
-    """
+
+def columns(kind: str, n: int, *, inertia: float = 0.0) -> tuple[Columns, Columns]:
+    """Joints between the standard models, stretched at the speeds of Table V."""
     rng = np.random.default_rng(7)
     base = list(STANDARD_MODELS.values())
-    joints, motions = [], []
-    for i in range(n):
-        joint = replace(
-            base[i % 4],
-            catch_angle_constant=radians(rng.uniform(110.0, 130.0)),
-            catch_torque_constant=rng.uniform(1.4, 3.8),
-            catch_travel=radians(rng.uniform(10.0, 60.0)),
-        )
-        start, end = radians(30.0), radians(rng.uniform(120.0, 145.0))
-        speed = radians(rng.uniform(60.0, 131.0))
-        if samples is not None:
-            speed = (end - start) / ((samples - 0.5) / 1000.0)
-        motion = (
-            ConstantSpeed(start=start, end=end, speed=speed)
-            if kind == "constant"
-            else MinimumJerk(start=start, end=end, mean_speed=speed)
-        )
-        joints.append(joint)
-        motions.append(motion)
-    return joints, motions
+    names = [
+        "catch_angle_constant",
+        "catch_torque_constant",
+        "residual_ratio",
+        "catch_travel",
+    ]
+    values = np.array([[getattr(joint, name) for name in names] for joint in base])
+    share = rng.uniform(0.0, 3.0, n)
+    joints = Columns(
+        ElbowParameters,
+        inertia=inertia,
+        **{
+            name: np.interp(share, range(4), column)
+            for name, column in zip(names, values.T, strict=True)
+        },
+    )
+    speed = {"minimum jerk": "mean_speed"}.get(kind, "speed")
+    moves: dict[str, object] = {
+        "start": radians(30.0),
+        "end": np.radians(rng.uniform(120.0, 145.0, n)),
+        speed: np.radians(rng.uniform(60.0, 131.0, n)),
+    }
+    if kind == "trapezoid":
+        moves["acceleration_rate"] = radians(600.0)
+    return joints, Columns(KINDS[kind], **moves)
+
+
+def many_scenes(kind: str, turns: int, *, inertia: float = 0.0) -> str:
+    """Events and peak torque of 10 000 scenes beside stepping them all at once."""
+    joints, motions = columns(kind, N_SCENES, inertia=inertia)
+    rows = range(N_SCENES)
+    each = [joints.row(i) for i in rows], [motions.row(i) for i in rows]
+    models = list(STANDARD_MODELS.values())
+    four = [models[i % 4] for i in rows] if not inertia else each[0]
+    outputs = (*EVENTS, "peak_torque")
+    p = {
+        item.name: getattr(STANDARD_MODELS["HM1"], item.name)
+        for item in fields(ElbowParameters)
+    } | joints.columns
+    m = {
+        name: np.broadcast_to(column, N_SCENES)
+        for name, column in motions.columns.items()
+    }
+    duration, at = places(kind, m)
+    timings = side_by_side(
+        {
+            "step": lambda: step_together(p, m["start"], duration, at, 1000.0),
+            "columns": lambda: evaluate(joints, motions, outputs),
+            "objects": lambda: evaluate(*each, outputs),
+            "models": lambda: evaluate(four, each[1], outputs),
+        },
+        turns=turns,
+        clock=time.process_time,
+    )
+    table = evaluate(joints, motions, outputs)
+    name = f"{kind}, with inertia" if inertia else kind
+    cells = [f"{1e3 * timings['step'].median:.0f} ms"]
+    for way in ("columns", "models", "objects"):
+        cells.append(f"{1e3 * timings[way].median:.1f} ms")
+        cells.append(ratio(timings, "step", way))
+    return f"| {name} | {' | '.join(cells)} | {table.n_alone} |"
 
 
 def step(joint: ElbowParameters, motion: Motion, rate_hz: float) -> tuple[float, float]:
     """The plain loop: when the catch is seen, and the largest torque."""
     n = int(np.floor(motion.duration * rate_hz)) + 1
     times = np.arange(n) / rate_hz
-    columns = (times, motion.angle(times), motion.velocity(times))
+    samples = (times, motion.angle(times), motion.velocity(times))
     stepped = SampledJoint(joint, start_angle=motion.start)
     torques = [
         stepped.step(*sample)
-        for sample in zip(*(column.tolist() for column in columns), strict=True)
+        for sample in zip(*(column.tolist() for column in samples), strict=True)
     ]
     return stepped.catch_time, max(torques)
 
 
-def step_all(joints: Sequence[ElbowParameters], motions: Sequence[Motion]) -> None:
-    for joint, motion in zip(joints, motions, strict=True):
-        step(joint, motion, 1000.0)
-
-
-def ratio(timings: dict[str, Timing], slow: str, fast: str, factor: float) -> str:
-    """How often the fast goes into the slow, turn by turn, times a factor."""
+def ratio(timings: dict[str, Timing], slow: str, fast: str) -> str:
+    """How often the fast goes into the slow, turn by turn."""
     every = [
-        factor * a / b
-        for a, b in zip(timings[slow].seconds, timings[fast].seconds, strict=True)
+        a / b for a, b in zip(timings[slow].seconds, timings[fast].seconds, strict=True)
     ]
     low, middle, high = np.quantile(every, [0.25, 0.5, 0.75])
     return f"{middle:.3g} ± {100 * (high - low) / (2 * middle):.0f} %"
-
-
-def many_scenes(kind: str, turns: int) -> str:
-    """Events and peak torque of 10 000 scenes beside the plain loop over some."""
-    joints, motions = scenes(kind, N_SCENES)
-    outputs = (*EVENTS, "peak_torque")
-    timings = side_by_side(
-        {
-            "step": lambda: step_all(joints[:N_STEPPED], motions[:N_STEPPED]),
-            "together": lambda: evaluate(joints, motions, outputs),
-        },
-        turns=turns,
-        clock=time.process_time,
-    )
-    alone = evaluate(joints, motions, outputs).n_alone
-    scaled = N_SCENES / N_STEPPED
-    return (
-        f"| {kind} | {1e3 * timings['together'].median:.0f} ms "
-        f"| {scaled * timings['step'].median:.1f} s "
-        f"| {ratio(timings, 'step', 'together', scaled)} | {alone} |"
-    )
-
-
-def many_traces(kind: str, turns: int) -> str:
-    """Traces of 1000 scenes of 1500 samples beside one multiply and the plain loop."""
-    joints, motions = scenes(kind, N_TRACES, samples=N_SAMPLES)
-    made = torque_traces(joints, motions)
-    sampled = torque_traces(joints, motions, reading="sampled")
-    if not made.shape == sampled.shape == (N_TRACES, N_SAMPLES):
-        raise SystemExit(f"traces of shapes {made.shape} and {sampled.shape}")
-    out = np.empty_like(made)
-    timings = side_by_side(
-        {
-            "multiply": lambda: np.multiply(made, 2.0, out=out),
-            "sampled": lambda: torque_traces(joints, motions, reading="sampled"),
-            "exact": lambda: torque_traces(joints, motions),
-            "step": lambda: step_all(joints[:N_STEPPED], motions[:N_STEPPED]),
-        },
-        turns=turns,
-        clock=time.process_time,
-    )
-    scaled = N_TRACES / N_STEPPED
-    return "\n".join(
-        f"| {kind} | {reading} | {1e3 * timings[reading].median:.1f} ms "
-        f"| {ratio(timings, reading, 'multiply', 1.0)} "
-        f"| {ratio(timings, 'step', reading, scaled)} |"
-        for reading in ("exact", "sampled")
-    )
 
 
 @dataclass(frozen=True)
@@ -165,7 +191,6 @@ def work_against_error(turns: int) -> list[Point]:
     }
     for rate in RATES_HZ:
         name = f"{rate:g} Hz"
-        ways["stepped", name] = (_sampled(rate), _stepped(rate))
         ways["sampled", name] = (_sampled(rate), None)
     for tolerance in TOLERANCES:
         ways["solve_ivp", f"rtol {tolerance:g}"] = (_integrated(tolerance), None)
@@ -222,10 +247,6 @@ def _sampled(rate_hz: float) -> Way:
     return find_events
 
 
-def _stepped(rate_hz: float) -> Way:
-    return lambda joint, motion: step(joint, motion, rate_hz)
-
-
 def _integrated(rtol: float) -> Way:
     def find_events(joint: ElbowParameters, motion: Motion) -> tuple[float, float]:
         ode = Ode(joint, motion, rtol=rtol, max_step=np.inf, method="RK45")
@@ -263,12 +284,14 @@ def main() -> None:
     parser.add_argument("--quiet", action="store_true", help="show no progress")
     parser.add_argument("--turns", type=int, default=11)
     options = parser.parse_args()
-    turns, rows = options.turns, []
-    with tqdm(total=6, desc="parts", disable=options.quiet) as bar:
-        for table in (many_scenes, many_traces):
-            for kind in ("constant", "minimum jerk"):
-                rows.append(table(kind, turns))
-                bar.update()
+    turns = options.turns
+    scenes = [(kind, 0.0) for kind in KINDS]
+    scenes += [("minimum jerk", 0.1), ("trapezoid", 0.1)]
+    rows = one_scene(turns)
+    with tqdm(total=len(scenes) + 2, desc="parts", disable=options.quiet) as bar:
+        for kind, inertia in scenes:
+            rows.append(many_scenes(kind, turns, inertia=inertia))
+            bar.update()
         points = work_against_error(turns)
         bar.update()
         from docs.make.benchmarks import elbow_figures

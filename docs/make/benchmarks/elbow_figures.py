@@ -13,7 +13,6 @@ from masrel.report.figures._style import (
     DASHES,
     GREY,
     ORANGE,
-    VERMILLION,
     file_of,
     house_style,
 )
@@ -25,8 +24,7 @@ FIGURES = Path(__file__).parents[2] / "figures"
 
 _WAYS = {
     "exact": ("exact: events and peak", BLUE, "*", 11),
-    "sampled": ("sampled, whole columns", VERMILLION, "o", 5),
-    "stepped": ("sampled, step by step", ORANGE, "s", 5),
+    "sampled": ("sampled, step by step", ORANGE, "s", 5),
     "solve_ivp": ("solve_ivp, RK45 with events", GREY, "^", 5),
 }
 
@@ -42,7 +40,7 @@ def draw_work(points: Sequence["Point"]) -> None:
             y = [max(point.error_s, 1e-17) for point in of_way]
             axes.loglog(x, y, marker=marker, color=colour, markersize=size, lw=0.8,
                         label=label)  # fmt: skip
-            if way in ("stepped", "solve_ivp"):
+            if way in ("sampled", "solve_ivp"):
                 for point, at, height in zip(of_way, x, y, strict=True):
                     axes.annotate(
                         point.setting, (at, height), xytext=(6, 4), fontsize=6.5,

@@ -1,12 +1,13 @@
 """Kinds of movements: prescribed, recorded, and made of others."""
 
-from masrel.elbow.motions.constant_speed import ConstantSpeed
-from masrel.elbow.motions.hold import Hold
-from masrel.elbow.motions.joined import Joined, interrupted
-from masrel.elbow.motions.minimum_jerk import MinimumJerk
-from masrel.elbow.motions.part import Part, Reversed
+from masrel.elbow.motions.composed import Joined, Part, Reversed, interrupted
+from masrel.elbow.motions.prescribed import (
+    ConstantSpeed,
+    Hold,
+    MinimumJerk,
+    Trapezoid,
+)
 from masrel.elbow.motions.recorded import Interpolation, Recorded
-from masrel.elbow.motions.trapezoid import Trapezoid
 
 __all__ = [
     "ConstantSpeed",

@@ -1,20 +1,12 @@
 """A movement as it was recorded: samples, and what happens between them."""
 
-from collections.abc import Iterator
-from decimal import Decimal
-from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from masrel.elbow.motion import Floats
-from masrel.elbow.motions.slopes import (
-    chord_slopes,
-    exact_monotone_slopes,
-    monotone_slopes,
-)
-from masrel.elbow.piece import Piece
+from masrel.elbow._polynomials import bernstein, derivative
+from masrel.elbow.motion import Floats, Motion, Piece, Rows
 from masrel.errors import ParameterError
 
 __all__ = ["Interpolation", "Recorded"]
@@ -22,10 +14,8 @@ __all__ = ["Interpolation", "Recorded"]
 Interpolation = Literal["pchip", "linear"]
 """What lies between two samples: a cubic that never overshoots, or a line."""
 
-_SLOPES = {"pchip": monotone_slopes, "linear": chord_slopes}
 
-
-class Recorded:
+class Recorded(Motion):
     """A movement given by samples, evenly spaced or not, a `Motion`.
 
     Parameters
@@ -63,7 +53,7 @@ class Recorded:
     (3.0, 1.0)
     """
 
-    __slots__ = ("_angles", "_cubic", "_first", "_knots", "_last", "interpolation")
+    __slots__ = ("_angles", "_knots", "_rows", "interpolation")
 
     def __init__(
         self,
@@ -72,24 +62,25 @@ class Recorded:
         angle: ArrayLike,
         interpolation: Interpolation = "pchip",
     ) -> None:
-        if interpolation not in _SLOPES:
+        if interpolation not in ("pchip", "linear"):
             raise ParameterError(
-                f"interpolation: needs one of {', '.join(_SLOPES)}, "
-                f"got {interpolation!r}"
+                f"interpolation: needs one of pchip, linear, got {interpolation!r}"
             )
         times, angles = _checked(time, angle)
         self.interpolation = interpolation
         self._knots, self._angles = times - times[0], angles
-        width, rise = np.diff(self._knots), np.diff(angles)
-        self._first, self._last = _SLOPES[interpolation](width, rise)
-        # θ_i + u (first + u (c₂ + u c₃)), u the time since sample i; of a line, exactly
-        # 0 is left of the differences
-        chord = rise / width
-        begin, finish = self._first - chord, self._last - chord
-        self._cubic = (
-            -(2.0 * begin + finish) / width,
-            (begin + finish) / width / width,
-        )
+        self._rows = Rows(self._knots[:-1], self._coefficients())
+
+    def _coefficients(self) -> Floats:
+        # θ_i + u (first + u (c₂ + u c₃)), u the time since sample i
+        width, rise = np.diff(self._knots), np.diff(self._angles)
+        low, chord = self._angles[:-1] - self._angles[0], rise / width
+        if self.interpolation == "linear":
+            return np.stack([low, chord])
+        slopes = _monotone_slopes(width, chord)
+        begin, finish = slopes[:-1] - chord, slopes[1:] - chord
+        square, cube = -(2.0 * begin + finish) / width, (begin + finish) / width / width
+        return np.stack([low, slopes[:-1], square, cube])
 
     @property
     def start(self) -> float:
@@ -106,50 +97,43 @@ class Recorded:
         """From the first sample to the last, s."""
         return float(self._knots[-1])
 
-    def angle(self, time: Floats | float, origin: float = 0.0) -> Floats:
-        """Angle at times within the duration, rad."""
-        i, u = self._place(time)
-        square, cube = self._cubic
-        travel = u * (self._first[i] + u * (square[i] + u * cube[i]))
-        return np.asarray((self._angles[i] - origin) + travel)
+    def pieces(self) -> list[Piece]:
+        """Return the cubics, or lines, from sample to sample."""
+        width = np.diff(self._knots)
+        speeds = bernstein(derivative(list(self._rows.angle)), width)
+        slowest, fastest = np.min(speeds, axis=0), np.max(speeds, axis=0)
+        columns = (self._rows.start, width, self._rows.angle.T, slowest, fastest)
+        return list(map(Piece._make, zip(*(c.tolist() for c in columns), strict=True)))
 
-    def velocity(self, time: Floats | float) -> Floats:
-        """Angular velocity at times within the duration, rad/s."""
-        i, u = self._place(time)
-        square, cube = self._cubic
-        return np.asarray(self._first[i] + u * (2.0 * square[i] + 3.0 * u * cube[i]))
+    def rows(self) -> Rows:
+        """Return the pieces as arrays."""
+        return self._rows
 
-    def acceleration(self, time: Floats | float) -> Floats:
-        """Angular acceleration at times within the duration, rad/s²."""
-        i, u = self._place(time)
-        square, cube = self._cubic
-        return np.asarray(2.0 * square[i] + 6.0 * u * cube[i])
 
-    def _place(self, time: Floats | float) -> tuple[np.ndarray, Floats]:
-        # sample before each time, and the time since
-        at = np.searchsorted(self._knots, time, side="right") - 1
-        at = np.clip(at, 0, self._knots.size - 2)
-        return at, np.asarray(time) - self._knots[at]
+def _monotone_slopes(width: Floats, chord: Floats) -> Floats:
+    # (n_samples,): cubics with these slopes are monotone where the samples are
+    if chord.size == 1:
+        return np.repeat(chord, 2)
+    slopes = np.zeros(width.size + 1)
+    before, after = chord[:-1], chord[1:]
+    wide, narrow = 2.0 * width[1:] + width[:-1], width[1:] + 2.0 * width[:-1]
+    same = np.sign(before) * np.sign(after) > 0.0
+    # weighted harmonic mean of the chords on both sides, 0 where they turn round
+    weighted = wide[same] / before[same] + narrow[same] / after[same]
+    slopes[1:-1][same] = (wide + narrow)[same] / weighted
+    slopes[0] = _end_slope(width[0], width[1], chord[0], chord[1])
+    slopes[-1] = _end_slope(width[-1], width[-2], chord[-1], chord[-2])
+    return slopes
 
-    def pieces(self) -> Iterator[Piece]:
-        """Give the cubics, or lines, from sample to sample."""
-        times, angles = (
-            [Decimal(x) for x in column.tolist()]
-            for column in (self._knots, self._angles)
-        )
-        widths = [high - low for low, high in pairwise(times)]
-        rises = [high - low for low, high in pairwise(angles)]
-        if self.interpolation == "linear":
-            for width, low, rise in zip(widths, angles, rises, strict=False):
-                yield Piece(length=width, angle=(low, rise))
-            return
-        slopes = pairwise(exact_monotone_slopes(widths, rises))
-        for width, low, rise, (first, last) in zip(
-            widths, angles, rises, slopes, strict=False
-        ):
-            begin, finish = width * first, width * last
-            square, cube = 3 * rise - 2 * begin - finish, begin + finish - 2 * rise
-            yield Piece(length=width, angle=(low, begin, square, cube))
+
+def _end_slope(near: float, far: float, chord: float, next_chord: float) -> float:
+    # of the parabola through three samples, kept from overshooting
+    slope = ((2 * near + far) * chord - near * next_chord) / (near + far)
+    if slope * chord <= 0:
+        return 0.0
+    if chord * next_chord <= 0 and abs(slope) > 3 * abs(chord):
+        return 3 * chord
+    return slope
 
 
 def _checked(time: ArrayLike, angle: ArrayLike) -> tuple[Floats, Floats]:
@@ -162,7 +146,7 @@ def _checked(time: ArrayLike, angle: ArrayLike) -> tuple[Floats, Floats]:
         )
     for name, column in (("time", times), ("angle", angles)):
         _refuse(~np.isfinite(column), f"{name}: needs finite numbers", column)
-    behind = np.diff(times, prepend=-np.inf) <= 0.0
+    behind = np.diff(times, prepend=-np.inf) <= 1e-30
     _refuse(behind, "time: needs to grow from sample to sample", times)
     outside = (angles < 0.0) | (angles > np.pi)
     _refuse(outside, "angle: needs 0 to 180 degrees", np.degrees(angles))

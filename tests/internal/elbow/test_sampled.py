@@ -132,7 +132,7 @@ def test_sampled_torque_is_the_exact_torque_away_from_events(
     times = np.arange(len(torques)) / rate_hz
     distance = np.abs(times[:, np.newaxis] - np.array(marks)).min(axis=1)
     away = (distance > 5 / rate_hz) & (times <= found.end)
-    exact = torque(joint, motion, times[away], found=found)
+    exact = torque(joint, motion, times[away])
     # The catch is seen up to one period late, at another angle and speed: the levels
     # that it sets differ by as much as the laws move in two periods.
     speed = 1.875 * (motion.end - motion.start) / motion.duration

@@ -1,14 +1,11 @@
-"""Many scenes at once: the bits of one scene, only what is asked, bounded memory."""
+"""Many scenes at once: what one scene gives, only what is asked, bounded memory."""
 
 import tracemalloc
 from dataclasses import replace
-from fractions import Fraction
-from math import isnan, radians
+from math import isnan
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from masrel.elbow import (
     STANDARD_MODELS,
@@ -24,13 +21,13 @@ from masrel.elbow import (
     scenes,
     work,
 )
-from masrel.elbow.scenes import EFFORTS, EVENTS, batch
-from masrel.elbow.scenes.twofold import Twofold
+from masrel.elbow.scenes import EVENTS, LOADS
 from masrel.errors import ParameterError
 from tests.elbow.scenes import KINDS, corner_cases, random_scene
-from tests.elbow.stretches import constant, counted, minimum_jerk, table_v
+from tests.elbow.stretches import constant, minimum_jerk, table_v
 
 HM3 = STANDARD_MODELS["HM3"]
+ANGLES = ("catch_angle", "catch_speed", "mean_speed")
 FUNCTIONS = {
     "peak_torque": peak_torque,
     "residual_torque": residual_torque,
@@ -55,25 +52,28 @@ def drawn(
     return list(joints), list(motions)
 
 
-def same(one: float, other: float | None) -> bool:
-    return isnan(one) if other is None else one == other
+def same(one: float, other: float | None, size: float) -> bool:
+    # to some units in the last place of the time, angle or speed
+    return isnan(one) if other is None else abs(one - other) <= 1e-12 * size
 
 
 @pytest.mark.parametrize("wide", [False, True])
 @pytest.mark.parametrize("kind", ["constant", "minimum jerk", "interrupted"])
-def test_events_are_those_of_one_scene_to_the_last_bit(kind: str, wide: bool) -> None:
+def test_events_are_those_of_one_scene_to_rounding(kind: str, wide: bool) -> None:
     joints, motions = drawn(kind, 150, wide=wide)
     table = evaluate(joints, motions, EVENTS)
     for i, (joint, motion) in enumerate(zip(joints, motions, strict=True)):
         found = events(joint, motion)
         for name in EVENTS:
-            assert same(table.column(name)[i], getattr(found, name)), (i, name)
+            value = table.column(name)[i]
+            size = max(value, 1.0) if name in ANGLES else motion.duration
+            assert same(value, getattr(found, name), size), (i, name)
 
 
 @pytest.mark.parametrize("kind", ["constant", "minimum jerk"])
 def test_torques_and_integrals_are_those_of_one_scene(kind: str) -> None:
     joints, motions = drawn(kind, 120, wide=False)
-    table = evaluate(joints, motions, EFFORTS)
+    table = evaluate(joints, motions, LOADS)
     for name, function in FUNCTIONS.items():
         expected = [
             function(joint, motion)
@@ -90,7 +90,7 @@ def test_few_scenes_need_to_go_alone(kind: str) -> None:
     # Nothing but near ties: of 150 scenes over ten orders of magnitude in speed and
     # nine in D and the peak, at most a few.
     joints, motions = drawn(kind, 150, wide=True, plain=True)
-    table = evaluate(joints, motions, (*EVENTS, *EFFORTS))
+    table = evaluate(joints, motions, (*EVENTS, *LOADS))
     assert table.n_alone <= 30
     assert np.isfinite(table.column("catch")).sum() > 40
 
@@ -102,7 +102,9 @@ def test_corner_cases_are_those_of_one_scene() -> None:
     for i, name in enumerate(cases):
         found = events(joints[i], motions[i])
         for event in EVENTS:
-            assert same(table.column(event)[i], getattr(found, event)), (name, event)
+            value = table.column(event)[i]
+            size = max(value, 1.0) if event in ANGLES else motions[i].duration
+            assert same(value, getattr(found, event), size), (name, event)
         peak = peak_torque(joints[i], motions[i])
         assert table.column("peak_torque")[i] == pytest.approx(peak, rel=1e-13)
 
@@ -131,8 +133,8 @@ def test_one_joint_for_many_motions_and_one_motion_for_many_joints() -> None:
 @pytest.mark.parametrize("chunk", [1, 7, 1000])
 def test_chunks_change_nothing(chunk: int) -> None:
     joints, motions = drawn("minimum jerk", 40, wide=False)
-    whole = evaluate(joints, motions, (*EVENTS, *EFFORTS))
-    cut = evaluate(joints, motions, (*EVENTS, *EFFORTS), chunk=chunk)
+    whole = evaluate(joints, motions, (*EVENTS, *LOADS))
+    cut = evaluate(joints, motions, (*EVENTS, *LOADS), chunk=chunk)
     assert np.array_equal(whole.values, cut.values, equal_nan=True)
     assert whole.n_alone == cut.n_alone
 
@@ -150,21 +152,6 @@ def test_memory_is_that_of_a_chunk() -> None:
     finally:
         tracemalloc.stop()
     assert most < 6e6  # at once 200 columns would take 96 MB
-
-
-# Counted
-
-
-def test_only_what_is_asked_is_computed() -> None:
-    motions = [minimum_jerk(80.0), minimum_jerk(90.0)]
-    with counted(batch, "Efforts") as n_efforts:
-        evaluate(HM3, motions, EVENTS)
-        assert n_efforts == [0]
-        evaluate(HM3, motions, ["peak_torque", "work"])
-        assert n_efforts == [1]
-    with counted(batch, "course") as n_courses:
-        evaluate(HM3, motions, EVENTS)
-        assert n_courses == [0]  # nobody goes alone
 
 
 # Refused
@@ -201,40 +188,6 @@ def test_wrong_calls_are_refused(call, said: str) -> None:
 def test_the_names_are_those_of_the_functions() -> None:
     found = events(HM3, minimum_jerk(92.0))
     assert all(hasattr(found, name) for name in scenes.EVENTS)
-    assert set(scenes.EFFORTS) == set(FUNCTIONS)
+    assert set(scenes.LOADS) == set(FUNCTIONS)
     assert isinstance(constant(1.0), ConstantSpeed)
     assert isinstance(minimum_jerk(1.0), MinimumJerk)
-
-
-# Arithmetic in 32 digits
-
-numbers = st.floats(1e-6, 1e6) | st.floats(-1e6, -1e-6)
-
-
-def exact(number: Twofold) -> Fraction:
-    return Fraction(float(number.high)) + Fraction(float(number.low))
-
-
-@given(a=numbers, b=numbers, c=numbers)
-def test_twofold_numbers_have_32_digits(a: float, b: float, c: float) -> None:
-    x, y, z = Twofold(a) / 3.0, Twofold(b), Twofold(c)
-    least = Fraction(1, 10**30)
-    third = exact(x)
-    assert abs(third * 3 - Fraction(a)) <= least * abs(Fraction(a))
-    total = third + Fraction(b)
-    assert abs(exact(x + y) - total) <= least * (abs(third) + abs(Fraction(b)))
-    assert abs(exact(y - x) + third - Fraction(b)) <= least * (
-        abs(third) + abs(Fraction(b))
-    )
-    assert abs(exact(x * z) - third * Fraction(c)) <= least * abs(third * Fraction(c))
-    ratio = third / Fraction(c)
-    assert abs(exact(x / z) - ratio) <= least * abs(ratio)
-    root = exact((x * x).sqrt())
-    assert abs(root - abs(third)) <= least * abs(third)
-
-
-def test_a_twofold_number_rounds_to_the_nearest_float() -> None:
-    third = Twofold(1.0) / 3.0
-    assert float(third.high) == 1 / 3
-    assert abs(float(third.low)) <= 2.0**-54
-    assert radians(180.0) == float((Twofold(radians(180.0)) * 1.0).high)

@@ -12,7 +12,6 @@ from masrel.elbow import (
     ElbowParameters,
     Events,
     Motion,
-    effort,
     events,
     impulse,
     peak_torque,
@@ -22,7 +21,7 @@ from masrel.elbow import (
 )
 from tests.elbow.ode import Ode
 from tests.elbow.scenes import KINDS, corner_cases, random_scene
-from tests.elbow.stretches import constant, counted, minimum_jerk
+from tests.elbow.stretches import constant, minimum_jerk
 
 HM3 = STANDARD_MODELS["HM3"]
 DEG = pi / 180
@@ -59,7 +58,7 @@ def test_a_smoothed_onset_takes_half_its_rise_off_the_impulse() -> None:
     assert missing == pytest.approx(0.5 * 0.02 * 257.6 * DEG, rel=1e-12)
     found = events(smooth, constant(92.0))
     times = [found.catch, found.catch + 0.005, found.catch + 0.02]
-    levels = torque(smooth, constant(92.0), times, found=found)
+    levels = torque(smooth, constant(92.0), times)
     # y = 1/4: 3/16 - 2/64 = 10/64
     expected = [282.24, 282.24 + 257.6 * 10 / 64, 539.84]
     assert levels / DEG == pytest.approx(expected, rel=1e-12)
@@ -96,13 +95,13 @@ def by_quadrature(
         if high <= low:
             continue
         times = 0.5 * (low + high) + 0.5 * (high - low) * shares
-        tau = torque(joint, motion, times, found=found)
+        tau = torque(joint, motion, times)
         omega = motion.velocity(times)
         width = 0.5 * (high - low)
         done += width * float(weights @ (tau * omega))
         pushed += width * float(weights @ tau)
         scale += width * float(weights @ (np.abs(tau) * (1.0 + np.abs(omega))))
-        dense = torque(joint, motion, np.linspace(low, high, 99)[1:-1], found=found)
+        dense = torque(joint, motion, np.linspace(low, high, 99)[1:-1])
         largest = max(largest, float(dense.max()))
     return done, pushed, scale, largest
 
@@ -148,20 +147,3 @@ def test_an_ode_solver_finds_the_same(model: str, motion: Motion) -> None:
             assert ode.found[name] == pytest.approx(value, abs=1e-8), name
     assert ode.state[1] == pytest.approx(work(joint, motion), abs=1e-7)
     assert ode.state[2] == pytest.approx(impulse(joint, motion), abs=1e-7)
-
-
-# Counted
-
-
-def test_a_residual_needs_no_laws_and_a_peak_no_integrals() -> None:
-    motion = minimum_jerk(92.0)
-    with counted(effort, "sections") as n_sections:
-        residual_torque(HM3, motion)
-        assert n_sections == [0]
-        peak_torque(HM3, motion)
-        assert n_sections == [1]
-    with counted(effort, "integral") as n_integrals:
-        peak_torque(HM3, motion)
-        assert n_integrals == [0]
-        work(HM3, motion)
-        assert n_integrals[0] > 0

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.polynomial import Polynomial
 from scipy.interpolate import PchipInterpolator
 
 from masrel.elbow import (
@@ -20,7 +21,6 @@ from masrel.elbow import (
     Trapezoid,
     interrupted,
 )
-from masrel.elbow.polynomial import exactly, value
 from masrel.errors import ParameterError
 from tests.elbow.scenes import KINDS, random_scene
 
@@ -39,23 +39,21 @@ def any_motion(seed: int, kind: str) -> Motion:
 def test_samples_are_those_of_the_pieces(kind: str, seed: int) -> None:
     motion = any_motion(seed, kind)
     time = 0.0
-    with exactly():
-        for piece in motion.pieces():
-            for k in range(1, 8):
-                share = piece.length / 8 * k
-                at = time + float(share)
-                x = share / piece.length
-                pairs = [
-                    (piece.angle, motion.angle(at), 1.0),
-                    (piece.velocity, motion.velocity(at), 3.5 / motion.duration),
-                    (piece.acceleration, motion.acceleration(at), 1.0),
-                ]
-                for polynomial, sampled, scale in pairs:
-                    exact = float(value(polynomial, x))
-                    # accelerations of uneven samples are differences of near slopes
-                    slack = 1e-9 if polynomial is pairs[2][0] else 1e-13
-                    assert float(sampled) == pytest.approx(exact, abs=slack * scale * 9)
-            time += float(piece.length)
+    for piece in motion.pieces():
+        angle = Polynomial(piece.angle)
+        for share in np.arange(1, 8) / 8:
+            x = share * piece.length
+            at = piece.start + x
+            speed, acceleration = angle.deriv()(x), angle.deriv(2)(x)
+            assert piece.slowest - 1e-12 <= speed <= piece.fastest + 1e-12
+            expected = motion.origin + angle(x)
+            assert float(motion.angle(at)) == pytest.approx(expected, abs=1e-12)
+            assert float(motion.velocity(at)) == pytest.approx(speed, abs=1e-11)
+            # accelerations of uneven samples are differences of near slopes
+            scale = max(abs(acceleration), 1.0)
+            found = float(motion.acceleration(at))
+            assert found == pytest.approx(acceleration, abs=1e-8 * scale)
+        time += piece.length
     assert time == pytest.approx(motion.duration, rel=1e-14)
     assert float(motion.angle(0.0)) == pytest.approx(motion.start, abs=1e-15)
     assert float(motion.angle(motion.duration)) == pytest.approx(motion.end, abs=1e-14)
@@ -199,8 +197,7 @@ def test_a_part_is_the_whole_between_two_times() -> None:
     part = Part(motion=RAMPS, begin=0.25, finish=2.25)
     assert (part.start, part.end, part.duration) == (0.5625, 2.4375, 2.0)
     assert float(part.velocity(0.0)) == 0.5
-    with exactly():
-        assert [float(piece.length) for piece in part.pieces()] == [0.25, 1.5, 0.25]
+    assert [piece.length for piece in part.pieces()] == [0.25, 1.5, 0.25]
 
 
 def test_an_interruption_by_hand() -> None:
@@ -213,15 +210,15 @@ def test_an_interruption_by_hand() -> None:
     assert motion.acceleration(times).tolist() == [0.0] * 6
 
 
-def test_a_long_rest_does_not_cost_digits_afterwards() -> None:
-    # 1e5 s have an ulp of 1.5e-11 s; the reach after them starts at the exact time
+def test_a_long_rest_costs_no_more_digits_than_its_time_has() -> None:
+    # 1e5 s have an ulp of 1.5e-11 s, and the reach is as much too early or too late
     motion = Joined(
         [Hold(start=0.5, duration=0.1), Hold(start=0.5, duration=1e5), REACH]
     )
     begin = 100000.1
     left = begin - 1e5 - 0.1  # what the float of the time is more than 1e5 + 0.1
     at = float(motion.angle(begin + 1.0))
-    assert at == pytest.approx(float(REACH.angle(1.0 + left)), abs=1e-15)
+    assert at == pytest.approx(float(REACH.angle(1.0 + left)), abs=3e-11)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,116 @@
+"""The law of the joint: equations (1)-(6), for a sample, a polynomial or a column.
+
+Source: Park, Kim and Damiano (2012), IEEE TNSRE 20(3), 361-370,
+https://doi.org/10.1109/TNSRE.2012.2195330.
+
+The sampled joint applies it at every sample, the events and loads of a motion to the
+polynomials of its pieces, `evaluate` to columns of scenes. `p` is `ElbowParameters`, or
+columns under the same names.
+"""
+
+from typing import Any, NamedTuple
+
+from masrel.elbow._polynomials import NOTHING, Number, Polynomial, derivative, product
+
+Parameters = Any  # ElbowParameters, or columns under the same names
+
+
+class TorqueLaw(NamedTuple):
+    """Torque as long as one law holds: level + k (θ - origin) + b θ̇ + m θ̈."""
+
+    level: Number  # N·m
+    stiffness: Number = 0.0  # N·m/rad
+    origin: Number = 0.0  # rad
+    damping: Number = 0.0  # N·m·s/rad
+    inertia: Number = 0.0  # kg·m²
+
+    def commanded(self, angle: Number, velocity: Number) -> Number:
+        """Return the torque without m·θ̈: the mannequin's arm has the inertia."""
+        spring = self.stiffness * (angle - self.origin)
+        return self.level + spring + self.damping * velocity
+
+    @property
+    def is_level(self) -> bool:
+        """Whether the torque is constant, whatever the arm does."""
+        terms = (self.stiffness, self.damping, self.inertia)
+        return all(isinstance(term, float) and term == 0.0 for term in terms)
+
+    def along(self, angle: Polynomial) -> Polynomial:
+        """Return the torque along a polynomial angle."""
+        if self.is_level:
+            return [self.level]
+        speed = [*derivative(angle), 0.0]
+        acceleration = [*derivative(speed), 0.0]
+        start = self.commanded(angle[0], speed[0]) + self.inertia * acceleration[0]
+        columns = zip(angle[1:], speed[1:], acceleration[1:], strict=False)
+        return [
+            start,
+            *[
+                self.stiffness * x + self.damping * v + self.inertia * a
+                for x, v, a in columns
+            ],
+        ]
+
+
+def pre_catch(p: Parameters, rest: Number) -> TorqueLaw:
+    """(1): m·θ̈ + b·θ̇ + k·(θ - θ_rest)."""
+    return TorqueLaw(0.0, p.stiffness, rest, p.damping, p.inertia)
+
+
+def catch_line(
+    p: Parameters,
+    constant: Number,
+    angle: Polynomial,
+    way: Polynomial,
+    since: Polynomial,
+) -> Polynomial:
+    """(2) as a polynomial: θ - (L - α·v̄), v̄ = way/since, times the time since onset."""
+    # constant: L, counted as the angles are
+    beyond = product([angle[0] - constant, *angle[1:]], since)
+    return [
+        b + p.catch_slope * w
+        for b, w in zip(beyond, [*way, *[0.0] * len(beyond)], strict=False)
+    ]
+
+
+def slow_line(p: Parameters, way: Polynomial, since: Polynomial) -> Polynomial:
+    """ν_H - v̄, v̄ = way/since, times the time since onset: (6) where ν_L exceeds ν_H."""
+    # a mean speed that differs from ν_H by rounding alone is ν_H
+    longer = [*since, *[0.0] * len(way)]
+    return [
+        (1.0 + NOTHING) * p.fastest_mean_speed * s - w
+        for s, w in zip(longer, way, strict=False)
+    ]
+
+
+def catch_bounds(p: Parameters, origin: Number) -> tuple[Number, Number]:
+    """(6), last line and first: θ_L, and L - α·ν_L, the largest; rad from an origin."""
+    largest = (p.catch_angle_constant - origin) - p.catch_slope * p.slowest_mean_speed
+    return p.smallest_catch_angle - origin, largest
+
+
+def catch(p: Parameters, pre_end: Number, rise: Number) -> tuple[TorqueLaw, TorqueLaw]:
+    """(3), first and second line; pre_end is τ_pre_end and rise H·v_c."""
+    return TorqueLaw(pre_end + rise), TorqueLaw(pre_end + p.residual_share * rise)
+
+
+def onset_share(y: Number) -> Number:
+    """Share of the rise at share y of `catch_rise`, a smoothed onset: 3y² - 2y³."""
+    return y * y * (3.0 - 2.0 * y)
+
+
+def post_catch(
+    p: Parameters, pre_end: Number, rise: Number, start: Number, rest: Number
+) -> TorqueLaw:
+    """(5): from the residual torque on; start is θ_post."""
+    residual = p.residual_share * rise
+    additive = 1.0 * (p.post_catch == "additive")
+    # as Table III's footnote reads it, the spring and damper of (1) go on
+    base = additive * p.stiffness * (start - rest) + (1.0 - additive) * pre_end
+    return TorqueLaw(
+        level=base + residual,
+        stiffness=p.post_catch_stiffness + additive * p.stiffness,
+        origin=start,
+        damping=additive * p.damping,
+        inertia=p.inertia,
+    )
