@@ -6,9 +6,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from masrel.elbow._polynomials import Polynomial
 from masrel.elbow.motion import Floats, Motion
 from masrel.elbow.tone._model import ToneEvent, ToneModel, events_at, quantity
-from masrel.elbow.tone._passages import OneWay, one_way, spans
+from masrel.elbow.tone._passages import OneWay, negative, one_way, spans
 from masrel.errors import ParameterError
 from masrel.recording import PHASES
 
@@ -123,37 +124,33 @@ class ClaspKnife(ToneModel):
         passive = self.passive_stiffness * (angle - rest)
         return passive + scale * self._reflex(angle, velocity)
 
-    def _level(self, part: OneWay) -> Floats:
-        # r/k without the brackets, a polynomial
-        level = part.angle.copy()
-        level[0] -= self.threshold
-        if part.direction > 0:
-            velocity = part.velocity
-            level[: velocity.size] += self.threshold_slope * velocity
-        return level
+    def _beyond(self, part: OneWay, angle: float) -> Polynomial:
+        # how far θ + μ·max(ω, 0) is beyond an angle
+        lead = self.threshold_slope if part.direction > 0 else 0.0
+        return part.beyond(angle, lead)
 
     def _latched(self, motion: Motion) -> list[tuple[float, float]]:
         # when the latch closes and opens, s; the last may never open
         latched: list[tuple[float, float]] = []
         closed: float | None = None
+        fires_at = self.threshold + self.firing_torque / self.reflex_stiffness
         for part in one_way(motion):
-            fires, armed = self._level(part), part.angle.copy()
-            fires[0] -= self.firing_torque / self.reflex_stiffness
-            armed[0] -= self.arming_angle
-            since = part.start
+            armed, since = part.beyond(self.arming_angle), part.start
             if closed is not None and part.direction < 0:
-                opened = part.reached(-armed)
+                opened = part.reached(negative(armed))
                 if opened is not None:
                     latched.append((closed, opened))
                     closed, since = None, opened
             if closed is None:
+                fires = self._beyond(part, fires_at)
                 closed = part.reached(fires, armed, after=since)
         return latched if closed is None else [*latched, (closed, math.inf)]
 
     def events(self, motion: Motion) -> tuple[ToneEvent, ...]:
         """Return when the reflex sets in, fires, gives way, ends and is armed again."""
         times = []
-        for begun, until in spans(motion, self._level):
+        reflex = spans(motion, lambda part: self._beyond(part, self.threshold))
+        for begun, until in reflex:
             times += [("reflex", begun), ("reflex ends", until)]
         for closed, opened in self._latched(motion):
             times += [("fire", closed), ("arm", opened)]

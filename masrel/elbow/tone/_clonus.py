@@ -14,7 +14,7 @@ from masrel.elbow.tone._model import (
     grade_of,
     quantity,
 )
-from masrel.elbow.tone._passages import beyond, one_way
+from masrel.elbow.tone._passages import negative, one_way
 
 _IDLE, _BEATS = 0, 1  # positions in masrel.recording.PHASES: pre-catch, catch
 _FADE_S = {"3": 2.0, "4": 0.0}
@@ -117,14 +117,12 @@ class Clonus(ToneModel):
         trains: list[tuple[float, float]] = []
         begun: float | None = None
         for part in one_way(motion):
-            far = beyond(self.trigger_angle)(part)
-            fast = part.direction * part.velocity
+            far = part.beyond(self.trigger_angle)
             if part.direction > 0 and begun is None:
-                fast[0] -= self.trigger_speed
-                begun = part.reached(fast, far)
+                begun = part.reached(part.faster(self.trigger_speed, 1), far)
             elif part.direction < 0 and begun is not None:
-                fast[0] -= self.speed_threshold
-                ends = [t for t in map(part.reached, (fast, -far)) if t is not None]
+                given_up = (part.faster(self.speed_threshold, -1), negative(far))
+                ends = [t for t in map(part.reached, given_up) if t is not None]
                 if ends:
                     trains.append((begun, min(ends)))
                     begun = None

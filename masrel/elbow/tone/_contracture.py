@@ -2,13 +2,14 @@
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar, Self
 
 import numpy as np
 
 from masrel.elbow.motion import Floats, Motion
 from masrel.elbow.tone._model import ToneEvent, ToneModel, events_at, grade_of, quantity
-from masrel.elbow.tone._passages import beyond, spans
+from masrel.elbow.tone._passages import OneWay, spans
 
 _FULL_RANGE = math.radians(146.0)
 _SHORTENED_DEG = {"1": 10.0, "2": 20.0, "3": 30.0, "4": 40.0}
@@ -126,7 +127,7 @@ class Contracture(ToneModel):
         """Return when a motion goes beyond θ_e and θ_cap, in order."""
         times: list[tuple[str, float]] = []
         for name, at in (("end", self.end_angle), ("cap", self.cap_angle)):
-            for begun, until in spans(motion, beyond(at)):
+            for begun, until in spans(motion, partial(OneWay.beyond, angle=at)):
                 times += [(name, begun), (f"{name} left", until)]
         return events_at(motion, times)
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from masrel.elbow.motion import Floats, Motion
 from masrel.elbow.tone._model import ToneEvent, ToneModel, events_at, grade_of, quantity
-from masrel.elbow.tone._passages import one_way
+from masrel.elbow.tone._passages import negative, one_way
 
 # F N·m, K N·m/rad, B N·m·s/rad by the UPDRS score of rigidity: choices of ours
 _BY_UPDRS = {
@@ -108,13 +108,15 @@ class LeadPipe(ToneModel):
         for part in one_way(motion):
             if not part.direction:
                 continue
-            begin, end = part.angle_at(part.start), part.angle_at(part.end)
+            begin, end = part.angle[0], part.angle_at(part.end)
             if slips == -part.direction:
                 times.append(("stick", part.start))
                 slips = 0
-            level = part.direction * part.angle  # reaches z_c on its way
-            level[0] += part.direction * (bristle - begin) - limit
-            time = None if slips else part.reached(level)
+            slips_at = begin - bristle + part.direction * limit
+            over = part.beyond(slips_at)
+            if part.direction < 0:
+                over = negative(over)
+            time = None if slips else part.reached(over)
             if time is not None:
                 times.append(("slip", time))
                 slips = part.direction
@@ -127,8 +129,8 @@ class LeadPipe(ToneModel):
         bristle, limit = 0.0, self.bristle_travel
         for part in one_way(motion):
             mine = times >= part.start
-            begin, end = part.angle_at(part.start), part.angle_at(part.end)
-            travel = part.angles_at(np.minimum(times[mine], part.end)) - begin
+            begin, end = part.angle[0], part.angle_at(part.end)
+            travel = part.angle_at(np.minimum(times[mine], part.end)) - begin
             bent[mine] = np.clip(bristle + travel, -limit, limit)
             bristle = _clip(bristle + end - begin, limit)
         return bent

@@ -15,7 +15,7 @@ from masrel.elbow.tone._model import (
     grade_of,
     quantity,
 )
-from masrel.elbow.tone._passages import OneWay, spans
+from masrel.elbow.tone._passages import spans
 from masrel.errors import ParameterError
 
 _MAS = {"0": 0.0, "1": 1.0, "1+": 1.5, "2": 2.0, "3": 3.0, "4": 4.0}
@@ -150,18 +150,11 @@ class ThresholdReflex(ToneModel):
         limit = self.largest_reflex
         return torque if limit is None else min(torque, limit)
 
-    def _level(self, part: OneWay) -> Floats:
-        # the angle beyond the dynamic threshold, a polynomial
-        level = part.angle.copy()
-        level[0] -= self.threshold
-        velocity = part.velocity
-        level[: velocity.size] += self.threshold_slope * velocity
-        return level
-
     def events(self, motion: Motion) -> tuple[ToneEvent, ...]:
         """Return when the threshold is met and left, and the reflex a delay later."""
         times = []
-        for begun, until in spans(motion, self._level):
+        angle, lead = self.threshold, self.threshold_slope
+        for begun, until in spans(motion, lambda part: part.beyond(angle, lead)):
             times += [("threshold", begun), ("reflex", begun + self.delay)]
             times += [("threshold left", until), ("reflex ends", until + self.delay)]
         return events_at(motion, times)

@@ -3,14 +3,13 @@
 import dataclasses
 import inspect
 import re
-from collections.abc import Iterator
 from math import inf, nan, radians
 
 import numpy as np
 import pytest
 
-from masrel.elbow import MODELS, ConstantSpeed, Hold, Joined, MinimumJerk
-from masrel.elbow.motion import Floats
+from masrel.elbow import MODELS, ConstantSpeed, Hold, Joined, MinimumJerk, Motion
+from masrel.elbow.motion import Piece, piece_of
 from masrel.elbow.tone import Dystonia, LeadPipe, ToneModel
 from masrel.errors import ParameterError
 from tests.elbow.tone.joints import (
@@ -195,22 +194,15 @@ def test_events_are_in_order_and_at_their_angles(model: ToneModel) -> None:
             assert event.angle == float(motion.angle(event.time))
 
 
-class Wave:
+class Wave(Motion):
     """60 deg and a cubic in time on it, one piece that turns twice."""
 
     start, end, duration = radians(60), radians(60), 6.0
-    length = 6.0
 
-    def pieces(self) -> Iterator["Wave"]:
-        yield self
-
-    def angle(self, time: Floats | float, origin: float = 0.0) -> Floats:
-        x = np.asarray(time) / self.duration
-        return radians(60) - origin + radians(300) * x * (x - 0.5) * (x - 1.0)
-
-    def velocity(self, time: Floats | float) -> Floats:
-        x = np.asarray(time) / self.duration
-        return radians(300) * (3.0 * x * x - 3.0 * x + 0.5) / self.duration
+    def pieces(self) -> list[Piece]:
+        # 300·x·(x - 1/2)·(x - 1) deg, x = t/6
+        cubic = (0.0, radians(25), -radians(12.5), radians(300) / 216)
+        return [piece_of(0.0, self.duration, cubic)]
 
 
 def test_a_piece_may_turn() -> None:
