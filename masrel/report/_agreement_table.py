@@ -93,6 +93,7 @@ def agreement_table(
         caption=caption,
         columns=tuple(columns),
         rows=tuple(cells),
+        in_units=tuple(at for at, row in enumerate(rows) if _is_in_units(row)),
         read=read,
         notes=(
             *notes,
@@ -103,6 +104,11 @@ def agreement_table(
         ),
         data=data,
     )
+
+
+def _is_in_units(row: AgreementRow) -> bool:
+    entry = COEFFICIENTS.get(row.estimate.coefficient)  # none of kappa of a category
+    return entry is not None and entry.in_units
 
 
 def _cells(row: AgreementRow) -> tuple[Value, ...]:
@@ -347,7 +353,7 @@ def _why_null(estimate: Estimate) -> list[str]:
 def agreement_forest(rows: Sequence[AgreementRow], target: Target) -> Forest:
     """Return what a figure shows: the estimates and their intervals."""
     # what is in the units of the ratings is on no axis of agreement
-    rows = [row for row in rows if not COEFFICIENTS[row.estimate.coefficient].in_units]
+    rows = [row for row in rows if not _is_in_units(row)]
     if not rows:
         raise ParameterError(
             "--figure: shows coefficients of agreement, got only estimates in the "

@@ -159,7 +159,7 @@ def sentence(estimate: Estimate, *, word: str = "") -> str:
     sizes = (items, counted(estimate.n_raters, "rater"))
     if estimate.reason is not None:
         return f"{name} is undefined ({estimate.reason}), {', '.join(sizes)}."
-    shown = partial(number, digits=2) if entry.in_units else _apa
+    shown = partial(number, digits=2, in_units=True) if entry.in_units else _apa
     uncertainty = _uncertainty(estimate, shown)
     parts = (f"{name} = {shown(estimate.value)}", *uncertainty, word, *sizes)
     return f"{', '.join(filter(None, parts))}."

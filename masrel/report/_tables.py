@@ -55,6 +55,7 @@ class Table:
     columns: tuple[Column, ...]
     # values as computed: text, numbers, ``nan`` for undefined, None for absent
     rows: tuple[tuple[Value, ...], ...]
+    in_units: tuple[int, ...] = ()  # rows of numbers that may be of any size
     notes: tuple[str, ...] = ()  # what the reader must know, below the table
     read: tuple[str, ...] = ()  # what was read for it, above the table
     # where the data come from: "simulated", "published", "recorded" or "foreign"
@@ -67,8 +68,9 @@ class Table:
         return f"{SIMULATED}. {self.caption}" if is_simulated else self.caption
 
 
-def number(value: Value, digits: int | None) -> str:
+def number(value: Value, digits: int | None, *, in_units: bool = False) -> str:
     """Return a number as shown: rounded, with a true minus sign."""
+    # in_units: whether it may be of any size, and keeps four digits where it is small
     # Text and whole numbers are shown as they are.
     if value is None:
         return ABSENT
@@ -80,7 +82,7 @@ def number(value: Value, digits: int | None) -> str:
         return "∞" if value > 0.0 else "−∞"
     if math.isnan(value):
         return UNDEFINED
-    text = f"{value:.{digits}f}"
+    text = fixed_or_significant(value, digits) if in_units else f"{value:.{digits}f}"
     if float(text) == 0.0:
         text = text.removeprefix("-")  # no "-0.000"
     return text.replace("-", "−")
@@ -142,7 +144,10 @@ def counted(count: int, noun: str) -> str:
 def page_cells(table: Table) -> tuple[list[Column], list[list[str]]]:
     """Return the columns of a page or a screen, and every row as shown in them."""
     places = [(i, c) for i, c in enumerate(table.columns) if c.where != "csv"]
-    rows = [[number(row[i], c.digits) for i, c in places] for row in table.rows]
+    rows = [
+        [number(row[i], c.digits, in_units=at in table.in_units) for i, c in places]
+        for at, row in enumerate(table.rows)
+    ]
     return [column for _, column in places], rows
 
 

@@ -105,6 +105,21 @@ def test_estimates_in_units_have_rows_and_sentences(
     assert "Lin's concordance = ." in said
 
 
+def test_estimates_in_small_units_keep_their_digits(
+    masrel: Caller, tmp_path: Path
+) -> None:
+    # differences of 0, 2 and 1 tenths of a millimetre, in metres: SD 0.0001, and
+    # SEM = 0.0001 / √2
+    file = tmp_path / "metres.csv"
+    file.write_text("item,Kim,Lee\na,1,1\nb,2,2.0002\nc,3,3.0001\n", encoding="utf-8")
+    call = ("agree", file, "--coefficients", "lin_ccc,sem_consistency")
+    out = masrel(*call).out
+    row = next(line for line in out.splitlines() if "SEM" in line)
+    assert " 7.071e−05 " in row
+    assert " 1.000 " in next(line for line in out.splitlines() if "Lin's" in line)
+    assert "SEM, consistency = 7.071e−05" in masrel(*call, "--sentence").out
+
+
 @pytest.mark.parametrize(
     ("more", "why"),
     [
