@@ -41,3 +41,12 @@ class VelocityEstimate:
         self._velocity += self._gain * (difference - self._velocity)
         self._time, self._angle = time_s, angle
         return self._velocity
+
+
+def passive_damping(stiffness: float, damping: float, rate_hz: float) -> float:
+    """Return the damping a device needs to render these passively, N·m·s/rad."""
+    # Colgate, Schenkel (1997), J. Robot. Syst. 14(1), 37-47: at every frequency above
+    # T / (2 (1 - cos ωT)) Re{(1 - exp(-jωT)) H(exp(jωT))}. For K + B·s behind the
+    # low-pass that is largest at the Nyquist rate; without the motor's own delay.
+    gain = -math.expm1(-CUTOFF_RAD_S / rate_hz)
+    return 0.5 * stiffness / rate_hz + damping * gain / (2.0 - gain)

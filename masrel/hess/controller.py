@@ -186,9 +186,11 @@ class Controller:
             joint.release()
             self.grip_lost = True
         torque = joint.step(time_s, angle, velocity)
+        # what is no number fails here, and the recording keeps the last that was one
+        command = torque - self._compensation.torque(velocity)
         self.model_torque = torque
         self.phase = joint.phase
-        return torque - self._compensation.torque(velocity)
+        return command
 
     def _stop_for_slip(self, drop: float) -> None:
         self._joint.release()

@@ -15,7 +15,7 @@ from masrel.elbow.joint_model import JointModel
 from masrel.elbow.motion import Motion
 from masrel.errors import ParameterError
 from masrel.hess._presented import Presented
-from masrel.hess._velocity import CUTOFF_RAD_S
+from masrel.hess._velocity import passive_damping
 from masrel.hess.backends import open_device
 from masrel.hess.clock import SimulatedClock
 from masrel.hess.controller import Controller
@@ -250,7 +250,6 @@ def _compared(
     taken = np.concatenate(([0.0], np.cumsum(torques[:-1] * np.diff(angles))))
     speed = float(np.abs(goal_velocities).max(initial=0.0))
     stiffness, damping = model.largest_slope(speed=speed)
-    gain = -math.expm1(-CUTOFF_RAD_S / rate_hz)
     return Rendering(
         presented=presented,
         max_angle_error=_largest(angles - goal_angles),
@@ -260,7 +259,7 @@ def _compared(
         peak_torque=_largest(goal_torques),
         energy_taken=float(taken[-1]),
         energy_given=float(-taken.min()) + 0.0,  # no minus zero
-        damping_needed=0.5 * stiffness / rate_hz + damping * gain / (2.0 - gain),
+        damping_needed=passive_damping(stiffness, damping, rate_hz),
     )
 
 

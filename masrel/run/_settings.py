@@ -13,7 +13,9 @@ from masrel.hess import (
     Hand,
     device_names,
 )
-from masrel.protocol import DeviceSettings, Protocol, joint_model
+from masrel.hess._velocity import passive_damping
+from masrel.protocol import DeviceSettings, Model, Protocol, joint_model
+from masrel.protocol._kinds import DEFAULT_KIND
 
 if TYPE_CHECKING:
     from masrel.hess.puck import PuckOptions
@@ -33,38 +35,60 @@ def check_backend(settings: DeviceSettings) -> None:
 
 def torque_problems(protocol: Protocol) -> Iterator[str]:
     """Yield what is wrong with models that ask for more than the device may send."""
+    for index, model in enumerate(protocol.models):
+        for problem in _torque_problems(protocol, model):
+            yield f'models[{index}]: needed {problem} (id "{model.id}")'
+
+
+def _torque_problems(protocol: Protocol, model: Model) -> Iterator[str]:
     settings, stretch = protocol.device, protocol.stretch
     start = math.radians(stretch.start_deg)
+    joint = joint_model(protocol, model.id)
+    if joint.range_end <= start:
+        yield (
+            f"an end of range beyond stretch.start_deg ({stretch.start_deg:g}), got "
+            f"{math.degrees(joint.range_end):g} deg"
+        )
+        return
     speed = math.radians(stretch.largest_speed_deg_s)
-    for index, model in enumerate(protocol.models):
-        where, name = f"models[{index}]", f'(id "{model.id}")'
-        key, limit = "torque_limit_nm", settings.torque_limit_nm
-        if model_controller(protocol, model.id).is_guarded:
-            active = settings.active_torque_limit_nm
-            if active < limit:
-                key, limit = "active_torque_limit_nm", active
-        joint = joint_model(protocol, model.id)
-        if joint.range_end <= start:
-            yield (
-                f"{where}: needed an end of range beyond stretch.start_deg "
-                f"({stretch.start_deg:g}), got {math.degrees(joint.range_end):g} deg "
-                f"{name}"
-            )
-            continue
-        largest = joint.largest_torque(start_angle=start, speed=speed)
-        if not largest <= limit:
-            yield (
-                f"{where}: needed at most device.{key} ({limit:g} N·m) at "
-                f"stretch.largest_speed_deg_s ({stretch.largest_speed_deg_s:g} deg/s), "
-                f"got {largest:.3f} N·m {name}"
-            )
-        first = abs(joint.stepper(start).step(0.0, start, 0.0))
-        if not first <= settings.standing_torque_nm:
-            yield (
-                f"{where}: needed at most device.standing_torque_nm "
-                f"({settings.standing_torque_nm:g} N·m) where the stretch starts, got "
-                f"{first:.3f} N·m {name}"
-            )
+    key, limit = _torque_limit(protocol, model)
+    largest = joint.largest_torque(start_angle=start, speed=speed)
+    if not largest <= limit:
+        yield (
+            f"at most device.{key} ({limit:g} N·m) at stretch.largest_speed_deg_s "
+            f"({stretch.largest_speed_deg_s:g} deg/s), got {largest:.3f} N·m"
+        )
+    first = abs(joint.stepper(start).step(0.0, start, 0.0))
+    if not first <= settings.standing_torque_nm:
+        yield (
+            f"at most device.standing_torque_nm ({settings.standing_torque_nm:g} N·m) "
+            f"where the stretch starts, got {first:.3f} N·m"
+        )
+    if model.kind != DEFAULT_KIND:
+        yield from _stiffness_problems(settings, *joint.largest_slope(speed=speed))
+
+
+def _torque_limit(protocol: Protocol, model: Model) -> tuple[str, float]:
+    # the key of the limit that is for this model, and the limit, N·m
+    settings = protocol.device
+    limits = {"torque_limit_nm": settings.torque_limit_nm}
+    if model_controller(protocol, model.id).is_guarded:
+        limits["active_torque_limit_nm"] = settings.active_torque_limit_nm
+    return min(limits.items(), key=lambda entry: entry[1])
+
+
+def _stiffness_problems(
+    settings: DeviceSettings, stiffness: float, damping: float
+) -> Iterator[str]:
+    # slopes that the device cannot render without feeding energy into a hand
+    most = settings.friction_viscous_nms_rad
+    needs = passive_damping(stiffness, damping, settings.rate_hz)
+    if not needs <= most:
+        yield (
+            f"slopes that device.friction_viscous_nms_rad ({most:g} N·m·s/rad) makes "
+            f"passive at {settings.rate_hz} Hz, got {stiffness:g} N·m/rad and "
+            f"{damping:g} N·m·s/rad, which need {needs:.3g}"
+        )
 
 
 def device_limits(settings: DeviceSettings) -> DeviceLimits:

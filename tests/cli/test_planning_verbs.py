@@ -83,6 +83,22 @@ def test_a_guarded_model_is_checked_against_the_torque_of_the_guard(
     assert err.count("needed") == 1
 
 
+def test_a_model_too_stiff_for_the_device_is_a_problem(tmp_path: Path) -> None:
+    # By hand: 2002 N·m/rad · 1 ms / 2 = 1.001 N·m·s/rad, and 0.3 · 0.0898 of damping.
+    masrel("init", tmp_path / "new", "--study", "tone")
+    protocol = tmp_path / "new" / "protocol.toml"
+    text = protocol.read_text(encoding="utf-8")
+    stiff = text.replace("end_angle_deg = 116.0 ", "end_stiffness_nm_rad = 2000.0 # ")
+    stiff = stiff.replace("range_end_deg = 126.0 ", "end_steepness_per_rad = 30.0 # ")
+    protocol.write_text(stiff, encoding="utf-8")
+    _, err = masrel("check", tmp_path / "new", code=2)
+    assert (
+        "models[7]: needed slopes that device.friction_viscous_nms_rad (0.168 "
+        "N·m·s/rad) makes passive at 1000 Hz, got 2002 N·m/rad and 0.3 N·m·s/rad, "
+        'which need 1.03 (id "F3")'
+    ) in err
+
+
 def test_a_model_that_pulls_where_the_stretch_starts_is_a_problem(
     tmp_path: Path,
 ) -> None:

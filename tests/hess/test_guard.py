@@ -180,6 +180,24 @@ def test_no_number_is_not_sent() -> None:
     assert all(math.isfinite(torque) for _, torque in device.commands)
 
 
+@pytest.mark.parametrize("is_passive", [False, True])
+@pytest.mark.parametrize("value", [None, "1", [1.0]])
+def test_a_model_that_gives_no_number_is_a_fault_with_the_ramp(
+    value: object, is_passive: bool
+) -> None:
+    def law(time_s: float, _angle: float, _velocity: float) -> float:
+        return 1.5 if time_s < 0.1 else value  # type: ignore[return-value]
+
+    device, presented = at_constant_speed(Joint(law, is_passive=is_passive))
+    assert presented.fault is not None
+    assert presented.fault.kind == "controller"
+    assert presented.fault.torque_nm == 1.5
+    assert_ramps_to_zero(device, presented)
+    assert presented.recording.columns["model_torque_nm"].tolist() == (
+        [1.5] * presented.recording.n_samples
+    )
+
+
 # Slip
 
 
@@ -242,7 +260,7 @@ def test_the_papers_own_law_keeps_the_papers_own_release(name: str) -> None:
     assert presented.recording.facts["grip_lost"] is True
 
 
-# Every registered model that is not passive: guard and ramp
+# Every registered model, rendered; and of those that are not passive guard and ramp
 
 GUARDED = {
     kind: model()
@@ -256,6 +274,22 @@ FULL = Joined(
         Reversed(motion=MinimumJerk(start=START, end=OUT.end, mean_speed=SPEED)),
     ]
 )
+
+
+@pytest.mark.parametrize("kind", ["lead-pipe-rigidity", "contracture"])
+def test_a_passive_model_is_rendered_there_and_back_without_a_guard(kind: str) -> None:
+    joint = MODELS[kind]()
+    end = min(OUT.end, joint.range_end)
+    out = MinimumJerk(start=START, end=end, mean_speed=SPEED)
+    motion = Joined([out, Hold(start=end, duration=1.0), Reversed(motion=out)])
+    # guarded it would have no fault either
+    limits = DeviceLimits(active_energy=1e-9, active_torque=1e-9)
+    rendering = rendered(joint, motion, limits=limits)
+    assert rendering.presented.fault is None
+    assert rendering.max_angle_error < radians(1.2)  # 12 N·m on 600 N·m/rad
+    assert rendering.energy_taken > 1.0
+    assert rendering.energy_given < 0.01  # a spring that was not at rest
+    assert rendering.damping_needed < Friction().viscous
 
 
 def assert_rendered_a_ramp(presented: Presented, kind: str) -> None:

@@ -22,7 +22,7 @@ from masrel.hess import (
     run_presentation,
 )
 from masrel.hess._simulated import SimulatedDevice
-from masrel.hess._velocity import VelocityEstimate
+from masrel.hess._velocity import VelocityEstimate, passive_damping
 
 PAGE = (Path(__file__).parents[3] / "docs" / "driver.md").read_text(encoding="utf-8")
 PERIOD = 0.001
@@ -74,6 +74,22 @@ def test_with_the_filtered_speed_it_is() -> None:
     assert needed(MODEL.damping, MODEL.stiffness, cutoff=260.0) < B
     assert needed(MODEL.damping, MODEL.stiffness, cutoff=270.0) > B
     says("0.115 N·m·s/rad", "260 rad/s")
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "damping"), [(3.15, 1.26), (100.0, 0.3), (0.0, 0.8), (47.2, 0.2)]
+)
+@pytest.mark.parametrize("rate_hz", [1000, 2000])
+def test_what_the_loop_checks_is_the_largest_over_all_frequencies(
+    stiffness: float, damping: float, rate_hz: int
+) -> None:
+    if rate_hz == 1000:
+        expected = needed(damping, stiffness)
+        assert passive_damping(stiffness, damping, 1000) == pytest.approx(
+            expected, rel=1e-6
+        )
+    half = passive_damping(stiffness, damping, 2 * rate_hz)
+    assert half < passive_damping(stiffness, damping, rate_hz)
 
 
 def test_a_delay_of_the_motor_takes_that_away() -> None:
