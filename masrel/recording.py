@@ -5,7 +5,9 @@ their names, and ``NAME.json`` with the facts and the SHA-256 of the first.
 """
 
 import hashlib
+import io
 import json
+import os
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -86,7 +88,7 @@ class Recording:
 
 
 def write_recording(recording: Recording, path: Path) -> str:
-    """Write a recording beside its facts.
+    """Write a recording beside its facts, both whole and on disk or not at all.
 
     Parameters
     ----------
@@ -103,24 +105,45 @@ def write_recording(recording: Recording, path: Path) -> str:
     Raises
     ------
     RecordingError
-        If `path` does not end in ``.npz``.
+        If `path` does not end in ``.npz``, or is there already: a recording is never
+        overwritten.
     OSError
         If the files cannot be written.
     """
     if path.suffix != ".npz":
         raise RecordingError(f"{path}: the file of a recording must end in .npz")
+    if path.exists():
+        raise RecordingError(
+            f"{path}: needs a new file, a recording is never overwritten; move it away"
+        )
     path.parent.mkdir(parents=True, exist_ok=True)
     ordered = {name: recording.columns[name] for name in RECORDING_COLUMNS}
-    with path.open("wb") as file:
-        # Floats are never pickled; numpy 2.0 takes `allow_pickle` for a column.
-        np.savez_compressed(file, **ordered)  # type: ignore[arg-type]
-    checksum = hashlib.sha256(path.read_bytes()).hexdigest()
+    archive = io.BytesIO()
+    # Floats are never pickled; numpy 2.0 takes `allow_pickle` for a column.
+    np.savez_compressed(archive, **ordered)  # type: ignore[arg-type]
+    checksum = hashlib.sha256(archive.getbuffer()).hexdigest()
     document = {"sha256": checksum, **recording.facts}
-    path.with_suffix(".json").write_text(
-        json.dumps(document, indent=1, sort_keys=True, allow_nan=False) + "\n",
-        encoding="utf-8",
-    )
+    facts = json.dumps(document, indent=1, sort_keys=True, allow_nan=False) + "\n"
+    _write_whole({path: archive.getvalue(), path.with_suffix(".json"): facts.encode()})
     return checksum
+
+
+def _write_whole(contents: dict[Path, bytes]) -> None:
+    # Under other names until all is on disk; the last file gets its name first, so that
+    # a recording that is there has its facts.
+    parts = {path: path.with_name(f"part-{path.name}") for path in contents}
+    try:
+        for path, data in contents.items():
+            with parts[path].open("wb") as file:
+                file.write(data)
+                file.flush()
+                os.fsync(file.fileno())
+        for path in reversed(parts):
+            parts[path].replace(path)
+    except OSError:
+        for part in parts.values():
+            part.unlink(missing_ok=True)
+        raise
 
 
 def read_recording(path: Path) -> Recording:

@@ -96,3 +96,24 @@ def test_columns_are_complete_equal_and_read_only(recording: Recording) -> None:
 def test_another_ending_is_refused(recording: Recording, tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match=r"must end in \.npz"):
         write_recording(recording, tmp_path / "a.csv")
+
+
+def test_a_recording_is_never_overwritten(recording: Recording, tmp_path: Path) -> None:
+    path = tmp_path / "a.npz"
+    write_recording(recording, path)
+    before = path.read_bytes()
+    with pytest.raises(RecordingError, match=r"a\.npz: needs a new file, a recording"):
+        write_recording(recording, path)
+    assert path.read_bytes() == before
+
+
+def test_a_full_disk_leaves_no_half_of_a_recording(
+    recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(_descriptor: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+    with pytest.raises(OSError, match="No space left"):
+        write_recording(recording, tmp_path / "a.npz")
+    assert list(tmp_path.iterdir()) == []

@@ -2,8 +2,8 @@
 
 import contextlib
 import dataclasses
+import hashlib
 import math
-import os
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,7 +25,13 @@ from masrel.hess import (
 from masrel.hess._stop import stop_on_key, stop_on_signals
 from masrel.hess._watchdog import watched
 from masrel.protocol import Protocol, joint_model
-from masrel.recording import RECORDING_COLUMNS, Recording, _Fact, write_recording
+from masrel.recording import (
+    RECORDING_COLUMNS,
+    Recording,
+    _Fact,
+    read_recording,
+    write_recording,
+)
 from masrel.run._grade_sources import GradeRequest
 from masrel.run._settings import (
     backend_options,
@@ -73,7 +79,10 @@ def present(
     file: Path,
     stop: EmergencyStop,
 ) -> Outcome:
-    """Present a model once on the protocol's device and write the recording."""
+    """Present a model once on the protocol's device and write the recording.
+
+    What was kept while it was made stays beside it until the log names it.
+    """
     # Signals that would end the process, and with a real clock any key of the terminal,
     # press the emergency stop while the device is open.
     limits = device_limits(protocol.device)
@@ -81,21 +90,29 @@ def present(
         stack.enter_context(stop_on_signals(stop))
         if isinstance(clock, RealClock):
             stack.enter_context(stop_on_key(stop, sys.stdin))
-        spool = _spool_of(file)
+        spool = spool_of(file)
         presented = _on_device(protocol, request, clock, limits, stop, spool)
     return _keep(presented, protocol, request, file)
 
 
 def recover(protocol: Protocol, request: GradeRequest, *, file: Path) -> Outcome | None:
-    """Make a recording of what a process left that died while presenting."""
-    spool = _spool_of(file)
+    """Return what a process left that died while presenting, as a recording."""
+    spool = spool_of(file)
     if not spool.exists():
         return None
+    if file.exists():  # it died between the recording and the log
+        checksum = hashlib.sha256(file.read_bytes()).hexdigest()
+        return _outcome(read_recording(file), checksum)
     presented = cut_off(spool)
     if presented is None:
         spool.unlink()
         return None
     return _keep(presented, protocol, request, file)
+
+
+def spool_of(file: Path) -> Path:
+    """Return where samples are kept until the recording is logged."""
+    return file.with_suffix(".partial")
 
 
 def _on_device(
@@ -165,15 +182,9 @@ def _max_duration_s(travel: float, speed: float | None) -> float:
     return max(_MAX_STRETCH_S, 2.0 * travel / speed)
 
 
-def _spool_of(file: Path) -> Path:
-    # Where samples are kept while the recording is made
-    return file.with_suffix(".partial")
-
-
 def _keep(
     presented: Presented, protocol: Protocol, request: GradeRequest, file: Path
 ) -> Outcome:
-    # Writes the recording, and removes what was kept while it was made
     presentation, recording = request.presentation, presented.recording
     facts: dict[str, _Fact] = {
         **recording.facts,
@@ -191,26 +202,27 @@ def _keep(
     except OSError as error:
         error.filename = str(file)  # a full disk does not say which file it was
         raise
-    for written in (file, file.with_suffix(".json")):
-        _sync(written)  # before the log says that they are there
-    _spool_of(file).unlink(missing_ok=True)  # only now is it of no use
-    speed, fault = facts["mean_speed_deg_s"], presented.fault
+    return _outcome(recording, checksum)
+
+
+def _outcome(recording: Recording, checksum: str) -> Outcome:
+    facts, fault = recording.facts, None
+    if facts["fault"] is not None:
+        fault = Fault(
+            kind=str(facts["fault_kind"]),
+            message=str(facts["fault"]),
+            time_s=float(facts["fault_time_s"] or 0.0),
+            torque_nm=float(facts["fault_torque_nm"] or 0.0),
+        )
+    speed = facts["mean_speed_deg_s"]
     return Outcome(
         sha256=checksum,
         mean_speed_deg_s=None if speed is None else float(speed),
-        n_missed_ticks=presented.n_missed_ticks,
+        n_missed_ticks=int(facts["n_missed_ticks"] or 0),
         fault=fault,
         last_200_ms=None if fault is None else _before(fault, recording),
         simulated=bool(facts["simulated"]),
     )
-
-
-def _sync(path: Path) -> None:
-    descriptor = os.open(path, os.O_RDWR)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 def _before(fault: Fault, recording: Recording) -> str:

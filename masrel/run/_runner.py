@@ -17,7 +17,7 @@ from masrel.protocol import Protocol, StudyPaths, presented_hash, protocol_hash
 from masrel.recording import _Fact
 from masrel.run._grade_sources import GradeRequest, GradeSource
 from masrel.run._log import SessionLog
-from masrel.run._present import Outcome, present, recover
+from masrel.run._present import Outcome, present, recover, spool_of
 from masrel.run._settings import moves_hardware
 from masrel.run._state import SessionState, replay
 from masrel.schedule import Presentation, Schedule
@@ -160,7 +160,11 @@ class SessionRunner:
         self._log.append("grade", {**fields, "grade": grade})
 
     def _until_graded(self, presentation: Presentation) -> str:
-        attempt = len(self._state.presented.get(presentation.code, []))
+        before = self._state.presented.get(presentation.code, [])
+        for event in before:  # a process may have died between the log and this
+            file = self._study.sessions / str(event.fields["recording"])
+            spool_of(file).unlink(missing_ok=True)
+        attempt = len(before)
         n_faults, grade = 0, None
         attempt += self._recovered(self._request(presentation, attempt + 1, 0))
         while grade is None:
@@ -256,6 +260,7 @@ class SessionRunner:
                     "last_200_ms": outcome.last_200_ms,
                 },
             )
+        spool_of(file).unlink(missing_ok=True)  # only now is it of no use
 
     def _checked(self, request: GradeRequest, grade: str | None) -> str | None:
         grades = self._protocol.scale.grades

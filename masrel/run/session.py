@@ -5,8 +5,9 @@ what was presented but not graded is presented again and logged as another attem
 """
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from datetime import datetime
+from pathlib import Path
 
 from masrel.errors import (
     ParameterError,
@@ -16,11 +17,12 @@ from masrel.errors import (
 )
 from masrel.protocol import Protocol, StudyPaths
 from masrel.run._grade_sources import GradeSource
-from masrel.run._log import SessionLog, utc_now
+from masrel.run._log import Event, SessionLog, utc_now
+from masrel.run._present import spool_of
 from masrel.run._runner import CLOCKS, ClockName, SessionRunner, SessionSummary
 from masrel.run._settings import check_backend, has_simulated_hand, torque_problems
 from masrel.run._state import replay
-from masrel.schedule import Presentation, check_schedule, read_schedule
+from masrel.schedule import Presentation, Schedule, check_schedule, read_schedule
 
 
 def run_session(
@@ -65,7 +67,8 @@ def run_session(
         If the schedule is missing, damaged, foreign, or stale.
     SessionLogError
         If the log is damaged, of another schedule or protocol, was begun with
-        another source of grades or device, or is open elsewhere.
+        another source of grades or device, or is open elsewhere, or if there are
+        recordings of the session that it does not name.
     ProtocolError
         If a model asks for more torque than the device may send.
     ParameterError
@@ -94,10 +97,39 @@ def run_session(
             f"got that of {schedule.rater} in {schedule.session}"
         )
     checksum = hashlib.sha256(path.read_bytes()).hexdigest()
-    with SessionLog.open(study.log_file(rater, session), now=now) as log:
+    log_file = study.log_file(rater, session)
+    if not log_file.exists():
+        _check_recordings(schedule, log_file, ())  # before an empty log is made
+    with SessionLog.open(log_file, now=now) as log:
+        _check_recordings(schedule, log_file, log.events)
         runner = SessionRunner(study, protocol, schedule, grades, clock, log)
         runner.begin(checksum)
         return runner.run(progress)
+
+
+def _check_recordings(
+    schedule: Schedule, log_file: Path, events: Sequence[Event]
+) -> None:
+    # What the log does not name was graded, perhaps, in a log that is lost.
+    named = {Path(str(event.fields.get("recording"))).name for event in events}
+    codes = {presentation.code for presentation in schedule.presentations}
+    folder = log_file.with_suffix("")
+    unnamed = sorted(
+        file.name
+        for file in folder.glob("*.npz")
+        if file.stem.partition("-")[0] in codes and file.name not in named
+    )
+    begun = any(event.kind == "session" for event in events)
+    if begun:  # the one whose process died before it could log it is recovered
+        unnamed = [name for name in unnamed if not spool_of(folder / name).exists()]
+    if unnamed:
+        what = "does not name" if begun else "is gone or empty, and there are"
+        more = f" and {len(unnamed) - 1} more" if len(unnamed) > 1 else ""
+        raise SessionLogError(
+            f"{log_file}: {what} recordings in {folder} ({unnamed[0]}{more}): put the "
+            "whole log back from a copy, or move these recordings away to present "
+            "their models again"
+        )
 
 
 def _check_device(clock: str, protocol: Protocol) -> None:

@@ -62,6 +62,12 @@ def test_killed_at_each_line_and_gone_on_with_it_is_as_if_never_killed(
         graded = [e.fields["code"] for e in events if e.kind == "grade"]
         assert len(graded) == len(set(graded)) == 3
         assert ("recovered" in {e.kind for e in events}) is (n_bytes > 0)
+        # every recording is in the log, also of a presentation that was not logged
+        named = {e.fields["recording"] for e in events if e.kind == "presented"}
+        there = {f"test_R1/{f.name}" for f in copy.sessions.glob("*/*.npz")}
+        assert there == named
+        assert not list(copy.sessions.glob("*/*.partial"))
+        assert len(there) == 3 + (line in (2, 3, 4, 5, 6, 7))
         assert ratings_from_logs(copy, protocol).table.equals(expected.table)
 
 

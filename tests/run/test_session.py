@@ -225,6 +225,38 @@ def test_a_person_decides_whether_to_try_again_after_a_fault(faulty: Small) -> N
     assert said.getvalue().count("Present it again? (yes, no): ") == 3
 
 
+def contents(small: Small) -> dict[str, bytes]:
+    folder = small[0].log_file("R1", "test").with_suffix("")
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+@pytest.mark.parametrize("loss", ["deleted", "emptied"])
+def test_recordings_without_their_log_stop_the_session(small: Small, loss: str) -> None:
+    run(small, ScriptGrades(["1", "1+", "3"]))
+    log, before = small[0].log_file("R1", "test"), contents(small)
+    log.unlink() if loss == "deleted" else log.write_bytes(b"")
+    words = r"test_R1\.jsonl: is gone or empty, and there are recordings in .*2 more"
+    with pytest.raises(SessionLogError, match=words + r".*put the whole log back"):
+        run(small, ScriptGrades(["4", "4", "4"]))
+    assert contents(small) == before
+    assert log.exists() is (loss == "emptied")
+    log.with_suffix("").rename(log.with_suffix(".old"))  # as the message says
+    run(small, ScriptGrades(["4", "4", "4"]))
+
+
+def test_a_log_that_lost_its_end_stops_the_session(small: Small) -> None:
+    run(small, ScriptGrades(["1", "1+", "3"]))
+    log, before = small[0].log_file("R1", "test"), contents(small)
+    lines = log.read_bytes().splitlines(keepends=True)
+    log.write_bytes(b"".join(lines[:5]))  # the third presentation and its grade
+    code = read_schedule(small[0].schedule_file("R1", "test")).presentations[2].code
+    words = rf"does not name recordings in .*\({code}\.npz\): put the whole log back"
+    with pytest.raises(SessionLogError, match=words):
+        run(small, ScriptGrades(["4", "4", "4"]))
+    assert contents(small) == before
+    assert log.read_bytes() == b"".join(lines[:5])
+
+
 def test_sources_of_grades_do_not_mix(small: Small) -> None:
     with pytest.raises(ParameterError, match="script: needed a grade of position 2"):
         run(small, ScriptGrades(["1"]))
