@@ -26,8 +26,8 @@ class TorqueLaw(NamedTuple):
 
     def commanded(self, angle: Number, velocity: Number) -> Number:
         """Return the torque without m·θ̈: the mannequin's arm has the inertia."""
-        spring = self.stiffness * (angle - self.origin)
-        return self.level + spring + self.damping * velocity
+        level, stiffness, origin, damping, _ = self  # twice as fast as by their names
+        return level + stiffness * (angle - origin) + damping * velocity
 
     @property
     def is_level(self) -> bool:

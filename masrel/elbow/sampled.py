@@ -58,8 +58,10 @@ class SampledJoint:
         "_onset_angle",
         "_onset_time",
         "_parameters",
+        "_peak",
         "_pre_catch",
         "_pre_end",
+        "_residual",
         "_rise",
         "catch_angle",
         "catch_time",
@@ -84,6 +86,7 @@ class SampledJoint:
         self._onset_angle = start_angle
         self._pre_end = 0.0  # τ_pre_end of (3)
         self._rise = 0.0  # H·v_c of (3)
+        self._peak = self._residual = 0.0  # torques of (3), first and second line
 
     def release(self) -> None:
         """Return to pre-catch at once, as when the grip is lost (section III.B.3)."""
@@ -121,7 +124,8 @@ class SampledJoint:
             self._to_pre_catch()
         if self.phase == CATCH:
             return self._catch_torque(time_s - self.catch_time)
-        return float(self._law.commanded(angle, velocity))
+        torque: float = self._law.commanded(angle, velocity)
+        return torque
 
     def _watch_for_catch(self, time_s: float, angle: float, velocity: float) -> None:
         parameters = self._parameters
@@ -144,14 +148,15 @@ class SampledJoint:
             self.catch_angle = angle
             self._pre_end = self._pre_catch.commanded(angle, velocity)
             self._rise = parameters.catch_torque_constant * velocity
+            peak, residual = _law.catch(parameters, self._pre_end, self._rise)
+            self._peak, self._residual = peak.level, residual.level
 
     def _catch_torque(self, since: float) -> float:
         parameters = self._parameters
         if since < parameters.catch_rise:
             share = _law.onset_share(since / parameters.catch_rise)
             return float(self._pre_end + self._rise * share)
-        peak, residual = _law.catch(parameters, self._pre_end, self._rise)
-        return float((peak if since < parameters.peak_duration else residual).level)
+        return self._peak if since < parameters.peak_duration else self._residual
 
     def _to_post_catch(self, angle: float) -> None:
         self.phase = POST_CATCH
