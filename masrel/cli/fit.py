@@ -2,11 +2,12 @@
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
 from masrel.cli._options import (
+    Decorator,
     OutputOptions,
     output_options,
     warnings_as_notes,
@@ -15,10 +16,34 @@ from masrel.cli._options import (
 from masrel.errors import ParameterError
 
 if TYPE_CHECKING:
-    from masrel.elbow.identification import ElbowFit, FrictionFit, Movement
-    from masrel.elbow.parameters import PostCatch
+    from masrel.elbow.identification import (
+        ComparedFit,
+        ElbowFit,
+        FrictionFit,
+        Movement,
+    )
 
-_Inertia = Literal["zero", "fitted"]
+_Term = float | Literal["off", "fitted"]
+
+
+class _TermType(click.ParamType[Any]):
+    name = "off|fitted|number"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> _Term:
+        if value in ("off", "fitted"):
+            return "off" if value == "off" else "fitted"
+        try:
+            return float(value)
+        except ValueError:
+            self.fail(f"needs off, fitted or a number, got {value!r}", param, ctx)
+
+
+def _term(option: str, text: str, default: str = "off") -> Decorator:
+    return click.option(
+        option, type=_TermType(), default=default, show_default=True, help=text
+    )
 
 
 @click.command("fit")
@@ -70,6 +95,24 @@ _Inertia = Literal["zero", "fitted"]
     show_default=True,
     help="How (5) is read.",
 )
+@_term("--gravity", "Weight of the arm, m·g·l, N·m: adds m·g·l·sin(angle).")
+@click.option(
+    "--gravity-angle",
+    type=float,
+    default=0.0,
+    show_default=True,
+    help="Angle at which the weight has no torque, deg.",
+)
+@_term("--arm-inertia", "Inertia of the arm in every phase, kg·m².")
+@_term("--offset", "Constant torque of a trial, N·m: the sensor's zero.", "fitted")
+@_term("--drift", "What the offset gains, N·m/s; fitted for each trial.")
+@_term("--lag", "Time constant of the torque sensor, s.")
+@_term("--rise", "How long a catch takes to its peak, s.")
+@click.option(
+    "--compare",
+    is_flag=True,
+    help="Also fit with each of these, and compare by leaving trials out.",
+)
 @click.option("--level", type=float, default=0.95, show_default=True)
 @click.option(
     "--figures",
@@ -87,27 +130,28 @@ def fit(
     of_device: bool,
     units: tuple[str, ...],
     columns: tuple[str, ...],
-    slow_below: float | None,
-    inertia: _Inertia,
-    post_catch: "PostCatch",
+    compare: bool,
     level: float,
     folder: Path | None,
     output: OutputOptions,
+    **of_joint: Any,
 ) -> None:
     """Identify the joint behind RECORDINGS of slow and fast stretches.
 
     A recording is a CSV file or an npz archive with time, angle and torque, the unit
     in each column's name (time_s, angle_deg, torque_nm). Prints every parameter with
-    its confidence interval, clustered by trial, and what these trials do not
-    determine.
+    its confidence interval, clustered by trial, what these trials do not determine, and
+    whether the law fits them.
     """
     if of_device:
-        _check_device_options(model_file, slow_below, inertia, post_catch)
+        _check_device_options(model_file, {**of_joint, "compare": compare})
+    slow_below = of_joint["slow_below"]
     if slow_below is not None and not slow_below > 0.0:
         raise ParameterError(
             f"--slow-below: needs more than 0 deg/s, got {slow_below:g}"
         )
     names = _pairs("--column", columns), _pairs("--unit", units)
+    compared: tuple[ComparedFit, ...] = ()
     fitted: ElbowFit | FrictionFit
     with warnings_as_notes():
         movements = _read(recordings, *names, hides_progress=output.hides_progress)
@@ -116,30 +160,24 @@ def fit(
 
             fitted = fit_friction(movements, level=level)
         else:
-            fitted = _fit_joint(movements, slow_below, inertia, post_catch, level)
-    _write(fitted, folder, output)
+            fitted, compared = _fit_joint(movements, of_joint, level, compare)
+    _write(fitted, compared, folder, output)
     if model_file is not None:
         _write_model(fitted, model_file)
 
 
 def _check_device_options(
-    model_file: Path | None,
-    slow_below: float | None,
-    inertia: _Inertia,
-    post_catch: "PostCatch",
+    model_file: Path | None, of_joint: "dict[str, object]"
 ) -> None:
     if model_file is not None:
         raise ParameterError("--output: a model file is of a joint, not of a device")
-    joint_options = {
-        "--slow-below": slow_below is not None,
-        "--inertia": inertia != "zero",
-        "--post-catch": post_catch != "continuous",
-    }
-    idle = [option for option, is_used in joint_options.items() if is_used]
-    if idle:
-        raise ParameterError(
-            f"{idle[0]}: says something of a joint, not of a device (--friction)"
-        )
+    source = click.get_current_context().get_parameter_source
+    for name in of_joint:
+        if source(name) is click.core.ParameterSource.COMMANDLINE:
+            raise ParameterError(
+                f"--{name.replace('_', '-')}: says something of a joint, not of a "
+                "device (--friction)"
+            )
 
 
 def _pairs(option: str, entries: tuple[str, ...]) -> dict[str, str]:
@@ -170,29 +208,43 @@ def _read(
 
 
 def _fit_joint(
-    movements: "list[Movement]",
-    slow_below: float | None,
-    inertia: _Inertia,
-    post_catch: "PostCatch",
-    level: float,
-) -> "ElbowFit":
+    movements: "list[Movement]", of_joint: "dict[str, Any]", level: float, compare: bool
+) -> "tuple[ElbowFit, tuple[ComparedFit, ...]]":
     from dataclasses import replace
 
     from masrel.elbow import STANDARD_MODELS, identification
 
-    return identification.fit(
-        movements,
-        constants=replace(STANDARD_MODELS["HM1"], post_catch=post_catch),
-        inertia=inertia,
-        slow_below=None if slow_below is None else math.radians(slow_below),
-        level=level,
-    )
+    post_catch = of_joint.pop("post_catch")
+    slow_below = of_joint.pop("slow_below")
+    options = {
+        **of_joint,
+        "gravity_angle": math.radians(of_joint["gravity_angle"]),
+        "constants": replace(STANDARD_MODELS["HM1"], post_catch=post_catch),
+        "slow_below": None if slow_below is None else math.radians(slow_below),
+        "level": level,
+    }
+    if not compare:
+        return identification.fit(movements, **options), ()
+    compared = identification.compare_fits(movements, **options)
+    first = compared[0].fit
+    if first is None:  # refused, which was said
+        raise ParameterError("--compare: there is no fit to compare with")
+    return first, compared
 
 
 def _write(
-    fitted: "ElbowFit | FrictionFit", folder: Path | None, output: OutputOptions
+    fitted: "ElbowFit | FrictionFit",
+    compared: "tuple[ComparedFit, ...]",
+    folder: Path | None,
+    output: OutputOptions,
 ) -> None:
-    from masrel.report._fits import fit_document, fit_figures, fit_table
+    from masrel.report._fits import (
+        comparison_document,
+        comparison_tables,
+        fit_document,
+        fit_figures,
+        fit_table,
+    )
 
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
@@ -202,8 +254,9 @@ def _write(
         click.echo(f"figures: {folder}", err=True)
     write_output(
         output,
-        document=lambda: fit_document(fitted),
+        document=lambda: fit_document(fitted) | comparison_document(compared),
         text=lambda: fit_table(fitted),
+        more=comparison_tables(compared),
     )
 
 

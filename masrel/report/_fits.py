@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 
 from masrel.elbow.identification import (
+    ComparedFit,
     ElbowFit,
     FittedParameter,
     FrictionFit,
@@ -73,6 +74,78 @@ def _lack_of_fit_notes(lack: LackOfFit) -> list[str]:
     if not math.isnan(lack.rest_sd):
         notes.append(f"Noise at rest {number(lack.rest_sd, 3)} N·m.")
     return notes
+
+
+def comparison_tables(compared: Sequence[ComparedFit]) -> tuple[Table, ...]:
+    """Return the table of a comparison of fits, if there is one."""
+    first = compared[0].fit if compared else None
+    if first is None:
+        return ()
+    rows = tuple(
+        (
+            _with_text(each),
+            number(each.error, 4) if each.fit else ABSENT,
+            number(1e3 * each.worse, 3) if each.fit else ABSENT,
+            number(1e3 * each.worse_se, 3) if each.fit else ABSENT,
+            each.fit.lack_of_fit.verdict if each.fit else "refused",
+            "chosen" if each.is_chosen else "",
+        )
+        for each in compared
+    )
+    columns = (
+        Column(key="fit", heading="Fit", align="left"),
+        Column(key="error", heading="Error (N·m)"),
+        Column(key="worse", heading="Worse (10⁻³ N²·m²)"),
+        Column(key="worse_se", heading="SE"),
+        Column(key="verdict", heading="Verdict", align="left"),
+        Column(key="chosen", heading="", align="left"),
+    )
+    notes = (
+        "Error: root mean square distance of a trial's torque from what the parameters "
+        "of all other trials give, with its own constant, peak, residual and travel.",
+        "Worse: mean square distance less that of the best fit, with its standard "
+        "error over trials; chosen is the first that is within one of the best.",
+        *(f"{_with_text(each)}: {each.reason}" for each in compared if each.reason),
+    )
+    return (
+        Table(
+            name="comparison",
+            caption="Fits compared by leaving trials out",
+            columns=columns,
+            rows=rows,
+            notes=notes,
+            data="simulated" if first.simulated else "recorded",
+        ),
+    )
+
+
+def _with_text(each: ComparedFit) -> str:
+    words = ", ".join(name.replace("_", " ") for name in each.fitted)
+    return f"with {words}" if words else "as given"
+
+
+def comparison_document(compared: Sequence[ComparedFit]) -> dict[str, object]:
+    """Return a comparison of fits as plain values for JSON; empty without one."""
+    if not compared:
+        return {}
+    return {
+        "comparison": [
+            {
+                "fitted": list(each.fitted),
+                "error_nm": _finite(each.error),
+                "worse_nm2": _finite(each.worse),
+                "worse_se_nm2": _finite(each.worse_se),
+                "chosen": each.is_chosen,
+                "verdict": each.fit.lack_of_fit.verdict if each.fit else None,
+                "reason": each.reason,
+                "estimates": [
+                    _estimate(e, ALL_QUANTITIES[e.name])
+                    for e in (each.fit.estimates if each.fit else ())
+                ],
+            }
+            for each in compared
+        ]
+    }
 
 
 def _friction_table(fit: FrictionFit) -> Table:

@@ -58,6 +58,43 @@ def test_a_fit_goes_into_a_protocol(
     assert joint.catch_slope == pytest.approx(0.35, rel=0.1)
 
 
+def test_a_fit_says_whether_it_fits_everywhere(
+    masrel: Caller, files: list[Path], tmp_path: Path
+) -> None:
+    done = masrel(
+        "fit", *files, "-o", tmp_path / "m.toml", "--json", tmp_path / "f.json"
+    )
+    document = json.loads((tmp_path / "f.json").read_text(encoding="utf-8"))
+    lack = document["lack_of_fit"]
+    assert lack["verdict"] == "fits"
+    assert lack["sentence"] in done.out
+    assert "From the catch on" in done.out
+    assert "Noise at rest" in done.out
+    assert {"runs", "autocorrelation", "sd_nm"} <= set(lack["phases"][0])
+    model = tomllib.loads((tmp_path / "m.toml").read_text(encoding="utf-8"))
+    assert model["remarks"][0] == lack["sentence"]
+    assert model["lack_of_fit"]["verdict"] == "fits"
+    assert model["lack_of_fit"]["explained"] == lack["explained"]
+
+
+@pytest.mark.slow
+def test_fits_are_compared(masrel: Caller, files: list[Path], tmp_path: Path) -> None:
+    done = masrel("fit", *files, "--compare", "--json", tmp_path / "f.json")
+    assert done.code == 0, done.err
+    assert "Fits compared by leaving trials out" in done.out
+    document = json.loads((tmp_path / "f.json").read_text(encoding="utf-8"))
+    compared = document["comparison"]
+    assert [each["fitted"] for each in compared] == [
+        [],
+        ["gravity"],
+        ["arm_inertia"],
+        ["drift"],
+        ["lag"],
+        ["rise"],
+    ]
+    assert sum(each["chosen"] for each in compared) == 1
+
+
 def test_json_on_stdout_is_one_document_and_nothing_else(
     masrel: Caller, files: list[Path]
 ) -> None:
@@ -111,6 +148,9 @@ def test_friction_is_fitted_and_drawn(masrel: Caller, tmp_path: Path) -> None:
         (["--column", "torque=Moment"], "needs the column 'Moment'"),
         (["--friction", "-o", "x.toml"], "a model file is of a joint"),
         (["--level", "2"], "level: needs more than 0.5"),
+        (["--gravity", "much"], "needs off, fitted or a number, got 'much'"),
+        (["--rise", "0.2"], "rise: needs 0 to ΔT_peak, 0.1 s, got 0.2 s"),
+        (["--lag", "-1"], "lag: needs 0 or more, got -1"),
     ],
 )
 def test_a_wrong_call_is_one_sentence(
@@ -135,6 +175,7 @@ def test_options_of_a_joint_are_refused_for_a_device(
         ("--slow-below", "10"),
         ("--inertia", "fitted"),
         ("--post-catch", "additive"),
+        ("--gravity", "fitted"),
     ):
         done = masrel("fit", "--friction", files[0], option, value)
         assert done.code == 2

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from masrel.elbow.identification._between import intermediate_models
+    from masrel.elbow.identification._comparison import ComparedFit, compare_fits
     from masrel.elbow.identification._friction import FrictionFit, fit_friction
     from masrel.elbow.identification._identify import fit
     from masrel.elbow.identification._lack_of_fit import (
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from masrel.elbow.identification._results import ElbowFit, FittedParameter, Step
 
 __all__ = [
+    "ComparedFit",
     "ElbowFit",
     "FittedParameter",
     "FrictionFit",
@@ -30,6 +32,7 @@ __all__ = [
     "Step",
     "StructureTest",
     "as_toml",
+    "compare_fits",
     "fit",
     "fit_friction",
     "intermediate_models",
@@ -38,12 +41,14 @@ __all__ = [
 ]
 
 _HOMES = {
+    "ComparedFit": "_comparison",
     "FrictionFit": "_friction",
     "LackOfFit": "_lack_of_fit",
     "Movement": "_reading",
     "PhaseResidual": "_lack_of_fit",
     "StructureTest": "_lack_of_fit",
     "as_toml": "_model_file",
+    "compare_fits": "_comparison",
     "fit": "_identify",
     "fit_friction": "_friction",
     "intermediate_models": "_between",

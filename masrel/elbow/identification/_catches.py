@@ -68,6 +68,7 @@ def find_changes(
     peak: int,
     additive: bool,
     pushed: _Floats | None = None,
+    gaps: tuple[int, int] = (0, 0),
 ) -> Changes:
     """Return the catch of a stretch, by least squares over all pairs of instants.
 
@@ -75,6 +76,7 @@ def find_changes(
     samples of the peak, one after it, and a climb in proportion to the angle travelled
     after the end of the catch. No catch is before sample `first`. `additive` says that
     post-catch adds to the pre-catch law instead of going on from the residual torque;
+    `gaps` samples after the start and the peak are left out, where torque takes time;
     `pushed` is m·θ̈ of (5), which post-catch has and the catch has not.
 
     A catch whose rise, or an end whose climb, is below `MIN_SIGNAL` standard deviations
@@ -93,7 +95,7 @@ def find_changes(
     sums = _sums(torque, torque - pre_catch, later, angle)
     if torque.size - 2 <= first + 1:
         return Changes(catch=None, end=None, residual_sd=math.nan)
-    best = _search(sums, angle, first, peak, offset)
+    best = _search(sums, angle, first, (peak, *gaps), offset)
     catch, end, n = best.catch, best.end, torque.size
     if not math.isfinite(best.squares) or best.catch >= best.end:
         return Changes(catch=None, end=None, residual_sd=math.nan)
@@ -103,7 +105,7 @@ def find_changes(
     if end == n:
         return Changes(catch=catch, end=None, residual_sd=sd)
     starts = best.starts
-    endless = _squares(sums, angle, starts, np.array([n]), (peak, 0), offset)[:, 0]
+    endless = _squares(sums, angle, starts, np.array([n]), (peak, *gaps), offset)[:, 0]
     climbs = additive or (
         _climb(sums, angle, min(catch + peak, end), end) >= MIN_SIGNAL * sd
     )
@@ -123,23 +125,28 @@ class _Best:
 
 
 def _search(
-    sums: _Sums, angle: _Floats, first: int, peak: int, offset: _Floats
+    sums: _Sums,
+    angle: _Floats,
+    first: int,
+    lengths: tuple[int, int, int],
+    offset: _Floats,
 ) -> _Best:
     # First both coarsely, then the catch to the sample, then the end to the sample.
     n = angle.size
     step = max(1, n // _COARSE)
     starts = np.arange(first + 1, n - 2, step)
     ends = np.append(np.arange(first + 2, n - 1, step), n)
-    gap = step
+    peak, *gaps = lengths
+    gap, last_gap = (max(step, each) for each in gaps)
     for finer in (False, True, True):
-        squares = _squares(sums, angle, starts, ends, (peak, gap), offset)
+        squares = _squares(sums, angle, starts, ends, (peak, gap, last_gap), offset)
         place = np.unravel_index(int(np.argmin(squares)), squares.shape)
         catch, end = int(starts[place[0]]), int(ends[place[1]])
         reach = 2 if finer else 3 * step
         starts = np.arange(max(catch - reach, first + 1), min(catch + reach, n - 3) + 1)
         if finer:
             ends = np.append(np.arange(first + 2, n - 1), n)
-        gap = 0
+        gap, last_gap = gaps
     return _Best(catch, end, float(squares[place]), starts)
 
 
@@ -171,14 +178,14 @@ def _squares(
     angle: _Floats,
     starts: _Ints,
     ends: _Ints,
-    lengths: tuple[int, int],
+    lengths: tuple[int, int, int],
     offset: _Floats,
 ) -> _Floats:
     # residual sum of squares of every pair, shape (n_starts, n_ends); without `gap`
     # samples after a step, which then may be anywhere between two candidates, and
     # without the two around the end of the peak, whose length is no whole number
     n = angle.size
-    peak, gap = lengths
+    peak, gap, last_gap = lengths
     i, e = starts[:, None], ends[None, :]
     step = np.minimum(i + peak, e)  # down, from the peak
     low = np.minimum(i + gap, step)
@@ -186,7 +193,7 @@ def _squares(
     total = total + _about_mean(
         sums.torque, sums.torque2, low, np.maximum(step - 1, low)
     )
-    after = np.minimum(step + max(gap, 1), n)
+    after = np.minimum(step + max(last_gap, 1), n)
     end = np.maximum(e, after)
     total = total + _hinge(sums, angle, (after, end), offset[i])
     # an end just before that of the peak is the same as one just after it
@@ -248,8 +255,14 @@ class Arm:
     arm_inertia: float = 0.0
     lag: float = 0.0
     catch_rise: float = 0.0
+    fits_inertia: bool = False
     drift: float = 0.0
     drifts: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def takes_time(self) -> bool:
+        """Return whether the torque that is read takes time to step."""
+        return self.lag > 0.0 or self.catch_rise > 0.0
 
     def torque(self, part: Part, trial: str) -> _Floats:
         """Return what weight, inertia and drift add to the torque, N·m."""
@@ -294,12 +307,22 @@ class Catch:
     residual_sd: float  # of torque about the law of the change points, N·m
 
 
+# A speed that reaches the threshold in less time jumps, s.
+_JUMP = 0.03
+
+# A catch of a fit that is further from the one that was looked for is none, s.
+_NEAR = 0.02
+
 # Samples this near to a step of torque are left out: it falls between two, s.
 _GUARD = 0.002
 
 # Windows of the filter of angle and torque before a catch, s. An encoder's steps take
 # long when the joint moves slowly.
 _SLOW_WINDOW, _FAST_WINDOW = 0.25, 0.1
+
+# Windows of the filter of the angle after a catch, s: where its acceleration is a
+# regressor, an encoder's steps must not be.
+_AFTER_WINDOW, _PUSHED_WINDOW = 0.06, 0.09
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -338,11 +361,12 @@ def fast_trial(
     law: PreCatchLaw,
     window: float,
     arm: Arm | None = None,
-    instants: tuple[float, float | None] | None = None,
+    instant: float | None = None,
 ) -> Trial:
     """Return a fast stretch with its catch, or a remark that says why it has none.
 
-    The catch is looked for, unless its start and end are given as `instants`.
+    The catch is looked for; where a fit has it begin (`instant`) goes before if that is
+    near.
     """
     arm = arm or Arm()
     nothing = part_of(stretch, slice(0, 0))
@@ -351,15 +375,16 @@ def fast_trial(
         why = "not used: a gap in the recording"
         return _trial(stretch, name, nothing, remark=why)
     changes = _changes(stretch, name, constants, law, arm, (onset, stop))
-    if changes.catch is not None and instants is None:
+    catch = None
+    if changes.catch is not None:
         half = 0.5 * stretch.samples.period  # between two samples
-        ends = [
+        start, end = (
             None if at is None else float(stretch.time[at]) - half
             for at in (changes.catch, changes.end)
-        ]
-        instants = ends[0] or 0.0, ends[1]
-    catch = None
-    if instants is not None and changes.catch is not None:
+        )
+        if instant is not None and abs(instant - (start or 0.0)) < _NEAR:
+            start = instant
+        instants = start or 0.0, end
         catch = _catch_at(stretch, (onset, stop), instants, constants, changes)
     if catch is None:
         why = "not used: no catch that stands out of the noise"
@@ -431,6 +456,10 @@ def _changes(
         peak=round(constants.peak_duration / stretch.samples.period),
         additive=constants.post_catch == "additive",
         pushed=law.inertia * part.acceleration if law.inertia else None,
+        gaps=(
+            round((arm.catch_rise + 3.0 * arm.lag) / stretch.samples.period),
+            round(3.0 * arm.lag / stretch.samples.period),
+        ),
     )
 
 
@@ -475,13 +504,31 @@ def _catch_at(
 
 def _crossing(stretch: Stretch, place: int, limit: float) -> tuple[float, float]:
     # time and angle at which the speed reaches the limit, between two samples
+    time = float(stretch.time[place])
+    if stretch.acceleration[place] > limit / _JUMP:
+        return _jump(stretch, time)
     if place == 0:
-        return float(stretch.time[0]), float(stretch.angle[0])
+        return time, float(stretch.angle[0])
     low, high = stretch.velocity[place - 1], stretch.velocity[place]
-    time = float(stretch.time[place]) - stretch.samples.period * float(
-        (high - limit) / (high - low)
-    )
+    time -= stretch.samples.period * float((high - limit) / (high - low))
     return time, float(np.interp(time, stretch.time, stretch.angle))
+
+
+def _jump(stretch: Stretch, near: float) -> tuple[float, float]:
+    # where a motor starts at once, which a filter of speeds sees before it is: rest,
+    # and a parabola from an instant on, by least squares
+    samples = stretch.samples
+    window = np.abs(samples.time - near) <= 3.0 * _JUMP
+    time, angle = samples.time[window], samples.angle[window]
+    best, squares = near, math.inf
+    for instant in time[(time > near - _JUMP) & (time < near + 2.0 * _JUMP)].tolist():
+        since = np.maximum(time - instant, 0.0)
+        design = np.stack([np.ones_like(since), since, since**2], axis=1)
+        values = np.linalg.lstsq(design, angle, rcond=None)[0]
+        left = float(((angle - design @ values) ** 2).sum())
+        if left < squares:
+            best, squares = instant, left
+    return best, stretch.rest_angle
 
 
 def _after(
@@ -493,7 +540,9 @@ def _after(
     smooth_end: bool,
 ) -> Part:
     # samples from the catch on, without those next to a step of torque
-    part = part_of(stretch, slice(*ends), smoothed_anew=True)
+    pushes = arm.arm_inertia != 0.0 or arm.fits_inertia
+    window = _PUSHED_WINDOW if pushes else _AFTER_WINDOW
+    part = part_of(stretch, slice(*ends), anew=window)
     if catch.end is not None and smooth_end:
         # speed and acceleration are regressors here, as they are before the catch
         first = int(np.searchsorted(stretch.time, catch.end))

@@ -186,21 +186,21 @@ def _adjustment(design: _Floats, inverse: _Floats) -> _Floats:
     return np.asarray(design.T @ (directions * roots) @ directions.T)
 
 
-def left_out_errors(
-    designs: Sequence[_Floats], errors: Sequence[_Floats]
-) -> list[_Floats]:
-    """Return per trial its errors under the fit of all others, (I - H_gg)⁻¹e_g.
+def left_out_steps(trials: Sequence[Rows]) -> list[_Floats]:
+    """Return per trial what its rows move the fit by, were they left out.
 
-    They are ``nan`` for a trial that alone determines something.
+    The fit of all trials is at 0: -(X'X)⁻¹X_g'(I - H_gg)⁻¹e_g; ``nan`` of a trial that
+    alone determines something.
     """
-    gram = sum((x.T @ x for x in designs), np.zeros((designs[0].shape[1],) * 2))
+    n_parameters = trials[0].design.shape[1]
+    gram = sum((t.design.T @ t.design for t in trials), np.zeros((n_parameters,) * 2))
     inverse = np.linalg.pinv(gram, rcond=1e-13, hermitian=True)
-    made: list[_Floats] = []
-    for design, error in zip(designs, errors, strict=True):
-        inside = np.eye(design.shape[0]) - design @ inverse @ design.T
-        alone = np.linalg.eigvalsh(0.5 * (inside + inside.T)).min() <= 1e-10
-        left_out = np.full_like(error, np.nan)
-        if not alone:
-            left_out[:] = np.linalg.solve(inside, error)
-        made.append(left_out)
-    return made
+    steps = []
+    for rows in trials:
+        inside = np.eye(rows.target.size) - rows.design @ inverse @ rows.design.T
+        step = np.full(n_parameters, np.nan)
+        if np.linalg.eigvalsh(0.5 * (inside + inside.T)).min() > 1e-10:
+            errors = np.linalg.solve(inside, rows.target)
+            step = -(inverse @ (rows.design.T @ errors))
+        steps.append(step)
+    return steps

@@ -84,7 +84,7 @@ class Equations:
         self.measured = np.concatenate([part.measured for part in parts])
         self.time = np.concatenate([part.time for part in parts])
         self._middle = float(self.time.mean()) if self.time.size else 0.0
-        self._curved = tuple(n for n in ("lag", "catch_rise") if n in known.names)
+        self._curved = known.arm.takes_time
         self.own = self._own_names()
         self._static = None if self._curved else self._columns({}, {})
         self._compact = self._compressed() if self._static else None
@@ -182,30 +182,20 @@ class Equations:
         elif catch.end is not None:  # m·θ̈ of (5)
             held["inertia"] += np.where(part.time >= catch.end, part.acceleration, 0.0)
         last = self._peak_end(catch) - catch.time
-        risen = self._through(
-            _risen(since, rise), part, lag, step=rise == 0.0, at=since
-        )
-        fallen = self._through(_risen(since - last, 0.0), part, lag, True, since - last)
+        risen = _risen(since, rise)
+        risen = _slow(risen, part.time, lag) if rise > 0.0 else _step(since, lag)
+        fallen = _step(since - last, lag)
         held |= {
             "gravity": np.sin(seen - self.known.arm.gravity_angle),
             "arm_inertia": part.acceleration,
             "drift": part.time - self._middle,
             "peak": risen - fallen,
         }
-        past = np.where(since >= last, seen - angle, -math.inf)
+        climbs = since >= last
+        if self._fixed_end(catch):
+            climbs = part.time >= (catch.end or math.inf)
+        past = np.where(climbs, part.angle - angle, -math.inf)
         return held, fallen, past
-
-    def _through(
-        self, values: _Floats, part: Part, lag: float, step: bool, at: _Floats
-    ) -> _Floats:
-        # what a sensor of first order makes of a step at `at` = 0, or of a smooth rise
-        if lag <= 0.0:
-            return values
-        if step:
-            return np.where(at > 0.0, -np.expm1(-np.maximum(at, 0.0) / lag), 0.0)
-        keep = math.exp(-float(np.median(np.diff(part.time))) / lag)
-        half = 0.5 * (1.0 - keep)
-        return np.asarray(lfilter([half, half], [1.0, -keep], values))
 
     def _compressed(self) -> tuple[_Columns, _Floats]:
         # Where nothing climbs, everything is linear: QR leaves a row for each column.
@@ -310,9 +300,14 @@ class Equations:
             if catch is not None and catch.end is not None:
                 past = columns.past - mine.get("travel", catch.travel)
                 over = past > 0.0 if columns.over is None else columns.over
-            climb = np.where(over, past, 0.0)
+            climb, slope = np.where(over, past, 0.0), np.where(over, -k_post, 0.0)
+            lag = now.get("lag", arm.lag)
+            if lag > 0.0:
+                later = slice(self.n_pre, None)
+                climb[later] = _slow(climb[later], self.time[later], lag)
+                slope[later] = _slow(slope[later], self.time[later], lag)
             by_name |= {"residual": columns.held, "post_catch_stiffness": climb}
-            by_name["travel"] = np.where(over, -k_post, 0.0)
+            by_name["travel"] = slope
             law = law + mine["residual"] * columns.held + k_post * climb
         return by_name, law
 
@@ -375,6 +370,22 @@ def _risen(since: _Floats, rise: float) -> _Floats:
         return np.where(since >= 0.0, 1.0, 0.0)
     x = np.clip(since / rise, 0.0, 1.0)
     return np.asarray(x * x * (3.0 - 2.0 * x))
+
+
+def _step(since: _Floats, lag: float) -> _Floats:
+    # a step as a sensor of first order reads it
+    if lag <= 0.0:
+        return _risen(since, 0.0)
+    return np.where(since > 0.0, -np.expm1(-np.maximum(since, 0.0) / lag), 0.0)
+
+
+def _slow(values: _Floats, time: _Floats, lag: float) -> _Floats:
+    # what is 0 at first as that sensor reads it
+    if lag <= 0.0 or values.size < 2:
+        return values
+    keep = math.exp(-float(np.median(np.diff(time))) / lag)
+    half = 0.5 * (1.0 - keep)
+    return np.asarray(lfilter([half, half], [1.0, -keep], values))
 
 
 def _scaled(left: float, slopes: dict[str, float], size: float) -> Row:

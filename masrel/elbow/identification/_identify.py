@@ -7,7 +7,8 @@ https://doi.org/10.1109/TNSRE.2012.2195330, section II.
 import math
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 from typing import Any, Literal
 
@@ -25,7 +26,12 @@ from masrel.elbow.identification._catches import (
     slow_trial,
 )
 from masrel.elbow.identification._equations import Equations, Known, Spreads
-from masrel.elbow.identification._joint_fit import JointFit, fit_together
+from masrel.elbow.identification._joint_fit import (
+    JointFit,
+    Solution,
+    fit_together,
+    joint_fit,
+)
 from masrel.elbow.identification._quantities import (
     ALL_QUANTITIES,
     ARM_QUANTITIES,
@@ -69,8 +75,12 @@ Term = float | Literal["off", "fitted"]
 """What an arm has: nothing of it, a fixed value in SI units, or what is fitted."""
 
 _WINDOW = 0.06  # of the filter of speeds, s: 20.5 Hz at 1 kHz
-_ROUNDS = 4  # of catches and fit, where what an arm has moves the catches
-_START = {"lag": 0.005, "catch_rise": 0.03}  # where the search begins, s
+# Of catches and fit, where what an arm has moves the catches, or makes them last.
+_ROUNDS, _TIMED_ROUNDS = 2, 8
+
+# Where the search for what takes time begins, s, and its floor in periods of samples.
+_STARTS = {"lag": (0.004, 0.016), "catch_rise": (0.01, 0.04, 0.08)}
+_FLOORS = {"lag": 0.2, "catch_rise": 3.0}
 _ALWAYS = ("damping", "stiffness", "inertia")
 
 
@@ -98,11 +108,14 @@ class _Options:
     def arm(self) -> Arm:
         """Return the arm as the first round knows it."""
         values: dict[str, Any] = {
-            name: _START.get(name, 0.0) if term == "fitted" else _number(term)
+            name: _STARTS.get(name, (0.0,))[0] if term == "fitted" else _number(term)
             for name, term in self.terms.items()
             if name != "offset"
         }
-        return replace(Arm(gravity_angle=self.gravity_angle), **values)
+        fits = "arm_inertia" in self.fitted
+        return replace(
+            Arm(gravity_angle=self.gravity_angle, fits_inertia=fits), **values
+        )
 
 
 def _number(term: Term) -> float:
@@ -225,6 +238,18 @@ class _Material:
     rest_sd: float
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Fitted:
+    # one round: trials, what was read off them, steps and the last fit
+    fast: Sequence[Trial]
+    trials: list[Trial]  # slow and fast ones that are used
+    arm: Arm
+    limits: list[DetectionLimit | None]
+    steps: list[Step]
+    equations: list[Equations]
+    solution: Solution
+
+
 def _check_options(options: _Options, inertia: str) -> None:
     held = options.constants
     if not 0.5 < options.level < 1.0:
@@ -323,47 +348,96 @@ def _no_slow(stretches: Mapping[str, Stretch], limit: float) -> str:
     )
 
 
-def _rounds(material: _Material, options: _Options) -> ElbowFit:
+def _rounds(
+    material: _Material,
+    options: _Options,
+    reasons: Mapping[str, str] | None = None,
+) -> ElbowFit:
     # What an arm has moves catches, and catches tell what an arm has: both in turn.
-    arm, instants = options.arm(), dict[str, tuple[float, float | None]]()
-    wanted = (*options.fitted, *(["inertia"] if options.with_inertia else []))
+    arm = options.arm()
+    to_fit = (*options.fitted, *(["inertia"] if options.with_inertia else []))
     slow = fit_slow(
         material.slow,
-        wanted,
-        replace(arm, drift=0.0) if "drift" in wanted else arm,
+        to_fit,
+        arm,
         offset=options.offset,
         rest_angle=options.constants.rest_angle,
         level=options.level,
     )
     _check_slow(slow, material.stretches, options)
-    law = slow.law
-    if "gravity" in options.fitted:
-        arm = replace(arm, gravity=slow.gravity)
+    law, arm = slow.law, replace(arm, gravity=slow.gravity)
+    tries = [
+        _round(material, slow, law, each, options) for each in _starts(options, arm)
+    ]
+    made = min(tries, key=lambda each: each.solution.typical)
     n_rounds = _ROUNDS if set(options.fitted) - {"offset"} else 1
-    for _ in range(n_rounds):
-        fast = [
-            fast_trial(
-                s, name, options.constants, law, options.window, arm, instants.get(name)
-            )
-            for name, s in material.stretches.items()
-            if s.pace == "fast"
-        ]
-        made = _fit_trials(slow, fast, arm, options, material.rest_sd)
-        values = dict(
-            zip(made.joint.names, made.joint.fit.values.tolist(), strict=True)
-        )
-        if not all(math.isfinite(values[name]) for name in ("damping", "stiffness")):
+    for _ in range((_TIMED_ROUNDS if made.arm.takes_time else n_rounds) - 1):
+        law, arm = _next(law, made)
+        instants = _instants(made)
+        settled = instants and _is_settled(made)
+        made = _round(material, slow, law, arm, options, instants)
+        if settled:
             break
-        law = PreCatchLaw(
-            damping=values["damping"],
-            stiffness=values["stiffness"],
-            inertia=values.get("inertia", 0.0),
+    none = _no_time(made)
+    if none and not reasons:
+        terms: dict[str, Term] = dict(options.terms)
+        terms.update(dict.fromkeys(none, 0.0))
+        return _rounds(material, replace(options, terms=terms), none)
+    _warn_of_parts([*slow.trials, *made.fast])
+    return _result(material, slow, made, options, reasons or {})
+
+
+def _starts(options: _Options, arm: Arm) -> list[Arm]:
+    # the sum of squares has a valley for each of several lags and rises
+    timed = [name for name in _STARTS if name in options.fitted]
+    times: list[dict[str, Any]] = [
+        dict(zip(timed, each, strict=True))
+        for each in product(*(_STARTS[name] for name in timed))
+    ]
+    return [replace(arm, **each) for each in times]
+
+
+def _round(
+    material: _Material,
+    slow: SlowFit,
+    law: PreCatchLaw,
+    arm: Arm,
+    options: _Options,
+    instants: Mapping[str, float] | None = None,
+) -> _Fitted:
+    fast = [
+        fast_trial(
+            stretch,
+            name,
+            options.constants,
+            law,
+            options.window,
+            arm,
+            (instants or {}).get(name),
         )
-        arm = _next_arm(arm, values, made)
-        if {"lag", "catch_rise"} & set(options.fitted):
-            instants = _instants(made)
-    _warn_of_parts([*slow.trials, *fast])
-    return _result(material, slow, fast, made, options)
+        for name, stretch in material.stretches.items()
+        if stretch.pace == "fast"
+    ]
+    return _fit_trials(slow, fast, arm, options)
+
+
+def _is_settled(made: _Fitted) -> bool:
+    # no catch moves by more than a sample
+    period = _floor("catch_rise", made.equations) / _FLOORS["catch_rise"]
+    return all(abs(own.get("shift", 0.0)) < period for own in _own(made))
+
+
+def _no_time(made: _Fitted) -> dict[str, str]:
+    # why a lag or a rise is not fitted: the samples do not tell it from none
+    names = made.equations[0].known.names
+    values = dict(zip(names, made.solution.shared.tolist(), strict=True))
+    floors = {n: _floor(n, made.equations) for n in _STARTS if n in values}
+    return {
+        name: f"shorter than {1000.0 * floor:.2g} ms, which these samples do not tell "
+        "from nothing: taken as 0"
+        for name, floor in floors.items()
+        if values[name] <= 1.001 * floor
+    }
 
 
 def _check_slow(
@@ -376,7 +450,8 @@ def _check_slow(
     for name, size in (("damping", speed), ("stiffness", travel)):
         estimate = slow.step[name]
         half = 0.5 * (estimate.high - estimate.low)
-        unsure = half > abs(estimate.value) and half * size > max(torque)
+        # an error that matters: of the value, and of the torque at the largest speed
+        unsure = 2.0 * half > abs(estimate.value) and 2.0 * half * size > max(torque)
         if math.isnan(estimate.value) or unsure:
             raise RecordingError(_untold(name, estimate, options))
         if estimate.high < 0.0:
@@ -410,22 +485,11 @@ def _untold(name: str, estimate: FittedParameter, options: _Options) -> str:
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Fitted:
-    # one round: trials, what was read off them, steps and the last fit
-    trials: list[Trial]
-    limits: list[DetectionLimit | None]
-    steps: list[Step]
-    joint: JointFit
-    arm: Arm = field(repr=False)
-
-
 def _fit_trials(
     slow: SlowFit,
     fast: Sequence[Trial],
     arm: Arm,
     options: _Options,
-    rest_sd: float,
 ) -> _Fitted:
     constants, level = options.constants, options.level
     trials = [*slow.trials, *(trial for trial in fast if trial.catch is not None)]
@@ -455,8 +519,20 @@ def _fit_trials(
         )
         for trial, on_line, limit in zip(trials, lines, limits, strict=True)
     ]
-    joint = fit_together(equations, start, rest_sd)
-    return _Fitted(trials=trials, limits=limits, steps=steps, joint=joint, arm=arm)
+    floors = {name: _floor(name, equations) for name in _STARTS if name in start}
+    return _Fitted(
+        fast=fast,
+        trials=trials,
+        arm=arm,
+        limits=limits,
+        steps=steps,
+        equations=equations,
+        solution=fit_together(equations, start, floors),
+    )
+
+
+def _floor(name: str, equations: Sequence[Equations]) -> float:
+    return _FLOORS[name] * float(np.median(np.diff(equations[-1].trial.pre_catch.time)))
 
 
 def _start(steps: Sequence[Step], options: _Options, arm: Arm) -> dict[str, float]:
@@ -470,32 +546,35 @@ def _start(steps: Sequence[Step], options: _Options, arm: Arm) -> dict[str, floa
     return start
 
 
-def _next_arm(arm: Arm, values: Mapping[str, float], made: _Fitted) -> Arm:
-    of_arm = {
-        n: values[n] for n in ARM_QUANTITIES if math.isfinite(values.get(n, math.nan))
-    }
+def _own(made: _Fitted) -> list[dict[str, float]]:
+    # each trial's own parameters, by name
+    return [
+        dict(zip(e.own, values.tolist(), strict=True))
+        for e, values in zip(made.equations, made.solution.own, strict=True)
+    ]
+
+
+def _next(law: PreCatchLaw, made: _Fitted) -> tuple[PreCatchLaw, Arm]:
+    # what the fit says of the law before a catch, and of the arm
+    names = made.equations[0].known.names
+    values = dict(zip(names, made.solution.shared.tolist(), strict=True))
     drifts = {
         trial.name: own["drift"]
-        for trial, own in zip(made.trials, made.joint.own, strict=True)
+        for trial, own in zip(made.trials, _own(made), strict=True)
         if "drift" in own
     }
-    return replace(arm, **of_arm, drifts=drifts)
+    of_arm: dict[str, Any] = {n: values[n] for n in ARM_QUANTITIES if n in values}
+    of_law = {n: values[n] for n in _ALWAYS if n in values}
+    return replace(law, **of_law), replace(made.arm, **of_arm, drifts=drifts)
 
 
-def _instants(made: _Fitted) -> dict[str, tuple[float, float | None]]:
-    # start and end of each catch as the fit has them
-    instants = {}
-    for trial, own in zip(made.trials, made.joint.own, strict=True):
-        catch, after = trial.catch, trial.after
-        if catch is None or after is None or "shift" not in own:
-            continue
-        shift = min(max(own["shift"], -0.05), 0.05)
-        end = catch.end
-        if end is not None and "travel" in own:
-            angle = catch.angle + catch.speed * shift + own["travel"]
-            end = float(np.interp(angle, after.angle, after.time))
-        instants[trial.name] = (catch.time + shift, end)
-    return instants
+def _instants(made: _Fitted) -> dict[str, float]:
+    # where the fit has each catch begin
+    return {
+        trial.name: trial.catch.time + own["shift"]
+        for trial, own in zip(made.trials, _own(made), strict=True)
+        if trial.catch is not None and "shift" in own
+    }
 
 
 def _limits(
@@ -570,14 +649,18 @@ def _on_line(trials: Sequence[Trial], held: ElbowParameters) -> list[bool]:
 def _result(
     material: _Material,
     slow: SlowFit,
-    fast: Sequence[Trial],
     made: _Fitted,
     options: _Options,
+    no_time: Mapping[str, str],
 ) -> ElbowFit:
-    joint, steps = made.joint, made.steps
-    estimates = _all_estimates(made, _reasons(steps, fast, options), options)
+    joint, steps = (
+        joint_fit(made.equations, made.solution, material.rest_sd),
+        made.steps,
+    )
+    reasons = {**_reasons(steps, made.fast, options), **no_time}
+    estimates = _all_estimates(joint, made, reasons, options)
     _check_ratio(estimates)
-    own = joint.own
+    own = _own(made)
     return ElbowFit(
         estimates=estimates,
         correlation=_correlation(joint, estimates),
@@ -591,12 +674,12 @@ def _result(
         constants=options.constants,
         arm=dict(options.terms) | {"gravity_angle": options.gravity_angle},
         offsets=tuple(each.get("offset", options.offset or 0.0) for each in own),
-        drifts=tuple(each.get("drift", made.arm.drift) for each in own),
+        drifts=tuple(each.get("drift", options.arm().drift) for each in own),
         n_evaluations=joint.n_evaluations,
         level=options.level,
         simulated=any(movement.simulated for movement in material.movements),
         sources={m.name: m.sha256 for m in material.movements},
-        remarks=_remarks(estimates, made, fast),
+        remarks=_remarks(estimates, made),
     )
 
 
@@ -637,17 +720,17 @@ def _reasons(
 
 
 def _all_estimates(
-    made: _Fitted, reasons: Mapping[str, str], options: _Options
+    joint: JointFit, made: _Fitted, reasons: Mapping[str, str], options: _Options
 ) -> tuple[FittedParameter, ...]:
     # Where travels are censored, D is that of its step. Least squares hold the spread
     # of travels and know less than they say; and they draw each end towards D, by
     # which that spread would come out too small.
-    joint, level = made.joint, options.level
+    level = options.level
     by_name = {e.name: e for e in fitted(joint.names, joint.fit, level, reasons)}
     if any(each is not None for each in made.limits):
         whole = {e.name: e for step in made.steps for e in step.estimates}
         by_name["catch_travel"] = whole["catch_travel"]
-    optional = {"inertia", *ARM_QUANTITIES} - set(options.fitted)
+    optional = {"inertia", *ARM_QUANTITIES} - set(options.fitted) - set(reasons)
     return tuple(
         by_name[name]
         if name in by_name
@@ -668,9 +751,7 @@ def _correlation(joint: JointFit, estimates: Sequence[FittedParameter]) -> _Floa
     return whole[np.ix_(places, places)]
 
 
-def _remarks(
-    estimates: Sequence[FittedParameter], made: _Fitted, fast: Sequence[Trial]
-) -> tuple[str, ...]:
+def _remarks(estimates: Sequence[FittedParameter], made: _Fitted) -> tuple[str, ...]:
     remarks = [
         f"{ALL_QUANTITIES[e.name].symbol}: {e.reason}"
         for e in estimates
@@ -681,9 +762,9 @@ def _remarks(
     if 0 < unended < len(catches):
         behind = sum(each is not None for each in made.limits)
         remarks += _unended(unended, behind, len(catches))
-    unused = sum(trial.catch is None for trial in fast)
+    unused = sum(trial.catch is None for trial in made.fast)
     if unused:
-        remarks.append(f"{unused} of {len(fast)} fast stretches are not used")
+        remarks.append(f"{unused} of {len(made.fast)} fast stretches are not used")
     return tuple(remarks)
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from masrel.elbow.identification._clusters import (
     ClusteredFit,
     Rows,
-    left_out_errors,
+    left_out_steps,
     partial_out,
     solve,
     triangle,
@@ -28,8 +28,10 @@ from masrel.elbow.identification._lack_of_fit import LackOfFit, lack_of_fit
 _Floats = NDArray[np.float64]
 
 _EVALUATIONS = 60
-_PRECISE = 1e-12  # relative fall of the sum of squares that ends the search
-_MIN_TIME = 2e-4  # a lag or a rise is no shorter, s
+# Relative fall of the sum of squares that ends the search; with derivatives that are
+# differences, or of more rounds to come, less is enough.
+_PRECISE, _TIMED = 1e-10, 1e-7
+_KINK = 1e-6  # where a climb begins at a sample, nothing is more precise
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,7 +40,6 @@ class JointFit:
 
     names: tuple[str, ...]
     fit: ClusteredFit
-    own: tuple[dict[str, float], ...]  # by trial
     fitted_torque: tuple[_Floats, ...] = field(repr=False)
     torque_sd: float
     lack_of_fit: LackOfFit
@@ -46,36 +47,60 @@ class JointFit:
     n_evaluations: int
 
 
+@dataclass(frozen=True, slots=True)
+class Solution:
+    """Where the sum of squares is smallest: shared parameters, and each trial's own."""
+
+    shared: _Floats
+    own: list[_Floats]
+    typical: float  # median over catches of the mean square that is left, (N·m)²
+    n_evaluations: int
+
+
 def fit_together(
-    equations: Sequence[Equations], start: Mapping[str, float], rest_sd: float
-) -> JointFit:
+    equations: Sequence[Equations],
+    start: Mapping[str, float],
+    floors: Mapping[str, float],
+) -> Solution:
     """Fit every parameter to every trial at once, by Gauss and Newton's method.
 
     Instants of catches stay where the change points are, unless the torque takes time:
-    the law is not differentiable in them. Everything else is.
+    the law is not differentiable in them. Everything else is. No parameter falls
+    below its floor.
     """
     names = equations[0].known.names
     shared = np.array([start[name] for name in names])
     own = [e.start(start) for e in equations]
+    bound = np.array([floors.get(name, -math.inf) for name in names])
     tables = _tables(equations, shared, own)
     squares, n_evaluations = _squares(tables), 1
+    precise = _TIMED if equations[0].known.arm.takes_time else _PRECISE
     while n_evaluations < _EVALUATIONS:
         steps = _step(equations, tables, len(names))
         share, best = 1.0, squares
         while n_evaluations < _EVALUATIONS:
-            trial = _moved(names, shared, own, steps, share)
+            trial = (
+                np.maximum(shared + share * steps[0], bound),
+                [x + share * step for x, step in zip(own, steps[1], strict=True)],
+            )
             tried = _tables(equations, *trial)
             best, n_evaluations = _squares(tried), n_evaluations + 1
-            if best <= squares or share < 1e-3:
+            if best <= squares * (1.0 + _KINK) or share < 1e-3:
                 break
             share *= 0.5
         if not best <= squares:
             break
         fall, squares = squares - best, best
         (shared, own), tables = trial, tried
-        if fall <= _PRECISE * squares:
+        if fall <= precise * squares:
             break
-    return _finish(equations, shared, own, rest_sd, n_evaluations)
+    left = [
+        float(((e.measured - e.law(shared, x)) ** 2).mean())
+        for e, x in zip(equations, own, strict=True)
+        if e.catch is not None
+    ]
+    typical = float(np.median(left)) if left else math.nan
+    return Solution(shared, own, typical, n_evaluations)
 
 
 def _tables(
@@ -109,27 +134,11 @@ def _step(
     return shared, own
 
 
-def _moved(
-    names: Sequence[str],
-    shared: _Floats,
-    own: Sequence[_Floats],
-    steps: tuple[_Floats, list[_Floats]],
-    share: float,
-) -> tuple[_Floats, list[_Floats]]:
-    moved = shared + share * steps[0]
-    for place, name in enumerate(names):
-        if name in ("lag", "catch_rise"):
-            moved[place] = max(moved[place], _MIN_TIME)
-    return moved, [x + share * step for x, step in zip(own, steps[1], strict=True)]
-
-
-def _finish(
-    equations: Sequence[Equations],
-    shared: _Floats,
-    own: Sequence[_Floats],
-    rest_sd: float,
-    n_evaluations: int,
+def joint_fit(
+    equations: Sequence[Equations], solution: Solution, rest_sd: float
 ) -> JointFit:
+    """Return what a solution says of the parameters, and leaves over."""
+    shared, own = solution.shared, solution.own
     names = equations[0].known.names
     tables = [
         e.table(shared, mine, whole=True)
@@ -149,26 +158,42 @@ def _finish(
     return JointFit(
         names=names,
         fit=replace(step, values=values),
-        own=tuple(
-            dict(zip(e.own, mine.tolist(), strict=True))
-            for e, mine in zip(equations, own, strict=True)
-        ),
         fitted_torque=laws,
         torque_sd=math.sqrt(squares / max(count - n_own - len(names), 1)),
         lack_of_fit=lack_of_fit(equations, shared, own, tables, laws, rest_sd),
-        cross_validation=_left_out(equations, rows),
-        n_evaluations=n_evaluations,
+        cross_validation=_left_out(equations, solution, rows, tables, laws),
+        n_evaluations=solution.n_evaluations,
     )
 
 
-def _left_out(equations: Sequence[Equations], rows: Sequence[Rows]) -> _Floats:
-    # (N·m)² a degree of freedom, of the equations as they are linear at the fit
-    errors = left_out_errors([r.design for r in rows], [r.target for r in rows])
-    return np.array(
+def _left_out(
+    equations: Sequence[Equations],
+    solution: Solution,
+    rows: Sequence[Rows],
+    tables: Sequence[_Floats],
+    laws: Sequence[_Floats],
+) -> _Floats:
+    # Per trial the mean square of its torque less what the others' parameters give, as
+    # linear as they are at the fit. Constant, peak, residual and travel are its own;
+    # its drift is the others' mean, or a drift would better every fit.
+    drifts = np.array(
         [
-            float(error @ error)
-            * e.known.spreads.torque**2
-            / max(e.torque.size - len(e.own), 1)
-            for e, error in zip(equations, errors, strict=True)
+            own[e.own.index("drift")] if "drift" in e.own else 0.0
+            for e, own in zip(equations, solution.own, strict=True)
         ]
     )
+    made = []
+    for i, (e, step) in enumerate(zip(equations, left_out_steps(rows), strict=True)):
+        table, law, n = tables[i], laws[i], len(e.own)
+        r = triangle(table)
+        own = np.zeros(n)
+        if "drift" in e.own and drifts.size > 1:
+            others = (drifts.sum() - drifts[i]) / (drifts.size - 1)
+            own[e.own.index("drift")] = others - drifts[i]
+        left = r[:, -1] + r[:, n:-1] @ np.nan_to_num(step) + r[:, :n] @ own
+        free = [j for j, name in enumerate(e.own) if name != "drift"]
+        own[free] = np.linalg.lstsq(r[:, free], -left, rcond=1e-12)[0]
+        columns = table[: law.size, :-1] * np.concatenate([own, step])
+        error = e.measured - law - e.known.spreads.torque * columns.sum(axis=1)
+        made.append(float((error**2).mean()))
+    return np.array(made)

@@ -196,7 +196,7 @@ class ElbowFit:
                 values[estimate.name] = estimate.value
             elif missing is not None:
                 values[estimate.name] = getattr(missing, estimate.name)
-            elif estimate.name != "inertia":
+            elif estimate.name not in ("inertia", "catch_rise"):
                 raise ParameterError(f"{estimate.name}: {estimate.reason}")
         return replace(self.constants, **values)
 

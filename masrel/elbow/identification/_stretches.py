@@ -27,9 +27,6 @@ _MOVING = math.radians(2.0)
 # A shorter rest, without going back, does not end a stretch, s.
 _MIN_REST = 0.1
 
-# Window of the filter of the angle after a catch, s.
-_AFTER_WINDOW = 0.06
-
 
 def window_length(window: float, period: float) -> int:
     """Return the samples of a filter's window: odd, enough for its polynomial."""
@@ -304,19 +301,20 @@ def filtered_part(
     return whole.keep(~touched)
 
 
-def part_of(stretch: Stretch, which: slice, *, smoothed_anew: bool = False) -> Part:
+def part_of(stretch: Stretch, which: slice, *, anew: float | None = None) -> Part:
     """Return samples of a stretch with torque as measured.
 
-    With `smoothed_anew` the angle is smoothed within the part alone, so that it knows
+    With `anew` the angle is smoothed within the part alone, by a window of so many
+    seconds, so that it knows
     nothing of the motion beyond.
     """
     angle, velocity, acceleration = (
         values[which]
         for values in (stretch.angle, stretch.velocity, stretch.acceleration)
     )
-    if smoothed_anew:
+    if anew is not None:
         angle, velocity, acceleration = differentiate(
-            stretch.raw_angle[which], stretch.samples.period, _AFTER_WINDOW
+            stretch.raw_angle[which], stretch.samples.period, anew
         )
     return Part(
         time=stretch.time[which],

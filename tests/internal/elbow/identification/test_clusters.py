@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from masrel.elbow.identification._clusters import (
     Rows,
-    left_out_errors,
+    left_out_steps,
     partial_out,
     solve,
     triangle,
@@ -107,16 +107,15 @@ def test_the_triangle_of_blocks_is_that_of_the_whole(n_rows: int) -> None:
     assert r.shape == (min(n_rows, 5), 5)
 
 
-def test_what_others_give_a_trial_is_that_of_a_fit_without_it() -> None:
+def test_what_leaving_a_trial_out_does_is_what_a_fit_without_it_says() -> None:
     rows = trials(6, [7, 9, 6, 8])
     fit = solve(rows)
-    errors = [r.target - r.design @ fit.values for r in rows]
-    without = left_out_errors([r.design for r in rows], errors)
-    for i, row in enumerate(rows):
+    at_zero = [
+        Rows(design=r.design, target=r.target - r.design @ fit.values) for r in rows
+    ]
+    for i, step in enumerate(left_out_steps(at_zero)):
         others = solve([r for j, r in enumerate(rows) if j != i])
-        np.testing.assert_allclose(
-            without[i], row.target - row.design @ others.values, rtol=1e-9
-        )
+        np.testing.assert_allclose(fit.values + step, others.values, rtol=1e-9)
 
 
 def test_a_mean_of_trials_of_unlike_size_by_hand() -> None:
