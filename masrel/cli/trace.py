@@ -26,7 +26,6 @@ from masrel.cli._tone_traces import (
     write_tardieu,
 )
 from masrel.errors import ParameterError
-from masrel.report._tone_scenes import stepped
 from masrel.report._traced_scenes import (
     SCENE_OUTPUTS,
     SCENE_VIEWS,
@@ -40,8 +39,6 @@ from masrel.report._traced_scenes import (
 )
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from masrel.elbow import ElbowParameters, JointModel, Motion
 
 _KINDS = ("constant", "minimum-jerk", "trapezoid", "recording")
@@ -563,26 +560,18 @@ def _write_rows(
 def _rows(scene: AnyScene, rate_hz: float) -> Iterator[tuple[object, ...]]:
     import numpy as np
 
+    from masrel import elbow
     from masrel.recording import PHASES
 
-    time, angle, velocity, torque, codes = _sampled(scene, rate_hz)
-    columns = (time, np.degrees(angle), np.degrees(velocity), torque)
-    for start in range(0, time.size, _N_AT_ONCE):
+    joint = scene.parameters if isinstance(scene, Scene) else scene.joint
+    samples = elbow.trace(joint, scene.motion, rate_hz=rate_hz)
+    columns = (
+        samples.time,
+        np.degrees(samples.angle),
+        np.degrees(samples.velocity),
+        samples.torque,
+    )
+    for start in range(0, samples.time.size, _N_AT_ONCE):
         block = slice(start, start + _N_AT_ONCE)
-        phases = [PHASES[code] for code in codes[block].tolist()]
+        phases = [PHASES[code] for code in samples.phase[block].tolist()]
         yield from zip(*(c[block].tolist() for c in columns), phases, strict=True)
-
-
-def _sampled(scene: AnyScene, rate_hz: float) -> "tuple[NDArray[Any], ...]":
-    # time, angle, velocity, torque and phase of every sample, SI units
-    import numpy as np
-
-    from masrel import elbow
-
-    if isinstance(scene, Scene):
-        made = elbow.trace(scene.parameters, scene.motion, rate_hz=rate_hz)
-        return made.time, made.angle, made.velocity, made.torque, made.phase
-    motion = scene.motion
-    time = np.arange(math.floor(motion.duration * rate_hz) + 1) / rate_hz
-    torque, phase = stepped(scene.joint, motion, time)
-    return time, motion.angle(time), motion.velocity(time), torque, phase

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.elbow.events import timeline
-from masrel.elbow.motion import Motion
+from masrel.elbow.joint_model import JointModel
+from masrel.elbow.motion import Floats, Motion
 from masrel.elbow.parameters import ElbowParameters
-from masrel.elbow.sampled import SampledJoint
 from masrel.errors import ParameterError
 
 __all__ = ["Trace", "trace"]
@@ -43,17 +43,15 @@ class Trace:
     rate_hz: float
 
 
-def trace(
-    parameters: ElbowParameters, motion: Motion, *, rate_hz: float = 1000.0
-) -> Trace:
+def trace(parameters: JointModel, motion: Motion, *, rate_hz: float = 1000.0) -> Trace:
     """Give the sampled law every sample of a motion.
 
     Parameters
     ----------
-    parameters : ElbowParameters
+    parameters : JointModel
         The joint.
     motion : Motion
-        The motion, SI units; it is cut at the end of range.
+        The motion, SI units; for a spastic elbow it is cut at the end of range.
     rate_hz : float, optional
         Samples a second.
 
@@ -79,15 +77,12 @@ def trace(
     """
     if not 0.0 < rate_hz < math.inf:
         raise ParameterError(f"rate_hz: needs more than 0, got {rate_hz}")
-    end = timeline(parameters, motion).end.time
+    end = motion.duration
+    if isinstance(parameters, ElbowParameters):
+        end = timeline(parameters, motion).end.time
     time = np.arange(math.floor(end * rate_hz) + 1) / rate_hz
     angle, velocity = motion.angle(time), motion.velocity(time)
-    joint = SampledJoint(parameters, start_angle=motion.start)
-    torque, phase = np.empty(time.size), np.empty(time.size, dtype=np.int8)
-    samples = zip(time.tolist(), angle.tolist(), velocity.tolist(), strict=True)
-    for i, sample in enumerate(samples):
-        torque[i] = joint.step(*sample)
-        phase[i] = joint.phase
+    torque, phase = _stepped(parameters, motion.start, time, angle, velocity)
     columns = (time, angle, velocity, torque, phase)
     for column in columns:
         column.setflags(write=False)
@@ -99,3 +94,16 @@ def trace(
         phase=phase,
         rate_hz=rate_hz,
     )
+
+
+def _stepped(
+    model: JointModel, start: float, time: Floats, angle: Floats, velocity: Floats
+) -> tuple[Floats, NDArray[np.int8]]:
+    # (n,) each: torque, N·m, and phase of the sampled law at these samples
+    joint = model.stepper(start)
+    torque, phase = np.empty(time.size), np.empty(time.size, dtype=np.int8)
+    samples = zip(time.tolist(), angle.tolist(), velocity.tolist(), strict=True)
+    for i, sample in enumerate(samples):
+        torque[i] = joint.step(*sample)
+        phase[i] = joint.phase
+    return torque, phase

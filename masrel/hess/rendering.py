@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from masrel.elbow.joint_model import JointModel
 from masrel.elbow.motion import Motion
+from masrel.elbow.trace import _stepped
 from masrel.errors import ParameterError
 from masrel.hess._presented import Presented
 from masrel.hess._velocity import passive_damping
@@ -246,7 +247,7 @@ def _compared(
     angles = np.radians(columns["angle_deg"][:n_rows])
     torques = columns["model_torque_nm"][:n_rows]
     goal_angles, goal_velocities = motion.angle(times), motion.velocity(times)
-    goal_torques = _stepped(model, motion.start, times, goal_angles, goal_velocities)
+    goal_torques, _ = _stepped(model, motion.start, times, goal_angles, goal_velocities)
     taken = np.concatenate(([0.0], np.cumsum(torques[:-1] * np.diff(angles))))
     speed = float(np.abs(goal_velocities).max(initial=0.0))
     stiffness, damping = model.largest_slope(speed=speed)
@@ -261,19 +262,6 @@ def _compared(
         energy_given=float(-taken.min()) + 0.0,  # no minus zero
         damping_needed=passive_damping(stiffness, damping, rate_hz),
     )
-
-
-def _stepped(
-    model: JointModel,
-    start: float,
-    times: NDArray[np.float64],
-    angles: NDArray[np.float64],
-    velocities: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    # (n_ticks,) each: the model given the motion itself
-    joint = model.stepper(start)
-    samples = zip(times.tolist(), angles.tolist(), velocities.tolist(), strict=True)
-    return np.array([joint.step(*sample) for sample in samples])
 
 
 def _largest(values: NDArray[np.float64]) -> float:

@@ -5,10 +5,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from masrel.analysis import Speed, Speeds, SpeedSummary
-from masrel.elbow import ConstantSpeed, ElbowParameters, JointModel, evaluate, trace
+from masrel.elbow import (
+    ConstantSpeed,
+    ElbowParameters,
+    JointModel,
+    Trace,
+    evaluate,
+    trace,
+)
 from masrel.protocol import Protocol, joint_model
 from masrel.protocol._kinds import DEFAULT_KIND
 from masrel.report._figure_data import (
@@ -32,7 +38,6 @@ from masrel.report._tables import (
     number,
     whole_or_tenths,
 )
-from masrel.report._tone_scenes import stepped
 
 _PANELS_PER_FIGURE = 4
 
@@ -126,13 +131,10 @@ def _speed_drawing(material: Material, speeds: Speeds) -> Drawing:
     )
 
 
-_Line = tuple[NDArray[np.generic], ...]  # time, s; angle, deg; torque, N·m; phase
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Stretch:
     speed: Speed  # whose it is, and how fast
-    line: _Line  # what the controller commands, at the device's rate
+    trace: Trace  # what the controller commands, at the device's rate
     # the largest torque, N·m: of the exact law, or of the samples of another kind
     peak: float
 
@@ -201,23 +203,14 @@ def _of_model(
         ConstantSpeed(start=start, end=end, speed=math.radians(speed.mean_speed_deg_s))
         for speed in speeds
     ]
-    lines = [_line(joint, motion, rate_hz) for motion in motions]
-    peaks = [float(torque.max()) for _, _, torque, _ in lines]
+    made = [trace(joint, motion, rate_hz=rate_hz) for motion in motions]
+    peaks = [float(line.torque.max()) for line in made]
     if isinstance(joint, ElbowParameters):
         peaks = evaluate(joint, motions, ["peak_torque"]).column("peak_torque").tolist()
     return [
-        _Stretch(speed=speed, line=line, peak=peak)
-        for speed, line, peak in zip(speeds, lines, peaks, strict=True)
+        _Stretch(speed=speed, trace=line, peak=peak)
+        for speed, line, peak in zip(speeds, made, peaks, strict=True)
     ]
-
-
-def _line(joint: JointModel, motion: ConstantSpeed, rate_hz: int) -> _Line:
-    if isinstance(joint, ElbowParameters):
-        made = trace(joint, motion, rate_hz=rate_hz)
-        return made.time, np.degrees(made.angle), made.torque, made.phase
-    time = np.arange(math.floor(motion.duration * rate_hz) + 1) / rate_hz
-    torque, phase = stepped(joint, motion, time)
-    return time, np.degrees(motion.angle(time)), torque, phase
 
 
 def _trace_drawing(
@@ -233,10 +226,13 @@ def _trace_drawing(
         grade = ""
         if intended[model] is not None:
             grade = f" ({material.protocol.scale.name} {intended[model]})"
+        traces = [stretch.trace for stretch in made]
         panels.append(
             TracePanel(
                 title=f"{model}{grade}\n{slowest} to {fastest} deg/s",
-                stretches=tuple(stretch.line for stretch in made),
+                stretches=tuple(
+                    (t.time, np.degrees(t.angle), t.torque, t.phase) for t in traces
+                ),
             )
         )
     listed = ", ".join(model for model, _ in stretches)

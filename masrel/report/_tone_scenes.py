@@ -16,8 +16,6 @@ from masrel.report._figure_data import StretchLine
 from masrel.report._tables import aligned, fixed_or_significant, significant
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from masrel.elbow import JointModel, Motion
     from masrel.elbow.tone import ToneModel
 
@@ -124,15 +122,15 @@ def tone_line(scene: ToneScene) -> StretchLine:
     """Return the exact torque of every millisecond, and the phases at these."""
     import numpy as np
 
+    from masrel.elbow import trace
+
     joint, motion = scene.joint, scene.motion
-    n_steps = math.floor(motion.duration * _RATE_HZ)
-    time = np.append(np.arange(n_steps + 1) / _RATE_HZ, motion.duration)
-    phases = stepped(joint, motion, time)[1].tolist()
+    sampled = trace(joint, motion, rate_hz=_RATE_HZ)
+    time = np.append(sampled.time, motion.duration)
     spans, first = [], 0
-    for code, group in groupby(phases):
+    for code, group in groupby(sampled.phase.tolist()):
         n = len(list(group))
-        last = min(first + n, time.size - 1)
-        spans.append((PHASES[code], float(time[first]), float(time[last])))
+        spans.append((PHASES[code], float(time[first]), float(time[first + n])))
         first += n
     speed = scene.speed_deg_s
     return StretchLine(
@@ -142,22 +140,6 @@ def tone_line(scene: ToneScene) -> StretchLine:
         torque=joint.torque(motion, time),
         phases=tuple(spans),
     )
-
-
-def stepped(
-    joint: "JointModel", motion: "Motion", time: "NDArray[Any]"
-) -> "tuple[NDArray[Any], NDArray[Any]]":
-    """Return the torque (N·m) and the phase at samples of a motion, (n,) each."""
-    import numpy as np
-
-    stepper = joint.stepper(motion.start)
-    torque, phase = np.empty(time.size), np.empty(time.size, dtype=np.int8)
-    columns = (time, motion.angle(time), motion.velocity(time))
-    samples = zip(*(column.tolist() for column in columns), strict=True)
-    for i, sample in enumerate(samples):
-        torque[i] = stepper.step(*sample)
-        phase[i] = stepper.phase
-    return torque, phase
 
 
 def tardieu_document(
