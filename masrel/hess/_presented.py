@@ -20,7 +20,8 @@ class Fault:
     ----------
     kind : str
         One word: a limit such as ``"torque"``, ``"frozen"`` or ``"overrun"``,
-        ``"no-answer"``, ``"device"``, ``"controller"`` or ``"emergency-stop"``.
+        ``"no-answer"``, ``"device"``, ``"model"``, ``"controller"`` or
+        ``"emergency-stop"``.
     message : str
         What was needed and what came.
     time_s : float

@@ -13,6 +13,7 @@ from masrel.hess.friction import Friction, FrictionCompensation
 from masrel.recording import PHASES
 
 _PRE_CATCH = PHASES.index("pre-catch")
+_INFINITE = math.inf
 _SLIP_WINDOW_S = 0.010  # twice the delay of the estimated speed
 _RANGE_END_MARGIN = math.radians(3.0)  # what the loop takes for arrived, too
 
@@ -164,7 +165,7 @@ class Controller:
         Raises
         ------
         LimitExceededError
-            If the grip on a guarded model is lost.
+            If the grip on a guarded model is lost, or the model gives no number.
         """
         self.is_new = False
         index = self._past_index
@@ -186,11 +187,18 @@ class Controller:
             joint.release()
             self.grip_lost = True
         torque = joint.step(time_s, angle, velocity)
-        # what is no number fails here, and the recording keeps the last that was one
-        command = torque - self._compensation.torque(velocity)
+        try:
+            is_number = -_INFINITE < torque < _INFINITE
+        except TypeError:
+            is_number = False
+        if not is_number:  # the recording keeps the last that was one
+            raise LimitExceededError(
+                f"model: needs a torque that is a finite number, got {torque!r}",
+                "model",
+            )
         self.model_torque = torque
         self.phase = joint.phase
-        return command
+        return torque - self._compensation.torque(velocity)
 
     def _stop_for_slip(self, drop: float) -> None:
         self._joint.release()

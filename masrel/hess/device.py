@@ -87,7 +87,12 @@ class Device(ABC):
             raise DeviceError(
                 f"{self.name}: needs a new device, this one has been closed"
             )
-        self._start()
+        try:
+            self._start()
+        except DeviceError:
+            raise
+        except Exception as error:
+            raise self._failure("opening", error) from error
         self._state = "open"  # only after it has worked
 
     def read(self) -> Reading:
@@ -105,7 +110,12 @@ class Device(ABC):
         """
         if self._state != "open":
             raise self._not_open("read")
-        return self._read()
+        try:
+            return self._read()
+        except DeviceError:
+            raise
+        except Exception as error:
+            raise self._failure("reading", error) from error
 
     def command(self, torque_nm: float) -> None:
         """Send a torque, held until the next one.
@@ -125,7 +135,12 @@ class Device(ABC):
             raise self._not_open("command")
         if not math.isfinite(torque_nm):
             raise DeviceError(f"{self.name}: needs a finite torque, got {torque_nm}")
-        self._send(torque_nm)
+        try:
+            self._send(torque_nm)
+        except DeviceError:
+            raise
+        except Exception as error:
+            raise self._failure("sending a torque", error) from error
 
     def check(self) -> None:
         """Ask the device whether it still does what it is told.
@@ -140,7 +155,12 @@ class Device(ABC):
         """
         if self._state != "open":
             raise self._not_open("check")
-        self._check()
+        try:
+            self._check()
+        except DeviceError:
+            raise
+        except Exception as error:
+            raise self._failure("asking for its state", error) from error
 
     def idle_command(self) -> IdleCommand | None:
         """Return how another process can idle the device, once it is open.
@@ -163,9 +183,14 @@ class Device(ABC):
         state, self._state = self._state, "closed"
         if state == "open":
             try:
-                self._send(0.0)
-            finally:
-                self._stop()
+                try:
+                    self._send(0.0)
+                finally:
+                    self._stop()
+            except DeviceError:
+                raise
+            except Exception as error:
+                raise self._failure("letting go", error) from error
 
     def __enter__(self) -> Self:
         self.open()
@@ -190,6 +215,10 @@ class Device(ABC):
                 )
             finally:  # also when warnings are errors
                 self.close()
+
+    def _failure(self, act: str, error: Exception) -> DeviceError:
+        # Whatever goes wrong within a backend is a fault of the device.
+        return DeviceError(f"{self.name}: {act}: {type(error).__name__}: {error}")
 
     def _not_open(self, wish: str) -> DeviceError:
         return DeviceError(

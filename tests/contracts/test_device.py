@@ -262,6 +262,42 @@ def test_an_opening_that_fails_leaves_nothing_to_close() -> None:
     assert device.commands == []
 
 
+def use(device: Device) -> None:
+    device.open()
+    device.read()
+    device.command(0.0)
+    device.check()
+    device.close()
+
+
+@pytest.mark.parametrize("error", [OSError(5, "broken"), ValueError("broken")])
+@pytest.mark.parametrize(
+    ("hook", "act"),
+    [
+        ("_start", "opening"),
+        ("_read", "reading"),
+        ("_send", "sending a torque"),
+        ("_check", "asking for its state"),
+        ("_stop", "letting go"),
+    ],
+)
+def test_an_exception_of_a_backend_is_a_fault_of_the_device(
+    hook: str, act: str, error: Exception
+) -> None:
+    def fail(*_arguments: object) -> None:
+        raise error
+
+    device = ScriptedDevice(SimulatedClock())
+    setattr(device, hook, fail)
+    with pytest.raises(DeviceError) as caught:
+        use(device)
+    assert str(caught.value) == f"scripted: {act}: {type(error).__name__}: {error}"
+    assert caught.value.kind == "device"
+    assert caught.value.__cause__ is error
+    vars(device).pop(hook)
+    device.close()
+
+
 # Reading
 
 

@@ -198,6 +198,20 @@ def not_taken(start_s: float, n: float = math.inf) -> SendFault:
     return fault
 
 
+def failing(start_s: float, error: Exception) -> SendFault:
+    """Sending one torque raises an error, from a time on."""
+    has_failed = False
+
+    def fault(time_s: float, torque: float) -> float | None:
+        nonlocal has_failed
+        if time_s >= start_s - 1e-9 and not has_failed:
+            has_failed = True
+            raise error
+        return torque
+
+    return fault
+
+
 def ignored(start_s: float) -> SendFault:
     """The device was idled from outside: it follows no torque and holds none."""
 

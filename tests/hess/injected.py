@@ -244,6 +244,24 @@ def injections() -> list[Injection]:
             reading(f.broken(CATCH, f.BUS_OFF)),
         ),
         device(
+            "OSError of the backend while reading",
+            CATCH,
+            "device",
+            reading(f.broken(CATCH, OSError(5, "Input/output error"))),
+        ),
+        device(
+            "ValueError of the backend while reading",
+            CATCH,
+            "device",
+            reading(f.broken(CATCH, ValueError("no such count"))),
+        ),
+        device(
+            "OSError of the backend while sending",
+            CATCH,
+            "device",
+            sending(f.failing(CATCH, OSError(5, "Input/output error"))),
+        ),
+        device(
             "one torque not taken", CATCH, "no-answer", sending(f.not_taken(CATCH, 1))
         ),
         device(
@@ -300,8 +318,14 @@ def injections() -> list[Injection]:
         Injection(
             name="model gives no number",
             at_s=CATCH,
-            expected="torque",
+            expected="model",
             controller=model(CATCH, lambda _: math.nan),
+        ),
+        Injection(
+            name="model gives nothing",
+            at_s=CATCH,
+            expected="model",
+            controller=model(CATCH, lambda _: None),
         ),
         Injection(
             name="model gives 35 N·m",

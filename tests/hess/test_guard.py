@@ -176,12 +176,12 @@ def test_no_number_is_not_sent() -> None:
         Joint(lambda t, _a, _v: 1.0 if t < 0.1 else math.nan)
     )
     assert presented.fault is not None
-    assert presented.fault.kind == "active-torque"
+    assert presented.fault.kind == "model"
     assert all(math.isfinite(torque) for _, torque in device.commands)
 
 
 @pytest.mark.parametrize("is_passive", [False, True])
-@pytest.mark.parametrize("value", [None, "1", [1.0]])
+@pytest.mark.parametrize("value", [None, "1", [1.0], math.nan, -math.inf, 1j])
 def test_a_model_that_gives_no_number_is_a_fault_with_the_ramp(
     value: object, is_passive: bool
 ) -> None:
@@ -190,7 +190,10 @@ def test_a_model_that_gives_no_number_is_a_fault_with_the_ramp(
 
     device, presented = at_constant_speed(Joint(law, is_passive=is_passive))
     assert presented.fault is not None
-    assert presented.fault.kind == "controller"
+    assert presented.fault.kind == "model"
+    assert presented.fault.message == (
+        f"model: needs a torque that is a finite number, got {value!r}"
+    )
     assert presented.fault.torque_nm == 1.5
     assert_ramps_to_zero(device, presented)
     assert presented.recording.columns["model_torque_nm"].tolist() == (

@@ -287,7 +287,8 @@ def test_a_torque_that_is_no_number_is_a_fault() -> None:
     controller = Controller(STANDARD_MODELS["HM3"], start_angle=math.nan)
     with device:
         presented = run_presentation(device, controller, clock=clock, limits=LIMITS)
-    assert presented.fault.message == "torque: needs at most 20 N·m, got nan N·m"
+    words = "model: needs a torque that is a finite number, got nan"
+    assert presented.fault.message == words
     assert [torque for _, torque in device.commands] == [0.0, 0.0]  # end, closing
 
 
