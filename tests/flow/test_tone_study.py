@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from masrel.errors import ProtocolError
+from masrel.errors import ProtocolError, RatingsError
 from masrel.protocol import StudyPaths, read_protocol
 from masrel.recording import PHASES, read_recording
 from masrel.run import SimulatedGrades, run_session
@@ -84,6 +84,14 @@ def test_its_report_has_traces_and_numbers_of_every_kind(rated: StudyPaths) -> N
     page = (report / "report.md").read_text(encoding="utf-8")
     assert "Constants all spastic elbows share" in page
     assert len(list((report / "figures").glob("traces_*.png"))) == 3
+
+
+def test_what_grades_follow_is_asked_of_the_spastic_elbows_alone(
+    rated: StudyPaths,
+) -> None:
+    # S2 is the only one, and what one model was graded follows nothing.
+    with pytest.raises(RatingsError, match="got 1 and 3 in 3 ratings with every"):
+        run("grading", str(rated.root))
 
 
 def test_run_refuses_what_check_refuses(tmp_path: Path) -> None:

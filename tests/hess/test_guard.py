@@ -8,6 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from masrel.elbow import (
     MODELS,
@@ -34,6 +36,14 @@ from .rig import LIMITS, START, ScriptedDevice, present
 
 OUT = MinimumJerk(start=START, end=radians(130.0), mean_speed=radians(80.0))
 SPEED = radians(90.0)
+
+FULL = Joined(
+    [
+        OUT,
+        Hold(start=OUT.end, duration=1.0),
+        Reversed(motion=MinimumJerk(start=START, end=OUT.end, mean_speed=SPEED)),
+    ]
+)
 
 Law = Callable[[float, float, float], float]
 
@@ -244,6 +254,39 @@ def test_moving_the_arm_back_is_no_lost_grip() -> None:
     assert presented.recording.facts["grip_lost"] is False
 
 
+# Whatever a model does
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.lists(st.floats(-12.0, 12.0), min_size=1, max_size=12),
+    st.floats(0.0, 3.0),
+    st.floats(0.05, 2.0),
+)
+def test_no_model_gives_more_than_the_tank_nor_more_torque_than_the_limit(
+    levels: list[float], gain: float, tank: float
+) -> None:
+    # torque that goes to one level after another, and helps every motion beside
+    def law(time_s: float, _angle: float, velocity: float) -> float:
+        level = levels[int(time_s * 20.0) % len(levels)]
+        return level * min(1.0, 5.0 * time_s) - gain * velocity
+
+    limits = DeviceLimits(active_energy=tank)
+    presented = rendered(Joint(law), FULL, limits=limits).presented
+    columns, fault = presented.recording.columns, presented.fault
+    end_s = math.inf if fault is None else fault.time_s - 1e-9
+    sent = columns["time_s"] < end_s
+    torques = columns["model_torque_nm"][sent]
+    angles = np.radians(columns["angle_deg"][sent])
+    given_up_to = -np.cumsum(torques[:-1] * np.diff(angles))
+    assert float(given_up_to.max(initial=0.0)) <= tank + 1e-12
+    assert float(np.abs(torques).max(initial=0.0)) <= limits.active_torque
+    if fault is not None:  # what is left of it goes to zero within 50 ms
+        after = np.abs(columns["command_torque_nm"][~sent])
+        assert np.all(np.diff(after) <= 1e-9)
+        assert after.size == 0 or after[-1] == 0.0
+
+
 # Who is guarded
 
 
@@ -270,13 +313,6 @@ GUARDED = {
     for kind, model in MODELS.items()
     if kind != ElbowParameters.kind and not model().is_passive
 }
-FULL = Joined(
-    [
-        OUT,
-        Hold(start=OUT.end, duration=1.0),
-        Reversed(motion=MinimumJerk(start=START, end=OUT.end, mean_speed=SPEED)),
-    ]
-)
 
 
 @pytest.mark.parametrize("kind", ["lead-pipe-rigidity", "contracture"])
