@@ -71,6 +71,13 @@ def _decode_value(
             into.problems.append(f"{where}: needed a table, got {got(value)}")
     elif (entry := _entry_type(annotation)) is not None:
         _decode_array(value, annotation, entry, where, key, into)
+    elif typing.get_origin(annotation) is dict and isinstance(value, Mapping):
+        entries = Decoded()
+        for name, item in value.items():
+            of_value = typing.get_args(annotation)[1]
+            _decode_value(item, of_value, f"{where}.{name}", name, entries)
+        into.values[key] = entries.values
+        into.problems.extend(entries.problems)
     elif (problem := _leaf_problem(value, annotation, where)) is None:
         into.values[key] = value
     else:
@@ -202,7 +209,7 @@ def _range(info: inspect.FloatType | inspect.IntType) -> str:
     phrases = [
         f"{word} {limit:{form}}"
         for word, limit in limits
-        if limit not in (None, sys.float_info.max)  # that one is all finite numbers
+        if limit is not None and abs(limit) < sys.float_info.max  # else every number
     ]
     return " " + " and ".join(phrases) if phrases else ""
 

@@ -123,7 +123,8 @@ def test_numbers_that_do_not_go_together_are_refused(tmp_path: Path) -> None:
     (problem,) = problems_of(of_kind("clasp-knife", arming_angle_deg=80.0), tmp_path)
     assert problem.startswith("models[2].parameters.arming_angle_deg: needed at most ")
     (problem,) = problems_of(of_kind("cogwheel-rigidity", gap_share=0.0), tmp_path)
-    assert problem.startswith("models[2].parameters")
+    where, needed = "models[2].parameters.beat_rate_hz", "needed a number, got "
+    assert problem.startswith(f"{where}: {needed}")
     assert "gap_edge: needs at most half a gap" in problem
 
 
@@ -164,7 +165,8 @@ def test_a_spastic_elbow_has_no_parameters(tmp_path: Path) -> None:
 @pytest.mark.parametrize("value", ["1", True, [1.0], {"a": 1.0}, math.inf, math.nan])
 def test_what_is_no_number_is_refused(tmp_path: Path, value: object) -> None:
     (problem,) = problems_of(of_kind("clonus", beat_rate_hz=value), tmp_path)
-    assert problem.startswith("models[2].parameters")
+    where, needed = "models[2].parameters.beat_rate_hz", "needed a number, got "
+    assert problem.startswith(f"{where}: {needed}")
     assert problem.endswith('(id "K")')
 
 
