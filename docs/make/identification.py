@@ -2,6 +2,8 @@
 
 python -m docs.make.identification figures
 python -m docs.make.identification coverage [STUDIES]
+python -m docs.make.identification wrong [STUDIES]
+python -m docs.make.identification right [STUDIES]
 python -m docs.make.identification time
 """
 
@@ -9,6 +11,7 @@ import math
 import statistics
 import sys
 import time
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +23,14 @@ from masrel.report._figure_data import FrictionView, JointFitView
 from masrel.report.figures import draw
 from tests.elbow.identification.synthesis import Scatter, recording, study
 from tests.elbow.identification.test_friction import backdriven
+from tests.elbow.identification.test_lack_of_fit import (
+    NAMES,
+    RIGHT,
+    WRONG,
+    counts,
+    quiet_fit,
+    recordings,
+)
 
 FIGURES = Path(__file__).parents[1] / "figures"
 SCATTER = Scatter(
@@ -28,6 +39,7 @@ SCATTER = Scatter(
 HALF = Scatter(
     catch_angle=math.radians(1.0), catch_torque=0.05, catch_travel=math.radians(1.0)
 )
+SYMBOLS = tuple(QUANTITIES[name].symbol for name in NAMES)
 CASES = (
     ("HM3", None, (60.0, 120.0)),
     ("HM3", SCATTER, (60.0, 120.0)),
@@ -67,8 +79,35 @@ def coverage(n_studies: int) -> None:
         print(f"| {model}, {scatter} |", " | ".join(shares), "|")
 
 
+def wrong(n_studies: int) -> None:
+    """Print what 95 % intervals hold without and with what an arm has."""
+    print("| what the arm has | announced |", " | ".join(SYMBOLS), "| fitted |")
+    for scatter in (None, SCATTER):
+        for name, arm in WRONG.items():
+            case = {"arm": arm, "scatter": scatter}
+            for options in ({}, {name: "fitted"}):
+                total = counts(case, range(5000, 5000 + n_studies), **options)
+                row = [str(total[parameter]) for parameter in NAMES]
+                announced = total["does not fit"]
+                kind = "scattered" if scatter else "exact"
+                print(
+                    f"| {name}, {kind} | {announced} |",
+                    " | ".join(row),
+                    f"| {'yes' if options else 'no'} |",
+                    flush=True,
+                )
+
+
+def right(n_studies: int) -> None:
+    """Print how often the right law is called wrong."""
+    for case in RIGHT:
+        made = (quiet_fit(recordings(case, 7000 + i)) for i in range(n_studies))
+        verdicts = Counter(each.lack_of_fit.verdict for each in made)
+        print(f"| {case} | {verdicts['does not fit']} of {n_studies} |", flush=True)
+
+
 def seconds() -> None:
-    """Print how long 24 trials of 2 s take, and of it the change points."""
+    """Print the processor time that 24 trials of 2 s take."""
     rng = np.random.default_rng(1)
     joint, movements = STANDARD_MODELS["HM3"], []
     for i in range(24):
@@ -81,10 +120,10 @@ def seconds() -> None:
         movements.append(made[0])
     taken = []
     for _ in range(7):
-        begun = time.perf_counter()
+        begun = time.process_time()
         fit(movements)
-        taken.append(time.perf_counter() - begun)
-    print(f"24 trials of 2 s at 1 kHz: median {statistics.median(taken):.2f} s")
+        taken.append(time.process_time() - begun)
+    print(f"24 trials of 2 s at 1 kHz: {statistics.median(taken):.2f} s of processor")
 
 
 if __name__ == "__main__":
@@ -93,6 +132,9 @@ if __name__ == "__main__":
         figures()
     elif what == ["coverage"]:
         coverage(int(sys.argv[2]) if len(sys.argv) > 2 else 200)
+    elif what in (["wrong"], ["right"]):
+        study_of = {"wrong": (wrong, 40), "right": (right, 400)}[what[0]]
+        study_of[0](int(sys.argv[2]) if len(sys.argv) > 2 else study_of[1])
     elif what == ["time"]:
         seconds()
     else:

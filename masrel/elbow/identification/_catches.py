@@ -318,7 +318,7 @@ _GUARD = 0.002
 
 # Windows of the filter of angle and torque before a catch, s. An encoder's steps take
 # long when the joint moves slowly.
-_SLOW_WINDOW, _FAST_WINDOW = 0.25, 0.1
+SLOW_WINDOW, _FAST_WINDOW = 0.25, 0.1
 
 # Windows of the filter of the angle after a catch, s: where its acceleration is a
 # regressor, an encoder's steps must not be.
@@ -349,7 +349,7 @@ def slow_trial(stretch: Stretch, name: str) -> Trial:
     """Return a slow stretch as one pre-catch phase (section II.B)."""
     unusable = stretch.missing | stretch.saturated
     lost = int(unusable.sum())
-    whole = filtered_part(stretch, unusable, (0, stretch.time.size), _SLOW_WINDOW)
+    whole = filtered_part(stretch, unusable, (0, stretch.time.size), SLOW_WINDOW)
     remark = f"{lost} samples missing or saturated" if lost else ""
     return _trial(stretch, name, whole, remark=remark)
 

@@ -14,6 +14,7 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import stdtrit
 
 from masrel.elbow.identification._catches import (
     Arm,
@@ -75,6 +76,9 @@ Term = float | Literal["off", "fitted"]
 """What an arm has: nothing of it, a fixed value in SI units, or what is fitted."""
 
 _WINDOW = 0.06  # of the filter of speeds, s: 20.5 Hz at 1 kHz
+# Two slow trials say little of how they differ, but not nothing of b.
+_MIN_DF = 4.0
+
 # Of catches and fit, where what an arm has moves the catches, or makes them last.
 _ROUNDS, _TIMED_ROUNDS = 2, 8
 
@@ -449,11 +453,13 @@ def _check_slow(
     travel = max(float(np.ptp(stretch.angle)) for stretch in stretches.values())
     for name, size in (("damping", speed), ("stiffness", travel)):
         estimate = slow.step[name]
-        half = 0.5 * (estimate.high - estimate.low)
+        df = estimate.df if estimate.df > _MIN_DF else _MIN_DF
+        half = float(stdtrit(df, 0.5 + 0.5 * options.level)) * slow.errors[name]
         # an error that matters: of the value, and of the torque at the largest speed
         unsure = 2.0 * half > abs(estimate.value) and 2.0 * half * size > max(torque)
         if math.isnan(estimate.value) or unsure:
-            raise RecordingError(_untold(name, estimate, options))
+            error = slow.errors[name]
+            raise RecordingError(_untold(name, estimate.value, error, options))
         if estimate.high < 0.0:
             symbol = QUANTITIES[name].symbol
             raise RecordingError(
@@ -468,11 +474,10 @@ def _check_slow(
             )
 
 
-def _untold(name: str, estimate: FittedParameter, options: _Options) -> str:
+def _untold(name: str, value: float, error: float, options: _Options) -> str:
     symbol = QUANTITIES[name].symbol
-    error = ""
-    if not math.isnan(estimate.standard_error):
-        error = f" ({estimate.value:.3g}, standard error {estimate.standard_error:.2g})"
+    if not math.isnan(error):
+        symbol += f" ({value:.3g}, standard error {error:.2g})"
     remedy = "they need a speed that varies within a stretch"
     if options.offset is None:
         remedy += (
@@ -480,7 +485,7 @@ def _untold(name: str, estimate: FittedParameter, options: _Options) -> str:
             "zero is known (offset)"
         )
     return (
-        f"recordings: the slow stretches do not tell {symbol}{error} from a constant "
+        f"recordings: the slow stretches do not tell {symbol} from a constant "
         f"torque; {remedy}"
     )
 

@@ -27,7 +27,7 @@ LEVEL = 0.01
 # What is tried for lag and rise, s: of the size that a sensor and a muscle have.
 _LAG, _RISE = 0.005, 0.04
 
-_MIN_DF, _MIN_TRIALS = 2.0, 5  # a test with fewer says nothing
+_MIN_DF, _MIN_TRIALS = 1.0, 5  # a test with fewer says nothing
 
 STRUCTURES = {
     "gravity": ("the weight of the arm", "--gravity fitted"),
@@ -102,7 +102,7 @@ class LackOfFit:
     Attributes
     ----------
     verdict : {"fits", "does not fit", "undecided"}
-        Undecided with so few trials that no test has two degrees of freedom.
+        Undecided with so few trials that no test says anything.
     level : float
         Of all tests together: how often the right law is called wrong.
     tests : tuple of StructureTest

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.elbow.identification._catches import (
+    SLOW_WINDOW,
     Arm,
     Catch,
     CatchLevels,
@@ -55,6 +56,7 @@ class SlowFit:
     law: PreCatchLaw
     gravity: float
     relative_error: float
+    errors: Mapping[str, float]  # standard errors, of one trial those of its samples
 
 
 def fit_slow(
@@ -106,7 +108,26 @@ def fit_slow(
         ),
         gravity=step["gravity"].value if "gravity" in names else arm.gravity,
         relative_error=far / size if size > 0.0 else math.nan,
+        errors=_errors(step, left, trials),
     )
+
+
+def _errors(
+    step: Step, rows: Sequence[_Floats], trials: Sequence[Trial]
+) -> dict[str, float]:
+    errors = {e.name: e.standard_error for e in step.estimates}
+    if len(trials) > 1 or math.isnan(step["damping"].value + step["stiffness"].value):
+        return errors
+    # samples of one trial, of which the filter leaves one in so many independent
+    time, (table,) = trials[0].pre_catch.time, rows
+    period = float(np.median(np.diff(time))) if time.size > 1 else 1.0
+    inverse = np.linalg.pinv(table[:, :-1].T @ table[:, :-1], hermitian=True)
+    values = inverse @ (table[:, :-1].T @ table[:, -1])
+    squares = float(((table[:, -1] - table[:, :-1] @ values) ** 2).sum())
+    n_alike = max(SLOW_WINDOW / period, 1.0)
+    df = max(time.size / n_alike - table.shape[1], 1.0)
+    variances = squares / df * np.diag(inverse)
+    return dict(zip(errors, np.sqrt(variances).tolist(), strict=True))
 
 
 def _distance(
