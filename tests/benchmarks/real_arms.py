@@ -16,7 +16,7 @@ fit` reads (time_s, angle_deg or angle_rad, torque_nm). Sources:
   by about one degree, at 1 kHz; export position and torque as CSV from MATLAB.
 
 Every law is fitted to all recordings but one and predicts that one, up to a constant;
-with a single recording, to its first half, and predicts the second.
+a single recording has nothing to predict it from: what is left is that of the fit.
 """
 
 import argparse
@@ -221,15 +221,8 @@ LAWS: dict[str, Law] = {
 def folds(arms: Sequence[Arm]) -> list[tuple[list[Arm], Arm]]:
     """What each law learns from, and what it predicts."""
     if len(arms) > 1:
-        pairs = [([*arms[:i], *arms[i + 1 :]], arm) for i, arm in enumerate(arms)]
-        return pairs
-    (arm,) = arms
-    halves = []
-    for part in (slice(0, arm.time.size // 2), slice(arm.time.size // 2, None)):
-        columns = {name: getattr(arm, name)[part] for name in list(vars(arm))[1:]}
-        columns["torque"] = columns["torque"] - columns["torque"].mean()
-        halves.append(Arm(name=arm.name, **columns))
-    return [([halves[0]], halves[1])]
+        return [([*arms[:i], *arms[i + 1 :]], arm) for i, arm in enumerate(arms)]
+    return [(list(arms), arms[0])]
 
 
 def compare(arms: Sequence[Arm]) -> None:

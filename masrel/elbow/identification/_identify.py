@@ -537,7 +537,7 @@ def _fit_trials(
 
 
 def _floor(name: str, equations: Sequence[Equations]) -> float:
-    return _FLOORS[name] * float(np.median(np.diff(equations[-1].trial.pre_catch.time)))
+    return _FLOORS[name] * float(np.median(np.diff(equations[0].time)))
 
 
 def _start(steps: Sequence[Step], options: _Options, arm: Arm) -> dict[str, float]:

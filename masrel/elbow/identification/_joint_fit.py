@@ -195,5 +195,5 @@ def _left_out(
         own[free] = np.linalg.lstsq(r[:, free], -left, rcond=1e-12)[0]
         columns = table[: law.size, :-1] * np.concatenate([own, step])
         error = e.measured - law - e.known.spreads.torque * columns.sum(axis=1)
-        made.append(float((error**2).mean()))
+        made.append(float((error**2).mean()) if error.size else math.nan)
     return np.array(made)

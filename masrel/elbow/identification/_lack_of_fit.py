@@ -185,7 +185,11 @@ def lack_of_fit(
         float(((e.measured - law) ** 2).sum())
         for e, law in zip(equations, laws, strict=True)
     )
-    whole = sum(float(((e.measured - e.measured.mean()) ** 2).sum()) for e in equations)
+    whole = sum(
+        float(((e.measured - e.measured.mean()) ** 2).sum())
+        for e in equations
+        if e.measured.size
+    )
     return LackOfFit(
         verdict=verdict,
         level=LEVEL,
@@ -223,7 +227,7 @@ def _test(
         rows.append(Rows(design=design, target=-whole[:, n - 1]))
     fit = solve(rows)
     value, df = float(fit.values[-1]), float(fit.df[-1])
-    error = math.sqrt(fit.covariance[-1, -1])
+    error = math.sqrt(max(fit.covariance[-1, -1], 0.0))
     if not (error > 0.0 and df >= _MIN_DF and fit.n_trials[-1] >= _MIN_TRIALS):
         return None
     p = 2.0 * float(stdtr(df, -abs(value / error)))

@@ -211,7 +211,7 @@ def fitted(
     estimates = []
     for place, name in enumerate(names):
         value = float(fit.values[place])
-        error = math.sqrt(fit.covariance[place, place])
+        error = math.sqrt(max(fit.covariance[place, place], 0.0))
         df = float(fit.df[place])
         half = float(stdtrit(df, 0.5 + 0.5 * level)) * error
         reason = None
