@@ -10,7 +10,7 @@ columns under the same names.
 
 from typing import Any, NamedTuple
 
-from masrel.elbow._polynomials import NOTHING, Number, Polynomial, derivative, product
+from masrel.elbow._polynomials import NOTHING, Number, Polynomial, derivative
 
 Parameters = Any  # ElbowParameters, or columns under the same names
 
@@ -65,12 +65,16 @@ def catch_line(
     since: Polynomial,
 ) -> Polynomial:
     """(2) as a polynomial: θ - (L - α·v̄), v̄ = way/since, times the time since onset."""
-    # constant: L, counted as the angles are
-    beyond = product([angle[0] - constant, *angle[1:]], since)
-    return [
-        b + p.catch_slope * w
-        for b, w in zip(beyond, [*way, *[0.0] * len(beyond)], strict=False)
-    ]
+    # constant: L, counted as the angles are; since: one coefficient or two
+    beyond = [angle[0] - constant, *angle[1:]]
+    if len(since) == 2:
+        longer, before = [*beyond, 0.0], [0.0, *beyond]
+        beyond = [
+            since[0] * a + since[1] * b for a, b in zip(longer, before, strict=True)
+        ]
+    for i, w in enumerate(way):
+        beyond[i] = beyond[i] + p.catch_slope * w
+    return beyond
 
 
 def slow_line(p: Parameters, way: Polynomial, since: Polynomial) -> Polynomial:
@@ -89,9 +93,15 @@ def catch_bounds(p: Parameters, origin: Number) -> tuple[Number, Number]:
     return p.smallest_catch_angle - origin, largest
 
 
+def residual_share(p: Parameters) -> Number:
+    """Q as section II reads it, or 1 - Q, as section III.C does."""
+    decrease = 1.0 * (p.residual_reading == "decrease")
+    return decrease * (1.0 - p.residual_ratio) + (1.0 - decrease) * p.residual_ratio
+
+
 def catch(p: Parameters, pre_end: Number, rise: Number) -> tuple[TorqueLaw, TorqueLaw]:
     """(3), first and second line; pre_end is τ_pre_end and rise H·v_c."""
-    return TorqueLaw(pre_end + rise), TorqueLaw(pre_end + p.residual_share * rise)
+    return TorqueLaw(pre_end + rise), TorqueLaw(pre_end + residual_share(p) * rise)
 
 
 def onset_share(y: Number) -> Number:
@@ -100,15 +110,14 @@ def onset_share(y: Number) -> Number:
 
 
 def post_catch(
-    p: Parameters, pre_end: Number, rise: Number, start: Number, rest: Number
+    p: Parameters, residual: Number, pre_end: Number, start: Number, rest: Number
 ) -> TorqueLaw:
-    """(5): from the residual torque on; start is θ_post."""
-    residual = p.residual_share * rise
+    """(5): from the residual torque of (3) on; start is θ_post."""
     additive = 1.0 * (p.post_catch == "additive")
     # as Table III's footnote reads it, the spring and damper of (1) go on
-    base = additive * p.stiffness * (start - rest) + (1.0 - additive) * pre_end
+    spring = p.stiffness * (start - rest)
     return TorqueLaw(
-        level=base + residual,
+        level=residual + additive * (spring - pre_end),
         stiffness=p.post_catch_stiffness + additive * p.stiffness,
         origin=start,
         damping=additive * p.damping,

@@ -10,6 +10,7 @@ coefficients within `NOTHING` of the largest count as 0: floats tell no more.
 from collections.abc import Sequence
 from itertools import pairwise
 from math import comb, sqrt
+from operator import ne
 from typing import Any
 
 import numpy as np
@@ -85,6 +86,9 @@ def first_above(p: Polynomial, low: float, high: float) -> float | None:
     width = high - low
     if width <= 0.0:
         return None
+    if len(p) == 2 and p[1] > 0.0:  # a line that rises
+        x = max(-p[0] / p[1], low)
+        return None if x > high - TIE * width else x
     b = bernstein(shifted(p, low) if low else p, width)
     if (most := max(b)) <= 0.0:
         return None
@@ -143,7 +147,7 @@ def _sign_changes(
     p: Polynomial, b: list[float], low: float, high: float, least: float, tie: float
 ) -> list[float]:
     signs = [c > 0.0 for c in b if not -least <= c <= least]
-    n_changes = sum(one != other for one, other in pairwise(signs))
+    n_changes = sum(map(ne, signs, signs[1:]))
     if n_changes == 0:
         return []
     if n_changes == 1:
@@ -162,9 +166,9 @@ def _sign_changes(
 def _guess(b: list[float], low: float, high: float) -> float:
     # where the control polygon first passes 0, but not at an end: that may be a root
     share = 0.5
-    for i, (one, other) in enumerate(pairwise(b)):
-        if (one > 0.0) != (other > 0.0):
-            share = (i + one / (one - other)) / (len(b) - 1)
+    for i, c in enumerate(b):
+        if (c > 0.0) != (b[0] > 0.0):
+            share = (i - c / (c - b[i - 1])) / (len(b) - 1)
             break
     return low + min(max(share, 0.02), 0.98) * (high - low)
 
@@ -222,20 +226,20 @@ def _of_square(p: Polynomial, *, rises: bool) -> float:
 def refined_columns(p: Polynomial, low: Number, high: Number) -> Number:
     """Return the places, one a row, where polynomials rise through 0; as `refined`."""
     if len(p) == 2:
-        return np.clip(-p[0] / p[1], low, high)
+        return np.minimum(np.maximum(-p[0] / p[1], low), high)
     x, slopes, near = 0.5 * (low + high), derivative(p), 1e-7 * (high - low)
-    left = 2  # steps, once near: each doubles the digits
+    is_there = np.zeros(np.shape(x), dtype=np.bool_)
     for _ in range(100):
         height = value(p, x)
         is_above = height > 0.0
         low, high = np.where(is_above, low, x), np.where(is_above, x, high)
         after = x - height / value(slopes, x)
         is_inside = (after >= low) & (after <= high)
-        after = np.where(is_inside, after, 0.5 * (low + high))
-        # of a row that is there nothing changes, whatever the others need
-        step = np.where(left > 0, after - x, 0.0)
-        left = left - (np.abs(step) <= near)
-        x = x + step
-        if not (left > 0).any():
+        step = np.where(is_inside, after, 0.5 * (low + high)) - x
+        x = x + np.where(is_there, 0.0, step)  # whatever other rows need
+        is_there |= np.abs(step) <= near
+        if is_there.all():
             break
+    for _ in range(2):  # each doubles the digits
+        x = np.minimum(np.maximum(x - value(p, x) / value(slopes, x), low), high)
     return x

@@ -309,7 +309,7 @@ class _PhaseMachine:
         self.constant = p.catch_angle_constant - motion.origin  # L
         smallest, largest = _law.catch_bounds(p, motion.origin)
         # θ_catch jumps at ν_H where ν_L is above that
-        self.jumps = smallest - largest > NOTHING
+        self.jumps = smallest > largest
         self.lowest, self.highest = sorted((smallest, largest))
         self.phase = _PRE_CATCH
         self.goal = math.inf  # angle at which the catch ends, rad from the origin

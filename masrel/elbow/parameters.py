@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
+from masrel.elbow import _law
 from masrel.elbow.sampled import SampledJoint
 from masrel.errors import ParameterError
 
@@ -160,9 +161,7 @@ class ElbowParameters:
     @property
     def residual_share(self) -> float:
         """Residual torque over peak torque, both above pre-catch."""
-        if self.residual_reading == "decrease":  # section III.C
-            return 1.0 - self.residual_ratio
-        return self.residual_ratio
+        return float(_law.residual_share(self))
 
     def catch_angle(self, mean_speed: float) -> float:
         """Return the catch angle for a mean pre-catch speed.

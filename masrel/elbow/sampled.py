@@ -160,8 +160,9 @@ class SampledJoint:
 
     def _to_post_catch(self, angle: float) -> None:
         self.phase = POST_CATCH
+        rest = self._pre_catch.origin
         self._law = _law.post_catch(
-            self._parameters, self._pre_end, self._rise, angle, self._pre_catch.origin
+            self._parameters, self._residual, self._pre_end, angle, rest
         )
 
     def _to_pre_catch(self) -> None:

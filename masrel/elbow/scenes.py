@@ -5,10 +5,11 @@ scene. Single stretches go through together, by the formulas of one scene over c
 what floats leave in doubt there, and every other motion, goes through piece by piece.
 """
 
+import functools
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import MISSING, dataclass, field, fields
-from itertools import chain
+from itertools import chain, pairwise
 from operator import attrgetter
 from types import SimpleNamespace
 from typing import Any, NamedTuple
@@ -71,6 +72,7 @@ _CLOSE = 1e-9
 # Of a time, a speed or a line: nearer than that to a tie a scene goes through alone.
 
 Flags = NDArray[np.bool_]
+_Which = NDArray[np.intp] | slice
 
 
 class Columns:
@@ -149,7 +151,7 @@ class Columns:
                 rows.update(np.unique(column, return_index=True)[1].tolist())
             else:
                 rows.update((int(np.argmin(column)), int(np.argmax(column))))
-        full = SimpleNamespace(**{**_defaults(self.kind), **self.columns})
+        full = SimpleNamespace(**{**_DEFAULTS[self.kind], **self.columns})
         for margin in _MARGINS[self.kind](full):
             rows.add(int(np.argmin(margin)))
         return sorted(rows)
@@ -228,7 +230,7 @@ def evaluate(
     motions: Motion | Sequence[Motion] | Columns,
     outputs: Sequence[str] = ("catch_angle", "peak_torque"),
     *,
-    chunk: int = 8192,
+    chunk: int = 16384,
 ) -> SceneTable:
     """Compute outputs of many scenes.
 
@@ -325,20 +327,23 @@ def _evaluated(
             "parameters, motions: need as many joints as motions, or one of either, "
             f"got {len(joints)} and {len(moves)}"
         )
-    values, n_alone = np.empty((n, len(outputs))), 0
+    if n > 1000:  # once so much has been given back, the allocator keeps its pages
+        np.empty(128 * min(n, chunk))
+    values, n_alone = np.empty((len(outputs), n)).T, 0
     for kind, rows in _groups(moves, n, chunk):
-        alone = rows
+        alone = np.arange(n)[rows]
         if kind in _PIECES:
-            p, motion = _joint_columns(joints, rows), _motion_columns(moves, kind, rows)
-            _check_starts(motion.start, p.range_end, rows)
+            motion = _motion_columns(moves, kind, rows, alone.size)
+            p = _joint_columns(joints, rows)
+            _check_starts(motion.start, p.range_end, alone)
             with np.errstate(all="ignore"):  # what is in doubt may be anything
                 scenes = _Scenes(p, motion.start, _PIECES[kind](motion))
                 for i, name in enumerate(outputs):
                     values[rows, i] = scenes.output(name)
-            alone = rows[scenes.is_doubtful]
+            alone = alone[scenes.is_doubtful]
         for i in alone.tolist():
             joint, motion = _row(joints, i), _row(moves, i)
-            _check_starts(np.array([motion.start]), joint.range_end, alone[alone == i])
+            _check_starts(np.array([motion.start]), joint.range_end, np.array([i]))
             values[i] = _alone(joint, motion, outputs)
         n_alone += alone.size
     return values, n_alone
@@ -361,20 +366,20 @@ def _row(items: Any, i: int) -> Any:
 
 def _groups(
     moves: Sequence[Motion] | Columns, n: int, chunk: int
-) -> Iterator[tuple[type, NDArray[np.intp]]]:
+) -> Iterator[tuple[type, _Which]]:
     # rows of motions of one kind, not too many at a time
-    if isinstance(moves, Columns):
-        groups = {moves.kind: np.arange(n)}
-    elif len(kinds := set(map(type, moves))) == 1:
-        groups = {kinds.pop(): np.arange(n)}
-    else:
-        places: dict[type, list[int]] = {}
-        for i, motion in enumerate(moves):
-            places.setdefault(type(motion), []).append(i)
-        groups = {kind: np.array(rows) for kind, rows in places.items()}
-    for kind, rows in groups.items():
-        for first in range(0, rows.size, chunk):
-            yield kind, rows[first : first + chunk]
+    kinds = {moves.kind} if isinstance(moves, Columns) else set(map(type, moves))
+    if len(kinds) == 1:
+        kind = kinds.pop()
+        for first in range(0, n, chunk):
+            yield kind, slice(first, first + chunk)
+        return
+    places: dict[type, list[int]] = {}
+    for i in range(n):
+        places.setdefault(type(_row(moves, i)), []).append(i)
+    for kind, of_kind in places.items():
+        for first in range(0, len(of_kind), chunk):
+            yield kind, np.array(of_kind[first : first + chunk])
 
 
 _NUMBERS = tuple(
@@ -390,9 +395,10 @@ _FIELDS: dict[type, tuple[str, ...]] = {
 }
 
 
-def _defaults(kind: type) -> dict[str, Any]:
-    every = fields(kind)
-    return {item.name: item.default for item in every if item.default is not MISSING}
+_DEFAULTS: dict[type, dict[str, Any]] = {
+    kind: {f.name: f.default for f in fields(kind) if f.default is not MISSING}
+    for kind in (ElbowParameters, *_FIELDS)
+}
 
 
 _MARGINS: dict[type, Callable[[SimpleNamespace], list[Any]]] = {
@@ -408,58 +414,58 @@ _MARGINS: dict[type, Callable[[SimpleNamespace], list[Any]]] = {
 
 
 def _joint_columns(
-    joints: Sequence[ElbowParameters] | Columns, rows: NDArray[np.intp]
+    joints: Sequence[ElbowParameters] | Columns, rows: _Which
 ) -> SimpleNamespace:
     # parameters by name, each a column or one value for all
     if isinstance(joints, Columns):
         p = SimpleNamespace(**_taken(joints, rows))
-        rest = p.rest_angle
-        p.rest_angle = math.nan if rest is None else rest
-    else:
-        distinct, index = _distinct(joints, rows)
-        p = SimpleNamespace(**_read(distinct, index, _NUMBERS))
-        for name in ("rest_angle", "post_catch", "residual_reading"):
-            values = list(map(attrgetter(name), distinct))
-            if len(set(values)) == 1:
-                setattr(p, name, math.nan if values[0] is None else values[0])
-            else:
-                column = np.array([math.nan if v is None else v for v in values])
-                setattr(p, name, column if index is None else column[index])
-    decrease = np.equal(p.residual_reading, "decrease")
-    p.residual_share = np.where(decrease, 1.0 - p.residual_ratio, p.residual_ratio)
+        p.rest_angle = math.nan if p.rest_angle is None else p.rest_angle
+        return p
+    distinct, index = _distinct(joints, rows)
+    p = SimpleNamespace(**_read(distinct, index, _NUMBERS))
+    for name in ("rest_angle", "post_catch", "residual_reading"):
+        values = list(map(attrgetter(name), distinct))
+        if len(set(values)) == 1:
+            column = math.nan if values[0] is None else values[0]
+        else:
+            column = np.array([math.nan if v is None else v for v in values])
+            column = column if index is None else column[index]
+        setattr(p, name, column)
     return p
 
 
 def _motion_columns(
-    moves: Sequence[Motion] | Columns, kind: type, rows: NDArray[np.intp]
+    moves: Sequence[Motion] | Columns, kind: type, rows: _Which, n: int
 ) -> SimpleNamespace:
     # the fields of motions of one kind by name, as columns
     if isinstance(moves, Columns):
         taken = _taken(moves, rows)
     else:
-        taken = _read(*_distinct(moves, rows), _FIELDS[kind])
-    whole = {k: np.broadcast_to(c, rows.shape) for k, c in taken.items()}
-    return SimpleNamespace(**whole)
+        taken = _read(_chosen_of(moves, rows), None, _FIELDS[kind])
+    return SimpleNamespace(
+        **{k: c if np.ndim(c) else np.full(n, c) for k, c in taken.items()}
+    )
 
 
-def _taken(items: Columns, rows: NDArray[np.intp]) -> dict[str, Any]:
-    return _defaults(items.kind) | {
-        name: column
-        if not isinstance(column, np.ndarray)
-        else column[rows]
-        if len(items) > 1
-        else column[0]
+def _taken(items: Columns, rows: _Which) -> dict[str, Any]:
+    which = rows if len(items) > 1 else 0
+    return _DEFAULTS[items.kind] | {
+        name: column[which] if isinstance(column, np.ndarray) else column
         for name, column in items.columns.items()
     }
 
 
-def _distinct(
-    items: Sequence[Any], rows: NDArray[np.intp]
-) -> tuple[list[Any], NDArray[np.intp] | None]:
-    # objects, each once, and which of them is in each row; None as they come
+def _chosen_of(items: Sequence[Any], rows: _Which) -> Sequence[Any]:
     if len(items) == 1:
-        return [items[0]], None
-    chosen = items if rows.size == len(items) else [items[i] for i in rows.tolist()]
+        return items
+    return items[rows] if isinstance(rows, slice) else [items[i] for i in rows.tolist()]
+
+
+def _distinct(
+    items: Sequence[Any], rows: _Which
+) -> tuple[Sequence[Any], NDArray[np.intp] | None]:
+    # objects, each once, and which of them is in each row; None as they come
+    chosen = _chosen_of(items, rows)
     once = dict(zip(map(id, chosen), chosen, strict=True))
     if len(once) in (1, len(chosen)):
         return list(once.values()), None
@@ -487,13 +493,21 @@ class _ColumnPiece(NamedTuple):
     length: Number
     angle: Polynomial
 
-    def rows(self, which: NDArray[np.intp]) -> "_ColumnPiece":
+    def rows(self, which: _Which) -> "_ColumnPiece":
         start, length, *angle = _rows([self.start, self.length, *self.angle], which)
         return _ColumnPiece(start, length, angle)
 
 
-def _rows(columns: Sequence[Number], which: NDArray[np.intp]) -> list[Number]:
-    return [c[which] if np.ndim(c) else c for c in columns]
+def _rows(columns: Sequence[Number], which: _Which) -> list[Number]:
+    return [c[which] if isinstance(c, np.ndarray) and c.ndim else c for c in columns]
+
+
+def _chosen(flags: Flags, *, share: float = 1.0) -> _Which | None:
+    # the rows that are meant; all of them, without a copy, from a share on
+    n = np.count_nonzero(flags)
+    if n >= share * flags.size:
+        return slice(None)
+    return np.flatnonzero(flags) if n else None
 
 
 _PIECES: dict[type, Callable[[SimpleNamespace], list[tuple[Any, ...]]]] = {
@@ -519,22 +533,25 @@ class _Scenes:
         self.p, self.start = p, start
         self.pieces = [_ColumnPiece(*piece) for piece in pieces]
         self.constant = p.catch_angle_constant - start  # L
-        rest = np.where(np.isnan(p.rest_angle), 0.0, p.rest_angle - start)
+        rest: Number = 0.0
+        if not np.isnan(p.rest_angle).all():
+            rest = np.where(np.isnan(p.rest_angle), 0.0, p.rest_angle - start)
         self.law = _law.pre_catch(p, rest)
         self.lowest, self.highest = _law.catch_bounds(p, start)
         # θ_catch jumps at ν_H
-        self.is_doubtful: Flags = self.lowest - self.highest > NOTHING
+        self.is_doubtful: Flags = self.lowest > self.highest
         self.end = self._end()
         self.onset, self.slow = self._movement()
-        self.catch, self.angle, self.speed, self.mean_speed, self.pre_end = (
-            np.full(start.shape, math.nan) for _ in range(5)
+        self.catch, self.angle, self.speed, self.mean_speed, self.pre_end = np.full(
+            (5, start.size), math.nan
         )
         self._catch()
         self.rise = p.catch_torque_constant * self.speed
         goal = self.angle + p.catch_travel  # (4)
-        self.catch_end = self._before(self._reached(goal), self.end)
-        slowed = np.maximum(self._before(self.slow, self.end), self.catch_end)
-        self.post_catch_end = slowed  # nan unless both are reached
+        self.catch_end = self._before_end(self._reached(goal))
+        self.left = np.where(np.isnan(self.catch_end), self.end, self.catch_end)
+        # nan unless both are reached
+        self.post_catch_end = np.maximum(self.slow, self.catch_end)
 
     def output(self, name: str) -> Floats:
         """One output by its name."""
@@ -543,8 +560,7 @@ class _Scenes:
         if name == "catch_speed":
             return np.asarray(self.speed)
         if name == "peak_end":
-            last = np.where(np.isnan(self.catch_end), self.end, self.catch_end)
-            return np.asarray(np.minimum(self.catch + self.p.peak_duration, last))
+            return np.asarray(np.minimum(self.catch + self.p.peak_duration, self.left))
         if name == "residual_torque":
             return np.asarray(_law.catch(self.p, self.pre_end, self.rise)[1].level)
         if name == "peak_torque":
@@ -554,19 +570,20 @@ class _Scenes:
             return np.asarray(sum(map(of_section, self._sections(self._segments()))))
         return np.asarray(getattr(self, name))
 
-    def _before(self, time: Floats, end: Floats) -> Floats:
+    def _before_end(self, time: Floats) -> Floats:
         # nan where it is not before the end
-        self.is_doubtful = self.is_doubtful | (np.abs(time - end) <= _CLOSE * end)
-        return np.where(time < end, time, math.nan)
+        self.is_doubtful |= np.abs(time - self.end) <= _CLOSE * self.end
+        return np.where(time < self.end, time, math.nan)
 
     def _end(self) -> Floats:
         last = self.pieces[-1]
         whole, top = last.start + last.length, value(last.angle, last.length)
         limit = self.p.range_end - self.start
         is_cut = top - limit > NOTHING * top
-        if not is_cut.any():
+        self.ends_in_range = not is_cut.any()
+        if self.ends_in_range:
             return np.asarray(whole)
-        self.is_doubtful = self.is_doubtful | (is_cut & (top - limit < _CLOSE * top))
+        self.is_doubtful |= is_cut & (top - limit < _CLOSE * top)
         return np.where(is_cut, self._reached(limit), whole)
 
     def _reached(self, goal: Floats) -> Floats:
@@ -574,7 +591,7 @@ class _Scenes:
         time = np.full(goal.shape, math.nan)
         for piece in self.pieces:
             here = (goal > piece.angle[0]) & (goal <= value(piece.angle, piece.length))
-            if (rows := np.flatnonzero(here)).size:
+            if (rows := _chosen(here)) is not None:
                 start, length, angle = piece.rows(rows)
                 line = [angle[0] - goal[rows], *angle[1:]]
                 time[rows] = start + refined_columns(line, 0.0, length)
@@ -586,21 +603,28 @@ class _Scenes:
         onset, slow = (np.full(self.start.shape, math.nan) for _ in range(2))
         for piece in self.pieces:
             start, length, angle = piece
-            speed = derivative(angle)
-            first, last = speed[0] - threshold, value(speed, length) - threshold
-            is_near = np.minimum(np.abs(first), np.abs(last)) <= _CLOSE * threshold
-            lasts = length > 0.0
-            self.is_doubtful = self.is_doubtful | (lasts & is_near)
-            at_once = lasts & np.isnan(onset) & (first > 0.0)
+            speed, lasts = derivative(angle), length > 0.0
+            first = speed[0] - threshold
+            is_near = np.abs(first) <= _CLOSE * threshold
+            at_once = lasts & (first > 0.0)
+            if piece is not self.pieces[0]:
+                at_once = at_once & np.isnan(onset)
             onset = np.where(at_once, start, onset)
-            self._crossed(piece, onset, lasts & (first < 0.0) & (last > 0.0), 1.0)
-            self._crossed(piece, slow, lasts & (first > 0.0) & (last < 0.0), -1.0)
-        return self._before(onset, self.end), slow
+            if len(speed) > 1:
+                last = value(speed, length) - threshold
+                is_near = is_near | (np.abs(last) <= _CLOSE * threshold)
+                rises = lasts & (first < 0.0) & (last > 0.0)
+                self._crossed(piece, onset, rises, 1.0)
+                self._crossed(piece, slow, lasts & (first > 0.0) & (last < 0.0), -1.0)
+            self.is_doubtful |= lasts & is_near
+        if self.ends_in_range:
+            return onset, slow
+        return self._before_end(onset), self._before_end(slow)
 
     def _crossed(
         self, piece: _ColumnPiece, times: Floats, which: Flags, sign: float
     ) -> None:
-        if (rows := np.flatnonzero(which)).size:
+        if (rows := _chosen(which)) is not None:
             start, length, angle = piece.rows(rows)
             (threshold,) = _rows([self.p.speed_threshold], rows)
             speed = [sign * c for c in derivative(angle)]
@@ -610,77 +634,94 @@ class _Scenes:
     def _catch(self) -> None:
         stop = np.fmin(self.slow, self.end)
         first = self.pieces[0]
-        self.onset_angle = value(first.angle, self.onset - first.start)
-        for i, piece in enumerate(self.pieces):
+        for piece in self.pieces:
             begin = np.maximum(self.onset, piece.start)
             until = np.minimum(stop, piece.start + piece.length)
-            is_open = (until > begin) & np.isnan(self.catch)
             top = value(piece.angle, until - piece.start)
-            rows = np.flatnonzero(is_open & (top > self.lowest))
-            if rows.size:
-                is_first = i == 0  # in which the speed reaches ν_th, if it does
-                self._catch_in(
-                    piece.rows(rows), rows, begin[rows], until[rows], is_first
-                )
+            is_open = (until > begin) & (top > self.lowest)
+            if piece is not first:
+                is_open &= np.isnan(self.catch)
+            if (rows := _chosen(is_open)) is not None:
+                # the speed reaches ν_th in the first piece, if it does
+                times = begin[rows], until[rows], top[rows]
+                self._catch_in(piece, rows, *times, is_first=piece is first)
 
     def _catch_in(
         self,
         piece: _ColumnPiece,
-        rows: NDArray[np.intp],
+        rows: _Which,
         begin: Floats,
         until: Floats,
+        top: Floats,
+        *,
         is_first: bool,
     ) -> None:
-        (slope,) = _rows([self.p.catch_slope], rows)
-        onset, width, angle = self.onset[rows], until - begin, piece.angle
-        way, since = angle[1:], [1.0]  # both over the time, in the piece of the onset
+        start, _, angle = piece.rows(rows)
+        slope, constant, onset = _rows(
+            [self.p.catch_slope, self.constant, self.onset], rows
+        )
+        width = until - begin
+        way: Polynomial
         if not is_first:
-            way = [angle[0] - self.onset_angle[rows], *angle[1:]]
-            since = [piece.start - onset, 1.0]
-        elif np.any(onset > piece.start):
-            angle = shifted(angle, onset - piece.start)
-            way = angle[1:]
+            first = self.pieces[0].rows(rows)
+            way = [angle[0] - value(first.angle, onset), *angle[1:]]
+            since = [start - onset, 1.0]
+        else:  # both over the time, in the piece of the onset
+            angle = shifted(angle, onset) if onset.any() else angle
+            way, since = angle[1:], [1.0]
         p = SimpleNamespace(catch_slope=slope)
-        line = _law.catch_line(p, self.constant[rows], angle, way, since)
+        line = _law.catch_line(p, constant, angle, way, since)
         place, doubt = _first_rise(line, width)
         low, high = self.lowest[rows], self.highest[rows]
         here = value(angle, place)
         _reach(angle, low, width, place, here < low)
         is_late = np.isnan(place) | (here > high)
-        _reach(angle, high, width, place, is_late & (value(angle, width) > high))
+        _reach(angle, high, width, place, is_late & (top > high))
         self.is_doubtful[rows] |= doubt | (width - place <= _CLOSE * width)
-        is_caught = ~np.isnan(place)
-        speeds, state = derivative(angle), value(angle, place)
+        self._begin(rows, begin, place, angle, value(way, place) / value(since, place))
+
+    def _begin(
+        self,
+        rows: _Which,
+        begin: Floats,
+        place: Floats,
+        angle: Polynomial,
+        mean: Floats,
+    ) -> None:
+        # the state at the catch; nan where there is none
+        none, speeds = 0.0 * place, derivative(angle)
+        state, speed = value(angle, place), value(speeds, place) + none
         self.catch[rows], self.angle[rows] = begin + place, state
-        self.speed[rows] = speed = np.where(is_caught, value(speeds, place), place)
-        mean = value(way, place) / value(since, place)
-        self.mean_speed[rows] = np.where(is_caught, mean, place)
+        self.speed[rows], self.mean_speed[rows] = speed, mean + none
         law = TorqueLaw(*_rows(self.law, rows))
-        acceleration = value(derivative(speeds), place)
-        self.pre_end[rows] = law.commanded(state, speed) + law.inertia * acceleration
+        self.pre_end[rows] = _torque(law, speeds, place, state, speed)
 
     def _segments(self) -> list[TorqueSegment]:
-        p, end = self.p, self.end
-        catch, left, slowed = (
-            np.where(np.isnan(time), end, time)
-            for time in (self.catch, self.catch_end, self.post_catch_end)
+        p, end, none = self.p, self.end, np.isnan(self.catch)
+        left, slowed = self.left, self.post_catch_end
+        catch, slowed = (
+            np.where(none, end, self.catch),
+            np.where(np.isnan(slowed), end, slowed),
         )
-        pre_end, rise = np.nan_to_num(self.pre_end), np.nan_to_num(self.rise)
-        travelled = np.nan_to_num(self.angle + p.catch_travel)
+        pre_end, rise, travelled = (
+            np.where(none, 0.0, column)
+            for column in (self.pre_end, self.rise, self.angle + p.catch_travel)
+        )
         peak, residual = _law.catch(p, pre_end, rise)
-        post = _law.post_catch(p, pre_end, rise, travelled, self.law.origin)
-        risen = np.minimum(catch + p.catch_rise, left)
+        post = _law.post_catch(p, residual.level, pre_end, travelled, self.law.origin)
+        risen, laid = catch, [TorqueSegment(np.zeros(end.shape), catch, self.law)]
+        if np.any(p.catch_rise):
+            risen = np.minimum(catch + p.catch_rise, left)
+            onset = rise, np.where(p.catch_rise, p.catch_rise, 1.0)
+            laid.append(TorqueSegment(catch, risen, TorqueLaw(pre_end), onset))
         fallen = np.minimum(catch + p.peak_duration, left)
-        onset = (rise, np.where(np.greater(p.catch_rise, 0.0), p.catch_rise, 1.0))
-        laid = [
-            TorqueSegment(np.zeros(end.shape), catch, self.law),
-            TorqueSegment(catch, risen, TorqueLaw(pre_end), onset),
+        return [
+            *laid,
             TorqueSegment(risen, fallen, peak),
             TorqueSegment(fallen, left, residual),
             TorqueSegment(left, slowed, post),
             TorqueSegment(slowed, end, self.law),
         ]
-        return [segment for segment in laid if (segment.end > segment.start).any()]
 
     def _sections(self, segments: Iterable[TorqueSegment]) -> Iterator[Section]:
         # what the segments and the pieces have in common; of length 0 where nothing
@@ -694,64 +735,119 @@ class _Scenes:
                     yield Section(np.maximum(until - low, 0.0), part, torque)
 
     def _peak(self) -> Floats:
-        best = np.full(self.end.shape, -math.inf)
-        moving = []
+        best, moving = np.full(self.end.shape, -math.inf), []
         for segment in self._segments():
-            if segment.law.is_level and segment.onset is None:
+            if segment.law.is_level:
                 lasts = segment.end > segment.start
-                best = np.where(lasts, np.maximum(best, segment.law.level), best)
+                best = np.where(lasts, np.maximum(best, _last_level(segment)), best)
             else:
                 moving.append(segment)
-        sections = list(self._sections(moving))
-        for length, _, torque in sections:
-            ends = np.maximum(torque[0], value(torque, length))
-            best = np.where(length > 0.0, np.maximum(best, ends), best)
-        for length, _, torque in sections:
-            if len(torque) > 2:
-                bound = np.maximum.reduce(
-                    np.broadcast_arrays(*bernstein(torque, length))
-                )
-                rows = np.flatnonzero((length > 0.0) & (bound > best))
-                if rows.size:
-                    turns = _turning(_rows(torque, rows), length[rows])
-                    best[rows] = np.maximum(best[rows], turns)
+        for segment in moving[::-1]:
+            for start, length, angle in self.pieces:
+                low = np.maximum(segment.start - start, 0.0)
+                high = np.minimum(segment.end - start, length)
+                if not (lasts := high > low).any():
+                    continue
+                higher = lasts & (_bound(segment.law, angle, low, high) > best)
+                if (rows := _chosen(higher, share=0.2)) is not None:
+                    law, part = TorqueLaw(*_rows(segment.law, rows)), _rows(angle, rows)
+                    peak = _moving_peak(law, part, low[rows], high[rows], best[rows])
+                    peak = np.where(higher[rows], peak, -math.inf)
+                    best[rows] = np.maximum(best[rows], peak)
         return best
+
+
+def _torque(
+    law: TorqueLaw, speeds: Polynomial, at: Floats, angle: Number, speed: Number
+) -> Number:
+    # at a time of a piece whose angle and speed there are known
+    torque = law.commanded(angle, speed)
+    if np.any(law.inertia):
+        torque = torque + law.inertia * value(derivative(speeds), at)
+    return torque
+
+
+def _last_level(segment: TorqueSegment) -> Number:
+    # the largest torque of the catch: a smoothed onset only rises
+    if segment.onset is None:
+        return segment.law.level
+    rise, time = segment.onset
+    return segment.law.level + rise * _law.onset_share(
+        (segment.end - segment.start) / time
+    )
+
+
+def _bound(law: TorqueLaw, angle: Polynomial, low: Floats, high: Floats) -> Floats:
+    # no torque between two times is larger; the angle grows, the speed goes one way
+    speeds = derivative(angle)
+    fastest = speeds[0]
+    if len(speeds) > 1:
+        fastest = np.maximum(value(speeds, low), value(speeds, high))
+    bound = law.commanded(value(angle, high), fastest)
+    if np.any(law.inertia):
+        accelerations = bernstein(derivative(shifted(speeds, low)), high - low)
+        bound = bound + law.inertia * functools.reduce(np.maximum, accelerations)
+    return np.asarray(bound)
+
+
+def _moving_peak(
+    law: TorqueLaw, angle: Polynomial, low: Floats, high: Floats, best: Floats
+) -> Floats:
+    # the largest torque between two times; where it turns only if that may be the best
+    start, end = (
+        _torque(law, derivative(angle), x, value(angle, x), value(derivative(angle), x))
+        for x in (low, high)
+    )
+    peak = np.maximum(start, end)
+    if len(angle) > 2:
+        torque = law.along(shifted(angle, low))
+        bound = functools.reduce(np.maximum, bernstein(torque, high - low))
+        if (rows := _chosen(bound > np.maximum(best, peak))) is not None:
+            turns = _turning(_rows(torque, rows), (high - low)[rows])
+            peak[rows] = np.maximum(peak[rows], turns)
+    return np.asarray(peak)
 
 
 def _first_rise(line: Polynomial, width: Floats) -> tuple[Floats, Flags]:
     # where a line is first above 0, nan if it is not; and which need another look
-    b = np.array(np.broadcast_arrays(*bernstein(line, width)))
-    above = b > 0.0
-    changes = (above[1:] != above[:-1]).sum(axis=0)
-    smallest = np.minimum(np.abs(b[0]), np.abs(b[-1]))
-    doubt = (changes > 1) | (smallest <= _CLOSE * np.abs(b).max(axis=0))
+    b = bernstein(line, width)
+    sizes = list(map(np.abs, b))
+    is_near = sizes[0] <= _CLOSE * functools.reduce(np.maximum, sizes)
+    if len(b) == 2:
+        return np.where(
+            b[1] > 0.0, refined_columns(line, 0.0, width), math.nan
+        ), is_near
+    above, changes = _signs(b)
     place = np.where(above[0], 0.0, math.nan)
-    rises = np.flatnonzero(~above[0] & (changes == 1))
-    place[rises] = refined_columns(_rows(line, rises), 0.0, width[rises])
-    return place, doubt | (above[0] & (changes > 0))
+    if (rows := _chosen((changes == 1) & above[-1])) is not None:
+        place[rows] = refined_columns(_rows(line, rows), 0.0, width[rows])
+    return place, is_near | (changes + above[0] > 1)
+
+
+def _signs(b: Sequence[Number]) -> tuple[list[Flags], NDArray[np.int8]]:
+    # which Bernstein coefficients are above 0, and how often that changes
+    above = [np.greater(c, 0.0) for c in b]
+    return above, sum((u != v).astype(np.int8) for u, v in pairwise(above))
 
 
 def _reach(
     angle: Polynomial, goal: Floats, width: Floats, place: Floats, which: Flags
 ) -> None:
     # set some places to where a growing angle reaches a goal
-    if (rows := np.flatnonzero(which)).size:
+    if (rows := _chosen(which)) is not None:
         first, *others = _rows(angle, rows)
         line = [first - goal[rows], *others]
-        place[rows] = np.where(
-            line[0] >= 0.0, 0.0, refined_columns(line, 0.0, width[rows])
-        )
+        root = refined_columns(line, 0.0, width[rows])
+        place[rows] = np.where(line[0] >= 0.0, 0.0, root)
 
 
 def _turning(torque: Polynomial, length: Floats) -> Floats:
     # the largest value at the inner maxima of polynomials; -inf without one
     falls = [-c for c in derivative(torque)]
-    b = np.array(np.broadcast_arrays(*bernstein(falls, length)))
-    above = b > 0.0
-    changes = (above[1:] != above[:-1]).sum(axis=0)
+    above, changes = _signs(bernstein(falls, length))
     largest = np.full(length.shape, -math.inf)
-    rows = np.flatnonzero((changes == 1) & above[-1])  # rises, then falls
-    if rows.size:
+    rows = _chosen((changes == 1) & above[-1])  # rises, then falls
+    if rows is not None:
         x = refined_columns(_rows(falls, rows), 0.0, length[rows])
         largest[rows] = value(_rows(torque, rows), x)
     for i in np.flatnonzero(changes > 1).tolist():

@@ -345,7 +345,8 @@ def segments(p: ElbowParameters, motion: Motion, line: Timeline) -> list[TorqueS
                 TorqueSegment(fallen, end, residual),
             ]
         else:
-            law = _law.post_catch(p, stretch.pre_end, stretch.rise, state.angle, rest)
+            level = residual.level
+            law = _law.post_catch(p, level, stretch.pre_end, state.angle, rest)
             laid.append(TorqueSegment(start, end, law))
     return [segment for segment in laid if segment.end > segment.start]
 

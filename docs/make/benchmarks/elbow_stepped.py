@@ -48,7 +48,7 @@ def places(kind: str, m: Mapping[str, Floats]) -> tuple[Floats, Places]:
 def step_together(
     p: Mapping[str, Column], start: Floats, duration: Floats, at: Places, rate_hz: float
 ) -> dict[str, Floats]:
-    """Events and peak torque of single stretches, as samples see them."""
+    """Events and peak torque of movements, as samples see them."""
     n, threshold = start.size, p["speed_threshold"]
     phase, is_armed, is_moving = np.zeros(n, int), np.ones(n, bool), np.zeros(n, bool)
     zeros = np.zeros((4, n))
@@ -61,6 +61,10 @@ def step_together(
         t = i / rate_hz
         angle, speed = at(t)
         goes_on = (t <= duration) & (angle <= p["range_end"])
+        # flexed faster than ν_th: the stretch is over, and the next may catch
+        is_flexed = (speed <= -threshold) & goes_on
+        phase = np.where(is_flexed, 0, phase)
+        is_armed, is_moving = is_armed | is_flexed, is_moving & ~is_flexed
         # pre-catch: onset, and the catch by (2) and (6)
         is_fast = (speed >= threshold) & goes_on
         in_pre = phase == 0
@@ -98,4 +102,6 @@ def step_together(
         after = residual + p["post_catch_stiffness"] * (angle - post_angle)  # (5)
         torque = np.where(phase == 0, torque, np.where(phase == 1, flat, after))
         peak = np.where(goes_on, np.maximum(peak, torque), peak)
-    return out | {"end": np.minimum(duration, t), "peak_torque": peak}
+    left = np.where(np.isnan(out["catch_end"]), duration, out["catch_end"])
+    out["peak_end"] = np.minimum(out["catch"] + p["peak_duration"], left)
+    return out | {"end": duration, "peak_torque": peak}
