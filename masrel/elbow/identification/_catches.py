@@ -222,9 +222,9 @@ def _hinge(
     return _left(whole, cross - total * h / count, h2 - h**2 / count)
 
 
-def _left(whole: _Floats, along: _Floats, spread: _Floats) -> _Floats:
-    usable = (spread > 0.0) & (along > 0.0)
-    return whole - np.where(usable, along**2 / np.where(usable, spread, 1.0), 0.0)
+def _left(whole: _Floats, along: _Floats, squares: _Floats) -> _Floats:
+    usable = (squares > 0.0) & (along > 0.0)
+    return whole - np.where(usable, along**2 / np.where(usable, squares, 1.0), 0.0)
 
 
 def _rise(torque: _Floats, pre_catch: _Floats, catch: int, end: int) -> float:
@@ -237,8 +237,8 @@ def _climb(sums: _Sums, angle: _Floats, low: int, end: int) -> float:
     h = np.maximum(angle[low:] - angle[end], 0.0)
     torque = np.append(np.diff(sums.torque[low : end + 1]), np.diff(sums.later[end:]))
     centred = h - h.mean()
-    spread = float(centred @ centred)
-    return float(h[-1]) * float(centred @ torque) / spread if spread else 0.0
+    squares = float(centred @ centred)
+    return float(h[-1]) * float(centred @ torque) / squares if squares else 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -347,7 +347,7 @@ class Trial:
 
 def slow_trial(stretch: Stretch, name: str) -> Trial:
     """Return a slow stretch as one pre-catch phase (section II.B)."""
-    unusable = stretch.missing | stretch.saturated
+    unusable = stretch.in_gap | stretch.saturated
     lost = int(unusable.sum())
     whole = filtered_part(stretch, unusable, (0, stretch.time.size), SLOW_WINDOW)
     remark = f"{lost} samples missing or saturated" if lost else ""
@@ -371,7 +371,7 @@ def fast_trial(
     arm = arm or Arm()
     nothing = part_of(stretch, slice(0, 0))
     onset, stop = _fast_part(stretch, constants.speed_threshold, window)
-    if stretch.missing[:stop].any():
+    if stretch.in_gap[:stop].any():
         why = "not used: a gap in the recording"
         return _trial(stretch, name, nothing, remark=why)
     changes = _changes(stretch, name, constants, law, arm, (onset, stop))

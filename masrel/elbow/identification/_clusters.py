@@ -63,7 +63,7 @@ def triangle(table: _Floats) -> _Floats:
     return np.asarray(np.linalg.qr(table, mode="r"), dtype=np.float64)
 
 
-def partial_out(table: _Floats, n_own: int) -> _Floats:
+def partial_out(table: _Floats, n_local: int) -> _Floats:
     """Return rows of a table without what its first `n_own` columns explain.
 
     Shape (n_columns - n_determined, n_columns - n_own): all that least squares see of a
@@ -74,16 +74,16 @@ def partial_out(table: _Floats, n_own: int) -> _Floats:
     if r.shape[0] < r.shape[1]:  # fewer rows than columns
         r = np.concatenate([r, np.zeros((r.shape[1] - r.shape[0], r.shape[1]))])
     explained = np.zeros(r.shape[0], dtype=np.bool_)
-    own = np.abs(np.diag(r)[:n_own]) > _RANK_TOLERANCE * size[:n_own]
-    explained[:n_own] = own
-    rest = r[~explained, n_own:]
+    local = np.abs(np.diag(r)[:n_local]) > _RANK_TOLERANCE * size[:n_local]
+    explained[:n_local] = local
+    rest = r[~explained, n_local:]
     # What is left of a column that they explain whole is rounding, and no witness.
     left = np.linalg.norm(rest, axis=0)
-    rest[:, left <= _RANK_TOLERANCE * size[n_own:]] = 0.0
+    rest[:, left <= _RANK_TOLERANCE * size[n_local:]] = 0.0
     return np.asarray(rest)
 
 
-def solve(trials: Sequence[Rows], *, n_own: int = 0) -> ClusteredFit:
+def solve(trials: Sequence[Rows], *, n_local: int = 0) -> ClusteredFit:
     """Fit the shared parameters by least squares.
 
     `n_own` counts the parameters that were taken out of all trials together.
@@ -120,7 +120,7 @@ def solve(trials: Sequence[Rows], *, n_own: int = 0) -> ClusteredFit:
         block, degrees = _robust(used, errors, inverse)
         covariance[np.ix_(keep, keep)], df[keep] = block, degrees
     squares = sum(float(e @ e) for e in errors)
-    spare = n_rows - n_own - int(keep.sum())
+    spare = n_rows - n_local - int(keep.sum())
     return ClusteredFit(
         values=values,
         covariance=covariance,

@@ -85,11 +85,11 @@ class Equations:
         self.time = np.concatenate([part.time for part in parts])
         self._middle = float(self.time.mean()) if self.time.size else 0.0
         self._curved = known.arm.takes_time
-        self.own = self._own_names()
+        self.local = self._local_names()
         self._static = None if self._curved else self._columns({}, {})
         self._compact = self._compressed() if self._static else None
 
-    def _own_names(self) -> tuple[str, ...]:
+    def _local_names(self) -> tuple[str, ...]:
         names = ["offset"] if self.known.offset is None else []
         names += ["drift"] if self.known.drifts else []
         catch, after = self.catch, self.trial.after
@@ -116,7 +116,9 @@ class Equations:
     def _in_peak(self, after: Part, catch: Catch) -> NDArray[np.bool_]:
         return np.asarray(after.time < self._peak_end(catch))
 
-    def _columns(self, now: Mapping[str, float], own: Mapping[str, float]) -> _Columns:
+    def _columns(
+        self, now: Mapping[str, float], local: Mapping[str, float]
+    ) -> _Columns:
         arm = self.known.arm
         lag = now.get("lag", arm.lag)
         rise = now.get("catch_rise", arm.catch_rise)
@@ -126,7 +128,7 @@ class Equations:
         if catch is None or after is None:
             return _Columns(before | {"peak": zero}, zero, zero - math.inf)
         later, held, past = self._from_catch(
-            after, catch, lag, rise, own.get("shift", 0.0)
+            after, catch, lag, rise, local.get("shift", 0.0)
         )
         linear = {name: np.concatenate([before[name], later[name]]) for name in before}
         linear["peak"] = np.concatenate([zero, later["peak"]])
@@ -220,7 +222,7 @@ class Equations:
     def start(self, shared: Mapping[str, float]) -> _Floats:
         """Return where to begin with the trial's own: (3), and what was seen."""
         catch = self.catch
-        values = dict.fromkeys(self.own, 0.0)
+        values = dict.fromkeys(self.local, 0.0)
         if catch is not None:
             peak = shared["catch_torque_constant"] * catch.speed
             residual = peak * shared["residual_ratio"]
@@ -229,15 +231,15 @@ class Equations:
                 "residual": residual if math.isfinite(residual) else 0.0,
                 "travel": catch.travel,
             }
-        return np.array([values[name] for name in self.own])
+        return np.array([values[name] for name in self.local])
 
-    def table(self, shared: _Floats, own: _Floats, *, whole: bool = False) -> _Floats:
+    def table(self, shared: _Floats, local: _Floats, *, whole: bool = False) -> _Floats:
         """Return the columns [own | shared | residuals], over their spreads.
 
         Of all samples if `whole`, else of what least squares see of them.
         """
         now = dict(zip(self.known.names, shared.tolist(), strict=True))
-        mine = dict(zip(self.own, own.tolist(), strict=True))
+        mine = dict(zip(self.local, local.tolist(), strict=True))
         by_name, law, torque = self._torque_rows(now, mine, whole)
         rows = self.catch_rows(now, mine).values()
         zeros = np.zeros(law.size)
@@ -247,7 +249,7 @@ class Equations:
                 by_name.get(name, zeros) / sd,
                 [slopes.get(name, 0.0) for _, slopes in rows],
             )
-            for name in (*self.own, *self.known.names)
+            for name in (*self.local, *self.known.names)
         ]
         left = np.append((law - torque) / sd, [value for value, _ in rows])
         return np.column_stack([*columns, left])
@@ -266,10 +268,10 @@ class Equations:
         for name in (n for n in _CURVED if n in now or n in mine):
             laws = []
             for step in (_STEP, -_STEP):
-                near, own = {**now}, {**mine}
-                (near if name in near else own)[name] += step
+                near, local = {**now}, {**mine}
+                (near if name in near else local)[name] += step
                 laws.append(
-                    self._evaluate(self._columns(near, own), ones, near, own)[1]
+                    self._evaluate(self._columns(near, local), ones, near, local)[1]
                 )
             by_name[name] = (laws[0] - laws[1]) / (2.0 * _STEP)
         return by_name, law, torque
@@ -343,14 +345,14 @@ class Equations:
         names, limit = self.known.names, self.known.limit
         if limit is not None and "catch_travel" in names:
             place = names.index("catch_travel")
-            spread = self.known.spreads.travel
-            _, slope, root = beyond(float(shared[place]), limit, spread)
+            scale = self.known.spreads.travel
+            _, slope, root = beyond(float(shared[place]), limit, scale)
             # the last row: as steep as the likelihood is curved, and of equal score
             if slope != 0.0:
                 table = table.copy()
                 table[-1, -1] *= slope / -root
                 table[-1, :-1] *= -root / slope
-        rest = partial_out(table, len(self.own))
+        rest = partial_out(table, len(self.local))
         return Rows(design=rest[:, :-1], target=-rest[:, -1])
 
     def law_at(self, now: Mapping[str, float], mine: Mapping[str, float]) -> _Floats:
@@ -358,10 +360,10 @@ class Equations:
         ones = np.ones(self.torque.size)
         return self._evaluate(self._columns(now, mine), ones, now, mine)[1]
 
-    def law(self, shared: _Floats, own: _Floats) -> _Floats:
+    def law(self, shared: _Floats, local: _Floats) -> _Floats:
         """Return the torque of the law at the trial's samples, N·m."""
         now = dict(zip(self.known.names, shared.tolist(), strict=True))
-        return self.law_at(now, dict(zip(self.own, own.tolist(), strict=True)))
+        return self.law_at(now, dict(zip(self.local, local.tolist(), strict=True)))
 
 
 def _risen(since: _Floats, rise: float) -> _Floats:

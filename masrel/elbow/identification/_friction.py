@@ -58,7 +58,7 @@ def _find_strokes(samples: Samples) -> list[_Moved]:
     )
     time = samples.time[margin:-margin]
     unusable = np.convolve(
-        samples.missing | samples.saturated, np.ones(2 * margin + 1), mode="valid"
+        samples.in_gap | samples.saturated, np.ones(2 * margin + 1), mode="valid"
     )
     # sgn of (7) is one number within the window of the filter, or it is not used
     direction = np.where(np.abs(velocity) > _MOVING, np.sign(velocity), 0.0)
@@ -146,7 +146,7 @@ def fit_friction(
     ]
     parts = _parts(movements)
     rows = _rows(parts)
-    fit = solve(rows, n_own=len(movements))
+    fit = solve(rows, n_local=len(movements))
     estimates = fitted(_NAMES, fit, level)
     _warn_of_negative(estimates)
     strokes = _fitted_strokes(parts, rows, fit.values)

@@ -394,11 +394,11 @@ def _rounds(
 def _starts(options: _Options, arm: Arm) -> list[Arm]:
     # the sum of squares has a valley for each of several lags and rises
     timed = [name for name in _STARTS if name in options.fitted]
-    times: list[dict[str, Any]] = [
+    starts: list[dict[str, Any]] = [
         dict(zip(timed, each, strict=True))
         for each in product(*(_STARTS[name] for name in timed))
     ]
-    return [replace(arm, **each) for each in times]
+    return [replace(arm, **each) for each in starts]
 
 
 def _round(
@@ -428,7 +428,7 @@ def _round(
 def _is_settled(made: _Fitted) -> bool:
     # no catch moves by more than a sample
     period = _floor("catch_rise", made.equations) / _FLOORS["catch_rise"]
-    return all(abs(own.get("shift", 0.0)) < period for own in _own(made))
+    return all(abs(local.get("shift", 0.0)) < period for local in _local(made))
 
 
 def _no_time(made: _Fitted) -> dict[str, str]:
@@ -551,11 +551,11 @@ def _start(steps: Sequence[Step], options: _Options, arm: Arm) -> dict[str, floa
     return start
 
 
-def _own(made: _Fitted) -> list[dict[str, float]]:
+def _local(made: _Fitted) -> list[dict[str, float]]:
     # each trial's own parameters, by name
     return [
-        dict(zip(e.own, values.tolist(), strict=True))
-        for e, values in zip(made.equations, made.solution.own, strict=True)
+        dict(zip(e.local, values.tolist(), strict=True))
+        for e, values in zip(made.equations, made.solution.local, strict=True)
     ]
 
 
@@ -564,9 +564,9 @@ def _next(law: PreCatchLaw, made: _Fitted) -> tuple[PreCatchLaw, Arm]:
     names = made.equations[0].known.names
     values = dict(zip(names, made.solution.shared.tolist(), strict=True))
     drifts = {
-        trial.name: own["drift"]
-        for trial, own in zip(made.trials, _own(made), strict=True)
-        if "drift" in own
+        trial.name: local["drift"]
+        for trial, local in zip(made.trials, _local(made), strict=True)
+        if "drift" in local
     }
     of_arm: dict[str, Any] = {n: values[n] for n in ARM_QUANTITIES if n in values}
     of_law = {n: values[n] for n in _ALWAYS if n in values}
@@ -576,9 +576,9 @@ def _next(law: PreCatchLaw, made: _Fitted) -> tuple[PreCatchLaw, Arm]:
 def _instants(made: _Fitted) -> dict[str, float]:
     # where the fit has each catch begin
     return {
-        trial.name: trial.catch.time + own["shift"]
-        for trial, own in zip(made.trials, _own(made), strict=True)
-        if trial.catch is not None and "shift" in own
+        trial.name: trial.catch.time + local["shift"]
+        for trial, local in zip(made.trials, _local(made), strict=True)
+        if trial.catch is not None and "shift" in local
     }
 
 
@@ -629,7 +629,7 @@ def _catch_steps(
 
 
 def _spreads(steps: Sequence[Step]) -> Spreads:
-    def spread(name: str) -> float:
+    def size_of(name: str) -> float:
         for step in steps:
             if any(estimate.name == name for estimate in step.estimates):
                 # of one trial, or of none that differ, any size serves
@@ -637,11 +637,11 @@ def _spreads(steps: Sequence[Step]) -> Spreads:
         return 1.0
 
     return Spreads(
-        torque=spread("damping"),
-        peak=spread("catch_torque_constant"),
-        residual=spread("residual_ratio"),
-        catch_angle=spread("catch_slope"),
-        travel=spread("catch_travel"),
+        torque=size_of("damping"),
+        peak=size_of("catch_torque_constant"),
+        residual=size_of("residual_ratio"),
+        catch_angle=size_of("catch_slope"),
+        travel=size_of("catch_travel"),
     )
 
 
@@ -665,7 +665,7 @@ def _result(
     reasons = {**_reasons(steps, made.fast, options), **no_time}
     estimates = _all_estimates(joint, made, reasons, options)
     _check_ratio(estimates)
-    own = _own(made)
+    local = _local(made)
     return ElbowFit(
         estimates=estimates,
         correlation=_correlation(joint, estimates),
@@ -678,8 +678,8 @@ def _result(
         fitted_torque=joint.fitted_torque,
         constants=options.constants,
         arm=dict(options.terms) | {"gravity_angle": options.gravity_angle},
-        offsets=tuple(each.get("offset", options.offset or 0.0) for each in own),
-        drifts=tuple(each.get("drift", options.arm().drift) for each in own),
+        offsets=tuple(each.get("offset", options.offset or 0.0) for each in local),
+        drifts=tuple(each.get("drift", options.arm().drift) for each in local),
         n_evaluations=joint.n_evaluations,
         level=options.level,
         simulated=any(movement.simulated for movement in material.movements),

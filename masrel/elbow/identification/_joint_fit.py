@@ -52,7 +52,7 @@ class Solution:
     """Where the sum of squares is smallest: shared parameters, and each trial's own."""
 
     shared: _Floats
-    own: list[_Floats]
+    local: list[_Floats]
     typical: float  # median over catches of the mean square that is left, (N·m)²
     n_evaluations: int
 
@@ -70,9 +70,9 @@ def fit_together(
     """
     names = equations[0].known.names
     shared = np.array([start[name] for name in names])
-    own = [e.start(start) for e in equations]
+    local = [e.start(start) for e in equations]
     bound = np.array([floors.get(name, -math.inf) for name in names])
-    tables = _tables(equations, shared, own)
+    tables = _tables(equations, shared, local)
     squares, n_evaluations = _squares(tables), 1
     precise = _TIMED if equations[0].known.arm.takes_time else _PRECISE
     while n_evaluations < _EVALUATIONS:
@@ -81,7 +81,7 @@ def fit_together(
         while n_evaluations < _EVALUATIONS:
             trial = (
                 np.maximum(shared + share * steps[0], bound),
-                [x + share * step for x, step in zip(own, steps[1], strict=True)],
+                [x + share * step for x, step in zip(local, steps[1], strict=True)],
             )
             tried = _tables(equations, *trial)
             best, n_evaluations = _squares(tried), n_evaluations + 1
@@ -91,23 +91,24 @@ def fit_together(
         if not best <= squares:
             break
         fall, squares = squares - best, best
-        (shared, own), tables = trial, tried
+        (shared, local), tables = trial, tried
         if fall <= precise * squares:
             break
     left = [
         float(((e.measured - e.law(shared, x)) ** 2).mean())
-        for e, x in zip(equations, own, strict=True)
+        for e, x in zip(equations, local, strict=True)
         if e.catch is not None
     ]
     typical = float(np.median(left)) if left else math.nan
-    return Solution(shared, own, typical, n_evaluations)
+    return Solution(shared, local, typical, n_evaluations)
 
 
 def _tables(
-    equations: Sequence[Equations], shared: _Floats, own: Sequence[_Floats]
+    equations: Sequence[Equations], shared: _Floats, local: Sequence[_Floats]
 ) -> list[_Floats]:
     return [
-        triangle(e.table(shared, mine)) for e, mine in zip(equations, own, strict=True)
+        triangle(e.table(shared, mine))
+        for e, mine in zip(equations, local, strict=True)
     ]
 
 
@@ -120,37 +121,37 @@ def _step(
 ) -> tuple[_Floats, list[_Floats]]:
     # each trial's own parameters are eliminated first, and follow from the shared ones
     rest = np.concatenate(
-        [partial_out(t, len(e.own)) for e, t in zip(equations, tables, strict=True)]
+        [partial_out(t, len(e.local)) for e, t in zip(equations, tables, strict=True)]
     )
     size = np.linalg.norm(rest[:, :-1], axis=0)
     size[size == 0.0] = 1.0
     reduced = triangle(np.column_stack([rest[:, :-1] / size, rest[:, -1]]))
     shared = np.linalg.lstsq(reduced[:, :-1], -reduced[:, -1], rcond=1e-12)[0] / size
-    own = []
+    local = []
     for e, table in zip(equations, tables, strict=True):
-        n = len(e.own)
+        n = len(e.local)
         left = table[:, -1] + table[:, n : n + n_shared] @ shared
-        own.append(np.linalg.lstsq(table[:, :n], -left, rcond=1e-12)[0])
-    return shared, own
+        local.append(np.linalg.lstsq(table[:, :n], -left, rcond=1e-12)[0])
+    return shared, local
 
 
 def joint_fit(
     equations: Sequence[Equations], solution: Solution, rest_sd: float
 ) -> JointFit:
     """Return what a solution says of the parameters, and leaves over."""
-    shared, own = solution.shared, solution.own
+    shared, local = solution.shared, solution.local
     names = equations[0].known.names
     tables = [
         e.table(shared, mine, whole=True)
-        for e, mine in zip(equations, own, strict=True)
+        for e, mine in zip(equations, local, strict=True)
     ]
     rows = [e.rows(shared, t) for e, t in zip(equations, tables, strict=True)]
-    laws = tuple(e.law(shared, mine) for e, mine in zip(equations, own, strict=True))
+    laws = tuple(e.law(shared, mine) for e, mine in zip(equations, local, strict=True))
     squares = sum(
         float(((e.measured - law) ** 2).sum())
         for e, law in zip(equations, laws, strict=True)
     )
-    n_own = sum(mine.size for mine in own)
+    n_local = sum(mine.size for mine in local)
     count = sum(e.measured.size for e in equations)
     step = solve(rows)
     # what no trial determines is nan in the step and stays so
@@ -159,8 +160,8 @@ def joint_fit(
         names=names,
         fit=replace(step, values=values),
         fitted_torque=laws,
-        torque_sd=math.sqrt(squares / max(count - n_own - len(names), 1)),
-        lack_of_fit=lack_of_fit(equations, shared, own, tables, laws, rest_sd),
+        torque_sd=math.sqrt(squares / max(count - n_local - len(names), 1)),
+        lack_of_fit=lack_of_fit(equations, shared, local, tables, laws, rest_sd),
         cross_validation=_left_out(equations, solution, rows, tables, laws),
         n_evaluations=solution.n_evaluations,
     )
@@ -178,22 +179,22 @@ def _left_out(
     # its drift is the others' mean, or a drift would better every fit.
     drifts = np.array(
         [
-            own[e.own.index("drift")] if "drift" in e.own else 0.0
-            for e, own in zip(equations, solution.own, strict=True)
+            local[e.local.index("drift")] if "drift" in e.local else 0.0
+            for e, local in zip(equations, solution.local, strict=True)
         ]
     )
     made = []
     for i, (e, step) in enumerate(zip(equations, left_out_steps(rows), strict=True)):
-        table, law, n = tables[i], laws[i], len(e.own)
+        table, law, n = tables[i], laws[i], len(e.local)
         r = triangle(table)
-        own = np.zeros(n)
-        if "drift" in e.own and drifts.size > 1:
+        local = np.zeros(n)
+        if "drift" in e.local and drifts.size > 1:
             others = (drifts.sum() - drifts[i]) / (drifts.size - 1)
-            own[e.own.index("drift")] = others - drifts[i]
-        left = r[:, -1] + r[:, n:-1] @ np.nan_to_num(step) + r[:, :n] @ own
-        free = [j for j, name in enumerate(e.own) if name != "drift"]
-        own[free] = np.linalg.lstsq(r[:, free], -left, rcond=1e-12)[0]
-        columns = table[: law.size, :-1] * np.concatenate([own, step])
+            local[e.local.index("drift")] = others - drifts[i]
+        left = r[:, -1] + r[:, n:-1] @ np.nan_to_num(step) + r[:, :n] @ local
+        free = [j for j, name in enumerate(e.local) if name != "drift"]
+        local[free] = np.linalg.lstsq(r[:, free], -left, rcond=1e-12)[0]
+        columns = table[: law.size, :-1] * np.concatenate([local, step])
         error = e.measured - law - e.known.spreads.torque * columns.sum(axis=1)
         made.append(float((error**2).mean()) if error.size else math.nan)
     return np.array(made)

@@ -150,7 +150,7 @@ class LackOfFit:
 def lack_of_fit(
     equations: Sequence[Equations],
     shared: _Floats,
-    own: Sequence[_Floats],
+    local: Sequence[_Floats],
     tables: Sequence[_Floats],
     laws: Sequence[_Floats],
     rest_sd: float,
@@ -159,20 +159,18 @@ def lack_of_fit(
 
     `tables` are the equations' whole ones, `laws` their torques.
     """
-    missing = [
-        _missing(e, shared, mine) for e, mine in zip(equations, own, strict=True)
-    ]
+    added = [_added(e, shared, mine) for e, mine in zip(equations, local, strict=True)]
     # of catches that outlast their stretch, those that end are the short ones
     unended = any(e.catch is not None and e.catch.end is None for e in equations)
     names = [
         name
         for name in STRUCTURES
-        if any(name in each for each in missing)
+        if any(name in each for each in added)
         and not (unended and name in ("travel", "bent climb"))
     ]
     reduced = [
         _reduced(e, table, columns, names)
-        for e, table, columns in zip(equations, tables, missing, strict=True)
+        for e, table, columns in zip(equations, tables, added, strict=True)
     ]
     tests = _holm([t for i, name in enumerate(names) if (t := _test(i, name, reduced))])
     phases = _phases(equations, laws)
@@ -214,8 +212,8 @@ def _reduced(
     # rows of [shared | residuals | added], and how many columns are not added
     zeros = np.zeros(table.shape[0])
     added = [columns.get(name, zeros) for name in names]
-    n_own = len(e.own)
-    return partial_out(np.column_stack([table, *added]), n_own), table.shape[1] - n_own
+    rest = partial_out(np.column_stack([table, *added]), len(e.local))
+    return rest, table.shape[1] - len(e.local)
 
 
 def _test(
@@ -251,10 +249,10 @@ def _holm(tests: Sequence[StructureTest]) -> tuple[StructureTest, ...]:
     return tuple(adjusted)
 
 
-def _missing(e: Equations, shared: _Floats, own: _Floats) -> dict[str, _Floats]:
+def _added(e: Equations, shared: _Floats, local: _Floats) -> dict[str, _Floats]:
     # columns of what the law has not, over the rows of the whole table
     now = dict(zip(e.known.names, shared.tolist(), strict=True))
-    mine = dict(zip(e.own, own.tolist(), strict=True))
+    mine = dict(zip(e.local, local.tolist(), strict=True))
     rows = list(e.catch_rows(now, mine))
     columns = {
         name: np.append(column / e.known.spreads.torque, np.zeros(len(rows)))

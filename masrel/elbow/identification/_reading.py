@@ -131,21 +131,21 @@ def _check_time(name: str, time: _Floats) -> None:
 def _check_sizes(name: str, angle: _Floats, torque: _Floats) -> None:
     low, high = math.degrees(angle.min()), math.degrees(angle.max())
     largest = float(np.abs(torque).max())
-    said = f"{name}: got angles from {low:.4g} to {high:.4g} degrees and torques "
-    said += f"to {largest:.4g} N·m"
+    message = f"{name}: got angles from {low:.4g} to {high:.4g} degrees and torques "
+    message += f"to {largest:.4g} N·m"
     if largest > _MAX_TORQUE:
         if high - low < math.degrees(MIN_TRAVEL) or largest < 180.0:
             raise RecordingError(
-                f"{said}; are the columns of angle and torque swapped?"
+                f"{message}; are the columns of angle and torque swapped?"
             )
-        raise RecordingError(f"{said}; is the unit of torque right?")
+        raise RecordingError(f"{message}; is the unit of torque right?")
     if angle.min() < _ANGLE_RANGE[0] or angle.max() > _ANGLE_RANGE[1]:
-        raise RecordingError(f"{said}; is the unit of the angle right?")
+        raise RecordingError(f"{message}; is the unit of the angle right?")
     if angle.max() - angle.min() < MIN_TRAVEL:
         needed = math.degrees(MIN_TRAVEL)
         raise RecordingError(
-            f"{said}; a stretch travels {needed:g} degrees or more. Is the unit of the "
-            "angle right, and is its column not the torque's?"
+            f"{message}; a stretch travels {needed:g} degrees or more. Is the unit of "
+            "the angle right, and is its column not the torque's?"
         )
 
 
@@ -200,18 +200,18 @@ def find_columns(
     """Find the columns of time, angle, torque and, if there is one, velocity."""
     columns, units = dict(columns or {}), dict(units or {})
     _check_options(columns, units)
-    found = {}
+    result = {}
     for quantity in UNITS:
         column = _find(names, quantity, source, columns.get(quantity), units)
         if column is not None:
-            found[quantity] = column
+            result[quantity] = column
         elif quantity not in _OPTIONAL:
             forms = [f"{quantity}_{unit}" for unit in UNITS[quantity]]
             raise RecordingError(
                 f"{source}: needs a column of {quantity}: {', '.join(forms)}, or its "
                 f"name given; got {', '.join(names) or 'no columns'}"
             )
-    return found
+    return result
 
 
 def _check_options(columns: Mapping[str, str], units: Mapping[str, str]) -> None:
@@ -232,15 +232,15 @@ def _find(
     names: Sequence[str],
     quantity: str,
     source: str,
-    given: str | None,
+    declared: str | None,
     units: Mapping[str, str],
 ) -> Column | None:
-    if given is not None:
-        if given not in names:
+    if declared is not None:
+        if declared not in names:
             raise RecordingError(
-                f"{source}: needs the column {given!r}, got {', '.join(names)}"
+                f"{source}: needs the column {declared!r}, got {', '.join(names)}"
             )
-        fitting = [given]
+        fitting = [declared]
     else:
         forms = {quantity, *(f"{quantity}_{unit}" for unit in UNITS[quantity])}
         fitting = [name for name in names if name.strip().lower() in forms]
@@ -253,14 +253,15 @@ def _find(
     return _with_unit(fitting[0], quantity, source, units.get(quantity))
 
 
-def _with_unit(name: str, quantity: str, source: str, asked: str | None) -> Column:
+def _with_unit(name: str, quantity: str, source: str, requested: str | None) -> Column:
     suffix = name.strip().lower().removeprefix(f"{quantity}_")
-    said = suffix if suffix in UNITS[quantity] else None
-    if said is not None and asked is not None and said != asked:
+    named = suffix if suffix in UNITS[quantity] else None
+    if named is not None and requested is not None and named != requested:
         raise RecordingError(
-            f"{source}: column {name} says {said}, units says {asked} for {quantity}"
+            f"{source}: column {name} says {named}, units says {requested} for "
+            f"{quantity}"
         )
-    unit = said or asked
+    unit = named or requested
     if unit is None:
         raise RecordingError(
             f"{source}: column {name} has no unit: name it "
@@ -324,9 +325,9 @@ def read_archive(path: Path) -> Table:
             f"{path}: not an archive of columns (one array without a name)"
         ) from error
     if set(arrays) == set(RECORDING_COLUMNS) and path.with_suffix(".json").is_file():
-        own = read_recording(path)  # holds it to its checksum
-        simulated = own.facts.get("simulated") is True
-        return _Archive(path=path, arrays=dict(own.columns), simulated=simulated)
+        local = read_recording(path)  # holds it to its checksum
+        simulated = local.facts.get("simulated") is True
+        return _Archive(path=path, arrays=dict(local.columns), simulated=simulated)
     simulated = bool(np.any(arrays.pop("simulated", False)))
     return _Archive(path=path, arrays=arrays, simulated=simulated)
 
@@ -471,16 +472,16 @@ def read_movement(
     if set(table.names) == set(RECORDING_COLUMNS):
         columns = {"torque": _OWN_TORQUE, **(columns or {})}
         units = {"torque": "nm", **(units or {})}
-    found = find_columns(table.names, source=str(path), columns=columns, units=units)
-    values = {key: table.column(column.name) for key, column in found.items()}
-    _check_lengths(path, {found[key].name: values[key] for key in values})
+    result = find_columns(table.names, source=str(path), columns=columns, units=units)
+    values = {key: table.column(column.name) for key, column in result.items()}
+    _check_lengths(path, {result[key].name: values[key] for key in values})
     whole = np.isfinite(np.stack(list(values.values()))).all(axis=0)
     if not whole.all():
-        empty = {found[key].name: int(np.isnan(values[key]).sum()) for key in values}
+        empty = {result[key].name: int(np.isnan(values[key]).sum()) for key in values}
         warnings.warn(
             _left_out(path, int((~whole).sum()), empty), RecordingWarning, stacklevel=2
         )
-    si = {key: values[key][whole] * found[key].factor for key in values}
+    si = {key: values[key][whole] * result[key].factor for key in values}
     return Movement(
         name=str(path),
         time=si["time"],
@@ -495,15 +496,15 @@ def read_movement(
 def _check_lengths(path: Path, columns: Mapping[str, NDArray[np.float64]]) -> None:
     sizes = {name: column.size for name, column in columns.items()}
     if len(set(sizes.values())) > 1:
-        said = ", ".join(f"{name} {size}" for name, size in sizes.items())
-        raise RecordingError(f"{path}: columns need one length, got {said}")
+        message = ", ".join(f"{name} {size}" for name, size in sizes.items())
+        raise RecordingError(f"{path}: columns need one length, got {message}")
 
 
 def _left_out(path: Path, n_rows: int, empty: Mapping[str, int]) -> str:
-    said = ", ".join(f"{name} {count}" for name, count in empty.items() if count)
+    message = ", ".join(f"{name} {count}" for name, count in empty.items() if count)
     rows = "1 row has" if n_rows == 1 else f"{n_rows} rows have"
     left = "is" if n_rows == 1 else "are"
-    return f"{path}: {rows} an empty cell ({said}) and {left} left out"
+    return f"{path}: {rows} an empty cell ({message}) and {left} left out"
 
 
 LONGEST_GAP = 0.02
@@ -522,7 +523,7 @@ class Samples:
     time: _Floats = field(compare=False, repr=False)
     angle: _Floats = field(compare=False, repr=False)
     torque: _Floats = field(compare=False, repr=False)
-    missing: NDArray[np.bool_] = field(compare=False, repr=False)
+    in_gap: NDArray[np.bool_] = field(compare=False, repr=False)
     saturated: NDArray[np.bool_] = field(compare=False, repr=False)
 
 
@@ -538,7 +539,7 @@ def even_samples(movement: Movement) -> Samples:
             time=time,
             angle=movement.angle,
             torque=movement.torque,
-            missing=np.zeros(time.size, dtype=np.bool_),
+            in_gap=np.zeros(time.size, dtype=np.bool_),
             saturated=movement.saturated,
         )
     even = time[0] + period * np.arange(int((time[-1] - time[0]) / period + 1e-9) + 1)
@@ -551,6 +552,6 @@ def even_samples(movement: Movement) -> Samples:
         time=even,
         angle=np.interp(even, time, movement.angle),
         torque=np.interp(even, time, movement.torque),
-        missing=inside & (steps[before] > max(LONGEST_GAP, 5.0 * period)),
+        in_gap=inside & (steps[before] > max(LONGEST_GAP, 5.0 * period)),
         saturated=cut[before] | (cut[before + 1] & inside),
     )

@@ -85,11 +85,11 @@ def fit_slow(
             "inertia": part.acceleration,
             "gravity": np.sin(part.angle - arm.gravity_angle),
         }
-        own = [np.ones(part.time.size)] if offset is None else []
-        own += [part.time - part.time.mean()] if "drift" in fitted_names else []
+        local = [np.ones(part.time.size)] if offset is None else []
+        local += [part.time - part.time.mean()] if "drift" in fitted_names else []
         target = part.torque - arm.torque(part, trial.name) - (offset or 0.0)
-        tables.append(np.column_stack([*own, *(columns[n] for n in names), target]))
-        owns.append(len(own))
+        tables.append(np.column_stack([*local, *(columns[n] for n in names), target]))
+        owns.append(len(local))
     left = [partial_out(table, n) for table, n in zip(tables, owns, strict=True)]
     fit = solve([Rows(design=r[:, :-1], target=r[:, -1]) for r in left])
     far, squares, size, count = _distance(trials, tables, owns, fit.values)

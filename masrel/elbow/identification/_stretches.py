@@ -146,9 +146,9 @@ class Stretch:
         return self.samples.torque[self.start : self.stop]
 
     @property
-    def missing(self) -> _Bools:
+    def in_gap(self) -> _Bools:
         """Return which samples are in a gap."""
-        return self.samples.missing[self.start : self.stop]
+        return self.samples.in_gap[self.start : self.stop]
 
     @property
     def saturated(self) -> _Bools:
@@ -198,7 +198,7 @@ def find_stretches(
 
 
 def _rest_noise(samples: Samples, velocity: _Floats) -> float:
-    still = (np.abs(velocity) < 0.5 * _MOVING) & ~samples.missing & ~samples.saturated
+    still = (np.abs(velocity) < 0.5 * _MOVING) & ~samples.in_gap & ~samples.saturated
     edges = np.flatnonzero(np.diff(still, prepend=False, append=False))
     squares, df = 0.0, 0
     for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):

@@ -99,32 +99,32 @@ class CensoredTravels:
 
     def log_likelihood(self, mean: float, sd: float) -> float:
         """Evaluate the log-likelihood of normal travels, without its constant."""
-        spread = (self.seen - mean) / sd
+        scaled = (self.seen - mean) / sd
         z, _ = self._beyond(mean, sd)
-        density = -0.5 * float(spread @ spread) - self.seen.size * math.log(sd)
+        density = -0.5 * float(scaled @ scaled) - self.seen.size * math.log(sd)
         return density + float(log_ndtr(z).sum())
 
     def score(self, mean: float, sd: float) -> tuple[float, float]:
         """Differentiate the log-likelihood."""
-        spread = (self.seen - mean) / sd
+        scaled = (self.seen - mean) / sd
         z, size = self._beyond(mean, sd)
         ratio = mills(z)
-        by_mean = float(spread.sum()) / sd + float((ratio / size).sum())
-        by_sd = (float(spread @ spread) - spread.size) / sd
+        by_mean = float(scaled.sum()) / sd + float((ratio / size).sum())
+        by_sd = (float(scaled @ scaled) - scaled.size) / sd
         return by_mean, by_sd - float((ratio * z * sd / size**2).sum())
 
     def information(self, mean: float, sd: float) -> _Floats:
         """Give minus the second derivatives of the log-likelihood."""
-        spread = (self.seen - mean) / sd
+        scaled = (self.seen - mean) / sd
         z, size = self._beyond(mean, sd)
         ratio = mills(z)
         curve = ratio * (z + ratio)  # -d²/dz² ln Φ
         turn = -z * sd / size**2  # dz/dsd
         turn2 = z * (3.0 * sd**2 - size**2) / size**4  # d²z/dsd²
-        by_mean = spread.size / sd**2 + float((curve / size**2).sum())
-        both = 2.0 * float(spread.sum()) / sd**2
+        by_mean = scaled.size / sd**2 + float((curve / size**2).sum())
+        both = 2.0 * float(scaled.sum()) / sd**2
         both += float((curve * turn / size + ratio * sd / size**3).sum())
-        by_sd = (3.0 * float(spread @ spread) - spread.size) / sd**2
+        by_sd = (3.0 * float(scaled @ scaled) - scaled.size) / sd**2
         by_sd += float((curve * turn**2 - ratio * turn2).sum())
         return np.array([[by_mean, both], [both, by_sd]])
 

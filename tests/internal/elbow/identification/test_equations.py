@@ -46,7 +46,7 @@ def caught(
 
 def jacobian_holds(equations: Equations, shared: np.ndarray, own: np.ndarray) -> None:
     """Columns of the table are the derivatives of its last one."""
-    n, names = shared.size, (*equations.own, *equations.known.names)
+    n, names = shared.size, (*equations.local, *equations.known.names)
     table = equations.table(shared, own, whole=True)
     whole = np.concatenate([own, shared])
     for place, name in enumerate(names):
@@ -82,7 +82,7 @@ def test_derivatives_are_those_of_the_residuals(
     )
     equations = Equations(caught(joint, speed), known)
     additive_end = post_catch == "additive" and model == "HM3"
-    assert len(equations.own) == own - additive_end
+    assert len(equations.local) == own - additive_end
     shared = np.array([getattr(joint, name) for name in NAMES])
     mine = equations.start(dict(zip(NAMES, shared.tolist(), strict=True)))
     jacobian_holds(equations, shared, mine)
@@ -174,8 +174,8 @@ def test_a_censored_travel_adds_one_row_of_d_alone() -> None:
     np.testing.assert_array_equal(table[:-1], plain.table(shared, mine, whole=True))
     left, slope, root = beyond(joint.catch_travel, behind, SPREADS.travel)
     place = NAMES.index("catch_travel")
-    expected = np.zeros(len(censored.own) + len(NAMES) + 1)
-    expected[len(censored.own) + place] = slope
+    expected = np.zeros(len(censored.local) + len(NAMES) + 1)
+    expected[len(censored.local) + place] = slope
     expected[-1] = left
     np.testing.assert_array_equal(table[-1], expected)
     # linear rows: the same score, and as much information as the likelihood is curved
