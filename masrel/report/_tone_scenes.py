@@ -97,8 +97,8 @@ def tone_document(
         late = [time for time in times if not 0.0 <= time <= motion.duration]
         if late:
             raise ParameterError(
-                f"--at-s: needs times within the motion, 0 to {motion.duration:g} s, "
-                f"got {late[0]:g}"
+                "--at-s: needs times within the motion, 0 to "
+                f"{significant(motion.duration)} s, got {significant(late[0])}"
             )
         values = joint.torque(motion, list(times)).tolist()
         document["torque_at_s"] = _torques("time_s", times, values)

@@ -22,6 +22,9 @@ from masrel.run._settings import (
 FIELDS = {
     "torque_limit_nm": ("torque", 1.0),
     "torque_rate_limit_nm_s": ("torque_rate", 1.0),
+    "active_torque_limit_nm": ("active_torque", 1.0),
+    "active_energy_limit_j": ("active_energy", 1.0),
+    "active_speed_limit_deg_s": ("active_speed", radians(1.0)),
     "speed_limit_deg_s": ("speed", radians(1.0)),
     "lowest_angle_deg": ("lowest_angle", radians(1.0)),
     "highest_angle_deg": ("highest_angle", radians(1.0)),
