@@ -58,7 +58,7 @@ def errors(
         largest = max(abs(term) for of_time in terms for term in of_time)
         found_torque = torque(joint, motion, times).tolist()
         apart = max(
-            abs(mpf(value) - sum(of_time)) - steep * mpf(ulp(found.end))
+            abs(mpf(value) - sum(of_time)) - steep * max(worst, mpf(ulp(found.end)))
             for value, of_time, steep in zip(
                 found_torque, terms, map(exact.steepness, times.tolist()), strict=True
             )

@@ -30,6 +30,8 @@ KINDS = (
     "recorded, linear",
 )
 
+N_SEEDS = 715  # of each kind, at the speeds of a study and at all others: 10 010
+
 Scene = tuple[ElbowParameters, Motion]
 
 
@@ -183,6 +185,31 @@ def corner_cases() -> dict[str, Scene]:
             [Hold(start=d(30), duration=1e5), reach(92.0)])),
         "ν_L above ν_H": (
             replace(hm3, smallest_catch_angle=d(100.0)), reach(92.0)),
+    }  # fmt: skip
+    at_threshold = ConstantSpeed(start=d(30), end=d(100), speed=hm3.speed_threshold)
+    fast = line(92.0, end=100.0)
+    cases |= {
+        "speed ν_th": (hm3, ConstantSpeed(
+            start=d(30), end=d(146), speed=hm3.speed_threshold)),
+        "peak speed ν_th": (
+            replace(hm3, speed_threshold=1.875),
+            MinimumJerk(start=0.5, end=2.5, mean_speed=1.0),
+        ),
+        "flexed at ν_th": (hm3, Joined([fast, Reversed(motion=at_threshold), fast])),
+        "stopped at the catch": (hm3, Joined(
+            [line(92.0, end=82.8), Hold(start=d(82.8), duration=1.0)])),
+        "catch at a joint": (hm3, Joined(
+            [line(92.0, end=82.8), line(92.0, start=82.8)])),
+        "stopped at the catch's end": (hm3, Joined(
+            [line(92.0, end=112.8), Hold(start=d(112.8), duration=1.0),
+             line(92.0, start=112.8)])),
+        "slowed at the catch": (hm3, Joined(
+            [line(92.0, end=82.8), line(19.0, start=82.8)])),
+        "catch's end and range end together": (
+            replace(hm3, range_end=d(112.8)), line(92.0)),
+        "reach to the end of range": (hm3, reach(92.0, end=146.0)),
+        "trapezoid to the end of range": (hm3, Trapezoid(
+            start=d(30), end=d(146), speed=d(92.0), acceleration_rate=d(600.0))),
     }  # fmt: skip
     whole = reach(92.0)
     for name, share in (

@@ -5,7 +5,7 @@ import pytest
 
 from masrel.elbow import ElbowParameters, Motion
 from tests.elbow.exactness import Errors, errors
-from tests.elbow.scenes import KINDS, corner_cases, random_scene
+from tests.elbow.scenes import KINDS, N_SEEDS, corner_cases, random_scene
 
 CORNERS = corner_cases()
 
@@ -25,20 +25,28 @@ def assert_exact(found: list[Errors]) -> None:
     assert any("post-catch" in one.phases for one in found)
 
 
-# Phases must be the same, times within 1e-11 s or 4 ulp of the duration, torques within
+# Phases must be the same, times within 1e-11 s or 1e-14 of the duration, torques within
 # 1e-12 of the largest term: `errors` and `holds` say so. The scenes are fixed by their
-# seeds: there is no false alarm.
+# seeds: there is no false alarm. Of the ten thousand of docs/accuracy.md a hundredth is
+# quick, a tenth slow.
 @pytest.mark.parametrize("wide", [False, True])
 @pytest.mark.parametrize("kind", KINDS)
 def test_random_scenes_are_exact(kind: str, wide: bool) -> None:
-    assert_exact(of_scenes(kind, wide=wide, seeds=range(1000, 1010)))
+    assert_exact(of_scenes(kind, wide=wide, seeds=range(0, N_SEEDS, 100)))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("wide", [False, True])
 @pytest.mark.parametrize("kind", KINDS)
-def test_thousands_of_random_scenes_are_exact(kind: str, wide: bool) -> None:
-    assert_exact(of_scenes(kind, wide=wide, seeds=range(250)))
+def test_a_thousand_random_scenes_are_exact(kind: str, wide: bool) -> None:
+    assert_exact(of_scenes(kind, wide=wide, seeds=range(0, N_SEEDS, 10)))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("wide", [False, True])
+@pytest.mark.parametrize("kind", KINDS)
+def test_ten_thousand_random_scenes_are_exact(kind: str, wide: bool) -> None:
+    assert_exact(of_scenes(kind, wide=wide, seeds=range(N_SEEDS)))
 
 
 @pytest.mark.parametrize("scene", CORNERS.values(), ids=CORNERS)
@@ -69,6 +77,19 @@ def test_corner_cases_are_exact(scene: tuple[ElbowParameters, Motion]) -> None:
             "reversed in post-catch",
             "pre-catch catch post-catch pre-catch catch post-catch pre-catch",
         ),
+        # exactly at a threshold, or two events at once
+        ("speed ν_th", "pre-catch"),
+        ("peak speed ν_th", "pre-catch"),
+        ("flexed at ν_th", "pre-catch catch pre-catch catch"),
+        ("mean speed ν_L", "pre-catch catch post-catch"),
+        ("mean speed ν_H", "pre-catch catch post-catch"),
+        ("catch and range end together", "pre-catch"),
+        ("catch end and end together", "pre-catch catch"),
+        ("catch's end and range end together", "pre-catch catch"),
+        ("stopped at the catch", "pre-catch"),
+        ("slowed at the catch", "pre-catch"),
+        ("catch at a joint", "pre-catch catch post-catch"),
+        ("stopped at the catch's end", "pre-catch catch post-catch"),
         # a rest does not end a catch, and one in post-catch does not arm the next
         ("interrupted in the peak", "pre-catch catch post-catch pre-catch"),
         ("interrupted in post-catch", "pre-catch catch post-catch pre-catch"),

@@ -16,11 +16,10 @@ from tqdm import tqdm
 
 from docs.make.accuracy import cells
 from tests.elbow.exactness import Errors, errors
-from tests.elbow.scenes import KINDS, corner_cases, random_scene
+from tests.elbow.scenes import KINDS, N_SEEDS, corner_cases, random_scene
 
 PAGE = Path(__file__).parents[2] / "accuracy.md"
 HEADING = "\n## The joint model\n"
-N_SEEDS = 250
 
 _TEMPLATE = Path(__file__).with_name("elbow_template.md")
 
