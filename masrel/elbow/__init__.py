@@ -6,7 +6,17 @@ what moving the arm takes, or the trace a controller would command.
 
 from typing import TYPE_CHECKING
 
-from masrel.elbow.events import Events, PhaseSpan, StretchEvents, events
+from masrel.elbow._events import Events, PhaseSpan, StretchEvents, events
+from masrel.elbow._scenes import Columns, SceneTable, evaluate
+from masrel.elbow._torque import (
+    impulse,
+    peak_torque,
+    residual_torque,
+    times_at,
+    torque,
+    torque_at,
+    work,
+)
 from masrel.elbow.joint_model import MODELS, JointModel, Stepper
 from masrel.elbow.motion import Motion
 from masrel.elbow.motions import (
@@ -23,17 +33,7 @@ from masrel.elbow.motions import (
 from masrel.elbow.outline import Outline, outline
 from masrel.elbow.parameters import STANDARD_MODELS, ElbowParameters
 from masrel.elbow.sampled import SampledJoint
-from masrel.elbow.scenes import Columns, SceneTable, evaluate
 from masrel.elbow.tardieu import Tardieu, tardieu
-from masrel.elbow.torque import (
-    impulse,
-    peak_torque,
-    residual_torque,
-    times_at,
-    torque,
-    torque_at,
-    work,
-)
 from masrel.elbow.trace import Trace, trace
 
 if TYPE_CHECKING:

@@ -1,6 +1,7 @@
 """What a movement of the arm is, whatever its kind: a row of polynomial pieces."""
 
 from collections.abc import Sequence
+from operator import attrgetter
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -67,10 +68,7 @@ class Motion:
         def duration(self) -> float:
             """How long it takes, s."""
 
-    @property
-    def origin(self) -> float:
-        """Angle from which the pieces count, rad."""
-        return self.start
+    origin = property(attrgetter("start"), doc="Angle the pieces count from, rad.")
 
     def pieces(self) -> Sequence[Piece]:
         """Return the pieces in order of time."""

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.elbow.events import Events, events, timeline
+from masrel.elbow._events import Events, events, timeline
+from masrel.elbow._torque import segment_torque, segments
 from masrel.elbow.motion import Floats, Motion
 from masrel.elbow.parameters import ElbowParameters
-from masrel.elbow.torque import segment_torque, segments
 from masrel.errors import ParameterError
 
 __all__ = ["Outline", "outline"]
@@ -82,7 +82,7 @@ def outline(
     line = timeline(parameters, motion)
     times, torques, codes = [], [], []
     starts = [state.time for _, state, _ in line.changes]
-    for segment in segments(parameters, motion, line):
+    for segment in segments(parameters, line):
         low, high = segment.start, segment.end
         n = max(2, math.ceil(n_points * (high - low) / line.end.time) + 1)
         at = np.linspace(low, high, n)

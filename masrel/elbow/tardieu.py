@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from masrel.elbow.events import events
+from masrel.elbow._events import events
 from masrel.elbow.joint_model import JointModel
 from masrel.elbow.motions import ConstantSpeed
 from masrel.elbow.parameters import ElbowParameters

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.elbow.events import timeline
+from masrel.elbow._events import timeline
 from masrel.elbow.joint_model import JointModel
 from masrel.elbow.motion import Floats, Motion
 from masrel.elbow.parameters import ElbowParameters

@@ -18,10 +18,9 @@ from masrel.elbow import (
     impulse,
     peak_torque,
     residual_torque,
-    scenes,
     work,
 )
-from masrel.elbow.scenes import EVENTS, LOADS
+from masrel.elbow._scenes import EVENTS, LOADS
 from masrel.errors import ParameterError
 from tests.elbow.scenes import KINDS, corner_cases, random_scene
 from tests.elbow.stretches import constant, minimum_jerk, table_v
@@ -187,7 +186,7 @@ def test_wrong_calls_are_refused(call, said: str) -> None:
 
 def test_the_names_are_those_of_the_functions() -> None:
     found = events(HM3, minimum_jerk(92.0))
-    assert all(hasattr(found, name) for name in scenes.EVENTS)
-    assert set(scenes.LOADS) == set(FUNCTIONS)
+    assert all(hasattr(found, name) for name in EVENTS)
+    assert set(LOADS) == set(FUNCTIONS)
     assert isinstance(constant(1.0), ConstantSpeed)
     assert isinstance(minimum_jerk(1.0), MinimumJerk)

@@ -31,7 +31,7 @@ from masrel.elbow import (
     peak_torque,
     trace,
 )
-from masrel.elbow.scenes import EVENTS
+from masrel.elbow._scenes import EVENTS
 from tests.benchmarks.sidebyside import Timing, side_by_side
 from tests.elbow.ode import Ode
 from tests.elbow.reference import solved

@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from operator import attrgetter
 
 from masrel.elbow._polynomials import reversed_from, shifted
 from masrel.elbow.motion import Motion, Piece, Rows, piece_of, rows_of
@@ -54,10 +55,7 @@ class Part(Motion):
                 f"{self.finish:g} s"
             )
 
-    @property
-    def origin(self) -> float:
-        """Angle from which the pieces count, rad."""
-        return self.motion.origin
+    origin = property(attrgetter("motion.origin"), doc=Motion.origin.__doc__)
 
     @property
     def start(self) -> float:
@@ -109,10 +107,7 @@ class Reversed(Motion):
 
     motion: Motion
 
-    @property
-    def origin(self) -> float:
-        """Angle from which the pieces count, rad."""
-        return self.motion.origin
+    origin = property(attrgetter("motion.origin"), doc=Motion.origin.__doc__)
 
     @property
     def start(self) -> float:
@@ -199,8 +194,8 @@ class Joined(Motion):
 
     @property
     def origin(self) -> float:
-        """Angle from which the pieces count, rad."""
-        return self.motions[0].origin
+        """Angle the pieces count from, rad."""
+        return float(self.motions[0].origin)
 
     @property
     def start(self) -> float:

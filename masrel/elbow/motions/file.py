@@ -36,7 +36,7 @@ def read_motion(path: Path, *, interpolation: Interpolation = "pchip") -> Record
     Raises
     ------
     RecordingError
-        If there is no such file, a column is missing, or a value is not a number; the
+        If there is no such file, a column is absent, or a value is not a number; the
         message names file, row and column. A row is counted with the names as row 1.
     ParameterError
         If the samples are no motion; as of `Recorded`.
@@ -84,8 +84,8 @@ def _read_table(path: Path) -> list[list[float]]:
         raise RecordingError(f"{path}: cannot be read: {error}") from error
     head = 1 + sum(1 for _ in takewhile(_is_remark, rows))  # row of the names
     names = [name.strip() for name in rows[head - 1]] if len(rows) >= head else []
-    missing = [name for name in _COLUMNS if name not in names]
-    if missing:
+    absent = [name for name in _COLUMNS if name not in names]
+    if absent:
         raise RecordingError(
             f"{path}: needs the columns {', '.join(_COLUMNS)} in row {head}, "
             f"got {', '.join(names) or 'nothing'}"

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from masrel.elbow import _law
+from masrel.elbow._events import first_stretch, rounded, timeline
 from masrel.elbow._law import TorqueLaw
 from masrel.elbow._polynomials import (
     NOTHING,
@@ -29,7 +30,15 @@ from masrel.elbow._polynomials import (
     shifted,
     value,
 )
-from masrel.elbow.events import first_stretch, rounded, timeline
+from masrel.elbow._torque import (
+    Section,
+    TorqueSegment,
+    along,
+    loads,
+    section_impulse,
+    section_peak,
+    section_work,
+)
 from masrel.elbow.motion import Floats, Motion
 from masrel.elbow.motions.prescribed import (
     ConstantSpeed,
@@ -39,15 +48,6 @@ from masrel.elbow.motions.prescribed import (
     ramps,
 )
 from masrel.elbow.parameters import ElbowParameters
-from masrel.elbow.torque import (
-    Section,
-    TorqueSegment,
-    along,
-    loads,
-    section_impulse,
-    section_peak,
-    section_work,
-)
 from masrel.errors import ParameterError
 
 __all__ = ["EVENTS", "LOADS", "Columns", "SceneTable", "evaluate"]
@@ -803,7 +803,7 @@ def _moving_peak(
         torque = law.along(shifted(angle, low))
         bound = functools.reduce(np.maximum, bernstein(torque, high - low))
         if (rows := _chosen(bound > np.maximum(best, peak))) is not None:
-            turns = _turning(_rows(torque, rows), (high - low)[rows])
+            turns = _turning_peak(_rows(torque, rows), (high - low)[rows])
             peak[rows] = np.maximum(peak[rows], turns)
     return np.asarray(peak)
 
@@ -841,7 +841,7 @@ def _reach(
         place[rows] = np.where(line[0] >= 0.0, 0.0, root)
 
 
-def _turning(torque: Polynomial, length: Floats) -> Floats:
+def _turning_peak(torque: Polynomial, length: Floats) -> Floats:
     # the largest value at the inner maxima of polynomials; -inf without one
     falls = [-c for c in derivative(torque)]
     above, changes = _signs(bernstein(falls, length))

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from masrel.elbow import _law
+from masrel.elbow._events import Timeline, timeline
 from masrel.elbow._law import TorqueLaw
 from masrel.elbow._polynomials import (
     Number,
@@ -26,7 +27,6 @@ from masrel.elbow._polynomials import (
     split_at_roots,
     value,
 )
-from masrel.elbow.events import Timeline, rest_angle, timeline
 from masrel.elbow.motion import Floats, Motion
 from masrel.elbow.parameters import ElbowParameters
 from masrel.errors import ParameterError
@@ -87,7 +87,7 @@ def torque(parameters: ElbowParameters, motion: Motion, times: ArrayLike) -> Flo
             f"got {at.min():g} to {at.max():g} s"
         )
     values = np.empty(at.shape)
-    laid = segments(parameters, motion, line)
+    laid = segments(parameters, line)
     which = np.searchsorted([segment.start for segment in laid], at, side="right") - 1
     for i, segment in enumerate(laid):
         mine = which == i
@@ -325,15 +325,14 @@ class TorqueSegment(NamedTuple):
     # of a smoothed onset: what it adds along 3y² - 2y³, N·m, and in which time, s
 
 
-def segments(p: ElbowParameters, motion: Motion, line: Timeline) -> list[TorqueSegment]:
+def segments(p: ElbowParameters, line: Timeline) -> list[TorqueSegment]:
     """Return the laws of a motion in order, without those that hold for no time."""
-    rest = rest_angle(p, motion)
     ends = [state.time for _, state, _ in line.changes[1:]] + [line.end.time]
     laid = []
     for (_, state, stretch), end in zip(line.changes, ends, strict=True):
         start = state.time
         if stretch is None:
-            laid.append(TorqueSegment(start, end, _law.pre_catch(p, rest)))
+            laid.append(TorqueSegment(start, end, line.law))
         elif state is stretch.catch:
             peak, residual = _law.catch(p, stretch.pre_end, stretch.rise)
             risen = min(start + p.catch_rise, end)
@@ -346,7 +345,9 @@ def segments(p: ElbowParameters, motion: Motion, line: Timeline) -> list[TorqueS
             ]
         else:
             level = residual.level
-            law = _law.post_catch(p, level, stretch.pre_end, state.angle, rest)
+            law = _law.post_catch(
+                p, level, stretch.pre_end, state.angle, line.law.origin
+            )
             laid.append(TorqueSegment(start, end, law))
     return [segment for segment in laid if segment.end > segment.start]
 
@@ -412,7 +413,7 @@ def loads(p: ElbowParameters, motion: Motion, line: Timeline, name: str) -> floa
         if not caught:
             return math.nan
         return float(_law.catch(p, caught[0].pre_end, caught[0].rise)[1].level)
-    parts = sections(segments(p, motion, line), motion)
+    parts = sections(segments(p, line), motion)
     if name == "peak_torque":
         return max(map(section_peak, parts))
     return math.fsum(map(section_work if name == "work" else section_impulse, parts))

@@ -10,6 +10,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from masrel.elbow import _law
+from masrel.elbow._law import TorqueLaw
 from masrel.elbow._polynomials import (
     NOTHING,
     TIE,
@@ -262,15 +263,11 @@ class Stretch:
 class Timeline(NamedTuple):
     """What happens in a motion."""
 
+    law: TorqueLaw  # of pre-catch
     # phases in order, each with the stretch whose catch or post-catch it is
     changes: list[tuple[int, State, Stretch | None]]
     stretches: list[Stretch]
     end: State  # of the motion, or of the range of motion
-
-
-def rest_angle(p: ElbowParameters, motion: Motion) -> float:
-    """θ_rest of (1), rad from the motion's origin."""
-    return (motion.start if p.rest_angle is None else p.rest_angle) - motion.origin
 
 
 def timeline(p: ElbowParameters, motion: Motion) -> Timeline:
@@ -297,7 +294,7 @@ def timeline(p: ElbowParameters, motion: Motion) -> Timeline:
     end = State(motion.duration, motion.end - motion.origin)
     if last is not None:
         end = State(start + last, limit)
-    return Timeline(machine.changes, machine.stretches, end)
+    return Timeline(machine.law, machine.changes, machine.stretches, end)
 
 
 class _PhaseMachine:
@@ -305,7 +302,8 @@ class _PhaseMachine:
 
     def __init__(self, p: ElbowParameters, motion: Motion) -> None:
         self.p = p
-        self.law = _law.pre_catch(p, rest_angle(p, motion))
+        rest = motion.start if p.rest_angle is None else p.rest_angle
+        self.law = _law.pre_catch(p, rest - motion.origin)
         self.constant = p.catch_angle_constant - motion.origin  # L
         smallest, largest = _law.catch_bounds(p, motion.origin)
         # θ_catch jumps at ν_H where ν_L is above that
