@@ -21,6 +21,7 @@ from masrel.errors import RecordingError
 
 __all__ = [
     "PHASES",
+    "RAMPS",
     "RECORDING_COLUMNS",
     "Phase",
     "Recording",
@@ -34,6 +35,10 @@ Phase = Literal["pre-catch", "catch", "post-catch"]
 PHASES: tuple[Phase, ...] = ("pre-catch", "catch", "post-catch")
 """Names of the phases; their positions are the codes in the column `phase`."""
 
+RAMPS = ("none", "post-catch", "end", "fault")
+"""Why a torque is not the law's: post-catch, the presentation or a fault has ended it,
+and it is on its way from there. Positions are the codes in the column `ramp`."""
+
 RECORDING_COLUMNS = (
     "time_s",  # since the presentation began
     "angle_deg",  # as the encoder reads it
@@ -41,6 +46,7 @@ RECORDING_COLUMNS = (
     "model_torque_nm",  # what the joint model asks for
     "command_torque_nm",  # what was sent: model, friction compensation, limits
     "phase",  # position in PHASES
+    "ramp",  # position in RAMPS
 )
 
 _Fact = str | int | float | bool | None
@@ -53,7 +59,8 @@ class Recording:
     Attributes
     ----------
     columns : mapping of str to ndarray, shape (n_samples,)
-        One array per name of `RECORDING_COLUMNS`, all of one length, read-only.
+        One array per name of `RECORDING_COLUMNS`, all of one length, read-only. Where
+        `ramp` is left out, as it once was, it follows from the fault.
     facts : mapping of str to str, int, float, bool or None
         What was presented and how: ``simulated``, ``device``, ``model``, ``code``,
         ``rate_hz``, ``n_missed_ticks``, ``fault``, ``mean_speed_deg_s`` and others.
@@ -68,6 +75,9 @@ class Recording:
     facts: Mapping[str, _Fact]
 
     def __post_init__(self) -> None:
+        if "ramp" not in self.columns and "time_s" in self.columns:
+            ramp = _ramp_without_column(self.columns["time_s"], self.facts)
+            object.__setattr__(self, "columns", {**self.columns, "ramp": ramp})
         if set(self.columns) != set(RECORDING_COLUMNS):
             raise RecordingError(
                 f"a recording needs the columns {', '.join(RECORDING_COLUMNS)}, "
@@ -85,6 +95,22 @@ class Recording:
     def n_samples(self) -> int:
         """Samples in every column."""
         return int(self.columns["time_s"].size)
+
+    @property
+    def n_presented(self) -> int:
+        """Samples before the torque was taken away, at the end or after a fault."""
+        return int(np.count_nonzero(self.columns["ramp"] < RAMPS.index("end")))
+
+
+def _ramp_without_column(
+    time_s: NDArray[np.float64], facts: Mapping[str, _Fact]
+) -> NDArray[np.float64]:
+    # (n,) -> (n,): before recordings had the column, faults alone had a ramp
+    fault_s = facts.get("fault_time_s")
+    ramp = np.zeros(time_s.shape)
+    if isinstance(fault_s, float):
+        ramp[time_s >= fault_s] = RAMPS.index("fault")
+    return ramp
 
 
 def write_recording(recording: Recording, path: Path) -> str:

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from masrel.hess._spool import Columns, read_spool, recorded_columns
-from masrel.recording import PHASES, Recording, _Fact
+from masrel.recording import PHASES, RAMPS, Recording, _Fact
 
-_CATCH = PHASES.index("catch")
+_CATCH, _END = PHASES.index("catch"), RAMPS.index("end")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,6 +134,9 @@ def movement_facts(
     columns: Columns, speed_threshold: float, stopped: bool
 ) -> dict[str, _Fact]:
     """Return the phases, the catch and the mean speed of a movement."""
+    # What the law did while the torque was taken away at the end, nobody felt.
+    n_felt = int(np.count_nonzero(columns["ramp"] != _END))
+    columns = {name: column[:n_felt] for name, column in columns.items()}
     catch = catch_angle_deg(columns)
     # A stretch that was stopped before the catch has no mean speed of its own.
     has_speed = not stopped or catch is not None

@@ -18,18 +18,20 @@ from numpy.typing import NDArray
 
 from masrel.errors import RecordingError
 from masrel.hess.limits import DeviceLimits
-from masrel.recording import _Fact
+from masrel.recording import RECORDING_COLUMNS, _Fact
 
 Columns = dict[str, NDArray[np.float64]]
 
-_N_COLUMNS = 6
+_N_COLUMNS = len(RECORDING_COLUMNS)
+_N_COLUMNS_ONCE = 6  # before the column `ramp`
 _HEADER = 4096  # bytes for the facts, a page
 _WORD = 8  # bytes of a float64
 
 
 def n_samples(n_ticks: int, rate_hz: int, limits: DeviceLimits) -> int:
     """Return how many samples so many ticks can leave."""
-    return n_ticks + math.ceil(limits.ramp_time * rate_hz) + 3
+    ramps_s = limits.end_ramp_time + limits.ramp_time
+    return n_ticks + math.ceil(ramps_s * rate_hz) + 4
 
 
 class Spool:
@@ -38,7 +40,8 @@ class Spool:
     __slots__ = ("_map", "values")
 
     def __init__(self, path: Path, capacity: int, facts: dict[str, _Fact]) -> None:
-        header = json.dumps({**facts, "capacity": capacity}).encode()
+        sizes = {"capacity": capacity, "n_columns": _N_COLUMNS}
+        header = json.dumps({**facts, **sizes}).encode()
         n_bytes = _HEADER + _WORD * (1 + _N_COLUMNS * capacity)
         path.parent.mkdir(parents=True, exist_ok=True)
         try:
@@ -68,6 +71,7 @@ class Samples:
         "_command",
         "_model",
         "_phase",
+        "_ramp",
         "_time",
         "_values",
         "_velocity",
@@ -85,7 +89,7 @@ class Samples:
         starts = range(1, n_values, max(capacity, 1))
         self._columns = [values[start : start + capacity] for start in starts]
         self._time, self._angle, self._velocity = self._columns[:3]
-        self._model, self._command, self._phase = self._columns[3:]
+        self._model, self._command, self._phase, self._ramp = self._columns[3:]
         self.n = 0
 
     def add(
@@ -106,6 +110,11 @@ class Samples:
         self._command[n] = command_torque
         self._phase[n] = phase
         self.n = self._values[0] = n + 1  # last, so that what is counted is complete
+
+    def flag(self, ramp: int) -> None:
+        """Say of the last sample that its torque is on a ramp."""
+        if self.n:
+            self._ramp[self.n - 1] = ramp
 
     def replace_command(self, command_torque: float) -> None:
         """Write another torque into the last sample; nothing when there is none."""
@@ -133,8 +142,8 @@ class Samples:
 
 def recorded_columns(written: NDArray[np.float64]) -> Columns:
     """Return what the loop wrote by name, in the units of a recording."""
-    # written (6, n) -> (n,)
-    time_s, angle, velocity, model, command, phase = written
+    # written (n_columns, n) -> (n,)
+    time_s, angle, velocity, model, command, phase, ramp = written
     return {
         "time_s": time_s.copy(),
         "angle_deg": np.degrees(angle),
@@ -142,6 +151,7 @@ def recorded_columns(written: NDArray[np.float64]) -> Columns:
         "model_torque_nm": model.copy(),
         "command_torque_nm": command.copy(),
         "phase": phase.copy(),
+        "ramp": ramp.copy(),
     }
 
 
@@ -149,7 +159,7 @@ def recorded_columns(written: NDArray[np.float64]) -> Columns:
 class Spooled:
     """What a presentation that never ended left."""
 
-    columns: NDArray[np.float64]  # (6, n): its samples, as the loop wrote them
+    columns: NDArray[np.float64]  # (n_columns, n): its samples, as the loop wrote them
     facts: dict[str, _Fact]  # what was known before the first
 
 
@@ -172,6 +182,7 @@ def _spooled(facts: dict[str, _Fact], data: bytes) -> Spooled | None:
     if not isinstance(facts, dict):
         raise TypeError(f"no facts but {facts}")
     capacity, rate_hz = facts.pop("capacity"), facts["rate_hz"]
+    n_columns = int(facts.pop("n_columns", _N_COLUMNS_ONCE) or 0)
     threshold = facts["speed_threshold"]
     if not isinstance(capacity, int) or capacity < 1:
         raise ValueError(f"a capacity of {capacity}")
@@ -184,7 +195,8 @@ def _spooled(facts: dict[str, _Fact], data: bytes) -> Spooled | None:
     if not (n.is_integer() and 0.0 < n <= capacity):
         raise ValueError(f"{n:g} samples where {capacity} fit in")
     values = np.frombuffer(
-        data, np.float64, count=_N_COLUMNS * capacity, offset=_HEADER + _WORD
+        data, np.float64, count=n_columns * capacity, offset=_HEADER + _WORD
     )
-    columns = values.reshape(_N_COLUMNS, capacity)[:, : int(n)]
-    return Spooled(columns=columns.copy(), facts=facts)
+    columns = np.zeros((_N_COLUMNS, int(n)))
+    columns[:n_columns] = values.reshape(n_columns, capacity)[:, : int(n)]
+    return Spooled(columns=columns, facts=facts)

@@ -1,9 +1,11 @@
 """The ticks of one presentation: pace, and what happens at each of them."""
 
 import math
+import sys
 
 from masrel.errors import ControllerError, DeviceTimeoutError, LimitExceededError
 from masrel.hess._guard import ActiveGuard, Guard, SoftStops, check_overrun
+from masrel.hess._soft_end import raised_cosine
 from masrel.hess._spool import Samples
 from masrel.hess._stop import EmergencyStop
 from masrel.hess._velocity import VelocityEstimate
@@ -12,12 +14,15 @@ from masrel.hess.clock import Clock
 from masrel.hess.controller import Controller
 from masrel.hess.device import Device
 from masrel.hess.limits import DeviceLimits
+from masrel.recording import RAMPS
 
 # A hand that presses against the end stop rests within a few tenths of a degree of
 # it; one encoder step makes 0.8 deg/s; 0.1 s is shorter than a person's reaction.
 _ARRIVAL_TOLERANCE = math.radians(3.0)
 _ARRIVAL_SPEED = math.radians(5.0)
 _ARRIVAL_TIME_S = 0.1
+
+_POST_CATCH, _END, _FAULT = (RAMPS.index(of) for of in RAMPS[1:])
 
 _CHECK_EVERY_S = 0.05  # how often the device is asked for its state
 _BEAT_EVERY_S = 0.005  # how often the watchdog is told that the loop is alive
@@ -31,6 +36,8 @@ class Ticks:
         "_controller",
         "_end_angle",
         "_estimate",
+        "_is_ending",
+        "_last_torques",
         "_latest",
         "_limits",
         "_n_ticks",
@@ -75,6 +82,8 @@ class Ticks:
         self._start_ns = self._sent_ns = 0
         self._latest: tuple[float, float, float] | None = None
         self._resting_since = math.inf
+        self._last_torques: list[float] = []  # torques yet to be sent, last first, N·m
+        self._is_ending = False
         self._stop = stop
         self.watchdog = watchdog
         self._limits = limits
@@ -85,14 +94,24 @@ class Ticks:
         self.samples = samples
 
     def run(self) -> str:
-        """Run ticks until they end -> ``"arrived"`` or ``"max-duration"``."""
+        """Run ticks until the torque is zero -> ``"arrived"`` or ``"max-duration"``."""
         self._start_ns = self._sent_ns = self.clock.now_ns()
+        tick, has_arrived = self._run_from(0)
+        shares = raised_cosine(self._limits.end_ramp_time, 1e9 / self.period_ns)
+        if shares and self.sent != 0.0:
+            self._last_torques = [self.sent * share for share in reversed(shares)]
+            self._is_ending = True
+            self._n_ticks = sys.maxsize
+            self._run_from(self._wait_for(tick + 1) if has_arrived else tick)
+        return "arrived" if has_arrived else "max-duration"
+
+    def _run_from(self, tick: int) -> tuple[int, bool]:
+        # -> the tick it ended at, and whether something in it ended it
         stop, device, beat = self._stop, self.device, self.watchdog.beat
         check_every = max(1, round(_CHECK_EVERY_S * 1e9 / self.period_ns))
         beat_every_s = min(_BEAT_EVERY_S, 0.25 * self._limits.watchdog_time)
         beat_every = max(1, round(beat_every_s * 1e9 / self.period_ns))
-        next_check, next_beat = check_every, 0
-        tick = 0
+        next_check, next_beat = tick + check_every, tick
         while tick < self._n_ticks:
             if stop.reason is not None:
                 stop.check()
@@ -103,9 +122,9 @@ class Ticks:
                 device.check()
                 next_check = tick + check_every
             if self._tick():
-                return "arrived"
+                return tick, True
             tick = self._wait_for(tick + 1)
-        return "max-duration"
+        return tick, False
 
     def _wait_for(self, tick: int) -> int:
         # Sleeps until the tick is due -> the tick that is due then. Those whose time
@@ -141,8 +160,12 @@ class Ticks:
         guard.speed(velocity)
         controller = self._controller
         torque = self._decide(time_s, angle, velocity) + self._stops.torque(angle)
+        acting = controller.model_torque
+        if self._is_ending:  # whatever the model asks for
+            # One share a tick, however late it comes: no fall is steeper than this
+            torque = acting = self._last_torques.pop()
         if self._active_guard is not None:
-            self._active_guard.check(angle, velocity, controller.model_torque)
+            self._active_guard.check(angle, velocity, acting)
         guard.torque(time_s, torque)
         self.device.command(torque)
         self.sent = torque
@@ -150,6 +173,11 @@ class Ticks:
         self.samples.add(
             time_s, angle, velocity, controller.model_torque, torque, controller.phase
         )
+        if self._is_ending:
+            self.samples.flag(_END)
+            return not self._last_torques
+        if controller.is_easing:
+            self.samples.flag(_POST_CATCH)
         if angle < self._end_angle or not -_ARRIVAL_SPEED <= velocity <= _ARRIVAL_SPEED:
             self._resting_since = math.inf
         elif self._resting_since == math.inf:
@@ -185,8 +213,7 @@ class Ticks:
         time_s = max((now_ns - self._start_ns) * 1e-9, read_s)
         if time_s <= self.samples.last_time_s:
             self.samples.replace_command(torque)
-            return
-        controller = self._controller
-        self.samples.add(
-            time_s, angle, velocity, controller.model_torque, torque, controller.phase
-        )
+        else:
+            model, phase = self._controller.model_torque, self._controller.phase
+            self.samples.add(time_s, angle, velocity, model, torque, phase)
+        self.samples.flag(_FAULT)

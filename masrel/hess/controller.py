@@ -5,14 +5,16 @@ https://doi.org/10.1109/TNSRE.2012.2195330, section III.B and Fig. 7.
 """
 
 import math
+from collections.abc import Iterator
 
 from masrel.elbow.joint_model import JointModel
 from masrel.elbow.parameters import ElbowParameters
 from masrel.errors import LimitExceededError, ParameterError
+from masrel.hess._soft_end import raised_cosine
 from masrel.hess.friction import Friction, FrictionCompensation
 from masrel.recording import PHASES
 
-_PRE_CATCH = PHASES.index("pre-catch")
+_PRE_CATCH, _POST_CATCH = PHASES.index("pre-catch"), PHASES.index("post-catch")
 _INFINITE = math.inf
 _SLIP_WINDOW_S = 0.010  # twice the delay of the estimated speed
 _RANGE_END_MARGIN = math.radians(3.0)  # what the loop takes for arrived, too
@@ -26,6 +28,10 @@ class Controller:
     model is then released to pre-catch at once and stays there until the arm has been
     moved back, faster than ν_th. A fall of speed within 3 deg of the end of range does
     not count: there it is the joint that stops the arm.
+
+    Where post-catch ends otherwise, the torque goes from where it stands to that of the
+    law within `post_catch_ramp`, along a raised cosine. A grip that is lost meanwhile
+    ends this at once.
 
     A model that is not passive is guarded: such a fall of speed is a fault in every
     phase, while the model resists extension; moving the arm backwards is not. The
@@ -51,6 +57,9 @@ class Controller:
         between what a held arm does and a loose one: a minimum-jerk stretch at the
         highest mean speed of Table V, 131 deg/s, brakes by 8.5 deg/s in 10 ms, and
         10 N·m take 95 deg/s off an arm of 0.06 kg·m² in that time.
+    post_catch_ramp : float, optional
+        How long the end of post-catch takes, s, 0 to 1; 0 is the step of Fig. 7. A
+        guarded model has its own law there.
     rate_hz : int, optional
         Steps a second.
 
@@ -64,6 +73,8 @@ class Controller:
         Whether grip has been lost since the beginning.
     is_guarded : bool
         Whether the model runs behind `DeviceLimits.active_energy` and `active_torque`.
+    is_easing : bool
+        Whether the last torque was on its way from the end of a post-catch.
     is_new : bool
         Whether it has never been stepped: one controller makes one presentation.
     rate_hz : int
@@ -91,13 +102,19 @@ class Controller:
     """
 
     __slots__ = (
+        "_command",
         "_compensation",
+        "_easing",
         "_free_end",
         "_joint",
         "_past",
         "_past_index",
+        "_post_catch_ramp",
         "_slip_speed_drop",
+        "_steepest_fall",
+        "_stood",
         "grip_lost",
+        "is_easing",
         "is_guarded",
         "is_new",
         "model_torque",
@@ -116,11 +133,16 @@ class Controller:
         dead_zone: float = math.radians(0.1),
         full_speed: float = math.radians(2.0),
         slip_speed_drop: float = math.radians(40.0),
+        post_catch_ramp: float = 0.1,
         rate_hz: int = 1000,
     ) -> None:
         if not 0.0 < slip_speed_drop < math.inf:
             raise ParameterError(
                 f"slip_speed_drop: needs more than 0, got {slip_speed_drop}"
+            )
+        if not 0.0 <= post_catch_ramp <= 1.0:
+            raise ParameterError(
+                f"post_catch_ramp: needs 0 to 1 s, got {post_catch_ramp}"
             )
         if rate_hz < 1:
             raise ParameterError(f"rate_hz: needs 1 or more, got {rate_hz}")
@@ -133,6 +155,11 @@ class Controller:
             full_speed=full_speed,
         )
         self._slip_speed_drop = slip_speed_drop
+        self._post_catch_ramp = raised_cosine(post_catch_ramp, rate_hz)
+        self._easing: Iterator[float] = iter(())
+        self._command = self._stood = 0.0  # the torque now, at the last such end, N·m
+        self._steepest_fall = 0.0  # of a tick under that ramp, N·m
+        self.is_easing = False
         self._free_end = model.range_end - _RANGE_END_MARGIN
         self._past = [0.0] * max(1, round(_SLIP_WINDOW_S * rate_hz))
         self._past_index = 0
@@ -180,12 +207,14 @@ class Controller:
                 and self.model_torque > 0.0
             ):
                 self._stop_for_slip(drop)
-        elif joint.phase != _PRE_CATCH and (
-            velocity < -self.speed_threshold
+        elif (joint.phase != _PRE_CATCH or self.is_easing) and (
+            (velocity < -self.speed_threshold and joint.phase != _PRE_CATCH)
             or (drop > self._slip_speed_drop and angle < self._free_end)
         ):
             joint.release()
             self.grip_lost = True
+            self.is_easing = False
+            self.phase = _PRE_CATCH  # no end that takes its time
         torque = joint.step(time_s, angle, velocity)
         try:
             is_number = -_INFINITE < torque < _INFINITE
@@ -197,8 +226,37 @@ class Controller:
                 "model",
             )
         self.model_torque = torque
-        self.phase = joint.phase
-        return torque - self._compensation.torque(velocity)
+        command = torque - self._compensation.torque(velocity)
+        phase = joint.phase
+        if self.phase != phase:
+            self._enter(phase)
+        if self.is_easing:
+            command = self._eased(command)
+        self._command = command
+        return command
+
+    def _enter(self, phase: int) -> None:
+        ends = self.phase == _POST_CATCH and phase == _PRE_CATCH
+        if ends and self._post_catch_ramp and not self.is_guarded:
+            self._easing = iter(self._post_catch_ramp)
+            self._stood = self._command
+            n_ticks = len(self._post_catch_ramp)
+            self._steepest_fall = 0.5 * math.pi * abs(self._stood) / n_ticks
+            self.is_easing = True
+        self.phase = phase
+
+    def _eased(self, command: float) -> float:
+        # Between the torque that stood at the end and what the law asks for now
+        share = next(self._easing, 0.0)
+        eased = command + share * (self._stood - command)
+        # Speed, and so friction compensation, may change at once; the torque may not.
+        before, fall = self._command, self._steepest_fall
+        if before > 0.0:
+            eased = max(eased, before - fall)
+        else:
+            eased = min(eased, before + fall)
+        self.is_easing = share > 0.0 or eased != command
+        return eased
 
     def _stop_for_slip(self, drop: float) -> None:
         self._joint.release()

@@ -9,6 +9,7 @@ from masrel.errors import ParameterError
 _LOWEST_ANGLE, _HIGHEST_ANGLE = math.radians(-5.0), math.radians(185.0)
 
 _MAX_RAMP_S = 0.1  # a fault's torque is zero after this at the latest
+_MAX_END_RAMP_S = 1.0  # and that of any other end after this
 
 _POSITIVE = (
     "torque",
@@ -84,6 +85,9 @@ class DeviceLimits:
         Longest time without a command, s; then the watchdog idles the device.
     ramp_time : float, optional
         How long a fault takes to bring the torque to zero, s; at most 0.1.
+    end_ramp_time : float, optional
+        How long every other end of a presentation takes, s; at most 1, and 0 for at
+        once.
 
     Raises
     ------
@@ -116,6 +120,7 @@ class DeviceLimits:
     jump_angle: float = math.radians(0.3)
     watchdog_time: float = 0.05
     ramp_time: float = 0.05
+    end_ramp_time: float = 0.1
 
     def __post_init__(self) -> None:
         for name in _POSITIVE:
@@ -126,10 +131,11 @@ class DeviceLimits:
             value = getattr(self, name)
             if not 0 <= value < math.inf:
                 raise ParameterError(f"{name}: needs 0 or more, got {value}")
-        if not 0.0 <= self.ramp_time <= _MAX_RAMP_S:
-            raise ParameterError(
-                f"ramp_time: needs 0 to {_MAX_RAMP_S:g} s, got {self.ramp_time}"
-            )
+        longest = {"ramp_time": _MAX_RAMP_S, "end_ramp_time": _MAX_END_RAMP_S}
+        for name, most in longest.items():
+            value = getattr(self, name)
+            if not 0.0 <= value <= most:
+                raise ParameterError(f"{name}: needs 0 to {most:g} s, got {value}")
         if not -math.inf < self.lowest_angle < self.highest_angle < math.inf:
             raise ParameterError(
                 "lowest_angle, highest_angle: need finite angles in this order, "

@@ -37,11 +37,13 @@ def run_presentation(
     """Present one model on an open device and record it.
 
     The presentation ends when the arm has been slower than 5 deg/s for 0.1 s within 3
-    deg of `end_angle` or beyond, or at `max_duration_s`, with zero torque. A limit,
-    an error of the device or of the controller, or an emergency stop ends it with a
-    fault: the torque goes to zero within `DeviceLimits.ramp_time`, and the device is
-    closed. Any other exception closes it at once and goes on to the caller, with a
-    note when the device did not take the zero torque.
+    deg of `end_angle` or beyond, or at `max_duration_s`. Then the torque goes from
+    where it stands to zero within `DeviceLimits.end_ramp_time`, along a raised cosine,
+    while readings are taken and checked as before. A limit, an error of the device or
+    of the controller, or an emergency stop ends it with a fault: the torque goes to
+    zero within `DeviceLimits.ramp_time`, and the device is closed. Any other exception
+    closes it at once and goes on to the caller, with a note when the device did not
+    take the zero torque.
 
     Parameters
     ----------
@@ -56,7 +58,7 @@ def run_presentation(
     rate_hz : int, optional
         Ticks a second.
     max_duration_s : float, optional
-        Longest duration, s.
+        Longest duration, without the ramp at its end, s.
     end_angle : float, optional
         Where the stretch is meant to end, rad.
     stop : EmergencyStop or None, optional

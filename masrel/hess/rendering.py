@@ -239,10 +239,8 @@ def render(
 def _compared(
     model: JointModel, motion: Motion, presented: Presented, rate_hz: int
 ) -> Rendering:
-    columns, fault = presented.recording.columns, presented.fault
-    n_rows = presented.recording.n_samples
-    if fault is not None:  # a ramp is no rendering
-        n_rows = int(np.searchsorted(columns["time_s"], fault.time_s))
+    columns = presented.recording.columns
+    n_rows = presented.recording.n_presented  # a ramp is no rendering
     times = np.minimum(columns["time_s"][:n_rows], motion.duration)
     angles = np.radians(columns["angle_deg"][:n_rows])
     torques = columns["model_torque_nm"][:n_rows]

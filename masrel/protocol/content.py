@@ -144,6 +144,8 @@ _LATER: dict[str, dict[str, object]] = {
         "active_torque_limit_nm": 10.0,
         "active_energy_limit_j": 1.0,
         "active_speed_limit_deg_s": 180.0,
+        "end_ramp_ms": 100.0,
+        "post_catch_ramp_ms": 100.0,
     },
 }
 """Keys that protocols once had not, by table, with the defaults they then had: these

@@ -155,6 +155,8 @@ class DeviceSettings(_Table, frozen=True, kw_only=True):
     jump_limit_deg: Annotated[float, Meta(gt=0, le=5)] = 0.3
     watchdog_ms: Annotated[float, Meta(gt=0, le=100)] = 50.0
     ramp_ms: Annotated[float, Meta(ge=0, le=100)] = 50.0
+    end_ramp_ms: Annotated[float, Meta(ge=0, le=1000)] = 100.0
+    post_catch_ramp_ms: Annotated[float, Meta(ge=0, le=1000)] = 100.0
     friction_compensation: Annotated[float, Meta(ge=0, le=1)] = 0.9
     friction_viscous_nms_rad: _NonNegative = 0.168
     friction_coulomb_nm: _NonNegative = 0.189

@@ -54,6 +54,7 @@ _FORMATS = {
     "model_torque_nm": "{:.4f}",
     "command_torque_nm": "{:.4f}",
     "phase": "{:.0f}",
+    "ramp": "{:.0f}",
 }
 
 

@@ -114,6 +114,7 @@ def device_limits(settings: DeviceSettings) -> DeviceLimits:
         jump_angle=math.radians(settings.jump_limit_deg),
         watchdog_time=settings.watchdog_ms * 1e-3,
         ramp_time=settings.ramp_ms * 1e-3,
+        end_ramp_time=settings.end_ramp_ms * 1e-3,
     )
 
 
@@ -149,6 +150,7 @@ def model_controller(protocol: Protocol, model: str) -> Controller:
         dead_zone=math.radians(settings.dead_zone_deg_s),
         full_speed=math.radians(settings.full_speed_deg_s),
         slip_speed_drop=math.radians(settings.slip_speed_drop_deg_s),
+        post_catch_ramp=settings.post_catch_ramp_ms * 1e-3,
         rate_hz=settings.rate_hz,
     )
 

@@ -403,7 +403,8 @@ def test_a_soft_stop_pushes_back_and_the_model_does_not_know(
             device, controller, clock=clock, limits=LOADED, max_duration_s=0.05
         )
     columns = presented.recording.columns
-    np.testing.assert_allclose(columns["command_torque_nm"], pushed_nm, rtol=1e-12)
+    pushed = columns["command_torque_nm"][: presented.recording.n_presented]
+    np.testing.assert_allclose(pushed, pushed_nm, rtol=1e-12)
     np.testing.assert_array_equal(columns["model_torque_nm"], 0.0)
 
 
@@ -559,8 +560,9 @@ def test_it_ends_when_the_arm_has_rested_at_the_end() -> None:
     columns, facts = presented.recording.columns, presented.recording.facts
     assert facts["ended"] == "arrived"
     resting = (columns["angle_deg"] >= 143.0) & (np.abs(columns["velocity_deg_s"]) <= 5)
-    since = columns["time_s"].size - int(np.argmin(resting[::-1]))
-    rested_s = columns["time_s"][-1] - columns["time_s"][since]
+    end = presented.recording.n_presented
+    since = end - int(np.argmin(resting[:end][::-1]))
+    rested_s = columns["time_s"][end - 1] - columns["time_s"][since]
     assert rested_s == pytest.approx(0.1, abs=1e-9)
 
 
@@ -586,7 +588,8 @@ def test_a_rest_before_the_end_does_not_end_it() -> None:
         limits=LOADED,
     )
     assert presented.recording.facts["ended"] == "max-duration"
-    assert len(ticks_ms(device)) == 300
+    assert presented.recording.n_presented == 300
+    assert len(ticks_ms(device)) == 400  # and the ramp
 
 
 def test_a_rest_that_is_broken_off_begins_anew() -> None:
@@ -611,8 +614,8 @@ def test_a_hand_that_never_arrives_is_stopped_at_the_longest_duration() -> None:
     presented = present("HM3", 90.0, slip_time=0.3, max_duration_s=0.8)
     columns = presented.recording.columns
     assert presented.recording.facts["ended"] == "max-duration"
-    assert presented.recording.n_samples == 800
-    assert columns["time_s"][-1] == pytest.approx(0.799)
+    assert presented.recording.n_presented == 800
+    assert columns["time_s"][799] == pytest.approx(0.799)
 
 
 def test_without_a_fault_it_ends_with_zero_torque_and_stays_open() -> None:
@@ -623,8 +626,8 @@ def test_without_a_fault_it_ends_with_zero_torque_and_stays_open() -> None:
         presented = run_presentation(device, controller, clock=clock, limits=LOADED)
         assert presented.recording.facts["ended"] == "arrived"
         assert device.is_open
-        assert device.commands[-1][1] == 0.0
-        assert device.commands[-2][1] > 0.0
+        assert [torque for _, torque in device.commands[-2:]] == [0.0, 0.0]
+        assert device.commands[-3][1] > 0.0
 
 
 # The result

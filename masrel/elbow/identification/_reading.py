@@ -324,10 +324,14 @@ def read_archive(path: Path) -> Table:
         raise RecordingError(
             f"{path}: not an archive of columns (one array without a name)"
         ) from error
-    if set(arrays) == set(RECORDING_COLUMNS) and path.with_suffix(".json").is_file():
+    is_local = {*arrays, "ramp"} == set(RECORDING_COLUMNS)
+    if is_local and path.with_suffix(".json").is_file():
         local = read_recording(path)  # holds it to its checksum
         simulated = local.facts.get("simulated") is True
-        return _Archive(path=path, arrays=dict(local.columns), simulated=simulated)
+        shown: dict[str, NDArray[np.generic]] = {
+            name: column[: local.n_presented] for name, column in local.columns.items()
+        }
+        return _Archive(path=path, arrays=shown, simulated=simulated)
     simulated = bool(np.any(arrays.pop("simulated", False)))
     return _Archive(path=path, arrays=arrays, simulated=simulated)
 
@@ -469,7 +473,7 @@ def read_movement(
     table: Table = (
         read_archive(path) if path.suffix == ".npz" else read_text(path, content)
     )
-    if set(table.names) == set(RECORDING_COLUMNS):
+    if {*table.names, "ramp"} == set(RECORDING_COLUMNS):
         columns = {"torque": _OWN_TORQUE, **(columns or {})}
         units = {"torque": "nm", **(units or {})}
     result = find_columns(table.names, source=str(path), columns=columns, units=units)

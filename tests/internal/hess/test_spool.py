@@ -52,7 +52,7 @@ def test_what_was_added_is_in_the_file(tmp_path: Path) -> None:
     left = read_spool(path)
     assert left is not None
     assert left.facts == FACTS
-    assert left.columns.shape == (6, 3)
+    assert left.columns.shape == (7, 3)
     assert left.columns[0].tolist() == [0.0, 1e-3, 2e-3]
     assert left.columns[1].tolist() == [0.5, 1.5, 2.5]
     assert left.columns[4].tolist() == [3.0, 4.0, 5.0]
@@ -62,7 +62,7 @@ def test_the_whole_file_is_there_before_the_first_sample(tmp_path: Path) -> None
     path = tmp_path / "a.partial"
     spool = Spool(path, 1000, FACTS)
     size = path.stat().st_size
-    assert size == 4096 + 8 * (1 + 6 * 1000)
+    assert size == 4096 + 8 * (1 + 7 * 1000)
     assert path.stat().st_blocks * 512 >= size  # not sparse: the disk has given it
     spool.close()
     assert read_spool(path) is None  # and nothing was sampled
@@ -184,3 +184,15 @@ def test_the_columns_have_the_units_in_their_names() -> None:
     assert written["model_torque_nm"].tolist() == [2.0, 2.1]
     assert written["command_torque_nm"].tolist() == [3.0, 3.1]
     assert written["phase"].tolist() == [0.0, 1.0]
+
+
+def test_samples_of_a_process_that_died_before_there_were_ramps_are_read(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "a.partial"
+    facts = {"rate_hz": 1000, "speed_threshold": 0.35, "capacity": 2}
+    values = np.array([1.0, *np.arange(12.0)])  # one of two samples, six columns
+    path.write_bytes(json.dumps(facts).encode().ljust(4096) + values.tobytes())
+    left = read_spool(path)
+    assert left is not None
+    assert left.columns.tolist() == [[0.0], [2.0], [4.0], [6.0], [8.0], [10.0], [0.0]]

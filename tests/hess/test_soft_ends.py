@@ -1,0 +1,300 @@
+"""Every end takes torque away slowly: of post-catch, of a presentation, by a fault."""
+
+import dataclasses
+import math
+import warnings
+from math import radians
+
+import numpy as np
+import pytest
+
+from masrel.elbow import STANDARD_MODELS, SampledJoint
+from masrel.errors import OverrunWarning
+from masrel.hess import (
+    Controller,
+    DeviceLimits,
+    EmergencyStop,
+    Presented,
+    SimulatedClock,
+    SimulatedHand,
+    YieldingHand,
+    open_device,
+    run_presentation,
+)
+from masrel.recording import RAMPS
+
+from . import faults as f
+from .rig import LIMITS, START, ScriptedDevice, present
+from .test_random_faults import Disturbed
+
+POST_CATCH, END, FAULT = (RAMPS.index(name) for name in RAMPS[1:])
+
+
+def steepest(torque: float, ramp_s: float, rate_hz: int = 1000) -> float:
+    """The most that a torque may fall in a tick of its ramp, N·m."""
+    if ramp_s == 0.0:
+        return math.inf
+    return math.pi / 2.0 * abs(torque) / ramp_s / rate_hz + 1e-9
+
+
+def assert_soft(presented: Presented, limits: DeviceLimits, post_catch_s: float) -> int:
+    """Hold every fall under a ramp to its bound -> how many ramps there were."""
+    columns = presented.recording.columns
+    ramp, torque = columns["ramp"], columns["command_torque_nm"]
+    starts = np.flatnonzero((np.diff(ramp, prepend=0.0) != 0.0) & (ramp != 0.0))
+    lasts = {
+        POST_CATCH: post_catch_s,
+        END: limits.end_ramp_time,
+        FAULT: limits.ramp_time,
+    }
+    for start in starts:
+        code = int(ramp[start])
+        end = start + (int(np.argmax(ramp[start:] != code)) or ramp.size - start)
+        stands = slice(max(start - 1, 0), end)  # from the torque that stands
+        falls = -np.diff(np.abs(torque[stands]))
+        if code == FAULT:  # in time: a machine that is away leaves ticks out
+            n_ticks = np.round(np.diff(columns["time_s"][stands]) * 1e3)
+            falls /= np.maximum(n_ticks, 1.0)
+        assert falls.max(initial=0.0) <= steepest(torque[stands][0], lasts[code])
+    if presented.recording.n_samples:
+        assert torque[-1] == 0.0
+    return len(starts)
+
+
+# One presentation
+
+
+def test_an_end_on_arrival_is_a_raised_cosine_from_the_torque_that_stands() -> None:
+    recording = present("HM3", 92.0).recording
+    torque, end = recording.columns["command_torque_nm"], recording.n_presented
+    assert recording.facts["ended"] == "arrived"
+    stood = torque[end - 1]
+    assert stood > 5.0
+    # By hand: half of it after 50 ms, a part of (2 - √2)/4 left after 75
+    assert torque[end + 49] == pytest.approx(stood / 2.0)
+    assert torque[end + 74] == pytest.approx(stood * (2.0 - math.sqrt(2.0)) / 4.0)
+    assert torque.size == end + 100
+    assert torque[-1] == 0.0
+    assert set(recording.columns["ramp"][end:]) == {END}
+
+
+def test_a_time_limit_in_mid_stretch_ends_softly() -> None:
+    presented = present("HM3", 92.0, max_duration_s=0.7)
+    recording = presented.recording
+    assert (presented.fault, recording.facts["ended"]) == (None, "max-duration")
+    assert recording.columns["command_torque_nm"][recording.n_presented - 1] > 8.0
+    assert assert_soft(presented, LIMITS, 0.1) == 1
+
+
+def test_post_catch_ends_from_the_torque_that_stands_to_that_of_the_law() -> None:
+    recording = present("HM4", 92.0).recording
+    columns, ramp = recording.columns, recording.columns["ramp"]
+    (rows,) = np.nonzero(ramp == POST_CATCH)
+    assert len(rows) == 99  # the hundredth is the law's again
+    assert np.all(np.diff(rows) == 1)
+    first = rows[0]
+    assert columns["phase"][first - 1 : first + 1].tolist() == [2.0, 0.0]
+    torque, law = columns["command_torque_nm"], columns["model_torque_nm"]
+    assert law[first - 1] - law[first] > 5.0  # the step of Fig. 7
+    half = first + 49
+    assert torque[half] == pytest.approx((torque[first - 1] + law[half]) / 2.0, abs=0.1)
+    assert np.max(-np.diff(torque[first - 1 : rows[-1] + 2])) <= steepest(
+        torque[first - 1], 0.1
+    )
+
+
+@pytest.mark.parametrize("model", sorted(STANDARD_MODELS))
+def test_while_no_ramp_is_active_it_is_the_law_to_the_last_bit(model: str) -> None:
+    presented = present(model, 92.0)
+    columns = presented.recording.columns
+    at_once = Controller(STANDARD_MODELS[model], start_angle=START, post_catch_ramp=0.0)
+    joint = SampledJoint(STANDARD_MODELS[model], start_angle=START)
+    for time_s, angle, velocity, law, command, ramp in zip(
+        columns["time_s"].tolist(),
+        np.radians(columns["angle_deg"]).tolist(),
+        np.radians(columns["velocity_deg_s"]).tolist(),
+        columns["model_torque_nm"].tolist(),
+        columns["command_torque_nm"].tolist(),
+        columns["ramp"].tolist(),
+        strict=True,
+    ):
+        assert joint.step(time_s, angle, velocity) == pytest.approx(law, abs=1e-9)
+        plain = at_once.step(time_s, angle, velocity)
+        if ramp == 0.0:  # degrees in the recording cost the last bits
+            assert plain == pytest.approx(command, abs=1e-9)
+
+
+@pytest.mark.parametrize("model", sorted(STANDARD_MODELS))
+def test_two_controllers_differ_under_the_ramp_alone(model: str) -> None:
+    soft, hard = (
+        Controller(STANDARD_MODELS[model], start_angle=START, post_catch_ramp=ramp)
+        for ramp in (0.1, 0.0)
+    )
+    n_easing = 0
+    for tick in range(2000):
+        time_s = tick * 1e-3
+        angle = START + radians(58.0) * (1.0 - math.cos(math.pi * time_s / 2.0))
+        speed = radians(58.0) * math.pi / 2.0 * math.sin(math.pi * time_s / 2.0)
+        command, plain = (c.step(time_s, angle, speed) for c in (soft, hard))
+        n_easing += soft.is_easing
+        assert soft.model_torque == hard.model_torque
+        assert command == plain or soft.is_easing
+    assert n_easing in (0, 99)
+
+
+def test_a_grip_that_is_lost_under_the_ramp_ends_it_at_once() -> None:
+    controller = Controller(STANDARD_MODELS["HM4"], start_angle=START)
+
+    def step(tick: int, angle_deg: float, speed_deg_s: float) -> float:
+        return controller.step(tick * 1e-3, radians(angle_deg), radians(speed_deg_s))
+
+    for tick in range(800):  # 30 to 110 deg: beyond the catch, and brake
+        step(tick, 30.0 + 0.1 * tick, min(100.0, 10.0 + 2.0 * (800 - tick)))
+    stood = step(800, 110.0, 10.0)  # post-catch ends
+    assert controller.is_easing
+    torque = step(801, 110.0, -100.0)
+    assert not controller.is_easing
+    assert controller.grip_lost
+    assert torque < 0.5 * stood
+
+
+def test_a_fault_under_the_ramp_of_an_end_ramps_from_there() -> None:
+    clock, stop = SimulatedClock(), EmergencyStop()
+
+    def angle(time_s: float) -> float:
+        if time_s > 0.15:
+            stop.press("test")
+        return radians(145.0)
+
+    limits = dataclasses.replace(LIMITS, standing_torque=20.0)
+    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
+    with ScriptedDevice(clock, angle) as device:
+        presented = run_presentation(
+            device, controller, clock=clock, limits=limits, stop=stop
+        )
+        assert not device.is_open
+    columns, fault = presented.recording.columns, presented.fault
+    assert fault is not None
+    assert fault.kind == "emergency-stop"
+    assert presented.recording.facts["ended"] == "fault"
+    ramp = columns["ramp"]
+    assert set(ramp) == {0.0, END, FAULT}
+    assert np.all(np.diff(ramp) >= 0.0)
+    assert 0.0 < fault.torque_nm < columns["command_torque_nm"][0]
+    assert assert_soft(presented, limits, 0.1) == 2
+
+
+def test_ticks_that_are_missed_under_the_ramp_make_it_longer_and_no_steeper() -> None:
+    clock = Disturbed({0.75: 0.007}, EmergencyStop())
+    hand = SimulatedHand(start=START, end=radians(146.0), mean_speed=radians(92.0))
+    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
+    with (
+        open_device("simulated", clock=clock, hand=hand) as device,
+        pytest.warns(OverrunWarning),
+    ):
+        presented = run_presentation(
+            device, controller, clock=clock, limits=LIMITS, max_duration_s=0.7
+        )
+    assert presented.n_missed_ticks == 7
+    columns = presented.recording.columns
+    assert np.count_nonzero(columns["ramp"] == END) == 100
+    assert columns["time_s"][-1] == pytest.approx(0.806, abs=1e-6)
+    assert assert_soft(presented, LIMITS, 0.1) == 1
+
+
+def test_both_may_be_at_once() -> None:
+    clock = SimulatedClock()
+    hand = SimulatedHand(start=START, end=radians(146.0), mean_speed=radians(92.0))
+    limits = dataclasses.replace(LIMITS, end_ramp_time=0.0)
+    controller = Controller(
+        STANDARD_MODELS["HM3"], start_angle=START, post_catch_ramp=0.0
+    )
+    with open_device("simulated", clock=clock, hand=hand) as device:
+        recording = run_presentation(
+            device, controller, clock=clock, limits=limits
+        ).recording
+    assert set(recording.columns["ramp"]) == {0.0}
+    assert recording.columns["command_torque_nm"][-1] > 5.0
+
+
+# Random ones
+
+
+def random_presentation(seed: int) -> int:
+    """Present at random, hold every end to its bound -> how many ramps there were."""
+    rng = np.random.default_rng([2012, seed])
+    stop = EmergencyStop()
+    gaps = {float(at): 0.004 for at in rng.uniform(0.0, 1.5, rng.integers(0, 3))}
+    clock = Disturbed(gaps, stop)
+    if rng.random() < 0.1:
+        clock.press_at = float(rng.uniform(0.1, 2.0))
+    start, end = radians(rng.uniform(10.0, 80.0)), radians(rng.uniform(110.0, 146.0))
+    slips = float(rng.uniform(0.2, 1.5)) if rng.random() < 0.15 else None
+    speed = radians(rng.uniform(15.0, 140.0))
+    if rng.random() < 0.6:
+        hand = SimulatedHand(
+            start=start,
+            end=end,
+            mean_speed=speed,
+            slip_time=slips,
+            stiffness=rng.uniform(100.0, 600.0),
+            damping=rng.uniform(5.0, 40.0),
+            ramp_down=rng.uniform(0.05, 0.3),
+        )
+    else:
+        hand = YieldingHand(start=start, end=end, mean_speed=speed, slip_time=slips)
+    limits = DeviceLimits(
+        ramp_time=float(rng.uniform(0.02, 0.1)),
+        end_ramp_time=float(rng.uniform(0.05, 0.3)),
+    )
+    post_catch_s = float(rng.uniform(0.05, 0.3))
+    fault = [
+        None,
+        None,
+        None,
+        f.dropped(rng.uniform(0.1, 1.5), 3),
+        f.dropped(rng.uniform(0.1, 1.5), 2),
+        f.shifted(rng.uniform(0.1, 1.5), f.JUMP),
+        f.frozen(rng.uniform(0.1, 1.5)),
+    ][rng.integers(7)]
+    model = STANDARD_MODELS[f"HM{rng.integers(1, 5)}"]
+    model = dataclasses.replace(model, catch_rise=float(rng.choice([0.0, 0.03])))
+    inner = open_device("simulated", clock=clock, hand=hand, range_end=radians(146.0))
+    device = f.FaultyDevice(inner, read_fault=fault)
+    device.open()
+    controller = Controller(model, start_angle=start, post_catch_ramp=post_catch_s)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", OverrunWarning)
+        presented = run_presentation(
+            device,
+            controller,
+            clock=clock,
+            limits=limits,
+            stop=stop,
+            end_angle=end,
+            max_duration_s=float(rng.uniform(0.3, 3.0)),
+        )
+    try:
+        device.close()
+    finally:
+        inner.close()
+    return assert_soft(presented, limits, post_catch_s)
+
+
+def assert_random_ones_are_soft(n: int) -> None:
+    n_ramps = sum(random_presentation(seed) for seed in range(n))
+    assert n_ramps > 1.1 * n  # hardly one is without an end under torque
+
+
+def test_some_random_presentations_end_softly() -> None:
+    assert_random_ones_are_soft(20)
+
+
+@pytest.mark.slow
+def test_hundreds_of_random_presentations_end_softly() -> None:
+    assert_random_ones_are_soft(400)
+
+
+@pytest.mark.long
+def test_ten_thousand_random_presentations_end_softly() -> None:
+    assert_random_ones_are_soft(10_000)
