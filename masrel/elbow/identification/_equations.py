@@ -189,7 +189,9 @@ class Equations:
         fallen = _step(since - last, lag)
         held |= {
             "gravity": np.sin(seen - self.known.arm.gravity_angle),
-            "arm_inertia": part.acceleration,
+            # the hand slows at once, and the sensor comes from what it was before
+            "arm_inertia": _slow(part.acceleration, part.time, lag)
+            + catch.acceleration * fading,
             "drift": part.time - self._middle,
             "peak": risen - fallen,
         }

@@ -236,6 +236,13 @@ def test_with_the_right_term_every_interval_holds(
 
 
 @pytest.mark.long
+def test_all_that_an_arm_has_is_fitted_at_once() -> None:
+    arm = Arm(gravity=0.5, inertia=0.05, drift=0.3, lag=0.008, rise=0.05)
+    total = counts({"arm": arm}, range(5000, 5040), **dict.fromkeys(WRONG, "fitted"))
+    assert all(total[name] >= 34 for name in NAMES), total
+
+
+@pytest.mark.long
 @pytest.mark.parametrize("scatter", [None, SCATTERED], ids=["exact", "scattered"])
 @pytest.mark.parametrize("wrong", WRONG)
 def test_without_it_every_parameter_is_covered_or_the_fit_says_so(
