@@ -8,7 +8,7 @@ tests together are held to one level by Holm's method.
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -26,6 +26,9 @@ LEVEL = 0.01
 
 # What is tried for lag and rise, s: of the size that a sensor and a muscle have.
 _LAG, _RISE = 0.005, 0.04
+
+# Of the right law, what is left from the catch on is what is left before it.
+_MAX_RATIO = 1.5
 
 _MIN_DF, _MIN_TRIALS = 1.0, 5  # a test with fewer says nothing
 
@@ -102,6 +105,7 @@ class LackOfFit:
     Attributes
     ----------
     verdict : {"fits", "does not fit", "undecided"}
+        Not if a test says so, or from the catch on 1.5 times what is left before it.
         Undecided with so few trials that no test says anything.
     level : float
         Of all tests together: how often the right law is called wrong.
@@ -132,14 +136,21 @@ class LackOfFit:
         share = f"the law explains {100.0 * self.explained:.1f} % of the torque"
         if self.verdict == "undecided":
             return f"Fit undecided: too few trials to tell; {share}."
+        if not self.tests or (
+            self.verdict == "does not fit" and self.tests[0].adjusted >= self.level
+        ):
+            return (
+                f"DOES NOT FIT: from the catch on {self.after_to_before:.2g} times "
+                f"what is left before it; {share}."
+            )
         first = self.tests[0]
         p = f"p {'< 0.0001' if first.adjusted < 1e-4 else f'= {first.adjusted:.2g}'}"
-        words, option = STRUCTURES[first.name]
         if self.verdict == "fits":
             return (
                 f"Fits: nothing left goes with any of {len(self.tests)} structures "
                 f"({p} at least); {share}."
             )
+        words, option = STRUCTURES[first.name]
         remedy = f"; try {option}" if option else ""
         return (
             f"DOES NOT FIT: what is left goes with {words} ({p}), so that intervals "
@@ -176,9 +187,14 @@ def lack_of_fit(
     phases = _phases(equations, laws)
     before = [p for p in phases if p.phase in ("slow", "pre-catch")]
     after = [p for p in phases if p.phase not in ("slow", "pre-catch")]
+    ratio = math.nan
+    if after and before and _pooled(before) > 0.0:
+        ratio = _pooled(after) / _pooled(before)
     verdict: Literal["fits", "does not fit", "undecided"] = "undecided"
-    if tests:
-        verdict = "does not fit" if tests[0].adjusted < LEVEL else "fits"
+    if ratio > _MAX_RATIO or (tests and tests[0].adjusted < LEVEL):
+        verdict = "does not fit"
+    elif tests:
+        verdict = "fits"
     left = sum(
         float(((e.measured - law) ** 2).sum())
         for e, law in zip(equations, laws, strict=True)
@@ -194,9 +210,7 @@ def lack_of_fit(
         tests=tests,
         explained=1.0 - left / whole if whole > 0.0 else math.nan,
         phases=phases,
-        after_to_before=_pooled(after) / _pooled(before)
-        if after and before
-        else math.nan,
+        after_to_before=ratio,
         rest_sd=rest_sd,
     )
 
@@ -237,15 +251,7 @@ def _holm(tests: Sequence[StructureTest]) -> tuple[StructureTest, ...]:
     adjusted, last = [], 0.0
     for i, test in enumerate(ordered):
         last = max(last, min(1.0, (len(ordered) - i) * test.p_value))
-        adjusted.append(
-            StructureTest(
-                name=test.name,
-                t=test.t,
-                df=test.df,
-                p_value=test.p_value,
-                adjusted=last,
-            )
-        )
+        adjusted.append(replace(test, adjusted=last))
     return tuple(adjusted)
 
 

@@ -114,6 +114,13 @@ def test_runs_and_autocorrelation_see_what_is_left() -> None:
     assert peak.runs < 0.9
 
 
+def test_what_is_left_after_the_catch_alone_is_announced_with_few_trials() -> None:
+    lack = quiet_fit(study(HM3, seed=3, n_slow=2, n_fast=2, arm=Arm(rise=0.08)))
+    assert lack.lack_of_fit.verdict == "does not fit"
+    assert lack.lack_of_fit.tests == ()
+    assert "times what is left before it" in lack.lack_of_fit.sentence
+
+
 def test_few_trials_are_undecided() -> None:
     lack = quiet_fit(study(HM3, seed=3, n_slow=2, n_fast=2)).lack_of_fit
     assert lack.verdict == "undecided"
