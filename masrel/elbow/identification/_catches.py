@@ -7,6 +7,7 @@ https://doi.org/10.1109/TNSRE.2012.2195330, section II and equations (1) to (5).
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,8 +46,7 @@ class Changes:
     residual_sd: float
 
 
-@dataclass(frozen=True, slots=True)
-class _Sums:
+class _Sums(NamedTuple):
     # Sums of products over samples before each place: any stretch of samples in O(1)
     torque: _Floats
     torque2: _Floats
@@ -151,20 +151,8 @@ def _search(
 
 
 def _sums(torque: _Floats, rest: _Floats, later: _Floats, angle: _Floats) -> _Sums:
-    def before(values: _Floats) -> _Floats:
-        return np.concatenate([[0.0], np.cumsum(values)])
-
-    return _Sums(
-        torque=before(torque),
-        torque2=before(torque**2),
-        rest=before(rest),
-        rest2=before(rest**2),
-        angle=before(angle),
-        angle2=before(angle**2),
-        later=before(later),
-        later2=before(later**2),
-        later_angle=before(later * angle),
-    )
+    columns = [each for x in (torque, rest, angle, later) for each in (x, x * x)]
+    return _Sums(*(np.append(0.0, np.cumsum(x)) for x in (*columns, later * angle)))
 
 
 def _about_mean(one: _Floats, two: _Floats, low: _Ints, high: _Ints) -> _Floats:

@@ -14,7 +14,6 @@ import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -171,7 +170,7 @@ def _saturated(name: str, torque: _Floats) -> NDArray[np.bool_]:
     return marked
 
 
-UNITS: dict[str, dict[str, float]] = {
+_UNITS: dict[str, dict[str, float]] = {
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6},
     "angle": {"deg": math.pi / 180.0, "rad": 1.0},
     "torque": {"nm": 1.0, "mnm": 1e-3, "ncm": 1e-2},
@@ -183,30 +182,30 @@ _OPTIONAL = ("velocity",)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Column:
+class _Column:
     """A column of a recording."""
 
     name: str
     factor: float
 
 
-def find_columns(
+def _find_columns(
     names: Sequence[str],
     *,
     source: str,
     columns: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None,
-) -> dict[str, Column]:
+) -> dict[str, _Column]:
     """Find the columns of time, angle, torque and, if there is one, velocity."""
     columns, units = dict(columns or {}), dict(units or {})
     _check_options(columns, units)
     result = {}
-    for quantity in UNITS:
+    for quantity in _UNITS:
         column = _find(names, quantity, source, columns.get(quantity), units)
         if column is not None:
             result[quantity] = column
         elif quantity not in _OPTIONAL:
-            forms = [f"{quantity}_{unit}" for unit in UNITS[quantity]]
+            forms = [f"{quantity}_{unit}" for unit in _UNITS[quantity]]
             raise RecordingError(
                 f"{source}: needs a column of {quantity}: {', '.join(forms)}, or its "
                 f"name given; got {', '.join(names) or 'no columns'}"
@@ -216,14 +215,14 @@ def find_columns(
 
 def _check_options(columns: Mapping[str, str], units: Mapping[str, str]) -> None:
     for quantity in (*columns, *units):
-        if quantity not in UNITS:
+        if quantity not in _UNITS:
             raise ParameterError(
-                f"columns, units: need one of {', '.join(UNITS)}, got {quantity!r}"
+                f"columns, units: need one of {', '.join(_UNITS)}, got {quantity!r}"
             )
     for quantity, unit in units.items():
-        if unit not in UNITS[quantity]:
+        if unit not in _UNITS[quantity]:
             raise ParameterError(
-                f"units: {quantity} needs one of {', '.join(UNITS[quantity])}, "
+                f"units: {quantity} needs one of {', '.join(_UNITS[quantity])}, "
                 f"got {unit!r}"
             )
 
@@ -234,7 +233,7 @@ def _find(
     source: str,
     declared: str | None,
     units: Mapping[str, str],
-) -> Column | None:
+) -> _Column | None:
     if declared is not None:
         if declared not in names:
             raise RecordingError(
@@ -242,7 +241,7 @@ def _find(
             )
         fitting = [declared]
     else:
-        forms = {quantity, *(f"{quantity}_{unit}" for unit in UNITS[quantity])}
+        forms = {quantity, *(f"{quantity}_{unit}" for unit in _UNITS[quantity])}
         fitting = [name for name in names if name.strip().lower() in forms]
     if len(fitting) > 1:
         raise RecordingError(
@@ -253,9 +252,9 @@ def _find(
     return _with_unit(fitting[0], quantity, source, units.get(quantity))
 
 
-def _with_unit(name: str, quantity: str, source: str, requested: str | None) -> Column:
+def _with_unit(name: str, quantity: str, source: str, requested: str | None) -> _Column:
     suffix = name.strip().lower().removeprefix(f"{quantity}_")
-    named = suffix if suffix in UNITS[quantity] else None
+    named = suffix if suffix in _UNITS[quantity] else None
     if named is not None and requested is not None and named != requested:
         raise RecordingError(
             f"{source}: column {name} says {named}, units says {requested} for "
@@ -265,25 +264,10 @@ def _with_unit(name: str, quantity: str, source: str, requested: str | None) -> 
     if unit is None:
         raise RecordingError(
             f"{source}: column {name} has no unit: name it "
-            f"{' or '.join(f'{quantity}_{u}' for u in UNITS[quantity])}, or say the "
+            f"{' or '.join(f'{quantity}_{u}' for u in _UNITS[quantity])}, or say the "
             f"unit of {quantity}"
         )
-    return Column(name=name, factor=UNITS[quantity][unit])
-
-
-class Table(Protocol):
-    """Columns of a recording."""
-
-    @property
-    def names(self) -> list[str]:
-        """Names of the columns."""
-
-    @property
-    def simulated(self) -> bool:
-        """Whether it says so."""
-
-    def column(self, name: str) -> _Floats:
-        """Read one column."""
+    return _Column(name=name, factor=_UNITS[quantity][unit])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -313,8 +297,7 @@ class _Archive:
         return numbers
 
 
-def read_archive(path: Path) -> Table:
-    """Read an npz archive."""
+def _read_archive(path: Path) -> _Archive:
     try:
         with np.load(path, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
@@ -367,8 +350,7 @@ def _number(cell: str) -> float:
     return value
 
 
-def read_text(path: Path, content: bytes) -> Table:
-    """Read a CSV file."""
+def _read_text(path: Path, content: bytes) -> _Text:
     try:
         lines = content.decode("utf-8-sig").splitlines()
     except UnicodeDecodeError as error:
@@ -470,13 +452,11 @@ def read_movement(
         why = "a folder; needs a file" if path.is_dir() else "no such file"
         raise RecordingError(f"{path}: {why}")
     content = path.read_bytes()
-    table: Table = (
-        read_archive(path) if path.suffix == ".npz" else read_text(path, content)
-    )
+    table = _read_archive(path) if path.suffix == ".npz" else _read_text(path, content)
     if {*table.names, "ramp"} == set(RECORDING_COLUMNS):
         columns = {"torque": _OWN_TORQUE, **(columns or {})}
         units = {"torque": "nm", **(units or {})}
-    result = find_columns(table.names, source=str(path), columns=columns, units=units)
+    result = _find_columns(table.names, source=str(path), columns=columns, units=units)
     values = {key: table.column(column.name) for key, column in result.items()}
     _check_lengths(path, {result[key].name: values[key] for key in values})
     whole = np.isfinite(np.stack(list(values.values()))).all(axis=0)
@@ -511,7 +491,7 @@ def _left_out(path: Path, n_rows: int, empty: Mapping[str, int]) -> str:
     return f"{path}: {rows} an empty cell ({message}) and {left} left out"
 
 
-LONGEST_GAP = 0.02
+_LONGEST_GAP = 0.02
 """Gaps up to this are bridged by straight lines, longer ones are left out, s."""
 
 _EVEN = 1e-3
@@ -556,6 +536,6 @@ def even_samples(movement: Movement) -> Samples:
         time=even,
         angle=np.interp(even, time, movement.angle),
         torque=np.interp(even, time, movement.torque),
-        in_gap=inside & (steps[before] > max(LONGEST_GAP, 5.0 * period)),
+        in_gap=inside & (steps[before] > max(_LONGEST_GAP, 5.0 * period)),
         saturated=cut[before] | (cut[before + 1] & inside),
     )

@@ -23,6 +23,15 @@ def test_a_cubic_is_kept_with_its_derivatives_up_to_the_ends() -> None:
     np.testing.assert_allclose(acceleration, cubic.deriv(2)(TIME), atol=1e-6)
 
 
+def test_speed_at_20_5_hz_comes_out_at_half_its_power() -> None:
+    turn = 2.0 * math.pi * 20.5  # as the page on identification has it
+    _, velocity, _ = differentiate(np.sin(turn * TIME), PERIOD, 0.06)
+    inner = slice(100, 500)
+    ratio = velocity[inner] @ np.cos(turn * TIME[inner])
+    ratio /= turn * (np.cos(turn * TIME[inner]) @ np.cos(turn * TIME[inner]))
+    assert ratio == pytest.approx(math.sqrt(0.5), rel=5e-3)
+
+
 def test_neither_filter_delays() -> None:
     # An even function of time about the middle stays even, its derivative odd.
     about = TIME - TIME[300]
