@@ -1,5 +1,7 @@
 """The filters: what they keep, what they pass, and where a hand's speed breaks."""
 
+import math
+
 import numpy as np
 import pytest
 
