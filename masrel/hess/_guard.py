@@ -15,6 +15,15 @@ from masrel.hess.limits import DeviceLimits
 _MOVING_SPEED = math.radians(20.0)
 _MAX_STOP_TICKS = 1.5
 
+# A drift is told from a start by two intervals of this: an arm that begins to move
+# covers more in the second than in the first (simulated hands 1.33 times as much and
+# more), an even speed as much, but for a step of the encoder (at most 1.17). Less than
+# six steps in the first do not tell.
+_START_S = 0.010
+_EVEN = (0.75, 1.25)
+_LEAST_START = math.radians(0.03)
+_REST_S = 0.05  # without a change of angle: the arm has come to rest
+
 # Of so many ticks `DeviceLimits.missed_replies_per_100` may be without a reading.
 _WINDOW_TICKS = 100
 
@@ -24,6 +33,7 @@ class Guard:
 
     __slots__ = (
         "_angle",
+        "_drift",
         "_limits",
         "_moved_at",
         "_period",
@@ -45,6 +55,7 @@ class Guard:
         self._stopped_dead = False  # whether it moved fast one tick before that
         self._sent = 0.0  # the last torque, N·m
         self._sent_at = math.inf  # nothing yet: the device holds zero
+        self._drift: Drift | None = None  # while the arm may be one that creeps
         self.dropouts = Dropouts(limits, period_s)
 
     def is_new(self, time_s: float) -> bool:
@@ -70,6 +81,7 @@ class Guard:
         self.dropouts.n_in_a_row = 0
         if self._time == -math.inf:
             self._moved_at = time_s
+            self._drift = Drift(limits, angle)
         else:
             self._follows(time_s, angle)
         self._time = time_s
@@ -93,6 +105,10 @@ class Guard:
                 f"{math.degrees(deviation / ticks):.2f} deg a tick from there",
                 "jump",
             )
+        if self._drift is not None and not self._drift.goes_on(
+            time_s, angle, self._time
+        ):
+            self._drift = None
         self._raw_speed = speed = change / interval
         self._moved_at = time_s
         # Over a longer gap it may well have come to rest, against an end stop say.
@@ -100,6 +116,8 @@ class Guard:
 
     def _still_for(self, duration_s: float) -> None:
         limits = self._limits
+        if self._drift is None and duration_s > _REST_S:
+            self._drift = Drift(limits, self._angle)
         if self._stopped_dead and duration_s > limits.frozen_time:
             raise LimitExceededError(
                 f"frozen: needs an angle that changes within "
@@ -161,6 +179,50 @@ class Guard:
                 "it to where the stretch starts",
                 "start",
             )
+
+
+class Drift:
+    """Tell whether an arm that leaves its rest starts, or its encoder drifts."""
+
+    __slots__ = ("_first", "_left_at", "_limits", "_rest", "_speed")
+
+    def __init__(self, limits: DeviceLimits, rest: float) -> None:
+        self._limits = limits
+        self._rest = rest  # rad
+        self._left_at = math.inf  # when it was there last, s
+        self._first = 0.0  # travel of the first interval, rad
+        self._speed = 0.0  # of the second, rad/s; 0 before
+
+    def goes_on(self, time_s: float, angle: float, before_s: float) -> bool:
+        """Take a changed angle in -> whether it may still be a drift."""
+        if self._left_at == math.inf:
+            self._left_at = before_s
+        moved, since = angle - self._rest, time_s - self._left_at
+        if since < _START_S:
+            return True
+        if self._first == 0.0:
+            self._first = moved
+            return abs(moved) >= _LEAST_START
+        if since < 2.0 * _START_S:
+            return True
+        if self._speed == 0.0:
+            second = moved - self._first
+            self._speed = abs(moved) / since
+            return _EVEN[0] < second / self._first < _EVEN[1]
+        return self._is_even(abs(moved), abs(moved) / since)
+
+    def _is_even(self, moved: float, speed: float) -> bool:
+        limits = self._limits
+        if moved < limits.drift_angle:
+            return 0.5 * self._speed < speed < 1.5 * self._speed
+        if speed < limits.drift_speed:
+            raise LimitExceededError(
+                f"drift: needs an arm that starts from rest, got an encoder that was "
+                f"at {math.degrees(speed):.1f} deg/s at once and has gone "
+                f"{math.degrees(moved):.1f} deg",
+                "drift",
+            )
+        return False
 
 
 class Dropouts:

@@ -8,7 +8,7 @@ from masrel.hess._guard import ActiveGuard, Guard, SoftStops, check_overrun
 from masrel.hess._soft_end import raised_cosine
 from masrel.hess._spool import Samples
 from masrel.hess._stop import EmergencyStop
-from masrel.hess._velocity import VelocityEstimate
+from masrel.hess._velocity import VelocityEstimate, speed_noise
 from masrel.hess._watchdog import Watching
 from masrel.hess.clock import Clock
 from masrel.hess.controller import Controller
@@ -16,13 +16,10 @@ from masrel.hess.device import Device
 from masrel.hess.limits import DeviceLimits
 from masrel.recording import RAMPS
 
-# A hand that presses against the end stop rests within a few tenths of a degree of
-# it; one encoder step makes 0.8 deg/s; 0.1 s is shorter than a person's reaction.
-_ARRIVAL_TOLERANCE = math.radians(3.0)
-_ARRIVAL_SPEED = math.radians(5.0)
-_ARRIVAL_TIME_S = 0.1
-
 _POST_CATCH, _END, _FAULT = (RAMPS.index(of) for of in RAMPS[1:])
+
+# A hundred ticks at rest all lie within so many standard deviations of the speed.
+_ARRIVAL_DEVIATIONS = 5.0
 
 _CHECK_EVERY_S = 0.05  # how often the device is asked for its state
 _BEAT_EVERY_S = 0.005  # how often the watchdog is told that the loop is alive
@@ -33,6 +30,8 @@ class Ticks:
 
     __slots__ = (
         "_active_guard",
+        "_arrival_speed",
+        "_arrival_time",
         "_controller",
         "_end_angle",
         "_estimate",
@@ -77,8 +76,11 @@ class Ticks:
         self._n_ticks = n_ticks
         self.period_ns = round(1e9 / rate_hz)
         self.ramp_ns = round(limits.ramp_time * 1e9)
-        self._end_angle = end_angle - _ARRIVAL_TOLERANCE
+        self._end_angle = end_angle - limits.arrival_angle
+        self._arrival_time = limits.arrival_time
         self._estimate = VelocityEstimate()
+        noise = speed_noise(limits.encoder_noise, rate_hz)
+        self._arrival_speed = limits.arrival_speed + _ARRIVAL_DEVIATIONS * noise
         self._start_ns = self._sent_ns = 0
         self._latest: tuple[float, float, float] | None = None
         self._resting_since = math.inf
@@ -178,11 +180,12 @@ class Ticks:
             return not self._last_torques
         if controller.is_easing:
             self.samples.flag(_POST_CATCH)
-        if angle < self._end_angle or not -_ARRIVAL_SPEED <= velocity <= _ARRIVAL_SPEED:
+        speed = self._arrival_speed
+        if angle < self._end_angle or not -speed <= velocity <= speed:
             self._resting_since = math.inf
         elif self._resting_since == math.inf:
             self._resting_since = time_s
-        return time_s - self._resting_since >= _ARRIVAL_TIME_S
+        return time_s - self._resting_since >= self._arrival_time
 
     def _decide(self, time_s: float, angle: float, velocity: float) -> float:
         try:

@@ -43,6 +43,13 @@ class VelocityEstimate:
         return self._velocity
 
 
+def speed_noise(angle_noise: float, rate_hz: float) -> float:
+    """Return the standard deviation that noise of the angle gives the speed, rad/s."""
+    # v = g/T (n_t - g Σ (1 - g)^k n_(t-1-k)) of independent n
+    gain = -math.expm1(-CUTOFF_RAD_S / rate_hz)
+    return angle_noise * rate_hz * gain * math.sqrt(2.0 / (2.0 - gain))
+
+
 def passive_damping(stiffness: float, damping: float, rate_hz: float) -> float:
     """Return the damping a device needs to render these passively, N·m·s/rad."""
     # Colgate, Schenkel (1997), J. Robot. Syst. 14(1), 37-47: at every frequency above

@@ -22,6 +22,10 @@ _POSITIVE = (
     "stale_time",
     "frozen_time",
     "jump_angle",
+    "drift_angle",
+    "drift_speed",
+    "arrival_speed",
+    "arrival_time",
     "standing_time",
     "standing_torque",
     "watchdog_time",
@@ -31,6 +35,8 @@ _NOT_NEGATIVE = (
     "missed_replies",
     "missed_replies_per_100",
     "soft_stop_torque",
+    "arrival_angle",
+    "encoder_noise",
 )
 
 
@@ -81,6 +87,15 @@ class DeviceLimits:
     jump_angle : float, optional
         How far a reading may lie from where the speed before would have it, a tick
         later, rad.
+    drift_angle, drift_speed : float, optional
+        How far an arm may creep from where it rested, rad, that was at once at an even
+        speed below this, rad/s: no arm starts like that, an encoder that drifts does.
+    encoder_noise : float, optional
+        Standard deviation of a reading of an arm at rest, beyond the encoder's steps,
+        rad; the arrival allows for what it does to the estimated speed.
+    arrival_angle, arrival_speed, arrival_time : float, optional
+        An arm has arrived that was slower than this speed for this time, rad/s and s,
+        at most this far before the end of the stretch, rad.
     watchdog_time : float, optional
         Longest time without a command, s; then the watchdog idles the device.
     ramp_time : float, optional
@@ -118,6 +133,12 @@ class DeviceLimits:
     standing_time: float = 0.5
     standing_torque: float = 2.0
     jump_angle: float = math.radians(0.3)
+    drift_angle: float = math.radians(3.0)
+    drift_speed: float = math.radians(25.0)
+    encoder_noise: float = 0.0
+    arrival_angle: float = math.radians(3.0)
+    arrival_speed: float = math.radians(5.0)
+    arrival_time: float = 0.1
     watchdog_time: float = 0.05
     ramp_time: float = 0.05
     end_ramp_time: float = 0.1

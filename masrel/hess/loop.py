@@ -36,8 +36,9 @@ def run_presentation(
 ) -> Presented:
     """Present one model on an open device and record it.
 
-    The presentation ends when the arm has been slower than 5 deg/s for 0.1 s within 3
-    deg of `end_angle` or beyond, or at `max_duration_s`. Then the torque goes from
+    The presentation ends when the arm has been slower than
+    `DeviceLimits.arrival_speed` for `arrival_time` within `arrival_angle` of
+    `end_angle` or beyond, or at `max_duration_s`. Then the torque goes from
     where it stands to zero within `DeviceLimits.end_ramp_time`, along a raised cosine,
     while readings are taken and checked as before. A limit, an error of the device or
     of the controller, or an emergency stop ends it with a fault: the torque goes to

@@ -153,6 +153,12 @@ class DeviceSettings(_Table, frozen=True, kw_only=True):
     standing_limit_ms: Annotated[float, Meta(gt=0, le=5000)] = 500.0
     standing_torque_nm: Annotated[float, Meta(gt=0, le=28)] = 2.0
     jump_limit_deg: Annotated[float, Meta(gt=0, le=5)] = 0.3
+    drift_limit_deg: Annotated[float, Meta(gt=0, le=180)] = 3.0
+    drift_speed_deg_s: Annotated[float, Meta(gt=0, le=600)] = 25.0
+    encoder_noise_deg: Annotated[float, Meta(ge=0, le=1)] = 0.0
+    arrival_deg: Annotated[float, Meta(ge=0, le=180)] = 3.0
+    arrival_speed_deg_s: Annotated[float, Meta(gt=0, le=600)] = 5.0
+    arrival_ms: Annotated[float, Meta(gt=0, le=5000)] = 100.0
     watchdog_ms: Annotated[float, Meta(gt=0, le=100)] = 50.0
     ramp_ms: Annotated[float, Meta(ge=0, le=100)] = 50.0
     end_ramp_ms: Annotated[float, Meta(ge=0, le=1000)] = 100.0

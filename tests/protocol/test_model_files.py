@@ -171,6 +171,12 @@ def test_a_protocol_without_files_has_the_hash_it_had_before_there_were_any() ->
     assert content["device"].pop("active_energy_limit_j") == 1.0
     assert content["device"].pop("active_speed_limit_deg_s") == 180.0
     assert content["device"].pop("end_ramp_ms") == 100.0
+    assert content["device"].pop("drift_limit_deg") == 3.0
+    assert content["device"].pop("drift_speed_deg_s") == 25.0
+    assert content["device"].pop("encoder_noise_deg") == 0.0
+    assert content["device"].pop("arrival_deg") == 3.0
+    assert content["device"].pop("arrival_speed_deg_s") == 5.0
+    assert content["device"].pop("arrival_ms") == 100.0
     assert content["device"].pop("post_catch_ramp_ms") == 100.0
     canonical = msgspec.json.encode(content, order="sorted")
     assert protocol_hash(protocol) == hashlib.sha256(canonical).hexdigest()

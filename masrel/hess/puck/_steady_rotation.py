@@ -34,6 +34,7 @@ LIMITS = DeviceLimits(
     # an end stop, or its encoder has frozen.
     standing_torque=1.0,
     standing_time=0.2,
+    drift_angle=math.pi,  # never: here a motor keeps the speed even
 )
 """What passes while nobody holds the arm: less than in a presentation."""
 

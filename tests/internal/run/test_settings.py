@@ -40,6 +40,13 @@ FIELDS = {
     "jump_limit_deg": ("jump_angle", radians(1.0)),
     "watchdog_ms": ("watchdog_time", 1e-3),
     "ramp_ms": ("ramp_time", 1e-3),
+    "end_ramp_ms": ("end_ramp_time", 1e-3),
+    "drift_limit_deg": ("drift_angle", radians(1.0)),
+    "drift_speed_deg_s": ("drift_speed", radians(1.0)),
+    "encoder_noise_deg": ("encoder_noise", radians(1.0)),
+    "arrival_deg": ("arrival_angle", radians(1.0)),
+    "arrival_speed_deg_s": ("arrival_speed", radians(1.0)),
+    "arrival_ms": ("arrival_time", 1e-3),
 }
 
 

@@ -1,0 +1,137 @@
+"""Arrival, noise and drift: what an encoder may do is a setting."""
+
+from dataclasses import replace
+from math import radians
+
+import numpy as np
+import pytest
+
+from masrel.elbow import STANDARD_MODELS
+from masrel.hess import (
+    Controller,
+    DeviceLimits,
+    Hand,
+    Presented,
+    Reading,
+    SimulatedClock,
+    SimulatedHand,
+    YieldingHand,
+    open_device,
+    run_presentation,
+)
+
+from . import faults as f
+from .rig import END, START, ScriptedDevice
+
+
+def presented(
+    hand: Hand, fault: f.ReadFault | None = None, limits: DeviceLimits | None = None
+) -> Presented:
+    clock = SimulatedClock()
+    inner = open_device("simulated", clock=clock, hand=hand)
+    controller = Controller(STANDARD_MODELS["HM3"], start_angle=hand.start)
+    with inner, f.FaultyDevice(inner, read_fault=fault) as device:
+        return run_presentation(
+            device, controller, clock=clock, limits=limits or DeviceLimits()
+        )
+
+
+def resting() -> SimulatedHand:
+    return SimulatedHand(start=START, end=END, mean_speed=1.0, delay=30.0)
+
+
+# Drift
+
+
+@pytest.mark.parametrize("start_s", [0.0, 0.5])
+@pytest.mark.parametrize("rate", [-20.0, -8.0, 4.0, 10.0, 15.0, 20.0, 24.0])
+def test_a_resting_arm_that_creeps_is_a_fault_below_half_a_newton_metre(
+    rate: float, start_s: float
+) -> None:
+    shown = presented(resting(), f.drifting(start_s, radians(rate)))
+    assert shown.fault is not None
+    assert shown.fault.kind == "drift"
+    assert shown.fault.message.startswith(
+        "drift: needs an arm that starts from rest, got an encoder that was at "
+    )
+    assert shown.fault.time_s == pytest.approx(start_s + 3.0 / abs(rate), abs=0.005)
+    assert np.abs(shown.recording.columns["command_torque_nm"]).max() < 0.5
+
+
+def test_an_encoder_that_drifts_in_whole_steps_is_one_too() -> None:
+    clock, step = SimulatedClock(), radians(0.005)
+    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
+    with ScriptedDevice(
+        clock, lambda t: START + round(radians(20.0) * t / step) * step
+    ) as device:
+        shown = run_presentation(device, controller, clock=clock, limits=DeviceLimits())
+    assert shown.fault is not None
+    assert shown.fault.kind == "drift"
+
+
+@pytest.mark.parametrize("kind", [SimulatedHand, YieldingHand])
+@pytest.mark.parametrize("speed", [2.0, 4.0, 4.5, 5.0, 7.5, 10.0, 15.0, 20.0, 24.0])
+@pytest.mark.parametrize("start_deg", [30.0, 100.003])
+def test_a_slow_stretch_is_no_drift(
+    kind: type[SimulatedHand], speed: float, start_deg: float
+) -> None:
+    hand = kind(start=radians(start_deg), end=END, mean_speed=radians(speed))
+    assert presented(hand).fault is None
+
+
+def test_how_far_it_may_go_and_how_fast_are_settings() -> None:
+    fault = f.drifting(0.0, radians(20.0))
+    further = presented(resting(), fault, DeviceLimits(drift_angle=radians(6.0))).fault
+    assert further is not None
+    assert further.time_s == pytest.approx(0.3, abs=0.005)
+    slower = DeviceLimits(drift_speed=radians(15.0))
+    fault = f.drifting(0.0, radians(20.0))
+    other = presented(resting(), fault, slower).fault
+    assert other is not None
+    assert other.kind == "range"
+
+
+# Noise and arrival
+
+
+def noisy(deviation_deg: float) -> f.ReadFault:
+    rng = np.random.default_rng(3)
+
+    def fault(_time_s: float, reading: Reading) -> Reading:
+        off = radians(deviation_deg) * float(rng.standard_normal())
+        return reading._replace(angle=reading.angle + off)
+
+    return fault
+
+
+def test_an_encoder_with_noise_arrives_where_its_noise_is_stated() -> None:
+    hand = SimulatedHand(start=START, end=END, mean_speed=radians(92.0))
+    stated = DeviceLimits(encoder_noise=radians(0.02))
+    shown = presented(hand, noisy(0.02), stated)
+    assert (shown.fault, shown.recording.facts["ended"]) == (None, "arrived")
+    assert shown.recording.columns["time_s"][-1] < 2.0
+    silent = presented(hand, noisy(0.02))
+    assert silent.recording.facts["ended"] == "max-duration"
+
+
+@pytest.mark.parametrize("change", ["arrival_angle", "arrival_speed", "arrival_time"])
+def test_each_part_of_an_arrival_is_a_setting(change: str) -> None:
+    hand = SimulatedHand(start=START, end=END, mean_speed=radians(92.0))
+    usual = presented(hand).recording
+    values = {
+        "arrival_angle": radians(60.0),
+        "arrival_speed": radians(200.0),
+        "arrival_time": 0.2,
+    }
+    limits = replace(DeviceLimits(), **{change: values[change]})
+    other = presented(hand, limits=limits).recording
+    if change == "arrival_angle":  # slow enough only at the end, where it was before
+        assert other.n_presented == usual.n_presented
+        short = SimulatedHand(start=START, end=radians(100.0), mean_speed=1.5)
+        assert presented(short, limits=limits).recording.facts["ended"] == "arrived"
+        ended = presented(short).recording.facts["ended"]
+        assert ended in ("max-duration", "fault")  # 46 deg before the end of range
+    elif change == "arrival_speed":
+        assert other.n_presented < usual.n_presented
+    else:
+        assert other.n_presented == pytest.approx(usual.n_presented + 100, abs=1)
