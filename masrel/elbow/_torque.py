@@ -6,6 +6,7 @@ Source: Park, Kim and Damiano (2012), IEEE TNSRE 20(3), 361-370,
 https://doi.org/10.1109/TNSRE.2012.2195330, equations (1), (3) and (5).
 """
 
+import functools
 import math
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -19,6 +20,7 @@ from masrel.elbow._law import TorqueLaw
 from masrel.elbow._polynomials import (
     Number,
     Polynomial,
+    bernstein,
     derivative,
     first_above,
     integral,
@@ -40,6 +42,8 @@ __all__ = [
     "torque_at",
     "work",
 ]
+
+_MANY = 16  # pieces, above which columns of them are faster
 
 _SAME_ANGLE = 1e-15  # rad: the end of a motion, of which `end` is the nearest float
 
@@ -366,7 +370,7 @@ def segment_torque(segment: TorqueSegment, motion: Motion, at: Floats) -> Floats
 
 
 class Section(NamedTuple):
-    """What a law and a piece of the motion have in common."""
+    """What a law and a piece of the motion, or a column of pieces, have in common."""
 
     length: Number  # s
     angle: Polynomial  # rad, over s since the section began
@@ -375,21 +379,31 @@ class Section(NamedTuple):
 
 def sections(laid: list[TorqueSegment], motion: Motion) -> Iterator[Section]:
     """Cut a motion where its law or its polynomial changes."""
-    waiting = iter(laid)
-    segment = next(waiting, None)
-    for start, length, angle, _, _ in motion.pieces():
-        while segment is not None and segment.start < start + length:
+    if len(pieces := motion.pieces()) > _MANY:
+        yield from _column_sections(laid, motion)
+        return
+    for segment in laid:
+        for start, length, angle, _, _ in pieces:
             low = max(segment.start - start, 0.0)
             high = min(segment.end - start, length)
             if low < high:
                 part = shifted(angle, low) if low else angle
                 since = start + low - segment.start
                 yield Section(high - low, part, along(segment, part, since))
-            if segment.end > start + length:
-                break
-            segment = next(waiting, None)
-        if segment is None:
-            return
+
+
+def _column_sections(laid: list[TorqueSegment], motion: Motion) -> Iterator[Section]:
+    # the same for many pieces: a segment's sections are columns
+    start, angle = motion.rows()
+    stop = np.append(start[1:], motion.duration)
+    for segment in laid:
+        first = np.searchsorted(stop, segment.start, side="right")
+        rows = slice(int(first), int(np.searchsorted(start, segment.end)))
+        low = np.maximum(segment.start - start[rows], 0.0)
+        high = np.minimum(segment.end, stop[rows]) - start[rows]
+        part = shifted(list(angle[:, rows]), low)
+        since = start[rows] + low - segment.start
+        yield Section(high - low, part, along(segment, part, since))
 
 
 def along(segment: TorqueSegment, angle: Polynomial, since: Number) -> Polynomial:
@@ -415,8 +429,22 @@ def loads(p: ElbowParameters, motion: Motion, line: Timeline, name: str) -> floa
         return float(_law.catch(p, caught[0].pre_end, caught[0].rise)[1].level)
     parts = sections(segments(p, line), motion)
     if name == "peak_torque":
-        return max(map(section_peak, parts))
-    return math.fsum(map(section_work if name == "work" else section_impulse, parts))
+        return functools.reduce(_peak_of_both, parts, -math.inf)
+    of_section = section_work if name == "work" else section_impulse
+    return math.fsum(float(np.sum(of_section(part))) for part in parts)
+
+
+def _peak_of_both(best: float, section: Section) -> float:
+    # the larger of a torque and of the largest of a section, or of a column of them
+    length, _, torque = section
+    if not isinstance(length, np.ndarray):
+        return max(best, section_peak(section))
+    best = max(best, float(np.max(np.maximum(torque[0], value(torque, length)))))
+    bounds = functools.reduce(np.maximum, bernstein(torque, length), 0.0 * length)
+    for i in np.flatnonzero(~(bounds <= best)).tolist():
+        one = [float(c[i] if np.ndim(c) else c) for c in torque]
+        best = max(best, section_peak(Section(float(length[i]), [0.0], one)))
+    return best
 
 
 def section_peak(section: Section) -> float:
@@ -425,10 +453,9 @@ def section_peak(section: Section) -> float:
     if not math.isfinite(sum(map(abs, torque))):
         return math.inf  # more than a float can hold
     peak = float(max(torque[0], value(torque, length)))
-    slope = derivative(torque)
-    if len(slope) < 2:
+    if len(torque) < 3:
         return peak
-    turns = split_at_roots(slope, length)[1:-1]
+    turns = split_at_roots(derivative(torque), length)[1:-1]
     return float(max([peak, *[value(torque, x) for x in turns]]))
 
 

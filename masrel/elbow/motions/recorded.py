@@ -53,7 +53,7 @@ class Recorded(Motion):
     (3.0, 1.0)
     """
 
-    __slots__ = ("_angles", "_knots", "_rows", "interpolation")
+    __slots__ = ("_angles", "_knots", "_pieces", "_rows", "interpolation")
 
     def __init__(
         self,
@@ -70,6 +70,7 @@ class Recorded(Motion):
         self.interpolation = interpolation
         self._knots, self._angles = times - times[0], angles
         self._rows = Rows(self._knots[:-1], self._coefficients())
+        self._pieces = self._laid()
 
     def _coefficients(self) -> Floats:
         # θ_i + u (first + u (c₂ + u c₃)), u the time since sample i
@@ -81,6 +82,13 @@ class Recorded(Motion):
         begin, finish = slopes[:-1] - chord, slopes[1:] - chord
         square, cube = -(2.0 * begin + finish) / width, (begin + finish) / width / width
         return np.stack([low, slopes[:-1], square, cube])
+
+    def _laid(self) -> list[Piece]:
+        width = np.diff(self._knots)
+        speeds = bernstein(derivative(list(self._rows.angle)), width)
+        slowest, fastest = np.min(speeds, axis=0), np.max(speeds, axis=0)
+        columns = (self._rows.start, width, self._rows.angle.T, slowest, fastest)
+        return list(map(Piece._make, zip(*(c.tolist() for c in columns), strict=True)))
 
     @property
     def start(self) -> float:
@@ -99,11 +107,7 @@ class Recorded(Motion):
 
     def pieces(self) -> list[Piece]:
         """Return the cubics, or lines, from sample to sample."""
-        width = np.diff(self._knots)
-        speeds = bernstein(derivative(list(self._rows.angle)), width)
-        slowest, fastest = np.min(speeds, axis=0), np.max(speeds, axis=0)
-        columns = (self._rows.start, width, self._rows.angle.T, slowest, fastest)
-        return list(map(Piece._make, zip(*(c.tolist() for c in columns), strict=True)))
+        return self._pieces
 
     def rows(self) -> Rows:
         """Return the pieces as arrays."""
