@@ -591,10 +591,12 @@ class _Scenes:
         time = np.full(goal.shape, math.nan)
         for piece in self.pieces:
             here = (goal > piece.angle[0]) & (goal <= value(piece.angle, piece.length))
-            if (rows := _chosen(here)) is not None:
+            share = 0.2 if len(piece.angle) == 2 else 1.0  # lines cost less than copies
+            if (rows := _chosen(here, share=share)) is not None:
                 start, length, angle = piece.rows(rows)
                 line = [angle[0] - goal[rows], *angle[1:]]
-                time[rows] = start + refined_columns(line, 0.0, length)
+                place = start + refined_columns(line, 0.0, length)
+                time[rows] = np.where(here[rows], place, time[rows])
         return time
 
     def _movement(self) -> tuple[Floats, Floats]:
@@ -748,11 +750,12 @@ class _Scenes:
                 high = np.minimum(segment.end - start, length)
                 if not (lasts := high > low).any():
                     continue
-                higher = lasts & (_bound(segment.law, angle, low, high) > best)
-                if (rows := _chosen(higher, share=0.2)) is not None:
+                bound = _bound(segment.law, angle, low, high)
+                if len(angle) == 2:  # along a line the end has the largest
+                    best = np.where(lasts, np.maximum(best, bound), best)
+                elif (rows := _chosen(lasts & (bound > best))) is not None:
                     law, part = TorqueLaw(*_rows(segment.law, rows)), _rows(angle, rows)
                     peak = _moving_peak(law, part, low[rows], high[rows], best[rows])
-                    peak = np.where(higher[rows], peak, -math.inf)
                     best[rows] = np.maximum(best[rows], peak)
         return best
 
@@ -799,12 +802,11 @@ def _moving_peak(
         for x in (low, high)
     )
     peak = np.maximum(start, end)
-    if len(angle) > 2:
-        torque = law.along(shifted(angle, low))
-        bound = functools.reduce(np.maximum, bernstein(torque, high - low))
-        if (rows := _chosen(bound > np.maximum(best, peak))) is not None:
-            turns = _turning_peak(_rows(torque, rows), (high - low)[rows])
-            peak[rows] = np.maximum(peak[rows], turns)
+    torque = law.along(shifted(angle, low))
+    bound = functools.reduce(np.maximum, bernstein(torque, high - low))
+    if (rows := _chosen(bound > np.maximum(best, peak))) is not None:
+        turns = _turning_peak(_rows(torque, rows), (high - low)[rows])
+        peak[rows] = np.maximum(peak[rows], turns)
     return np.asarray(peak)
 
 
