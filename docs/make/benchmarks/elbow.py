@@ -8,7 +8,7 @@ all functions of a table are timed in turn in one run.
 import argparse
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from math import radians
 
 import numpy as np
@@ -120,7 +120,7 @@ def many_scenes(kind: str, turns: int, *, inertia: float = 0.0) -> str:
     rows = range(N_SCENES)
     each = [joints.row(i) for i in rows], [motions.row(i) for i in rows]
     models = list(STANDARD_MODELS.values())
-    four = [models[i % 4] for i in rows] if not inertia else each[0]
+    four = [replace(models[i % 4], inertia=inertia) for i in range(4)] * (N_SCENES // 4)
     outputs = (*EVENTS, "peak_torque")
     p = {
         item.name: getattr(STANDARD_MODELS["HM1"], item.name)
