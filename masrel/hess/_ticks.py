@@ -162,11 +162,11 @@ class Ticks:
         guard.speed(velocity)
         controller = self._controller
         torque = self._decide(time_s, angle, velocity) + self._stops.torque(angle)
-        acting = controller.model_torque
         if self._is_ending:  # whatever the model asks for
             # One share a tick, however late it comes: no fall is steeper than this
-            torque = acting = self._last_torques.pop()
+            torque = self._last_torques.pop()
         if self._active_guard is not None:
+            acting = torque if self._is_ending else controller.model_torque
             self._active_guard.check(angle, velocity, acting)
         guard.torque(time_s, torque)
         self.device.command(torque)
@@ -180,8 +180,7 @@ class Ticks:
             return not self._last_torques
         if controller.is_easing:
             self.samples.flag(_POST_CATCH)
-        speed = self._arrival_speed
-        if angle < self._end_angle or not -speed <= velocity <= speed:
+        if angle < self._end_angle or abs(velocity) > self._arrival_speed:
             self._resting_since = math.inf
         elif self._resting_since == math.inf:
             self._resting_since = time_s
