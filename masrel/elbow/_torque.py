@@ -45,7 +45,7 @@ __all__ = [
 
 _MANY = 16  # pieces, above which columns of them are faster
 
-_SAME_ANGLE = 1e-15  # rad: the end of a motion, of which `end` is the nearest float
+_SAME_ANGLE = 1e-15  # rad: the end of a motion, but for rounding
 
 
 def torque(parameters: ElbowParameters, motion: Motion, times: ArrayLike) -> Floats:

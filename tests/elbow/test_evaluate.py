@@ -9,10 +9,12 @@ import pytest
 
 from masrel.elbow import (
     STANDARD_MODELS,
+    Columns,
     ConstantSpeed,
     ElbowParameters,
     MinimumJerk,
     Motion,
+    Trapezoid,
     evaluate,
     events,
     impulse,
@@ -151,6 +153,66 @@ def test_memory_is_that_of_a_chunk() -> None:
     finally:
         tracemalloc.stop()
     assert most < 6e6  # at once 200 columns would take 96 MB
+
+
+# Columns
+
+
+@pytest.mark.parametrize("kind", [ConstantSpeed, MinimumJerk, Trapezoid])
+def test_columns_are_their_rows(kind: type) -> None:
+    rng = np.random.default_rng(3)
+    joints = Columns(
+        ElbowParameters,
+        catch_angle_constant=rng.uniform(1.9, 2.3, 40),
+        catch_torque_constant=rng.uniform(1.4, 3.8, 40),
+        residual_ratio=0.3,
+        catch_travel=rng.uniform(0.2, 1.0, 40),
+        inertia=rng.choice([0.0, 0.1], 40),
+        rest_angle=rng.choice([np.nan, 0.4], 40),
+        post_catch=rng.choice(["continuous", "additive"], 40),
+        residual_reading=rng.choice(["residual", "decrease"], 40),
+        catch_rise=rng.choice([0.0, 0.05], 40),
+    )
+    name = "mean_speed" if kind is MinimumJerk else "speed"
+    rates = {name: rng.uniform(0.3, 2.4, 40)}
+    if kind is Trapezoid:
+        rates["acceleration_rate"] = 10.0
+    motions = Columns(kind, start=0.5, end=rng.uniform(2.0, 2.6, 40), **rates)
+    table = evaluate(joints, motions, (*EVENTS, *LOADS))
+    rows = [joints.row(i) for i in range(40)], [motions.row(i) for i in range(40)]
+    for i, (joint, motion) in enumerate(zip(*rows, strict=True)):
+        alone = evaluate(joint, motion, (*EVENTS, *LOADS))
+        assert table.values[i] == pytest.approx(
+            alone.values[0], rel=1e-12, nan_ok=True
+        ), i
+    objects = evaluate(*rows, (*EVENTS, *LOADS))
+    assert objects.values == pytest.approx(table.values, rel=1e-14, nan_ok=True)
+
+
+def line(**columns: object) -> Columns:
+    return Columns(ConstantSpeed, **{"start": 0.5, "end": 2.5, "speed": 1.0} | columns)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: Columns(dict, a=[1.0]), "kind: needs ElbowParameters, .* got dict"),
+        (lambda: line(speed=[1.0, 0.0]), "row 2: speed: needs more than 0"),
+        (lambda: line(speed=[1.0, np.nan, 2.0]), "row 2: speed: needs more than 0"),
+        (lambda: line(end=[2.0, 2.5, 0.5]), "row 3: start, end: need 0 <= start < end"),
+        (
+            lambda: line(start=[0.1, 0.2], end=[1.0, 1.5, 2.0]),
+            "columns: need one length",
+        ),
+        (
+            lambda: evaluate(HM3, line(start=[0.5, 2.6], end=3.0)),
+            r"motions\[1\]\.start: needs less than the end of range",
+        ),
+    ],
+)
+def test_wrong_columns_are_refused_with_their_row(call, message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        call()
 
 
 # Refused

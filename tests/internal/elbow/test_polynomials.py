@@ -1,0 +1,88 @@
+"""Places of polynomials: products of known factors, touching roots, ties."""
+
+from math import prod
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from masrel.elbow._polynomials import (
+    bernstein,
+    first_above,
+    integral,
+    product,
+    refined_columns,
+    reversed_from,
+    shifted,
+    split_at_roots,
+    value,
+)
+
+places = st.lists(
+    st.integers(1, 99).map(lambda k: k / 100), min_size=1, max_size=5, unique=True
+)
+
+
+def with_roots(*roots: float, scale: float = 1.0) -> list[float]:
+    p = [scale]
+    for root in roots:
+        p = product(p, [-root, 1.0])
+    return p
+
+
+@given(roots=places)
+def test_a_product_is_cut_at_the_roots_of_its_factors(roots: list[float]) -> None:
+    cuts = split_at_roots(with_roots(*roots), 1.0)
+    # five factors a hundredth apart magnify rounding 1e8 times at most
+    assert cuts == pytest.approx([0.0, *sorted(roots), 1.0], abs=1e-7)
+
+
+@given(roots=places, low=st.floats(0.0, 0.9))
+def test_the_first_place_above_0_is_a_root_or_the_beginning(
+    roots: list[float], low: float
+) -> None:
+    p = with_roots(*roots, scale=-1.0)
+    x = first_above(p, low, 1.0)
+    grid = np.linspace(low, 1.0, 4001)[1:-1]
+    signs = [-prod(at - root for root in roots) for at in grid.tolist()]
+    above = [at for at, sign in zip(grid.tolist(), signs, strict=True) if sign > 1e-9]
+    if above:
+        assert x is not None
+        assert x <= above[0] + 1e-6
+    if x is not None:
+        assert value(p, min(x + 1e-5, 1.0)) > -1e-9
+
+
+def test_what_touches_0_neither_cuts_nor_is_above_it() -> None:
+    touching = with_roots(0.3, 0.3)
+    assert split_at_roots(touching, 1.0) == [0.0, 1.0]
+    assert first_above([-c for c in touching], 0.0, 1.0) is None
+
+
+def test_a_place_nearer_to_the_end_than_a_tie_is_none() -> None:
+    assert first_above([-1.0 + 1e-14, 1.0], 0.0, 1.0) is None
+    assert first_above([-1.0 + 1e-12, 1.0], 0.0, 1.0) == pytest.approx(1.0)
+    cubic = with_roots(1.0 - 1e-15, 3.0, 4.0)
+    assert first_above(cubic, 0.0, 1.0) is None
+
+
+@pytest.mark.parametrize("p", [[-1.0, 4.0], [-1.0, 2.0, 8.0], [-1.0, 0.0, 0.0, 8.0]])
+def test_closed_forms_and_newton_find_the_same_kind_of_place(p: list[float]) -> None:
+    x = first_above(p, 0.0, 1.0)
+    assert x is not None
+    assert value(p, x) == pytest.approx(0.0, abs=1e-15)
+    columns = [np.array([c, c]) for c in p]
+    at = refined_columns(columns, np.zeros(2), np.ones(2))
+    assert at == pytest.approx([x, x], rel=1e-15)
+
+
+@given(p=st.lists(st.floats(-3.0, 3.0), min_size=1, max_size=6), x=st.floats(0.0, 2.0))
+def test_changes_of_variable_keep_the_values(p: list[float], x: float) -> None:
+    assert value(shifted(p, 0.7), x) == pytest.approx(value(p, 0.7 + x), abs=1e-9)
+    assert value(reversed_from(p, 0.7), x) == pytest.approx(value(p, 0.7 - x), abs=1e-9)
+    b = bernstein(p, 2.0)
+    assert min(b) - 1e-9 <= value(p, x) <= max(b) + 1e-9
+    assert value(integral(p), 1.0) == pytest.approx(
+        sum(c / (i + 1) for i, c in enumerate(p))
+    )
