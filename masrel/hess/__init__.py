@@ -15,6 +15,7 @@ from masrel.hess.device import (
 )
 from masrel.hess.friction import Friction, FrictionCompensation
 from masrel.hess.hand import Hand, SimulatedHand, YieldingHand
+from masrel.hess.human_hand import HandDistribution, HandTraits, HumanHand
 from masrel.hess.limits import DeviceLimits
 from masrel.hess.loop import run_presentation
 from masrel.hess.rendering import MotionHand, Rendering, render
@@ -31,6 +32,9 @@ __all__ = [
     "Friction",
     "FrictionCompensation",
     "Hand",
+    "HandDistribution",
+    "HandTraits",
+    "HumanHand",
     "IdleCommand",
     "MotionHand",
     "Presented",

@@ -119,8 +119,8 @@ def _exponential(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
 class Plant:
     """The arm, integrated in fixed steps from the time of its first use."""
 
-    # The arm turns in a horizontal plane (no gravity):
-    #     (I + I_arm) θ̈ = τ_hand - τ_motor - B θ̇ - β sgn(θ̇) - τ_stop
+    # The arm turns in a horizontal plane (no gravity), and the hand's own mass with it:
+    #     (I + I_arm + I_hand) θ̈ = τ_muscles - τ_motor - B θ̇ - β sgn(θ̇) - τ_stop
     # with I, B, β of (7). While the arm rests, Coulomb friction takes any value up to
     # β, so the arm truly sticks. The motor's torque follows the command, rounded to its
     # quantum, after a delay and through a first-order lag.
@@ -170,7 +170,7 @@ class Plant:
         friction = parameters.friction
         self._hand = hand
         self._yields = hand.yields
-        self._inertia = friction.inertia + parameters.arm_inertia
+        self._inertia = friction.inertia + parameters.arm_inertia  # nobody's hand
         self._viscous = friction.viscous
         self._coulomb = friction.coulomb
         self._range_end = parameters.range_end
@@ -201,12 +201,26 @@ class Plant:
     @property
     def hand_torque(self) -> float:
         """Torque of the hand on the arm now, as a sensor between them reads, N·m."""
-        hand = self._hand
         if not self._holds:
             return 0.0
+        inertia = self._hand.inertia  # its part of the net torque moves the hand itself
+        share = inertia / (self._inertia + inertia)
+        return self._muscle_torque() - share * self._net_torque()
+
+    def _muscle_torque(self) -> float:
+        # Of the hand's spring and damper, N·m
+        hand = self._hand
         angle, velocity = hand.intended(self._time)
         spring = hand.stiffness * (angle - self.angle)
         return spring + hand.damping * (velocity - self.velocity)
+
+    def _net_torque(self) -> float:
+        # What accelerates arm and hand, N·m; nothing while they stick
+        if not self._slide:
+            return 0.0
+        driven = self._force - self._lag - self._slide * self._coulomb
+        resisted = self._stiffness() * self.angle + self._damping() * self.velocity
+        return driven - resisted
 
     def angle_at(self, now_ns: int) -> float:
         """Return the angle at a time less than a step ahead, rad."""
@@ -235,7 +249,7 @@ class Plant:
             # From integers, so that rounding does not add up.
             self._time = (self.now_ns - self._start_ns) * 1e-9
             if self._yields and self._holds:
-                self._hand.feel(self._time, self.hand_torque)
+                self._hand.feel(self._time, self._muscle_torque())
                 self._force = self._force_at(self._time)
 
     def _follow(self, torque_nm: float) -> None:
@@ -269,6 +283,10 @@ class Plant:
     def _stiffness(self) -> float:
         stiffness = self._hand.stiffness if self._holds else 0.0
         return stiffness + (self._stop_stiffness if self._contact else 0.0)
+
+    def _damping(self) -> float:
+        damping = self._viscous + (self._hand.damping if self._holds else 0.0)
+        return damping + (self._stop_damping if self._contact else 0.0)
 
     def _try_step(self, level: int) -> bool:
         # One part of a step, half as long per level -> whether it was taken. It is
@@ -306,10 +324,9 @@ class Plant:
         return True
 
     def _propagator(self, step: float, level: int) -> Propagator:
-        damping = self._viscous + (self._hand.damping if self._holds else 0.0)
-        damping += self._stop_damping if self._contact else 0.0
+        inertia = self._inertia + (self._hand.inertia if self._holds else 0.0)
         factors = propagator(
-            self._inertia, damping, self._stiffness(), self._lag_time, step
+            inertia, self._damping(), self._stiffness(), self._lag_time, step
         )
         self._propagators[self._holds, self._contact, level] = factors
         return factors

@@ -5,37 +5,43 @@ https://doi.org/10.1109/TNSRE.2012.2195330, section III.B and Fig. 7.
 """
 
 import math
+from collections import deque
 from collections.abc import Iterator
 
 from masrel.elbow.joint_model import JointModel
 from masrel.elbow.parameters import ElbowParameters
 from masrel.errors import LimitExceededError, ParameterError
 from masrel.hess._soft_end import raised_cosine
+from masrel.hess._velocity import CUTOFF_RAD_S
 from masrel.hess.friction import Friction, FrictionCompensation
 from masrel.recording import PHASES
 
 _PRE_CATCH, _POST_CATCH = PHASES.index("pre-catch"), PHASES.index("post-catch")
-_INFINITE = math.inf
 _SLIP_WINDOW_S = 0.010  # twice the delay of the estimated speed
+_LOOSE_WINDOW_S = 0.005  # under 3 N·m a loose arm loses 18 times the speed's noise
+# Share of the speed a loose arm would lose: an arm in people's hands loses at most two
+# fifths, a loose one all but what the low-pass holds back.
+_LOOSE_SHARE = 0.6
 _RANGE_END_MARGIN = math.radians(3.0)  # what the loop takes for arrived, too
 
 
 class Controller:
     """Decide a torque from every sample of the motion.
 
-    Grip is lost when, in catch or post-catch, the speed falls by more than
-    `slip_speed_drop` within 10 ms, or the arm moves backwards faster than ν_th. The
-    model is then released to pre-catch at once and stays there until the arm has been
-    moved back, faster than ν_th. A fall of speed within 3 deg of the end of range does
-    not count: there it is the joint that stops the arm.
+    Grip is lost when, in catch or post-catch, the arm loses more than 0.6 of the speed
+    within 5 ms that the torque would take off it if nobody held it. A hand that gives
+    way still pushes, and its own mass goes on. The model is then released to pre-catch
+    at once and stays there until the arm has been moved back, faster than ν_th. Within
+    3 deg of the end of range no loss counts: there it is the joint that stops the arm.
 
     Where post-catch ends otherwise, the torque goes from where it stands to that of the
     law within `post_catch_ramp`, along a raised cosine. A grip that is lost meanwhile
     ends this at once.
 
-    A model that is not passive is guarded: such a fall of speed is a fault in every
-    phase, while the model resists extension; moving the arm backwards is not. The
-    paper's own law has a trigger too, and is released as the paper has it instead.
+    A model that is not passive is guarded: a fall of speed by more than
+    `slip_speed_drop` within 10 ms is a fault in every phase, while the model resists
+    extension. The paper's own law has a trigger too, and is released as the paper has
+    it instead.
 
     Parameters
     ----------
@@ -53,10 +59,13 @@ class Controller:
         Speeds below which Coulomb friction is not compensated, and above which it
         is, rad/s; see `FrictionCompensation`.
     slip_speed_drop : float, optional
-        Fall of speed that means a lost grip, rad/s. The default, 40 deg/s, lies
-        between what a held arm does and a loose one: a minimum-jerk stretch at the
-        highest mean speed of Table V, 131 deg/s, brakes by 8.5 deg/s in 10 ms, and
-        10 N·m take 95 deg/s off an arm of 0.06 kg·m² in that time.
+        Fall of speed that means a lost grip on a guarded model, rad/s. The default,
+        40 deg/s, lies between what a held arm does and a loose one: a minimum-jerk
+        stretch at the highest mean speed of Table V, 131 deg/s, brakes by 8.5 deg/s in
+        10 ms, and 10 N·m take 95 deg/s off an arm of 0.06 kg·m² in that time.
+    loose_inertia : float, optional
+        Inertia of device and arm that nobody holds, kg·m². Too large a number takes a
+        soft hand for a lost grip, too small a one notices a lost grip late.
     post_catch_ramp : float, optional
         How long the end of post-catch takes, s, 0 to 1; 0 is the step of Fig. 7. A
         guarded model has its own law there.
@@ -106,13 +115,17 @@ class Controller:
         "_compensation",
         "_easing",
         "_free_end",
+        "_gain",
         "_joint",
+        "_late_torque",
+        "_loose_share",
         "_past",
-        "_past_index",
         "_post_catch_ramp",
         "_slip_speed_drop",
         "_steepest_fall",
         "_stood",
+        "_taken",
+        "_time",
         "grip_lost",
         "is_easing",
         "is_guarded",
@@ -133,13 +146,14 @@ class Controller:
         dead_zone: float = math.radians(0.1),
         full_speed: float = math.radians(2.0),
         slip_speed_drop: float = math.radians(40.0),
+        loose_inertia: float = 0.06,
         post_catch_ramp: float = 0.1,
         rate_hz: int = 1000,
     ) -> None:
-        if not 0.0 < slip_speed_drop < math.inf:
-            raise ParameterError(
-                f"slip_speed_drop: needs more than 0, got {slip_speed_drop}"
-            )
+        slips = {"slip_speed_drop": slip_speed_drop, "loose_inertia": loose_inertia}
+        for name, value in slips.items():
+            if not 0.0 < value < math.inf:
+                raise ParameterError(f"{name}: needs more than 0, got {value}")
         if not 0.0 <= post_catch_ramp <= 1.0:
             raise ParameterError(
                 f"post_catch_ramp: needs 0 to 1 s, got {post_catch_ramp}"
@@ -155,14 +169,20 @@ class Controller:
             full_speed=full_speed,
         )
         self._slip_speed_drop = slip_speed_drop
+        self._loose_share = _LOOSE_SHARE / loose_inertia
+        self._gain = -math.expm1(-CUTOFF_RAD_S / rate_hz)
+        self._late_torque = 0.0  # that was sent, as late as the speed is, N·m
+        self._taken = 0.0  # speed that share of it has taken since the catch, rad/s
+        self._time = 0.0  # of the last sample in catch or post-catch, s
         self._post_catch_ramp = raised_cosine(post_catch_ramp, rate_hz)
         self._easing: Iterator[float] = iter(())
         self._command = self._stood = 0.0  # the torque now, at the last such end, N·m
         self._steepest_fall = 0.0  # of a tick under that ramp, N·m
         self.is_easing = False
         self._free_end = model.range_end - _RANGE_END_MARGIN
-        self._past = [0.0] * max(1, round(_SLIP_WINDOW_S * rate_hz))
-        self._past_index = 0
+        window_s = _SLIP_WINDOW_S if self.is_guarded else _LOOSE_WINDOW_S
+        n_past = max(1, round(window_s * rate_hz))
+        self._past = deque([0.0] * n_past, maxlen=n_past)  # speeds, rad/s
         self.speed_threshold = model.speed_threshold
         self.grip_lost = False
         self.model_torque = 0.0
@@ -195,29 +215,25 @@ class Controller:
             If the grip on a guarded model is lost, or the model gives no number.
         """
         self.is_new = False
-        index = self._past_index
-        drop = self._past[index] - velocity
-        self._past[index] = velocity
-        self._past_index = index + 1 if index + 1 < len(self._past) else 0
         joint = self._joint
         if self.is_guarded:
-            if (
-                drop > self._slip_speed_drop
-                and angle < self._free_end
-                and self.model_torque > 0.0
-            ):
-                self._stop_for_slip(drop)
-        elif (joint.phase != _PRE_CATCH or self.is_easing) and (
-            (velocity < -self.speed_threshold and joint.phase != _PRE_CATCH)
-            or (drop > self._slip_speed_drop and angle < self._free_end)
-        ):
-            joint.release()
-            self.grip_lost = True
-            self.is_easing = False
-            self.phase = _PRE_CATCH  # no end that takes its time
+            self._check_slip(angle, velocity)
+        elif self.phase != _PRE_CATCH or self.is_easing:
+            late = self._late_torque
+            self._late_torque = late = late + self._gain * (self._command - late)
+            taken = self._taken + self._loose_share * late * (time_s - self._time)
+            self._taken, self._time = taken, time_s
+            kept = velocity + taken
+            past = self._past
+            if kept < past[0] and angle < self._free_end:
+                joint.release()
+                self.grip_lost = True
+                self.is_easing = False
+                self.phase = _PRE_CATCH  # no end that takes its time
+            past.append(kept)
         torque = joint.step(time_s, angle, velocity)
         try:
-            is_number = -_INFINITE < torque < _INFINITE
+            is_number = torque - torque == 0.0  # neither infinite nor nan
         except TypeError:
             is_number = False
         if not is_number:  # the recording keeps the last that was one
@@ -229,13 +245,17 @@ class Controller:
         command = torque - self._compensation.torque(velocity)
         phase = joint.phase
         if self.phase != phase:
-            self._enter(phase)
+            self._enter(phase, time_s)
         if self.is_easing:
             command = self._eased(command)
         self._command = command
         return command
 
-    def _enter(self, phase: int) -> None:
+    def _enter(self, phase: int, time_s: float) -> None:
+        if self.phase == _PRE_CATCH and not self.is_guarded:
+            self._late_torque, self._taken = self._command, 0.0
+            self._time = time_s
+            self._past.extend([-math.inf] * len(self._past))  # nothing to fall from
         ends = self.phase == _POST_CATCH and phase == _PRE_CATCH
         if ends and self._post_catch_ramp and not self.is_guarded:
             self._easing = iter(self._post_catch_ramp)
@@ -258,12 +278,18 @@ class Controller:
         self.is_easing = share > 0.0 or eased != command
         return eased
 
-    def _stop_for_slip(self, drop: float) -> None:
+    def _check_slip(self, angle: float, velocity: float) -> None:
+        past = self._past
+        drop = past[0] - velocity
+        past.append(velocity)
+        limit = self._slip_speed_drop
+        if drop <= limit or angle >= self._free_end or self.model_torque <= 0.0:
+            return
         self._joint.release()
         self.grip_lost = True
         raise LimitExceededError(
             f"slip: needs an arm whose speed falls by at most "
-            f"{math.degrees(self._slip_speed_drop):g} deg/s in "
-            f"{_SLIP_WINDOW_S * 1e3:g} ms, got {math.degrees(drop):.0f} deg/s",
+            f"{math.degrees(limit):g} deg/s in {_SLIP_WINDOW_S * 1e3:g} ms, "
+            f"got {math.degrees(drop):.0f} deg/s",
             "slip",
         )

@@ -1,4 +1,4 @@
-"""Hands that move a simulated arm: a spring and a damper to an intention."""
+"""Hands that move a simulated arm: mass, spring and damper, and an intention."""
 
 import math
 from typing import ClassVar, Protocol
@@ -7,7 +7,7 @@ from masrel.errors import ParameterError
 
 
 class Hand(Protocol):
-    """A hand as the simulated arm feels it: a spring and a damper to an intention."""
+    """A hand as the simulated arm feels it: mass, spring and damper, an intention."""
 
     @property
     def stiffness(self) -> float:
@@ -17,6 +17,11 @@ class Hand(Protocol):
     @property
     def damping(self) -> float:
         """Damper towards the intended speed, N·m·s/rad."""
+        ...
+
+    @property
+    def inertia(self) -> float:
+        """What of its own moves with the arm that it holds, kg·m²."""
         ...
 
     @property
@@ -31,7 +36,7 @@ class Hand(Protocol):
 
     @property
     def yields(self) -> bool:
-        """Whether its intention depends on the torque it feels; then `feel` is told."""
+        """Whether its intention depends on the torque it feels, which `feel` takes."""
         ...
 
     def intended(self, time_s: float) -> tuple[float, float]:
@@ -57,7 +62,7 @@ class Hand(Protocol):
         time_s : float
             Time after the first reading, s; never earlier than the one before.
         torque : float
-            Torque of the hand on the arm, N·m.
+            Torque of its spring and damper, N·m.
         """
         ...
 
@@ -67,10 +72,10 @@ class SimulatedHand:
 
     The intention is a trapezoid: rest for `delay`, a short ramp up, constant speed, a
     ramp down. So the mean speed before the catch, which the catch angle depends on,
-    falls at most 2 % short of the intended one. Spring and damper are stiffer than a
-    human arm: the damper keeps the speed within 12 deg/s of the intention when the
-    catch adds 7 N·m at once, and the spring lags by about 1 deg. This hand executes
-    an intention; it is no model of how a person reacts.
+    falls at most 2 % short of the intended one. It is a clamp rather than a hand: the
+    damper keeps the speed within 12 deg/s of the intention when the
+    catch adds 7 N·m at once, and the spring lags by about 1 deg. It has no mass, does
+    not tremble and does not react: `HumanHand` does.
 
     Parameters
     ----------
@@ -119,6 +124,7 @@ class SimulatedHand:
         "_ramp_up",
         "damping",
         "end",
+        "inertia",
         "mean_speed",
         "slip_time",
         "start",
@@ -147,6 +153,7 @@ class SimulatedHand:
         self.slip_time = math.inf if slip_time is None else slip_time
         self.stiffness = stiffness
         self.damping = damping
+        self.inertia = 0.0
         self._delay = delay
         self._ramp_up = ramp_up
         self._ramp_down = ramp_down
@@ -309,7 +316,7 @@ class YieldingHand(SimulatedHand):
         time_s : float
             Time after the first reading, s; never earlier than the one before.
         torque : float
-            Torque of the hand on the arm, N·m.
+            Torque of its spring and damper, N·m.
         """
         since = time_s - self._felt_at
         self._intended_at += self._rate * since

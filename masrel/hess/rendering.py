@@ -72,6 +72,7 @@ class MotionHand:
         "stiffness",
     )
 
+    inertia: ClassVar[float] = 0.0
     yields: ClassVar[bool] = False
     _TREMOR_RAD_S: ClassVar[float] = 2.0 * math.pi * 9.0  # physiological: 8 to 12 Hz
 

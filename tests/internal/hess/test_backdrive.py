@@ -20,6 +20,7 @@ class BackAndForth:
     stiffness = 600.0
     damping = 40.0
     slip_time = math.inf
+    inertia = 0.0
     yields = False
     start = radians(35.0)
 
