@@ -152,6 +152,7 @@ _LATER: dict[str, dict[str, object]] = {
         "arrival_ms": 100.0,
         "end_ramp_ms": 100.0,
         "post_catch_ramp_ms": 100.0,
+        "loose_inertia_kg_m2": 0.06,
     },
 }
 """Keys that protocols once had not, by table, with the defaults they then had: these

@@ -157,6 +157,7 @@ def model_controller(protocol: Protocol, model: str) -> Controller:
         full_speed=math.radians(settings.full_speed_deg_s),
         slip_speed_drop=math.radians(settings.slip_speed_drop_deg_s),
         post_catch_ramp=settings.post_catch_ramp_ms * 1e-3,
+        loose_inertia=settings.loose_inertia_kg_m2,
         rate_hz=settings.rate_hz,
     )
 
