@@ -17,6 +17,7 @@ from masrel.hess.friction import Friction, FrictionCompensation
 from masrel.recording import PHASES
 
 _PRE_CATCH, _POST_CATCH = PHASES.index("pre-catch"), PHASES.index("post-catch")
+_INFINITE = math.inf
 _SLIP_WINDOW_S = 0.010  # twice the delay of the estimated speed
 _LOOSE_WINDOW_S = 0.005  # under 3 N·m a loose arm loses 18 times the speed's noise
 # Share of the speed a loose arm would lose: an arm in people's hands loses at most two
@@ -233,7 +234,7 @@ class Controller:
             past.append(kept)
         torque = joint.step(time_s, angle, velocity)
         try:
-            is_number = torque - torque == 0.0  # neither infinite nor nan
+            is_number = -_INFINITE < torque < _INFINITE
         except TypeError:
             is_number = False
         if not is_number:  # the recording keeps the last that was one
@@ -255,7 +256,7 @@ class Controller:
         if self.phase == _PRE_CATCH and not self.is_guarded:
             self._late_torque, self._taken = self._command, 0.0
             self._time = time_s
-            self._past.extend([-math.inf] * len(self._past))  # nothing to fall from
+            self._past.extend([-_INFINITE] * len(self._past))  # nothing to fall from
         ends = self.phase == _POST_CATCH and phase == _PRE_CATCH
         if ends and self._post_catch_ramp and not self.is_guarded:
             self._easing = iter(self._post_catch_ramp)

@@ -73,9 +73,11 @@ def people(n_hands: int, seed: int) -> Iterator[Person]:
         )
 
 
-def presented(person: Person, slip_time: float | None = None) -> Presented:
+def presented(
+    person: Person, slip_time: float | None = None, **options: float
+) -> Presented:
     """Present the model to a hand."""
-    return _presented(person, _hand(person, slip_time))
+    return _presented(person, _hand(person, slip_time), **options)
 
 
 def _hand(person: Person, slip_time: float | None) -> HumanHand:
@@ -88,9 +90,10 @@ def _hand(person: Person, slip_time: float | None) -> HumanHand:
     )
 
 
-def _presented(person: Person, hand: SimulatedHand) -> Presented:
+def _presented(person: Person, hand: SimulatedHand, **options: float) -> Presented:
     clock = SimulatedClock()
-    controller = Controller(STANDARD_MODELS[person.model], start_angle=START)
+    model = STANDARD_MODELS[person.model]
+    controller = Controller(model, start_angle=START, **options)
     with open_device("simulated", clock=clock, hand=hand, range_end=END) as device:
         return run_presentation(
             device, controller, clock=clock, limits=DeviceLimits(), end_angle=END
@@ -110,7 +113,7 @@ def outcome(person: Person) -> Outcome:
             damping=person.traits.damping,
         ),
     )
-    columns = made.recording.columns
+    columns = _held(made)
     return Outcome(
         person=person,
         fault=_kind(made),
@@ -119,9 +122,15 @@ def outcome(person: Person) -> Outcome:
         recoiled=_recoiled(columns),
         lost_before=_lost_before(columns),
         clamp_fault=_kind(clamp),
-        clamp_lost_before=_lost_before(clamp.recording.columns),
+        clamp_lost_before=_lost_before(_held(clamp)),
         slip_s=_released_after(person, columns),
     )
+
+
+def _held(made: Presented) -> dict[str, NDArray[np.float64]]:
+    # Without the ramp at the end
+    n_rows = made.recording.n_presented
+    return {name: column[:n_rows] for name, column in made.recording.columns.items()}
 
 
 def _kind(made: Presented) -> str | None:
@@ -133,7 +142,7 @@ def _is_law(person: Person, columns: dict[str, NDArray[np.float64]]) -> bool:
         STANDARD_MODELS[person.model],
         START,
         columns["time_s"],
-        np.radians(columns["angle_deg"]),
+        np.rint(columns["angle_deg"] / 0.005) * radians(0.005),  # as it was read
         np.radians(columns["velocity_deg_s"]),
     )
     return bool(np.allclose(columns["model_torque_nm"], torques, rtol=0.0, atol=1e-9))
@@ -155,11 +164,15 @@ def _lost_before(columns: dict[str, NDArray[np.float64]]) -> bool:
     return bool(np.any(in_catch & (sudden | (velocity < -20.0))[1:]))
 
 
-def _released_after(person: Person, held: dict[str, NDArray[np.float64]]) -> float:
-    # It lets go in catch or post-catch, where it can be noticed before the joint's end
+def slip_time(person: Person, held: dict[str, NDArray[np.float64]]) -> float:
+    """Return when a hand lets go, s: in a catch or after, 20 ms before the end."""
     ahead = held["angle_deg"] + NOTICE_S * np.maximum(held["velocity_deg_s"], 0.0)
     at = np.flatnonzero((held["phase"] != PRE_CATCH) & (ahead < FREE_END_DEG))
-    slip_s = float(held["time_s"][at[int(person.slips * at.size)]]) + 0.0003
+    return float(held["time_s"][at[int(person.slips * at.size)]]) + 0.0003
+
+
+def _released_after(person: Person, held: dict[str, NDArray[np.float64]]) -> float:
+    slip_s = slip_time(person, held)
     slipped = presented(person, slip_s).recording.columns
     free = (slipped["time_s"] > slip_s) & (slipped["phase"] == PRE_CATCH)
     return float(slipped["time_s"][np.flatnonzero(free)[0]]) - slip_s
@@ -167,7 +180,8 @@ def _released_after(person: Person, held: dict[str, NDArray[np.float64]]) -> flo
 
 def shares(columns: dict[str, NDArray[np.float64]]) -> NDArray[np.float64]:
     """Return the speed lost in 5 ms as a share of what a loose arm would lose."""
-    velocity, torque = np.radians(columns["velocity_deg_s"]), columns["model_torque_nm"]
+    velocity = np.radians(columns["velocity_deg_s"])
+    torque = columns["command_torque_nm"]
     late, gain = np.zeros_like(torque), -math.expm1(-0.18)
     for index in range(1, torque.size):
         late[index] = late[index - 1] + gain * (torque[index - 1] - late[index - 1])

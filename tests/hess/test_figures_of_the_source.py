@@ -13,7 +13,7 @@ from .test_controller import table_5
 
 MODELS = sorted(STANDARD_MODELS)
 LIMITS = DeviceLimits(torque=28.0)
-RELEASED_MS = 25.0  # docs/driver.md says so
+RELEASED_MS, NEAR_THE_END_MS = 10.0, 29.0  # docs/driver.md says so
 FASTEST_DEG_S = 250.0
 
 
@@ -74,7 +74,9 @@ def test_after_a_slip_the_torque_is_that_of_pre_catch_and_the_arm_slow_enough(
             slipped = columns(model, speed, slip_time=slip_s)
             after = slipped["time_s"] > slip_s
             released = int(np.flatnonzero(after & (slipped["phase"] == 0))[0])
-            assert (slipped["time_s"][released] - slip_s) * 1e3 <= RELEASED_MS
+            at_end = slipped["angle_deg"][slipped["time_s"] < slip_s + 0.02].max() > 143
+            most = NEAR_THE_END_MS if at_end else RELEASED_MS
+            assert (slipped["time_s"][released] - slip_s) * 1e3 <= most
             # From then on it is (1), and never anything else
             angle = np.radians(slipped["angle_deg"][released:])
             velocity = np.radians(slipped["velocity_deg_s"][released:])

@@ -1,0 +1,119 @@
+"""What docs/driver.md says of people's hands: its table and its figure.
+
+``python -m docs.make.hands [HANDS]`` prints the table and draws the figure; a thousand
+hands take some minutes.
+"""
+
+import sys
+from math import degrees, radians
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from tqdm import tqdm
+
+from masrel.hess import HandTraits
+from masrel.recording import PHASES
+from tests.hess.held import (
+    FREE_END_DEG,
+    PRE_CATCH,
+    Person,
+    outcome,
+    people,
+    presented,
+    shares,
+    slip_time,
+    table,
+)
+
+FIGURE = Path(__file__).parents[1] / "figures" / "driver_hands.png"
+HANDS = {600.0: ("#0072B2", "-"), 60.0: ("#009E73", "--"), 12.0: ("#E69F00", "-.")}
+VERMILLION, GREY = "#D55E00", "#6B6B6B"
+N_DRAWN = 200  # hands in the right half
+
+
+def draw(path: Path) -> None:
+    """Draw speeds through a catch, and how much of a loose arm's loss is lost."""
+    mpl.rcParams.update({"font.size": 9, "axes.spines.top": False})
+    mpl.rcParams.update({"axes.spines.right": False, "savefig.dpi": 200})
+    figure = Figure(figsize=(7.2, 3.4), layout="constrained")
+    speeds, losses = figure.subplots(1, 2)
+    _draw_speeds(speeds)
+    _draw_losses(losses)
+    speeds.set_title("SIMULATED DATA", loc="left", color=GREY, fontsize=7)
+    figure.savefig(path)
+
+
+def _draw_speeds(axes: Axes) -> None:
+    for stiffness, (colour, line) in HANDS.items():
+        traits = HandTraits(stiffness=stiffness, damping=0.05 * stiffness)
+        person = Person(
+            traits=traits, model="HM4", mean_speed=radians(100.0), slips=0.0
+        )
+        _draw_speed(axes, person, None, f"{stiffness:g} N·m/rad", colour, line)
+    _draw_speed(axes, person, 0.02, "lets go after 20 ms", VERMILLION, ":")
+    axes.set(
+        xlabel="time from the catch of HM4, ms",
+        ylabel="speed, deg/s",
+        xlim=(-50.0, 150.0),
+        ylim=(-60.0, 125.0),
+    )
+    axes.axhline(0.0, color=GREY, linewidth=0.5)
+    axes.legend(frameon=False, loc="lower left", fontsize=7)
+
+
+def _draw_speed(
+    axes: Axes,
+    person: Person,
+    slips_s: float | None,
+    label: str,
+    colour: str,
+    line: str,
+) -> None:
+    held = presented(person).recording.columns
+    catch_s = held["time_s"][np.argmax(held["phase"] == PHASES.index("catch"))]
+    if slips_s is not None:
+        held = presented(person, float(catch_s) + slips_s).recording.columns
+    axes.plot(
+        (held["time_s"] - catch_s) * 1e3,
+        held["velocity_deg_s"],
+        line,
+        color=colour,
+        label=label,
+    )
+
+
+def _draw_losses(axes: Axes) -> None:
+    held, loose = [], []
+    for person in people(N_DRAWN, seed=1):
+        columns = presented(person).recording.columns
+        counts = columns["phase"] != PRE_CATCH
+        counts &= columns["angle_deg"] < FREE_END_DEG
+        held.append(shares(columns)[counts].max())
+        slip_s = slip_time(person, columns)
+        # By so small an inertia no lost grip is ever noticed
+        slipped = presented(person, slip_s, loose_inertia=1e-3).recording.columns
+        after = (slipped["time_s"] > slip_s) & (slipped["time_s"] < slip_s + 0.02)
+        loose.append(shares(slipped)[after].max())
+    bins = np.linspace(0.0, 1.2, 49)
+    axes.hist(held, bins, color=HANDS[600.0][0])
+    axes.hist(loose, bins, color=VERMILLION)
+    axes.axvline(0.6, color=GREY, linestyle="--", linewidth=1.0)
+    axes.set(
+        xlabel="speed lost in 5 ms, as a share of a loose arm's",
+        ylabel=f"of {N_DRAWN} hands",
+    )
+    axes.text(0.61, 20.0, "grip lost\nfrom here on", color=GREY, fontsize=8)
+    axes.text(0.2, 35.0, "held", color=HANDS[600.0][0])
+    axes.text(1.06, 40.0, "let go", color=VERMILLION)
+
+
+if __name__ == "__main__":
+    n_hands = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
+    draw(FIGURE)
+    drawn = list(people(n_hands, seed=0))
+    print(table([outcome(person) for person in tqdm(drawn)]))
+    speeds = [degrees(person.mean_speed) for person in drawn]
+    print(f"{min(speeds):.0f} to {max(speeds):.0f} deg/s")
