@@ -4,7 +4,13 @@ from math import radians
 import pytest
 
 from masrel.errors import DeviceError, ParameterError
-from masrel.hess import Friction, SimulatedClock, SimulatedHand
+from masrel.hess import (
+    Friction,
+    HandTraits,
+    HumanHand,
+    SimulatedClock,
+    SimulatedHand,
+)
 from masrel.hess._plant import PlantParameters
 from masrel.hess._simulated import SimulatedDevice
 
@@ -183,3 +189,23 @@ def test_a_hand_that_has_let_go_or_not_begun_gives_no_torque() -> None:
         assert device.hand_torque == 0.0
     hand = SimulatedHand(start=1.0, end=2.5, mean_speed=1.5)
     assert SimulatedDevice(clock=SimulatedClock(), hand=hand).hand_torque == 0.0
+
+
+def test_a_sensor_reads_what_a_heavy_hand_gives_the_arm() -> None:
+    # What moves the arm's own 0.0597 kg·m² is the hand less motor and friction
+    clock = SimulatedClock()
+    traits = HandTraits(stiffness=60.0, damping=3.0, inertia=0.1)
+    hand = HumanHand(traits, start=1.0, end=2.5, mean_speed=1.5)
+    device = SimulatedDevice(clock=clock, hand=hand, resolution=1e-9)
+    given, last = 0.0, 1.0
+    with device:
+        for tick in range(400):
+            angle = device.read().angle
+            if tick:
+                viscous, coulomb = 0.168 * (angle - last), 0.189e-3 * (angle > last)
+                given -= viscous + coulomb + device.motor_torque * 1e-3
+            given += device.hand_torque * 1e-3
+            speed, last = (angle - last) / 1e-3, angle
+            device.command(3.0 if tick > 200 else 0.0)
+            clock.sleep_until_ns(clock.now_ns() + 1_000_000)
+    assert given == pytest.approx(0.0597 * speed, abs=0.004)
