@@ -224,14 +224,14 @@ class Controller:
             self._late_torque = late = late + self._gain * (self._command - late)
             taken = self._taken + self._loose_share * late * (time_s - self._time)
             self._taken, self._time = taken, time_s
-            kept = velocity + taken
+            restored = velocity + taken
             past = self._past
-            if kept < past[0] and angle < self._free_end:
+            if restored < past[0] and angle < self._free_end:
                 joint.release()
                 self.grip_lost = True
                 self.is_easing = False
                 self.phase = _PRE_CATCH  # no end that takes its time
-            past.append(kept)
+            past.append(restored)
         torque = joint.step(time_s, angle, velocity)
         try:
             is_number = -_INFINITE < torque < _INFINITE
