@@ -244,6 +244,7 @@ def _write(
         fit_document,
         fit_figures,
         fit_table,
+        residual_tables,
     )
 
     if folder is not None:
@@ -256,7 +257,7 @@ def _write(
         output,
         document=lambda: fit_document(fitted) | comparison_document(compared),
         text=lambda: fit_table(fitted),
-        more=comparison_tables(compared),
+        more=(*residual_tables(fitted), *comparison_tables(compared)),
     )
 
 

@@ -44,7 +44,7 @@ def _joint_table(fit: ElbowFit) -> Table:
     slow = sum(trial.pace == "slow" for trial in fit.trials)
     fast = len(fit.trials) - slow
     notes = (
-        *_lack_of_fit_notes(fit.lack_of_fit),
+        fit.lack_of_fit.sentence,
         f"{slow} slow and {fast} fast trials; intervals are clustered by trial.",
         f"Slow trials differ from (1) by {number(100.0 * fit.relative_error, 1)} % of "
         f"their mean torque; all trials from the law by {number(fit.torque_sd, 3)} N·m "
@@ -55,25 +55,44 @@ def _joint_table(fit: ElbowFit) -> Table:
     return _table("joint", "Parameters of the joint", rows, notes, fit)
 
 
-def _lack_of_fit_notes(lack: LackOfFit) -> list[str]:
-    phases = "; ".join(
-        f"{p.phase} {number(p.sd, 3)}, {number(p.runs, 2)}, "
-        f"{number(p.autocorrelation, 2)}"
-        for p in lack.phases
-    )
+def residual_tables(fit: ElbowFit | FrictionFit) -> tuple[Table, ...]:
+    """Return the table of what a fitted joint leaves of the torque, phase by phase."""
+    if not isinstance(fit, ElbowFit):
+        return ()
+    lack = fit.lack_of_fit
     notes = [
-        lack.sentence,
-        "Left over (N·m, root mean square; runs of one sign over those of independent "
-        f"samples; autocorrelation of neighbours): {phases}.",
+        "Runs of one sign over those that independent samples would have; "
+        "autocorrelation of neighbouring samples."
     ]
     if not math.isnan(lack.after_to_before):
-        notes.append(
-            f"From the catch on {number(lack.after_to_before, 2)} times what is left "
-            "before it."
-        )
+        ratio = number(lack.after_to_before, 2)
+        notes.append(f"From the catch on {ratio} times what is left before it.")
     if not math.isnan(lack.rest_sd):
         notes.append(f"Noise at rest {number(lack.rest_sd, 3)} N·m.")
-    return notes
+    table = Table(
+        name="residuals",
+        caption="What is left of the torque",
+        columns=(
+            Column(key="phase", heading="Phase", align="left"),
+            Column(key="n_samples", heading="Samples"),
+            Column(key="sd", heading="Root mean square (N·m)"),
+            Column(key="runs", heading="Runs"),
+            Column(key="autocorrelation", heading="Autocorrelation"),
+        ),
+        rows=tuple(
+            (
+                phase.phase,
+                phase.n_samples,
+                number(phase.sd, 3),
+                number(phase.runs, 2),
+                number(phase.autocorrelation, 2),
+            )
+            for phase in lack.phases
+        ),
+        notes=tuple(notes),
+        data="simulated" if fit.simulated else "recorded",
+    )
+    return (table,)
 
 
 def comparison_tables(compared: Sequence[ComparedFit]) -> tuple[Table, ...]:

@@ -8,7 +8,6 @@ of a device.
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from masrel.elbow.identification._between import intermediate_models
     from masrel.elbow.identification._comparison import ComparedFit, compare_fits
     from masrel.elbow.identification._friction import FrictionFit, fit_friction
     from masrel.elbow.identification._identify import fit
@@ -17,7 +16,11 @@ if TYPE_CHECKING:
         PhaseResidual,
         StructureTest,
     )
-    from masrel.elbow.identification._model_file import as_toml, model_document
+    from masrel.elbow.identification._model_file import (
+        as_toml,
+        intermediate_models,
+        model_document,
+    )
     from masrel.elbow.identification._reading import Movement, read_movement
     from masrel.elbow.identification._results import ElbowFit, FittedParameter, Step
 
@@ -51,7 +54,7 @@ _HOMES = {
     "compare_fits": "_comparison",
     "fit": "_identify",
     "fit_friction": "_friction",
-    "intermediate_models": "_between",
+    "intermediate_models": "_model_file",
     "model_document": "_model_file",
     "read_movement": "_reading",
 }

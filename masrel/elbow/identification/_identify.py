@@ -40,11 +40,11 @@ from masrel.elbow.identification._quantities import (
 )
 from masrel.elbow.identification._reading import Movement, even_samples, read_movement
 from masrel.elbow.identification._results import (
+    UNDETERMINED,
     ElbowFit,
     FittedParameter,
     Step,
     fitted,
-    undetermined,
 )
 from masrel.elbow.identification._steps import (
     SlowFit,
@@ -739,7 +739,9 @@ def _all_estimates(
     return tuple(
         by_name[name]
         if name in by_name
-        else undetermined(name, level, reasons.get(name))
+        else FittedParameter(
+            name=name, level=level, reason=reasons.get(name, UNDETERMINED)
+        )
         for name in ALL_QUANTITIES
         if name in by_name or name not in optional
     )

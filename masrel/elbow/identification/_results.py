@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 _Floats = NDArray[np.float64]
 
+UNDETERMINED = "these trials do not determine it"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FittedParameter:
@@ -45,13 +47,13 @@ class FittedParameter:
     """
 
     name: str
-    value: float
-    standard_error: float
-    df: float
-    low: float
-    high: float
+    value: float = math.nan
+    standard_error: float = math.nan
+    df: float = math.nan
+    low: float = math.nan
+    high: float = math.nan
     level: float
-    n_trials: int
+    n_trials: int = 0
     reason: str | None = None
 
     def covers(self, truth: float) -> bool:
@@ -216,7 +218,7 @@ def fitted(
         half = float(stdtrit(df, 0.5 + 0.5 * level)) * error
         reason = None
         if math.isnan(value):
-            reason = (reasons or {}).get(name, "these trials do not determine it")
+            reason = (reasons or {}).get(name, UNDETERMINED)
         elif fit.n_trials[place] < 2 or not half > 0.0:
             error = half = df = math.nan
             reason = "an interval by trial needs two trials that differ"
@@ -236,21 +238,3 @@ def fitted(
             )
         )
     return tuple(estimates)
-
-
-def undetermined(
-    name: str, level: float, reason: str | None, n_trials: int = 0
-) -> FittedParameter:
-    """Return a parameter without a value."""
-    nan = math.nan
-    return FittedParameter(
-        name=name,
-        value=nan,
-        standard_error=nan,
-        df=nan,
-        low=nan,
-        high=nan,
-        level=level,
-        n_trials=n_trials,
-        reason=reason or "these trials do not determine it",
-    )

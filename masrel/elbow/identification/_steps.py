@@ -30,7 +30,6 @@ from masrel.elbow.identification._results import (
     FittedParameter,
     Step,
     fitted,
-    undetermined,
 )
 from masrel.elbow.identification._travels import (
     CensoredTravels,
@@ -188,7 +187,10 @@ def fit_catch_line(
             f"needs catches at mean speeds that differ by {math.degrees(_MIN_SPAN):g} "
             f"deg/s or more above {math.degrees(slowest):g} deg/s"
         )
-        estimates = tuple(undetermined(n, level, reason, len(used)) for n in names)
+        estimates = tuple(
+            FittedParameter(name=name, level=level, n_trials=len(used), reason=reason)
+            for name in names
+        )
         return Step(name=title, estimates=estimates, residual_sd=math.nan)
     design = np.stack([np.ones_like(speeds), -speeds], axis=1)
     angles = np.array([catch.angle for catch in used])

@@ -72,7 +72,14 @@ def quiet_fit(movements: list[Movement], **options: object) -> ElbowFit:
         return fit(movements, **options)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("wrong", WRONG)
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        "gravity",
+        "rise",
+        *(pytest.param(each, marks=pytest.mark.slow) for each in list(WRONG)[1:4]),
+    ],
+)
 def test_what_an_arm_has_and_the_law_has_not_is_announced(wrong: str) -> None:
     made = fit(study(HM3, seed=5000, arm=WRONG[wrong]))
     lack = made.lack_of_fit
@@ -99,6 +106,7 @@ def test_the_right_law_fits_and_what_is_left_is_noise() -> None:
         assert phase.autocorrelation == pytest.approx(0.0, abs=0.1)
 
 
+@pytest.mark.slow
 def test_runs_and_autocorrelation_see_what_is_left() -> None:
     phases = fit(study(HM3, seed=5000, arm=WRONG["lag"])).lack_of_fit.phases
     peak = next(p for p in phases if p.phase == "peak")
@@ -118,19 +126,6 @@ def test_few_trials_are_undecided() -> None:
     assert lack.verdict == "undecided"
     assert "too few trials to tell" in lack.sentence
     assert lack.tests == ()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("wrong", ["gravity", "arm_inertia", "drift"])
-def test_what_is_fitted_comes_back(wrong: str) -> None:
-    made = fit(study(HM3, seed=5001, arm=WRONG[wrong]), **{wrong: "fitted"})
-    assert made.lack_of_fit.verdict == "fits"
-    if wrong == "drift":
-        assert np.mean(made.drifts) == pytest.approx(0.3, abs=0.02)
-    else:
-        truth = 0.5 if wrong == "gravity" else 0.05
-        assert made[wrong].covers(truth)
-    assert made.arm[wrong] == "fitted"
 
 
 @pytest.mark.slow
@@ -180,14 +175,13 @@ def sampled(motion: object, name: str, rng: np.random.Generator) -> Movement:
     )
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_constant_speeds_do_not_tell_b_from_the_sensors_zero(seed: int) -> None:
     with pytest.raises(RecordingError, match=r"do not tell b \(.*standard error"):
         fit(motor("constant", seed))
 
 
-@pytest.mark.parametrize("seed", [1, 2])
-@pytest.mark.parametrize("fast", ["hand", "motor"])
+@pytest.mark.parametrize(("seed", "fast"), [(1, "hand"), (2, "motor")])
 def test_constant_speeds_are_identified_where_the_zero_is_known(
     seed: int, fast: str
 ) -> None:
@@ -232,7 +226,7 @@ def counts(case: dict[str, object], seeds: range, **options: object) -> Counter[
 
 # 40 seeds: of intervals that hold 95 %, fewer than 34 hold once in 70 000 times.
 COVERED = [
-    pytest.param(4, 2, marks=pytest.mark.slow),
+    pytest.param(2, 1, marks=pytest.mark.slow),
     pytest.param(40, 34, marks=pytest.mark.long),
 ]
 
@@ -242,10 +236,10 @@ COVERED = [
 def test_with_the_right_term_every_interval_holds(
     wrong: str, n: int, fewest: int
 ) -> None:
-    if wrong in ("lag", "rise"):
-        n, fewest = (n // 2, fewest // 2) if n < 40 else (n, fewest)
-    total = counts({"arm": WRONG[wrong]}, range(5000, 5000 + n), **{wrong: "fitted"})
+    seeds = range(5000, 5000 + n)
+    total = counts({"arm": WRONG[wrong]}, seeds, **{wrong: "fitted"})
     assert all(total[name] >= fewest for name in NAMES), total
+    assert total["fits"] >= fewest
 
 
 @pytest.mark.long
@@ -272,7 +266,7 @@ def test_without_it_every_parameter_is_covered_or_the_fit_says_so(
 @pytest.mark.parametrize(
     ("n", "most"),
     [
-        pytest.param(4, 0, marks=pytest.mark.slow),
+        pytest.param(2, 0, marks=pytest.mark.slow),
         pytest.param(400, 20, marks=pytest.mark.long),
     ],
 )
@@ -286,7 +280,7 @@ def test_the_right_law_is_seldom_called_wrong(case: str, n: int, most: int) -> N
     assert verdicts["undecided"] == 0
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_leaving_trials_out_finds_what_is_missing() -> None:
     compared = compare_fits(study(HM3, seed=5001, arm=WRONG["gravity"]))
     chosen = [each for each in compared if each.is_chosen]
