@@ -230,7 +230,8 @@ def sum_groups(
         return groups
     rows, freq = np.asarray(rows), np.asarray(freq)
     ratings = rows.sum(axis=1)
-    for size in np.unique(ratings).tolist():
+    # the sizes there are; `np.unique` loads masked arrays
+    for size in np.flatnonzero(np.bincount(ratings)).tolist():
         same = ratings == size
         of, often = rows[same], freq[same]
         weighed = of * often[:, None]

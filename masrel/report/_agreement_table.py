@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import masrel
 from masrel.agreement import COEFFICIENTS, BandScale, benchmark, strength
@@ -17,10 +18,12 @@ from masrel.report._estimate_words import (
     promise,
     sentence,
 )
-from masrel.report._figure_data import Forest, ForestRow
 from masrel.report._row_notes import NotedRow, row_notes
 from masrel.report._tables import SIMULATED, Column, Table, Value, capital, percent
 from masrel.scales import Scale
+
+if TYPE_CHECKING:
+    from masrel.report._figure_data import Forest, ForestRow
 
 _POPULATIONS = {"items": "items", "raters": "raters", "both": "items and raters"}
 
@@ -350,8 +353,10 @@ def _why_null(estimate: Estimate) -> list[str]:
     return why
 
 
-def agreement_forest(rows: Sequence[AgreementRow], target: Target) -> Forest:
+def agreement_forest(rows: Sequence[AgreementRow], target: Target) -> "Forest":
     """Return what a figure shows: the estimates and their intervals."""
+    from masrel.report._figure_data import Forest
+
     # what is in the units of the ratings is on no axis of agreement
     rows = [row for row in rows if not _is_in_units(row)]
     if not rows:
@@ -367,7 +372,7 @@ def agreement_forest(rows: Sequence[AgreementRow], target: Target) -> Forest:
     )
 
 
-def _forest_row(row: AgreementRow, target: Target, *, has_group: bool) -> ForestRow:
+def _forest_row(row: AgreementRow, target: Target, *, has_group: bool) -> "ForestRow":
     interval = row.estimate.interval
     # what neither the axis nor the legend says of the interval
     details = []

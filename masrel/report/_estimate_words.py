@@ -3,12 +3,14 @@
 import math
 from collections.abc import Callable
 from functools import partial
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from masrel.agreement import COEFFICIENTS
 from masrel.estimates import Estimate, Interval
-from masrel.report._figure_data import ForestRow
 from masrel.report._tables import UNDEFINED, counted, interval_text, number, percent
+
+if TYPE_CHECKING:
+    from masrel.report._figure_data import ForestRow
 
 Noun = Literal["model", "item"]
 """What is rated: a haptic model in a study, any item elsewhere."""
@@ -44,8 +46,10 @@ def coefficient_name(coefficient: str, weights: str = "identity") -> str:
 
 def forest_row(
     label: str, estimate: Estimate | None, *, detail: str = "", group: str = ""
-) -> ForestRow:
+) -> "ForestRow":
     """Return the row of an estimate in a forest, or one that says there is none."""
+    from masrel.report._figure_data import ForestRow  # a table has no figure
+
     value = interval = None
     text, has_zero = NOT_THERE, False
     if estimate is not None:
