@@ -28,6 +28,9 @@ _WAYS = {
     "solve_ivp": ("solve_ivp, RK45 with events", GREY, "^", 5),
 }
 
+# where the settings stand beside their points, so that they cover nothing
+_LABELS = {"sampled": ((5, 5), "left"), "solve_ivp": ((-6, -8), "right")}
+
 
 def draw_work(points: Sequence["Point"]) -> None:
     """Error of the events against the time that finding them takes."""
@@ -40,12 +43,12 @@ def draw_work(points: Sequence["Point"]) -> None:
             y = [max(point.error_s, 1e-17) for point in of_way]
             axes.loglog(x, y, marker=marker, color=colour, markersize=size, lw=0.8,
                         label=label)  # fmt: skip
-            if way in ("sampled", "solve_ivp"):
+            if way in _LABELS:
+                offset, side = _LABELS[way]
                 for point, at, height in zip(of_way, x, y, strict=True):
                     axes.annotate(
-                        point.setting, (at, height), xytext=(6, 4), fontsize=6.5,
-                        textcoords="offset points", color=colour,
-                        bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.3},
+                        point.setting, (at, height), xytext=offset, fontsize=6.5,
+                        textcoords="offset points", color=colour, ha=side,
                     )  # fmt: skip
         axes.set_xlabel("processor time of one stretch (ms)")
         axes.set_ylabel("largest error of catch\nand catch end (s)")
