@@ -225,29 +225,26 @@ class ElbowParameters:
         >>> joint = STANDARD_MODELS["HM3"]
         >>> bound = joint.largest_torque(start_angle=radians(30), speed=radians(92))
         >>> round(bound, 3)
-        12.039
+        12.897
         """
         rest = start_angle if self.rest_angle is None else self.rest_angle
         end = self.range_end
-        late = self.catch_angle(0.0)  # (6): a slow stretch catches last
-        latest = min(max(late, start_angle), end)
-        earliest = min(max(self.smallest_catch_angle, start_angle), latest)
-        damped = self.damping * speed
+        first = min(self.catch_angle(0.0), self.smallest_catch_angle)  # (6)
+        earliest = min(max(first, start_angle), end)
+        held = end if self.post_catch == "additive" else earliest
+        climb = max(end - earliest - self.catch_travel, 0.0)
         rise = self.catch_torque_constant * speed  # H·v_c of (3)
-        bounds = [
-            damped + self.stiffness * max(abs(start_angle - rest), abs(end - rest)),
-            damped + self.stiffness * (latest - rest) + rise,
-        ]
-        for catch in (earliest, latest):  # (5) is linear in the catch angle
-            held = end if self.post_catch == "additive" else catch
-            climb = max(end - catch - self.catch_travel, 0.0)
-            bounds.append(
-                damped
-                + self.stiffness * (held - rest)
-                + self.residual_share * rise
-                + self.post_catch_stiffness * climb
-            )
-        return max(bounds)
+        spring = self.stiffness * (end - rest)
+        return self.damping * speed + max(
+            abs(spring),
+            self.stiffness * abs(start_angle - rest),
+            # an arm led slowly past the catch angle catches where it is first fast
+            spring + rise,
+            # (5), whose torque is convex in the angle of the catch
+            self.stiffness * (held - rest)
+            + self.residual_share * rise
+            + self.post_catch_stiffness * climb,
+        )
 
     def largest_slope(self, *, speed: float) -> tuple[float, float]:
         """Return the largest slopes of the torque where it does not jump.

@@ -58,12 +58,31 @@ def test_no_stretch_passes_the_largest_torque(name: str, post_catch: str) -> Non
         speed, end = radians(degrees), model.range_end
         there = ConstantSpeed(start=START, end=end, speed=speed)
         gentle = MinimumJerk(start=START, end=end, mean_speed=speed * 8 / 15)
+        slow = ConstantSpeed(start=START, end=end - 0.1, speed=radians(15))
+        late = Joined([slow, ConstantSpeed(start=end - 0.1, end=end, speed=speed)])
         bound = model.largest_torque(start_angle=START, speed=speed)
-        for stretch in (there, gentle):
+        for stretch in (there, gentle, late):
             motion = Joined([stretch, Reversed(motion=stretch)])
             shares.append(float(abs(stepped(model, motion)).max()) / bound)
     assert max(shares) <= 1.0
     assert max(shares) > 0.8  # a bound that is reached, more or less
+
+
+def test_a_catch_at_the_smallest_angle_may_be_after_that_of_a_slow_stretch() -> None:
+    # nu_L is above nu_H: slower than nu_H it catches at L - 0.35 · 2 = 0.8, else at 1.4
+    model = ElbowParameters(
+        catch_angle_constant=1.5,
+        catch_torque_constant=20.0,
+        residual_ratio=0.0,
+        catch_travel=1.0,
+        slowest_mean_speed=2.0,
+        smallest_catch_angle=1.4,
+        post_catch_stiffness=0.0,
+    )
+    stretch = ConstantSpeed(start=START, end=2.0, speed=1.0)
+    torque = stepped(model, Joined([stretch]))
+    assert torque.max() > 21.26 + 3.15 * (1.4 - START)
+    assert torque.max() <= model.largest_torque(start_angle=START, speed=1.0)
 
 
 def test_no_sample_is_steeper_than_the_largest_slope() -> None:
