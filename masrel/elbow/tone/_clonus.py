@@ -152,15 +152,17 @@ class Clonus(ToneModel):
 class ClonusStepper:
     """Clonus that sees one sample at a time."""
 
-    __slots__ = ("_begun", "_model", "phase")
+    __slots__ = ("_begun", "_is_given_up", "_model", "phase")
 
     def __init__(self, model: Clonus) -> None:
         self._model = model
         self._begun = math.nan  # when the beats were set off, s
+        self._is_given_up = False
         self.phase = _IDLE
 
     def release(self) -> None:
-        """Stop the beats until another stretch sets them off."""
+        """Stop the beats until the arm has been moved back."""
+        self._is_given_up = True
         self.phase = _IDLE
 
     def step(self, time_s: float, angle: float, velocity: float) -> float:
@@ -168,7 +170,9 @@ class ClonusStepper:
         model = self._model
         is_back = velocity <= -model.speed_threshold or angle < model.trigger_angle
         if is_back:
-            self.phase = _IDLE
+            self.phase, self._is_given_up = _IDLE, False
+        elif self._is_given_up:
+            return model.base_torque
         elif self.phase == _IDLE and velocity >= model.trigger_speed:
             self.phase, self._begun = _BEATS, time_s
         if self.phase == _IDLE:

@@ -237,6 +237,20 @@ def test_a_release_gives_up_what_was_triggered(model: ToneModel) -> None:
 
 
 @EVERY
+def test_what_is_released_stays_so_while_the_stretch_goes_on(model: ToneModel) -> None:
+    joint, speed = model.stepper(START), radians(150)
+    samples = iter([(i / 1000, START + speed * i / 1000, speed) for i in range(600)])
+    for sample in samples:
+        joint.step(*sample)
+        if joint.phase:
+            break
+    joint.release()
+    for sample in samples:
+        joint.step(*sample)
+        assert joint.phase == 0
+
+
+@EVERY
 def test_a_passive_joint_never_gives_more_than_it_took(model: ToneModel) -> None:
     # Stored energy at the start is at most what leads the arm to where nothing is.
     if not model.is_passive:
