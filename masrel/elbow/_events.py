@@ -5,9 +5,10 @@ https://doi.org/10.1109/TNSRE.2012.2195330, equations (2), (4), (6) and Fig. 7.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from masrel.elbow import _law
 from masrel.elbow._law import TorqueLaw
@@ -30,6 +31,7 @@ from masrel.recording import PHASES, Phase
 __all__ = ["Events", "PhaseSpan", "StretchEvents", "events"]
 
 _PRE_CATCH, _CATCH, _POST_CATCH = range(3)  # positions in PHASES
+_Stretch = TypeVar("_Stretch", "StretchEvents", "Stretch")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,8 +114,7 @@ class Events:
 
     @property
     def _first(self) -> StretchEvents | None:
-        caught = [stretch for stretch in self.stretches if stretch.catch is not None]
-        return next(iter(caught or self.stretches), None)
+        return first_stretch(self.stretches)
 
     @property
     def onset(self) -> float | None:
@@ -214,10 +215,10 @@ def events(parameters: ElbowParameters, motion: Motion) -> Events:
     return Events(stretches=tuple(stretches), end=end.time, phases=tuple(phases))
 
 
-def first_stretch(line: "Timeline") -> "Stretch | None":
+def first_stretch(stretches: Sequence[_Stretch]) -> _Stretch | None:
     """Return the first stretch that catches, or the first if none does."""
-    caught = [stretch for stretch in line.stretches if stretch.catch is not None]
-    return next(iter(caught or line.stretches), None)
+    caught = [stretch for stretch in stretches if stretch.catch is not None]
+    return next(iter(caught or stretches), None)
 
 
 def rounded(stretch: "Stretch", origin: float, end: "State") -> StretchEvents:

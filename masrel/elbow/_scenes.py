@@ -122,13 +122,11 @@ class Columns:
                 "kind: needs ElbowParameters, ConstantSpeed, MinimumJerk or Trapezoid, "
                 f"got {kind.__name__}"
             )
-        self.kind, self.columns = (
-            kind,
-            {
-                name: np.asarray(column) if np.ndim(column) else column
-                for name, column in columns.items()
-            },
-        )
+        self.kind = kind
+        self.columns = {
+            name: np.asarray(column) if np.ndim(column) else column
+            for name, column in columns.items()
+        }
         shapes = {c.shape for c in self.columns.values() if isinstance(c, np.ndarray)}
         if len(shapes) > 1 or any(len(shape) > 1 for shape in shapes):
             raise ParameterError(
@@ -150,7 +148,13 @@ class Columns:
             if column.dtype.kind in "US":
                 rows.update(np.unique(column, return_index=True)[1].tolist())
             else:
-                rows.update((int(np.argmin(column)), int(np.argmax(column))))
+                # nan comes before any extreme, and a rest angle may be that
+                extremes = (
+                    np.argmin(column),
+                    np.argmax(column),
+                    np.isinf(column).argmax(),
+                )
+                rows.update(map(int, extremes))
         full = SimpleNamespace(**{**_DEFAULTS[self.kind], **self.columns})
         for margin in _MARGINS[self.kind](full):
             rows.add(int(np.argmin(margin)))
@@ -290,14 +294,14 @@ def evaluate(
     return SceneTable(outputs=names, values=values, n_alone=n_alone)
 
 
-_OUTPUTS = dict.fromkeys(EVENTS + LOADS)
+_OUTPUTS = EVENTS + LOADS
 
 
 def _alone(
     joint: ElbowParameters, motion: Motion, outputs: tuple[str, ...]
 ) -> list[float]:
     line = timeline(joint, motion)
-    first = first_stretch(line)
+    first = first_stretch(line.stretches)
     events = None if first is None else rounded(first, motion.origin, line.end)
     row = []
     for name in outputs:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from masrel.elbow import _law
-from masrel.elbow._events import Timeline, timeline
+from masrel.elbow._events import Timeline, first_stretch, timeline
 from masrel.elbow._law import TorqueLaw
 from masrel.elbow._polynomials import (
     Number,
@@ -423,10 +423,10 @@ def along(segment: TorqueSegment, angle: Polynomial, since: Number) -> Polynomia
 def loads(p: ElbowParameters, motion: Motion, line: Timeline, name: str) -> float:
     """Return one of the loads, by the name of its function."""
     if name == "residual_torque":
-        caught = [stretch for stretch in line.stretches if stretch.catch is not None]
-        if not caught:
+        first = first_stretch(line.stretches)
+        if first is None or first.catch is None:
             return math.nan
-        return float(_law.catch(p, caught[0].pre_end, caught[0].rise)[1].level)
+        return float(_law.catch(p, first.pre_end, first.rise)[1].level)
     parts = sections(segments(p, line), motion)
     if name == "peak_torque":
         return functools.reduce(_peak_of_both, parts, -math.inf)

@@ -199,6 +199,17 @@ def line(**columns: object) -> Columns:
         (lambda: Columns(dict, a=[1.0]), "kind: needs ElbowParameters, .* got dict"),
         (lambda: line(speed=[1.0, 0.0]), "row 2: speed: needs more than 0"),
         (lambda: line(speed=[1.0, np.nan, 2.0]), "row 2: speed: needs more than 0"),
+        (
+            lambda: Columns(
+                ElbowParameters,
+                catch_angle_constant=2.0,
+                catch_torque_constant=2.8,
+                residual_ratio=0.6,
+                catch_travel=0.5,
+                rest_angle=[np.nan, 0.5, np.inf],
+            ),
+            "row 3: rest_angle: needs a finite number, got inf",
+        ),
         (lambda: line(end=[2.0, 2.5, 0.5]), "row 3: start, end: need 0 <= start < end"),
         (
             lambda: line(start=[0.1, 0.2], end=[1.0, 1.5, 2.0]),
