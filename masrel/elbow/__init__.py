@@ -7,6 +7,7 @@ what moving the arm takes, or the trace a controller would command.
 from typing import TYPE_CHECKING
 
 from masrel.elbow._events import Events, PhaseSpan, StretchEvents, events
+from masrel.elbow._motion import Motion
 from masrel.elbow._scenes import Columns, SceneTable, evaluate
 from masrel.elbow._torque import (
     impulse,
@@ -18,7 +19,6 @@ from masrel.elbow._torque import (
     work,
 )
 from masrel.elbow.joint_model import MODELS, JointModel, Stepper
-from masrel.elbow.motion import Motion
 from masrel.elbow.motions import (
     ConstantSpeed,
     Hold,

@@ -12,6 +12,7 @@ from typing import NamedTuple, TypeVar
 
 from masrel.elbow import _law
 from masrel.elbow._law import TorqueLaw
+from masrel.elbow._motion import Motion
 from masrel.elbow._polynomials import (
     NOTHING,
     TIE,
@@ -23,7 +24,6 @@ from masrel.elbow._polynomials import (
     split_at_roots,
     value,
 )
-from masrel.elbow.motion import Motion
 from masrel.elbow.parameters import ElbowParameters
 from masrel.errors import ParameterError
 from masrel.recording import PHASES, Phase

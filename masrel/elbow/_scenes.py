@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from masrel.elbow import _law
 from masrel.elbow._events import first_stretch, rounded, timeline
 from masrel.elbow._law import TorqueLaw
+from masrel.elbow._motion import Floats, Motion
 from masrel.elbow._polynomials import (
     NOTHING,
     Number,
@@ -39,8 +40,7 @@ from masrel.elbow._torque import (
     section_peak,
     section_work,
 )
-from masrel.elbow.motion import Floats, Motion
-from masrel.elbow.motions.prescribed import (
+from masrel.elbow.motions._prescribed import (
     ConstantSpeed,
     MinimumJerk,
     Trapezoid,

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from masrel.elbow import _law
 from masrel.elbow._events import Timeline, first_stretch, timeline
 from masrel.elbow._law import TorqueLaw
+from masrel.elbow._motion import Floats, Motion
 from masrel.elbow._polynomials import (
     Number,
     Polynomial,
@@ -29,7 +30,6 @@ from masrel.elbow._polynomials import (
     split_at_roots,
     value,
 )
-from masrel.elbow.motion import Floats, Motion
 from masrel.elbow.parameters import ElbowParameters
 from masrel.errors import ParameterError
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.elbow._events import Events, events, timeline
+from masrel.elbow._motion import Floats, Motion
 from masrel.elbow._torque import segment_torque, segments
-from masrel.elbow.motion import Floats, Motion
 from masrel.elbow.parameters import ElbowParameters
 from masrel.errors import ParameterError
 

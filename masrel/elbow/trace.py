@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.elbow._events import timeline
+from masrel.elbow._motion import Floats, Motion
 from masrel.elbow.joint_model import JointModel
-from masrel.elbow.motion import Floats, Motion
 from masrel.elbow.parameters import ElbowParameters
 from masrel.errors import ParameterError
 

@@ -11,8 +11,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from masrel.elbow._motion import Motion
 from masrel.elbow.joint_model import JointModel
-from masrel.elbow.motion import Motion
 from masrel.elbow.trace import _stepped
 from masrel.errors import ParameterError
 from masrel.hess._presented import Presented

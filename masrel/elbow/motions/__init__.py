@@ -1,13 +1,13 @@
 """Kinds of movements: prescribed, recorded, and made of others."""
 
-from masrel.elbow.motions.composed import Joined, Part, Reversed, interrupted
-from masrel.elbow.motions.prescribed import (
+from masrel.elbow.motions._composed import Joined, Part, Reversed, interrupted
+from masrel.elbow.motions._prescribed import (
     ConstantSpeed,
     Hold,
     MinimumJerk,
     Trapezoid,
 )
-from masrel.elbow.motions.recorded import Interpolation, Recorded
+from masrel.elbow.motions._recorded import Interpolation, Recorded
 
 __all__ = [
     "ConstantSpeed",

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from masrel.elbow.motions.recorded import Interpolation, Recorded
+from masrel.elbow.motions._recorded import Interpolation, Recorded
 from masrel.errors import ParameterError, RecordingError
 from masrel.recording import read_recording
 

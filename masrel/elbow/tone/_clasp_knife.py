@@ -6,8 +6,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from masrel.elbow._motion import Floats, Motion
 from masrel.elbow._polynomials import Polynomial
-from masrel.elbow.motion import Floats, Motion
 from masrel.elbow.tone._model import ToneEvent, ToneModel, events_at, quantity
 from masrel.elbow.tone._passages import OneWay, negative, one_way, spans
 from masrel.errors import ParameterError

@@ -6,7 +6,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from masrel.elbow.motion import Floats, Motion
+from masrel.elbow._motion import Floats, Motion
 from masrel.elbow.tone._model import (
     ToneEvent,
     ToneModel,

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from masrel.elbow.motion import Floats, Motion
+from masrel.elbow._motion import Floats, Motion
 from masrel.elbow.tone._lead_pipe import LeadPipe, RigidStepper
 from masrel.elbow.tone._model import ToneEvent, events_at, quantity
 from masrel.elbow.tone._passages import movements

@@ -7,7 +7,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from masrel.elbow.motion import Floats, Motion
+from masrel.elbow._motion import Floats, Motion
 from masrel.elbow.tone._model import ToneEvent, ToneModel, events_at, grade_of, quantity
 from masrel.elbow.tone._passages import OneWay, spans
 

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from masrel.elbow.motion import Floats, Motion
+from masrel.elbow._motion import Floats, Motion
 from masrel.elbow.tone._model import ToneEvent, ToneModel, events_at, quantity
 
 

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from masrel.elbow.motion import Floats, Motion
+from masrel.elbow._motion import Floats, Motion
 from masrel.elbow.tone._stepper import Stepper
 from masrel.errors import ParameterError
 

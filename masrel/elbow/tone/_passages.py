@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
+from masrel.elbow._motion import Motion
 from masrel.elbow._polynomials import (
     Number,
     Polynomial,
@@ -13,7 +14,6 @@ from masrel.elbow._polynomials import (
     split_at_roots,
     value,
 )
-from masrel.elbow.motion import Motion
 
 _SAME_TIME = 1e-12  # s: nearer times are the same but for rounding
 _SLACK = 1e-12  # rad, rad/s: by so little less than 0 is 0 but for rounding

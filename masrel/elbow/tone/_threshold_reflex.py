@@ -1,13 +1,13 @@
 """Threshold stretch reflex: nothing, then resistance, the earlier the faster."""
 
 import math
+from collections import deque
 from dataclasses import dataclass
 from typing import ClassVar, Self
 
 import numpy as np
 
-from masrel.elbow.motion import Floats, Motion
-from masrel.elbow.tone._delay_line import DelayLine
+from masrel.elbow._motion import Floats, Motion
 from masrel.elbow.tone._model import (
     ToneEvent,
     ToneModel,
@@ -20,6 +20,7 @@ from masrel.errors import ParameterError
 
 _MAS = {"0": 0.0, "1": 1.0, "1+": 1.5, "2": 2.0, "3": 3.0, "4": 4.0}
 _OFF, _ON = 0, 1  # positions in masrel.recording.PHASES: pre-catch, catch
+_ROUNDING_S = 1e-6  # a sample as old as the delay but for this is old enough
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -183,7 +184,7 @@ class ThresholdReflexStepper:
     def __init__(self, model: ThresholdReflex, start_angle: float) -> None:
         self._model = model
         self._rest = model._rest(start_angle)
-        self._late = DelayLine(model.delay)
+        self._late = _DelayLine(model.delay)
         self._is_given_up = False
         self.phase = _OFF
 
@@ -202,3 +203,29 @@ class ThresholdReflexStepper:
             reflex = 0.0
         self.phase = _ON if reflex > 0.0 else _OFF
         return model._passive(angle, velocity, self._rest) + reflex
+
+
+class _DelayLine:
+    """Give the latest sample that is as old as the delay.
+
+    At a regular rate that is a whole number of samples; after a missed tick the line
+    is still right. Before the first sample is old enough the arm is taken to have
+    rested where it was then.
+    """
+
+    __slots__ = ("_delay", "_late", "_samples")
+
+    def __init__(self, delay: float) -> None:
+        self._delay = delay - _ROUNDING_S
+        self._samples: deque[tuple[float, float, float]] = deque()
+        self._late: tuple[float, float] | None = None
+
+    def step(self, time_s: float, angle: float, velocity: float) -> tuple[float, float]:
+        """Take a sample in -> angle, rad, and velocity, rad/s, of the late one."""
+        samples = self._samples
+        samples.append((time_s, angle, velocity))
+        late = self._late or (angle, 0.0)
+        while samples and time_s - samples[0][0] >= self._delay:
+            late = samples.popleft()[1:]
+        self._late = late
+        return late

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from masrel.elbow import MODELS, ConstantSpeed, Hold, Joined, MinimumJerk, Motion
-from masrel.elbow.motion import Piece, piece_of
+from masrel.elbow._motion import Piece, piece_of
 from masrel.elbow.tone import Dystonia, LeadPipe, ToneModel
 from masrel.errors import ParameterError
 from tests.elbow.tone.joints import (

@@ -1,5 +1,6 @@
 """What a movement of the arm is, whatever its kind: a row of polynomial pieces."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from operator import attrgetter
 from typing import TYPE_CHECKING, NamedTuple
@@ -8,8 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.elbow._polynomials import Polynomial, bernstein, derivative
-
-__all__ = ["Floats", "Motion", "Piece", "Rows", "piece_of"]
 
 Floats = NDArray[np.float64]
 
@@ -45,16 +44,17 @@ def rows_of(pieces: Sequence[Piece]) -> Rows:
     return Rows(np.array([p.start for p in pieces]), np.array(padded).T)
 
 
-class Motion:
+class Motion(ABC):
     """A movement as a function of time, made of polynomial pieces; SI units.
 
-    It may go either way and rest. Samples, events and loads come from its pieces. A
-    kind of its own needs `start`, `end`, `duration` and `pieces`.
+    It may go either way and rest. Samples, events and loads come from its pieces.
     """
 
     __slots__ = ()
 
-    if TYPE_CHECKING:  # fields of most kinds
+    # Every kind has these, as fields or properties of its own; a property here would be
+    # the default of a field.
+    if TYPE_CHECKING:
 
         @property
         def start(self) -> float:
@@ -70,9 +70,9 @@ class Motion:
 
     origin = property(attrgetter("start"), doc="Angle the pieces count from, rad.")
 
+    @abstractmethod
     def pieces(self) -> Sequence[Piece]:
         """Return the pieces in order of time."""
-        raise NotImplementedError
 
     def rows(self) -> Rows:
         """Return the pieces as arrays."""

@@ -5,8 +5,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from masrel.elbow._motion import Floats, Motion, Piece, Rows
 from masrel.elbow._polynomials import bernstein, derivative
-from masrel.elbow.motion import Floats, Motion, Piece, Rows
 from masrel.errors import ParameterError
 
 __all__ = ["Interpolation", "Recorded"]

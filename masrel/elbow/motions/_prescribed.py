@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from masrel.elbow._motion import Motion, Piece, piece_of
 from masrel.elbow._polynomials import Number, Polynomial
-from masrel.elbow.motion import Motion, Piece, piece_of
 from masrel.errors import ParameterError
 
 __all__ = ["ConstantSpeed", "Hold", "MinimumJerk", "Trapezoid"]

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 from operator import attrgetter
 
+from masrel.elbow._motion import Motion, Piece, Rows, piece_of, rows_of
 from masrel.elbow._polynomials import reversed_from, shifted
-from masrel.elbow.motion import Motion, Piece, Rows, piece_of, rows_of
-from masrel.elbow.motions.prescribed import Hold
+from masrel.elbow.motions._prescribed import Hold
 from masrel.errors import ParameterError
 
 __all__ = ["Joined", "Part", "Reversed", "interrupted"]
