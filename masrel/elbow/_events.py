@@ -170,7 +170,7 @@ def events(parameters: ElbowParameters, motion: Motion) -> Events:
     Returns
     -------
     Events
-        Times within some units in their last place; what the motion does not reach
+        Times within 1e-11 s or 1e-14 of the duration; what the motion does not reach
         is None.
 
     Raises
