@@ -4,6 +4,7 @@ import datetime
 import json
 import math
 import sys
+import types
 import typing
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -62,6 +63,8 @@ def _default(info: FieldInfo) -> object:
 def _decode_value(
     value: object, annotation: object, where: str, key: str, into: Decoded
 ) -> None:
+    if isinstance(value, list):
+        annotation = _array_of(annotation)
     if _is_struct(annotation):
         if isinstance(value, Mapping):
             part = decode_table(value, annotation, where)
@@ -164,6 +167,15 @@ def _entry_type(annotation: object) -> object | None:
     return None
 
 
+def _array_of(annotation: object) -> object:
+    # the member of a union that is an array, or the annotation itself
+    is_union = typing.get_origin(annotation) in (typing.Union, types.UnionType)
+    for member in typing.get_args(annotation) if is_union else ():
+        if _entry_type(member) is not None:
+            return member
+    return annotation
+
+
 _IDENTIFIER = (
     "a name of 1 to 32 letters, digits, '.', '_' or '-', "
     "the first a letter or digit (in quotes)"
@@ -188,9 +200,10 @@ def _phrase(info: inspect.Type) -> str:
     if isinstance(info, inspect.IntType):
         return "a whole number" + _range(info)
     if isinstance(info, inspect.LiteralType):
-        return "one of " + ", ".join(got(value) for value in info.values)
+        of = "one of " if len(info.values) > 1 else ""
+        return of + ", ".join(got(value) for value in info.values)
     if isinstance(info, inspect.VarTupleType):
-        return "an array" + _length(info)
+        return "an array" + _entries(info)
     if isinstance(info, inspect.StrType) and info.pattern is not None:
         return _IDENTIFIER
     if isinstance(info, inspect.StrType) and info.min_length:
@@ -214,13 +227,16 @@ def _range(info: inspect.FloatType | inspect.IntType) -> str:
     return " " + " and ".join(phrases) if phrases else ""
 
 
-def _length(info: inspect.VarTupleType) -> str:
+def _entries(info: inspect.VarTupleType) -> str:
+    phrase = ""
     if info.min_length and info.max_length:
-        return f" of {info.min_length} to {info.max_length} entries"
-    if info.min_length:
+        phrase = f" of {info.min_length} to {info.max_length} entries"
+    elif info.min_length:
         few = "entry" if info.min_length == 1 else "entries"
-        return f" of at least {info.min_length} {few}"
-    return ""
+        phrase = f" of at least {info.min_length} {few}"
+    if isinstance(info.item_type, inspect.LiteralType) and info.max_length:
+        phrase += f", each {_phrase(info.item_type)}"
+    return phrase
 
 
 def got(value: object) -> str:

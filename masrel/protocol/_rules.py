@@ -1,14 +1,14 @@
 """The rules across keys of a protocol, applied to whatever could be decoded."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import msgspec
 
 from masrel.protocol._decode import got, needed, with_id
 from masrel.protocol._kinds import DEFAULT_KIND, kind_problem, value_problems
-from masrel.protocol.definition import Model
+from masrel.protocol.definition import Model, PresentationRules
 
 Values = dict[str, Any]
 
@@ -30,6 +30,7 @@ def broken_rules(values: Values) -> tuple[str, ...]:
         *_references(values),
         *_schedules(values),
         *_device(values),
+        *_presentation(values),
         *kind_rules(values),
         *joint_rules(values),
         *_plan(values),
@@ -174,6 +175,49 @@ def _device(values: Values) -> Iterator[str]:
         yield (
             f"stretch.end_deg: needed at most device.highest_angle_deg less the soft "
             f"stop before it ({high:g} - {width:g}), got {end:g}"
+        )
+
+
+def _presentation(values: Values) -> Iterator[str]:
+    # keys that say something for what is asked, and speeds that the limits allow
+    rules, stretch = values.get("presentation") or {}, values.get("stretch") or {}
+    stretches = rules.get("stretches")
+    if stretches == 1:
+        for key in ("time_limit_s", "stretch_limit_s", "done_with"):
+            default = getattr(PresentationRules(), key)
+            if rules.get(key, default) != default:
+                yield (
+                    f"presentation.{key}: needed with presentation.stretches other "
+                    f"than 1 only, got {got(rules[key])}"
+                )
+    if isinstance(stretches, list | tuple):
+        yield from _cued_speeds(rules, stretch, stretches)
+
+
+def _cued_speeds(
+    rules: Values, stretch: Values, cues: Sequence[str | None]
+) -> Iterator[str]:
+    slow, fast = rules.get("slow_speed_deg_s"), rules.get("fast_speed_deg_s")
+    most, limit = stretch.get("largest_speed_deg_s"), rules.get("stretch_limit_s")
+    start, end = stretch.get("start_deg"), stretch.get("end_deg")
+    if slow is None or fast is None or most is None:
+        return
+    if "fast" in cues and fast > most:
+        yield (
+            f"presentation.fast_speed_deg_s: needed at most "
+            f"stretch.largest_speed_deg_s ({most:g}), got {fast:g}"
+        )
+    if {"slow", "fast"} <= set(cues) and slow >= fast:
+        yield (
+            f"presentation.slow_speed_deg_s: needed less than "
+            f"presentation.fast_speed_deg_s ({fast:g}), got {slow:g}"
+        )
+    if "slow" not in cues or limit is None or start is None or end is None:
+        return
+    if end - start >= slow * limit:
+        yield (
+            f"presentation.slow_speed_deg_s: needed a stretch of {end - start:g} deg "
+            f"within presentation.stretch_limit_s ({limit:g}), got {slow:g}"
         )
 
 

@@ -130,7 +130,15 @@ def _joint_of(model: Model, shared: ElbowConstants) -> ElbowParameters:
     )
 
 
-_PRESENTED = ("scale", "elbow", "models", "schedule", "stretch", "device")
+_PRESENTED = (
+    "scale",
+    "elbow",
+    "models",
+    "schedule",
+    "stretch",
+    "presentation",
+    "device",
+)
 """The tables that decide what a rater meets, besides the study's id."""
 
 _LATER: dict[str, dict[str, object]] = {
@@ -140,6 +148,14 @@ _LATER: dict[str, dict[str, object]] = {
         "rest_angle_deg": None,
     },
     "stretch": {"largest_speed_deg_s": 131.0},
+    "presentation": {
+        "stretches": 1,
+        "time_limit_s": 60.0,
+        "stretch_limit_s": 20.0,
+        "slow_speed_deg_s": 10.0,
+        "fast_speed_deg_s": 120.0,
+        "done_with": "enter",
+    },
     "device": {
         "active_torque_limit_nm": 10.0,
         "active_energy_limit_j": 1.0,
@@ -201,7 +217,8 @@ def presented_hash(protocol: Protocol) -> str:
     -------
     str
         SHA-256, 64 hexadecimal digits, of the study's id and the tables
-        ``scale``, ``elbow``, ``models``, ``schedule``, ``stretch`` and ``device``.
+        ``scale``, ``elbow``, ``models``, ``schedule``, ``stretch``, ``presentation``
+        and ``device``.
 
     Notes
     -----
@@ -224,6 +241,8 @@ def _content_hash(content: object, ignored: tuple[str, ...] = ()) -> str:
         for key, default in defaults.items():
             if plain[table][key] == default:
                 del plain[table][key]
+        if not plain[table]:
+            del plain[table]
     canonical = msgspec.json.encode(plain, order="sorted")
     return hashlib.sha256(canonical).hexdigest()
 

@@ -130,6 +130,25 @@ class Stretch(_Table, frozen=True, kw_only=True):
     largest_speed_deg_s: Annotated[float, Meta(gt=0, le=600)] = 131.0
 
 
+Cue = Literal["slow", "fast"]
+"""What a rater is asked for: V1 or V3 of the Tardieu scale."""
+
+
+class PresentationRules(_Table, frozen=True, kw_only=True):
+    """``[presentation]``: how often a rater may stretch the arm, and who says done."""
+
+    stretches: (
+        Literal["free"]
+        | Annotated[int, Meta(ge=1, le=100)]
+        | Annotated[tuple[Cue, ...], Meta(min_length=1, max_length=100)]
+    ) = 1
+    time_limit_s: Annotated[float, Meta(gt=0, le=3600)] = 60.0
+    stretch_limit_s: Annotated[float, Meta(gt=0, le=600)] = 20.0
+    slow_speed_deg_s: Annotated[float, Meta(gt=0, le=600)] = 10.0  # V1
+    fast_speed_deg_s: Annotated[float, Meta(gt=0, le=600)] = 120.0  # V3
+    done_with: Literal["enter", "button"] = "enter"
+
+
 class DeviceSettings(_Table, frozen=True, kw_only=True):
     """``[device]``: which device, and the limits around it."""
 
@@ -252,6 +271,7 @@ class Protocol(_Table, frozen=True, kw_only=True):
     sessions: Annotated[tuple[Session, ...], Meta(min_length=1)]
     schedule: ScheduleScheme
     stretch: Stretch = Stretch()
+    presentation: PresentationRules = PresentationRules()
     device: DeviceSettings = DeviceSettings()
     simulated_raters: SimulatedRaters = SimulatedRaters()
     analysis: Analysis = Analysis()

@@ -22,6 +22,7 @@ TABLES = {
     "[[sessions]]": definition.Session,
     "[schedule]": definition.ScheduleScheme,
     "[stretch]": definition.Stretch,
+    "[presentation]": definition.PresentationRules,
     "[device]": definition.DeviceSettings,
     "[simulated_raters]": definition.SimulatedRaters,
     "[analysis]": definition.Analysis,

@@ -42,6 +42,9 @@ def test_comments_layout_order_and_defaults_do_not_enter(tmp_path: Path) -> None
         (("models", 1, "constants"), {"residual_reading": "decrease"}),
         (("models", 1, "constants"), {"catch_rise_s": 0.02}),
         (("stretch", "start_deg"), 31.0),
+        (("presentation",), {"stretches": "free"}),
+        (("presentation",), {"stretches": 3}),
+        (("presentation",), {"stretches": ["slow", "fast"]}),
         (("device", "torque_limit_nm"), 19.0),
     ],
 )
@@ -143,6 +146,12 @@ def test_a_variant_at_its_default_is_no_change(
     assert hashes(changed("elbow", key, to=default), tmp_path) == before
     own = changed("models", 0, "constants", to={key: default})
     assert hashes(own, tmp_path) == before
+
+
+def test_one_stretch_is_what_protocols_always_had(tmp_path: Path) -> None:
+    before = hashes(VALID, tmp_path)
+    said = {"stretches": 1, "stretch_limit_s": 20.0, "done_with": "enter"}
+    assert hashes(changed("presentation", to=said), tmp_path) == before
 
 
 def test_a_model_that_says_what_all_follow_is_no_change(tmp_path: Path) -> None:
