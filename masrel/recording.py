@@ -8,21 +8,24 @@ import hashlib
 import io
 import json
 import os
+import re
 import zipfile
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.errors import RecordingError
+from masrel.errors import ParameterError, RecordingError
 
 __all__ = [
+    "MEASURED_TORQUE",
     "PHASES",
     "RAMPS",
     "RECORDING_COLUMNS",
+    "Channel",
     "Phase",
     "Recording",
     "read_recording",
@@ -51,6 +54,55 @@ RECORDING_COLUMNS = (
 
 _Fact = str | int | float | bool | None
 
+_COLUMN_NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
+_LONGEST_NAME = 40
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Channel:
+    """What a device measures beside the angle, once per reading.
+
+    Attributes
+    ----------
+    name : str
+        Words in lower case with underscores, such as ``"emg_biceps"``.
+    unit : str
+        As in names of columns: ``"nm"``, ``"mv"``; empty for a number without one, such
+        as a trigger's.
+
+    Raises
+    ------
+    ParameterError
+        If name and unit make no name of a column, or that of a column that every
+        recording has.
+
+    Examples
+    --------
+    >>> Channel(name="emg_biceps", unit="mv").column
+    'emg_biceps_mv'
+    """
+
+    name: str
+    unit: str = ""
+
+    def __post_init__(self) -> None:
+        fits = _COLUMN_NAME.fullmatch(self.column) and len(self.column) <= _LONGEST_NAME
+        if not fits or self.column in RECORDING_COLUMNS:
+            raise ParameterError(
+                f"channel: needs a name and a unit of up to {_LONGEST_NAME} lower-case "
+                "letters, digits and underscores that no other column has, "
+                f"got {self.name!r} in {self.unit!r}"
+            )
+
+    @property
+    def column(self) -> str:
+        """Name of its column in a recording, with the unit."""
+        return f"{self.name}_{self.unit}" if self.unit else self.name
+
+
+MEASURED_TORQUE = Channel(name="measured_torque", unit="nm")
+"""Torque with which the device resists extension, as its sensor reads it."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recording:
@@ -64,6 +116,9 @@ class Recording:
     facts : mapping of str to str, int, float, bool or None
         What was presented and how: ``simulated``, ``device``, ``model``, ``code``,
         ``rate_hz``, ``n_missed_ticks``, ``fault``, ``mean_speed_deg_s`` and others.
+    channels : tuple of Channel, optional
+        What the device measured beside the angle; each has a column too, ``nan`` where
+        it gave no number.
 
     Raises
     ------
@@ -73,14 +128,16 @@ class Recording:
 
     columns: Mapping[str, NDArray[np.float64]] = field(compare=False, repr=False)
     facts: Mapping[str, _Fact]
+    channels: tuple[Channel, ...] = ()
 
     def __post_init__(self) -> None:
         if "ramp" not in self.columns and "time_s" in self.columns:
             ramp = _ramp_without_column(self.columns["time_s"], self.facts)
             object.__setattr__(self, "columns", {**self.columns, "ramp": ramp})
-        if set(self.columns) != set(RECORDING_COLUMNS):
+        names = (*RECORDING_COLUMNS, *(channel.column for channel in self.channels))
+        if sorted(self.columns) != sorted(names):
             raise RecordingError(
-                f"a recording needs the columns {', '.join(RECORDING_COLUMNS)}, "
+                f"a recording needs the columns {', '.join(names)}, "
                 f"got {', '.join(sorted(self.columns)) or 'none'}"
             )
         shapes = {column.shape for column in self.columns.values()}
@@ -143,12 +200,15 @@ def write_recording(recording: Recording, path: Path) -> str:
             f"{path}: needs a new file, a recording is never overwritten; move it away"
         )
     path.parent.mkdir(parents=True, exist_ok=True)
-    ordered = {name: recording.columns[name] for name in RECORDING_COLUMNS}
+    channels = [channel.column for channel in recording.channels]
+    ordered = {n: recording.columns[n] for n in (*RECORDING_COLUMNS, *channels)}
     archive = io.BytesIO()
     # Floats are never pickled; numpy 2.0 takes `allow_pickle` for a column.
     np.savez_compressed(archive, **ordered)  # type: ignore[arg-type]
     checksum = hashlib.sha256(archive.getbuffer()).hexdigest()
-    document = {"sha256": checksum, **recording.facts}
+    document: dict[str, object] = {"sha256": checksum, **recording.facts}
+    if channels:
+        document["channels"] = [asdict(channel) for channel in recording.channels]
     facts = json.dumps(document, indent=1, sort_keys=True, allow_nan=False) + "\n"
     _write_whole({path: archive.getvalue(), path.with_suffix(".json"): facts.encode()})
     return checksum
@@ -210,4 +270,20 @@ def read_recording(path: Path) -> Recording:
             columns = {name: archive[name] for name in archive.files}
     except (ValueError, EOFError, OSError, zipfile.BadZipFile) as error:
         raise RecordingError(f"{path}: not an archive of columns ({error})") from error
-    return Recording(columns=columns, facts=facts)
+    try:
+        channels = _channels_of(facts.pop("channels", []))
+    except ValueError as error:
+        raise RecordingError(f"{facts_path}: {error}") from error
+    return Recording(columns=columns, facts=facts, channels=channels)
+
+
+def _channels_of(plain: object) -> tuple[Channel, ...]:
+    # as JSON has them; raises ValueError where they are none
+    channels = []
+    for entry in plain if isinstance(plain, list) else [plain]:
+        match entry:
+            case {"name": str(name), "unit": str(unit)}:
+                channels.append(Channel(name=name, unit=unit))
+            case _:
+                raise ValueError(f"channels: needs name and unit of each, got {entry}")
+    return tuple(channels)

@@ -6,9 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from masrel.errors import RecordingError
+from masrel.errors import ParameterError, RecordingError
 from masrel.recording import (
+    MEASURED_TORQUE,
     RECORDING_COLUMNS,
+    Channel,
     Recording,
     read_recording,
     write_recording,
@@ -117,3 +119,74 @@ def test_a_full_disk_leaves_no_half_of_a_recording(
     with pytest.raises(OSError, match="No space left"):
         write_recording(recording, tmp_path / "a.npz")
     assert list(tmp_path.iterdir()) == []
+
+
+# Channels
+
+
+@pytest.fixture
+def measured(recording: Recording) -> Recording:
+    columns = {**recording.columns, "measured_torque_nm": np.array([0.1, np.nan, 2, 3])}
+    return Recording(
+        columns=columns, facts=recording.facts, channels=(MEASURED_TORQUE,)
+    )
+
+
+def test_a_channel_is_written_with_its_name_and_unit(
+    measured: Recording, tmp_path: Path
+) -> None:
+    path = tmp_path / "a.npz"
+    write_recording(measured, path)
+    facts = json.loads(path.with_suffix(".json").read_text())
+    assert facts["channels"] == [{"name": "measured_torque", "unit": "nm"}]
+    back = read_recording(path)
+    assert (back.channels, back.facts) == (measured.channels, measured.facts)
+    column = back.columns["measured_torque_nm"]
+    assert np.array_equal(column, [0.1, np.nan, 2, 3], equal_nan=True)
+
+
+def test_a_recording_without_channels_says_nothing_of_them(
+    recording: Recording, tmp_path: Path
+) -> None:
+    write_recording(recording, tmp_path / "a.npz")
+    with np.load(tmp_path / "a.npz") as archive:
+        assert archive.files == list(RECORDING_COLUMNS)
+    facts = json.loads((tmp_path / "a.json").read_text())
+    assert facts.keys() == {"sha256", *recording.facts}
+
+
+def test_a_channel_needs_its_column_and_a_column_its_channel(
+    recording: Recording, measured: Recording
+) -> None:
+    with pytest.raises(RecordingError, match=r"phase, ramp.*, measured_torque_nm, got"):
+        Recording(columns=recording.columns, facts={}, channels=(MEASURED_TORQUE,))
+    with pytest.raises(RecordingError, match=r"got .*measured_torque_nm"):
+        Recording(columns=measured.columns, facts={})
+
+
+@pytest.mark.parametrize(
+    "channels", [3, [3], [{"name": "a"}], [{"name": "a", "unit": 1}], [{"unit": "nm"}]]
+)
+def test_channels_that_are_none_are_an_error(
+    measured: Recording, tmp_path: Path, channels: object
+) -> None:
+    path = tmp_path / "a.npz"
+    write_recording(measured, path)
+    facts = json.loads(path.with_suffix(".json").read_text()) | {"channels": channels}
+    path.with_suffix(".json").write_text(json.dumps(facts))
+    with pytest.raises(RecordingError, match=r"a\.json: channels: needs name and unit"):
+        read_recording(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [("", ""), ("EMG", "mv"), ("emg biceps", "mv"), ("emg", "µV"), ("a" * 50, "")],
+)
+def test_a_channel_needs_a_name_that_a_column_can_have(name: str, unit: str) -> None:
+    with pytest.raises(ParameterError, match="channel: needs a name and a unit"):
+        Channel(name=name, unit=unit)
+
+
+def test_a_channel_is_none_of_the_columns_that_all_have() -> None:
+    with pytest.raises(ParameterError, match="that no other column has"):
+        Channel(name="angle", unit="deg")

@@ -2,6 +2,7 @@
 
 from masrel.hess._presented import Fault, Presented, cut_off
 from masrel.hess._replay import ReplayOptions
+from masrel.hess._simulated import SimulatedOptions, TorqueSensor
 from masrel.hess._stop import EmergencyStop
 from masrel.hess.backends import device_names, open_device
 from masrel.hess.clock import Clock, RealClock, SimulatedClock
@@ -44,6 +45,8 @@ __all__ = [
     "ReplayOptions",
     "SimulatedClock",
     "SimulatedHand",
+    "SimulatedOptions",
+    "TorqueSensor",
     "YieldingHand",
     "cut_off",
     "device_names",

@@ -132,6 +132,7 @@ class Plant:
     # II and equation (7). https://doi.org/10.1109/TNSRE.2012.2195330
 
     __slots__ = (
+        "_arm_inertia",
         "_commanded",
         "_contact",
         "_coulomb",
@@ -170,6 +171,7 @@ class Plant:
         friction = parameters.friction
         self._hand = hand
         self._yields = hand.yields
+        self._arm_inertia = parameters.arm_inertia
         self._inertia = friction.inertia + parameters.arm_inertia  # nobody's hand
         self._viscous = friction.viscous
         self._coulomb = friction.coulomb
@@ -201,11 +203,25 @@ class Plant:
     @property
     def hand_torque(self) -> float:
         """Torque of the hand on the arm now, as a sensor between them reads, N·m."""
-        if not self._holds:
-            return 0.0
-        inertia = self._hand.inertia  # its part of the net torque moves the hand itself
-        share = inertia / (self._inertia + inertia)
-        return self._muscle_torque() - share * self._net_torque()
+        return self._pull_of(0.0) if self._holds else 0.0
+
+    @property
+    def arm_torque(self) -> float:
+        """Torque of the arm on the device now, as a sensor between them reads, N·m."""
+        # Motor and friction are on its other side; the end stops are the elbow's own.
+        stop = 0.0
+        if self._contact:
+            beyond = self.angle - (self._range_end if self._contact == _UPPER else 0.0)
+            stop = self._stop_stiffness * beyond + self._stop_damping * self.velocity
+        return self._pull_of(self._arm_inertia) - stop
+
+    def _pull_of(self, inertia: float) -> float:
+        # The muscles' torque less what moves the hand and so much of the arm, N·m
+        muscles, of_hand = 0.0, 0.0
+        if self._holds:
+            muscles, of_hand = self._muscle_torque(), self._hand.inertia
+        share = (of_hand + inertia) / (self._inertia + of_hand)
+        return muscles - share * self._net_torque()
 
     def _muscle_torque(self) -> float:
         # Of the hand's spring and damper, N·m

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
+from masrel.hess._channels import channel_facts
 from masrel.hess._spool import Columns, read_spool, recorded_columns
-from masrel.recording import PHASES, RAMPS, Recording, _Fact
+from masrel.recording import PHASES, RAMPS, Channel, Recording, _Fact
 
 _CATCH, _END = PHASES.index("catch"), RAMPS.index("end")
 
@@ -77,7 +78,7 @@ def cut_off(spool: Path) -> Presented | None:
     if left is None:
         return None
     threshold = float(left.facts.pop("speed_threshold") or 0.0)
-    columns = recorded_columns(left.columns)
+    columns = recorded_columns(left.columns, left.channels)
     time_s = columns["time_s"]
     fault = Fault(
         kind="process",
@@ -90,6 +91,7 @@ def cut_off(spool: Path) -> Presented | None:
     return as_presented(
         columns,
         {**left.facts, "scheduling": None},
+        channels=left.channels,
         speed_threshold=threshold,
         ended="fault",
         fault=fault,
@@ -103,6 +105,7 @@ def as_presented(
     columns: Columns,
     facts: dict[str, _Fact],
     *,
+    channels: tuple[Channel, ...] = (),
     speed_threshold: float,
     ended: str,
     fault: Fault | None,
@@ -122,9 +125,10 @@ def as_presented(
         "ended": ended,
         "grip_lost": grip_lost,
         **movement_facts(columns, speed_threshold, fault is not None),
+        **channel_facts(columns, channels),
     }
     return Presented(
-        recording=Recording(columns=columns, facts=facts),
+        recording=Recording(columns=columns, facts=facts, channels=channels),
         fault=fault,
         n_missed_ticks=n_missed_ticks,
     )

@@ -58,6 +58,8 @@ class ReplayDevice(Device):
             columns["angle_deg"][:n_readings].tolist(),
             columns["velocity_deg_s"][:n_readings].tolist(),
         )
+        self.channels = recording.channels
+        self._values = _values(recording, n_readings)
         self._start_ns: int | None = None
         self._next = 0
 
@@ -71,7 +73,7 @@ class ReplayDevice(Device):
             raise DeviceError("replay: the recording has no more readings")
         time_ns = self._start_ns + self._times_ns[self._next]
         self._clock.sleep_until_ns(time_ns)
-        reading = Reading(time_ns, self._angles[self._next])
+        reading = Reading(time_ns, self._angles[self._next], self._values[self._next])
         self._next += 1
         return reading
 
@@ -88,6 +90,15 @@ def _n_readings(recording: Recording) -> int:
     if not isinstance(noticed_s, float):
         return recording.n_samples
     return int(np.searchsorted(recording.columns["time_s"], noticed_s))
+
+
+def _values(recording: Recording, n_readings: int) -> list[tuple[float, ...]]:
+    # What the channels gave, reading by reading
+    if not recording.channels:
+        return [()] * n_readings
+    columns = [recording.columns[channel.column] for channel in recording.channels]
+    rows = (column[:n_readings].tolist() for column in columns)
+    return list(zip(*rows, strict=True))
 
 
 def build(setup: DeviceSetup) -> ReplayDevice:

@@ -10,15 +10,16 @@ import json
 import math
 import mmap
 from array import array
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.errors import RecordingError
+from masrel.errors import ParameterError, RecordingError
 from masrel.hess.limits import DeviceLimits
-from masrel.recording import RECORDING_COLUMNS, _Fact
+from masrel.recording import RECORDING_COLUMNS, Channel, _channels_of, _Fact
 
 Columns = dict[str, NDArray[np.float64]]
 
@@ -39,10 +40,24 @@ class Spool:
 
     __slots__ = ("_map", "values")
 
-    def __init__(self, path: Path, capacity: int, facts: dict[str, _Fact]) -> None:
-        sizes = {"capacity": capacity, "n_columns": _N_COLUMNS}
-        header = json.dumps({**facts, **sizes}).encode()
-        n_bytes = _HEADER + _WORD * (1 + _N_COLUMNS * capacity)
+    def __init__(
+        self,
+        path: Path,
+        capacity: int,
+        facts: dict[str, _Fact],
+        channels: Sequence[Channel] = (),
+    ) -> None:
+        n_columns = _N_COLUMNS + len(channels)
+        layout: dict[str, object] = {"capacity": capacity, "n_columns": n_columns}
+        if channels:
+            layout["channels"] = [asdict(channel) for channel in channels]
+        header = json.dumps({**facts, **layout}).encode()
+        if len(header) > _HEADER:
+            raise ParameterError(
+                f"channels: need names that fit into {_HEADER} bytes, "
+                f"got {len(channels)} channels"
+            )
+        n_bytes = _HEADER + _WORD * (1 + n_columns * capacity)
         path.parent.mkdir(parents=True, exist_ok=True)
         try:
             with path.open("w+b") as file:
@@ -69,18 +84,26 @@ class Samples:
         "_angle",
         "_columns",
         "_command",
+        "_measured",
         "_model",
         "_phase",
         "_ramp",
         "_time",
         "_values",
         "_velocity",
+        "channels",
         "n",
     )
 
-    def __init__(self, capacity: int, spool: Spool | None = None) -> None:
+    def __init__(
+        self,
+        capacity: int,
+        spool: Spool | None = None,
+        channels: Sequence[Channel] = (),
+    ) -> None:
+        self.channels = tuple(channels)
         # How many samples there are, and after it column by column
-        n_values = 1 + _N_COLUMNS * capacity
+        n_values = 1 + (_N_COLUMNS + len(channels)) * capacity
         if spool is None:
             values: memoryview[float] = memoryview(array("d", bytes(8 * n_values)))
         else:
@@ -89,7 +112,12 @@ class Samples:
         starts = range(1, n_values, max(capacity, 1))
         self._columns = [values[start : start + capacity] for start in starts]
         self._time, self._angle, self._velocity = self._columns[:3]
-        self._model, self._command, self._phase, self._ramp = self._columns[3:]
+        self._model, self._command, self._phase, self._ramp = self._columns[
+            3:_N_COLUMNS
+        ]
+        self._measured = self._columns[_N_COLUMNS:]
+        for column in self._measured:  # so that rows without a reading have no values
+            column[:] = array("d", [math.nan]) * capacity
         self.n = 0
 
     def add(
@@ -111,6 +139,13 @@ class Samples:
         self._phase[n] = phase
         self.n = self._values[0] = n + 1  # last, so that what is counted is complete
 
+    def measure(self, values: Sequence[float]) -> None:
+        """Write what the channels gave into the row that `add` writes next."""
+        # Raises ValueError or TypeError where there is not a number for each.
+        n = self.n
+        for column, value in zip(self._measured, values, strict=True):
+            column[n] = value
+
     def flag(self, ramp: int) -> None:
         """Say of the last sample that its torque is on a ramp."""
         if self.n:
@@ -129,10 +164,10 @@ class Samples:
     def columns(self) -> Columns:
         """Return copies of what was written, in the units of a recording."""
         # -> (n,)
-        written = np.empty((_N_COLUMNS, self.n))
+        written = np.empty((len(self._columns), self.n))
         for row, column in zip(written, self._columns, strict=True):
             row[:] = column[: self.n]
-        return recorded_columns(written)
+        return recorded_columns(written, self.channels)
 
     def close(self) -> None:
         """Let go of a spool's memory, so that it can be closed; nothing is left."""
@@ -140,11 +175,13 @@ class Samples:
             column.release()
 
 
-def recorded_columns(written: NDArray[np.float64]) -> Columns:
+def recorded_columns(
+    written: NDArray[np.float64], channels: Sequence[Channel] = ()
+) -> Columns:
     """Return what the loop wrote by name, in the units of a recording."""
     # written (n_columns, n) -> (n,)
-    time_s, angle, velocity, model, command, phase, ramp = written
-    return {
+    time_s, angle, velocity, model, command, phase, ramp, *measured = written
+    columns = {
         "time_s": time_s.copy(),
         "angle_deg": np.degrees(angle),
         "velocity_deg_s": np.degrees(velocity),
@@ -153,6 +190,10 @@ def recorded_columns(written: NDArray[np.float64]) -> Columns:
         "phase": phase.copy(),
         "ramp": ramp.copy(),
     }
+    for channel, values in zip(channels, measured, strict=True):
+        # What is infinite is no measurement either
+        columns[channel.column] = np.where(np.isfinite(values), values, np.nan)
+    return columns
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -160,6 +201,7 @@ class Spooled:
     """What a presentation that never ended left."""
 
     columns: NDArray[np.float64]  # (n_columns, n): its samples, as the loop wrote them
+    channels: tuple[Channel, ...]
     facts: dict[str, _Fact]  # what was known before the first
 
 
@@ -182,6 +224,7 @@ def _spooled(facts: dict[str, _Fact], data: bytes) -> Spooled | None:
     if not isinstance(facts, dict):
         raise TypeError(f"no facts but {facts}")
     capacity, rate_hz = facts.pop("capacity"), facts["rate_hz"]
+    channels = _channels_of(facts.pop("channels", []))
     n_columns = int(facts.pop("n_columns", _N_COLUMNS_ONCE) or 0)
     threshold = facts["speed_threshold"]
     if not isinstance(capacity, int) or capacity < 1:
@@ -197,6 +240,6 @@ def _spooled(facts: dict[str, _Fact], data: bytes) -> Spooled | None:
     values = np.frombuffer(
         data, np.float64, count=n_columns * capacity, offset=_HEADER + _WORD
     )
-    columns = np.zeros((_N_COLUMNS, int(n)))
+    columns = np.zeros((max(n_columns, _N_COLUMNS), int(n)))
     columns[:n_columns] = values.reshape(n_columns, capacity)[:, : int(n)]
-    return Spooled(columns=columns, facts=facts)
+    return Spooled(columns=columns, channels=channels, facts=facts)

@@ -3,7 +3,12 @@
 import math
 import sys
 
-from masrel.errors import ControllerError, DeviceTimeoutError, LimitExceededError
+from masrel.errors import (
+    ControllerError,
+    DeviceError,
+    DeviceTimeoutError,
+    LimitExceededError,
+)
 from masrel.hess._guard import ActiveGuard, Guard, SoftStops, check_overrun
 from masrel.hess._soft_end import raised_cosine
 from masrel.hess._spool import Samples
@@ -35,6 +40,7 @@ class Ticks:
         "_controller",
         "_end_angle",
         "_estimate",
+        "_has_channels",
         "_is_ending",
         "_last_torques",
         "_latest",
@@ -94,6 +100,7 @@ class Ticks:
         self.n_missed = 0
         self.sent = 0.0
         self.samples = samples
+        self._has_channels = bool(samples.channels)
 
     def run(self) -> str:
         """Run ticks until the torque is zero -> ``"arrived"`` or ``"max-duration"``."""
@@ -146,7 +153,7 @@ class Ticks:
         # Read, check, estimate, decide, check, send, record -> whether it is over
         guard = self.guard
         try:
-            time_ns, angle = self.device.read()
+            time_ns, angle, values = self.device.read()
         except DeviceTimeoutError as error:
             guard.dropouts.count(self.time_s(), str(error))
             return False  # the device holds its torque
@@ -172,6 +179,8 @@ class Ticks:
         self.device.command(torque)
         self.sent = torque
         self._sent_ns = now_ns
+        if self._has_channels:
+            self._measure(values)
         self.samples.add(
             time_s, angle, velocity, controller.model_torque, torque, controller.phase
         )
@@ -195,6 +204,16 @@ class Ticks:
             # Whatever a model does wrong, the torque has to be taken back slowly
             raise ControllerError(
                 f"controller: {type(error).__name__}: {error}"
+            ) from error
+
+    def _measure(self, values: tuple[float, ...]) -> None:
+        try:
+            self.samples.measure(values)
+        except (TypeError, ValueError) as error:
+            names = ", ".join(channel.name for channel in self.samples.channels)
+            raise DeviceError(
+                f"{self.device.name}: needs a number for each of its channels "
+                f"({names}), got {values}"
             ) from error
 
     def time_s(self) -> float:

@@ -10,6 +10,7 @@ from typing import ClassVar, Literal, NamedTuple, Self
 from masrel.errors import DeviceError
 from masrel.hess.clock import Clock
 from masrel.hess.hand import Hand
+from masrel.recording import Channel
 
 _State = Literal["new", "open", "closed"]
 
@@ -24,10 +25,14 @@ class Reading(NamedTuple):
     angle : float
         Elbow angle, rad: 0 is full flexion and grows with extension. The speed
         is not read but estimated by the loop, the same way for every device.
+    channels : tuple of float, optional
+        One value for each of `Device.channels`, of the same time and in their units;
+        ``nan`` where none has come since the last reading, never an old one again.
     """
 
     time_ns: int
     angle: float
+    channels: tuple[float, ...] = ()
 
 
 class IdleCommand(NamedTuple):
@@ -61,10 +66,14 @@ class Device(ABC):
         Name of the backend, as in `open_device`.
     simulated : bool
         Whether no hardware moves; goes into every recording.
+    channels : tuple of Channel
+        What it measures beside the angle, with every reading; none by default. The
+        torque of its sensor is `masrel.recording.MEASURED_TORQUE`.
     """
 
     name: ClassVar[str]
     simulated: ClassVar[bool]
+    channels: tuple[Channel, ...] = ()
 
     _state: _State = "new"  # on the class, so that `__del__` always finds one
 
@@ -96,12 +105,12 @@ class Device(ABC):
         self._state = "open"  # only after it has worked
 
     def read(self) -> Reading:
-        """Read the encoder.
+        """Read the encoder and the channels.
 
         Returns
         -------
         Reading
-            Time and angle.
+            Time, angle, and what each channel measures.
 
         Raises
         ------

@@ -6,7 +6,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from masrel.errors import DeviceError, OverrunWarning, ParameterError
+from masrel.errors import (
+    DeviceError,
+    OverrunWarning,
+    ParameterError,
+    RecordingWarning,
+)
 from masrel.hess._presented import Presented, as_presented
 from masrel.hess._realtime import collector_off, scheduled
 from masrel.hess._shutdown import run_to_the_end
@@ -18,7 +23,7 @@ from masrel.hess.clock import Clock
 from masrel.hess.controller import Controller
 from masrel.hess.device import Device
 from masrel.hess.limits import DeviceLimits
-from masrel.recording import _Fact
+from masrel.recording import Channel, _Fact
 
 
 def run_presentation(
@@ -90,6 +95,9 @@ def run_presentation(
     -----
     OverrunWarning
         If ticks were missed.
+    RecordingWarning
+        If a channel of the device gave no number in some samples, or its torque sensor
+        does not follow the torque.
 
     Examples
     --------
@@ -110,7 +118,9 @@ def run_presentation(
     capacity = n_samples(n_ticks, rate_hz, limits)
     facts: dict[str, _Fact] = {"simulated": device.simulated, "device": device.name}
     facts["rate_hz"] = rate_hz
-    with _samples(spool, capacity, facts, controller.speed_threshold) as samples:
+    with _samples(
+        spool, capacity, facts, controller.speed_threshold, device.channels
+    ) as samples:
         ticks = Ticks(
             device,
             controller,
@@ -129,9 +139,10 @@ def run_presentation(
     if ticks.n_missed:
         message = f"the control loop missed {ticks.n_missed} ticks; they were skipped"
         warnings.warn(message, OverrunWarning, stacklevel=2)
-    return as_presented(
+    presented = as_presented(
         columns,
         facts,
+        channels=device.channels,
         speed_threshold=controller.speed_threshold,
         ended=ended,
         fault=fault,
@@ -139,6 +150,10 @@ def run_presentation(
         n_missed_ticks=ticks.n_missed,
         n_missed_replies=ticks.guard.dropouts.n_missed,
     )
+    silent = presented.recording.facts.get("channel_faults")
+    if silent is not None:
+        warnings.warn(f"{device.name}: {silent}", RecordingWarning, stacklevel=2)
+    return presented
 
 
 def _check(
@@ -173,13 +188,18 @@ def _check(
 
 @contextmanager
 def _samples(
-    spool: Path | None, capacity: int, facts: dict[str, _Fact], threshold: float
+    spool: Path | None,
+    capacity: int,
+    facts: dict[str, _Fact],
+    threshold: float,
+    channels: tuple[Channel, ...],
 ) -> Iterator[Samples]:
     # In memory, or in a file that outlives this process
     file = None
     if spool is not None:
-        file = Spool(spool, capacity, {**facts, "speed_threshold": threshold})
-    samples = Samples(capacity, file)
+        known = {**facts, "speed_threshold": threshold}
+        file = Spool(spool, capacity, known, channels)
+    samples = Samples(capacity, file, channels)
     try:
         yield samples
     finally:

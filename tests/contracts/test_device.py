@@ -11,6 +11,7 @@ from itertools import pairwise
 from math import radians
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from masrel import hess
@@ -26,12 +27,14 @@ from masrel.hess import (
     ReplayOptions,
     SimulatedClock,
     SimulatedHand,
+    SimulatedOptions,
+    TorqueSensor,
     backends,
     device_names,
     open_device,
     run_presentation,
 )
-from masrel.recording import Recording
+from masrel.recording import MEASURED_TORQUE, Channel, Recording
 from tests.hess.rig import ScriptedDevice
 
 START, END = radians(30.0), radians(146.0)
@@ -45,12 +48,27 @@ def _scripted(clock: SimulatedClock, _hand: Hand) -> Device:
     return device
 
 
+# A torque sensor, muscles and a trigger
+CHANNELS = (MEASURED_TORQUE, Channel(name="emg_biceps", unit="mv"), Channel(name="key"))
+
+
+def _scripted_with_channels(clock: SimulatedClock, _hand: Hand) -> Device:
+    device = ScriptedDevice(clock)
+    device.channels = CHANNELS
+    device.values = lambda time_s: (2.0, 0.1 * time_s, 0.0)
+    device.open()
+    return device
+
+
+SENSING = SimulatedOptions(torque_sensor=TorqueSensor())
+
+
 @cache
-def _recording() -> Recording:
+def _recording(options: BackendOptions | None = None) -> Recording:
     clock = SimulatedClock()
     hand = SimulatedHand(start=START, end=END, mean_speed=radians(90.0))
     controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
-    with open_device("simulated", clock=clock, hand=hand) as device:
+    with open_device("simulated", clock=clock, hand=hand, options=options) as device:
         return run_presentation(
             device, controller, clock=clock, limits=DeviceLimits()
         ).recording
@@ -61,9 +79,16 @@ def _options(name: str) -> BackendOptions | None:
     return ReplayOptions(recording=_recording()) if name == "replay" else None
 
 
-def _registered(name: str) -> Opener:
+def _with_channels(name: str) -> BackendOptions:
+    if name == "replay":
+        return ReplayOptions(recording=_recording(SENSING))
+    return SENSING
+
+
+def _registered(name: str, *, with_channels: bool = False) -> Opener:
+    options = _with_channels if with_channels else _options
     return lambda clock, hand: open_device(
-        name, clock=clock, hand=hand, options=_options(name)
+        name, clock=clock, hand=hand, options=options(name)
     )
 
 
@@ -74,6 +99,12 @@ OPENERS: dict[str, Opener] = {
     "scripted": _scripted,
 }
 registered = pytest.mark.parametrize("backend", device_names(), indirect=True)
+# Those that measure anything beside the angle, told to do so
+WITH_CHANNELS: dict[str, Opener] = {
+    "simulated": _registered("simulated", with_channels=True),
+    "replay": _registered("replay", with_channels=True),
+    "scripted": _scripted_with_channels,
+}
 # A recording does not move.
 WITH_ARM = [name for name in device_names() if name != "replay"]
 with_arm = pytest.mark.parametrize("backend", WITH_ARM, indirect=True)
@@ -322,6 +353,47 @@ def test_a_later_reading_has_a_later_time(
         tick(clock)
         times.append(opened.read().time_ns)
     assert times == sorted(set(times))
+
+
+# Channels
+
+
+@pytest.fixture(params=[*OPENERS, *(f"{name} with channels" for name in WITH_CHANNELS)])
+def measuring(request: pytest.FixtureRequest, clock: SimulatedClock):
+    name, _, channels = request.param.partition(" ")
+    hand = SimulatedHand(start=START, end=END, mean_speed=radians(90.0))
+    device = (WITH_CHANNELS if channels else OPENERS)[name](clock, hand)
+    assert bool(device.channels) == bool(channels)
+    yield device
+    device.close()
+
+
+def test_every_reading_has_a_number_for_each_channel(
+    measuring: Device, clock: SimulatedClock
+) -> None:
+    columns = [channel.column for channel in measuring.channels]
+    assert len(set(columns)) == len(columns)
+    for _ in range(5):
+        tick(clock)
+        values = measuring.read().channels
+        assert len(values) == len(columns)
+        assert all(type(value) is float for value in values)
+
+
+def test_what_it_measures_is_in_the_recording(
+    measuring: Device, clock: SimulatedClock
+) -> None:
+    recording = run_presentation(
+        measuring,
+        Controller(STANDARD_MODELS["HM3"], start_angle=START),
+        clock=clock,
+        limits=DeviceLimits(),
+        max_duration_s=0.2,
+    ).recording
+    assert recording.channels == measuring.channels
+    for channel in recording.channels:
+        assert np.isfinite(recording.columns[channel.column]).all()
+        assert recording.facts[f"n_missing_{channel.column}"] == 0
 
 
 # Its state, and who else can idle it

@@ -56,6 +56,7 @@ class ScriptedDevice(Device):
     def __init__(self, clock: SimulatedClock, angle=lambda _time_s: START) -> None:
         self.clock = clock
         self.angle = angle
+        self.values = lambda _time_s: ()
         self.commands: list[tuple[int, float]] = []
         self.n_reads = 0
         self.silent_after = math.inf
@@ -69,7 +70,8 @@ class ScriptedDevice(Device):
         if self.n_reads > self.silent_after:
             raise DeviceTimeoutError("scripted: no answer")
         now_ns = self.clock.now_ns()
-        return Reading(now_ns, self.angle((now_ns - self.start_ns) * 1e-9))
+        time_s = (now_ns - self.start_ns) * 1e-9
+        return Reading(now_ns, self.angle(time_s), self.values(time_s))
 
     def _send(self, torque_nm: float) -> None:
         if len(self.commands) >= self.deaf_after:

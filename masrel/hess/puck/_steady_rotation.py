@@ -271,7 +271,7 @@ class _TurningArm:
         guard = self._guard
         check_overrun(LIMITS, 0, (now_ns - self._sent_ns) * 1e-9)  # silence alone
         try:
-            time_ns, angle = self._device.read()
+            time_ns, angle, _ = self._device.read()
         except DeviceTimeoutError as error:
             guard.dropouts.count(self._since_start_s(now_ns), str(error))
             return  # the device holds its torque
