@@ -7,7 +7,6 @@ their names, and ``NAME.json`` with the facts and the SHA-256 of the first.
 import hashlib
 import io
 import json
-import os
 import re
 import zipfile
 from collections.abc import Mapping
@@ -18,6 +17,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from masrel._files import write_files
 from masrel.errors import ParameterError, RecordingError
 
 __all__ = [
@@ -199,7 +199,6 @@ def write_recording(recording: Recording, path: Path) -> str:
         raise RecordingError(
             f"{path}: needs a new file, a recording is never overwritten; move it away"
         )
-    path.parent.mkdir(parents=True, exist_ok=True)
     channels = [channel.column for channel in recording.channels]
     ordered = {n: recording.columns[n] for n in (*RECORDING_COLUMNS, *channels)}
     archive = io.BytesIO()
@@ -210,26 +209,9 @@ def write_recording(recording: Recording, path: Path) -> str:
     if channels:
         document["channels"] = [asdict(channel) for channel in recording.channels]
     facts = json.dumps(document, indent=1, sort_keys=True, allow_nan=False) + "\n"
-    _write_whole({path: archive.getvalue(), path.with_suffix(".json"): facts.encode()})
+    # A recording that is there has its facts: these get their name first.
+    write_files({path.with_suffix(".json"): facts, path: archive.getvalue()})
     return checksum
-
-
-def _write_whole(contents: dict[Path, bytes]) -> None:
-    # Under other names until all is on disk; the last file gets its name first, so that
-    # a recording that is there has its facts.
-    parts = {path: path.with_name(f"part-{path.name}") for path in contents}
-    try:
-        for path, data in contents.items():
-            with parts[path].open("wb") as file:
-                file.write(data)
-                file.flush()
-                os.fsync(file.fileno())
-        for path in reversed(parts):
-            parts[path].replace(path)
-    except OSError:
-        for part in parts.values():
-            part.unlink(missing_ok=True)
-        raise
 
 
 def read_recording(path: Path) -> Recording:

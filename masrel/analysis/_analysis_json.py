@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
+from masrel._files import write_file
 from masrel.analysis._results import Analysis
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Interval, as_document
@@ -42,7 +43,9 @@ def as_analysis_document(analysis: Analysis) -> dict[str, object]:
     return document
 
 
-def write_analysis(analysis: Analysis, path: Path) -> None:
+def write_analysis(
+    analysis: Analysis, path: Path, *, within: Path | None = None
+) -> None:
     """Write an analysis as JSON; the same analysis gives the same bytes.
 
     Parameters
@@ -51,17 +54,20 @@ def write_analysis(analysis: Analysis, path: Path) -> None:
         The analysis.
     path : Path
         The file.
+    within : Path, optional
+        A folder that the file may not leave by a link, such as the study's.
 
     Raises
     ------
+    ParameterError
+        If `path` is the place of a study's primary record, or not within `within`.
     OSError
-        If the file cannot be written.
+        If the file cannot be written; what was there is then there still.
     """
     text = json.dumps(
         as_analysis_document(analysis), indent=1, ensure_ascii=False, allow_nan=False
     )
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(text + "\n", encoding="utf-8", newline="\n")
+    write_file(path, text + "\n", within=within)
 
 
 def to_frame(results: "Iterable[Estimate] | Mapping[str, Estimate]") -> "DataFrame":

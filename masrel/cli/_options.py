@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from masrel._files import write_file
 from masrel.errors import MasrelWarning, ParameterError, RatingsError
 
 if TYPE_CHECKING:
@@ -205,7 +206,7 @@ def write_output(
 
         form = figure_form(output.figure)
         files = draw(figure(), stamp=stamp, forms=(form,))
-        output.figure.write_bytes(files[form])
+        write_file(output.figure, files[form])
         click.echo(f"figure: {output.figure}", err=True)
 
 
@@ -229,11 +230,7 @@ def write_json(document: dict[str, object], file: Path) -> None:
     if file == STDOUT:
         click.echo(text)
         return
-    try:
-        file.write_text(text + "\n", encoding="utf-8", newline="\n")
-    except OSError as error:
-        error.filename = str(file)  # a full disk does not say which file it was
-        raise
+    write_file(file, text + "\n")
 
 
 def echo_notes(notes: tuple[str, ...]) -> None:

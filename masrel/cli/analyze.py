@@ -44,7 +44,9 @@ def analyze(study: Path, ratings_file: Path | None, output: OutputOptions) -> No
         write_json(library.as_analysis_document(analysis), STDOUT)
         return
     destination = output.json_file or data.paths.analysis_file
-    library.write_analysis(analysis, destination)
+    library.write_analysis(
+        analysis, destination, within=None if output.json_file else study
+    )
     _show(data, analysis, csv=output.csv)
     click.echo(f"analysis: {destination}", err=True)
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 import masrel
+from masrel._files import write_file
 from masrel.cli._options import OutputOptions, output_options, write_output
 from masrel.errors import ParameterError
 
@@ -194,9 +195,8 @@ def _write(placed: list[_Between], folder: Path, *, overwrite: bool) -> list[Pat
             f"{' and more' if len(there) > 3 else ''} already; --overwrite replaces "
             "what is there"
         )
-    folder.mkdir(parents=True, exist_ok=True)
     for path, model in zip(files, placed, strict=True):
-        path.write_text(as_toml(model.document), encoding="utf-8")
+        write_file(path, as_toml(model.document))
     click.echo(f"models: {folder}, {files[0].name} to {files[-1].name}", err=True)
     return files
 

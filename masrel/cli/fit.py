@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
+from masrel._files import write_file
 from masrel.cli._options import (
     Decorator,
     OutputOptions,
@@ -248,10 +249,9 @@ def _write(
     )
 
     if folder is not None:
-        folder.mkdir(parents=True, exist_ok=True)
         for name, forms in fit_figures(fitted).items():
             for form, picture in forms.items():
-                (folder / f"{name}.{form}").write_bytes(picture)
+                write_file(folder / f"{name}.{form}", picture)
         click.echo(f"figures: {folder}", err=True)
     write_output(
         output,
@@ -273,5 +273,5 @@ def _write_model(fitted: "ElbowFit | FrictionFit", path: Path) -> None:
         made_from=f"masrel fit {masrel.__version__}, {len(fitted.trials)} trials",
         fit=fitted,
     )
-    path.write_text(as_toml(document), encoding="utf-8")
+    write_file(path, as_toml(document))
     click.echo(f"model: {path}", err=True)

@@ -26,7 +26,7 @@ def ratings(study: Path, output: Path | None) -> None:
     paths = StudyPaths(study)
     ratings = ratings_from_logs(paths, read_protocol(paths.protocol))
     destination = output or paths.ratings_file
-    write_ratings(ratings, destination)
+    write_ratings(ratings, destination, within=None if output else study)
     n_rows = len(ratings.table)
     n_missing = int(ratings.table["grade"].isna().sum())
     label = " (simulated)" if ratings.simulated else ""

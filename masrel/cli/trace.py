@@ -1,6 +1,7 @@
 """``masrel trace``: events, torque and samples of stretches of models."""
 
 import csv
+import io
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 import click
 from tqdm import tqdm
 
+from masrel._files import new_file, write_file
 from masrel.cli._options import (
     OutputOptions,
     check_folder,
@@ -348,7 +350,7 @@ def trace(
         _write_samples(samples, scenes, documents, output.hides_progress)
     if output.figure is not None:
         form = figure_form(output.figure)
-        output.figure.write_bytes(scenes_figure(scenes, view, form=form))
+        write_file(output.figure, scenes_figure(scenes, view, form=form))
     only = documents[0] if len(documents) == 1 else None
     write_output(
         output,
@@ -524,7 +526,8 @@ def _write_samples(
     rate_hz = 1000.0 if samples.rate_hz is None else samples.rate_hz
     n_rows = _n_samples(documents, rate_hz)
     with (
-        samples.csv_file.open("w", encoding="utf-8", newline="") as out,
+        new_file(samples.csv_file) as file,
+        io.TextIOWrapper(file, encoding="utf-8", newline="") as out,
         tqdm(total=n_rows, desc="samples", delay=1.0, disable=hides_progress) as bar,
     ):
         _write_rows(out, scenes, rate_hz, bar)

@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from masrel._files import make_folder, no_follow
 from masrel.errors import ParameterError, RecordingError
 from masrel.hess.limits import DeviceLimits
 from masrel.recording import RECORDING_COLUMNS, Channel, _channels_of, _Fact
@@ -58,9 +59,9 @@ class Spool:
                 f"got {len(channels)} channels"
             )
         n_bytes = _HEADER + _WORD * (1 + n_columns * capacity)
-        path.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(path.parent)
         try:
-            with path.open("w+b") as file:
+            with open(path, "w+b", opener=no_follow) as file:
                 file.write(header.ljust(_HEADER))
                 file.write(bytes(n_bytes - _HEADER))  # not sparse: the space is taken
                 file.flush()

@@ -1,10 +1,10 @@
 """Where the files of a study are, and copying a bundled study as a new one."""
 
-import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
 import masrel
+from masrel._files import write_files
 from masrel.errors import ParameterError
 
 
@@ -78,10 +78,10 @@ class StudyPaths:
 
 
 _BUNDLED = (
-    "protocol.toml",
     "README.md",
     "ratings/published.csv",
     "ratings/in_person.csv",
+    "protocol.toml",  # last: a folder that has one is a study
 )
 """What a bundled study may hold; nothing drawn, run or computed in it is copied."""
 
@@ -103,7 +103,7 @@ def template_names() -> tuple[str, ...]:
 
 
 def copy_template(name: str, destination: Path) -> None:
-    """Copy a bundled study into a new or empty folder.
+    """Copy a bundled study into a new or empty folder, its protocol last.
 
     Parameters
     ----------
@@ -129,13 +129,10 @@ def copy_template(name: str, destination: Path) -> None:
             f"{destination}: needed a new or empty folder, got one that holds {held[0]}"
             + (f" and {len(held) - 1} more" if len(held) > 1 else "")
         )
-    destination.mkdir(parents=True, exist_ok=True)
-    for part in _BUNDLED:
-        source, target = _home() / name / part, destination / part
-        if source.is_file():
-            target.parent.mkdir(exist_ok=True)
-            # Contents only: an installed file may be read-only, a study is edited.
-            shutil.copyfile(source, target)
+    # Contents only: an installed file may be read-only, a study is edited.
+    sources = {destination / part: _home() / name / part for part in _BUNDLED}
+    contents = {to: of.read_bytes() for to, of in sources.items() if of.is_file()}
+    write_files(contents, within=destination)
 
 
 def _home() -> Path:

@@ -11,6 +11,7 @@ from typing import Any
 
 import pandas as pd
 
+from masrel._files import write_file
 from masrel.errors import RatingsError
 from masrel.scales import Scale
 
@@ -342,7 +343,7 @@ def _items(
     )
 
 
-def write_ratings(ratings: Ratings, path: Path) -> None:
+def write_ratings(ratings: Ratings, path: Path, *, within: Path | None = None) -> None:
     """Write a table of ratings; the same table gives the same bytes.
 
     Parameters
@@ -351,17 +352,20 @@ def write_ratings(ratings: Ratings, path: Path) -> None:
         The table.
     path : Path
         The CSV file; its folder is made when missing.
+    within : Path, optional
+        A folder that the file may not leave by a link, such as the study's.
 
     Raises
     ------
+    ParameterError
+        If `path` is the place of a study's primary record, or not within `within`.
     OSError
-        If the file cannot be written.
+        If the file cannot be written; what was there is then there still.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
     head = "# Ratings, one row a rating; grades are text; NA is missing.\n"
     if ratings.simulated:
         head = f"# SIMULATED: not grades of persons on hardware.\n{head}"
-    path.write_text(head + _body(ratings), encoding="utf-8", newline="")
+    write_file(path, head + _body(ratings), within=within)
 
 
 def ratings_hash(ratings: Ratings) -> str:

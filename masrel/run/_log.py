@@ -16,6 +16,7 @@ from pathlib import Path
 from types import MappingProxyType, TracebackType
 from typing import TYPE_CHECKING, Self
 
+from masrel._files import make_folder, no_follow, sync_folder
 from masrel.errors import SessionLogError
 
 if TYPE_CHECKING:
@@ -201,13 +202,11 @@ class SessionLog:
         OSError
             If the file cannot be opened.
         """
-        path.parent.mkdir(parents=True, exist_ok=True)
-        is_new = not path.exists()
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+        make_folder(path.parent)
+        descriptor = no_follow(str(path), os.O_RDWR | os.O_CREAT)
         try:
             _lock(descriptor, path)
-            if is_new:
-                _sync_folder(path.parent)
+            sync_folder(path.parent)  # also of a log that a dead process made
             return cls._recover(path, descriptor, now)
         except BaseException:
             os.close(descriptor)
@@ -237,10 +236,11 @@ class SessionLog:
             self.append("recovered", {**facts, "kept": True, "moved_to": None})
             return
         torn_file = self.path.with_name(self.path.name + ".torn")
-        with torn_file.open("ab") as file:
+        with open(torn_file, "ab", opener=no_follow) as file:
             file.write(torn + b"\n")
             file.flush()
             os.fsync(file.fileno())
+        sync_folder(torn_file.parent)
         # The event overwrites the torn bytes, so that no crash here can lose both.
         self.append("recovered", {**facts, "kept": False, "moved_to": torn_file.name})
 
@@ -358,16 +358,8 @@ def _lock(descriptor: int, path: Path) -> None:
         return
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
+    except BlockingIOError as error:
         raise SessionLogError(f"{path}: another process has this log open") from error
-
-
-def _sync_folder(folder: Path) -> None:
-    # A new file's name is on disk only when its folder is.
-    if sys.platform == "win32":
-        return
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+    except OSError as error:
+        error.filename = str(path)  # such as a file system without locks
+        raise

@@ -198,11 +198,7 @@ def _keep(
         "position": presentation.position,
         "attempt": request.attempt,
     }
-    try:
-        checksum = write_recording(dataclasses.replace(recording, facts=facts), file)
-    except OSError as error:
-        error.filename = str(file)  # a full disk does not say which file it was
-        raise
+    checksum = write_recording(dataclasses.replace(recording, facts=facts), file)
     return _outcome(recording, checksum)
 
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from masrel._files import write_files
 from masrel.errors import ScheduleError
 from masrel.protocol import Protocol, StudyPaths
 from masrel.schedule.presentation import (
@@ -203,13 +204,12 @@ def write_schedules(
         if problem is not None:
             problems.append(problem)
         drawn = draw_schedule(protocol, files.rater, files.session)
-        texts[files.schedule] = _schedule_text(drawn)
+        # The sheet gets its name first: one without its schedule is drawn anew.
         texts[files.sheet] = _sheet_text(drawn)
+        texts[files.schedule] = _schedule_text(drawn)
     if problems:
         raise ScheduleError("\n".join(problems))
-    study.schedules.mkdir(parents=True, exist_ok=True)
-    for path, text in texts.items():
-        path.write_bytes(text.encode("utf-8"))  # the same bytes on every system
+    write_files(texts, within=study.root)
     return tuple(texts)
 
 

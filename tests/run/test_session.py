@@ -429,18 +429,24 @@ def test_a_recording_is_on_disk_before_the_log_names_it(
     small: Small, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     order: list[str] = []
-    fsync = os.fsync
+    fsync, replace = os.fsync, os.replace
 
     def noted(descriptor: int) -> None:
         fsync(descriptor)
         order.append(Path(os.readlink(f"/proc/self/fd/{descriptor}")).suffix)
 
+    def renamed(part: Path, path: Path) -> None:
+        replace(part, path)
+        order.append(path.suffix)
+
     monkeypatch.setattr(os, "fsync", noted)
+    monkeypatch.setattr(os, "replace", renamed)
     run(small, ScriptGrades(["1", "1", "1"]))
-    written = [suffix for suffix in order if suffix in (".npz", ".json", ".jsonl")]
+    kinds = (".part", ".npz", ".json", ".jsonl")
+    written = [suffix for suffix in order if suffix in kinds]
     assert written == [
         ".jsonl",
-        *[".npz", ".json", ".jsonl", ".jsonl"] * 3,
+        *[".part", ".part", ".json", ".npz", ".jsonl", ".jsonl"] * 3,
         ".jsonl",
     ]
 

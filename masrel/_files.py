@@ -1,0 +1,252 @@
+"""Every file that is written: whole, on disk and under its name, or not at all.
+
+It is made under another name beside the file that it replaces, synced, and gets its
+name in one step, which is synced too: a kill or a full disk leaves the old bytes or the
+new ones. No link is followed, and no output takes the place of a primary record.
+"""
+
+import contextlib
+import errno
+import os
+import stat
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import BinaryIO
+
+from masrel.errors import ParameterError
+
+if sys.platform != "win32":
+    import fcntl
+
+# What Windows alone has, and what it lacks
+_NO_FOLLOW = getattr(os, "O_NOFOLLOW", 0)
+_BINARY = getattr(os, "O_BINARY", 0)
+
+# Names of files that are not whole yet
+_PART_BEGINS, _PART_ENDS = ".masrel-", ".part"
+
+# Where a study's primary records are, which no output replaces
+_PROTOCOL = "protocol.toml"
+_RECORD_FOLDERS = ("schedules", "sessions")
+_SOURCES = (("ratings", "published.csv"), ("ratings", "in_person.csv"))
+
+
+def write_file(path: Path, data: bytes | str, *, within: Path | None = None) -> None:
+    """Write an output: whole, on disk and under its name, or not at all."""
+    # within: a folder that it may not leave by a link
+    refuse_record(path)
+    write_files({path: data}, within=within)
+
+
+def write_files(
+    contents: Mapping[Path, bytes | str], *, within: Path | None = None
+) -> None:
+    """Write files that belong together: all on disk before the first has its name."""
+    # They get their names in this order. Text is UTF-8 with lines as they are.
+    with ExitStack() as stack:
+        parts = [stack.enter_context(_Part.of(path, within)) for path in contents]
+        for part, data in zip(parts, contents.values(), strict=True):
+            part.write(data.encode("utf-8") if isinstance(data, str) else data)
+        for part in parts:
+            part.take_name()
+    for folder in dict.fromkeys(path.parent for path in contents):
+        _remove_left_over(folder)
+        sync_folder(folder)
+
+
+@contextmanager
+def new_file(path: Path) -> Iterator[BinaryIO]:
+    """Give a file to write an output into bit by bit; at the end it gets its name."""
+    refuse_record(path)
+    with _Part.of(path, None) as part:
+        with (
+            part.names_target(),
+            os.fdopen(part.descriptor, "wb", closefd=False) as out,
+        ):
+            yield out
+        part.write(b"")
+        part.take_name()
+    _remove_left_over(path.parent)
+    sync_folder(path.parent)
+
+
+class _Part:
+    """A file that is not whole yet, beside the one whose place it takes."""
+
+    def __init__(self, path: Path, place: Path, descriptor: int) -> None:
+        self.descriptor = descriptor
+        self._path, self._place = path, place  # the name it gets, and the one it has
+        self._is_open = self._is_part = True
+
+    @classmethod
+    @contextmanager
+    def of(cls, path: Path, within: Path | None) -> Iterator["_Part"]:
+        """Give a new part for a target; without `take_name` it is taken away."""
+        if within is not None:
+            check_inside(path.parent, within)
+        mode = _mode(path)
+        make_folder(path.parent)
+        with _naming(path):
+            part = cls(path, *_create(path.parent))
+        try:
+            if mode is not None and sys.platform != "win32":
+                os.fchmod(part.descriptor, mode)
+            yield part
+        finally:
+            part._close()
+            if part._is_part:
+                part._place.unlink(missing_ok=True)
+
+    def names_target(self) -> contextlib.AbstractContextManager[None]:
+        """Give a context whose errors name the target: a full disk does not."""
+        return _naming(self._path)
+
+    def write(self, data: bytes) -> None:
+        """Add bytes and wait until they are on disk."""
+        with self.names_target():
+            remaining = memoryview(data)
+            while remaining:
+                remaining = remaining[os.write(self.descriptor, remaining) :]
+            os.fsync(self.descriptor)
+
+    def take_name(self) -> None:
+        """Take the place of the target, or of a link there."""
+        with self.names_target():
+            if sys.platform == "win32":
+                self._close()  # Windows renames no open file
+            os.replace(self._place, self._path)
+            self._is_part = False
+
+    def _close(self) -> None:
+        if self._is_open:
+            self._is_open = False
+            os.close(self.descriptor)
+
+
+def _create(folder: Path) -> tuple[Path, int]:
+    """Make a new file of a name that nobody knows, locked while it is a part."""
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | _NO_FOLLOW | _BINARY
+    while True:
+        place = folder / f"{_PART_BEGINS}{os.urandom(8).hex()}{_PART_ENDS}"
+        descriptor = os.open(place, flags, 0o666)
+        # Another process may have taken it for left over before it was locked.
+        if not _lock(descriptor) or os.fstat(descriptor).st_nlink:
+            return place, descriptor
+        os.close(descriptor)
+
+
+def _lock(descriptor: int) -> bool:
+    # -> whether this process has the file now; not all file systems can do it
+    if sys.platform == "win32":
+        return False
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True
+
+
+def _remove_left_over(folder: Path) -> None:
+    """Take away parts whose process is dead: its lock went with it."""
+    with contextlib.suppress(OSError):
+        for path in folder.iterdir():
+            if path.name.startswith(_PART_BEGINS) and path.name.endswith(_PART_ENDS):
+                _remove_if_dead(path)
+
+
+def _remove_if_dead(part: Path) -> None:
+    with contextlib.suppress(OSError):
+        descriptor = os.open(part, os.O_RDONLY | _NO_FOLLOW)
+        try:
+            if _lock(descriptor):
+                part.unlink()
+        finally:
+            os.close(descriptor)
+
+
+@contextmanager
+def _naming(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        error.filename, error.filename2 = str(path), None
+        raise
+
+
+def _mode(path: Path) -> int | None:
+    """Return the permissions of what is replaced; refuse what is no file or kept so."""
+    try:
+        mode = path.stat().st_mode
+    except FileNotFoundError:  # nothing, or a link to nothing, which is replaced
+        return None
+    if not stat.S_ISREG(mode):  # such as /dev/stdout, which "-" stands for
+        raise OSError(errno.EINVAL, "needs to be a file, or nothing yet", str(path))
+    if path.is_symlink():
+        return None  # the permissions of another file
+    if not os.access(path, os.W_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
+    return stat.S_IMODE(mode)
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder and those above it that are missing, each on disk."""
+    missing = []
+    while not folder.is_dir() and folder != folder.parent:
+        missing.append(folder)
+        folder = folder.parent
+    for new in reversed(missing):
+        new.mkdir(exist_ok=True)  # another process may be as fast
+        sync_folder(new.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """Wait until the names in a folder are on disk."""
+    # A new file's name is on disk only when its folder is.
+    if sys.platform == "win32":
+        return
+    try:
+        descriptor = os.open(folder, os.O_RDONLY)
+    except PermissionError:  # a folder that one may write into, but not list
+        return
+    try:
+        os.fsync(descriptor)
+    except OSError as error:
+        if error.errno != errno.EINVAL:  # a file system that syncs no folders
+            raise
+    finally:
+        os.close(descriptor)
+
+
+def check_inside(folder: Path, root: Path) -> None:
+    """Refuse a folder of a study that a link leads out of it."""
+    if not folder.resolve().is_relative_to(root.resolve()):
+        raise ParameterError(
+            f"{folder}: needs to be in {root}, got a link to {folder.resolve()}"
+        )
+
+
+def refuse_record(path: Path) -> None:
+    """Refuse an output in the place of a study's protocol, schedule, log and so on."""
+    place = path.parent.resolve() / path.name
+    for root in place.parents:
+        parts = place.relative_to(root).parts
+        is_record = parts[0] in _RECORD_FOLDERS or parts in _SOURCES
+        if (is_record or parts == (_PROTOCOL,)) and (root / _PROTOCOL).is_file():
+            raise ParameterError(
+                f"{path}: needs a file that is no primary record, got one of the "
+                f"study {root}"
+            )
+
+
+def no_follow(path: str, flags: int) -> int:
+    """Open a file that is added to, an `opener` for ``open``; refuse a link."""
+    try:
+        return os.open(path, flags | _NO_FOLLOW | _BINARY, 0o666)
+    except OSError as error:
+        if error.errno == errno.ELOOP:
+            raise OSError(
+                errno.ELOOP, "is a link, which is not followed", path
+            ) from None
+        raise

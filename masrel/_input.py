@@ -1,0 +1,81 @@
+"""Files of a study as they are read: regular, of a bounded size and depth.
+
+No pipe or device holds a verb up, no file fills the memory, and no nesting or number
+ends in an error of the parser.
+"""
+
+import errno
+import json
+import os
+import stat
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+# The most bytes of a protocol, a model file, a schedule, a sheet, facts of a recording
+MAX_SMALL = 1_000_000
+# of a table of ratings, or a session log
+MAX_TABLE = 64_000_000
+# of a recording, or of what one is unpacked to
+MAX_RECORDING = 256_000_000
+
+# Each missing on some systems
+_NO_WAIT = getattr(os, "O_NONBLOCK", 0)
+_BINARY = getattr(os, "O_BINARY", 0)
+
+# Tables and arrays inside each other; a protocol has four
+_MAX_DEPTH = 32
+_LARGEST_INTEGER = 2**63  # TOML promises no more
+
+
+def read_regular(path: Path, *, most: int) -> bytes:
+    """Return the bytes of a regular file of at most so many."""
+    # A pipe without a writer would keep it waiting, and a device never ends.
+    descriptor = os.open(path, os.O_RDONLY | _NO_WAIT | _BINARY)
+    with os.fdopen(_regular(descriptor, path), "rb") as file:
+        data = file.read(most + 1)
+    if len(data) > most:
+        raise OSError(errno.EFBIG, f"larger than {most} bytes", str(path))
+    return data
+
+
+def _regular(descriptor: int, path: Path) -> int:
+    mode = os.fstat(descriptor).st_mode
+    if stat.S_ISREG(mode):
+        return descriptor
+    os.close(descriptor)
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+    raise OSError(errno.EINVAL, "not a regular file", str(path))
+
+
+def parse_json(text: str | bytes) -> Any:
+    """Return what a JSON text holds; ValueError says why it cannot be read."""
+    try:
+        return json.loads(text)
+    except RecursionError:
+        raise ValueError("nested too deep") from None
+
+
+def parse_toml(data: bytes) -> dict[str, Any]:
+    """Return what a TOML file holds; ValueError says why it cannot be read."""
+    try:
+        # utf-8-sig: some editors put a byte order mark first.
+        content = tomllib.loads(data.decode("utf-8-sig"))
+    except RecursionError:
+        raise ValueError("nested too deep") from None
+    level: list[object] = [content]
+    for _ in range(_MAX_DEPTH):
+        level = [part for value in level for part in _parts(value)]
+    if level:
+        raise ValueError(f"nested deeper than {_MAX_DEPTH} tables or arrays")
+    return content
+
+
+def _parts(value: object) -> list[object]:
+    if isinstance(value, int) and not -_LARGEST_INTEGER <= value < _LARGEST_INTEGER:
+        raise ValueError("a whole number of more than 64 bits")
+    if isinstance(value, Mapping):
+        return list(value.values())
+    return value if isinstance(value, list) else []
