@@ -192,13 +192,13 @@ def _mode(path: Path) -> int | None:
 
 def make_folder(folder: Path) -> None:
     """Make a folder and those above it that are missing, each on disk."""
-    missing = []
+    new: list[Path] = []
     while not folder.is_dir() and folder != folder.parent:
-        missing.append(folder)
+        new.append(folder)
         folder = folder.parent
-    for new in reversed(missing):
-        new.mkdir(exist_ok=True)  # another process may be as fast
-        sync_folder(new.parent)
+    for path in reversed(new):
+        path.mkdir(exist_ok=True)  # another process may be as fast
+        sync_folder(path.parent)
 
 
 def sync_folder(folder: Path) -> None:
