@@ -29,7 +29,7 @@ _PART_BEGINS, _PART_ENDS = ".masrel-", ".part"
 
 # Where a study's primary records are, which no output replaces
 _PROTOCOL = "protocol.toml"
-_RECORD_FOLDERS = ("schedules", "sessions")
+_RECORD_FOLDERS = ("schedules", "sessions", ".key")
 _SOURCES = (("ratings", "published.csv"), ("ratings", "in_person.csv"))
 
 
@@ -41,12 +41,16 @@ def write_file(path: Path, data: bytes | str, *, within: Path | None = None) -> 
 
 
 def write_files(
-    contents: Mapping[Path, bytes | str], *, within: Path | None = None
+    contents: Mapping[Path, bytes | str],
+    *,
+    within: Path | None = None,
+    mode: int | None = None,
 ) -> None:
     """Write files that belong together: all on disk before the first has its name."""
-    # They get their names in this order. Text is UTF-8 with lines as they are.
+    # They get their names in this order. Text is UTF-8 with lines as they are. mode:
+    # permissions; those of the file that is replaced, or the usual ones, unless given
     with ExitStack() as stack:
-        parts = [stack.enter_context(_Part.of(path, within)) for path in contents]
+        parts = [stack.enter_context(_Part.of(path, within, mode)) for path in contents]
         for part, data in zip(parts, contents.values(), strict=True):
             part.write(data.encode("utf-8") if isinstance(data, str) else data)
         for part in parts:
@@ -82,11 +86,14 @@ class _Part:
 
     @classmethod
     @contextmanager
-    def of(cls, path: Path, within: Path | None) -> Iterator["_Part"]:
+    def of(
+        cls, path: Path, within: Path | None, mode: int | None = None
+    ) -> Iterator["_Part"]:
         """Give a new part for a target; without `take_name` it is taken away."""
         if within is not None:
             check_inside(path.parent, within)
-        mode = _mode(path)
+        replaced = _mode(path)
+        mode = replaced if mode is None else mode
         make_folder(path.parent)
         with _naming(path):
             part = cls(path, *_create(path.parent))
@@ -190,14 +197,15 @@ def _mode(path: Path) -> int | None:
     return stat.S_IMODE(mode)
 
 
-def make_folder(folder: Path) -> None:
-    """Make a folder and those above it that are missing, each on disk."""
+def make_folder(folder: Path, *, mode: int = 0o777) -> None:
+    """Make a folder, with this mode, and those above it that are missing, on disk."""
     new: list[Path] = []
     while not folder.is_dir() and folder != folder.parent:
         new.append(folder)
         folder = folder.parent
     for path in reversed(new):
-        path.mkdir(exist_ok=True)  # another process may be as fast
+        # Another process may be as fast.
+        path.mkdir(exist_ok=True, mode=mode if path is new[0] else 0o777)
         sync_folder(path.parent)
 
 

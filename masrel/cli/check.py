@@ -6,9 +6,10 @@ from pathlib import Path
 
 import click
 
+from masrel.cli._options import echo_notes
 from masrel.errors import MasrelError, ParameterError, ProtocolError
 from masrel.protocol import Protocol, StudyPaths, read_protocol, scale_of
-from masrel.schedule import schedule_problems
+from masrel.schedule import concealment_notes, schedule_problems
 
 
 @click.command("check")
@@ -22,7 +23,9 @@ def check(study: Path) -> None:
     if problems:
         click.echo(f"masrel: {study}: {_count(len(problems), 'problem')}", err=True)
         sys.exit(2)
-    click.echo(_summary(paths))
+    protocol = read_protocol(paths.protocol)
+    click.echo(_summary(protocol, paths))
+    echo_notes(tuple(f"note: {note}" for note in concealment_notes(protocol, paths)))
 
 
 def _check_study(study: StudyPaths) -> tuple[str, ...]:
@@ -79,8 +82,7 @@ _CHECKERS: tuple[Callable[[Protocol, StudyPaths], Iterable[str]], ...] = (
 )
 
 
-def _summary(study: StudyPaths) -> str:
-    protocol = read_protocol(study.protocol)
+def _summary(protocol: Protocol, study: StudyPaths) -> str:
     pairs = [(rater, s.id) for s in protocol.sessions for rater in s.raters]
     n_drawn = sum(study.schedule_file(*pair).is_file() for pair in pairs)
     return (

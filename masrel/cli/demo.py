@@ -6,6 +6,7 @@ from pathlib import Path
 import click
 from tqdm import tqdm
 
+from masrel._files import write_file
 from masrel.cli._options import OutputOptions, output_options, read_study
 from masrel.errors import MasrelWarning, ParameterError
 from masrel.protocol import StudyPaths, copy_template, read_protocol
@@ -40,6 +41,7 @@ def demo(out: Path, template: str | None, output: OutputOptions) -> None:
         for folder, name in studies.items():
             study = StudyPaths(out / folder)
             copy_template(name, study.root)
+            _publish_secret(study)
             _simulate(study, output)
             report = "simulated" if folder == "study" else folder
             pages.append(_report(study, study.ratings_file, report, output))
@@ -50,6 +52,14 @@ def demo(out: Path, template: str | None, output: OutputOptions) -> None:
     click.echo("Open these in a browser:")
     for page in pages:
         click.echo(f"  {page}")
+
+
+def _publish_secret(study: StudyPaths) -> None:
+    # A demo hides nothing, and is the same each time.
+    from masrel.schedule._secret import N_BYTES, secret_text
+
+    if not study.published_secret_file.exists():
+        write_file(study.published_secret_file, secret_text(bytes(range(N_BYTES))))
 
 
 def _simulate(study: StudyPaths, output: OutputOptions) -> None:

@@ -60,6 +60,16 @@ class StudyPaths:
         """The analysis, in full precision."""
         return self.root / "analysis.json"
 
+    @property
+    def secret_file(self) -> Path:
+        """The secret that decides orders and codes; its folder is its owner's alone."""
+        return self.root / ".key" / "secret.txt"
+
+    @property
+    def published_secret_file(self) -> Path:
+        """The same secret once everybody may know it."""
+        return self.root / "published_secret.txt"
+
     def schedule_file(self, rater: str, session: str) -> Path:
         """Return the file of one rater's schedule; it names the models."""
         return self.schedules / f"{session}_{rater}.csv"
@@ -81,6 +91,7 @@ _BUNDLED = (
     "README.md",
     "ratings/published.csv",
     "ratings/in_person.csv",
+    "published_secret.txt",
     "protocol.toml",  # last: a folder that has one is a study
 )
 """What a bundled study may hold; nothing drawn, run or computed in it is copied."""

@@ -202,7 +202,7 @@ class SessionLog:
         OSError
             If the file cannot be opened.
         """
-        make_folder(path.parent)
+        make_folder(path.parent, mode=0o700)  # recordings in it name their models
         descriptor = no_follow(str(path), os.O_RDWR | os.O_CREAT)
         try:
             _lock(descriptor, path)

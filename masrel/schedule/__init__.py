@@ -11,6 +11,7 @@ from masrel.schedule.presentation import (
     draw_schedule,
 )
 from masrel.schedule.sheets import (
+    concealment_notes,
     read_schedule,
     schedule_problems,
     write_schedules,
@@ -20,6 +21,7 @@ __all__ = [
     "Presentation",
     "Schedule",
     "check_schedule",
+    "concealment_notes",
     "draw_schedule",
     "read_schedule",
     "schedule_problems",

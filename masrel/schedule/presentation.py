@@ -1,6 +1,7 @@
 """The schedule of one rater in one session: what it is, drawing it, checking it."""
 
 import hashlib
+import hmac
 import json
 from collections import Counter
 from collections.abc import MutableSequence
@@ -12,6 +13,7 @@ from numpy.random import PCG64
 import masrel
 from masrel.errors import ScheduleError
 from masrel.protocol import Protocol, presented_hash, protocol_hash
+from masrel.schedule._secret import check_secret, commitment_of
 
 # No letter that reads as a digit (I, O, Q, S, Z), that makes a number of the code
 # (E), or that says left or right (L, R).
@@ -65,6 +67,9 @@ class Schedule:
         Version that drew it.
     presentations : tuple of Presentation
         In order of presentation.
+    commitment : str or None
+        Hash of the secret that decided order and codes: when the secret is published,
+        it shows that no other was used. None when the seed alone decided.
     """
 
     study: str
@@ -76,9 +81,17 @@ class Schedule:
     presented_sha256: str
     masrel_version: str
     presentations: tuple[Presentation, ...]
+    commitment: str | None = None
 
 
-def draw_schedule(protocol: Protocol, rater: str, session: str) -> Schedule:
+def draw_schedule(
+    protocol: Protocol,
+    rater: str,
+    session: str,
+    *,
+    secret: bytes | None = None,
+    row: int | None = None,
+) -> Schedule:
     """Draw the order and the blinded codes of one rater in one session.
 
     Parameters
@@ -87,6 +100,11 @@ def draw_schedule(protocol: Protocol, rater: str, session: str) -> Schedule:
         The study's protocol; its seed, models and repeats decide the draw.
     rater, session : str
         Their ids.
+    secret : bytes, optional
+        16 random bytes that decide the draw together with the seed. Without them the
+        seed alone does, and who knows it knows every order.
+    row : int, optional
+        Row of a design whose orders have rows; ``random-order`` has none.
 
     Returns
     -------
@@ -96,23 +114,33 @@ def draw_schedule(protocol: Protocol, rater: str, session: str) -> Schedule:
     Raises
     ------
     ScheduleError
-        If the session is not the protocol's or does not have the rater.
+        If the session is not the protocol's or does not have the rater, the secret
+        has another length, or the scheme has no rows and one is named.
 
     Notes
     -----
     Order and codes come from two streams for each session and rater alone, so
     adding a rater, a session or a repeat of another study moves nobody else's
-    schedule, and a code says nothing about the place or the model it stands for.
+    schedule. With a secret nobody can tell one stream from the other without it: all
+    codes of a study say nothing about its orders.
     """
     _require_place(protocol, rater, session)
+    if secret is not None:
+        check_secret(secret)
+    if row is not None:
+        raise ScheduleError(
+            f"row: needed none, scheme {protocol.schedule.scheme} has no rows, "
+            f"got {row}"
+        )
     seed, repeats = protocol.schedule.seed, protocol.schedule.repeats
     shown = [
         (model.id, repeat)
         for repeat in range(1, repeats + 1)
         for model in protocol.models
     ]
-    _Stream(seed, "schedule", session, rater).shuffle(shown)
-    codes = _draw_codes(protocol, len(shown), rater, session)
+    _Stream(seed, "schedule", session, rater, secret=secret).shuffle(shown)
+    stream = _Stream(seed, "codes", session, rater, secret=secret)
+    codes = _draw_codes(protocol, len(shown), stream)
     return Schedule(
         study=protocol.study.id,
         rater=rater,
@@ -128,16 +156,14 @@ def draw_schedule(protocol: Protocol, rater: str, session: str) -> Schedule:
                 zip(codes, shown, strict=True), start=1
             )
         ),
+        commitment=None if secret is None else commitment_of(secret),
     )
 
 
-def _draw_codes(
-    protocol: Protocol, n_codes: int, rater: str, session: str
-) -> list[str]:
+def _draw_codes(protocol: Protocol, n_codes: int, stream: "_Stream") -> list[str]:
     # Two digits and a letter, such as 47K: 1800 codes, of which at most 500 are
     # needed and 500 are some model's id, so that the draw always ends.
     taken = {model.id.upper() for model in protocol.models}
-    stream = _Stream(protocol.schedule.seed, "codes", session, rater)
     codes: list[str] = []
     while len(codes) < n_codes:
         number, letter = divmod(
@@ -224,11 +250,16 @@ class _Stream:
     #
     # The SHA-256 of the JSON array ``["masrel", seed, *purpose]`` (UTF-8, no spaces,
     # non-ASCII escaped) is the whole state of the generator: its first 16 bytes, big
-    # endian, are PCG64's state, the other 16 its increment, made odd.
+    # endian, are PCG64's state, the other 16 its increment, made odd. With a secret it
+    # is the HMAC-SHA256 of that array, whose key is the secret: who has the words of
+    # some streams learns neither the secret nor any other stream.
 
-    def __init__(self, seed: int, *purpose: str) -> None:
-        name = json.dumps(["masrel", seed, *purpose], separators=(",", ":"))
-        digest = hashlib.sha256(name.encode("ascii")).digest()
+    def __init__(self, seed: int, *purpose: str, secret: bytes | None = None) -> None:
+        name = json.dumps(["masrel", seed, *purpose], separators=(",", ":")).encode()
+        if secret is None:
+            digest = hashlib.sha256(name).digest()
+        else:
+            digest = hmac.digest(secret, name, "sha256")
         self._generator = PCG64(0)
         self._generator.state = {
             "bit_generator": "PCG64",

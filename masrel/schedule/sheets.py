@@ -1,14 +1,17 @@
 """The files of schedules and raters' sheets: read, drawn once, kept, found stale."""
 
 import csv
+import os
 import re
+import shlex
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from masrel._files import write_files
+from masrel._files import make_folder, write_files
 from masrel.errors import ScheduleError
 from masrel.protocol import Protocol, StudyPaths
+from masrel.schedule._secret import commitment_of, find_secret, new_secret
 from masrel.schedule.presentation import (
     Presentation,
     Schedule,
@@ -25,8 +28,12 @@ _HEAD = {
     "protocol_sha256": r"[0-9a-f]{64}",
     "presented_sha256": r"[0-9a-f]{64}",
     "masrel_version": r"\S+",
+    "commitment": r"[0-9a-f]{64}",
 }
 """Keys of the ``# key: value`` lines, in order, and what their values look like."""
+
+_OPTIONAL = ("commitment",)
+"""Those that a schedule drawn without a secret does not have."""
 
 _COLUMNS = ["position", "code", "model", "repeat"]
 _SHEET_COLUMNS = ["position", "code", "grade"]
@@ -82,6 +89,7 @@ def read_schedule(path: Path) -> Schedule:
         protocol_sha256=head["protocol_sha256"],
         presented_sha256=head["presented_sha256"],
         masrel_version=head["masrel_version"],
+        commitment=head.get("commitment"),
         presentations=tuple(rows),
     )
 
@@ -113,7 +121,7 @@ def _read_head(lines: list[str], path: Path, problems: list[str]) -> dict[str, s
             head[key] = ""
         else:
             head[key] = value
-    absent = [key for key in _HEAD if key not in head]
+    absent = [key for key in _HEAD if key not in head and key not in _OPTIONAL]
     if absent:
         problems.append(f"{path}: needed a line '# {absent[0]}: ...', got none")
     return head
@@ -166,12 +174,17 @@ def write_schedules(
 ) -> tuple[Path, ...]:
     """Draw every schedule that is not there yet, with its blinded sheet.
 
+    Order and codes come from the study's secret, which is drawn when the first
+    schedule needs it. A schedule that is there holds its order, so that it stays good
+    when the secret is lost; it can then not be drawn again for comparison.
+
     Parameters
     ----------
     protocol : Protocol
         The study's protocol.
     study : StudyPaths
-        Where the study is; its schedules folder is made when needed.
+        Where the study is; its schedules folder is made when needed. Schedules name
+        the models: a new folder is readable for its owner alone.
     redraw : bool
         Draw stale or damaged schedules anew. Schedules that still fit stay as they
         are, byte for byte, with or without it.
@@ -186,29 +199,34 @@ def write_schedules(
     ScheduleError
         If a schedule is stale or damaged and `redraw` is false; or a schedule that
         has to be drawn belongs to a session that has begun (it has a log, or
-        grades on its sheet). Nothing is written then.
+        grades on its sheet); or the file of the secret is damaged. Nothing is
+        written then.
     OSError
         If the system refuses a folder or file.
     """
-    every = _every_schedule(protocol, study)
     problems: list[str] = []
     texts: dict[Path, str] = {}
-    for files in every:
+    to_draw: list[_ScheduleFiles] = []
+    for files in _every_schedule(protocol, study):
         fault = _fault(files, protocol)
         if fault is None:
-            schedule = read_schedule(files.schedule)
             if not files.sheet.exists():
-                texts[files.sheet] = _sheet_text(schedule)
+                texts[files.sheet] = _sheet_text(read_schedule(files.schedule))
             continue
+        to_draw.append(files)
         problem = _refusal(files, fault, redraw=redraw)
         if problem is not None:
             problems.append(problem)
-        drawn = draw_schedule(protocol, files.rater, files.session)
-        # The sheet gets its name first: one without its schedule is drawn anew.
-        texts[files.sheet] = _sheet_text(drawn)
-        texts[files.schedule] = _schedule_text(drawn)
     if problems:
         raise ScheduleError("\n".join(problems))
+    if to_draw:
+        secret = find_secret(study) or new_secret(study)
+        for files in to_draw:
+            drawn = draw_schedule(protocol, files.rater, files.session, secret=secret)
+            # The sheet gets its name first: one without its schedule is drawn anew.
+            texts[files.sheet] = _sheet_text(drawn)
+            texts[files.schedule] = _schedule_text(drawn)
+    make_folder(study.schedules, mode=0o700)
     write_files(texts, within=study.root)
     return tuple(texts)
 
@@ -226,15 +244,23 @@ def schedule_problems(protocol: Protocol, study: StudyPaths) -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        Each problem with its file: damaged, stale, a sheet with other codes, or a
-        file that belongs to no rater and session. A schedule not drawn yet is none.
+        Each problem with its file: damaged, stale, not what its secret draws where
+        the study has that secret, a sheet with other codes, or a file that belongs to
+        no rater and session. A schedule not drawn yet is none.
     """
+    try:
+        secret = find_secret(study)
+    except ScheduleError as error:
+        return (str(error),)
     every = _every_schedule(protocol, study)
     problems: list[str] = []
     for files in every:
         if files.schedule.exists():
             fault = _fault(files, protocol)
-            fault = fault or _sheet_fault(files, read_schedule(files.schedule))
+            if fault is None:
+                schedule = read_schedule(files.schedule)
+                fault = _sheet_fault(files, schedule)
+                fault = fault or _draw_fault(files, schedule, protocol, secret)
             problems.extend([fault] if fault else [])
     expected = {path for files in every for path in (files.schedule, files.sheet)}
     for path in sorted(study.schedules.glob("*.csv")):
@@ -244,6 +270,63 @@ def schedule_problems(protocol: Protocol, study: StudyPaths) -> tuple[str, ...]:
                 "got a file of neither"
             )
     return tuple(problems)
+
+
+def concealment_notes(protocol: Protocol, study: StudyPaths) -> tuple[str, ...]:
+    """Say of which schedules the order is not concealed, or cannot be drawn again.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        The study's protocol.
+    study : StudyPaths
+        Where the study is; files that :func:`schedule_problems` finds damaged are
+        left out.
+
+    Returns
+    -------
+    tuple of str
+        A sentence each for a published secret, schedules drawn from the seed alone,
+        schedules of another secret, and folders that others may read.
+    """
+    secret = find_secret(study)
+    commitments = [
+        read_schedule(files.schedule).commitment
+        for files in _every_schedule(protocol, study)
+        if files.schedule.exists() and _fault(files, protocol) is None
+    ]
+    from_seed = commitments.count(None)
+    same = None if secret is None else commitment_of(secret)
+    of_others = sum(c is not None and c != same for c in commitments)
+    notes = []
+    if study.published_secret_file.is_file():
+        notes.append(
+            f"{study.published_secret_file}: the secret is published, so that codes "
+            "and orders drawn from it conceal nothing from who has read it"
+        )
+    if from_seed:
+        notes.append(
+            f"{study.schedules}: {from_seed} of {len(commitments)} schedules were "
+            "drawn from the protocol's seed alone: a sheet gives their order away"
+        )
+    if of_others:
+        notes.append(
+            f"{study.schedules}: {of_others} of {len(commitments)} schedules are of a "
+            "secret that is not in the study: they stay good, and cannot be drawn "
+            "again for comparison"
+        )
+    return (*notes, *_open_folders(study))
+
+
+def _open_folders(study: StudyPaths) -> Iterator[str]:
+    if os.name != "posix":
+        return
+    for folder in (study.secret_file.parent, study.schedules, study.sessions):
+        if folder.is_dir() and folder.stat().st_mode & 0o077:
+            yield (
+                f"{folder}: other users of this computer may read what names the "
+                f"models; chmod 700 {shlex.quote(str(folder))} forbids it"
+            )
 
 
 def _every_schedule(protocol: Protocol, study: StudyPaths) -> list[_ScheduleFiles]:
@@ -319,9 +402,25 @@ def _sheet_fault(files: _ScheduleFiles, schedule: Schedule) -> str | None:
     )
 
 
+def _draw_fault(
+    files: _ScheduleFiles, schedule: Schedule, protocol: Protocol, secret: bytes | None
+) -> str | None:
+    # Whether the study's secret draws another order or other codes than are there.
+    if secret is None or schedule.commitment != commitment_of(secret):
+        return None
+    drawn = draw_schedule(protocol, files.rater, files.session, secret=secret)
+    if drawn.presentations == schedule.presentations:
+        return None
+    return (
+        f"{files.schedule}: needed the order and codes that the study's secret draws, "
+        "got others"
+    )
+
+
 def _schedule_text(schedule: Schedule) -> str:
     """Write a schedule as the text of its file."""
-    head = [f"# {key}: {getattr(schedule, key)}" for key in _HEAD]
+    values = {key: getattr(schedule, key) for key in _HEAD}
+    head = [f"# {key}: {value}" for key, value in values.items() if value is not None]
     rows = [
         f"{shown.position},{shown.code},{shown.model},{shown.repeat}"
         for shown in schedule.presentations

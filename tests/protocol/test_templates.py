@@ -32,6 +32,7 @@ def test_the_published_study_brings_its_ratings(tmp_path: Path) -> None:
     assert sorted(found) == [
         "README.md",
         "protocol.toml",
+        "published_secret.txt",
         "ratings/in_person.csv",
         "ratings/published.csv",
     ]
@@ -93,4 +94,6 @@ def test_every_file_of_a_study_has_its_place() -> None:
     assert study.ratings_file == Path("s/ratings/ratings.csv")
     assert study.published_file == Path("s/ratings/published.csv")
     assert study.in_person_file == Path("s/ratings/in_person.csv")
+    assert study.secret_file == Path("s/.key/secret.txt")
+    assert study.published_secret_file == Path("s/published_secret.txt")
     assert study.analysis_file == Path("s/analysis.json")

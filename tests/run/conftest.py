@@ -7,6 +7,7 @@ import pytest
 
 from masrel.protocol import Protocol, StudyPaths, read_protocol
 from masrel.schedule import write_schedules
+from tests.schedule.studies import with_secret
 
 PROTOCOL = """
 [study]
@@ -78,6 +79,7 @@ def new_study(tmp_path: Path) -> Callable[..., tuple[StudyPaths, Protocol]]:
         study.root.mkdir()
         study.protocol.write_text(text, encoding="utf-8")
         protocol = read_protocol(study.protocol)
+        with_secret(study)
         write_schedules(protocol, study)
         return study, protocol
 

@@ -8,7 +8,18 @@ from masrel.protocol import (
     ScheduleScheme,
     Session,
     Study,
+    StudyPaths,
 )
+
+SECRET = bytes(range(16))
+
+
+def with_secret(study: StudyPaths, secret: bytes = SECRET) -> StudyPaths:
+    """The study, its secret published."""
+    study.root.mkdir(exist_ok=True)
+    text = f"format: 1\nsecret: {secret.hex()}\n"
+    study.published_secret_file.write_text(text, encoding="utf-8")
+    return study
 
 
 def protocol_of(

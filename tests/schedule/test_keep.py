@@ -13,12 +13,12 @@ from masrel.schedule import (
     schedule_problems,
     write_schedules,
 )
-from tests.schedule.studies import protocol_of
+from tests.schedule.studies import SECRET, protocol_of, with_secret
 
 
 @pytest.fixture
 def study(tmp_path: Path) -> StudyPaths:
-    return StudyPaths(tmp_path)
+    return with_secret(StudyPaths(tmp_path))
 
 
 @pytest.fixture
@@ -44,7 +44,7 @@ def test_each_rater_gets_a_schedule_and_a_sheet(study: StudyPaths) -> None:
     ]
     for rater in ("R1", "R2"):
         kept = read_schedule(study.schedule_file(rater, "test"))
-        assert kept == draw_schedule(protocol, rater, "test")
+        assert kept == draw_schedule(protocol, rater, "test", secret=SECRET)
 
 
 def test_a_sheet_reveals_neither_model_nor_grade_nor_seed(study: StudyPaths) -> None:
@@ -69,7 +69,7 @@ def test_drawing_again_writes_nothing(drawn: Protocol, study: StudyPaths) -> Non
 def test_drawing_in_another_place_gives_the_same_bytes(
     drawn: Protocol, study: StudyPaths, tmp_path: Path
 ) -> None:
-    other = StudyPaths(tmp_path / "elsewhere")
+    other = with_secret(StudyPaths(tmp_path / "elsewhere"))
     write_schedules(drawn, other)
     assert contents(other) == contents(study)
 
@@ -117,8 +117,9 @@ def test_a_redraw_follows_the_changed_protocol(
     changed = protocol_of(seed=2)
     assert len(write_schedules(changed, study, redraw=True)) == 4
     kept = read_schedule(study.schedule_file("R2", "test"))
-    assert kept == draw_schedule(changed, "R2", "test")
-    assert kept.presentations != draw_schedule(drawn, "R2", "test").presentations
+    assert kept == draw_schedule(changed, "R2", "test", secret=SECRET)
+    before = draw_schedule(drawn, "R2", "test", secret=SECRET)
+    assert kept.presentations != before.presentations
     assert schedule_problems(changed, study) == ()
 
 

@@ -8,16 +8,16 @@ import pytest
 from masrel.errors import ScheduleError
 from masrel.protocol import StudyPaths
 from masrel.schedule import draw_schedule, read_schedule, write_schedules
-from tests.schedule.studies import protocol_of
+from tests.schedule.studies import SECRET, protocol_of, with_secret
 
 PROTOCOL = protocol_of(models=("A", "B"))
-SCHEDULE = draw_schedule(PROTOCOL, "R1", "test")
+SCHEDULE = draw_schedule(PROTOCOL, "R1", "test", secret=SECRET)
 
 
 def written() -> list[str]:
     """The lines of the file of `SCHEDULE`."""
     with tempfile.TemporaryDirectory() as folder:
-        study = StudyPaths(Path(folder))
+        study = with_secret(StudyPaths(Path(folder)))
         write_schedules(PROTOCOL, study)
         return study.schedule_file("R1", "test").read_text("utf-8").splitlines()
 
@@ -36,6 +36,7 @@ def test_the_file_is_provenance_then_rows() -> None:
         f"# protocol_sha256: {SCHEDULE.protocol_sha256}",
         f"# presented_sha256: {SCHEDULE.presented_sha256}",
         f"# masrel_version: {SCHEDULE.masrel_version}",
+        f"# commitment: {SCHEDULE.commitment}",
         "position,code,model,repeat",
         f"1,{first.code},{first.model},1",
         f"2,{second.code},{second.model},1",
@@ -57,13 +58,14 @@ def test_what_was_written_is_read_back(tmp_path: Path, ending: str) -> None:
         (2, "# study: tiny", "line 2: needed '# key: value'"),
         (4, "# seed: -1", "line 4: needed seed"),
         (6, "# protocol_sha256: 12", "line 6: needed protocol_sha256"),
-        (9, "code,position,model,repeat", "line 9: needed columns position,code"),
-        (10, "2,47K,A,1", "line 10: needed position 1, got '2'"),
-        (10, "1,../x,A,1", "line 10: needed a code of letters and digits, got '../x'"),
-        (10, "1,47K,,1", "line 10: needed the id of a model"),
-        (10, "1,47K,A,0", "line 10: needed repeat"),
-        (10, "1,47K,A", "line 10: needed 4 cells, got 3"),
-        (11, f"2,{SCHEDULE.presentations[0].code},B,1", "line 11: needed codes that"),
+        (10, "code,position,model,repeat", "line 10: needed columns position,code"),
+        (9, "# commitment: no", "line 9: needed commitment"),
+        (11, "2,47K,A,1", "line 11: needed position 1, got '2'"),
+        (11, "1,../x,A,1", "line 11: needed a code of letters and digits, got '../x'"),
+        (11, "1,47K,,1", "line 11: needed the id of a model"),
+        (11, "1,47K,A,0", "line 11: needed repeat"),
+        (11, "1,47K,A", "line 11: needed 4 cells, got 3"),
+        (12, f"2,{SCHEDULE.presentations[0].code},B,1", "line 12: needed codes that"),
     ],
 )
 def test_a_wrong_line_is_named(
@@ -80,13 +82,13 @@ def test_a_wrong_line_is_named(
 
 def test_every_wrong_line_is_named_at_once(tmp_path: Path) -> None:
     lines = list(LINES)
-    lines[3], lines[9], lines[10] = "# seed: x", "1,47K", "3,48K,B,1"
+    lines[3], lines[10], lines[11] = "# seed: x", "1,47K", "3,48K,B,1"
     path = tmp_path / "test_R1.csv"
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     with pytest.raises(ScheduleError) as caught:
         read_schedule(path)
     found = [text.split(": ")[1] for text in str(caught.value).splitlines()]
-    assert found == ["line 4", "line 10", "line 11"]
+    assert found == ["line 4", "line 11", "line 12"]
 
 
 @pytest.mark.parametrize(
@@ -95,7 +97,7 @@ def test_every_wrong_line_is_named_at_once(tmp_path: Path) -> None:
         (None, "needed a schedule file, got: No such file"),
         (b"", "needed columns position,code,model,repeat, got nothing"),
         (b"\xff\xfe", "needed UTF-8 text"),
-        ("\n".join(LINES[:9]).encode(), "needed at least one presentation, got none"),
+        ("\n".join(LINES[:10]).encode(), "needed at least one presentation, got none"),
     ],
 )
 def test_a_file_that_is_no_schedule_is_refused(

@@ -17,8 +17,12 @@ MASK = 2**128 - 1
 
 
 def words_of(name: str) -> Iterator[int]:
-    """PCG XSL RR 128/64 (O'Neill 2014, HMC-CS-2014-0905), seeded by SHA-256."""
-    digest = hashlib.sha256(name.encode()).hexdigest()
+    """The words of a stream that is started from the SHA-256 of a name."""
+    return words_from(hashlib.sha256(name.encode()).hexdigest())
+
+
+def words_from(digest: str) -> Iterator[int]:
+    """PCG XSL RR 128/64 (O'Neill 2014, HMC-CS-2014-0905), started from 64 digits."""
     state, increment = int(digest[:32], 16), int(digest[32:], 16) | 1
     while True:
         state = (state * MULTIPLIER + increment) & MASK

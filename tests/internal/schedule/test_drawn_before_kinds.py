@@ -1,0 +1,64 @@
+"""Schedules of earlier versions: drawn the same without a secret, and still good.
+
+``drawn_before_kinds/`` holds the bundled protocols of that time, and the SHA-256 of
+every schedule and sheet that the code of that time drew from them.
+"""
+
+import hashlib
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from masrel.protocol import Protocol, StudyPaths, read_protocol
+from masrel.schedule import draw_schedule, schedule_problems, write_schedules
+from masrel.schedule.sheets import _schedule_text as schedule_text
+from masrel.schedule.sheets import _sheet_text as sheet_text
+
+BEFORE = Path(__file__).parent / "drawn_before_kinds"
+DRAWN = json.loads((BEFORE / "sha256.json").read_text(encoding="utf-8"))
+
+
+def drawn_then(paths: StudyPaths, name: str) -> Protocol:
+    """Make the study of that time, its schedules drawn from the seed alone."""
+    shutil.copyfile(BEFORE / f"{name}.toml", paths.protocol)
+    protocol = read_protocol(paths.protocol)
+    paths.schedules.mkdir()
+    for session in protocol.sessions:
+        for rater in session.raters:
+            drawn = draw_schedule(protocol, rater, session.id)
+            paths.schedule_file(rater, session.id).write_text(schedule_text(drawn))
+            paths.sheet_file(rater, session.id).write_text(sheet_text(drawn))
+    return protocol
+
+
+@pytest.mark.parametrize("study", sorted(DRAWN))
+def test_what_was_drawn_then_is_drawn_now(study: str, tmp_path: Path) -> None:
+    paths = StudyPaths(tmp_path)
+    drawn_then(paths, study)
+    drawn = {
+        file.name: hashlib.sha256(file.read_bytes()).hexdigest()
+        for file in paths.schedules.iterdir()
+    }
+    assert drawn == DRAWN[study]
+
+
+def test_they_are_kept_and_a_rater_who_comes_later_has_a_concealed_order(
+    tmp_path: Path,
+) -> None:
+    paths = StudyPaths(tmp_path)
+    protocol = drawn_then(paths, "small")
+    assert write_schedules(protocol, paths) == ()
+    assert schedule_problems(protocol, paths) == ()
+    assert not paths.secret_file.exists()  # nothing was drawn, nothing needed it
+    text = paths.protocol.read_text(encoding="utf-8")
+    later = '\n[[raters]]\nid = "R3"\n\n[[sessions]]\n'
+    text = text.replace("\n[[sessions]]\n", later)
+    text = text.replace('\nraters = ["R1", "R2"]', '\nraters = ["R1", "R2", "R3"]')
+    paths.protocol.write_text(text, encoding="utf-8")
+    changed = read_protocol(paths.protocol)
+    written = write_schedules(changed, paths)
+    assert [file.name for file in written] == ["test_R3.csv", "test_R3_sheet.csv"]
+    assert "# commitment: " in written[0].read_text(encoding="utf-8")
+    assert schedule_problems(changed, paths) == ()
