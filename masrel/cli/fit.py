@@ -140,8 +140,9 @@ def fit(
     """Identify the joint behind RECORDINGS of slow and fast stretches.
 
     A recording is a CSV file or an npz archive with time, angle and torque, the unit
-    in each column's name (time_s, angle_deg, torque_nm). Prints every parameter with
-    its confidence interval, clustered by trial, what these trials do not determine, and
+    in each column's name (time_s, angle_deg, torque_nm), or one of masrel run: then its
+    measured torque, or else the model's. Prints every parameter with its confidence
+    interval, clustered by trial, what these trials do not determine, and
     whether the law fits them.
     """
     if of_device:
@@ -155,7 +156,12 @@ def fit(
     compared: tuple[ComparedFit, ...] = ()
     fitted: ElbowFit | FrictionFit
     with warnings_as_notes():
-        movements = _read(recordings, *names, hides_progress=output.hides_progress)
+        movements = _read(
+            recordings,
+            *names,
+            of_device=of_device,
+            hides_progress=output.hides_progress,
+        )
         if of_device:
             from masrel.elbow.identification import fit_friction
 
@@ -196,6 +202,7 @@ def _read(
     columns: dict[str, str],
     units: dict[str, str],
     *,
+    of_device: bool,
     hides_progress: bool | None,
 ) -> "list[Movement]":
     from tqdm import tqdm
@@ -205,7 +212,10 @@ def _read(
     with tqdm(
         paths, desc="reading", unit="file", disable=hides_progress, delay=1.0
     ) as bar:
-        return [read_movement(path, columns=columns, units=units) for path in bar]
+        return [
+            read_movement(path, columns=columns, units=units, of_device=of_device)
+            for path in bar
+        ]
 
 
 def _fit_joint(

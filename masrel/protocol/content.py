@@ -169,6 +169,7 @@ _LATER: dict[str, dict[str, object]] = {
         "end_ramp_ms": 100.0,
         "post_catch_ramp_ms": 100.0,
         "loose_inertia_kg_m2": 0.06,
+        "torque_sensor": False,
     },
 }
 """Keys that protocols once had not, by table, with the defaults they then had: these

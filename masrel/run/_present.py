@@ -39,7 +39,7 @@ from masrel.run._settings import (
     has_simulated_hand,
     model_controller,
 )
-from masrel.run._simulated_raters import intended_speed
+from masrel.run._simulated_raters import intended_speed, sensor_seed
 
 # After this a presentation ends, wherever the arm is.
 _MAX_STRETCH_S = 10.0
@@ -140,7 +140,9 @@ def _on_device(
                 clock=clock,
                 hand=hand,
                 range_end=range_end,
-                options=backend_options(settings, hand),
+                options=backend_options(
+                    settings, hand, _sensor_seed(protocol, request)
+                ),
             )
         )
         watchdog = watched(device, limits.watchdog_time)
@@ -173,6 +175,13 @@ def _hand_speed(protocol: Protocol, request: GradeRequest) -> float | None:
             presentation.model,
             presentation.repeat,
         )
+    )
+
+
+def _sensor_seed(protocol: Protocol, request: GradeRequest) -> int:
+    presented = request.presentation
+    return sensor_seed(
+        protocol, request.rater, request.session, presented.model, presented.repeat
     )
 
 

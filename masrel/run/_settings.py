@@ -11,6 +11,8 @@ from masrel.hess import (
     DeviceLimits,
     Friction,
     Hand,
+    SimulatedOptions,
+    TorqueSensor,
     device_names,
 )
 from masrel.hess._velocity import passive_damping
@@ -28,6 +30,11 @@ def check_backend(settings: DeviceSettings) -> None:
         raise ParameterError(
             f"device.backend: needed one of {', '.join(names)}, "
             f"got {settings.backend!r}"
+        )
+    if settings.torque_sensor and settings.backend != "simulated":
+        raise ParameterError(
+            "device.torque_sensor: needed false, a device of the backend "
+            f"{settings.backend!r} has no torque sensor; got true"
         )
     device_limits(settings)
     backend_options(settings)
@@ -177,11 +184,13 @@ def moves_hardware(settings: DeviceSettings) -> bool:
 
 
 def backend_options(
-    settings: DeviceSettings, hand: Hand | None = None
+    settings: DeviceSettings, hand: Hand | None = None, seed: int = 0
 ) -> BackendOptions | None:
-    """Return the options of the backend that a protocol sets."""
+    """Return the options of the backend that a protocol sets; the seed is of noise."""
     if settings.backend != "puck":
-        return None
+        if not settings.torque_sensor:
+            return None
+        return SimulatedOptions(torque_sensor=TorqueSensor(seed=seed))
     options = _puck_options(settings)
     return options if hand is None else options.emulated(hand.start)
 

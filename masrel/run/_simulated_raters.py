@@ -14,7 +14,7 @@ from masrel.errors import ParameterError, ProtocolError
 from masrel.protocol import Model, Protocol, scale_of
 from masrel.run._grade_sources import MAX_FAULTS, GradeRequest
 
-_Purpose = Literal["accuracy", "neighbour", "severity", "retest", "speed"]
+_Purpose = Literal["accuracy", "neighbour", "severity", "retest", "speed", "sensor"]
 
 
 class SimulatedGrades:
@@ -141,6 +141,14 @@ def intended_speed(
     share = _uniform(settings.seed, "speed", rater, session, model, repeat)
     speed = mean + sd * statistics.NormalDist().inv_cdf(share)
     return min(max(speed, mean - 3 * sd, 0.2 * mean), mean + 3 * sd)
+
+
+def sensor_seed(
+    protocol: Protocol, rater: str, session: str, model: str, repeat: int
+) -> int:
+    """Return the seed of a simulated torque sensor's noise, another one each time."""
+    seed = protocol.simulated_raters.seed
+    return int(2**52 * _uniform(seed, "sensor", rater, session, model, repeat))
 
 
 def _interpolated(height: float, anchors: list[tuple[float, float]]) -> float:

@@ -6,6 +6,7 @@ import io
 import os
 import time
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from typing import Literal
 
@@ -22,7 +23,7 @@ from masrel.errors import (
 )
 from masrel.protocol import DeviceSettings, Protocol, StudyPaths
 from masrel.ratings import ratings_from_logs
-from masrel.recording import RECORDING_COLUMNS, read_recording
+from masrel.recording import MEASURED_TORQUE, RECORDING_COLUMNS, read_recording
 from masrel.run import (
     ConsoleGrades,
     GradeRequest,
@@ -460,3 +461,18 @@ def test_a_script_by_code_and_by_position() -> None:
     assert ScriptGrades(["1", "2"]).grade(request) == "2"
     with pytest.raises(ParameterError, match="position 2, code K7"):
         ScriptGrades({"A": "1"}).grade(request)
+
+
+def test_a_sensor_is_recorded_with_noise_of_its_own_each_time(
+    new_study: Callable[..., Small],
+) -> None:
+    sensing = "[device]\ntorque_sensor = true\n\n[schedule]"
+    small = new_study(("[schedule]", sensing))
+    run(small, SimulatedGrades(small[1]))
+    measured = []
+    for file in sorted(small[0].sessions.rglob("*.npz")):
+        recording = read_recording(file)
+        assert recording.channels == (MEASURED_TORQUE,)
+        measured.append(recording.columns[MEASURED_TORQUE.column][:20].tolist())
+    assert len(measured) == 3
+    assert all(one != other for one, other in pairwise(measured))

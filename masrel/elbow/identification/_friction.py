@@ -118,7 +118,8 @@ def fit_friction(
     ----------
     recordings : sequence of Movement or path
         The device moved to and fro by hand with its motor off; torque is what the
-        hand exerts in the direction of extension.
+        hand exerts in the direction of extension. Or masrel's own recordings with a
+        measured torque, of which the torque that was sent is taken off.
     level : float, optional
         Level of the intervals.
 
@@ -141,7 +142,9 @@ def fit_friction(
         If a value is negative, which the law of a passive device cannot have.
     """
     movements = [
-        entry if isinstance(entry, Movement) else read_movement(Path(entry))
+        entry
+        if isinstance(entry, Movement)
+        else read_movement(Path(entry), of_device=True)
         for entry in recordings
     ]
     parts = _parts(movements)

@@ -6,6 +6,7 @@ https://doi.org/10.1109/TNSRE.2012.2195330, section II.
 
 import math
 import warnings
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -38,7 +39,12 @@ from masrel.elbow.identification._quantities import (
     ARM_QUANTITIES,
     QUANTITIES,
 )
-from masrel.elbow.identification._reading import Movement, even_samples, read_movement
+from masrel.elbow.identification._reading import (
+    Movement,
+    TorqueSource,
+    even_samples,
+    read_movement,
+)
 from masrel.elbow.identification._results import (
     UNDETERMINED,
     ElbowFit,
@@ -684,7 +690,7 @@ def _result(
         level=options.level,
         simulated=any(movement.simulated for movement in material.movements),
         sources={m.name: m.sha256 for m in material.movements},
-        remarks=_remarks(estimates, made),
+        remarks=_torque_remarks(material.movements) + _remarks(estimates, made),
     )
 
 
@@ -756,6 +762,21 @@ def _correlation(joint: JointFit, estimates: Sequence[FittedParameter]) -> _Floa
     with np.errstate(invalid="ignore", divide="ignore"):
         whole[:-1, :-1] = joint.fit.covariance / np.outer(sd, sd)
     return whole[np.ix_(places, places)]
+
+
+def _torque_remarks(movements: Sequence[Movement]) -> tuple[str, ...]:
+    # which torque it is, of recordings of masrel's driver
+    said: dict[TorqueSource, str] = {
+        "sensor": "measured by the device's sensor: what friction compensation leaves "
+        "of the device is in it",
+        "model": "what the joint model asked for, not measured",
+    }
+    n_from = Counter(movement.torque_source for movement in movements)
+    return tuple(
+        f"Torque of {n_from[source]} of {len(movements)} recordings: {text}"
+        for source, text in said.items()
+        if n_from[source]
+    )
 
 
 def _remarks(estimates: Sequence[FittedParameter], made: _Fitted) -> tuple[str, ...]:

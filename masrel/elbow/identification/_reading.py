@@ -11,15 +11,18 @@ import math
 import warnings
 import zipfile
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from masrel.errors import ParameterError, RecordingError, RecordingWarning
-from masrel.recording import RECORDING_COLUMNS, read_recording
+from masrel.recording import MEASURED_TORQUE, RECORDING_COLUMNS, read_recording
+
+TorqueSource = Literal["recorded", "sensor", "model"]
 
 _Floats = NDArray[np.float64]
 
@@ -65,6 +68,9 @@ class Movement:
         Samples at which the torque sensor is at the end of its range.
     simulated : bool
         Whether no joint and no hand was there.
+    torque_source : {"recorded", "sensor", "model"}
+        Where the torque is from: somebody's recording; in one of masrel's driver the
+        sensor of the device, or what the joint model asked for.
     sha256 : str or None
         Checksum of the file, if it is from one.
 
@@ -87,6 +93,7 @@ class Movement:
     velocity: _Floats | None = field(default=None, compare=False, repr=False)
     saturated: NDArray[np.bool_] = field(init=False, compare=False, repr=False)
     simulated: bool = False
+    torque_source: TorqueSource = "recorded"
     sha256: str | None = None
 
     def __post_init__(self) -> None:
@@ -307,8 +314,7 @@ def _read_archive(path: Path) -> _Archive:
         raise RecordingError(
             f"{path}: not an archive of columns (one array without a name)"
         ) from error
-    is_local = {*arrays, "ramp"} == set(RECORDING_COLUMNS)
-    if is_local and path.with_suffix(".json").is_file():
+    if _is_own(arrays) and path.with_suffix(".json").is_file():
         local = read_recording(path)  # holds it to its checksum
         simulated = local.facts.get("simulated") is True
         shown: dict[str, NDArray[np.generic]] = {
@@ -399,8 +405,12 @@ def _is_simulated(remark: str) -> bool:
     return key.strip() == "simulated" and value.strip() == json.dumps(True)
 
 
-_OWN_TORQUE = "model_torque_nm"
-"""Of masrel's own recordings, what the joint asked for: its law can be fitted back."""
+_MODEL, _COMMANDED = "model_torque_nm", "command_torque_nm"
+
+
+def _is_own(names: Iterable[str]) -> bool:
+    # Whether these are the columns of masrel's driver, with or without channels
+    return set(RECORDING_COLUMNS) <= {*names, "ramp"}
 
 
 def read_movement(
@@ -408,6 +418,7 @@ def read_movement(
     *,
     columns: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None,
+    of_device: bool = False,
 ) -> Movement:
     """Read one recording.
 
@@ -418,13 +429,17 @@ def read_movement(
         npz archive with one array a column. Lines that start with ``#`` before the
         names are remarks, of which ``# simulated: true`` is understood; an archive
         has an array ``simulated`` instead. A recording of masrel's driver is
-        recognized by its columns; its torque is what the joint model asked for.
+        recognized by its columns; its torque is what the device's sensor measured, and
+        without one what the joint model asked for.
     columns : mapping of str to str, optional
         Quantity ("time", "angle", "torque", "velocity") to the name of its column,
         where the name does not say it.
     units : mapping of str to str, optional
         Quantity to unit, for columns without a unit in their name; see
         `docs/identification.md`.
+    of_device : bool, optional
+        Whether the device is of interest and not the joint: of a recording of masrel's
+        driver the torque that was sent is then taken off the measured one.
 
     Returns
     -------
@@ -437,7 +452,8 @@ def read_movement(
         If `columns` or `units` names what there is not.
     RecordingError
         If the file is missing or not a recording, with row and column; if a unit
-        is not said; or if the values cannot be what they are said to be.
+        is not said; or if the values cannot be what they are said to be; or if
+        `of_device` and the driver recorded no measured torque.
 
     Warns
     -----
@@ -453,11 +469,21 @@ def read_movement(
         raise RecordingError(f"{path}: {why}")
     content = path.read_bytes()
     table = _read_archive(path) if path.suffix == ".npz" else _read_text(path, content)
-    if {*table.names, "ramp"} == set(RECORDING_COLUMNS):
-        columns = {"torque": _OWN_TORQUE, **(columns or {})}
+    source: TorqueSource = "recorded"
+    if _is_own(table.names) and "torque" not in (columns or {}):
+        source = "sensor" if MEASURED_TORQUE.column in table.names else "model"
+        torque = MEASURED_TORQUE.column if source == "sensor" else _MODEL
+        columns = {"torque": torque, **(columns or {})}
         units = {"torque": "nm", **(units or {})}
     result = _find_columns(table.names, source=str(path), columns=columns, units=units)
     values = {key: table.column(column.name) for key, column in result.items()}
+    if of_device and source != "recorded":
+        if source == "model":
+            raise RecordingError(
+                f"{path}: needs the column {MEASURED_TORQUE.column}: what a device "
+                "does beside the torque that is sent only its sensor can tell"
+            )
+        values["torque"] = values["torque"] - table.column(_COMMANDED)
     _check_lengths(path, {result[key].name: values[key] for key in values})
     whole = np.isfinite(np.stack(list(values.values()))).all(axis=0)
     if not whole.all():
@@ -473,6 +499,7 @@ def read_movement(
         torque=si["torque"],
         velocity=si.get("velocity"),
         simulated=table.simulated,
+        torque_source=source,
         sha256=hashlib.sha256(content).hexdigest(),
     )
 

@@ -7,7 +7,7 @@ import msgspec
 import pytest
 
 from masrel.errors import ParameterError
-from masrel.hess import DeviceLimits, SimulatedHand
+from masrel.hess import DeviceLimits, SimulatedHand, SimulatedOptions, TorqueSensor
 from masrel.hess.puck import EmulatorOptions, PuckOptions, property_table
 from masrel.protocol import DeviceSettings
 from masrel.run._settings import (
@@ -69,6 +69,16 @@ def test_each_key_sets_its_limit_and_no_other(key: str) -> None:
     made, before = device_limits(changed), device_limits(usual)
     assert getattr(made, field) == pytest.approx(getattr(changed, key) * unit)
     assert dataclasses.replace(made, **{field: getattr(before, field)}) == before
+
+
+def test_a_torque_sensor_is_the_simulated_device_s_alone() -> None:
+    sensing = DeviceSettings(torque_sensor=True)
+    assert backend_options(sensing, seed=7) == SimulatedOptions(
+        torque_sensor=TorqueSensor(seed=7)
+    )
+    words = r"device\.torque_sensor: needed false, .* 'puck' has no torque sensor"
+    with pytest.raises(ParameterError, match=words):
+        check_backend(msgspec.structs.replace(sensing, backend="puck"))
 
 
 PUCK = {
