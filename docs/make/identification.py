@@ -26,6 +26,7 @@ from tests.elbow.identification.test_friction import backdriven
 from tests.elbow.identification.test_lack_of_fit import (
     NAMES,
     RIGHT,
+    TERMS,
     WRONG,
     counts,
     quiet_fit,
@@ -85,7 +86,7 @@ def wrong(n_studies: int) -> None:
     for scatter in (None, SCATTER):
         for name, arm in WRONG.items():
             case = {"arm": arm, "scatter": scatter}
-            for options in ({}, {name: "fitted"}):
+            for options in ({}, {TERMS[name]: "fitted"}):
                 total = counts(case, range(5000, 5000 + n_studies), **options)
                 row = [str(total[parameter]) for parameter in NAMES]
                 announced = total["does not fit"]

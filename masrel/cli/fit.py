@@ -148,9 +148,9 @@ def fit(
     if of_device:
         _check_device_options(model_file, {**of_joint, "compare": compare})
     slow_below = of_joint["slow_below"]
-    if slow_below is not None and not slow_below > 0.0:
+    if slow_below is not None and not 0.0 < slow_below < math.inf:
         raise ParameterError(
-            f"--slow-below: needs more than 0 deg/s, got {slow_below:g}"
+            f"--slow-below: needs more than 0 deg/s and finite, got {slow_below:g}"
         )
     names = _pairs("--column", columns), _pairs("--unit", units)
     compared: tuple[ComparedFit, ...] = ()

@@ -185,13 +185,24 @@ def test_options_of_a_joint_are_refused_for_a_device(
         )
 
 
-@pytest.mark.parametrize("speed", ["-3", "0", "nan"])
+@pytest.mark.parametrize("speed", ["-3", "0", "nan", "inf"])
 def test_a_limit_that_is_none_is_refused_in_its_unit(
     masrel: Caller, files: list[Path], speed: str
 ) -> None:
     done = masrel("fit", files[0], "--slow-below", speed)
     assert done.code == 2
-    assert done.err == (f"masrel: --slow-below: needs more than 0 deg/s, got {speed}\n")
+    assert done.err == (
+        f"masrel: --slow-below: needs more than 0 deg/s and finite, got {speed}\n"
+    )
+
+
+def test_only_fast_stretches_are_refused_with_the_option(
+    masrel: Caller, files: list[Path]
+) -> None:
+    done = masrel("fit", *(file for file in files if "fast" in file.name))
+    assert done.code == 2
+    assert done.err.startswith("masrel: recordings: b and k need a slow stretch")
+    assert done.err.endswith(" deg/s. --slow-below raises the limit\n")
 
 
 def test_a_folder_is_no_recording(masrel: Caller, tmp_path: Path) -> None:

@@ -27,6 +27,7 @@ from masrel.elbow.identification._catches import (
     fast_trial,
     slow_trial,
 )
+from masrel.elbow.identification._drifts import own_drifts
 from masrel.elbow.identification._equations import Equations, Known, Spreads
 from masrel.elbow.identification._joint_fit import (
     JointFit,
@@ -34,6 +35,7 @@ from masrel.elbow.identification._joint_fit import (
     fit_together,
     joint_fit,
 )
+from masrel.elbow.identification._lack_of_fit import LEVEL, p_text
 from masrel.elbow.identification._quantities import (
     ALL_QUANTITIES,
     ARM_QUANTITIES,
@@ -354,7 +356,7 @@ def _no_slow(stretches: Mapping[str, Stretch], limit: float) -> str:
     return (
         "recordings: b and k need a slow stretch, one whose speed stays below "
         f"{math.degrees(limit):g} deg/s; the slowest of {len(stretches)} reaches "
-        f"{math.degrees(slowest):.3g} deg/s. A larger limit can be given (slow_below)"
+        f"{math.degrees(slowest):.3g} deg/s. --slow-below raises the limit"
     )
 
 
@@ -464,8 +466,7 @@ def _check_slow(
         # an error that matters: of the value, and of the torque at the largest speed
         unsure = 2.0 * half > abs(estimate.value) and 2.0 * half * size > max(torque)
         if math.isnan(estimate.value) or unsure:
-            error = slow.errors[name]
-            raise RecordingError(_untold(name, estimate.value, error, options))
+            raise RecordingError(_untold(name, estimate.value, slow, options))
         if estimate.high < 0.0:
             symbol = QUANTITIES[name].symbol
             raise RecordingError(
@@ -480,15 +481,22 @@ def _check_slow(
             )
 
 
-def _untold(name: str, value: float, error: float, options: _Options) -> str:
-    symbol = QUANTITIES[name].symbol
+def _untold(name: str, value: float, slow: SlowFit, options: _Options) -> str:
+    symbol, error = QUANTITIES[name].symbol, slow.errors[name]
     if not math.isnan(error):
         symbol += f" ({value:.3g}, standard error {error:.2g})"
+    parts = [trial.pre_catch for trial in slow.trials]
+    drifts = own_drifts(parts, options.gravity_angle)
+    if "drift" not in options.fitted and drifts and drifts.p_value < LEVEL:
+        return (
+            f"recordings: the slow stretches do not tell {symbol}: each drifts in "
+            f"its own way (p {p_text(drifts.p_value)}); try --drift fitted"
+        )
     remedy = "they need a speed that varies within a stretch"
     if options.offset is None:
         remedy += (
             ", or, at constant speeds that differ between stretches, a sensor whose "
-            "zero is known (offset)"
+            "zero is known (--offset)"
         )
     return (
         f"recordings: the slow stretches do not tell {symbol} from a constant "

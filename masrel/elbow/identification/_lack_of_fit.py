@@ -2,8 +2,9 @@
 
 Each test adds one structure to the law that a real arm or sensor may have, and asks
 whether its size differs from 0 by more than trials differ (CR2 with Satterthwaite's
-degrees of freedom, clustered by trial: noise may have any colour within a trial). All
-tests together are held to one level by Holm's method.
+degrees of freedom, clustered by trial: noise may have any colour within a trial); one
+more asks whether trials drift each in a way of its own. All tests together are held to
+one level by Holm's method.
 """
 
 import math
@@ -17,6 +18,7 @@ from scipy.special import stdtr
 
 from masrel.elbow.identification._catches import Trial
 from masrel.elbow.identification._clusters import Rows, partial_out, solve
+from masrel.elbow.identification._drifts import own_drifts
 from masrel.elbow.identification._equations import Equations
 
 _Floats = NDArray[np.float64]
@@ -46,6 +48,7 @@ STRUCTURES = {
     "peak": ("peaks that are not in proportion to the speed", ""),
     "residual": ("residual torques that are not in proportion to the peaks", ""),
     "travel": ("travels that change with the speed", ""),
+    "own drifts": ("drifts that differ from trial to trial", "--drift fitted"),
 }
 """What is added to the law: in words, and the option that fits it."""
 
@@ -59,7 +62,8 @@ class StructureTest:
     name : str
         Which.
     t, df : float
-        Its size over its standard error, and degrees of freedom.
+        Its size over its standard error, and degrees of freedom; of drifts that differ,
+        which have no one size, the root of F and the degrees of its denominator.
     p_value : float
         Two-sided, of this test alone.
     adjusted : float
@@ -144,7 +148,7 @@ class LackOfFit:
                 f"what is left before it; {share}."
             )
         first = self.tests[0]
-        p = f"p {'< 0.0001' if first.adjusted < 1e-4 else f'= {first.adjusted:.2g}'}"
+        p = f"p {p_text(first.adjusted)}"
         if self.verdict == "fits":
             return (
                 f"Fits: nothing left goes with any of {len(self.tests)} structures "
@@ -183,7 +187,8 @@ def lack_of_fit(
         _reduced(e, table, columns, names)
         for e, table, columns in zip(equations, tables, added, strict=True)
     ]
-    tests = _holm([t for i, name in enumerate(names) if (t := _test(i, name, reduced))])
+    in_common = [t for i, name in enumerate(names) if (t := _test(i, name, reduced))]
+    tests = _holm([*in_common, *_own_drifts(equations)])
     phases = _phases(equations, laws)
     before = [p for p in phases if p.phase in ("slow", "pre-catch")]
     after = [p for p in phases if p.phase not in ("slow", "pre-catch")]
@@ -215,6 +220,15 @@ def lack_of_fit(
     )
 
 
+def p_text(p_value: float) -> str:
+    """Return a p-value with its sign of relation.
+
+    >>> p_text(0.0123), p_text(1e-9)
+    ('= 0.012', '< 0.0001')
+    """
+    return "< 0.0001" if p_value < 1e-4 else f"= {p_value:.2g}"
+
+
 def _pooled(phases: Sequence[PhaseResidual]) -> float:
     squares = sum(p.n_samples * p.sd**2 for p in phases)
     return math.sqrt(squares / sum(p.n_samples for p in phases))
@@ -244,6 +258,25 @@ def _test(
         return None
     p = 2.0 * float(stdtr(df, -abs(value / error)))
     return StructureTest(name=name, t=value / error, df=df, p_value=p, adjusted=p)
+
+
+def _own_drifts(equations: Sequence[Equations]) -> list[StructureTest]:
+    known = equations[0].known
+    slow = [e.trial.pre_catch for e in equations if e.trial.pace == "slow"]
+    if known.drifts or len(equations) < _MIN_TRIALS:
+        return []
+    test = own_drifts(slow, known.arm.gravity_angle)
+    if test is None:
+        return []
+    return [
+        StructureTest(
+            name="own drifts",
+            t=math.sqrt(test.ratio),
+            df=float(test.df),
+            p_value=test.p_value,
+            adjusted=test.p_value,
+        )
+    ]
 
 
 def _holm(tests: Sequence[StructureTest]) -> tuple[StructureTest, ...]:

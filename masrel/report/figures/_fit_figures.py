@@ -89,11 +89,22 @@ def _slow_trial(top: Axes, bottom: Axes, fit: ElbowFit, place: int) -> None:
     part, law = fit.trials[place].pre_catch, fit.fitted_torque[place]
     time = part.time - part.time[0]
     top.plot(time, part.measured, linewidth=0.5, **_MEASURED)
-    label = "b·θ̇ + k·θ, fitted"
-    top.plot(time, law, color=BLACK, linewidth=1.5, linestyle=_DASHES, label=label)
+    top.plot(
+        time, law, color=BLACK, linewidth=1.5, linestyle=_DASHES, label=_slow_law(fit)
+    )
     error = 100.0 * residuals.slow_error(fit, place)
     top.set_title(f"mean error {number(error, 1)} %")
     bottom.plot(time, np.degrees(part.velocity), color=BLACK, linewidth=1.0)
+
+
+def _slow_law(fit: ElbowFit) -> str:
+    # (1), and what is fitted or held of an arm beside it
+    has_mass = any(estimate.name == "inertia" for estimate in fit.estimates)
+    terms = ["b·θ̇", "k·θ", *(["m·θ̈"] if has_mass else [])]
+    of_arm = {"gravity": "G·sin(θ − θ_g)", "arm_inertia": "J·θ̈", "drift": "drift"}
+    there = [name for name, term in fit.arm.items() if term not in ("off", 0.0)]
+    terms += [text for name, text in of_arm.items() if name in there]
+    return f"{' + '.join(terms)}{' with a lag' if 'lag' in there else ''}, fitted"
 
 
 def _fast_trials(fit: ElbowFit) -> Figure:

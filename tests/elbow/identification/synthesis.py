@@ -50,6 +50,7 @@ class Arm:
     gravity: float = 0.0  # N·m, times the sine of the angle
     inertia: float = 0.0  # kg·m², in every phase
     drift: float = 0.0  # N·m/s
+    own_drift: float = 0.0  # N·m/s more in every other trial, and less in the others
     lag: float = 0.0  # s, of a sensor of first order
     rise: float = 0.0  # s, from the catch to its peak
     noise_time: float = 0.0  # s, over which noise is correlated; 0 is white
@@ -140,7 +141,7 @@ def study(
     """Slow stretches of part of the range and fast ones of all of it."""
     rng = np.random.default_rng(seed)
     made = []
-    sensors = {"noise": noise, "arm": arm, "rate": rate}
+    sensors = {"noise": noise, "rate": rate}
     for i in range(n_slow):
         start = math.radians(rng.uniform(25.0, 105.0))
         mean = math.radians(rng.uniform(5.0, 8.5))
@@ -152,6 +153,7 @@ def study(
                 mean_speed=mean,
                 rng=rng,
                 name=f"slow {i}",
+                arm=_drifting(arm, i),
                 **sensors,
             )[0]
         )
@@ -165,10 +167,17 @@ def study(
                 rng=rng,
                 scatter=scatter,
                 name=f"fast {i}",
+                arm=_drifting(arm, i),
                 **sensors,
             )[0]
         )
     return made
+
+
+def _drifting(arm: Arm | None, place: int) -> Arm | None:
+    if arm is None:
+        return None
+    return replace(arm, drift=arm.drift + (-1) ** place * arm.own_drift, own_drift=0.0)
 
 
 def _sensed(

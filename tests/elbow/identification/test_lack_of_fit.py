@@ -36,7 +36,9 @@ WRONG = {
     "drift": Arm(drift=0.3),
     "lag": Arm(lag=1.0 / (2.0 * math.pi * 20.0)),
     "rise": Arm(rise=0.08),
+    "own drifts": Arm(own_drift=0.1),
 }
+TERMS = {wrong: {"own drifts": "drift"}.get(wrong, wrong) for wrong in WRONG}
 RIGHT = {
     "white": {},
     "scattered": {"scatter": SCATTERED},
@@ -77,7 +79,10 @@ def quiet_fit(movements: list[Movement], **options: object) -> ElbowFit:
     [
         "gravity",
         "rise",
-        *(pytest.param(each, marks=pytest.mark.slow) for each in list(WRONG)[1:4]),
+        *(
+            pytest.param(each, marks=pytest.mark.slow)
+            for each in ("arm_inertia", "drift", "lag", "own drifts")
+        ),
     ],
 )
 def test_what_an_arm_has_and_the_law_has_not_is_announced(wrong: str) -> None:
@@ -119,6 +124,31 @@ def test_what_is_left_after_the_catch_alone_is_announced_with_few_trials() -> No
     assert lack.lack_of_fit.verdict == "does not fit"
     assert lack.lack_of_fit.tests == ()
     assert "times what is left before it" in lack.lack_of_fit.sentence
+
+
+def test_drifts_that_differ_are_announced_and_fitted() -> None:
+    # as many up as down: their mean is 0, and no trial tells from the others
+    movements = study(HM3, seed=1, n_slow=6, n_fast=0, arm=WRONG["own drifts"])
+    lack = fit(movements).lack_of_fit
+    assert lack.verdict == "does not fit"
+    assert lack.sentence.endswith("; try --drift fitted.")
+    assert "goes with drifts that differ from trial to trial" in lack.sentence
+    fitted = fit(movements, drift="fitted")
+    assert fitted.lack_of_fit.verdict == "fits"
+    assert np.sign(fitted.drifts).tolist() == [1.0, -1.0] * 3
+
+
+def test_one_drift_for_all_trials_is_not_one_that_differs() -> None:
+    movements = study(HM3, seed=1, n_slow=6, n_fast=0, arm=WRONG["drift"])
+    tests = {test.name: test for test in fit(movements).lack_of_fit.tests}
+    assert tests["own drifts"].p_value > 0.05
+
+
+def test_stretches_that_do_not_tell_k_for_their_drifts_say_so() -> None:
+    movements = study(HM3, seed=1, n_slow=6, n_fast=0, arm=Arm(own_drift=0.6))
+    with pytest.raises(RecordingError, match="each drifts in its own way"):
+        fit(movements)
+    assert fit(movements, drift="fitted")["stiffness"].covers(HM3.stiffness)
 
 
 def test_few_trials_are_undecided() -> None:
@@ -237,7 +267,7 @@ def test_with_the_right_term_every_interval_holds(
     wrong: str, n: int, fewest: int
 ) -> None:
     seeds = range(5000, 5000 + n)
-    total = counts({"arm": WRONG[wrong]}, seeds, **{wrong: "fitted"})
+    total = counts({"arm": WRONG[wrong]}, seeds, **{TERMS[wrong]: "fitted"})
     assert all(total[name] >= fewest for name in NAMES), total
     assert total["fits"] >= fewest
 
@@ -245,7 +275,8 @@ def test_with_the_right_term_every_interval_holds(
 @pytest.mark.long
 def test_all_that_an_arm_has_is_fitted_at_once() -> None:
     arm = Arm(gravity=0.5, inertia=0.05, drift=0.3, lag=0.008, rise=0.05)
-    total = counts({"arm": arm}, range(5000, 5040), **dict.fromkeys(WRONG, "fitted"))
+    fitted = dict.fromkeys(TERMS.values(), "fitted")
+    total = counts({"arm": arm}, range(5000, 5040), **fitted)
     # weight, drift and stiffness look alike: k holds 33 times, the others 37 to 39
     assert all(total[name] >= 33 for name in NAMES), total
     assert total["fits"] == 40

@@ -39,6 +39,24 @@ def test_only_slow_trials_have_figures_too() -> None:
     assert svg_of(found, "residuals")
 
 
+@pytest.mark.parametrize(
+    ("terms", "law"),
+    [
+        ({}, "b·θ̇ + k·θ, fitted"),
+        (
+            {"inertia": "fitted", "gravity": "fitted", "drift": 0.1},
+            "b·θ̇ + k·θ + m·θ̈ + G·sin(θ − θ_g) + drift, fitted",
+        ),
+        ({"lag": 0.01}, "b·θ̇ + k·θ with a lag, fitted"),
+    ],
+)
+def test_the_legend_of_slow_trials_has_every_term(
+    terms: dict[str, object], law: str
+) -> None:
+    movements = study(STANDARD_MODELS["HM3"], seed=31, n_slow=5, n_fast=0)
+    assert svg_of(fit(movements, **terms), "slow").count(f"<!-- {law} -->") == 1  # type: ignore[arg-type]
+
+
 def test_the_table_has_a_row_a_parameter_and_its_interval(found: ElbowFit) -> None:
     table = fit_table(found)
     assert [row[0] for row in table.rows] == "b k L α H Q D k_post".split()
