@@ -28,7 +28,9 @@ __all__ = [
     "Channel",
     "Phase",
     "Recording",
+    "Stretch",
     "read_recording",
+    "stretches",
     "write_recording",
 ]
 
@@ -50,8 +52,15 @@ RECORDING_COLUMNS = (
     "command_torque_nm",  # what was sent: model, friction compensation, limits
     "phase",  # position in PHASES
     "ramp",  # position in RAMPS
+    "stretch",  # which one goes on: 1, 2, ...; 0 before, between and after
 )
+_FIRST_COLUMNS = frozenset(RECORDING_COLUMNS[:6])  # those of every recording
 
+_CATCH = PHASES.index("catch")
+_END, _FAULT = RAMPS.index("end"), RAMPS.index("fault")
+_USUAL_THRESHOLD_DEG_S = 20.0  # before recordings said what theirs was
+
+_Columns = Mapping[str, NDArray[np.float64]]
 _Fact = str | int | float | bool | None
 
 _COLUMN_NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
@@ -112,7 +121,8 @@ class Recording:
     ----------
     columns : mapping of str to ndarray, shape (n_samples,)
         One array per name of `RECORDING_COLUMNS`, all of one length, read-only. Where
-        `ramp` is left out, as it once was, it follows from the fault.
+        `ramp` is left out, as it once was, it follows from the fault; where `stretch`
+        is, all before the end is one stretch.
     facts : mapping of str to str, int, float, bool or None
         What was presented and how: ``simulated``, ``device``, ``model``, ``code``,
         ``rate_hz``, ``n_missed_ticks``, ``fault``, ``mean_speed_deg_s`` and others.
@@ -131,15 +141,21 @@ class Recording:
     channels: tuple[Channel, ...] = ()
 
     def __post_init__(self) -> None:
-        if "ramp" not in self.columns and "time_s" in self.columns:
-            ramp = _ramp_without_column(self.columns["time_s"], self.facts)
-            object.__setattr__(self, "columns", {**self.columns, "ramp": ramp})
-        names = (*RECORDING_COLUMNS, *(channel.column for channel in self.channels))
-        if sorted(self.columns) != sorted(names):
+        measured = {channel.column for channel in self.channels}
+        others = set(self.columns) - measured
+        is_whole = _FIRST_COLUMNS <= others <= set(RECORDING_COLUMNS)
+        if not is_whole or not measured <= set(self.columns):
+            names = (*RECORDING_COLUMNS, *sorted(measured))
             raise RecordingError(
                 f"a recording needs the columns {', '.join(names)}, "
                 f"got {', '.join(sorted(self.columns)) or 'none'}"
             )
+        if "ramp" not in self.columns:
+            ramp = _ramp_without_column(self.columns["time_s"], self.facts)
+            object.__setattr__(self, "columns", {**self.columns, "ramp": ramp})
+        if "stretch" not in self.columns:
+            stretch = (self.columns["ramp"] < _END).astype(np.float64)
+            object.__setattr__(self, "columns", {**self.columns, "stretch": stretch})
         shapes = {column.shape for column in self.columns.values()}
         if len(shapes) != 1 or len(next(iter(shapes))) != 1:
             raise RecordingError(
@@ -156,7 +172,7 @@ class Recording:
     @property
     def n_presented(self) -> int:
         """Samples before the torque was taken away, at the end or after a fault."""
-        return int(np.count_nonzero(self.columns["ramp"] < RAMPS.index("end")))
+        return int(np.count_nonzero(self.columns["ramp"] < _END))
 
 
 def _ramp_without_column(
@@ -166,8 +182,179 @@ def _ramp_without_column(
     fault_s = facts.get("fault_time_s")
     ramp = np.zeros(time_s.shape)
     if isinstance(fault_s, float):
-        ramp[time_s >= fault_s] = RAMPS.index("fault")
+        ramp[time_s >= fault_s] = _FAULT
     return ramp
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stretch:
+    """One stretch of a presentation, as it was sampled.
+
+    Attributes
+    ----------
+    number : int
+        1 for the first of the presentation.
+    onset_s, end_s : float
+        First and last sample at which it went on, s since the presentation began.
+    mean_speed_deg_s : float or None
+        Angle travelled over time, from where the arm reached ν_th to the first catch:
+        v̄ of (2) and Table V. Without a catch to the last sample at ν_th or above.
+        None when the arm was never so fast, or a fault came before the catch.
+    catch_angle_deg, catch_time_s : float or None
+        Where and when the first catch began; None without one.
+    peak_torque_nm : float
+        Largest torque that the joint model asked for, N·m.
+    residual_torque_nm : float or None
+        Torque that it asked for in the last sample of that catch, N·m; None without.
+    phases : tuple of str
+        The phases in the order they came.
+    reached_threshold : bool
+        Whether the arm was extended at ν_th or faster.
+
+    References
+    ----------
+    .. [1] Park, H.-S., Kim, J., Damiano, D. L. (2012). IEEE TNSRE 20(3), 361-370,
+       equations (2) and (3). https://doi.org/10.1109/TNSRE.2012.2195330
+    """
+
+    number: int
+    onset_s: float
+    end_s: float
+    mean_speed_deg_s: float | None
+    catch_angle_deg: float | None
+    catch_time_s: float | None
+    peak_torque_nm: float
+    residual_torque_nm: float | None
+    phases: tuple[Phase, ...]
+    reached_threshold: bool
+
+
+def stretches(recording: Recording) -> tuple[Stretch, ...]:
+    """Return what each stretch of a presentation was, from its columns.
+
+    Parameters
+    ----------
+    recording : Recording
+        The presentation; ν_th is its fact ``speed_threshold_deg_s``, 20 deg/s where a
+        recording was made before there was such a fact.
+
+    Returns
+    -------
+    tuple of Stretch
+        In the order they were made; empty when the arm was never stretched.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> columns = {name: np.zeros(4) for name in RECORDING_COLUMNS}
+    >>> columns["time_s"] = np.array([0.0, 0.1, 0.2, 0.3])
+    >>> columns["angle_deg"] = np.array([30.0, 33.0, 39.0, 45.0])
+    >>> columns["velocity_deg_s"] = np.array([0.0, 60.0, 60.0, 60.0])
+    >>> columns["stretch"] = np.array([0.0, 1.0, 1.0, 1.0])
+    >>> (stretch,) = stretches(Recording(columns=columns, facts={}))
+    >>> stretch.onset_s, stretch.end_s, round(stretch.mean_speed_deg_s, 6)
+    (0.1, 0.3, 60.0)
+    """
+    columns, threshold = recording.columns, _threshold_deg_s(recording)
+    number = columns["stretch"].astype(np.int64)
+    starts = np.flatnonzero((np.diff(number, prepend=0) != 0) & (number > 0))
+    was_stopped = recording.facts.get("fault") is not None
+    return tuple(
+        _stretch(
+            {name: column[start:end] for name, column in columns.items()},
+            threshold,
+            was_stopped and end >= recording.n_presented,
+        )
+        for start, end in zip(starts.tolist(), _ends(number, starts), strict=True)
+    )
+
+
+def _threshold_deg_s(recording: Recording) -> float:
+    # ν_th, deg/s
+    threshold = recording.facts.get("speed_threshold_deg_s")
+    return _USUAL_THRESHOLD_DEG_S if threshold is None else float(threshold)
+
+
+def _ends(number: NDArray[np.int64], starts: NDArray[np.intp]) -> list[int]:
+    # number (n_samples,), starts (n_stretches,) -> the first sample after each
+    changes = np.flatnonzero(np.diff(number, append=0) != 0) + 1
+    return [int(changes[changes > start][0]) for start in starts]
+
+
+def _stretch(columns: _Columns, threshold_deg_s: float, stopped: bool) -> Stretch:
+    time_s, catch = columns["time_s"], _catch(columns)
+    torque = columns["model_torque_nm"]
+    moving = columns["velocity_deg_s"] >= threshold_deg_s
+    # One that was stopped before its catch has no mean speed of its own.
+    has_speed = catch is not None or not stopped
+    return Stretch(
+        number=int(columns["stretch"][0]),
+        onset_s=float(time_s[0]),
+        end_s=float(time_s[-1]),
+        mean_speed_deg_s=(
+            _mean_speed_deg_s(columns, threshold_deg_s) if has_speed else None
+        ),
+        catch_angle_deg=None if catch is None else float(columns["angle_deg"][catch]),
+        catch_time_s=None if catch is None else float(time_s[catch]),
+        peak_torque_nm=float(torque.max()),
+        residual_torque_nm=None if catch is None else _residual(columns, catch),
+        phases=_phases(columns),
+        reached_threshold=bool(moving.any()),
+    )
+
+
+def _main_stretch(recording: Recording) -> Stretch | None:
+    # What the facts of a presentation are of: the first of many stretches that reached
+    # ν_th, or the first of all; where there was one, all of it, rests and all
+    made = stretches(recording)
+    if len(made) > 1:
+        return next((one for one in made if one.reached_threshold), made[0])
+    n_rows = recording.n_presented  # what the law did under the ramp, nobody felt
+    if not n_rows:
+        return None
+    columns = {name: column[:n_rows] for name, column in recording.columns.items()}
+    stopped = recording.facts.get("fault") is not None
+    return _stretch(columns, _threshold_deg_s(recording), stopped)
+
+
+def _residual(columns: _Columns, catch: int) -> float:
+    # Torque of the model in the last sample of a catch, N·m
+    others = np.flatnonzero(columns["phase"][catch:] != _CATCH)
+    end = catch + int(others[0]) if others.size else columns["phase"].size
+    return float(columns["model_torque_nm"][end - 1])
+
+
+def _phases(columns: _Columns) -> tuple[Phase, ...]:
+    # Their names in the order they came
+    codes = columns["phase"].astype(np.int64)
+    if codes.size == 0:
+        return ()
+    changes = np.flatnonzero(np.diff(codes)) + 1
+    return tuple(PHASES[codes[index]] for index in (0, *changes))
+
+
+def _catch(columns: _Columns) -> int | None:
+    # The sample at which the first catch began
+    catches = np.flatnonzero(columns["phase"] == _CATCH)
+    return int(catches[0]) if catches.size else None
+
+
+def _mean_speed_deg_s(columns: _Columns, threshold_deg_s: float) -> float | None:
+    # Angle travelled over time, deg/s, from the onset to the first catch: v̄ of (2). An
+    # arm that was slower than ν_th in between has begun anew. Without a catch, from the
+    # first to the last sample at ν_th or above; None without extension.
+    moving = columns["velocity_deg_s"] >= threshold_deg_s
+    last = _catch(columns)
+    if last is not None:
+        slower = np.flatnonzero(~moving[:last])
+        onset = int(slower[-1]) + 1 if slower.size else 0
+    else:
+        fast = np.flatnonzero(moving)
+        onset, last = (int(fast[0]), int(fast[-1])) if fast.size else (0, 0)
+    if last <= onset:
+        return None
+    travel = columns["angle_deg"][last] - columns["angle_deg"][onset]
+    return float(travel / (columns["time_s"][last] - columns["time_s"][onset]))
 
 
 def write_recording(recording: Recording, path: Path) -> str:

@@ -20,6 +20,7 @@ from masrel.hess.human_hand import HandDistribution, HandTraits, HumanHand
 from masrel.hess.limits import DeviceLimits
 from masrel.hess.loop import run_presentation
 from masrel.hess.rendering import MotionHand, Rendering, render
+from masrel.hess.stretching import PresentationStatus, StretchRules
 
 __all__ = [
     "BackendOptions",
@@ -38,6 +39,7 @@ __all__ = [
     "HumanHand",
     "IdleCommand",
     "MotionHand",
+    "PresentationStatus",
     "Presented",
     "Reading",
     "RealClock",
@@ -46,6 +48,7 @@ __all__ = [
     "SimulatedClock",
     "SimulatedHand",
     "SimulatedOptions",
+    "StretchRules",
     "TorqueSensor",
     "YieldingHand",
     "cut_off",

@@ -25,7 +25,7 @@ from masrel.recording import RECORDING_COLUMNS, Channel, _channels_of, _Fact
 Columns = dict[str, NDArray[np.float64]]
 
 _N_COLUMNS = len(RECORDING_COLUMNS)
-_N_COLUMNS_ONCE = 6  # before the column `ramp`
+_N_COLUMNS_ONCE = 6  # before the column `ramp`, and before they said how many
 _HEADER = 4096  # bytes for the facts, a page
 _WORD = 8  # bytes of a float64
 
@@ -89,6 +89,7 @@ class Samples:
         "_model",
         "_phase",
         "_ramp",
+        "_stretch",
         "_time",
         "_values",
         "_velocity",
@@ -113,9 +114,8 @@ class Samples:
         starts = range(1, n_values, max(capacity, 1))
         self._columns = [values[start : start + capacity] for start in starts]
         self._time, self._angle, self._velocity = self._columns[:3]
-        self._model, self._command, self._phase, self._ramp = self._columns[
-            3:_N_COLUMNS
-        ]
+        self._model, self._command, self._phase = self._columns[3:6]
+        self._ramp, self._stretch = self._columns[6:_N_COLUMNS]
         self._measured = self._columns[_N_COLUMNS:]
         for column in self._measured:  # so that rows without a reading have no values
             column[:] = array("d", [math.nan]) * capacity
@@ -129,6 +129,7 @@ class Samples:
         model_torque: float,
         command_torque: float,
         phase: int,
+        stretch: int,
     ) -> None:
         """Write one sample; the columns must not be full."""
         n = self.n
@@ -138,6 +139,7 @@ class Samples:
         self._model[n] = model_torque
         self._command[n] = command_torque
         self._phase[n] = phase
+        self._stretch[n] = stretch
         self.n = self._values[0] = n + 1  # last, so that what is counted is complete
 
     def measure(self, values: Sequence[float]) -> None:
@@ -181,7 +183,7 @@ def recorded_columns(
 ) -> Columns:
     """Return what the loop wrote by name, in the units of a recording."""
     # written (n_columns, n) -> (n,)
-    time_s, angle, velocity, model, command, phase, ramp, *measured = written
+    time_s, angle, velocity, model, command, phase, ramp, stretch, *measured = written
     columns = {
         "time_s": time_s.copy(),
         "angle_deg": np.degrees(angle),
@@ -190,11 +192,26 @@ def recorded_columns(
         "command_torque_nm": command.copy(),
         "phase": phase.copy(),
         "ramp": ramp.copy(),
+        "stretch": _from_the_onset(stretch, velocity),
     }
     for channel, values in zip(channels, measured, strict=True):
         # What is infinite is no measurement either
         columns[channel.column] = np.where(np.isfinite(values), values, np.nan)
     return columns
+
+
+def _from_the_onset(
+    stretch: NDArray[np.float64], velocity: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    # stretch, velocity (n,) -> (n,): the loop knows that the arm is stretched when it
+    # has gone some way; a stretch began where the arm began to go it
+    complete = stretch.copy()
+    for start in np.flatnonzero(np.diff(stretch, prepend=0.0) > 0.0).tolist():
+        onset = start
+        while onset and complete[onset - 1] == 0.0 and velocity[onset - 1] > 0.0:
+            onset -= 1
+        complete[onset:start] = stretch[start]
+    return complete
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -227,7 +244,10 @@ def _spooled(facts: dict[str, _Fact], data: bytes) -> Spooled | None:
     capacity, rate_hz = facts.pop("capacity"), facts["rate_hz"]
     channels = _channels_of(facts.pop("channels", []))
     n_columns = int(facts.pop("n_columns", _N_COLUMNS_ONCE) or 0)
-    threshold = facts["speed_threshold"]
+    if "speed_threshold" in facts:  # as it was once
+        once = float(facts.pop("speed_threshold") or 0.0)
+        facts["speed_threshold_deg_s"] = math.degrees(once)
+    threshold = facts["speed_threshold_deg_s"]
     if not isinstance(capacity, int) or capacity < 1:
         raise ValueError(f"a capacity of {capacity}")
     for fact in (rate_hz, threshold):
@@ -242,5 +262,6 @@ def _spooled(facts: dict[str, _Fact], data: bytes) -> Spooled | None:
         data, np.float64, count=n_columns * capacity, offset=_HEADER + _WORD
     )
     columns = np.zeros((max(n_columns, _N_COLUMNS), int(n)))
+    columns[RECORDING_COLUMNS.index("stretch")] = 1.0  # as without such a column
     columns[:n_columns] = values.reshape(n_columns, capacity)[:, : int(n)]
     return Spooled(columns=columns, channels=channels, facts=facts)

@@ -1,6 +1,5 @@
 """The ticks of one presentation: pace, and what happens at each of them."""
 
-import math
 import sys
 
 from masrel.errors import (
@@ -10,10 +9,11 @@ from masrel.errors import (
     LimitExceededError,
 )
 from masrel.hess._guard import ActiveGuard, Guard, SoftStops, check_overrun
+from masrel.hess._progress import Progress
 from masrel.hess._soft_end import raised_cosine
 from masrel.hess._spool import Samples
 from masrel.hess._stop import EmergencyStop
-from masrel.hess._velocity import VelocityEstimate, speed_noise
+from masrel.hess._velocity import VelocityEstimate
 from masrel.hess._watchdog import Watching
 from masrel.hess.clock import Clock
 from masrel.hess.controller import Controller
@@ -22,9 +22,6 @@ from masrel.hess.limits import DeviceLimits
 from masrel.recording import RAMPS
 
 _POST_CATCH, _END, _FAULT = (RAMPS.index(of) for of in RAMPS[1:])
-
-# A hundred ticks at rest all lie within so many standard deviations of the speed.
-_ARRIVAL_DEVIATIONS = 5.0
 
 _CHECK_EVERY_S = 0.05  # how often the device is asked for its state
 _BEAT_EVERY_S = 0.005  # how often the watchdog is told that the loop is alive
@@ -35,10 +32,7 @@ class Ticks:
 
     __slots__ = (
         "_active_guard",
-        "_arrival_speed",
-        "_arrival_time",
         "_controller",
-        "_end_angle",
         "_estimate",
         "_has_channels",
         "_is_ending",
@@ -46,7 +40,7 @@ class Ticks:
         "_latest",
         "_limits",
         "_n_ticks",
-        "_resting_since",
+        "_progress",
         "_sent_ns",
         "_start_ns",
         "_stop",
@@ -70,7 +64,7 @@ class Ticks:
         limits: DeviceLimits,
         rate_hz: int,
         n_ticks: int,
-        end_angle: float,
+        progress: Progress,
         samples: Samples,
         stop: EmergencyStop,
         watchdog: Watching,
@@ -82,14 +76,10 @@ class Ticks:
         self._n_ticks = n_ticks
         self.period_ns = round(1e9 / rate_hz)
         self.ramp_ns = round(limits.ramp_time * 1e9)
-        self._end_angle = end_angle - limits.arrival_angle
-        self._arrival_time = limits.arrival_time
+        self._progress = progress
         self._estimate = VelocityEstimate()
-        noise = speed_noise(limits.encoder_noise, rate_hz)
-        self._arrival_speed = limits.arrival_speed + _ARRIVAL_DEVIATIONS * noise
         self._start_ns = self._sent_ns = 0
         self._latest: tuple[float, float, float] | None = None
-        self._resting_since = math.inf
         self._last_torques: list[float] = []  # torques yet to be sent, last first, N·m
         self._is_ending = False
         self._stop = stop
@@ -103,19 +93,20 @@ class Ticks:
         self._has_channels = bool(samples.channels)
 
     def run(self) -> str:
-        """Run ticks until the torque is zero -> ``"arrived"`` or ``"max-duration"``."""
+        """Run ticks until the torque is zero -> how the presentation ended."""
         self._start_ns = self._sent_ns = self.clock.now_ns()
-        tick, has_arrived = self._run_from(0)
+        tick, ended = self._run_from(0)
+        self._progress.end()
         shares = raised_cosine(self._limits.end_ramp_time, 1e9 / self.period_ns)
         if shares and self.sent != 0.0:
             self._last_torques = [self.sent * share for share in reversed(shares)]
             self._is_ending = True
             self._n_ticks = sys.maxsize
-            self._run_from(self._wait_for(tick + 1) if has_arrived else tick)
-        return "arrived" if has_arrived else "max-duration"
+            self._run_from(self._wait_for(tick + 1) if ended else tick)
+        return ended or "max-duration"
 
-    def _run_from(self, tick: int) -> tuple[int, bool]:
-        # -> the tick it ended at, and whether something in it ended it
+    def _run_from(self, tick: int) -> tuple[int, str]:
+        # -> the tick it ended at, and what in it ended it, empty for nothing
         stop, device, beat = self._stop, self.device, self.watchdog.beat
         check_every = max(1, round(_CHECK_EVERY_S * 1e9 / self.period_ns))
         beat_every_s = min(_BEAT_EVERY_S, 0.25 * self._limits.watchdog_time)
@@ -130,10 +121,11 @@ class Ticks:
             if tick >= next_check:
                 device.check()
                 next_check = tick + check_every
-            if self._tick():
-                return tick, True
+            ended = self._tick()
+            if ended:
+                return tick, ended
             tick = self._wait_for(tick + 1)
-        return tick, False
+        return tick, ""
 
     def _wait_for(self, tick: int) -> int:
         # Sleeps until the tick is due -> the tick that is due then. Those whose time
@@ -149,18 +141,18 @@ class Ticks:
         check_overrun(self._limits, self.n_missed, gap_s)
         return tick + n_skipped
 
-    def _tick(self) -> bool:
-        # Read, check, estimate, decide, check, send, record -> whether it is over
+    def _tick(self) -> str:
+        # Read, check, estimate, decide, check, send, record -> why it is over, or empty
         guard = self.guard
         try:
             time_ns, angle, values = self.device.read()
         except DeviceTimeoutError as error:
             guard.dropouts.count(self.time_s(), str(error))
-            return False  # the device holds its torque
+            return ""  # the device holds its torque
         time_s = (time_ns - self._start_ns) * 1e-9
         if not guard.is_new(time_s):
             guard.dropouts.count(self.time_s(), f"one of {time_s:.6f} s again")
-            return False
+            return ""
         now_ns = self.clock.now_ns()
         self._latest = (time_s, angle, 0.0)
         guard.reading(time_s, angle, (now_ns - time_ns) * 1e-9)
@@ -181,19 +173,22 @@ class Ticks:
         self._sent_ns = now_ns
         if self._has_channels:
             self._measure(values)
+        progress = self._progress
         self.samples.add(
-            time_s, angle, velocity, controller.model_torque, torque, controller.phase
+            time_s,
+            angle,
+            velocity,
+            controller.model_torque,
+            torque,
+            controller.phase,
+            progress.stretch,
         )
         if self._is_ending:
             self.samples.flag(_END)
-            return not self._last_torques
+            return "" if self._last_torques else "at rest"
         if controller.is_easing:
             self.samples.flag(_POST_CATCH)
-        if angle < self._end_angle or abs(velocity) > self._arrival_speed:
-            self._resting_since = math.inf
-        elif self._resting_since == math.inf:
-            self._resting_since = time_s
-        return time_s - self._resting_since >= self._arrival_time
+        return progress.update(time_s, angle, velocity)
 
     def _decide(self, time_s: float, angle: float, velocity: float) -> float:
         try:
@@ -236,5 +231,5 @@ class Ticks:
             self.samples.replace_command(torque)
         else:
             model, phase = self._controller.model_torque, self._controller.phase
-            self.samples.add(time_s, angle, velocity, model, torque, phase)
+            self.samples.add(time_s, angle, velocity, model, torque, phase, 0)
         self.samples.flag(_FAULT)

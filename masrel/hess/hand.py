@@ -1,7 +1,8 @@
 """Hands that move a simulated arm: mass, spring and damper, and an intention."""
 
 import math
-from typing import ClassVar, Protocol
+from collections.abc import Sequence
+from typing import ClassVar, NamedTuple, Protocol
 
 from masrel.errors import ParameterError
 
@@ -67,15 +68,69 @@ class Hand(Protocol):
         ...
 
 
+class _Leg(NamedTuple):
+    """One way of a hand, there or back: a trapezoid of speed between two rests."""
+
+    start: float  # rad
+    end: float  # rad
+    speed: float  # rad/s, negative on the way back
+    ramp_up: float  # s
+    ramp_down: float  # s
+    delay: float  # when it leaves, s
+    cruise_time: float  # and has its speed
+    cruise_angle: float  # where it has it, rad
+    brake_time: float  # when it begins to brake, s
+    final_time: float  # when it is there, s
+    until: float  # and when it leaves again
+
+
+def _leg(
+    start: float,
+    end: float,
+    speed: float,
+    *,
+    delay: float,
+    ramp_up: float,
+    ramp_down: float,
+    rest: float,
+) -> _Leg:
+    # Raises ParameterError where the ramps leave nothing between them
+    way = end - start
+    speed = math.copysign(speed, way)
+    ramps = 0.5 * speed * (ramp_up + ramp_down)
+    cruise = way - ramps
+    if cruise / speed <= 0.0:
+        raise ParameterError(
+            f"mean_speed: needs ramps shorter than the stretch, at {abs(speed)} "
+            f"rad/s they take {abs(ramps):.3g} of {abs(way):.3g} rad"
+        )
+    cruise_time = delay + ramp_up
+    brake_time = cruise_time + cruise / speed
+    return _Leg(
+        start=start,
+        end=end,
+        speed=speed,
+        ramp_up=ramp_up,
+        ramp_down=ramp_down,
+        delay=delay,
+        cruise_time=cruise_time,
+        cruise_angle=start + 0.5 * speed * ramp_up,
+        brake_time=brake_time,
+        final_time=brake_time + ramp_down,
+        until=brake_time + ramp_down + rest,
+    )
+
+
 class SimulatedHand:
-    """A hand that stretches the arm once at an intended speed, and then holds.
+    """A hand that stretches the arm at an intended speed, once or again and again.
 
     The intention is a trapezoid: rest for `delay`, a short ramp up, constant speed, a
-    ramp down. So the mean speed before the catch, which the catch angle depends on,
-    falls at most 2 % short of the intended one. It is a clamp rather than a hand: the
-    damper keeps the speed within 12 deg/s of the intention when the
-    catch adds 7 N·m at once, and the spring lags by about 1 deg. It has no mass, does
-    not tremble and does not react: `HumanHand` does.
+    ramp down. For every speed in `again` it then rests, brings the arm back, rests and
+    stretches once more; at last it holds. So the mean speed before the catch, which the
+    catch angle depends on, falls at most 2 % short of the intended one. It is a clamp
+    rather than a hand: the damper keeps the speed within 12 deg/s of the intention when
+    the catch adds 7 N·m at once, and the spring lags by about 1 deg. It has no mass,
+    does not tremble and does not react: `HumanHand` does.
 
     Parameters
     ----------
@@ -98,6 +153,12 @@ class SimulatedHand:
     follow_through : float, optional
         How far beyond `end` the hand intends to go, rad: it meets the joint's own
         end and presses against it, whatever the torque there.
+    again : sequence of float, optional
+        Speeds of the stretches after the first, rad/s.
+    return_speed : float, optional
+        Speed at which it brings the arm back between two of them, rad/s.
+    rest : float, optional
+        How long it rests at either end between them, s.
 
     Raises
     ------
@@ -114,12 +175,9 @@ class SimulatedHand:
     """
 
     __slots__ = (
-        "_brake_time",
-        "_cruise_angle",
-        "_cruise_time",
         "_delay",
-        "_final_angle",
-        "_final_time",
+        "_leg",
+        "_legs",
         "_ramp_down",
         "_ramp_up",
         "damping",
@@ -146,6 +204,9 @@ class SimulatedHand:
         ramp_up: float = 0.02,
         ramp_down: float = 0.1,
         follow_through: float = math.radians(2.5),
+        again: Sequence[float] = (),
+        return_speed: float = math.radians(60.0),
+        rest: float = 0.3,
     ) -> None:
         self.start = start
         self.end = end
@@ -157,23 +218,30 @@ class SimulatedHand:
         self._delay = delay
         self._ramp_up = ramp_up
         self._ramp_down = ramp_down
-        self._check(follow_through)
-        self._final_angle = end + follow_through
-        ramps = 0.5 * mean_speed * (ramp_up + ramp_down)
-        cruise = self._final_angle - start - ramps
-        if cruise <= 0.0:
-            raise ParameterError(
-                f"mean_speed: needs ramps shorter than the stretch, at {mean_speed} "
-                f"rad/s they take {ramps:.3g} of {self._final_angle - start:.3g} rad"
-            )
-        self._cruise_time = delay + ramp_up
-        self._cruise_angle = start + 0.5 * mean_speed * ramp_up
-        self._brake_time = self._cruise_time + cruise / mean_speed
-        self._final_time = self._brake_time + ramp_down
+        self._check(follow_through, again, return_speed, rest)
+        final = end + follow_through
+        ways = [(start, final, mean_speed)]  # there, and again back and there
+        for speed in again:
+            ways += [(final, start, return_speed), (start, final, speed)]
+        self._legs: list[_Leg] = []
+        for way in ways:
+            ramps = {"ramp_up": ramp_up, "ramp_down": ramp_down}
+            leg = _leg(*way, delay=delay, rest=rest, **ramps)
+            delay = leg.until
+            self._legs.append(leg)
+        self._leg = self._legs[0]
 
-    def _check(self, follow_through: float) -> None:
+    def _check(
+        self,
+        follow_through: float,
+        again: Sequence[float],
+        return_speed: float,
+        rest: float,
+    ) -> None:
         positive = {
             "mean_speed": self.mean_speed,
+            **{f"again[{n}]": speed for n, speed in enumerate(again)},
+            "return_speed": return_speed,
             "stiffness": self.stiffness,
             "damping": self.damping,
             "ramp_up": self._ramp_up,
@@ -182,7 +250,8 @@ class SimulatedHand:
         for name, value in positive.items():
             if not 0.0 < value < math.inf:
                 raise ParameterError(f"{name}: needs more than 0, got {value}")
-        for name, value in (("delay", self._delay), ("follow_through", follow_through)):
+        times = {"delay": self._delay, "follow_through": follow_through, "rest": rest}
+        for name, value in times.items():
             if not 0.0 <= value < math.inf:
                 raise ParameterError(f"{name}: needs 0 or more, got {value}")
         if not self.slip_time >= 0.0:
@@ -206,20 +275,28 @@ class SimulatedHand:
         tuple of float
             Intended angle, rad, and speed, rad/s.
         """
-        speed = self.mean_speed
-        if self._cruise_time <= time_s < self._brake_time:
-            return self._cruise_angle + speed * (time_s - self._cruise_time), speed
-        if time_s <= self._delay:
-            return self.start, 0.0
-        if time_s < self._cruise_time:
-            since = time_s - self._delay
-            rise = speed / self._ramp_up
-            return self.start + 0.5 * rise * since * since, rise * since
-        left = self._final_time - time_s
+        leg = self._leg
+        if time_s >= leg.until or time_s < leg.delay:
+            leg = self._leg = self._leg_at(time_s)
+        speed = leg.speed
+        if leg.cruise_time <= time_s < leg.brake_time:
+            return leg.cruise_angle + speed * (time_s - leg.cruise_time), speed
+        if time_s <= leg.delay:
+            return leg.start, 0.0
+        if time_s < leg.cruise_time:
+            since = time_s - leg.delay
+            rise = speed / leg.ramp_up
+            return leg.start + 0.5 * rise * since * since, rise * since
+        left = leg.final_time - time_s
         if left <= 0.0:
-            return self._final_angle, 0.0
-        fall = speed / self._ramp_down
-        return self._final_angle - 0.5 * fall * left * left, fall * left
+            return leg.end, 0.0
+        fall = speed / leg.ramp_down
+        return leg.end - 0.5 * fall * left * left, fall * left
+
+    def _leg_at(self, time_s: float) -> _Leg:
+        # The last that it has left, or the first
+        left = (leg for leg in reversed(self._legs) if leg.delay <= time_s)
+        return next(left, self._legs[0])
 
     def feel(self, time_s: float, torque: float) -> None:
         """Feel nothing: this hand goes on whatever the torque."""
@@ -247,6 +324,10 @@ class YieldingHand(SimulatedHand):
         1/(N·m); the default halves the speed at 10 N·m.
     reaction_time : float, optional
         In s; the default is a long-latency reflex rather than a decision.
+    again : sequence of float, optional
+        Speeds of the stretches after the first, rad/s.
+    rest : float, optional
+        How long it rests at either end between them where nothing resists, s.
 
     Raises
     ------
@@ -275,9 +356,16 @@ class YieldingHand(SimulatedHand):
         slip_time: float | None = None,
         yielding: float = 0.1,
         reaction_time: float = 0.08,
+        again: Sequence[float] = (),
+        rest: float = 0.1,
     ) -> None:
         super().__init__(
-            start=start, end=end, mean_speed=mean_speed, slip_time=slip_time
+            start=start,
+            end=end,
+            mean_speed=mean_speed,
+            slip_time=slip_time,
+            again=again,
+            rest=rest,
         )
         if not 0.0 <= yielding < math.inf:
             raise ParameterError(f"yielding: needs 0 or more, got {yielding}")

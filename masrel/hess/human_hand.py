@@ -5,6 +5,7 @@ In: what the hand is like, or how people's hands are distributed. Out: a `Hand`.
 
 import math
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import ClassVar
 
@@ -152,7 +153,7 @@ class HandDistribution:
 
 
 class HumanHand(SimulatedHand):
-    """A hand that stretches the arm once as a person might: soft, heavy and late.
+    """A hand that stretches the arm as a person might: soft, heavy and late.
 
     It intends the trapezoid of speed of a `SimulatedHand`, with ramps of 0.15 s. Its
     muscles give the torque it expects, that of an arm before its catch, and besides
@@ -173,6 +174,12 @@ class HumanHand(SimulatedHand):
         Speed between the ramps, rad/s.
     slip_time : float or None, optional
         Time after the first reading at which the hand lets go, s; None for never.
+    again : sequence of float, optional
+        Speeds of the stretches after the first, rad/s.
+    return_speed : float, optional
+        Speed at which it brings the arm back between two of them, rad/s.
+    rest : float, optional
+        How long it rests at either end between them, s.
 
     Attributes
     ----------
@@ -216,6 +223,9 @@ class HumanHand(SimulatedHand):
         end: float,
         mean_speed: float,
         slip_time: float | None = None,
+        again: Sequence[float] = (),
+        return_speed: float = math.radians(60.0),
+        rest: float = 0.5,
     ) -> None:
         super().__init__(
             start=start,
@@ -226,6 +236,9 @@ class HumanHand(SimulatedHand):
             damping=traits.damping,
             ramp_up=_RAMP_S,
             ramp_down=_RAMP_S,
+            again=again,
+            return_speed=return_speed,
+            rest=rest,
         )
         self.inertia = traits.inertia
         self._traits = traits
@@ -262,10 +275,11 @@ class HumanHand(SimulatedHand):
         return expected + tremor + self._correction
 
     def _acceleration(self, time_s: float) -> float:
-        if self._delay < time_s < self._cruise_time:
-            return self.mean_speed / self._ramp_up
-        if self._brake_time < time_s < self._final_time:
-            return -self.mean_speed / self._ramp_down
+        leg = self._leg  # of `intended` at this time
+        if leg.delay < time_s < leg.cruise_time:
+            return leg.speed / leg.ramp_up
+        if leg.brake_time < time_s < leg.final_time:
+            return -leg.speed / leg.ramp_down
         return 0.0
 
     def feel(self, time_s: float, torque: float) -> None:

@@ -13,6 +13,7 @@ from masrel.errors import (
     RecordingWarning,
 )
 from masrel.hess._presented import Presented, as_presented
+from masrel.hess._progress import Progress
 from masrel.hess._realtime import collector_off, scheduled
 from masrel.hess._shutdown import run_to_the_end
 from masrel.hess._spool import Samples, Spool, n_samples
@@ -23,7 +24,10 @@ from masrel.hess.clock import Clock
 from masrel.hess.controller import Controller
 from masrel.hess.device import Device
 from masrel.hess.limits import DeviceLimits
+from masrel.hess.stretching import PresentationStatus, StretchRules
 from masrel.recording import Channel, _Fact
+
+_MAX_DURATION_S = 10.0  # of one stretch
 
 
 def run_presentation(
@@ -33,19 +37,29 @@ def run_presentation(
     clock: Clock,
     limits: DeviceLimits,
     rate_hz: int = 1000,
-    max_duration_s: float = 10.0,
+    max_duration_s: float | None = None,
     end_angle: float = math.radians(146.0),
+    stretches: StretchRules | None = None,
+    status: PresentationStatus | None = None,
     stop: EmergencyStop | None = None,
     watchdog: Watching | None = None,
     spool: Path | None = None,
 ) -> Presented:
     """Present one model on an open device and record it.
 
-    The presentation ends when the arm has been slower than
-    `DeviceLimits.arrival_speed` for `arrival_time` within `arrival_angle` of
-    `end_angle` or beyond, or at `max_duration_s`. Then the torque goes from
-    where it stands to zero within `DeviceLimits.end_ramp_time`, along a raised cosine,
-    while readings are taken and checked as before. A limit, an error of the device or
+    One stretch ends it: when the arm has been slower than `DeviceLimits.arrival_speed`
+    for `arrival_time` within `arrival_angle` of `end_angle` or beyond. Of many
+    stretches each ends so, or when the arm is brought back: flexed faster than ν_th, or
+    near where the stretch began. A stretch begins when the arm was extended by
+    `arrival_angle`; the next one only after the arm was flexed faster than ν_th, as the
+    law has it. All the while the controller goes on.
+
+    The presentation is over after the last stretch (``"arrived"`` where there is one,
+    else ``"stretches"``), after the time limit (``"time-limit"``), when `status` says
+    that the rater is done (``"done"``), or at `max_duration_s` (``"max-duration"``).
+    Then the torque goes from where it stands to zero within
+    `DeviceLimits.end_ramp_time`, along a raised cosine, while readings are taken and
+    checked as before. A limit, an error of the device or
     of the controller, or an emergency stop ends it with a fault: the torque goes to
     zero within `DeviceLimits.ramp_time`, and the device is closed. Any other exception
     closes it at once and goes on to the caller, with a note when the device did not
@@ -63,10 +77,16 @@ def run_presentation(
         What the loop lets pass.
     rate_hz : int, optional
         Ticks a second.
-    max_duration_s : float, optional
-        Longest duration, without the ramp at its end, s.
+    max_duration_s : float or None, optional
+        Longest duration, without the ramp at its end, s. None for 10 s with one
+        stretch; with many for what the limits of `stretches` take, if the first begins
+        within `StretchRules.time_limit`.
     end_angle : float, optional
-        Where the stretch is meant to end, rad.
+        Where a stretch is meant to end, rad.
+    stretches : StretchRules or None, optional
+        How often the arm may be stretched, and for how long; None for once.
+    status : PresentationStatus or None, optional
+        Says how the presentation stands, and takes in that the rater is done.
     stop : EmergencyStop or None, optional
         A button that the loop looks at in every tick.
     watchdog : Watching or None, optional
@@ -78,7 +98,9 @@ def run_presentation(
     Returns
     -------
     Presented
-        The recording, the fault and the missed ticks.
+        The recording, the fault and the missed ticks. The facts ``phases``,
+        ``catch_angle_deg`` and ``mean_speed_deg_s`` are of the first of many stretches
+        that reached ν_th; `masrel.recording.stretches` has those of each.
 
     Raises
     ------
@@ -113,14 +135,24 @@ def run_presentation(
     >>> presented.recording.facts["phases"]
     'pre-catch, catch, post-catch, pre-catch'
     """
+    rules = stretches or StretchRules()
+    if max_duration_s is None:
+        max_duration_s = _longest_s(rules)
     _check(device, controller, limits, rate_hz, max_duration_s, end_angle)
     n_ticks = math.ceil(max_duration_s * rate_hz)
     capacity = n_samples(n_ticks, rate_hz, limits)
     facts: dict[str, _Fact] = {"simulated": device.simulated, "device": device.name}
     facts["rate_hz"] = rate_hz
-    with _samples(
-        spool, capacity, facts, controller.speed_threshold, device.channels
-    ) as samples:
+    facts["speed_threshold_deg_s"] = math.degrees(controller.speed_threshold)
+    progress = Progress(
+        rules,
+        limits,
+        status or PresentationStatus(),
+        rate_hz=rate_hz,
+        end_angle=end_angle,
+        speed_threshold=controller.speed_threshold,
+    )
+    with _samples(spool, capacity, facts, device.channels) as samples:
         ticks = Ticks(
             device,
             controller,
@@ -128,7 +160,7 @@ def run_presentation(
             limits,
             rate_hz,
             n_ticks,
-            end_angle,
+            progress,
             samples,
             stop or EmergencyStop(),
             watchdog or NoWatchdog(),
@@ -143,7 +175,6 @@ def run_presentation(
         columns,
         facts,
         channels=device.channels,
-        speed_threshold=controller.speed_threshold,
         ended=ended,
         fault=fault,
         grip_lost=controller.grip_lost,
@@ -154,6 +185,12 @@ def run_presentation(
     if silent is not None:
         warnings.warn(f"{device.name}: {silent}", RecordingWarning, stacklevel=2)
     return presented
+
+
+def _longest_s(rules: StretchRules) -> float:
+    if rules.n == 1:
+        return _MAX_DURATION_S
+    return 2.0 * rules.time_limit + rules.stretch_limit
 
 
 def _check(
@@ -191,14 +228,12 @@ def _samples(
     spool: Path | None,
     capacity: int,
     facts: dict[str, _Fact],
-    threshold: float,
     channels: tuple[Channel, ...],
 ) -> Iterator[Samples]:
     # In memory, or in a file that outlives this process
     file = None
     if spool is not None:
-        known = {**facts, "speed_threshold": threshold}
-        file = Spool(spool, capacity, known, channels)
+        file = Spool(spool, capacity, facts, channels)
     samples = Samples(capacity, file, channels)
     try:
         yield samples

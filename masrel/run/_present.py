@@ -55,6 +55,7 @@ _FORMATS = {
     "command_torque_nm": "{:.4f}",
     "phase": "{:.0f}",
     "ramp": "{:.0f}",
+    "stretch": "{:.0f}",
 }
 
 

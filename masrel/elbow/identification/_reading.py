@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.errors import ParameterError, RecordingError, RecordingWarning
-from masrel.recording import MEASURED_TORQUE, RECORDING_COLUMNS, read_recording
+from masrel.recording import _FIRST_COLUMNS, MEASURED_TORQUE, read_recording
 
 TorqueSource = Literal["recorded", "sensor", "model"]
 
@@ -410,7 +410,7 @@ _MODEL, _COMMANDED = "model_torque_nm", "command_torque_nm"
 
 def _is_own(names: Iterable[str]) -> bool:
     # Whether these are the columns of masrel's driver, with or without channels
-    return set(RECORDING_COLUMNS) <= {*names, "ramp"}
+    return set(names) >= _FIRST_COLUMNS
 
 
 def read_movement(

@@ -24,14 +24,14 @@ from masrel.hess._spool import Samples, Spool, read_spool
 from masrel.recording import RECORDING_COLUMNS
 from tests.hess.rig import END, START
 
-FACTS = {"device": "none", "rate_hz": 2000, "speed_threshold": 0.3}
+FACTS = {"device": "none", "rate_hz": 2000, "speed_threshold_deg_s": 17.0}
 
 
 def written(path: Path, n: int, capacity: int = 10) -> None:
     spool = Spool(path, capacity, FACTS)
     samples = Samples(capacity, spool)
     for tick in range(n):
-        samples.add(tick * 1e-3, 0.5 + tick, 1.0, 2.0, 3.0 + tick, 1)
+        samples.add(tick * 1e-3, 0.5 + tick, 1.0, 2.0, 3.0 + tick, 1, 1)
     samples.close()
     spool.close()
 
@@ -52,7 +52,7 @@ def test_what_was_added_is_in_the_file(tmp_path: Path) -> None:
     left = read_spool(path)
     assert left is not None
     assert left.facts == FACTS
-    assert left.columns.shape == (7, 3)
+    assert left.columns.shape == (8, 3)
     assert left.columns[0].tolist() == [0.0, 1e-3, 2e-3]
     assert left.columns[1].tolist() == [0.5, 1.5, 2.5]
     assert left.columns[4].tolist() == [3.0, 4.0, 5.0]
@@ -62,7 +62,7 @@ def test_the_whole_file_is_there_before_the_first_sample(tmp_path: Path) -> None
     path = tmp_path / "a.partial"
     spool = Spool(path, 1000, FACTS)
     size = path.stat().st_size
-    assert size == 4096 + 8 * (1 + 7 * 1000)
+    assert size == 4096 + 8 * (1 + 8 * 1000)
     assert path.stat().st_blocks * 512 >= size  # not sparse: the disk has given it
     spool.close()
     assert read_spool(path) is None  # and nothing was sampled
@@ -111,7 +111,7 @@ def test_a_ramp_between_two_ticks_is_no_tick_that_was_missed(tmp_path: Path) -> 
     spool = Spool(path, 10, {**FACTS, "rate_hz": 1000})
     samples = Samples(10, spool)
     for time_s in (0.0, 0.001, 0.0013, 0.0016, 0.002):  # two rows between two ticks
-        samples.add(time_s, 0.5, 1.0, 2.0, 3.0, 1)
+        samples.add(time_s, 0.5, 1.0, 2.0, 3.0, 1, 1)
     samples.close()
     spool.close()
     left = cut_off(path)
@@ -174,8 +174,8 @@ def test_anything_else_is_refused_with_a_way_out(tmp_path, content: bytes) -> No
 def test_the_columns_have_the_units_in_their_names() -> None:
     samples = Samples(3)
     assert samples.last_time_s == -np.inf
-    samples.add(0.0, 0.5, 1.0, 2.0, 3.0, 0)
-    samples.add(0.1, 0.6, 1.1, 2.1, 3.1, 1)
+    samples.add(0.0, 0.5, 1.0, 2.0, 3.0, 0, 0)
+    samples.add(0.1, 0.6, 1.1, 2.1, 3.1, 1, 1)
     assert samples.last_time_s == 0.1
     written = samples.columns()
     assert set(written) == set(RECORDING_COLUMNS)
@@ -195,4 +195,13 @@ def test_samples_of_a_process_that_died_before_there_were_ramps_are_read(
     path.write_bytes(json.dumps(facts).encode().ljust(4096) + values.tobytes())
     left = read_spool(path)
     assert left is not None
-    assert left.columns.tolist() == [[0.0], [2.0], [4.0], [6.0], [8.0], [10.0], [0.0]]
+    assert left.columns.tolist() == [
+        [0.0],
+        [2.0],
+        [4.0],
+        [6.0],
+        [8.0],
+        [10.0],
+        [0.0],
+        [1.0],
+    ]

@@ -1,0 +1,127 @@
+"""How far a presentation is: stretch by stretch, sample by sample."""
+
+import math
+
+from masrel.errors import LimitExceededError
+from masrel.hess._velocity import speed_noise
+from masrel.hess.limits import DeviceLimits
+from masrel.hess.stretching import PresentationStatus, StretchRules
+
+# A hundred ticks at rest all lie within so many standard deviations of the speed.
+_ARRIVAL_DEVIATIONS = 5.0
+
+# An arm has been brought back that is as near to where its stretch began as this share
+# of the way that told that it had begun.
+_BROUGHT_BACK = 0.5
+
+
+class Progress:
+    """Follow the arm through its stretches, and say when the presentation is over."""
+
+    __slots__ = (
+        "_arrival_speed",
+        "_arrival_time",
+        "_begins_after",
+        "_begun_at",
+        "_end_angle",
+        "_flexing_speed",
+        "_is_single",
+        "_least_angle",
+        "_n",
+        "_over_at",
+        "_resting_since",
+        "_stretch_limit",
+        "_time_limit",
+        "status",
+        "stretch",
+    )
+
+    def __init__(
+        self,
+        rules: StretchRules,
+        limits: DeviceLimits,
+        status: PresentationStatus,
+        *,
+        rate_hz: int,
+        end_angle: float,
+        speed_threshold: float,
+    ) -> None:
+        noise = speed_noise(limits.encoder_noise, rate_hz)
+        self._arrival_speed = limits.arrival_speed + _ARRIVAL_DEVIATIONS * noise
+        self._arrival_time = limits.arrival_time
+        self._end_angle = end_angle - limits.arrival_angle
+        self._resting_since = math.inf
+        self._is_single = rules.n == 1
+        self._n = math.inf if rules.n is None else rules.n
+        self._time_limit, self._stretch_limit = rules.time_limit, rules.stretch_limit
+        self._over_at = math.inf  # when no stretch may begin any more, s
+        self._flexing_speed = -speed_threshold
+        self._begins_after = limits.arrival_angle
+        self._begun_at = 0.0  # the stretch, s
+        self._least_angle = math.inf  # since the next stretch is armed, rad
+        self.stretch = 0  # the number of the one that goes on, 0 between
+        self.status = status
+        status.is_armed = True
+
+    def update(self, time_s: float, angle: float, velocity: float) -> str:
+        """Take one sample in -> why the presentation is over, empty while it is not."""
+        if self.status.is_done:
+            return "done"
+        if angle < self._end_angle or abs(velocity) > self._arrival_speed:
+            self._resting_since = math.inf
+        elif self._resting_since == math.inf:
+            self._resting_since = time_s
+        has_arrived = time_s - self._resting_since >= self._arrival_time
+        if self._is_single:
+            if not self.stretch:
+                self._watch_for_onset(time_s, angle)
+            return "arrived" if has_arrived else ""
+        if self.stretch:
+            return self._goes_on(time_s, angle, velocity, has_arrived)
+        if time_s >= self._over_at:
+            return "time-limit"
+        if self.status.is_armed:
+            self._watch_for_onset(time_s, angle)
+        elif velocity <= self._flexing_speed:
+            self._arm(angle)
+        return ""
+
+    def end(self) -> None:
+        """Let the stretch that goes on be over."""
+        if self.stretch:
+            self.status.n_stretches += 1
+            self.stretch = 0
+        self.status.is_armed = False
+
+    def _watch_for_onset(self, time_s: float, angle: float) -> None:
+        if angle < self._least_angle:
+            self._least_angle = angle
+        elif angle > self._least_angle + self._begins_after:
+            self.status.is_armed = False
+            self.stretch = self.status.n_stretches + 1
+            self._begun_at = time_s
+            if self._over_at == math.inf:
+                self._over_at = time_s + self._time_limit
+
+    def _goes_on(
+        self, time_s: float, angle: float, velocity: float, has_arrived: bool
+    ) -> str:
+        is_flexed = velocity <= self._flexing_speed
+        near = self._least_angle + _BROUGHT_BACK * self._begins_after
+        if has_arrived or is_flexed or angle <= near:
+            self.end()
+            if self.status.n_stretches == self._n:
+                return "stretches"
+            if is_flexed:
+                self._arm(angle)
+        elif time_s - self._begun_at > self._stretch_limit:
+            raise LimitExceededError(
+                f"stretch: needs one that has ended within {self._stretch_limit:g} s, "
+                f"stretch {self.stretch} has not",
+                "stretch-limit",
+            )
+        return ""
+
+    def _arm(self, angle: float) -> None:
+        self._least_angle = angle
+        self.status.is_armed = True
