@@ -8,8 +8,8 @@ from masrel.errors import (
     DeviceTimeoutError,
     LimitExceededError,
 )
+from masrel.hess._course import Course
 from masrel.hess._guard import ActiveGuard, Guard, SoftStops, check_overrun
-from masrel.hess._progress import Progress
 from masrel.hess._soft_end import raised_cosine
 from masrel.hess._spool import Samples
 from masrel.hess._stop import EmergencyStop
@@ -33,6 +33,7 @@ class Ticks:
     __slots__ = (
         "_active_guard",
         "_controller",
+        "_course",
         "_estimate",
         "_has_channels",
         "_is_ending",
@@ -40,7 +41,6 @@ class Ticks:
         "_latest",
         "_limits",
         "_n_ticks",
-        "_progress",
         "_sent_ns",
         "_start_ns",
         "_stop",
@@ -64,7 +64,7 @@ class Ticks:
         limits: DeviceLimits,
         rate_hz: int,
         n_ticks: int,
-        progress: Progress,
+        course: Course,
         samples: Samples,
         stop: EmergencyStop,
         watchdog: Watching,
@@ -76,7 +76,7 @@ class Ticks:
         self._n_ticks = n_ticks
         self.period_ns = round(1e9 / rate_hz)
         self.ramp_ns = round(limits.ramp_time * 1e9)
-        self._progress = progress
+        self._course = course
         self._estimate = VelocityEstimate()
         self._start_ns = self._sent_ns = 0
         self._latest: tuple[float, float, float] | None = None
@@ -96,7 +96,7 @@ class Ticks:
         """Run ticks until the torque is zero -> how the presentation ended."""
         self._start_ns = self._sent_ns = self.clock.now_ns()
         tick, ended = self._run_from(0)
-        self._progress.end()
+        self._course.end()
         shares = raised_cosine(self._limits.end_ramp_time, 1e9 / self.period_ns)
         if shares and self.sent != 0.0:
             self._last_torques = [self.sent * share for share in reversed(shares)]
@@ -173,7 +173,7 @@ class Ticks:
         self._sent_ns = now_ns
         if self._has_channels:
             self._measure(values)
-        progress = self._progress
+        course = self._course
         self.samples.add(
             time_s,
             angle,
@@ -181,14 +181,14 @@ class Ticks:
             controller.model_torque,
             torque,
             controller.phase,
-            progress.stretch,
+            course.stretch,
         )
         if self._is_ending:
             self.samples.flag(_END)
             return "" if self._last_torques else "at rest"
         if controller.is_easing:
             self.samples.flag(_POST_CATCH)
-        return progress.update(time_s, angle, velocity)
+        return course.update(time_s, angle, velocity)
 
     def _decide(self, time_s: float, angle: float, velocity: float) -> float:
         try:

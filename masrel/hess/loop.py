@@ -12,8 +12,8 @@ from masrel.errors import (
     ParameterError,
     RecordingWarning,
 )
+from masrel.hess._course import Course
 from masrel.hess._presented import Presented, as_presented
-from masrel.hess._progress import Progress
 from masrel.hess._realtime import collector_off, scheduled
 from masrel.hess._shutdown import run_to_the_end
 from masrel.hess._spool import Samples, Spool, n_samples
@@ -144,7 +144,7 @@ def run_presentation(
     facts: dict[str, _Fact] = {"simulated": device.simulated, "device": device.name}
     facts["rate_hz"] = rate_hz
     facts["speed_threshold_deg_s"] = math.degrees(controller.speed_threshold)
-    progress = Progress(
+    course = Course(
         rules,
         limits,
         status or PresentationStatus(),
@@ -160,7 +160,7 @@ def run_presentation(
             limits,
             rate_hz,
             n_ticks,
-            progress,
+            course,
             samples,
             stop or EmergencyStop(),
             watchdog or NoWatchdog(),

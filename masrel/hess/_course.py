@@ -15,7 +15,7 @@ _ARRIVAL_DEVIATIONS = 5.0
 _BROUGHT_BACK = 0.5
 
 
-class Progress:
+class Course:
     """Follow the arm through its stretches, and say when the presentation is over."""
 
     __slots__ = (
@@ -26,7 +26,7 @@ class Progress:
         "_end_angle",
         "_flexing_speed",
         "_is_single",
-        "_least_angle",
+        "_lowest_angle",
         "_n",
         "_over_at",
         "_resting_since",
@@ -58,7 +58,7 @@ class Progress:
         self._flexing_speed = -speed_threshold
         self._begins_after = limits.arrival_angle
         self._begun_at = 0.0  # the stretch, s
-        self._least_angle = math.inf  # since the next stretch is armed, rad
+        self._lowest_angle = math.inf  # since the next stretch is armed, rad
         self.stretch = 0  # the number of the one that goes on, 0 between
         self.status = status
         status.is_armed = True
@@ -94,9 +94,9 @@ class Progress:
         self.status.is_armed = False
 
     def _watch_for_onset(self, time_s: float, angle: float) -> None:
-        if angle < self._least_angle:
-            self._least_angle = angle
-        elif angle > self._least_angle + self._begins_after:
+        if angle < self._lowest_angle:
+            self._lowest_angle = angle
+        elif angle > self._lowest_angle + self._begins_after:
             self.status.is_armed = False
             self.stretch = self.status.n_stretches + 1
             self._begun_at = time_s
@@ -107,7 +107,7 @@ class Progress:
         self, time_s: float, angle: float, velocity: float, has_arrived: bool
     ) -> str:
         is_flexed = velocity <= self._flexing_speed
-        near = self._least_angle + _BROUGHT_BACK * self._begins_after
+        near = self._lowest_angle + _BROUGHT_BACK * self._begins_after
         if has_arrived or is_flexed or angle <= near:
             self.end()
             if self.status.n_stretches == self._n:
@@ -123,5 +123,5 @@ class Progress:
         return ""
 
     def _arm(self, angle: float) -> None:
-        self._least_angle = angle
+        self._lowest_angle = angle
         self.status.is_armed = True
