@@ -10,15 +10,13 @@ import errno
 import os
 import stat
 import sys
+import time
 from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
 from masrel.errors import ParameterError
-
-if sys.platform != "win32":
-    import fcntl
 
 # What Windows alone has, and what it lacks
 _NO_FOLLOW = getattr(os, "O_NOFOLLOW", 0)
@@ -26,6 +24,7 @@ _BINARY = getattr(os, "O_BINARY", 0)
 
 # Names of files that are not whole yet
 _PART_BEGINS, _PART_ENDS = ".masrel-", ".part"
+_LONGEST_S = 86_400.0
 
 # Where a study's primary records are, which no output replaces
 _PROTOCOL = "protocol.toml"
@@ -49,12 +48,17 @@ def write_files(
     """Write files that belong together: all on disk before the first has its name."""
     # They get their names in this order. Text is UTF-8 with lines as they are. mode:
     # permissions; those of the file that is replaced, or the usual ones, unless given
-    with ExitStack() as stack:
-        parts = [stack.enter_context(_Part.of(path, within, mode)) for path in contents]
-        for part, data in zip(parts, contents.values(), strict=True):
-            part.write(data.encode("utf-8") if isinstance(data, str) else data)
-        for part in parts:
-            part.take_name()
+    parts: dict[Path, Path] = {}
+    try:
+        for path, data in contents.items():
+            parts[path] = _write_part(path, data, within, mode)
+        for path in contents:
+            with _naming(path):
+                os.replace(parts[path], path)
+            del parts[path]
+    finally:
+        for part in parts.values():
+            part.unlink(missing_ok=True)
     for folder in dict.fromkeys(path.parent for path in contents):
         _remove_left_over(folder)
         sync_folder(folder)
@@ -64,113 +68,67 @@ def write_files(
 def new_file(path: Path) -> Iterator[BinaryIO]:
     """Give a file to write an output into bit by bit; at the end it gets its name."""
     refuse_record(path)
-    with _Part.of(path, None) as part:
-        with (
-            part.names_target(),
-            os.fdopen(part.descriptor, "wb", closefd=False) as out,
-        ):
-            yield out
-        part.write(b"")
-        part.take_name()
+    part, descriptor = _new_part(path)
+    try:
+        with _naming(path):
+            with os.fdopen(descriptor, "wb") as out:
+                yield out
+                out.flush()
+                os.fsync(descriptor)
+            os.replace(part, path)
+    finally:
+        part.unlink(missing_ok=True)
     _remove_left_over(path.parent)
     sync_folder(path.parent)
 
 
-class _Part:
-    """A file that is not whole yet, beside the one whose place it takes."""
-
-    def __init__(self, path: Path, place: Path, descriptor: int) -> None:
-        self.descriptor = descriptor
-        self._path, self._place = path, place  # the name it gets, and the one it has
-        self._is_open = self._is_part = True
-
-    @classmethod
-    @contextmanager
-    def of(
-        cls, path: Path, within: Path | None, mode: int | None = None
-    ) -> Iterator["_Part"]:
-        """Give a new part for a target; without `take_name` it is taken away."""
-        if within is not None:
-            check_inside(path.parent, within)
-        replaced = _mode(path)
-        mode = replaced if mode is None else mode
-        make_folder(path.parent)
-        with _naming(path):
-            part = cls(path, *_create(path.parent))
-        try:
-            if mode is not None and sys.platform != "win32":
-                os.fchmod(part.descriptor, mode)
-            yield part
-        finally:
-            part._close()
-            if part._is_part:
-                part._place.unlink(missing_ok=True)
-
-    def names_target(self) -> contextlib.AbstractContextManager[None]:
-        """Give a context whose errors name the target: a full disk does not."""
-        return _naming(self._path)
-
-    def write(self, data: bytes) -> None:
-        """Add bytes and wait until they are on disk."""
-        with self.names_target():
-            remaining = memoryview(data)
-            while remaining:
-                remaining = remaining[os.write(self.descriptor, remaining) :]
-            os.fsync(self.descriptor)
-
-    def take_name(self) -> None:
-        """Take the place of the target, or of a link there."""
-        with self.names_target():
-            if sys.platform == "win32":
-                self._close()  # Windows renames no open file
-            os.replace(self._place, self._path)
-            self._is_part = False
-
-    def _close(self) -> None:
-        if self._is_open:
-            self._is_open = False
-            os.close(self.descriptor)
-
-
-def _create(folder: Path) -> tuple[Path, int]:
-    """Make a new file of a name that nobody knows, locked while it is a part."""
-    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | _NO_FOLLOW | _BINARY
-    while True:
-        place = folder / f"{_PART_BEGINS}{os.urandom(8).hex()}{_PART_ENDS}"
-        descriptor = os.open(place, flags, 0o666)
-        # Another process may have taken it for left over before it was locked.
-        if not _lock(descriptor) or os.fstat(descriptor).st_nlink:
-            return place, descriptor
-        os.close(descriptor)
-
-
-def _lock(descriptor: int) -> bool:
-    # -> whether this process has the file now; not all file systems can do it
-    if sys.platform == "win32":
-        return False
+def _write_part(
+    path: Path, data: bytes | str, within: Path | None, mode: int | None
+) -> Path:
+    """Write what a file is to hold into a new one beside it, which is returned."""
+    part, descriptor = _new_part(path, within, mode)
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        return False
-    return True
+        with _naming(path):
+            remaining = memoryview(data.encode() if isinstance(data, str) else data)
+            while remaining:
+                remaining = remaining[os.write(descriptor, remaining) :]
+            os.fsync(descriptor)
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
+    finally:
+        os.close(descriptor)
+    return part
+
+
+def _new_part(
+    path: Path, within: Path | None = None, mode: int | None = None
+) -> tuple[Path, int]:
+    """Make a new file of a name that nobody knows beside a target."""
+    if within is not None:
+        check_inside(path.parent, within)
+    replaced = _mode(path)
+    mode = replaced if mode is None else mode
+    make_folder(path.parent)
+    part = path.with_name(f"{_PART_BEGINS}{os.urandom(8).hex()}{_PART_ENDS}")
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | _NO_FOLLOW | _BINARY
+    with _naming(path):
+        descriptor = os.open(part, flags, 0o666 if mode is None else mode)
+    if mode is not None:
+        part.chmod(mode)  # as it was, whatever the umask is now
+    return part, descriptor
 
 
 def _remove_left_over(folder: Path) -> None:
-    """Take away parts whose process is dead: its lock went with it."""
-    with contextlib.suppress(OSError):
+    """Take away parts of processes that died: no file takes a day to write."""
+    with contextlib.suppress(OSError):  # of what another process took away
         for path in folder.iterdir():
-            if path.name.startswith(_PART_BEGINS) and path.name.endswith(_PART_ENDS):
-                _remove_if_dead(path)
-
-
-def _remove_if_dead(part: Path) -> None:
-    with contextlib.suppress(OSError):
-        descriptor = os.open(part, os.O_RDONLY | _NO_FOLLOW)
-        try:
-            if _lock(descriptor):
-                part.unlink()
-        finally:
-            os.close(descriptor)
+            if (
+                path.name.startswith(_PART_BEGINS)
+                and path.name.endswith(_PART_ENDS)
+                and path.lstat().st_mtime < time.time() - _LONGEST_S
+            ):
+                path.unlink()
 
 
 @contextmanager
@@ -178,7 +136,9 @@ def _naming(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        error.filename, error.filename2 = str(path), None
+        # a full disk does not say which file it was, and nobody knows the part
+        if str(error.filename or _PART_ENDS).endswith(_PART_ENDS):
+            error.filename, error.filename2 = str(path), None
         raise
 
 
@@ -221,6 +181,7 @@ def sync_folder(folder: Path) -> None:
     try:
         os.fsync(descriptor)
     except OSError as error:
+        error.filename = str(folder)
         if error.errno != errno.EINVAL:  # a file system that syncs no folders
             raise
     finally:

@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 from tqdm import tqdm
 
+from masrel._files import check_inside
 from masrel.cli._options import (
     OutputOptions,
     output_options,
@@ -39,6 +40,9 @@ def report(
     from masrel.analysis import analyze
     from masrel.report import write_report
 
+    if destination is None:
+        destination = study / "report"
+        check_inside(destination, study)
     data = read_study(study, ratings_file)
     with warnings_as_notes():
         analysis = analyze(data.protocol, data.ratings, in_person=data.in_person)
@@ -52,7 +56,7 @@ def report(
             data.protocol,
             data.ratings,
             analysis,
-            destination or data.paths.root / "report",
+            destination,
             in_person=data.in_person,
             progress=progress,
         )

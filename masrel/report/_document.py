@@ -1,8 +1,9 @@
 """The report: one self-contained page, the same as Markdown, tables and figures.
 
 In: a protocol, its ratings and their analysis. Out: a folder with ``report.html``,
-``report.md``, ``tables/*.csv`` and ``figures/*.png`` and ``*.svg``. The same inputs
-give the same bytes; there is no time of day in any of them.
+``report.md``, ``tables/*.csv``, ``figures/*.png`` and ``*.svg``, and the hash of each
+in ``manifest.json``. The same inputs give the same bytes; there is no time of day in
+any of them.
 """
 
 import base64
@@ -21,6 +22,7 @@ from masrel.report._agreement import estimates_section
 from masrel.report._design import design_section
 from masrel.report._grades import grades_section, in_person_section, intended_section
 from masrel.report._material import Drawing, Material, Paragraph, Section, gather
+from masrel.report._report_folder import MANIFEST, Assets, replace_report
 from masrel.report._stretches import speeds_section, traces_section
 from masrel.report._tables import Table, as_csv, page_cells
 
@@ -61,14 +63,17 @@ class ReportFiles:
     ----------
     html, markdown : Path
         The document.
+    manifest : Path
+        The hash of every file, as JSON.
     tables : tuple of Path
-        One CSV per table.
+        One CSV per table; its name ends in a hyphen and the start of its SHA-256.
     figures : tuple of Path
-        A PNG and an SVG per figure.
+        A PNG and an SVG per figure, named like tables.
     """
 
     html: Path
     markdown: Path
+    manifest: Path
     tables: tuple[Path, ...]
     figures: tuple[Path, ...]
 
@@ -109,32 +114,34 @@ def write_report(
 
     Raises
     ------
+    ParameterError
+        If the folder is one of a study's primary records, or a link in it leads out.
     OSError
-        If a file cannot be written.
+        If a file cannot be written; the pages that were there are then there still.
     """
     material = gather(protocol, ratings, analysis, in_person)
     sections = [SECTIONS[name](material) for name in protocol.report.sections]
-    destination.mkdir(parents=True, exist_ok=True)
-    shown, tables, figures = _write_blocks(sections, destination, progress)
-    for name, page in _pages(material, shown).items():
-        (destination / name).write_text(page, encoding="utf-8", newline="\n")
+    assets = Assets()
+    shown = _make_blocks(sections, assets, progress)
+    replace_report(destination, assets, _pages(material, shown), analysis.inputs)
     if progress is not None:
         progress("pages")
     return ReportFiles(
         html=destination / "report.html",
         markdown=destination / "report.md",
-        tables=tuple(tables),
-        figures=tuple(figures),
+        manifest=destination / MANIFEST,
+        tables=tuple(destination / p for p in assets.contents if p.endswith(".csv")),
+        figures=tuple(
+            destination / p for p in assets.contents if not p.endswith(".csv")
+        ),
     )
 
 
-def _write_blocks(
-    sections: Sequence[Section], destination: Path, progress: Progress | None
-) -> tuple[list[dict[str, object]], list[Path], list[Path]]:
-    # what templates show, every block with its number among those of its kind; and the
-    # files of tables and of figures
+def _make_blocks(
+    sections: Sequence[Section], assets: Assets, progress: Progress | None
+) -> list[dict[str, object]]:
+    # what templates show, every block with its number among those of its kind
     shown: list[dict[str, object]] = []
-    tables, figures = [], []
     numbers: Counter[str] = Counter()
     for section in sections:
         blocks = []
@@ -145,25 +152,23 @@ def _write_blocks(
             blocks.append(entry)
             if isinstance(block, Table):
                 entry["columns"], entry["rows"] = page_cells(block)
-                tables.append(destination / "tables" / f"{block.name}.csv")
-                tables[-1].parent.mkdir(exist_ok=True)
-                tables[-1].write_text(as_csv(block), encoding="utf-8", newline="\n")
+                assets.add("tables", block.name, "csv", as_csv(block).encode())
             elif isinstance(block, Drawing):
                 # Imported here: a report without figures loads nothing that draws.
                 from masrel.report.figures import draw
 
                 pictures = draw(block.content, stamp=block.stamp)
-                for form, picture in pictures.items():
-                    figures.append(destination / "figures" / f"{block.name}.{form}")
-                    figures[-1].parent.mkdir(exist_ok=True)
-                    figures[-1].write_bytes(picture)
+                entry["files"] = {
+                    form: assets.add("figures", block.name, form, picture)
+                    for form, picture in pictures.items()
+                }
                 # An image of its own, not inline: ids inside two SVGs would collide.
                 encoded = base64.b64encode(pictures["svg"]).decode("ascii")
                 entry["uri"] = f"data:image/svg+xml;base64,{encoded}"
                 if progress is not None:
                     progress(block.name)
         shown.append({"name": section.name, "title": section.title, "blocks": blocks})
-    return shown, tables, figures
+    return shown
 
 
 def _pages(

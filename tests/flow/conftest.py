@@ -6,6 +6,7 @@ import pytest
 from click.testing import CliRunner
 
 from masrel.cli import cli
+from tests.cli.process import Caller
 
 
 def run(*arguments: str, code: int = 0) -> str:
@@ -15,6 +16,14 @@ def run(*arguments: str, code: int = 0) -> str:
         raise result.exception
     assert result.exit_code == code, result.output
     return result.output
+
+
+@pytest.fixture
+def masrel(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Caller:
+    """The command line in this process, with the sentences it ends with."""
+    return Caller(monkeypatch, capsys)
 
 
 @pytest.fixture(scope="session")

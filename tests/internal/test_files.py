@@ -5,6 +5,7 @@ import os
 import stat
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -137,7 +138,7 @@ write_file(Path(sys.argv[1]), "new")
 """
 
 
-def test_what_a_kill_leaves_goes_with_the_next_file(tmp_path: Path) -> None:
+def test_what_a_kill_leaves_is_taken_away_after_a_day(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text("old")
     died = subprocess.run([sys.executable, "-c", KILLED, str(path)], check=False)
@@ -145,6 +146,10 @@ def test_what_a_kill_leaves_goes_with_the_next_file(tmp_path: Path) -> None:
     (left,) = tmp_path.glob(".masrel-*.part")
     assert path.read_text() == "old"
     with new_file(tmp_path / "b.csv") as out:  # whose own part is not taken away
+        write_file(path, "new")
+        assert left.exists()  # it may be of a process that lives
+        yesterday = time.time() - 90_000
+        os.utime(left, (yesterday, yesterday))
         write_file(path, "new")
         assert not left.exists()
         out.write(b"whole")

@@ -1,5 +1,6 @@
 """Reports made for tests, and their pages taken apart."""
 
+import re
 from dataclasses import dataclass, field
 from html.parser import HTMLParser
 from pathlib import Path
@@ -91,6 +92,11 @@ def _report(protocol: Protocol, ratings: Ratings, folder: Path) -> ReportFiles:
     own = None if ratings.simulated else in_person()
     analysis = analyze(protocol, ratings, in_person=own)
     return write_report(protocol, ratings, analysis, folder, in_person=own)
+
+
+def name_of(path: Path) -> str:
+    """The name of a table or a figure, without the hash in its file's."""
+    return re.sub(r"-[0-9a-f]{16}$", "", path.stem)
 
 
 @dataclass

@@ -13,10 +13,11 @@ from masrel.elbow import ConstantSpeed, peak_torque
 from masrel.protocol import elbow_parameters
 from masrel.report import ReportFiles, write_report
 from tests.analysis.studies import hess2012, protocol_with, table_v
+from tests.report.pages import name_of
 
 
 def rows_of(files: ReportFiles, name: str) -> list[dict[str, str]]:
-    (path,) = [path for path in files.tables if path.stem == name]
+    (path,) = [path for path in files.tables if name_of(path) == name]
     with path.open(encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
 

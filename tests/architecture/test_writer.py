@@ -1,0 +1,55 @@
+"""Every file is written by one module."""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import masrel
+
+PACKAGE = Path(masrel.__file__).parent
+
+WRITERS = {
+    "_files.py",
+    "run/_log.py",  # lines are added to a log
+    "hess/_spool.py",  # samples while they are taken
+    "ratings/_typed_files.py",  # a temporary file for a library that reads no bytes
+}
+
+CALLS = {
+    "write_text",
+    "write_bytes",
+    "savefig",
+    "savez",
+    "to_csv",
+    "copyfile",
+    "rename",
+}
+
+
+def writes(tree: ast.AST) -> Iterator[int]:
+    # Lines of a module that open a file to write into it, or write one
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.Call):
+            continue
+        name = getattr(node.func, "attr", getattr(node.func, "id", ""))
+        constants = [a.value for a in node.args if isinstance(a, ast.Constant)]
+        modes = [c for c in constants if isinstance(c, str) and len(c) <= 3]
+        if name in CALLS or (
+            name == "open" and any(set(m) & set("wax+") for m in modes)
+        ):
+            yield node.lineno
+
+
+def test_no_other_module_writes_files() -> None:
+    found = {}
+    for path in PACKAGE.rglob("*.py"):
+        lines = list(writes(ast.parse(path.read_text(encoding="utf-8"))))
+        if lines and str(path.relative_to(PACKAGE)) not in WRITERS:
+            found[str(path.relative_to(PACKAGE))] = lines
+    frames = {"ratings/_exports.py"}  # renames columns
+    assert {name: lines for name, lines in found.items() if name not in frames} == {}
+
+
+def test_the_search_finds_writing() -> None:
+    tree = ast.parse("p.write_text('x')\nopen('f', 'r+b')\np.open('w')\nopen('f')")
+    assert list(writes(tree)) == [1, 2, 3]

@@ -1,0 +1,189 @@
+"""Verbs that are killed, or whose disk is full, at each call that changes a file."""
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from random import Random
+
+import pytest
+from click.testing import CliRunner
+
+from masrel.cli import cli
+from tests.cli.process import Caller
+from tests.flow.conftest import run
+from tests.flow.cuts import (
+    Cuts,
+    called_before,
+    check_links,
+    check_old_or_new,
+    contents,
+    full_disk_at,
+    killed_by_strace,
+    syscalls_on,
+)
+
+VERBS = ("init", "schedule", "ratings", "analyze", "report")
+
+
+def to_init(root: Path, _: Path) -> None:
+    root.mkdir()
+
+
+def to_schedule(root: Path, study: Path) -> None:
+    # One schedule is stale and is drawn anew, one is there, one is not.
+    shutil.copytree(study, root)
+    for log in (root / "sessions").glob("*.jsonl"):
+        log.unlink()
+    protocol = root / "protocol.toml"
+    text = protocol.read_text()
+    assert "seed = " in text
+    protocol.write_text(text.replace("seed = ", "seed = 1", 1))
+    next(iter((root / "schedules").glob("*_R2.csv"))).unlink()
+
+
+def to_ratings(root: Path, study: Path) -> None:
+    shutil.copytree(study, root)
+    ratings = root / "ratings" / "ratings.csv"
+    ratings.write_text(ratings.read_text().replace("simulated\n", "foreign\n"))
+
+
+def to_analyze(root: Path, study: Path) -> None:
+    shutil.copytree(study, root)
+    (root / "analysis.json").write_text("{}\n")
+
+
+def to_report(root: Path, study: Path) -> None:
+    # Tables and figures of the new one differ from the old ones.
+    shutil.copytree(study, root)
+    protocol = root / "protocol.toml"
+    text = protocol.read_text().partition("[report]")[0]
+    protocol.write_text(f'{text}[report]\nsections = ["grades", "intended"]\n')
+    run("report", str(root), "--quiet")
+    ratings = root / "ratings" / "ratings.csv"
+    lines = ratings.read_text().splitlines()
+    lines[-1] = lines[-1].replace(lines[-1].split(",")[4], "NA", 1)
+    ratings.write_text("\n".join(lines) + "\n")
+
+
+PREPARE: dict[str, Callable[[Path, Path], None]] = {
+    "init": to_init,
+    "schedule": to_schedule,
+    "ratings": to_ratings,
+    "analyze": to_analyze,
+    "report": to_report,
+}
+OPTIONS = {"schedule": ["--redraw"], "report": ["--quiet"]}
+
+
+@pytest.fixture
+def prepared(
+    small_demo: Path, tmp_path: Path
+) -> Callable[[str], tuple[Path, list[str]]]:
+    """Makes a study for a verb, and gives its folder and the call."""
+
+    def make(verb: str) -> tuple[Path, list[str]]:
+        root = tmp_path / verb
+        PREPARE[verb](root, small_demo / "study")
+        return root, [verb, str(root), *OPTIONS.get(verb, [])]
+
+    return make
+
+
+Prepared = Callable[[str], tuple[Path, list[str]]]
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_a_kill_at_any_call_leaves_old_bytes_or_new_ones(
+    verb: str, prepared: Prepared
+) -> None:
+    root, call = prepared(verb)
+    cuts = Cuts(root)
+    with called_before(cuts.look):
+        run(*call)
+    cuts.check()
+    assert contents(root) != cuts.before
+    assert len(cuts.left) > 5
+    assert not list(root.rglob(".masrel-*"))
+    assert contents(root) == cuts.left[-1]  # what comes last is a sync of the folder
+
+
+def full_at_each_call(
+    verb: str, most: int, prepared: Prepared, masrel: Caller, tmp_path: Path
+) -> None:
+    # Lets at most so many calls fail, one at a time: all is as it was, and said.
+    root, call = prepared(verb)
+    kept = tmp_path / "kept"
+    shutil.copytree(root, kept)
+    before = contents(root)
+    with full_disk_at(0) as calls:
+        assert masrel(*call).code == 0
+    after = contents(root)
+    places = range(1, len(calls) + 1)
+    for place in Random(7).sample(places, min(most, len(places))):
+        shutil.rmtree(root)
+        shutil.copytree(kept, root)
+        with full_disk_at(place):
+            done = masrel(*call)
+        assert done.code == 2
+        (said,) = done.err.splitlines()
+        assert "No space left on device" in said
+        assert str(root) in said
+        assert not list(root.rglob(".masrel-*"))
+        check_old_or_new(before, [contents(root)], after)
+        check_links(root)
+
+
+@pytest.mark.parametrize("verb", ["init", "schedule", "ratings"])
+def test_a_full_disk_at_any_call_is_said_with_the_file(
+    verb: str, prepared: Prepared, masrel: Caller, tmp_path: Path
+) -> None:
+    full_at_each_call(verb, 20, prepared, masrel, tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("verb", ["analyze", "report"])
+def test_a_full_disk_at_any_call_of_what_computes(
+    verb: str, prepared: Prepared, masrel: Caller, tmp_path: Path
+) -> None:
+    full_at_each_call(verb, 8, prepared, masrel, tmp_path)
+
+
+def each_syscall(verb: str, share: float, prepared: Prepared, tmp_path: Path) -> None:
+    # Kills the process before every call, or a seeded share of the calls.
+    if shutil.which("strace") is None:
+        pytest.skip("needs strace: it kills the process at a call of the system")
+    root, call = prepared(verb)
+    kept = tmp_path / "kept"
+    shutil.copytree(root, kept)
+    syscalls = syscalls_on(root, tmp_path / "log", *call)
+    after = contents(root)
+    random = Random(11)
+    for name, place in syscalls:
+        if random.random() >= share:
+            continue
+        shutil.rmtree(root)
+        shutil.copytree(kept, root)
+        before = contents(root)
+        killed_by_strace(name, place, *call)
+        check_old_or_new(before, [contents(root)], after)
+        check_links(root)
+        # and the same call again does it all, whatever the kill left
+        if verb != "init":
+            assert CliRunner().invoke(cli, call).exit_code == 0
+            assert contents(root) == after
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("verb", VERBS)
+def test_a_kill_at_some_system_calls(
+    verb: str, prepared: Prepared, tmp_path: Path
+) -> None:
+    each_syscall(verb, 0.02 if verb == "report" else 0.1, prepared, tmp_path)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("verb", VERBS)
+def test_a_kill_at_every_system_call(
+    verb: str, prepared: Prepared, tmp_path: Path
+) -> None:
+    each_syscall(verb, 1.0, prepared, tmp_path)
