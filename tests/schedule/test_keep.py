@@ -178,8 +178,8 @@ def test_a_damaged_schedule_is_refused_until_redrawn(
     with pytest.raises(ScheduleError, match=f"{path.name}: "):
         write_schedules(drawn, study)
     assert write_schedules(drawn, study, redraw=True) == (
-        path,
         study.sheet_file("R1", "test"),
+        path,
     )
     assert path.read_bytes() == whole
 
