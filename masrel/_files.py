@@ -71,10 +71,12 @@ def new_file(path: Path) -> Iterator[BinaryIO]:
     part, descriptor = _new_part(path)
     try:
         with _naming(path):
-            with os.fdopen(descriptor, "wb") as out:
-                yield out
-                out.flush()
+            try:
+                with os.fdopen(descriptor, "wb", closefd=False) as out:
+                    yield out
                 os.fsync(descriptor)
+            finally:
+                os.close(descriptor)
             os.replace(part, path)
     finally:
         part.unlink(missing_ok=True)
