@@ -58,6 +58,7 @@ def report(
             analysis,
             destination,
             in_person=data.in_person,
+            recordings=data.paths.sessions,
             progress=progress,
         )
     click.echo(files.html)

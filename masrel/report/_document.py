@@ -85,6 +85,7 @@ def write_report(
     destination: Path,
     *,
     in_person: InPerson | None = None,
+    recordings: Path | None = None,
     progress: Progress | None = None,
 ) -> ReportFiles:
     """Write the report a protocol asks for.
@@ -104,6 +105,8 @@ def write_report(
         The folder to write into; made if needed.
     in_person : InPerson, optional
         Grades given in person, whose notes are shown below their table.
+    recordings : Path, optional
+        The folder of the sessions' recordings, of which measured torque is drawn.
     progress : callable, optional
         Called with the name of each figure, and of the pages, once it is made.
 
@@ -119,7 +122,7 @@ def write_report(
     OSError
         If a file cannot be written; the pages that were there are then there still.
     """
-    material = gather(protocol, ratings, analysis, in_person)
+    material = gather(protocol, ratings, analysis, in_person, recordings)
     sections = [SECTIONS[name](material) for name in protocol.report.sections]
     assets = Assets()
     shown = _make_blocks(sections, assets, progress)

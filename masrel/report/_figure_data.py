@@ -88,6 +88,25 @@ class TraceColumns:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class MeasuredPanel:
+    """One presentation on a device with a torque sensor."""
+
+    title: str  # the model, and whose presentation it is
+    # (n_samples,): s, deg and N·m; ``nan`` where the sensor gave no number
+    time: "Floats" = field(compare=False, repr=False)
+    angle: "Floats" = field(compare=False, repr=False)
+    sent: "Floats" = field(compare=False, repr=False)
+    measured: "Floats" = field(compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MeasuredTorque:
+    """Torque that was sent and torque that was measured, one column a presentation."""
+
+    panels: tuple[MeasuredPanel, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ScaleRow:
     """One unknown of a latent-trait model."""
 
@@ -262,6 +281,7 @@ Content = (
     | Forest
     | SpeedDots
     | TraceColumns
+    | MeasuredTorque
     | LatentScale
     | Stretches
     | CatchCurves

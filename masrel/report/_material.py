@@ -1,6 +1,7 @@
 """What a section of the report is made from, and what it is made of."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from masrel.analysis import Analysis
 from masrel.protocol import Protocol
@@ -26,6 +27,7 @@ class Material:
     # sessions, raters: those that have ratings, in the protocol's order
     sessions: tuple[str, ...]
     raters: tuple[str, ...]
+    recordings: Path | None = None  # the folder of the sessions' recordings, if known
 
 
 def gather(
@@ -33,6 +35,7 @@ def gather(
     ratings: Ratings,
     analysis: Analysis,
     in_person: InPerson | None = None,
+    recordings: Path | None = None,
 ) -> Material:
     """Return ratings and their analysis with what every section says of them."""
     table = ratings.table
@@ -66,6 +69,7 @@ def gather(
         trace_stamp=trace_stamp,
         sessions=tuple(s.id for s in protocol.sessions if s.id in sessions),
         raters=tuple(r.id for r in protocol.raters if r.id in raters),
+        recordings=recordings,
     )
 
 

@@ -30,6 +30,7 @@ from masrel.report._material import (
     Section,
     absent_section,
 )
+from masrel.report._measured_torque import measured_blocks
 from masrel.report._tables import (
     Column,
     Table,
@@ -177,7 +178,7 @@ def traces_section(material: Material) -> Section:
     return Section(
         name="traces",
         title=title,
-        blocks=(Paragraph(text=text), *drawings, table),
+        blocks=(Paragraph(text=text), *drawings, table, *measured_blocks(material)),
     )
 
 

@@ -249,6 +249,7 @@ def main() -> None:
             print(f"{name:22} {setting:8.2g}  {seconds:9.5f} s/s  {error:.2e} N·m")
     driver_figures.draw_integrators(integrators, FIGURES / "driver_integrators.png")
     driver_figures.draw_traces(FIGURES / "driver_traces.png")
+    driver_figures.draw_measured(FIGURES / "driver_measured.png")
     driver_figures.draw_backdrive(FIGURES / "driver_backdrive.png")
     driver_figures.draw_slip(FIGURES / "driver_slip.png")
 

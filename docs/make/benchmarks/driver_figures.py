@@ -6,6 +6,7 @@ from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -13,16 +14,22 @@ from masrel.elbow import STANDARD_MODELS
 from masrel.hess import (
     Controller,
     DeviceLimits,
+    Friction,
     SimulatedClock,
     SimulatedHand,
     YieldingHand,
     open_device,
     run_presentation,
 )
-from masrel.recording import Recording
-from tests.internal.hess.test_backdrive import felt
+from masrel.recording import MEASURED_TORQUE, Recording
+from masrel.report._figure_data import MeasuredTorque
+from masrel.report._measured_torque import measured_panel
+from masrel.report._tables import SIMULATED
+from masrel.report.figures import draw
+from tests.hess.measured import NOTHING, measured, stretch, to_and_fro
 
 START, END = radians(30.0), radians(146.0)
+BACKDRIVE = to_and_fro(100.0 / 1.7)  # with a peak of 110 deg/s
 BLACK, GREY, BLUE, ORANGE, VERMILLION, GREEN = (
     "#000000",
     "#6B6B6B",
@@ -136,31 +143,58 @@ def draw_traces(path: Path) -> None:
     figure.savefig(path)
 
 
+def draw_measured(path: Path) -> None:
+    """Draw torque that was sent and measured, of the four models at one speed."""
+    panels = tuple(
+        measured_panel(measured(joint, stretch(60.0)), model)
+        for model, joint in STANDARD_MODELS.items()
+    )
+    files = draw(MeasuredTorque(panels=panels), stamp=SIMULATED, forms=("png",))
+    path.write_bytes(files["png"])
+
+
 def draw_backdrive(path: Path) -> None:
-    """Draw what a hand feels of the device alone, in the manner of Fig. 8."""
-    figure = _figure()
-    axes = figure.add_subplot()
-    for share, colour, line, label in (
-        (0.0, VERMILLION, "--", "without compensation"),
-        (0.9, BLUE, "-", "with nine tenths"),
-    ):
-        torque = felt(share)
-        axes.plot(
-            np.arange(len(torque)) * 1e-3,
-            torque,
-            color=colour,
-            linestyle=line,
-            linewidth=1.2,
-            label=label,
+    """Draw Fig. 8 anew: what the sensor measures of the device moved to and fro."""
+    figure = _figure(7.0, 3.1)
+    over_time, over_speed = figure.subplots(1, 2, width_ratios=(1.5, 1.0), sharey=True)
+    looks = (
+        (0.0, VERMILLION, 1.0, (1.28, 0.4, "without compensation")),
+        (0.9, BLUE, 0.8, (1.85, 0.09, "nine tenths compensated")),
+    )
+    for share, colour, width, label in looks:
+        columns = measured(NOTHING, BACKDRIVE, compensation=share).columns
+        felt = columns["ramp"] == 0
+        time, speed, torque = (
+            columns[name][felt]
+            for name in ("time_s", "velocity_deg_s", MEASURED_TORQUE.column)
         )
-    for level in (-0.5, -0.2, 0.2, 0.5):
-        axes.axhline(level, color=GREY, linewidth=0.7, linestyle=":")
-    axes.set_xlabel("time (s)")
-    axes.set_ylabel("torque of the hand (N·m)")
-    axes.set_title("device alone, moved back and forth, simulated", fontsize=9)
-    beside = {"loc": "center right", "bbox_to_anchor": (1.0, 0.78)}
-    axes.legend(frameon=False, fontsize=8, **beside)
+        over_time.plot(time, torque, color=colour, linewidth=width)
+        over_time.text(*label, color=colour, fontsize=8.5)
+        over_speed.plot(speed, torque, color=colour, linewidth=0.7)
+    for axes in (over_time, over_speed):
+        for level in (-0.5, -0.2, 0.2, 0.5):
+            axes.axhline(level, color=GREY, linewidth=0.7, linestyle=":")
+        axes.axhline(0.0, color=BLACK, linewidth=0.6)
+    _draw_law(over_speed)
+    over_time.set_xlabel("time (s)")
+    over_time.set_ylabel("measured torque (N·m)")
+    over_time.set_yticks([-0.5, -0.2, 0.0, 0.2, 0.5])
+    over_speed.set_xlabel("speed (deg/s)")
+    for axes, letter in ((over_time, "a"), (over_speed, "b")):
+        axes.set_title(letter, loc="left", weight="bold", fontsize=10)
+    over_time.set_xlim(0.0, 3.4)
+    figure.suptitle("SIMULATED DATA", x=0.995, ha="right", fontsize=8, color=VERMILLION)
     figure.savefig(path)
+
+
+def _draw_law(axes: Axes) -> None:
+    # (7) without its inertia
+    friction = Friction()
+    for side in (-1.0, 1.0):
+        speed = side * np.array([0.0, 115.0])
+        law = friction.viscous * np.radians(speed) + side * friction.coulomb
+        axes.plot(speed, law, color=BLACK, linewidth=1.0, linestyle="--")
+    axes.text(-105.0, 0.42, "dashed: (7)\nat an even speed", fontsize=8.5, va="center")
 
 
 def draw_slip(path: Path) -> None:

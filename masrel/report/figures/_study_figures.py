@@ -11,7 +11,12 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
-from masrel.report._figure_data import GradeGrid, SpeedDots, TraceColumns
+from masrel.report._figure_data import (
+    GradeGrid,
+    MeasuredTorque,
+    SpeedDots,
+    TraceColumns,
+)
 from masrel.report.figures._style import (
     BLACK,
     BLUE,
@@ -157,30 +162,13 @@ def _speed_row(
 
 def trace_figure(columns: TraceColumns) -> Figure:
     """Return torque and angle against time, one column a model."""
-    n_panels = len(columns.panels)
-    figure = Figure(figsize=(max(3.4, 0.5 + 2.05 * n_panels), 4.7))
-    grid = figure.subplots(
-        2,
-        n_panels,
-        sharex=True,
-        sharey="row",
-        squeeze=False,
-        height_ratios=(1.5, 1.0),
-    )
+    figure, grid = _torque_above_angle(len(columns.panels))
     for (top, bottom), panel in zip(grid.T, columns.panels, strict=True):
         for time, angle, torque, phase in panel.stretches:
             _by_phase(top, time, torque, phase)
             _by_phase(bottom, time, angle, phase)
         top.set_title(panel.title)
-        top.grid(axis="y")
-        bottom.grid(axis="y")
-        bottom.set_xlabel("time (s)")
-    # Limits come last: set before the last stretch they would cut it off.
-    grid[0, 0].set_xlim(left=0)
-    grid[0, 0].set_ylim(bottom=min(0.0, grid[0, 0].get_ylim()[0]))
-    grid[0, 0].set_ylabel("model torque (N·m)")
-    grid[1, 0].set_ylabel("elbow angle (deg)")
-    figure.align_ylabels(grid[:, 0])
+    _finish(figure, grid, "model torque (N·m)")
     handles = [Line2D([], [], solid_capstyle="butt", **look) for _, look in _PHASES]
     for handle in handles:
         handle.set_linewidth(handle.get_linewidth() + 0.5)
@@ -192,6 +180,54 @@ def trace_figure(columns: TraceColumns) -> Figure:
         handlelength=3.0,
     )
     return figure
+
+
+def measured_figure(content: MeasuredTorque) -> Figure:
+    """Return the torque that was sent and that was measured, above the angle."""
+    figure, grid = _torque_above_angle(len(content.panels))
+    for (top, bottom), panel in zip(grid.T, content.panels, strict=True):
+        top.plot(panel.time, panel.measured, color=BLUE, linewidth=0.8)
+        top.plot(panel.time, panel.sent, color=BLACK, linewidth=1.0, dashes=(3, 1.5))
+        bottom.plot(panel.time, panel.angle, color=GREY, linewidth=1.0)
+        top.set_title(panel.title)
+    _finish(figure, grid, "torque (N·m)")
+    figure.legend(
+        handles=[
+            Line2D([], [], color=BLUE, linewidth=1.3, label="measured"),
+            Line2D([], [], color=BLACK, linewidth=1.3, dashes=(3, 1.5), label="sent"),
+        ],
+        loc="outside lower center",
+        ncols=2,
+        handlelength=3.0,
+    )
+    return figure
+
+
+def _torque_above_angle(n_panels: int) -> tuple[Figure, NDArray[Any]]:
+    # -> the figure, and its axes (2, n_panels)
+    figure = Figure(figsize=(max(3.4, 0.5 + 2.05 * n_panels), 4.7))
+    grid = figure.subplots(
+        2,
+        n_panels,
+        sharex=True,
+        sharey="row",
+        squeeze=False,
+        height_ratios=(1.5, 1.0),
+    )
+    return figure, grid
+
+
+def _finish(figure: Figure, grid: NDArray[Any], torque_label: str) -> None:
+    for axes in grid.flat:
+        axes.grid(axis="y")
+    for axes in grid[1]:
+        axes.set_xlabel("time (s)")
+    # Limits come last: set before the last stretch they would cut it off.
+    grid[0, 0].set_xlim(left=0)
+    grid[0, 0].set_ylim(bottom=min(0.0, grid[0, 0].get_ylim()[0]))
+    grid[0, 0].set_ylabel(torque_label)
+    grid[1, 0].set_ylabel("elbow angle (deg)")
+    figure.align_ylabels(grid[:, 0])
 
 
 def _by_phase(

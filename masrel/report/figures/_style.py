@@ -125,6 +125,10 @@ def _figure(content: data.Content) -> Figure:
             if isinstance(content, data.SpeedDots):
                 return study.speed_figure(content)
             return study.trace_figure(content)
+        case data.MeasuredTorque():
+            from masrel.report.figures._study_figures import measured_figure
+
+            return measured_figure(content)
         case data.Forest():
             from masrel.report.figures._forest import forest_figure
 
