@@ -9,7 +9,7 @@ import io
 import json
 import re
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -62,6 +62,7 @@ _USUAL_THRESHOLD_DEG_S = 20.0  # before recordings said what theirs was
 
 _Columns = Mapping[str, NDArray[np.float64]]
 _Fact = str | int | float | bool | None
+_Facts = _Fact | Sequence[Mapping[str, _Fact]]  # also those of each of several
 
 _COLUMN_NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
 _LONGEST_NAME = 40

@@ -2,13 +2,15 @@
 
 import math
 import statistics
-from collections.abc import Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from typing import Any
 
 from masrel.analysis._results import (
     InPersonAgreement,
     InPersonPair,
     IntendedAgreement,
     ModelAgreement,
+    Presentations,
     Speed,
     Speeds,
     SpeedSummary,
@@ -123,10 +125,8 @@ def _entries(
 def stretching_speeds(protocol: Protocol, ratings: Ratings) -> Speeds:
     """Return the mean speeds of the stretches, and summaries of them."""
     known = ratings.table[ratings.table["mean_speed_deg_s"].notna()]
-    columns = (known[c] for c in ("session", "rater", "model", "mean_speed_deg_s"))
     values = tuple(
-        Speed(session=s, rater=r, model=m, mean_speed_deg_s=float(speed))
-        for s, r, m, speed in zip(*columns, strict=True)
+        speed for row in known.to_dict("records") for speed in _speeds_of(row)
     )
     by_model: dict[tuple[str, str], list[float]] = {}
     by_rater: dict[tuple[str, str], list[float]] = {}
@@ -141,8 +141,42 @@ def stretching_speeds(protocol: Protocol, ratings: Ratings) -> Speeds:
         values=values,
         by_model=_summaries(by_model, sessions, models),
         by_rater=_summaries(by_rater, sessions, raters),
-        n_missing=len(ratings.table) - len(values),
+        n_missing=len(ratings.table) - len(known),
         reason=None if values else "no rating comes with a stretching speed",
+    )
+
+
+def _speeds_of(row: Mapping[Hashable, Any]) -> Iterator[Speed]:
+    # of each stretch that has one; of all together where the ratings say no more
+    made: dict[int | None, Any] = {None: row["mean_speed_deg_s"]}
+    if row["speeds_deg_s"] is not None:
+        made = {**dict(enumerate(row["speeds_deg_s"], start=1))}
+    for stretch, speed in made.items():
+        if not math.isnan(speed):
+            yield Speed(
+                session=row["session"],
+                rater=row["rater"],
+                model=row["model"],
+                mean_speed_deg_s=float(speed),
+                stretch=stretch,
+                is_graded=stretch is not None and stretch == row["graded_stretch"],
+            )
+
+
+def presentations(ratings: Ratings) -> Presentations | None:
+    """Count stretches, and presentations in which nothing could be felt."""
+    table = ratings.table
+    known = table[table["n_stretches"].notna()]
+    if known.empty:
+        return None
+    felt = known["felt"].tolist()
+    return Presentations(
+        n_presentations=len(known),
+        n_stretches=int(known["n_stretches"].sum()),
+        n_felt=felt.count("felt"),
+        n_below_threshold=felt.count("below-threshold"),
+        n_no_catch=felt.count("no-catch"),
+        n_unknown=felt.count(None),
     )
 
 

@@ -7,6 +7,7 @@ from masrel.agreement import coefficient, cohen_kappa
 from masrel.analysis._descriptions import (
     in_person_agreement,
     intended_agreement,
+    presentations,
     stretching_speeds,
 )
 from masrel.analysis._results import Analysis, PlannedEstimate, RaterEstimate
@@ -86,6 +87,7 @@ def analyze(
             if sections & {"speeds", "traces"}
             else None
         ),
+        presentations=presentations(ratings),
         simulated=ratings.simulated,
         inputs=_inputs(protocol, ratings, in_person),
         masrel_version=masrel.__version__,

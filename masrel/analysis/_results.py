@@ -147,7 +147,7 @@ class InPersonAgreement:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Speed:
-    """Mean speed of one rater's stretches of one model, deg/s.
+    """Mean speed of a stretch, or of one rater's stretches of one model, deg/s.
 
     Attributes
     ----------
@@ -155,12 +155,19 @@ class Speed:
         Where it was made.
     mean_speed_deg_s : float
         Mean speed of the pre-catch phase, deg/s.
+    stretch : int or None
+        Which stretch of the presentation it was, from 1; None where the ratings have
+        one speed for all.
+    is_graded : bool
+        Whether the rater said that the grade rests on this stretch.
     """
 
     session: str
     rater: str
     model: str
     mean_speed_deg_s: float
+    stretch: int | None = None
+    is_graded: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -213,6 +220,30 @@ class Speeds:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Presentations:
+    """How often the arm was stretched, and how often nothing could be felt.
+
+    Attributes
+    ----------
+    n_presentations : int
+        Those whose stretches are known.
+    n_stretches : int
+        Stretches in all of them.
+    n_felt, n_below_threshold, n_no_catch, n_unknown : int
+        Presentations in which what the model has was felt; in which no stretch reached
+        ν_th; in which no catch came though the model has one at that speed; and those
+        of which nobody knows.
+    """
+
+    n_presentations: int
+    n_stretches: int
+    n_felt: int
+    n_below_threshold: int
+    n_no_catch: int
+    n_unknown: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Analysis:
     """Everything a study's plan asks for.
 
@@ -230,6 +261,8 @@ class Analysis:
         None when no section asks for it.
     speeds : Speeds or None
         None when no section asks for them.
+    presentations : Presentations or None
+        None when nothing is known of the stretches.
     simulated : bool
         Whether any rating is simulated.
     inputs : mapping of str to str
@@ -244,6 +277,7 @@ class Analysis:
     intended: IntendedAgreement | None
     in_person: InPersonAgreement | None
     speeds: Speeds | None
+    presentations: Presentations | None
     simulated: bool
     inputs: Mapping[str, str]
     masrel_version: str

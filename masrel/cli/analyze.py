@@ -53,10 +53,14 @@ def analyze(study: Path, ratings_file: Path | None, output: OutputOptions) -> No
 
 def _show(data: StudyData, analysis: "Analysis", *, csv: bool) -> None:
     from masrel.report._document import SECTIONS
+    from masrel.report._grades import felt_sentences
     from masrel.report._material import Paragraph, gather
     from masrel.report._tables import Table, as_csv, as_text
 
     material = gather(data.protocol, data.ratings, analysis, data.in_person)
+    felt = felt_sentences(material)
+    if felt:
+        click.echo(textwrap.fill(felt, 88) + "\n", err=csv)
     for name in _computed(analysis):
         for block in SECTIONS[name](material).blocks:
             if isinstance(block, Table):

@@ -33,3 +33,6 @@ def ratings(study: Path, output: Path | None) -> None:
     click.echo(
         f"{n_rows - n_missing} ratings{label}, {n_missing} missing: {destination}"
     )
+    n_slow = int(ratings.table["felt"].isin(["below-threshold", "no-catch"]).sum())
+    if n_slow:
+        click.echo(f"{n_slow} after stretches too slow to feel the catch: column felt")

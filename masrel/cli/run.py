@@ -30,6 +30,11 @@ if TYPE_CHECKING:
     help="Clock of the control loop; default: real, for simulated grades simulated.",
 )
 @output_options(quiet="No progress bar and no closing line.")
+@click.option(
+    "--rehearse",
+    is_flag=True,
+    help="Only rehearse: nothing of it enters the ratings of STUDY.",
+)
 @click.option("--correct", metavar="CODE", help="Correct the grade of this code.")
 @click.option("--grade", help="With --correct: what the grade should have been.")
 @click.option("--who", help="With --correct: who corrects it.")
@@ -41,6 +46,7 @@ def run(
     grades: Literal["console", "simulated"],
     clock: Literal["real", "simulated"] | None,
     output: OutputOptions,
+    rehearse: bool,
     correct: str | None,
     grade: str | None,
     who: str | None,
@@ -48,15 +54,20 @@ def run(
 ) -> None:
     """Run one rater's session of STUDY, or go on with it where it stopped.
 
-    The rater is shown blinded codes only. With --correct no model is presented: the
-    correction is added to the session's log, where the first grade stays.
+    The rater is shown blinded codes only. With --rehearse the order and the codes are
+    other ones, and log and recordings are kept in STUDY/rehearsals. With --correct no
+    model is presented: the correction is added to the session's log, where the first
+    grade stays.
     """
     paths = StudyPaths(study)
     protocol = read_protocol(paths.protocol)
     if correct is None:
         _refuse_strays({"--grade": grade, "--who": who, "--why": why})
-        _run(paths, protocol, rater, session, grades, clock, quiet=output.quiet)
+        options = {"rehearse": rehearse, "quiet": output.quiet}
+        _run(paths, protocol, rater, session, grades, clock, **options)
         return
+    if rehearse:
+        raise click.UsageError("--rehearse presents models, and --correct none")
     from masrel.run import record_correction
 
     if grade is None or who is None or why is None:
@@ -85,6 +96,7 @@ def _run(
     grades: Literal["console", "simulated"],
     clock: Literal["real", "simulated"] | None,
     *,
+    rehearse: bool,
     quiet: bool,
 ) -> None:
     from masrel.run import run_session
@@ -92,6 +104,8 @@ def _run(
     n_presentations = len(protocol.models) * protocol.schedule.repeats
     # A person's prompts count the presentations themselves.
     hidden = quiet or grades == "console"
+    if rehearse and not quiet:
+        click.echo("REHEARSAL: nothing of it enters the ratings of the study", err=True)
     with (
         warnings_as_notes(),
         tqdm(total=n_presentations, unit="", desc=rater, disable=hidden or None) as bar,
@@ -103,13 +117,16 @@ def _run(
             session,
             grades=_source(grades, protocol),
             clock=clock or ("simulated" if grades == "simulated" else "real"),
+            rehearsal=rehearse,
             progress=lambda _: bar.update(),
         )
     if not quiet:
         label = " (simulated)" if done.simulated else ""
+        what = "the rehearsal of session" if done.rehearsal else "session"
         click.echo(
-            f"session {done.session} of {done.rater} is complete: "
-            f"{done.n_presentations} grades{label} in {paths.log_file(rater, session)}"
+            f"{what} {done.session} of {done.rater} is complete: "
+            f"{done.n_presentations} grades{label} in {done.log_file}"
+            + ("; none is a rating of the study" if done.rehearsal else "")
         )
 
 

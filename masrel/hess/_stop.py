@@ -5,7 +5,7 @@ import select
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import TextIO
@@ -16,6 +16,7 @@ if sys.platform != "win32":
     import termios
     import tty
 
+_ENTER = (b"\n", b"\r")
 _SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
 
 
@@ -89,8 +90,12 @@ def stop_on_signals(stop: EmergencyStop) -> Iterator[None]:
 
 
 @contextmanager
-def stop_on_key(stop: EmergencyStop, keys: TextIO | None) -> Iterator[None]:
-    """Let any key of a terminal press the button."""
+def stop_on_key(
+    stop: EmergencyStop,
+    keys: TextIO | None,
+    enter: Callable[[], object] | None = None,
+) -> Iterator[None]:
+    """Let any key of a terminal press the button, or Enter do something else."""
     if sys.platform == "win32" or keys is None or not keys.isatty():
         yield
         return
@@ -98,7 +103,7 @@ def stop_on_key(stop: EmergencyStop, keys: TextIO | None) -> Iterator[None]:
     settings = termios.tcgetattr(terminal)
     tty.setcbreak(terminal)  # a key counts at once, without Enter
     try:
-        with _waiting_for_key(stop, terminal):
+        with _waiting_for_key(stop, terminal, enter):
             yield
     finally:
         with suppress(termios.error):  # it may have gone away meanwhile
@@ -106,10 +111,12 @@ def stop_on_key(stop: EmergencyStop, keys: TextIO | None) -> Iterator[None]:
 
 
 @contextmanager
-def _waiting_for_key(stop: EmergencyStop, terminal: int) -> Iterator[None]:
+def _waiting_for_key(
+    stop: EmergencyStop, terminal: int, enter: Callable[[], object] | None
+) -> Iterator[None]:
     read_end, write_end = os.pipe()
     thread = threading.Thread(
-        target=_wait_for_key, args=(stop, terminal, read_end), daemon=True
+        target=_wait_for_key, args=(stop, terminal, read_end, enter), daemon=True
     )
     thread.start()
     try:
@@ -120,12 +127,21 @@ def _waiting_for_key(stop: EmergencyStop, terminal: int) -> Iterator[None]:
         os.close(read_end)
 
 
-def _wait_for_key(stop: EmergencyStop, terminal: int, read_end: int) -> None:
-    ready, _, _ = select.select([terminal, read_end], [], [])
-    if terminal not in ready:
-        return
-    try:
-        key = os.read(terminal, 1)
-    except OSError:
-        key = b""
+def _wait_for_key(
+    stop: EmergencyStop,
+    terminal: int,
+    read_end: int,
+    enter: Callable[[], object] | None,
+) -> None:
+    while True:
+        ready, _, _ = select.select([terminal, read_end], [], [])
+        if terminal not in ready:
+            return
+        try:
+            key = os.read(terminal, 1)
+        except OSError:
+            key = b""
+        if enter is None or key not in _ENTER:
+            break
+        enter()
     stop.press("key" if key else "terminal lost")

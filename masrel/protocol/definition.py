@@ -130,7 +130,7 @@ class Stretch(_Table, frozen=True, kw_only=True):
     largest_speed_deg_s: Annotated[float, Meta(gt=0, le=600)] = 131.0
 
 
-Cue = Literal["slow", "fast"]
+_Cue = Literal["slow", "fast"]
 """What a rater is asked for: V1 or V3 of the Tardieu scale."""
 
 
@@ -140,7 +140,7 @@ class PresentationRules(_Table, frozen=True, kw_only=True):
     stretches: (
         Literal["free"]
         | Annotated[int, Meta(ge=1, le=100)]
-        | Annotated[tuple[Cue, ...], Meta(min_length=1, max_length=100)]
+        | Annotated[tuple[_Cue, ...], Meta(min_length=1, max_length=100)]
     ) = 1
     time_limit_s: Annotated[float, Meta(gt=0, le=3600)] = 60.0
     stretch_limit_s: Annotated[float, Meta(gt=0, le=600)] = 20.0

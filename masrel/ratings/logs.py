@@ -2,8 +2,10 @@
 
 import hashlib
 import math
+import statistics
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from masrel.errors import RatingsError
 from masrel.protocol import Protocol, StudyPaths, scale_of
@@ -29,8 +31,8 @@ def ratings_from_logs(study: StudyPaths, protocol: Protocol) -> Ratings:
         Sessions and raters in the protocol's order, models in the schedule's. A
         session that has begun has a row for every presentation, without grade
         where there is none yet; one that has no log has none. Corrections are in
-        the place of the grades they correct; the speed is that of the last
-        presentation before the grade.
+        the place of the grades they correct; stretches are those of the last
+        presentation before the grade, and the speed is the mean of theirs.
 
     Raises
     ------
@@ -64,6 +66,11 @@ def _rows(
     state = replay(log, read_log(log))
     if not state.header:
         return
+    if state.header.get("rehearsal"):
+        raise RatingsError(
+            f"{log}: needed the log of a session, got that of a rehearsal, whose "
+            "grades are no ratings of the study: move it away"
+        )
     schedule = _schedule(study, protocol, state, log)
     for code, events in state.presented.items():
         if code not in {shown.code for shown in schedule.presentations}:
@@ -86,8 +93,9 @@ def _rows(
             "model": shown.model,
             "repeat": shown.repeat,
             "grade": grade,
-            "mean_speed_deg_s": _speed(state.presented.get(shown.code, [])),
             "source": "simulated" if _is_simulated(state) else "recorded",
+            "graded_stretch": state.graded_stretches.get(shown.code),
+            **_of_stretches(state.presented.get(shown.code, [])),
         }
 
 
@@ -119,9 +127,24 @@ def _check_recording(study: StudyPaths, log: Path, event: Event) -> None:
         )
 
 
-def _speed(presented: list[Event]) -> float:
-    speed = presented[-1].fields["mean_speed_deg_s"] if presented else None
-    return math.nan if speed is None else float(speed)
+def _of_stretches(presented: list[Event]) -> dict[str, object]:
+    # what the table says of the stretches of the last presentation
+    if not presented:
+        return {}
+    fields = presented[-1].fields
+    one = [{"mean_speed_deg_s": fields["mean_speed_deg_s"]}]
+    made: Any = fields.get("stretches", one)  # there once was one, and no list
+    known = [stretch["mean_speed_deg_s"] for stretch in made]
+    speeds = tuple(math.nan if speed is None else float(speed) for speed in known)
+    moved = [speed for speed in speeds if not math.isnan(speed)]
+    return {
+        "n_stretches": len(speeds),
+        "mean_speed_deg_s": statistics.fmean(moved) if moved else math.nan,
+        "min_speed_deg_s": min(moved, default=math.nan),
+        "max_speed_deg_s": max(moved, default=math.nan),
+        "speeds_deg_s": speeds,
+        "felt": fields.get("felt"),
+    }
 
 
 def _is_simulated(state: SessionState) -> bool:

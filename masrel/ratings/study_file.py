@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from masrel.errors import RatingsError
 from masrel.ratings.table import (
@@ -15,6 +16,7 @@ from masrel.ratings.table import (
     Ratings,
     _assemble,
 )
+from masrel.run._state import FELT
 from masrel.scales import Scale
 
 _MISSING = ("", "NA")
@@ -67,6 +69,12 @@ class _Cell:
     grade: str | None
     mean_speed_deg_s: float
     source: str
+    n_stretches: int | None
+    min_speed_deg_s: float
+    max_speed_deg_s: float
+    speeds_deg_s: tuple[float, ...] | None
+    graded_stretch: int | None
+    felt: str | None
 
 
 def read_study_ratings(path: Path | str, scale: Scale) -> Ratings:
@@ -124,13 +132,15 @@ def _long_cells(
     rows: _CsvRows, places: Mapping[str, int | None], problems: list[_Problem]
 ) -> list[_Cell]:
     columns = {role: place for role, place in places.items() if place is not None}
-    for name in ("repeat", "mean_speed_deg_s", "source"):
+    for name in ("repeat", *RATING_COLUMNS[5:]):
         if name in rows.header:
             columns[name] = rows.header.index(name)
     cells = []
     for row in rows.rows:
         texts = {role: row.cells[place] for role, place in columns.items()}
-        repeat, speed, source = _extra_values(texts, row.line, problems)
+        row_problems: list[tuple[str, str]] = []
+        extra = _extra_values(texts, row_problems)
+        problems += [(row.line, name, text) for name, text in row_problems]
         cells.append(
             _Cell(
                 line=row.line,
@@ -139,9 +149,7 @@ def _long_cells(
                 rater=texts["rater"],
                 model=texts["model"],
                 grade=None if texts["grade"] in _MISSING else texts["grade"],
-                repeat=repeat,
-                mean_speed_deg_s=speed,
-                source=source,
+                **extra,
             )
         )
         for role in ("model", "rater"):
@@ -152,31 +160,72 @@ def _long_cells(
     return cells
 
 
-def _extra_values(
-    texts: Mapping[str, str], line: int, problems: list[_Problem]
-) -> tuple[int, float, str]:
-    # repeat, mean speed and source of one row, from the columns a file may lack
-    text, repeat = texts.get("repeat", "1"), 1
-    if text.isascii() and text.isdigit() and int(text) >= 1:
-        repeat = int(text)
-    else:
-        problems.append((line, "repeat", f"needed a whole number from 1, got {text!r}"))
-    text, speed = texts.get("mean_speed_deg_s", ""), math.nan
-    if text not in _MISSING:
-        try:
-            speed = float(text)
-        except ValueError:
-            speed = math.nan
-        if not 0 <= speed < math.inf:
-            problems.append(
-                (line, "mean_speed_deg_s", f"needed a speed of 0 or more, got {text!r}")
-            )
-    source = texts.get("source", "foreign")
-    if source not in SOURCES:
-        problems.append(
-            (line, "source", f"needed one of {', '.join(SOURCES)}, got {source!r}")
-        )
-    return repeat, speed, source
+_Problems = list[tuple[str, str]]
+"""Column and message of what is wrong with a row."""
+
+
+def _extra_values(texts: Mapping[str, str], problems: _Problems) -> dict[str, Any]:
+    # the values of one row from the columns that a file may lack
+    n_stretches = _whole(texts, "n_stretches", 0, problems)
+    speeds = _speeds(texts, n_stretches, problems)
+    graded = _whole(texts, "graded_stretch", 1, problems)
+    if graded is not None and graded > (n_stretches or 0):
+        problems.append(("graded_stretch", f"needed at most n_stretches, got {graded}"))
+    values: dict[str, Any] = {
+        "repeat": _whole({"repeat": "1", **texts}, "repeat", 1, problems),
+        "source": texts.get("source", "foreign"),
+        "felt": texts.get("felt", "NA"),
+        "n_stretches": n_stretches,
+        "speeds_deg_s": speeds,
+        "graded_stretch": graded,
+    }
+    values["felt"] = None if values["felt"] in _MISSING else values["felt"]
+    for name in ("mean_speed_deg_s", "min_speed_deg_s", "max_speed_deg_s"):
+        values[name] = _speed(name, texts.get(name, ""), problems)
+    for name, known in (("source", SOURCES), ("felt", (*FELT, None))):
+        if values[name] not in known:
+            listed = ", ".join(text for text in known if text is not None)
+            problems.append((name, f"needed one of {listed}, got {values[name]!r}"))
+    return values
+
+
+def _whole(
+    texts: Mapping[str, str], name: str, least: int, problems: _Problems
+) -> int | None:
+    # None where the cell is missing, or no such number; a repeat is never missing
+    text = texts.get(name, "NA")
+    if text in _MISSING and name != "repeat":
+        return None
+    if text.isascii() and text.isdigit() and int(text) >= least:
+        return int(text)
+    problems.append((name, f"needed a whole number from {least}, got {text!r}"))
+    return None
+
+
+def _speed(name: str, text: str, problems: _Problems) -> float:
+    if text in _MISSING:
+        return math.nan
+    try:
+        speed = float(text)
+    except ValueError:
+        speed = math.nan
+    if not 0 <= speed < math.inf:
+        problems.append((name, f"needed a speed of 0 or more, got {text!r}"))
+    return speed
+
+
+def _speeds(
+    texts: Mapping[str, str], n_stretches: int | None, problems: _Problems
+) -> tuple[float, ...] | None:
+    # one a stretch, separated by semicolons
+    text = texts.get("speeds_deg_s", "NA")
+    if text in _MISSING and n_stretches != 1:
+        return () if n_stretches == 0 else None
+    cells = text.split(";")
+    if len(cells) != n_stretches:
+        message = f"needed {n_stretches} separated by semicolons, got {text!r}"
+        problems.append(("speeds_deg_s", message))
+    return tuple(_speed("speeds_deg_s", cell.strip(), problems) for cell in cells)
 
 
 def _check_cells(cells: list[_Cell], scale: Scale, problems: list[_Problem]) -> None:

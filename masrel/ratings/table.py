@@ -13,6 +13,7 @@ import pandas as pd
 
 from masrel._files import write_file
 from masrel.errors import RatingsError
+from masrel.run._state import FELT
 from masrel.scales import Scale
 
 RATING_COLUMNS = (
@@ -23,7 +24,17 @@ RATING_COLUMNS = (
     "grade",  # text, a grade of the scale; None when missing
     "mean_speed_deg_s",  # mean speed before the catch, deg/s; nan when unknown
     "source",  # one of SOURCES
+    # of the stretches before the grade; a table without them has no such columns
+    "n_stretches",  # whole number; None when unknown
+    "min_speed_deg_s",  # slowest and fastest mean speed of a stretch; nan when unknown
+    "max_speed_deg_s",
+    "speeds_deg_s",  # mean speed of each, in order, nan where it has none; or None
+    "graded_stretch",  # number of the one that the grade rests on; None when not said
+    "felt",  # one of masrel.run's FELT; None when unknown
 )
+
+_N_ALWAYS = 7
+"""Columns that every table has."""
 
 SOURCES = ("published", "recorded", "simulated", "foreign")
 """Where a rating comes from; "foreign" is a file that does not say."""
@@ -40,7 +51,7 @@ class Ratings:
 
     Attributes
     ----------
-    table : DataFrame, shape (n_ratings, 7)
+    table : DataFrame, shape (n_ratings, 13)
         One row a rating, columns `RATING_COLUMNS`; session, rater, model and repeat
         together are unique; a missing grade is None.
     scale : Scale
@@ -118,7 +129,9 @@ def _assemble(
 ) -> Ratings:
     """Return the table of columns that have been checked."""
     types = dict.fromkeys(RATING_COLUMNS, "object")
-    types.update({"repeat": "int64", "mean_speed_deg_s": "float64"})
+    types["repeat"] = "int64"
+    for name in ("mean_speed_deg_s", "min_speed_deg_s", "max_speed_deg_s"):
+        types[name] = "float64"
     table = pd.DataFrame(
         {name: pd.Series(columns[name], dtype=types[name]) for name in RATING_COLUMNS}
     )
@@ -136,6 +149,12 @@ _DEFAULTS: dict[str, object] = {
     "grade": None,
     "mean_speed_deg_s": math.nan,
     "source": "foreign",
+    "n_stretches": None,
+    "min_speed_deg_s": math.nan,
+    "max_speed_deg_s": math.nan,
+    "speeds_deg_s": None,
+    "graded_stretch": None,
+    "felt": None,
 }
 
 
@@ -158,9 +177,39 @@ def _problems(row: Mapping[str, object], scale: Scale) -> list[str]:
         problems.append(
             f"source: needed one of {', '.join(SOURCES)}, got {row['source']!r}"
         )
+    problems += _stretch_problems(row)
     unknown = sorted(set(row) - set(RATING_COLUMNS))
     if unknown:
         problems.append(f"unknown columns {', '.join(unknown)}")
+    return problems
+
+
+def _stretch_problems(row: Mapping[str, object]) -> list[str]:
+    """Return what is wrong with what a row says of its stretches."""
+    problems = []
+    for name in ("min_speed_deg_s", "max_speed_deg_s"):
+        if not isinstance(row[name], int | float) or isinstance(row[name], bool):
+            problems.append(f"{name}: needed a number, got {row[name]!r}")
+    n_stretches, graded = row["n_stretches"], row["graded_stretch"]
+    speeds, felt, n_known = row["speeds_deg_s"], row["felt"], 0
+    if isinstance(n_stretches, int) and n_stretches >= 0:
+        n_known = n_stretches
+    elif n_stretches is not None:
+        problems.append(
+            f"n_stretches: needed a whole number from 0, got {n_stretches!r}"
+        )
+    if speeds is not None and not (
+        isinstance(speeds, tuple) and len(speeds) == n_known
+    ):
+        problems.append(
+            f"speeds_deg_s: needed one for each of {n_known} stretches, got {speeds!r}"
+        )
+    if graded is not None and not (isinstance(graded, int) and 1 <= graded <= n_known):
+        problems.append(
+            f"graded_stretch: needed one of {n_known} stretches, got {graded!r}"
+        )
+    if felt is not None and felt not in FELT:
+        problems.append(f"felt: needed one of {', '.join(FELT)}, got {felt!r}")
     return problems
 
 
@@ -388,9 +437,11 @@ def ratings_hash(ratings: Ratings) -> str:
 def _body(ratings: Ratings) -> str:
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(RATING_COLUMNS)
-    columns = [ratings.table[name].tolist() for name in RATING_COLUMNS]
-    for row in zip(*columns, strict=True):
+    table = ratings.table
+    has_stretches = table["n_stretches"].notna().any()
+    names = RATING_COLUMNS if has_stretches else RATING_COLUMNS[:_N_ALWAYS]
+    writer.writerow(names)
+    for row in zip(*(table[name].tolist() for name in names), strict=True):
         writer.writerow([_csv_cell(value) for value in row])
     return text.getvalue()
 
@@ -398,4 +449,6 @@ def _body(ratings: Ratings) -> str:
 def _csv_cell(value: object) -> str:
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return "NA"
+    if isinstance(value, tuple):
+        return ";".join(_csv_cell(part) for part in value)
     return repr(value) if isinstance(value, float) else str(value)

@@ -60,6 +60,7 @@ class SpeedColumn:
     session: str
     speeds: tuple[tuple[float, ...], ...]  # of every rater, in the raters' order
     mean: float
+    graded: tuple[tuple[float, ...], ...] = ()  # those that a grade is said to rest on
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,6 +79,7 @@ class TracePanel:
     title: str  # the model, its intended grade, and the range of speeds
     # per rater: time (s), angle (deg), torque (N·m), code of the phase
     stretches: "tuple[tuple[NDArray[np.generic], ...], ...]"
+    graded: tuple[bool, ...] = ()  # by stretch, whether a grade is said to rest on it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

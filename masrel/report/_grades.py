@@ -18,9 +18,34 @@ def grades_section(material: Material) -> Section:
     blocks: list[Paragraph | Table | Drawing] = []
     for session in material.sessions:
         blocks += _grid_blocks(material, session, _grid(material, session))
+    felt = felt_sentences(material)
+    if felt and blocks:
+        blocks.insert(0, Paragraph(text=felt))
     if not blocks:
         blocks.append(Paragraph(text="These data hold no ratings.", absent=True))
     return Section(name="grades", title="Grades", blocks=tuple(blocks))
+
+
+def felt_sentences(material: Material) -> str:
+    """Say how often the arm was stretched, and how often nothing could be felt."""
+    made = material.analysis.presentations
+    if made is None:
+        return ""
+    sentences, n_slow = [], made.n_below_threshold + made.n_no_catch
+    if made.n_stretches != made.n_presentations:
+        mean = number(made.n_stretches / made.n_presentations, 1)
+        sentences.append(
+            f"Raters stretched the arm {made.n_stretches} times in "
+            f"{counted(made.n_presentations, 'presentation')}, {mean} times each."
+        )
+    if n_slow:
+        sentences.append(
+            f"In {n_slow} of {counted(made.n_presentations, 'presentation')} the "
+            "stretches were too slow to feel the catch: none reached ν_th in "
+            f"{made.n_below_threshold}, and none came to the catch that the model has "
+            f"at that speed in {made.n_no_catch}."
+        )
+    return " ".join(sentences)
 
 
 def _grid(material: Material, session: str) -> GradeGrid:

@@ -60,6 +60,8 @@ def speeds_section(material: Material) -> Section:
     )
     if speeds.n_missing:
         text += f" Ratings whose speed is not known: {speeds.n_missing}."
+    if _has_many(speeds.values):
+        text += " Where a rater stretched the arm more than once, n counts stretches."
     digits = whole_or_tenths([speed.mean_speed_deg_s for speed in speeds.values])
     return Section(
         name="speeds",
@@ -97,9 +99,12 @@ def _summary_table(
 
 def _speed_drawing(material: Material, speeds: Speeds) -> Drawing:
     known: dict[tuple[str, str, str], tuple[float, ...]] = {}
+    graded: dict[tuple[str, str, str], tuple[float, ...]] = {}
     for value in speeds.values:
         key = (value.session, value.model, value.rater)
         known[key] = (*known.get(key, ()), value.mean_speed_deg_s)
+        if value.is_graded:
+            graded[key] = (*graded.get(key, ()), value.mean_speed_deg_s)
     columns = [
         SpeedColumn(
             model=s.name,
@@ -108,6 +113,9 @@ def _speed_drawing(material: Material, speeds: Speeds) -> Drawing:
                 known.get((s.session, s.name, r), ()) for r in material.raters
             ),
             mean=s.mean,
+            graded=tuple(
+                graded.get((s.session, s.name, r), ()) for r in material.raters
+            ),
         )
         for s in speeds.by_model
     ]
@@ -116,12 +124,18 @@ def _speed_drawing(material: Material, speeds: Speeds) -> Drawing:
         f"{number(s.least, 0)} to {number(s.most, 0)} deg/s"
         for s in speeds.by_model
     )
+    of = "rater for every model, and the mean over raters"
+    if _has_many(speeds.values):
+        of = "stretch of every rater for every model, and the mean over stretches"
+    caption = (
+        f"Mean stretching speed of every {of} (bar). Dashed: ν_L, below which the "
+        "catch angle stays the same."
+    )
+    if graded:
+        caption += " Ringed: the stretch that the rater said the grade rests on."
     return Drawing(
         name="speeds",
-        caption=(
-            "Mean stretching speed of every rater for every model, and the mean over "
-            "raters (bar). Dashed: ν_L, below which the catch angle stays the same."
-        ),
+        caption=caption,
         alt=f"Dot plot of speeds. {text}.",
         content=SpeedDots(
             columns=tuple(columns),
@@ -130,6 +144,11 @@ def _speed_drawing(material: Material, speeds: Speeds) -> Drawing:
         ),
         stamp=material.stamp,
     )
+
+
+def _has_many(speeds: Sequence[Speed]) -> bool:
+    # whether there was more than one stretch to a presentation
+    return any(speed.stretch is not None and speed.stretch > 1 for speed in speeds)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -157,14 +176,17 @@ def traces_section(material: Material) -> Section:
         "published": "published mean speeds",
         "simulated": "mean speeds of the simulated hands",
     }.get(material.data, "recorded mean speeds")
+    each = "stretch" if _has_many(values) else "rater"
     text = (
         "These traces are reconstructions, not measurements: each model is stretched "
         f"at constant speed from {as_entered(protocol.stretch.start_deg)}° to "
         f"{as_entered(end_deg)}°, at the {kind} of session "
-        f"{session}, one line a rater. Torque resists extension; the arm's own inertia "
-        "is not in it. Torque and phases are what the control law sends at "
+        f"{session}, one line a {each}. Torque resists extension; the arm's own "
+        "inertia is not in it. Torque and phases are what the control law sends at "
         f"{as_entered(protocol.device.rate_hz)} Hz."
     )
+    if any(value.is_graded for value in values):
+        text += " A thicker line is the stretch that the rater said the grade rests on."
     n_still = sum(v.session == session for v in speeds.values) - len(values)
     if n_still:
         text += f" Speeds {_TOO_SLOW}, which are not drawn: {n_still}."
@@ -234,9 +256,12 @@ def _trace_drawing(
                 stretches=tuple(
                     (t.time, np.degrees(t.angle), t.torque, t.phase) for t in traces
                 ),
+                graded=tuple(stretch.speed.is_graded for stretch in made),
             )
         )
     listed = ", ".join(model for model, _ in stretches)
+    made_of = [stretch.speed for _, made in stretches for stretch in made]
+    whose = "every stretch's" if _has_many(made_of) else "every rater's"
     shape = (
         "Torque rises slowly, jumps at the catch, falls to a residual, and rises again "
         "after the catch; the"
@@ -246,8 +271,8 @@ def _trace_drawing(
     return Drawing(
         name=f"traces_{nth}",
         caption=(
-            f"Reconstructed torque (top) and angle (bottom) of {listed} at every "
-            "rater's mean speed. Thin grey: before the catch; thick: catch; dashed: "
+            f"Reconstructed torque (top) and angle (bottom) of {listed} at {whose} "
+            "mean speed. Thin grey: before the catch; thick: catch; dashed: "
             "after the catch; a dot marks where a phase begins."
         ),
         alt=(
@@ -273,19 +298,22 @@ def _peak_table(
         "stretch, computed from the exact events of the motion, not from the samples."
     ]
     rows: list[tuple[Value, ...]] = []
-    has_repeats = False
+    has_repeats = has_many = False
     for model, made in stretches:
         peaks: dict[str, float] = {}
         for stretch in made:
             rater = stretch.speed.rater
             peaks[rater] = max(stretch.peak, peaks.get(rater, stretch.peak))
         has_repeats = has_repeats or len(peaks) < len(made)
+        has_many = has_many or _has_many([stretch.speed for stretch in made])
         of_raters = [peaks.get(rater) for rater in raters]
         rows.append((model, *of_raters, min(peaks.values()), max(peaks.values())))
     others = [model for model, _ in stretches if model in _of_other_kinds(material)]
     if others:
         notes.append(f"Of {', '.join(others)} it is the largest sample.")
-    if has_repeats:
+    if has_many:
+        notes.append("Of several stretches the largest peak is given.")
+    elif has_repeats:
         notes.append("Of repeated presentations the largest peak is given.")
     return Table(
         name="peak_torque",

@@ -8,7 +8,12 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from masrel.run._grade_sources import GradeRequest, GradeSource, ScriptGrades
+    from masrel.run._grade_sources import (
+        GradeRequest,
+        GradeSource,
+        ScriptGrades,
+        StretchGrade,
+    )
     from masrel.run._log import Event, SessionLog, read_log
     from masrel.run._runner import SessionSummary
     from masrel.run._settings import model_controller
@@ -25,6 +30,7 @@ __all__ = [
     "SessionLog",
     "SessionSummary",
     "SimulatedGrades",
+    "StretchGrade",
     "model_controller",
     "read_log",
     "record_correction",
@@ -32,7 +38,7 @@ __all__ = [
 ]
 
 _HOMES = {
-    "_grade_sources": ("GradeRequest", "GradeSource", "ScriptGrades"),
+    "_grade_sources": ("GradeRequest", "GradeSource", "ScriptGrades", "StretchGrade"),
     "_log": ("Event", "SessionLog", "read_log"),
     "_runner": ("SessionSummary",),
     "_settings": ("model_controller",),

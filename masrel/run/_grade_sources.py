@@ -1,11 +1,16 @@
 """What a source of grades is, and the one that reads them off a script."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, ClassVar, Protocol
 
 from masrel.errors import ParameterError
+from masrel.protocol import PresentationRules
+from masrel.run._state import Felt
 from masrel.schedule import Presentation
+
+if TYPE_CHECKING:
+    from masrel.hess import PresentationStatus  # loads numpy
 
 MAX_FAULTS = 3  # in a row of one presentation; after that nobody is asked any more
 
@@ -26,6 +31,19 @@ class GradeRequest:
         From 1; above 1 when it is presented again.
     n_faults : int
         Faults in a row so far.
+    rehearsal : bool
+        Whether nothing of this enters the study's ratings.
+    rules : PresentationRules
+        How often the arm may be stretched, and with which cues.
+    status : PresentationStatus or None
+        Of the presentation that is about to begin: whoever lets a program answer calls
+        its `done` when the rater is, from any thread. None once it is over.
+    n_stretches : int
+        Stretches that were made; 0 before.
+    felt : {"felt", "below-threshold", "no-catch"} or None
+        Whether what the model has could be felt: no stretch was fast enough, or none
+        came to the catch that the model has at that speed. None before, and after a
+        fault.
     """
 
     rater: str
@@ -34,6 +52,27 @@ class GradeRequest:
     n_presentations: int
     attempt: int
     n_faults: int = 0
+    rehearsal: bool = False
+    rules: PresentationRules = field(default_factory=PresentationRules)
+    status: "PresentationStatus | None" = None
+    n_stretches: int = 0
+    felt: Felt | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StretchGrade:
+    """A grade, and the stretch it rests on.
+
+    Attributes
+    ----------
+    grade : str
+        A grade of the scale.
+    stretch : int or None
+        Number of the stretch, from 1; None where nobody says.
+    """
+
+    grade: str
+    stretch: int | None = None
 
 
 class GradeSource(Protocol):
@@ -53,7 +92,7 @@ class GradeSource(Protocol):
         """Return when the rater is ready for the presentation."""
         ...
 
-    def grade(self, request: GradeRequest) -> str | None:
+    def grade(self, request: GradeRequest) -> str | StretchGrade | None:
         """Return the grade, or None to have it presented again first."""
         ...
 

@@ -20,7 +20,7 @@ from masrel._files import make_folder, no_follow, sync_folder
 from masrel.errors import SessionLogError
 
 if TYPE_CHECKING:
-    from masrel.recording import _Fact  # loads numpy
+    from masrel.recording import _Fact, _Facts  # loads numpy
 
 if sys.platform != "win32":
     import fcntl
@@ -44,13 +44,13 @@ class Event:
     time_utc : str
         When, ISO 8601 in UTC.
     fields : mapping of str to str, int, float, bool or None
-        The facts of the event.
+        The facts of the event; that of stretches is a list of such mappings.
     """
 
     line: int
     kind: str
     time_utc: str
-    fields: "Mapping[str, _Fact]" = field(hash=False)
+    fields: "Mapping[str, _Facts]" = field(hash=False)
 
 
 def read_log(path: Path) -> tuple[Event, ...]:
@@ -133,16 +133,24 @@ def _parse_line(path: Path, number: int, line: bytes) -> tuple[Event, object]:
             f"{path}: line {number}: needed text in event and time_utc and an object "
             "in fields"
         )
-    for name, fact in fields.items():
-        if isinstance(fact, dict | list):
-            raise SessionLogError(
-                f"{path}: line {number}: {name} needs text, a number, true, false or "
-                f"null, got {fact!r}"
-            )
+    for name, entry in fields.items():
+        for fact in _facts_of(entry):
+            if isinstance(fact, dict | list):
+                raise SessionLogError(
+                    f"{path}: line {number}: {name} needs text, a number, true, false "
+                    f"or null, or objects of these, got {entry!r}"
+                )
     event = Event(
         line=number, kind=kind, time_utc=time_utc, fields=MappingProxyType(fields)
     )
     return event, document["previous"]
+
+
+def _facts_of(entry: object) -> list[object]:
+    """Return the facts of a field: itself, or the values of a list of objects."""
+    if isinstance(entry, list) and all(isinstance(item, dict) for item in entry):
+        return [fact for item in entry for fact in item.values()]
+    return [entry]
 
 
 def utc_now() -> datetime:
@@ -254,7 +262,7 @@ class SessionLog:
         """Whether events can be appended."""
         return self._descriptor is not None
 
-    def append(self, kind: str, fields: "Mapping[str, _Fact]") -> Event:
+    def append(self, kind: str, fields: "Mapping[str, _Facts]") -> Event:
         """Append one event and wait until it is on disk.
 
         Parameters
@@ -262,7 +270,7 @@ class SessionLog:
         kind : str
             What happened.
         fields : mapping of str to str, int, float, bool or None
-            Its facts; numbers finite.
+            Its facts, or lists of mappings of such facts; numbers finite.
 
         Returns
         -------
@@ -278,8 +286,9 @@ class SessionLog:
             recovers what was written.
         """
         time_utc = self._now().astimezone(UTC).isoformat(timespec="milliseconds")
-        for name, fact in fields.items():
-            _check_fact(self.path, kind, name, fact)
+        for name, entry in fields.items():
+            for fact in _facts_of(entry):
+                _check_fact(self.path, kind, name, fact)
         document = {
             "event": kind,
             "time_utc": time_utc.replace("+00:00", "Z"),
@@ -336,7 +345,7 @@ def _is_event(path: Path, number: int, line: bytes, previous: str) -> bool:
     return claimed == previous
 
 
-def _check_fact(path: Path, kind: str, name: str, fact: "_Fact") -> None:
+def _check_fact(path: Path, kind: str, name: str, fact: object) -> None:
     if fact is not None and not isinstance(fact, str | int | float):
         raise SessionLogError(
             f"{path}: event {kind!r}: {name} needs text, a number, true, false or "

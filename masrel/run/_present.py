@@ -5,6 +5,7 @@ import dataclasses
 import hashlib
 import math
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,16 +16,18 @@ from masrel.hess import (
     DeviceLimits,
     EmergencyStop,
     Fault,
+    PresentationStatus,
     Presented,
     RealClock,
     SimulatedHand,
+    StretchRules,
     cut_off,
     open_device,
     run_presentation,
 )
 from masrel.hess._stop import stop_on_key, stop_on_signals
 from masrel.hess._watchdog import watched
-from masrel.protocol import Protocol, joint_model
+from masrel.protocol import PresentationRules, Protocol, joint_model
 from masrel.recording import (
     RECORDING_COLUMNS,
     Recording,
@@ -39,10 +42,17 @@ from masrel.run._settings import (
     has_simulated_hand,
     model_controller,
 )
-from masrel.run._simulated_raters import intended_speed, sensor_seed
+from masrel.run._simulated_raters import intended_speeds, sensor_seed
+from masrel.run._stretch_facts import (
+    StatusOfHand,
+    StretchFacts,
+    stretch_facts,
+    stretch_rules,
+)
+from masrel.run.console import _cues_shown
 
-# After this a presentation ends, wherever the arm is.
-_MAX_STRETCH_S = 10.0
+# After this a presentation of one stretch ends, wherever the arm is.
+_ONE_STRETCH_S = 10.0
 
 # How much of the recording before a fault goes into the log
 _BEFORE_FAULT_S = 0.2
@@ -71,6 +81,8 @@ class Outcome:
     # the recording from 200 ms before the fault until the torque was zero, as CSV
     last_200_ms: str | None
     simulated: bool  # whether no hardware moved
+    ended: str  # how it ended, as in the recording
+    made: StretchFacts  # what came of its stretches
 
 
 def present(
@@ -88,12 +100,15 @@ def present(
     # Signals that would end the process, and with a real clock any key of the terminal,
     # press the emergency stop while the device is open.
     limits = device_limits(protocol.device)
+    status = request.status or presentation_status(protocol, request)
     with contextlib.ExitStack() as stack:
         stack.enter_context(stop_on_signals(stop))
         if isinstance(clock, RealClock):
-            stack.enter_context(stop_on_key(stop, sys.stdin))
+            enter = _enter(protocol.presentation, status)
+            stack.enter_context(stop_on_key(stop, sys.stdin, enter))
+            stack.enter_context(_cues_shown(protocol.presentation, status, sys.stdin))
         spool = spool_of(file)
-        presented = _on_device(protocol, request, clock, limits, stop, spool)
+        presented = _on_device(protocol, request, status, clock, limits, stop, spool)
     return _keep(presented, protocol, request, file)
 
 
@@ -104,7 +119,7 @@ def recover(protocol: Protocol, request: GradeRequest, *, file: Path) -> Outcome
         return None
     if file.exists():  # it died between the recording and the log
         checksum = hashlib.sha256(file.read_bytes()).hexdigest()
-        return _outcome(read_recording(file), checksum)
+        return _outcome(read_recording(file), protocol, request, checksum)
     presented = cut_off(spool)
     if presented is None:
         spool.unlink()
@@ -120,6 +135,7 @@ def spool_of(file: Path) -> Path:
 def _on_device(
     protocol: Protocol,
     request: GradeRequest,
+    status: PresentationStatus,
     clock: Clock,
     limits: DeviceLimits,
     stop: EmergencyStop,
@@ -130,10 +146,14 @@ def _on_device(
     range_end = joint_model(protocol, model).range_end
     start = math.radians(stretch.start_deg)
     end = min(math.radians(stretch.end_deg), range_end)  # of a contracture sooner
-    speed = _hand_speed(protocol, request)
-    hand = (
-        None if speed is None else SimulatedHand(start=start, end=end, mean_speed=speed)
-    )
+    hand, longest_s = None, 0.0
+    speeds = _hand_speeds(protocol, request)
+    if speeds:
+        first, *again = speeds
+        hand = SimulatedHand(start=start, end=end, mean_speed=first, again=again)
+        # A simulated hand that means to be slow gets the time it needs.
+        longest_s = 2.0 * (end - start) / min(speeds)
+    rules = stretch_rules(protocol.presentation, longest_s)
     with contextlib.ExitStack() as stack:
         device = stack.enter_context(
             open_device(
@@ -155,28 +175,39 @@ def _on_device(
             clock=clock,
             limits=limits,
             rate_hz=settings.rate_hz,
-            max_duration_s=_max_duration_s(end - start, speed),
+            max_duration_s=_max_duration_s(protocol.presentation, rules, longest_s),
             end_angle=end,
+            stretches=rules,
+            status=status,
             stop=stop,
             watchdog=watchdog,
             spool=spool,
         )
 
 
-def _hand_speed(protocol: Protocol, request: GradeRequest) -> float | None:
-    # rad/s of the simulated hand; None when a person moves the arm
+def presentation_status(
+    protocol: Protocol, request: GradeRequest
+) -> PresentationStatus:
+    """Return the status of a presentation that has not begun."""
+    speeds = _hand_speeds(protocol, request)
+    if not speeds or protocol.presentation.stretches != "free":
+        return PresentationStatus()
+    return StatusOfHand(len(speeds))
+
+
+def _hand_speeds(protocol: Protocol, request: GradeRequest) -> list[float]:
+    # rad/s of the simulated hand, by stretch; none when a person moves the arm
     if not has_simulated_hand(protocol.device):
-        return None
+        return []
     presentation = request.presentation
-    return math.radians(
-        intended_speed(
-            protocol,
-            request.rater,
-            request.session,
-            presentation.model,
-            presentation.repeat,
-        )
+    speeds = intended_speeds(
+        protocol,
+        request.rater,
+        request.session,
+        presentation.model,
+        presentation.repeat,
     )
+    return [math.radians(speed) for speed in speeds]
 
 
 def _sensor_seed(protocol: Protocol, request: GradeRequest) -> int:
@@ -186,11 +217,23 @@ def _sensor_seed(protocol: Protocol, request: GradeRequest) -> int:
     )
 
 
-def _max_duration_s(travel: float, speed: float | None) -> float:
-    if speed is None:
-        return _MAX_STRETCH_S
-    # A simulated hand that means to be slow gets the time it needs.
-    return max(_MAX_STRETCH_S, 2.0 * travel / speed)
+def _max_duration_s(
+    protocol_rules: PresentationRules, rules: StretchRules, longest_s: float
+) -> float | None:
+    if rules.n != 1:
+        return None  # the limits of the rules
+    if protocol_rules.stretches == 1:
+        return max(_ONE_STRETCH_S, longest_s)
+    return rules.stretch_limit  # of the one that is cued
+
+
+def _enter(
+    rules: PresentationRules, status: PresentationStatus
+) -> Callable[[], object]:
+    # what Enter does at the console: it is never an emergency stop
+    if rules.stretches != 1 and rules.done_with == "enter":
+        return status.done
+    return lambda: None
 
 
 def _keep(
@@ -208,11 +251,15 @@ def _keep(
         "position": presentation.position,
         "attempt": request.attempt,
     }
+    if request.rehearsal:
+        facts["rehearsal"] = True
     checksum = write_recording(dataclasses.replace(recording, facts=facts), file)
-    return _outcome(recording, checksum)
+    return _outcome(recording, protocol, request, checksum)
 
 
-def _outcome(recording: Recording, checksum: str) -> Outcome:
+def _outcome(
+    recording: Recording, protocol: Protocol, request: GradeRequest, checksum: str
+) -> Outcome:
     facts, fault = recording.facts, None
     if facts["fault"] is not None:
         fault = Fault(
@@ -229,6 +276,8 @@ def _outcome(recording: Recording, checksum: str) -> Outcome:
         fault=fault,
         last_200_ms=None if fault is None else _before(fault, recording),
         simulated=bool(facts["simulated"]),
+        ended=str(facts["ended"]),
+        made=stretch_facts(protocol, request.presentation.model, recording),
     )
 
 

@@ -1,5 +1,6 @@
 """The runner of one session: present, ask for the grade, and log both at once."""
 
+import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,9 +16,16 @@ from masrel.errors import (
 from masrel.hess import Clock, EmergencyStop, RealClock, SimulatedClock
 from masrel.protocol import Protocol, StudyPaths, presented_hash, protocol_hash
 from masrel.recording import _Fact
-from masrel.run._grade_sources import GradeRequest, GradeSource
+from masrel.run._grade_sources import GradeRequest, GradeSource, StretchGrade
 from masrel.run._log import SessionLog
-from masrel.run._present import Outcome, present, recover, spool_of
+from masrel.run._present import (
+    Outcome,
+    present,
+    presentation_status,
+    recover,
+    spool_of,
+)
+from masrel.run._rehearsal import RehearsalPaths
 from masrel.run._settings import moves_hardware
 from masrel.run._state import SessionState, replay
 from masrel.schedule import Presentation, Schedule
@@ -30,7 +38,8 @@ CLOCKS: dict[str, Callable[[], Clock]] = {
 }
 """The clocks a control loop can run on, by name."""
 
-_FORMAT = 1
+_FORMAT = 2
+_FORMATS = (1, _FORMAT)  # a session begun with one of these is finished as it was begun
 
 # Emergency stops by somebody who wants the process to end; Ctrl-C may be a rater's.
 _TERMINATING = ("signal SIGTERM", "signal SIGHUP")
@@ -54,6 +63,10 @@ class SessionSummary:
         Presentations a fault stopped, in this run.
     simulated : bool
         Whether grades or device are simulated.
+    rehearsal : bool
+        Whether it was a rehearsal, of which nothing enters the study's ratings.
+    log_file : Path
+        Its log.
     """
 
     rater: str
@@ -63,6 +76,8 @@ class SessionSummary:
     n_again: int
     n_faults: int
     simulated: bool
+    rehearsal: bool
+    log_file: Path
 
 
 class SessionRunner:
@@ -92,6 +107,10 @@ class SessionRunner:
     def _is_simulated(self) -> bool:
         return self._grades.simulated or not moves_hardware(self._protocol.device)
 
+    @property
+    def _is_rehearsal(self) -> bool:
+        return isinstance(self._study, RehearsalPaths)
+
     def begin(self, schedule_sha256: str) -> None:
         """Log which session this is; check that it is the same when it is resumed."""
         protocol, schedule = self._protocol, self._schedule
@@ -105,6 +124,7 @@ class SessionRunner:
             "simulated": self._is_simulated,
             "grades": self._grades.name,
             "device": protocol.device.backend,
+            "rehearsal": self._is_rehearsal,
         }
         provenance: dict[str, _Fact] = {
             "protocol_sha256": protocol_hash(protocol),
@@ -115,10 +135,13 @@ class SessionRunner:
         if not header:
             self._log.append("session", {**same, **provenance})
             return
+        if header["format"] in _FORMATS:
+            same["format"] = header["format"]
         for name, value in same.items():
-            if header[name] != value:
+            begun = header.get(name, False)  # there once were no rehearsals
+            if begun != value:
                 raise SessionLogError(
-                    f"{self._log.path}: begun with {name} = {header[name]}: needed "
+                    f"{self._log.path}: begun with {name} = {begun}: needed "
                     f"the same to go on, got {value}"
                 )
         if not self._state.is_complete:
@@ -145,6 +168,8 @@ class SessionRunner:
             n_again=self._n_again,
             n_faults=self._n_faults,
             simulated=self._is_simulated,
+            rehearsal=self._is_rehearsal,
+            log_file=self._log.path,
         )
 
     def _rate(self, presentation: Presentation) -> None:
@@ -157,9 +182,11 @@ class SessionRunner:
         except SessionStoppedError as error:
             self._log.append("stopped", {**fields, "why": str(error)})
             raise
-        self._log.append("grade", {**fields, "grade": grade})
+        self._log.append(
+            "grade", {**fields, "grade": grade.grade, "stretch": grade.stretch}
+        )
 
-    def _until_graded(self, presentation: Presentation) -> str:
+    def _until_graded(self, presentation: Presentation) -> StretchGrade:
         before = self._state.presented.get(presentation.code, [])
         for event in before:  # a process may have died between the log and this
             file = self._study.sessions / str(event.fields["recording"])
@@ -170,10 +197,19 @@ class SessionRunner:
         while grade is None:
             attempt += 1
             request = self._request(presentation, attempt, n_faults)
+            status = presentation_status(self._protocol, request)
+            request = dataclasses.replace(request, status=status)
             self._grades.make_ready(request)
-            fault = self._present(request).fault
+            outcome = self._present(request)
+            fault, made = outcome.fault, outcome.made
             n_faults = 0 if fault is None else n_faults + 1
-            request = self._request(presentation, attempt, n_faults)
+            request = dataclasses.replace(
+                request,
+                status=None,
+                n_faults=n_faults,
+                n_stretches=len(made.stretches),
+                felt=made.felt if fault is None else None,
+            )
             if fault is None:
                 grade = self._checked(request, self._grades.grade(request))
             elif not self._grades.present_again(request, fault.message):
@@ -194,6 +230,8 @@ class SessionRunner:
             n_presentations=len(self._schedule.presentations),
             attempt=attempt,
             n_faults=n_faults,
+            rehearsal=self._is_rehearsal,
+            rules=self._protocol.presentation,
         )
 
     def _file(self, request: GradeRequest) -> Path:
@@ -229,7 +267,7 @@ class SessionRunner:
     def _log_presented(
         self, request: GradeRequest, outcome: Outcome, file: Path
     ) -> None:
-        fault = outcome.fault
+        fault, made = outcome.fault, outcome.made
         self._n_faults += fault is not None
         fields: dict[str, _Fact] = {
             "code": request.presentation.code,
@@ -246,6 +284,12 @@ class SessionRunner:
                 "n_missed_ticks": outcome.n_missed_ticks,
                 "fault": None if fault is None else fault.message,
                 "simulated": outcome.simulated,
+                "stretches": made.stretches,
+                "ended": outcome.ended,
+                "n_stretches": len(made.stretches),
+                "felt": made.felt if fault is None else None,
+                "r1_deg": made.r1_deg,
+                "r2_deg": made.r2_deg,
             },
         )
         if fault is not None:
@@ -262,11 +306,22 @@ class SessionRunner:
             )
         spool_of(file).unlink(missing_ok=True)  # only now is it of no use
 
-    def _checked(self, request: GradeRequest, grade: str | None) -> str | None:
-        grades = self._protocol.scale.grades
-        if grade is not None and grade not in grades:
+    def _checked(
+        self, request: GradeRequest, grade: str | StretchGrade | None
+    ) -> StretchGrade | None:
+        if grade is None:
+            return None
+        if isinstance(grade, str):
+            grade = StretchGrade(grade=grade)
+        grades, code = self._protocol.scale.grades, request.presentation.code
+        if grade.grade not in grades:
             raise ParameterError(
-                f"grade of {request.presentation.code}: needed one of "
-                f"{', '.join(grades)}, got {grade!r}"
+                f"grade of {code}: needed one of {', '.join(grades)}, "
+                f"got {grade.grade!r}"
+            )
+        stretch, n_stretches = grade.stretch, request.n_stretches
+        if stretch is not None and not 1 <= stretch <= n_stretches:
+            raise ParameterError(
+                f"stretch of {code}: needed one of {n_stretches}, from 1, got {stretch}"
             )
         return grade

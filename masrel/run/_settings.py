@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from masrel.hess.puck import PuckOptions
 
 
+_WITH_BUTTON = ("simulated",)  # which the simulated hand presses
+
+
 def check_backend(settings: DeviceSettings) -> None:
     """Do nothing if a session can be run on the device of a protocol."""
     names = [name for name in device_names() if name != "replay"]  # that has no hand
@@ -38,6 +41,16 @@ def check_backend(settings: DeviceSettings) -> None:
         )
     device_limits(settings)
     backend_options(settings)
+
+
+def check_button(protocol: Protocol) -> None:
+    """Do nothing if the device has the button that a protocol asks for."""
+    backend = protocol.device.backend
+    if protocol.presentation.done_with == "button" and backend not in _WITH_BUTTON:
+        raise ParameterError(
+            f"device.backend: needed one with a button ({', '.join(_WITH_BUTTON)}), "
+            f"as presentation.done_with asks for, got {backend!r}"
+        )
 
 
 def torque_problems(protocol: Protocol) -> Iterator[str]:

@@ -14,7 +14,11 @@ from masrel.errors import ParameterError, ProtocolError
 from masrel.protocol import Model, Protocol, scale_of
 from masrel.run._grade_sources import MAX_FAULTS, GradeRequest
 
-_Purpose = Literal["accuracy", "neighbour", "severity", "retest", "speed", "sensor"]
+_Purpose = Literal[
+    "accuracy", "neighbour", "severity", "retest", "speed", "sensor", "stretches"
+]
+
+_MOST_STRETCHES = 3  # of a simulated rater who may stretch as often as wanted
 
 
 class SimulatedGrades:
@@ -132,13 +136,30 @@ def severity(protocol: Protocol, model: Model) -> float:
     return _interpolated(height, anchors)
 
 
-def intended_speed(
+def intended_speeds(
     protocol: Protocol, rater: str, session: str, model: str, repeat: int
+) -> list[float]:
+    """Return the mean speed of each stretch that a simulated hand means to make."""
+    rules, key = protocol.presentation, (rater, session, model, repeat)
+    if isinstance(rules.stretches, tuple):
+        speeds = {"slow": rules.slow_speed_deg_s, "fast": rules.fast_speed_deg_s}
+        return [speeds[cue] for cue in rules.stretches]
+    if isinstance(rules.stretches, int):
+        n_stretches = rules.stretches
+    else:
+        share = _uniform(protocol.simulated_raters.seed, "stretches", *key)
+        n_stretches = 1 + int(share * _MOST_STRETCHES)
+    return [_speed(protocol, *key, number) for number in range(1, n_stretches + 1)]
+
+
+def _speed(
+    protocol: Protocol, rater: str, session: str, model: str, repeat: int, number: int
 ) -> float:
-    """Return the mean speed a simulated hand means to stretch with."""
     settings = protocol.simulated_raters
     mean, sd = settings.mean_speed_deg_s, settings.speed_sd_deg_s
-    share = _uniform(settings.seed, "speed", rater, session, model, repeat)
+    key = (rater, session, model, repeat)
+    # the first is as it was when there was no other
+    share = _uniform(settings.seed, "speed", *key, *((number,) if number > 1 else ()))
     speed = mean + sd * statistics.NormalDist().inv_cdf(share)
     return min(max(speed, mean - 3 * sd, 0.2 * mean), mean + 3 * sd)
 
@@ -162,9 +183,15 @@ def _interpolated(height: float, anchors: list[tuple[float, float]]) -> float:
 
 
 def _uniform(
-    seed: int, purpose: _Purpose, rater: str, session: str, model: str, repeat: int
+    seed: int,
+    purpose: _Purpose,
+    rater: str,
+    session: str,
+    model: str,
+    repeat: int,
+    *further: int,
 ) -> float:
     # In (0, 1), from SHA-256 so that it is the same on every machine and version.
-    key = json.dumps([seed, purpose, rater, session, model, repeat])
+    key = json.dumps([seed, purpose, rater, session, model, repeat, *further])
     word = int.from_bytes(hashlib.sha256(key.encode()).digest()[:8], "big")
     return ((word >> 12) + 0.5) / 2**52

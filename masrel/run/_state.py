@@ -3,13 +3,18 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, get_args
 
 from masrel.errors import SessionLogError
 from masrel.run._log import Event
 
 if TYPE_CHECKING:
-    from masrel.recording import _Fact  # loads numpy
+    from masrel.recording import _Facts  # loads numpy
+
+Felt = Literal["felt", "below-threshold", "no-catch"]
+"""Whether a presentation let feel what its model has."""
+
+FELT: tuple[Felt, ...] = get_args(Felt)
 
 EVENTS: dict[str, tuple[str, ...]] = {
     "session": (
@@ -25,6 +30,7 @@ EVENTS: dict[str, tuple[str, ...]] = {
         "device",
         "clock",
         "masrel_version",
+        "rehearsal",
     ),
     "resumed": ("protocol_sha256", "n_graded", "clock", "masrel_version"),
     "presented": (
@@ -37,6 +43,12 @@ EVENTS: dict[str, tuple[str, ...]] = {
         "n_missed_ticks",
         "fault",
         "simulated",
+        "stretches",
+        "ended",
+        "n_stretches",
+        "felt",
+        "r1_deg",
+        "r2_deg",
     ),
     "fault": (
         "code",
@@ -48,7 +60,7 @@ EVENTS: dict[str, tuple[str, ...]] = {
         "torque_nm",
         "last_200_ms",
     ),
-    "grade": ("code", "position", "grade"),
+    "grade": ("code", "position", "grade", "stretch"),
     "correction": ("code", "grade", "who", "why"),
     "stopped": ("code", "position", "why"),
     "recovered": ("line", "n_bytes", "sha256", "kept", "moved_to"),
@@ -56,18 +68,28 @@ EVENTS: dict[str, tuple[str, ...]] = {
 }
 """Every kind of event with the fields it has."""
 
+_LATER = {
+    "presented": {"stretches", "ended", "n_stretches", "felt", "r1_deg", "r2_deg"},
+    "grade": {"stretch"},
+    "session": {"rehearsal"},
+}
+"""Fields that events had not when every presentation was one stretch, and none was
+rehearsed."""
+
 
 @dataclass(slots=True, kw_only=True)
 class SessionState:
     """Where a session stands."""
 
     # fields of the event ``session``; empty when there is none yet
-    header: "Mapping[str, _Fact]" = field(default_factory=dict)
+    header: "Mapping[str, _Facts]" = field(default_factory=dict)
     # presentations of each code, in order
     presented: dict[str, list[Event]] = field(default_factory=dict)
     # grade of each graded code as the rater gave it
     first_grades: dict[str, str] = field(default_factory=dict)
     grades: dict[str, str] = field(default_factory=dict)  # the same with corrections
+    # the stretch each grade rests on, where the rater said so
+    graded_stretches: dict[str, int] = field(default_factory=dict)
     is_complete: bool = False  # whether the session came to its end
 
 
@@ -86,7 +108,8 @@ def _contradiction(state: SessionState, event: Event) -> str | None:
     # -> why the event cannot follow, or None
     if event.kind not in EVENTS:
         return f"needed an event of {', '.join(EVENTS)}"
-    if set(event.fields) != set(EVENTS[event.kind]):
+    fields = set(EVENTS[event.kind])
+    if set(event.fields) not in (fields, fields - _LATER.get(event.kind, set())):
         return (
             f"needed the fields {', '.join(EVENTS[event.kind])}, "
             f"got {', '.join(event.fields)}"
@@ -127,7 +150,11 @@ def _apply(state: SessionState, event: Event) -> None:
         state.presented.setdefault(code, []).append(event)
     elif event.kind == "grade":
         state.first_grades[code] = state.grades[code] = grade
+        stretch = event.fields.get("stretch")
+        if isinstance(stretch, int):
+            state.graded_stretches[code] = stretch
     elif event.kind == "correction":
         state.grades[code] = grade
+        state.graded_stretches.pop(code, None)  # what was felt was another grade's
     elif event.kind == "complete":
         state.is_complete = True

@@ -1,18 +1,28 @@
 """A person at the console gives the grades."""
 
 import sys
-from typing import ClassVar, TextIO
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, ClassVar, TextIO
 
 from masrel.errors import SessionStoppedError
-from masrel.run._grade_sources import GradeRequest
+from masrel.protocol import PresentationRules
+from masrel.run._grade_sources import GradeRequest, StretchGrade
 from masrel.scales import Scale
+
+if TYPE_CHECKING:
+    from masrel.hess import PresentationStatus  # loads numpy
+
+_CUE_EVERY_S = 0.05  # how often it is looked whether a stretch is over
 
 
 class ConsoleGrades:
     """A person at the console, who is told positions and blinded codes only.
 
     The words ``again`` and ``stop`` in place of a grade present the model again and
-    stop the session.
+    stop the session. After more than one stretch, ``1+ 2`` is the grade 1+ that rests
+    on stretch 2.
 
     Parameters
     ----------
@@ -53,17 +63,21 @@ class ConsoleGrades:
         """
         again = "" if request.attempt == 1 else " again"
         presentation = request.presentation
+        rehearsal = "REHEARSAL, no rating of the study. " if request.rehearsal else ""
+        instruction = _instruction(request.rules)
         answer = self._ask(
             request,
-            f"Presentation {presentation.position} of {request.n_presentations}, code "
-            f"{presentation.code}{again}. Enter to begin (then any key is an emergency "
-            "stop), stop to stop: ",
+            f"{rehearsal}Presentation {presentation.position} of "
+            f"{request.n_presentations}, code {presentation.code}{again}. {instruction}"
+            "Enter to begin (then any other key is an emergency stop), stop to stop: ",
         )
         if answer == "stop":
             raise _stopped(request, "on request")
 
-    def grade(self, request: GradeRequest) -> str | None:
+    def grade(self, request: GradeRequest) -> str | StretchGrade | None:
         """Ask for the grade until it is one of the scale.
+
+        Before, the rater is told if the stretches were too slow to feel the catch.
 
         Parameters
         ----------
@@ -72,19 +86,28 @@ class ConsoleGrades:
 
         Returns
         -------
-        str or None
-            The grade; None when the rater wants to feel it again.
+        str, StretchGrade or None
+            The grade, with the stretch it rests on if the rater says so; None when the
+            rater wants to feel it again.
 
         Raises
         ------
         SessionStoppedError
             If the person stops, or the input ends.
         """
-        grades = ", ".join(self._scale.grades)
+        grades, n_stretches = ", ".join(self._scale.grades), request.n_stretches
+        if request.felt not in ("felt", None):
+            self._say(
+                "That was too slow to feel the catch: once more? Then say again.\n"
+            )
+        rests = ""
+        if n_stretches > 1:
+            rests = f", and the stretch it rests on, 1 to {n_stretches}, if any"
         while True:
             answer = self._ask(
                 request,
-                f"Grade of {request.presentation.code} ({grades}; again; stop): ",
+                f"Grade of {request.presentation.code} ({grades}{rests}; again; "
+                "stop): ",
             )
             if answer in self._scale.grades:
                 return answer
@@ -92,7 +115,12 @@ class ConsoleGrades:
                 return None
             if answer == "stop":
                 raise _stopped(request, "on request")
-            self._say(f"{answer!r} is not a grade: needed one of {grades}.\n")
+            grade, _, stretch = answer.rpartition(" ")
+            if grade.strip() in self._scale.grades and stretch in map(
+                str, range(1, n_stretches + 1)
+            ):
+                return StretchGrade(grade=grade.strip(), stretch=int(stretch))
+            self._say(f"{answer!r} is not a grade: needed one of {grades}{rests}.\n")
 
     def present_again(self, request: GradeRequest, fault: str) -> bool:
         """Ask whether to present the model again after a fault.
@@ -133,6 +161,61 @@ class ConsoleGrades:
     def _say(self, text: str) -> None:
         self._questions.write(text)
         self._questions.flush()
+
+
+def _instruction(rules: PresentationRules) -> str:
+    # what the rater is asked to do, a sentence for each cue
+    stretches = rules.stretches
+    if stretches == 1:
+        return ""
+    done = "Enter says done" if rules.done_with == "enter" else "the button says done"
+    if stretches == "free":
+        return f"Stretch the arm as often as you want, then {done}. "
+    if isinstance(stretches, int):
+        return f"Stretch the arm {stretches} times; {done} before. "
+    return "".join(f"{cue}. " for cue in _cues_in_words(rules))
+
+
+@contextmanager
+def _cues_shown(
+    rules: PresentationRules, status: "PresentationStatus", keys: TextIO | None
+) -> Iterator[None]:
+    """Show a person at a terminal the next cue when a stretch is over."""
+    cues = _cues_in_words(rules)
+    if not cues or keys is None or not keys.isatty():
+        yield
+        return
+    is_over = threading.Event()
+
+    def show() -> None:
+        n_shown = 1  # before it began
+        while not is_over.wait(_CUE_EVERY_S):
+            if status.n_stretches >= n_shown and n_shown < len(cues):
+                sys.stdout.write(f"{cues[n_shown]}\n")
+                sys.stdout.flush()
+                n_shown += 1
+
+    thread = threading.Thread(target=show, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        is_over.set()
+        thread.join()
+
+
+def _cues_in_words(rules: PresentationRules) -> list[str]:
+    """Return what each stretch is to be like, for a rater; nothing without cues."""
+    if not isinstance(rules.stretches, tuple):
+        return []
+    words = {
+        "slow": f"slow, at most {rules.slow_speed_deg_s:g} deg/s (V1)",
+        "fast": f"fast, at least {rules.fast_speed_deg_s:g} deg/s (V3)",
+    }
+    return [
+        f"Stretch {number}: {words[cue]}"
+        for number, cue in enumerate(rules.stretches, start=1)
+    ]
 
 
 def _stopped(request: GradeRequest, why: str) -> SessionStoppedError:

@@ -19,8 +19,14 @@ from masrel.protocol import Protocol, StudyPaths
 from masrel.run._grade_sources import GradeSource
 from masrel.run._log import Event, SessionLog, utc_now
 from masrel.run._present import spool_of
+from masrel.run._rehearsal import next_rehearsal, rehearsal_schedule
 from masrel.run._runner import CLOCKS, ClockName, SessionRunner, SessionSummary
-from masrel.run._settings import check_backend, has_simulated_hand, torque_problems
+from masrel.run._settings import (
+    check_backend,
+    check_button,
+    has_simulated_hand,
+    torque_problems,
+)
 from masrel.run._state import replay
 from masrel.schedule import Presentation, Schedule, check_schedule, read_schedule
 
@@ -33,10 +39,15 @@ def run_session(
     *,
     grades: GradeSource,
     clock: ClockName,
+    rehearsal: bool = False,
     progress: Callable[[Presentation], object] | None = None,
     now: Callable[[], datetime] = utc_now,
 ) -> SessionSummary:
     """Run one rater's session to its end, or go on with it.
+
+    A rehearsal has an order and codes of its own, and leaves its log and recordings in
+    ``rehearsals/``: nothing of it enters the study's ratings. When it is complete, the
+    next one is another.
 
     Parameters
     ----------
@@ -50,6 +61,8 @@ def run_session(
         Where grades come from.
     clock : {"real", "simulated"}
         The clock of the control loop; "simulated" needs a simulated hand.
+    rehearsal : bool, optional
+        Whether to rehearse; no schedule need be drawn.
     progress : callable, optional
         Called with each presentation once it has its grade; at once for those
         that have it already.
@@ -88,15 +101,12 @@ def run_session(
         If the control loop missed ticks.
     """
     _check_device(clock, protocol)
-    path = study.schedule_file(rater, session)
-    schedule = read_schedule(path)
-    check_schedule(schedule, protocol)
-    if (schedule.rater, schedule.session) != (rater, session):
-        raise ScheduleError(
-            f"{path}: needed the schedule of rater {rater} in session {session}, "
-            f"got that of {schedule.rater} in {schedule.session}"
-        )
-    checksum = hashlib.sha256(path.read_bytes()).hexdigest()
+    if rehearsal:
+        study = next_rehearsal(study, rater, session)
+        number = study.number
+        schedule, checksum = rehearsal_schedule(protocol, rater, session, number)
+    else:
+        schedule, checksum = _drawn_schedule(study, protocol, rater, session)
     log_file = study.log_file(rater, session)
     if not log_file.exists():
         _check_recordings(schedule, log_file, ())  # before an empty log is made
@@ -105,6 +115,21 @@ def run_session(
         runner = SessionRunner(study, protocol, schedule, grades, clock, log)
         runner.begin(checksum)
         return runner.run(progress)
+
+
+def _drawn_schedule(
+    study: StudyPaths, protocol: Protocol, rater: str, session: str
+) -> tuple[Schedule, str]:
+    # the schedule, and the checksum of its file
+    path = study.schedule_file(rater, session)
+    schedule = read_schedule(path)
+    check_schedule(schedule, protocol)
+    if (schedule.rater, schedule.session) != (rater, session):
+        raise ScheduleError(
+            f"{path}: needed the schedule of rater {rater} in session {session}, "
+            f"got that of {schedule.rater} in {schedule.session}"
+        )
+    return schedule, hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def _check_recordings(
@@ -137,6 +162,7 @@ def _check_device(clock: str, protocol: Protocol) -> None:
         raise ParameterError(f"clock: needed one of {', '.join(CLOCKS)}, got {clock!r}")
     device = protocol.device
     check_backend(device)
+    check_button(protocol)
     if clock == "simulated" and not has_simulated_hand(device):
         raise ParameterError(
             f"clock: needed the real one for device {device.backend!r}, got 'simulated'"

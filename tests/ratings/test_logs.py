@@ -8,6 +8,7 @@ from masrel.errors import RatingsError, SessionLogError
 from masrel.protocol import Protocol, StudyPaths
 from masrel.ratings import rating_matrix, ratings_from_logs
 from masrel.run import ScriptGrades, SessionLog, read_log, run_session
+from masrel.run._state import EVENTS
 from masrel.schedule import read_schedule
 from tests.run.conftest import new_study, small
 
@@ -60,12 +61,17 @@ def test_the_speed_is_that_of_the_presentation_before_the_grade(
         graded(small)
     path = study.log_file("R1", "test")
     with SessionLog.open(path) as log:
-        presented = {**log.events[-1].fields, "attempt": 2, "mean_speed_deg_s": 12.5}
+        # an event of format 1, when every presentation was one stretch
+        names = EVENTS["presented"][:9]
+        presented = {name: log.events[-1].fields[name] for name in names}
+        presented |= {"attempt": 2, "mean_speed_deg_s": 12.5}
         log.append("presented", presented)
         code = presented["code"]
         log.append("grade", {"code": code, "position": 1, "grade": "1"})
     first = ratings_from_logs(*small).table.iloc[0]
     assert (first["grade"], first["mean_speed_deg_s"]) == ("1", 12.5)
+    assert (first["n_stretches"], first["speeds_deg_s"]) == (1, (12.5,))
+    assert first["felt"] is None
 
 
 def test_repeats_of_a_model_are_kept_apart(new_study: Callable[..., Small]) -> None:

@@ -63,7 +63,7 @@ def test_the_file_is_what_the_documentation_says(tmp_path: Path) -> None:
     rows = [{**ROW, "mean_speed_deg_s": 81.25}, {**ROW, "model": "HM2", "grade": None}]
     write_ratings(ratings_from_rows(rows, MODIFIED_ASHWORTH), tmp_path / "r.csv")
     assert (tmp_path / "r.csv").read_bytes().splitlines()[1:] == [
-        ",".join(RATING_COLUMNS).encode(),
+        ",".join(RATING_COLUMNS[:7]).encode(),
         b"test,R1,HM1,1,1+,81.25,foreign",
         b"test,R1,HM2,1,NA,NA,foreign",
     ]

@@ -32,6 +32,8 @@ _SHADES = LinearSegmentedColormap.from_list("grades", ["#F2F6FA", "#7FB6DA", "#0
 _MODELS_IN_A_ROW = 8  # more go into further rows: a page is no wider
 _SESSION_LOOKS = (("o", BLUE), ("s", ORANGE), ("^", VERMILLION), ("v", GREY))
 
+_GRADED_WIDTH = 2.2  # of the line of a stretch that a grade rests on, of the others
+
 # Name of each phase, and how its line looks.
 _PHASES: tuple[tuple[str, dict[str, Any]], ...] = (
     ("pre-catch", {"color": GREY, "linewidth": 0.8}),
@@ -143,6 +145,9 @@ def _speed_row(
             place = middle + 0.9 * width * ((rater + 0.5) / n_raters - 0.5)
             places = [place] * len(speeds)
             axes.plot(places, speeds, marker, color=colour, markersize=5, alpha=0.9)
+            graded = column.graded[rater] if column.graded else ()
+            places = [place] * len(graded)
+            axes.plot(places, graded, "o", color=BLACK, markersize=8, fillstyle="none")
         ends = [middle - 0.45 * width, middle + 0.45 * width]
         axes.plot(ends, [column.mean, column.mean], color=BLACK, linewidth=1.6)
     axes.axhline(dots.slowest, color=GREY, linewidth=0.8, linestyle=DASHES)
@@ -164,9 +169,12 @@ def trace_figure(columns: TraceColumns) -> Figure:
     """Return torque and angle against time, one column a model."""
     figure, grid = _torque_above_angle(len(columns.panels))
     for (top, bottom), panel in zip(grid.T, columns.panels, strict=True):
-        for time, angle, torque, phase in panel.stretches:
-            _by_phase(top, time, torque, phase)
-            _by_phase(bottom, time, angle, phase)
+        graded = panel.graded or (False,) * len(panel.stretches)
+        for is_graded, lines in zip(graded, panel.stretches, strict=True):
+            time, angle, torque, phase = lines
+            width = _GRADED_WIDTH if is_graded else 1.0
+            _by_phase(top, time, torque, phase, width)
+            _by_phase(bottom, time, angle, phase, width)
         top.set_title(panel.title)
     _finish(figure, grid, "model torque (N·m)")
     handles = [Line2D([], [], solid_capstyle="butt", **look) for _, look in _PHASES]
@@ -235,6 +243,7 @@ def _by_phase(
     time: NDArray[np.generic],
     values: NDArray[np.generic],
     phase: NDArray[np.generic],
+    width: float,
 ) -> None:
     # One line per run of a phase; each begins where the one before ended.
     codes = np.asarray(phase, dtype=np.intp)
@@ -243,7 +252,9 @@ def _by_phase(
     for start, end in zip(starts, ends, strict=True):
         _, look = _PHASES[codes[start]]
         run = slice(start, end)
-        axes.add_line(Line2D(time[run], values[run], solid_capstyle="butt", **look))
+        line = Line2D(time[run], values[run], solid_capstyle="butt", **look)
+        line.set_linewidth(width * line.get_linewidth())
+        axes.add_line(line)
     for start in starts[1:]:
         colour = _PHASES[codes[start]][1]["color"]
         axes.plot(time[start], values[start], "o", color=colour, markersize=2.4)
