@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from masrel._files import write_file
+from masrel.cli._paths import InputFile, OutputFile, note_inputs
 from masrel.errors import MasrelWarning, ParameterError, RatingsError
 
 if TYPE_CHECKING:
@@ -67,7 +68,7 @@ class StudyData:
 ratings_option = click.option(
     "--ratings",
     "ratings_file",
-    type=click.Path(path_type=Path),
+    type=InputFile(path_type=Path),
     help="File of ratings; default: the study's ratings.csv, else published.csv.",
 )
 
@@ -80,6 +81,8 @@ def read_study(root: Path, ratings_file: Path | None) -> StudyData:
     paths = StudyPaths(root)
     protocol = read_protocol(paths.protocol)
     source = ratings_file or _default_ratings(paths)
+    models = [paths.root / model.file for model in protocol.models if model.file]
+    note_inputs(source, paths.in_person_file, *models)
     ratings = read_study_ratings(source, scale_of(protocol))
     in_person = None
     if paths.in_person_file.is_file() and not ratings.simulated:
@@ -149,8 +152,8 @@ def output_options(
     quiet: str | None = None,
 ) -> Decorator:
     """Return the options with these helps, as one argument `output` of a command."""
-    path = click.Path(path_type=Path, dir_okay=False)
-    json_path = click.Path(path_type=Path, allow_dash=True)
+    path = OutputFile(path_type=Path, dir_okay=False)
+    json_path = OutputFile(path_type=Path, allow_dash=True)
     options = [
         (json, click.option("--json", "json_file", type=json_path, help=json)),
         (figure, click.option("--figure", type=path, help=figure)),

@@ -13,6 +13,7 @@ import click
 from tqdm import tqdm
 
 from masrel.cli._options import STDOUT, OutputOptions, output_options, write_output
+from masrel.cli._paths import InputFile
 from masrel.hess import Clock, RealClock, SimulatedClock, SimulatedHand
 from masrel.hess.puck import PuckOptions, read_property_table
 
@@ -42,7 +43,7 @@ _OPTIONS = (
     click.option("--gear-ratio", type=float, default=18.8, show_default=True),
     click.option(
         "--properties",
-        type=click.Path(path_type=Path),
+        type=InputFile(path_type=Path),
         help="TOML file with the property numbers of a firmware unknown to masrel.",
     ),
     click.option(

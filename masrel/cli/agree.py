@@ -14,6 +14,7 @@ from masrel.analysis._file_estimates import (
 from masrel.cli._agreement_output import FileAgreement, WithArguments, write_agreement
 from masrel.cli._further import FurtherOptions, further_options, further_tables
 from masrel.cli._options import OutputOptions, grouped, output_options, split_commas
+from masrel.cli._paths import InputFile
 from masrel.cli._reading import (
     ReadingOptions,
     read_file,
@@ -116,7 +117,7 @@ def _register() -> str:
 
 
 @click.command("agree", cls=WithArguments)
-@click.argument("file", type=click.Path(path_type=Path, allow_dash=True))
+@click.argument("file", type=InputFile(path_type=Path, allow_dash=True))
 @grouped(
     "reading",
     ReadingOptions,

@@ -12,6 +12,7 @@ import click
 import masrel
 from masrel._files import write_file
 from masrel.cli._options import OutputOptions, output_options, write_output
+from masrel.cli._paths import InputFile, refuse_inputs
 from masrel.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -49,7 +50,9 @@ class _Between:
 
 
 @click.command("between")
-@click.argument("models", nargs=-1, required=True, metavar="MODEL MODEL...")
+@click.argument(
+    "models", nargs=-1, required=True, metavar="MODEL MODEL...", type=InputFile()
+)
 @click.option(
     "-n",
     "--number",
@@ -188,6 +191,7 @@ def _write(placed: list[_Between], folder: Path, *, overwrite: bool) -> list[Pat
     from masrel.elbow.identification import as_toml
 
     files = [folder / f"{model.name}.toml" for model in placed]
+    refuse_inputs(*files)
     there = [path.name for path in files if path.exists()]
     if there and not overwrite:
         raise ParameterError(

@@ -14,6 +14,7 @@ from masrel.cli._options import (
     warnings_as_notes,
     write_output,
 )
+from masrel.cli._paths import InputFile, OutputFile
 from masrel.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -48,12 +49,12 @@ def _term(option: str, text: str, default: str = "off") -> Decorator:
 
 
 @click.command("fit")
-@click.argument("recordings", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.argument("recordings", nargs=-1, required=True, type=InputFile(path_type=Path))
 @click.option(
     "-o",
     "--output",
     "model_file",
-    type=click.Path(path_type=Path),
+    type=OutputFile(path_type=Path),
     help="Write the model file here, for a protocol to name.",
 )
 @click.option(

@@ -12,6 +12,7 @@ from masrel.cli._options import (
     output_options,
     write_output,
 )
+from masrel.cli._paths import InputFile
 from masrel.cli._progress import duration_words, progress
 from masrel.cli._reading import (
     ReadingOptions,
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 
 
 @click.command("latent")
-@click.argument("file", type=click.Path(path_type=Path))
+@click.argument("file", type=InputFile(path_type=Path))
 @click.option(
     "--items",
     type=click.Choice(["fixed", "random"]),

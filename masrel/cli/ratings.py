@@ -4,6 +4,7 @@ from pathlib import Path
 
 import click
 
+from masrel.cli._paths import OutputFile, note_inputs
 from masrel.protocol import StudyPaths, read_protocol
 
 
@@ -12,7 +13,7 @@ from masrel.protocol import StudyPaths, read_protocol
 @click.option(
     "-o",
     "--output",
-    type=click.Path(path_type=Path),
+    type=OutputFile(path_type=Path),
     help="File to write; default: STUDY/ratings/ratings.csv.",
 )
 def ratings(study: Path, output: Path | None) -> None:
@@ -24,7 +25,9 @@ def ratings(study: Path, output: Path | None) -> None:
     from masrel.ratings import ratings_from_logs, write_ratings
 
     paths = StudyPaths(study)
-    ratings = ratings_from_logs(paths, read_protocol(paths.protocol))
+    protocol = read_protocol(paths.protocol)
+    note_inputs(*(study / model.file for model in protocol.models if model.file))
+    ratings = ratings_from_logs(paths, protocol)
     destination = output or paths.ratings_file
     write_ratings(ratings, destination, within=None if output else study)
     n_rows = len(ratings.table)

@@ -21,6 +21,7 @@ from masrel.cli._options import (
     output_options,
     write_output,
 )
+from masrel.cli._paths import InputFile, OutputFile
 from masrel.cli._tone_traces import (
     end_within,
     joint_of_kind,
@@ -116,7 +117,7 @@ _motion_options = grouped(
         help="Of a trapezoid's ramps.",
     ),
     click.option(
-        "--recording", type=click.Path(path_type=Path),
+        "--recording", type=InputFile(path_type=Path),
         help="CSV with time_s and angle_deg, or npz.",
     ),
     click.option(
@@ -157,7 +158,10 @@ _sample_options = grouped(
         "--rate-hz", type=click.FloatRange(min=0.0, min_open=True),
         help="Samples a second of --csv.  [default: 1000]",
     ),
-    click.option("--csv", "csv_file", type=_PATH, help="Write the samples here."),
+    click.option(
+        "--csv", "csv_file", type=OutputFile(path_type=Path),
+        help="Write the samples here.",
+    ),
 )  # fmt: skip
 
 
@@ -252,7 +256,7 @@ _joint_options = grouped(
     "names",
     _JointOptions,
     click.option(
-        "--model", "models", multiple=True,
+        "--model", "models", multiple=True, type=InputFile(),
         help="HM1 to HM4, a model of --study, or a model file (.toml); may be given "
         "again.",
     ),

@@ -1,0 +1,70 @@
+"""Files that a call names: what is written is never what is read, nor a record."""
+
+import os
+from pathlib import Path
+from typing import Any
+
+import click
+
+from masrel._files import refuse_record
+from masrel.errors import ParameterError
+
+_INPUTS, _OUTPUTS = "masrel.inputs", "masrel.outputs"
+
+
+class InputFile(click.Path):
+    """An option's or argument's file that is read."""
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> Any:
+        """Return the path, which no output may have."""
+        path = super().convert(value, param, ctx)
+        note_inputs(Path(os.fsdecode(path)))
+        return path
+
+
+class OutputFile(click.Path):
+    """An option's file that is written."""
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> Any:
+        """Return the path, which no input has."""
+        path = super().convert(value, param, ctx)
+        file = Path(os.fsdecode(path))
+        if str(file) != "-":
+            refuse_record(file)
+            refuse_inputs(file)
+        return path
+
+
+def note_inputs(*paths: Path) -> None:
+    """Refuse outputs of the call that would take the place of these files."""
+    for path in paths:
+        _noted(_INPUTS).append(path)
+        if path.suffix == ".npz":  # the facts of a recording
+            _noted(_INPUTS).append(path.with_suffix(".json"))
+    _compare()
+
+
+def refuse_inputs(*paths: Path) -> None:
+    """Refuse to write these files if the call reads one of them."""
+    _noted(_OUTPUTS).extend(paths)
+    _compare()
+
+
+def _noted(key: str) -> list[Path]:
+    # of this call: options are converted in the order in which they were typed
+    ctx = click.get_current_context(silent=True)
+    paths: list[Path] = [] if ctx is None else ctx.meta.setdefault(key, [])
+    return paths
+
+
+def _compare() -> None:
+    inputs = {path.resolve() for path in _noted(_INPUTS)}
+    for path in _noted(_OUTPUTS):
+        if path.parent.resolve() / path.name in inputs or path.resolve() in inputs:
+            raise ParameterError(
+                f"{path}: needs another file to write, this one is read"
+            )
