@@ -23,6 +23,7 @@ MODULES = (
     "masrel.run",
     "masrel.ratings",
     "masrel.analysis",
+    "masrel.verification",
     "masrel.report",
     "masrel.scales",
     "masrel.estimates",

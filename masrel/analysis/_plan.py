@@ -19,7 +19,7 @@ from masrel.ratings import (
     Ratings,
     RetestPairs,
     rating_matrix,
-    ratings_hash,
+    ratings_csv,
     retest_pairs,
 )
 
@@ -117,17 +117,16 @@ def _check_known(protocol: Protocol, ratings: Ratings) -> None:
 def _inputs(
     protocol: Protocol, ratings: Ratings, in_person: InPerson | None
 ) -> dict[str, str]:
-    # SHA-256 by name; of the file where there is one: anybody can check it
-    inputs = {"protocol_sha256": protocol_hash(protocol)}
-    files = {"ratings_sha256": ratings.source_path}
+    # SHA-256 by name; of the file that is there, or that `masrel ratings` writes
+    path = ratings.source_path
+    text = ratings_csv(ratings).encode() if path is None else path.read_bytes()
+    inputs = {
+        "protocol_sha256": protocol_hash(protocol),
+        "ratings_sha256": hashlib.sha256(text).hexdigest(),
+    }
     if in_person is not None:
-        files["in_person_sha256"] = in_person.source_path
-    for name, path in files.items():
-        inputs[name] = (
-            ratings_hash(ratings)
-            if path is None
-            else hashlib.sha256(path.read_bytes()).hexdigest()
-        )
+        data = in_person.source_path.read_bytes()
+        inputs["in_person_sha256"] = hashlib.sha256(data).hexdigest()
     return inputs
 
 

@@ -38,6 +38,7 @@ GROUPS = {
         "analyze": "Compute the agreement tables a study asks for.",
         "grading": "Regress grades on the models' parameters and the speed.",
         "report": "Write the report of a study.",
+        "verify": "Hold every file of a study against the one before it.",
     },
     "The joint and the device": {
         "trace": "Torque trace of one stretch of one model.",

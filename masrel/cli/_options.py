@@ -13,11 +13,10 @@ import click
 
 from masrel._files import write_file
 from masrel.cli._paths import InputFile, OutputFile, note_inputs
-from masrel.errors import MasrelWarning, ParameterError, RatingsError
+from masrel.errors import MasrelWarning, ParameterError
 
 if TYPE_CHECKING:
-    from masrel.protocol import Protocol, StudyPaths
-    from masrel.ratings import InPerson, Ratings
+    from masrel.ratings import StudyData
     from masrel.report._figure_data import Content, Form
     from masrel.report._tables import Table
 
@@ -54,53 +53,26 @@ def split_commas(text: str) -> list[str]:
     return [part.strip() for part in text.split(",")]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class StudyData:
-    """A study read from its folder."""
-
-    paths: "StudyPaths"
-    protocol: "Protocol"
-    ratings: "Ratings"
-    # grades given in person; None for simulated ratings, to which they do not belong
-    in_person: "InPerson | None"
-
-
 ratings_option = click.option(
     "--ratings",
     "ratings_file",
     type=InputFile(path_type=Path),
-    help="File of ratings; default: the study's ratings.csv, else published.csv.",
+    help="File of ratings to use whatever the session logs say; default: what they "
+    "say, and without logs the study's ratings.csv, else published.csv.",
 )
 
 
-def read_study(root: Path, ratings_file: Path | None) -> StudyData:
-    """Return a study's protocol and its ratings, by default those in its folder."""
-    from masrel.protocol import StudyPaths, read_protocol, scale_of
-    from masrel.ratings import read_in_person, read_study_ratings
+def read_study(root: Path, ratings_file: Path | None) -> "StudyData":
+    """Return a study's protocol and its ratings."""
+    from masrel.protocol import StudyPaths, read_protocol
+    from masrel.ratings import read_study_data
 
     paths = StudyPaths(root)
     protocol = read_protocol(paths.protocol)
-    source = ratings_file or _default_ratings(paths)
     models = [paths.root / model.file for model in protocol.models if model.file]
-    note_inputs(source, paths.in_person_file, *models)
-    ratings = read_study_ratings(source, scale_of(protocol))
-    in_person = None
-    if paths.in_person_file.is_file() and not ratings.simulated:
-        in_person = read_in_person(paths.in_person_file)
-    return StudyData(
-        paths=paths, protocol=protocol, ratings=ratings, in_person=in_person
-    )
-
-
-def _default_ratings(paths: "StudyPaths") -> Path:
-    for path in (paths.ratings_file, paths.published_file):
-        if path.is_file():
-            return path
-    raise RatingsError(
-        f"{paths.root}: needs {paths.ratings_file.name} or "
-        f"{paths.published_file.name} in {paths.ratings_file.parent}; "
-        "`masrel ratings STUDY` makes the first from session logs"
-    )
+    tables = (paths.ratings_file, paths.published_file, paths.in_person_file)
+    note_inputs(*tables, *models)
+    return read_study_data(paths, protocol, file=ratings_file)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,7 +9,6 @@ import click
 from masrel.cli._options import (
     STDOUT,
     OutputOptions,
-    StudyData,
     output_options,
     ratings_option,
     read_study,
@@ -19,6 +18,7 @@ from masrel.cli._options import (
 
 if TYPE_CHECKING:
     from masrel.analysis import Analysis
+    from masrel.ratings import StudyData
 
 
 @click.command("analyze")
@@ -48,10 +48,10 @@ def analyze(study: Path, ratings_file: Path | None, output: OutputOptions) -> No
         analysis, destination, within=None if output.json_file else study
     )
     _show(data, analysis, csv=output.csv)
-    click.echo(f"analysis: {destination}", err=True)
+    click.echo(f"read: {data.read}\nanalysis: {destination}", err=True)
 
 
-def _show(data: StudyData, analysis: "Analysis", *, csv: bool) -> None:
+def _show(data: "StudyData", analysis: "Analysis", *, csv: bool) -> None:
     from masrel.report._document import SECTIONS
     from masrel.report._grades import felt_sentences
     from masrel.report._material import Paragraph, gather

@@ -15,7 +15,7 @@ from masrel.schedule import concealment_notes, schedule_problems
 @click.command("check")
 @click.argument("study", type=click.Path(path_type=Path))
 def check(study: Path) -> None:
-    """Check the protocol, schedules and ratings of STUDY and say every problem."""
+    """Check protocol, schedules, record and ratings of STUDY; say every problem."""
     paths = StudyPaths(study)
     problems = _check_study(paths)
     for problem in problems:
@@ -66,6 +66,16 @@ def _device_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
         yield f"{study.protocol}: {problem}"
 
 
+def _record_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
+    if not study.sessions.is_dir():
+        return
+    from masrel.verification import verify_sessions
+
+    for finding in verify_sessions(study, protocol).findings:
+        if finding.weight == "broken":
+            yield finding.message
+
+
 def _ratings_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
     files = [f for f in (study.ratings_file, study.published_file) if f.is_file()]
     if not files:
@@ -83,6 +93,7 @@ _CHECKERS: tuple[Callable[[Protocol, StudyPaths], Iterable[str]], ...] = (
     _plan_problems,
     _device_problems,
     schedule_problems,
+    _record_problems,
     _ratings_problems,
 )
 

@@ -99,9 +99,9 @@ def _report(
     from masrel.report import write_report
 
     destination = study.root.parent / f"report-{name}"
-    data = read_study(study.root, ratings_file)
-    analysis = analyze(data.protocol, data.ratings, in_person=data.in_person)
     is_simulated = ratings_file == study.ratings_file
+    data = read_study(study.root, None if is_simulated else ratings_file)
+    analysis = analyze(data.protocol, data.ratings, in_person=data.in_person)
     write_analysis(
         analysis,
         study.analysis_file if is_simulated else study.root / "analysis-published.json",

@@ -61,4 +61,5 @@ def report(
             recordings=data.paths.sessions,
             progress=progress,
         )
+    click.echo(f"read: {data.read}", err=True)
     click.echo(files.html)

@@ -12,6 +12,11 @@ if TYPE_CHECKING:
     from masrel.ratings.in_person import InPerson, InPersonRow, read_in_person
     from masrel.ratings.logs import ratings_from_logs
     from masrel.ratings.reader import RatingsFile, read_ratings
+    from masrel.ratings.study_data import (
+        StudyData,
+        read_study_data,
+        table_differences,
+    )
     from masrel.ratings.study_file import read_study_ratings
     from masrel.ratings.table import (
         DEFAULT_SESSION,
@@ -21,8 +26,8 @@ if TYPE_CHECKING:
         Ratings,
         RetestPairs,
         rating_matrix,
+        ratings_csv,
         ratings_from_rows,
-        ratings_hash,
         retest_pairs,
         write_ratings,
     )
@@ -39,14 +44,17 @@ __all__ = [
     "RatingsPart",
     "Repeated",
     "RetestPairs",
+    "StudyData",
     "rating_matrix",
+    "ratings_csv",
     "ratings_from_logs",
     "ratings_from_rows",
-    "ratings_hash",
     "read_in_person",
     "read_ratings",
+    "read_study_data",
     "read_study_ratings",
     "retest_pairs",
+    "table_differences",
     "write_ratings",
 ]
 
@@ -55,6 +63,7 @@ _HOMES = {
     "logs": ("ratings_from_logs",),
     "_parts": ("RatingsPart", "Repeated"),
     "reader": ("RatingsFile", "read_ratings"),
+    "study_data": ("StudyData", "read_study_data", "table_differences"),
     "study_file": ("read_study_ratings",),
 }
 """Module to the names in it; all other names are of `table`."""

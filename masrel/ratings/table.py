@@ -1,7 +1,6 @@
 """What a table of ratings is, how statistics take its ratings, and its bytes."""
 
 import csv
-import hashlib
 import io
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -411,14 +410,11 @@ def write_ratings(ratings: Ratings, path: Path, *, within: Path | None = None) -
     OSError
         If the file cannot be written; what was there is then there still.
     """
-    head = "# Ratings, one row a rating; grades are text; NA is missing.\n"
-    if ratings.simulated:
-        head = f"# SIMULATED: not grades of persons on hardware.\n{head}"
-    write_file(path, head + _body(ratings), within=within)
+    write_file(path, ratings_csv(ratings), within=within)
 
 
-def ratings_hash(ratings: Ratings) -> str:
-    """Return the SHA-256 of a table's rows and of its scale.
+def ratings_csv(ratings: Ratings) -> str:
+    """Return a table of ratings as the text of its file.
 
     Parameters
     ----------
@@ -428,10 +424,12 @@ def ratings_hash(ratings: Ratings) -> str:
     Returns
     -------
     str
-        In hexadecimal; where the table was read from does not matter.
+        What `write_ratings` writes.
     """
-    scale = "\n".join((ratings.scale.name, *ratings.scale.grades))
-    return hashlib.sha256(f"{scale}\n\n{_body(ratings)}".encode()).hexdigest()
+    head = "# Ratings, one row a rating; grades are text; NA is missing.\n"
+    if ratings.simulated:
+        head = f"# SIMULATED: not grades of persons on hardware.\n{head}"
+    return head + _body(ratings)
 
 
 def _body(ratings: Ratings) -> str:

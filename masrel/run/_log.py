@@ -94,6 +94,11 @@ def _line_hash(line: bytes) -> str:
     return hashlib.sha256(line).hexdigest()
 
 
+def line_hashes(path: Path) -> tuple[str, ...]:
+    """Return the SHA-256 of every whole line of a log, whatever is in it."""
+    return tuple(_line_hash(line) for line in _split_lines(path.read_bytes())[0])
+
+
 def _verify(path: Path, lines: list[bytes]) -> tuple[Event, ...]:
     """Return the events of a chain that holds from its first line on."""
     previous = _FIRST_PREVIOUS

@@ -11,7 +11,7 @@ import pytest
 from masrel.analysis import Analysis, analyze, as_analysis_document, write_analysis
 from masrel.errors import UndefinedStatisticWarning
 from masrel.protocol import protocol_hash
-from masrel.ratings import ratings_hash
+from masrel.ratings import ratings_csv
 from tests.analysis.studies import (
     IN_PERSON,
     PUBLISHED,
@@ -97,7 +97,9 @@ def test_the_inputs_are_named_by_hashes_anybody_can_check(tmp_path: Path) -> Non
 def test_ratings_without_a_file_are_named_by_their_rows() -> None:
     rows = of_session("test", R1=("1", "2"), R2=("1", "3"))
     found = analyze(protocol_with(), ratings(*rows))
-    assert found.inputs["ratings_sha256"] == ratings_hash(ratings(*rows))
+    assert found.inputs["ratings_sha256"] == (
+        hashlib.sha256(ratings_csv(ratings(*rows)).encode()).hexdigest()
+    )
     other = analyze(protocol_with(), ratings(*rows[:-1]))
     assert found.inputs["ratings_sha256"] != other.inputs["ratings_sha256"]
     assert "in_person_sha256" not in found.inputs

@@ -60,7 +60,10 @@ def test_the_tables_are_printed_and_the_analysis_written(
     assert "again is not in these data: there are no ratings of session retest" in (
         done.out
     )
-    assert done.err == f"analysis: {study / 'analysis.json'}\n"
+    assert done.err == (
+        f"read: 32 ratings from {study / 'ratings' / 'published.csv'}\n"
+        f"analysis: {study / 'analysis.json'}\n"
+    )
     document = json.loads((study / "analysis.json").read_text(encoding="utf-8"))
     value = document["estimates"][0]["estimate"]["value"]
     assert value == pytest.approx(0.626083678854127, abs=1e-15)
@@ -161,7 +164,7 @@ def test_a_study_without_ratings_says_how_to_get_them(
     (study / "ratings/published.csv").unlink()
     done = masrel("analyze", study)
     assert (done.code, done.out) == (2, "")
-    assert "`masrel ratings STUDY`" in done.err
+    assert "masrel run makes" in done.err
     assert str(study) in done.err
 
 

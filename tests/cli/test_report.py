@@ -23,6 +23,9 @@ def study(tmp_path: Path) -> Path:
     return root
 
 
+READ = "read: 32 ratings from {}/ratings/published.csv\n"
+
+
 def contents(folder: Path) -> dict[str, bytes]:
     return {
         str(path.relative_to(folder)): path.read_bytes()
@@ -38,7 +41,7 @@ def without_hash(name: str) -> str:
 def test_the_page_is_written_and_its_place_printed(masrel: Caller, study: Path) -> None:
     done = masrel("report", study, "--quiet")
     page = study / "report" / "report.html"
-    assert (done.code, done.out, done.err) == (0, f"{page}\n", "")
+    assert (done.code, done.out, done.err) == (0, f"{page}\n", READ.format(study))
     assert {without_hash(name) for name in contents(study / "report")} == {
         "report.html",
         "report.md",
@@ -53,11 +56,11 @@ def test_the_page_is_written_and_its_place_printed(masrel: Caller, study: Path) 
 def test_progress_is_on_a_terminal_unless_quiet(masrel: Caller, study: Path) -> None:
     page = f"{study / 'report' / 'report.html'}\n"
     done = masrel("report", study)
-    assert (done.out, done.err) == (page, "")
+    assert (done.out, done.err) == (page, READ.format(study))
     done = masrel.at_a_terminal("report", study)
     assert done.out == page
-    assert "report" in done.err
-    assert masrel.at_a_terminal("report", study, "--quiet").err == ""
+    assert "parts" in done.err
+    assert masrel.at_a_terminal("report", study, "--quiet").err == READ.format(study)
 
 
 def test_another_folder_gets_the_same_bytes(

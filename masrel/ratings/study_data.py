@@ -1,0 +1,166 @@
+"""A study's ratings: from its logs where it has some, from a file where it has not."""
+
+import csv
+import io
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from masrel.errors import RatingsError
+from masrel.protocol import Protocol, StudyPaths, scale_of
+from masrel.ratings.in_person import InPerson, read_in_person
+from masrel.ratings.logs import ratings_from_logs
+from masrel.ratings.study_file import read_study_ratings
+from masrel.ratings.table import Ratings, ratings_csv
+
+_KEY = ("session", "rater", "model", "repeat")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StudyData:
+    """What the analysis of a study is made from.
+
+    Attributes
+    ----------
+    paths : StudyPaths
+        Where the study is.
+    protocol : Protocol
+        Its protocol.
+    ratings : Ratings
+        The ratings.
+    in_person : InPerson or None
+        Grades given in person; None for simulated ratings, to which they do not belong.
+    read : str
+        What was read, in words.
+    """
+
+    paths: StudyPaths
+    protocol: Protocol
+    ratings: Ratings
+    in_person: InPerson | None
+    read: str
+
+
+def read_study_data(
+    study: StudyPaths, protocol: Protocol, *, file: Path | None = None
+) -> StudyData:
+    """Read the ratings of a study.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is.
+    protocol : Protocol
+        The study's protocol.
+    file : Path, optional
+        A table to use whatever the logs say. Without one it is what the session logs
+        say, where there are some, and else ``ratings.csv`` or ``published.csv``.
+
+    Returns
+    -------
+    StudyData
+        Ratings, grades given in person, and what was read.
+
+    Raises
+    ------
+    RatingsError
+        If there are no ratings, a file is not a table of ratings, a log is not of its
+        schedule, or ``ratings.csv`` is not what the logs say.
+    SessionLogError
+        If a log is damaged.
+    ScheduleError
+        If the schedule of a log is missing, damaged or stale.
+    """
+    if file is None and any(study.sessions.glob("*.jsonl")):
+        ratings = ratings_from_logs(study, protocol)
+        _check_table(study.ratings_file, ratings)
+        read = f"{len(ratings.table)} ratings from the logs in {study.sessions}"
+    else:
+        source = file or _file_of(study)
+        ratings = read_study_ratings(source, scale_of(protocol))
+        read = f"{len(ratings.table)} ratings from {source}"
+    in_person = None
+    if study.in_person_file.is_file() and not ratings.simulated:
+        in_person = read_in_person(study.in_person_file)
+    return StudyData(
+        paths=study,
+        protocol=protocol,
+        ratings=ratings,
+        in_person=in_person,
+        read=read,
+    )
+
+
+def _file_of(study: StudyPaths) -> Path:
+    for path in (study.ratings_file, study.published_file):
+        if path.is_file():
+            return path
+    raise RatingsError(
+        f"{study.root}: needs session logs in {study.sessions.name}, which masrel run "
+        f"makes, or {study.ratings_file.name} or {study.published_file.name} in "
+        f"{study.ratings_file.parent}"
+    )
+
+
+def _check_table(path: Path, ratings: Ratings) -> None:
+    differences = list(table_differences(path, ratings))
+    if differences:
+        more = f", and {len(differences) - 1} more" if len(differences) > 1 else ""
+        raise RatingsError(
+            f"{path}: is not what the session logs say: {differences[0]}{more}; masrel "
+            f"ratings writes it anew, --ratings {path} uses it as it is"
+        )
+
+
+def table_differences(path: Path, ratings: Ratings) -> Iterator[str]:
+    """Yield how a study's ``ratings.csv`` differs from what its logs say.
+
+    Parameters
+    ----------
+    path : Path
+        The file; one that is not there differs in nothing.
+    ratings : Ratings
+        What `ratings_from_logs` returned.
+
+    Yields
+    ------
+    str
+        Each cell and row that differs, in words.
+    """
+    if not path.is_file():
+        return
+    text = path.read_bytes().decode("utf-8", errors="replace")
+    logged = ratings_csv(ratings)
+    if text == logged:
+        return
+    rows, needed = _rows(text), _rows(logged)
+    if rows == needed:
+        yield "the ratings are the same, but not what stands around them"
+    yield from _differences(rows, needed)
+
+
+def _rows(text: str) -> dict[tuple[str, ...], Mapping[str, str]]:
+    lines = io.StringIO("".join(f"{x}\n" for x in text.splitlines() if x[:1] != "#"))
+    rows = csv.DictReader(lines, restkey="", restval="")
+    return {tuple(str(row.get(name)) for name in _KEY): row for row in rows}
+
+
+def _differences(
+    rows: Mapping[tuple[str, ...], Mapping[str, str]],
+    needed: Mapping[tuple[str, ...], Mapping[str, str]],
+) -> Iterator[str]:
+    for key, row in needed.items():
+        session, rater, model, repeat = key
+        where = f"{model}, repeat {repeat}, by {rater} in session {session}"
+        got = rows.get(key)
+        if got is None:
+            yield f"there is no row of {where}"
+            continue
+        for name, value in row.items():
+            if got.get(name) != value:
+                yield f"{name} of {where} is {got.get(name)}, in the log {value}"
+    for session, rater, model, repeat in sorted(rows.keys() - needed.keys()):
+        yield (
+            f"there is a row of {model}, repeat {repeat}, by {rater} in session "
+            f"{session}, in the logs there is none"
+        )

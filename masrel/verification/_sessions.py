@@ -1,0 +1,243 @@
+"""Session logs, what they say happened, and the recordings they name."""
+
+import hashlib
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Literal
+
+from masrel.errors import SessionLogError
+from masrel.protocol import Protocol, StudyPaths
+from masrel.run._log import Event, read_log
+from masrel.run._state import SessionState, replay
+from masrel.schedule import Presentation, Schedule
+from masrel.verification._finding import Finding, broken, doubt
+
+Stage = Literal["not begun", "begun", "complete", "unreadable"]
+
+# Facts of a recording that the schedule has too, and those that the log has
+_FROM_SCHEDULE = ("code", "position", "model", "repeat")
+_FROM_LOG = ("attempt", "mean_speed_deg_s", "n_missed_ticks", "fault", "simulated")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SessionRecord:
+    """One rater's session, as its log has it.
+
+    Attributes
+    ----------
+    session, rater : str
+        Whose session.
+    stage : {"not begun", "begun", "complete", "unreadable"}
+        How far it came.
+    n_presentations, n_graded, n_corrections : int
+        Presentations of the schedule, those with a grade, and corrections.
+    n_recordings : int
+        Recordings that the log names.
+    """
+
+    session: str
+    rater: str
+    stage: Stage
+    n_presentations: int = 0
+    n_graded: int = 0
+    n_corrections: int = 0
+    n_recordings: int = 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CheckedSession:
+    """A session, what is wrong with it, and the files it speaks for."""
+
+    record: SessionRecord
+    findings: tuple[Finding, ...]
+    files: frozenset[Path]
+
+
+def check_session(
+    study: StudyPaths,
+    protocol: Protocol,
+    schedule: Schedule | None,
+    session: str,
+    rater: str,
+) -> CheckedSession:
+    """Hold a log against its schedule, and its recordings against the log."""
+    log = study.log_file(rater, session)
+    events, finding = _events(log)
+    if finding is not None or not events or schedule is None:
+        stage: Stage = "not begun" if finding is None and not events else "unreadable"
+        return CheckedSession(
+            record=SessionRecord(session=session, rater=rater, stage=stage),
+            findings=() if finding is None else (finding,),
+            files=frozenset([log]),
+        )
+    state = replay(log, events)
+    presented = [event for of_code in state.presented.values() for event in of_code]
+    recordings = [study.sessions / str(e.fields["recording"]) for e in presented]
+    findings = [
+        *_head_findings(study, protocol, schedule, state, log),
+        *_event_findings(protocol, schedule, events, log),
+    ]
+    for event, recording in zip(presented, recordings, strict=True):
+        findings += _recording_findings(study, schedule, log, event, recording)
+    record = SessionRecord(
+        session=session,
+        rater=rater,
+        stage="complete" if state.is_complete else "begun",
+        n_presentations=len(schedule.presentations),
+        n_graded=len(state.first_grades),
+        n_corrections=sum(event.kind == "correction" for event in events),
+        n_recordings=len(presented),
+    )
+    facts = (recording.with_suffix(".json") for recording in recordings)
+    files = frozenset([log, *recordings, *facts])
+    return CheckedSession(record=record, findings=tuple(findings), files=files)
+
+
+def _events(log: Path) -> tuple[tuple[Event, ...], Finding | None]:
+    # of a chain that holds and can have happened, and what is wrong where none does
+    if not log.exists():
+        return (), None
+    try:
+        events = read_log(log)
+        replay(log, events)
+    except (SessionLogError, OSError) as error:
+        return (), Finding(weight="broken", path=log, message=str(error))
+    if not events:
+        return (), broken(log, "needed a session log, got an empty file")
+    return events, None
+
+
+def _head_findings(
+    study: StudyPaths,
+    protocol: Protocol,
+    schedule: Schedule,
+    state: SessionState,
+    log: Path,
+) -> Iterator[Finding]:
+    path = study.schedule_file(schedule.rater, schedule.session)
+    needed = {
+        "study": protocol.study.id,
+        "rater": schedule.rater,
+        "session": schedule.session,
+        "presented_sha256": schedule.presented_sha256,
+        "schedule_sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
+    }
+    for name, value in needed.items():
+        if state.header[name] != value:
+            yield broken(
+                log, f"line 1: {name}: needed {value}, got {state.header[name]}"
+            )
+    n_presentations = len(schedule.presentations)
+    if state.is_complete and len(state.first_grades) != n_presentations:
+        yield broken(
+            log,
+            f"is complete: needed {n_presentations} grades, "
+            f"got {len(state.first_grades)}",
+        )
+
+
+def _event_findings(
+    protocol: Protocol, schedule: Schedule, events: Sequence[Event], log: Path
+) -> Iterator[Finding]:
+    positions = {shown.code: shown.position for shown in schedule.presentations}
+    attempts = dict.fromkeys(positions, 0)
+    before = None
+    for event in events:
+        fields, where = event.fields, f"line {event.line}: {event.kind}"
+        code, grade = fields.get("code"), fields.get("grade")
+        if code is not None and code not in positions:
+            yield broken(log, f"{where}: needed a code of the schedule, got {code!r}")
+            continue
+        if "position" in fields and fields["position"] != positions[str(code)]:
+            yield broken(
+                log,
+                f"{where}: position of {code}: needed {positions[str(code)]}, "
+                f"got {fields['position']!r}",
+            )
+        if event.kind == "presented":
+            attempts[str(code)] += 1
+            if fields["attempt"] != attempts[str(code)]:
+                yield broken(
+                    log,
+                    f"{where}: attempt at {code}: needed {attempts[str(code)]}, "
+                    f"got {fields['attempt']!r}",
+                )
+        if grade is not None and grade not in protocol.scale.grades:
+            yield broken(
+                log,
+                f"{where}: grade of {code}: needed one of "
+                f"{', '.join(protocol.scale.grades)}, got {grade!r}",
+            )
+        time = _time(event)
+        if time is None:
+            yield broken(log, f"{where}: needed a time in UTC, got {event.time_utc!r}")
+        elif before is not None and time < before:
+            yield doubt(
+                log,
+                f"{where}: at {event.time_utc}, earlier than the line before: has the "
+                "clock been set back?",
+            )
+        before = time or before
+
+
+def _time(event: Event) -> datetime | None:
+    try:
+        time = datetime.fromisoformat(event.time_utc)
+    except ValueError:
+        return None
+    return time if time.tzinfo is not None else None
+
+
+def _recording_findings(
+    study: StudyPaths, schedule: Schedule, log: Path, event: Event, path: Path
+) -> Iterator[Finding]:
+    fields, where = event.fields, f"line {event.line} of {log}"
+    code, attempt = str(fields["code"]), fields["attempt"]
+    shown = {shown.code: shown for shown in schedule.presentations}.get(code)
+    name = code if attempt == 1 else f"{code}-{attempt}"
+    folder = study.recording_file(schedule.rater, schedule.session, code).parent
+    if shown is None or path != folder / f"{name}.npz":
+        yield broken(log, f"line {event.line}: {path} is not where {name} is recorded")
+        return
+    for file, sha256 in (
+        (path, fields["sha256"]),
+        (path.with_suffix(".json"), fields.get("facts_sha256")),
+    ):
+        if not file.is_file():
+            yield broken(file, f"needed a recording that {where} names, got no file")
+            return
+        if sha256 not in (None, hashlib.sha256(file.read_bytes()).hexdigest()):
+            yield broken(file, f"is not the file whose SHA-256 {where} has")
+    yield from _fact_findings(path.with_suffix(".json"), shown, schedule, event, where)
+
+
+def _fact_findings(
+    path: Path, shown: Presentation, schedule: Schedule, event: Event, where: str
+) -> Iterator[Finding]:
+    # what a file says that was not hashed once must at least agree with what was
+    try:
+        facts = json.loads(path.read_bytes())
+    except (ValueError, RecursionError):
+        facts = None
+    if not isinstance(facts, dict):
+        yield broken(path, "needed a JSON object, got none")
+        return
+    needed: dict[str, object] = {
+        "study": schedule.study,
+        "rater": schedule.rater,
+        "session": schedule.session,
+        "sha256": event.fields["sha256"],
+        **{name: getattr(shown, name) for name in _FROM_SCHEDULE},
+        **{name: event.fields[name] for name in _FROM_LOG},
+    }
+    for name, value in needed.items():
+        got = facts.get(name)
+        if got != value or type(got) is not type(value):
+            yield broken(
+                path,
+                f"{name}: needed {json.dumps(value)}, as {where} and the schedule "
+                f"have it, got {json.dumps(got)}",
+            )

@@ -1,0 +1,154 @@
+"""The record of a study, from protocol to analysis, each file held against the last."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from masrel.errors import ProtocolError, ScheduleError
+from masrel.protocol import Protocol, StudyPaths, read_protocol
+from masrel.schedule import read_schedule, schedule_problems
+from masrel.verification._finding import Finding, broken, doubt
+from masrel.verification._outputs import output_findings
+from masrel.verification._sessions import CheckedSession, SessionRecord, check_session
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verification:
+    """What verification of a study found.
+
+    Attributes
+    ----------
+    sessions : tuple of SessionRecord
+        Every session of the protocol, one line a rater.
+    findings : tuple of Finding
+        In the order of the record: protocol, schedules, logs and recordings, table,
+        analysis, report.
+    """
+
+    sessions: tuple[SessionRecord, ...]
+    findings: tuple[Finding, ...]
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether nothing is broken; there may be doubts."""
+        return not any(finding.weight == "broken" for finding in self.findings)
+
+
+def verify_study(study: StudyPaths) -> Verification:
+    """Verify the record of a study: every file against the one it was made from.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is. Nothing in it is changed.
+
+    Returns
+    -------
+    Verification
+        Every session, and every finding.
+
+    Raises
+    ------
+    OSError
+        If a file that is there cannot be read.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from masrel.protocol import copy_template
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     copy_template("small", Path(folder))
+    ...     verification = verify_study(StudyPaths(Path(folder)))
+    >>> verification.is_whole, len(verification.sessions)
+    (True, 2)
+    """
+    try:
+        protocol = read_protocol(study.protocol)
+    except ProtocolError as error:
+        return Verification(
+            sessions=(), findings=_of_problems(study.protocol, error.problems)
+        )
+    record = verify_sessions(study, protocol)
+    return Verification(
+        sessions=record.sessions,
+        findings=(
+            *_of_problems(study.schedules, schedule_problems(protocol, study)),
+            *record.findings,
+            *output_findings(study, protocol),
+        ),
+    )
+
+
+def verify_sessions(study: StudyPaths, protocol: Protocol) -> Verification:
+    """Verify the session logs of a study and the recordings they name.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is.
+    protocol : Protocol
+        Its protocol.
+
+    Returns
+    -------
+    Verification
+        Every session of the protocol, and what is wrong in ``sessions/``.
+
+    Raises
+    ------
+    OSError
+        If a file that is there cannot be read.
+    """
+    checked = [
+        _checked(study, protocol, session.id, rater)
+        for session in protocol.sessions
+        for rater in session.raters
+    ]
+    return Verification(
+        sessions=tuple(of_session.record for of_session in checked),
+        findings=(
+            *(finding for of_session in checked for finding in of_session.findings),
+            *_unnamed(study, checked),
+        ),
+    )
+
+
+def _of_problems(path: Path, problems: Iterable[str]) -> tuple[Finding, ...]:
+    return tuple(
+        Finding(weight="broken", path=path, message=problem) for problem in problems
+    )
+
+
+def _checked(
+    study: StudyPaths, protocol: Protocol, session: str, rater: str
+) -> CheckedSession:
+    path, schedule = study.schedule_file(rater, session), None
+    findings: tuple[Finding, ...] = ()
+    if path.exists():
+        try:
+            schedule = read_schedule(path)
+        except ScheduleError:
+            pass  # one of `schedule_problems`
+    elif study.log_file(rater, session).exists():
+        needed = "needed the schedule of a session that has begun, got no file"
+        findings = (broken(path, needed),)
+    checked = check_session(study, protocol, schedule, session, rater)
+    return replace(checked, findings=(*findings, *checked.findings))
+
+
+def _unnamed(study: StudyPaths, checked: list[CheckedSession]) -> Iterator[Finding]:
+    # what lies in sessions/ and no log speaks for
+    named = {path for of_session in checked for path in of_session.files}
+    for path in sorted(study.sessions.rglob("*")):
+        if path in named or (path.is_dir() and any(path.iterdir())):
+            continue
+        if path.name.endswith(".jsonl.torn") and path.with_suffix("") in named:
+            yield doubt(path, "bytes of a line that was not finished; the log says so")
+        elif path.suffix == ".partial":
+            yield doubt(path, "a presentation that was cut off; masrel run recovers it")
+        elif path.suffix == ".jsonl":
+            yield broken(path, "is the log of no rater in a session of the protocol")
+        elif path.suffix in {".npz", ".json"}:
+            yield broken(path, "is a recording that no log of the protocol names")
+        else:
+            yield doubt(path, "is in sessions/, and no log names it")
