@@ -20,6 +20,7 @@ from masrel.hess import (
     SimulatedClock,
     SimulatedHand,
     SimulatedOptions,
+    StretchRules,
     TorqueSensor,
     cut_off,
     open_device,
@@ -103,6 +104,31 @@ def test_the_noise_is_that_of_the_seed() -> None:
     assert first.columns[MEASURED].tobytes() == same.columns[MEASURED].tobytes()
     other = presented(SimulatedOptions(torque_sensor=TorqueSensor(seed=1))).recording
     assert (other.columns[MEASURED] != first.columns[MEASURED]).mean() > 0.5
+
+
+def test_every_stretch_of_a_presentation_has_its_measured_torque() -> None:
+    clock = SimulatedClock()
+    speed = radians(92.0)
+    hand = SimulatedHand(start=START, end=END, mean_speed=speed, again=(speed, speed))
+    with open_device("simulated", clock=clock, hand=hand, options=SENSING) as device:
+        presentation = run_presentation(
+            device,
+            Controller(STANDARD_MODELS["HM3"], start_angle=START),
+            clock=clock,
+            limits=DeviceLimits(),
+            end_angle=END,
+            stretches=StretchRules(n=3),
+            max_duration_s=20.0,
+        )
+    recording = presentation.recording
+    assert recording.facts["ended"] == "stretches"
+    assert recording.facts["channel_faults"] is None
+    torque, number = recording.columns[MEASURED], recording.columns["stretch"]
+    assert np.isfinite(torque).all()
+    peaks = [torque[number == stretch].max() for stretch in (1, 2, 3)]
+    # Each is the end of post-catch: 0.02 N·m of noise and 10 ms of the hand's ramp
+    assert max(peaks) - min(peaks) < 0.3
+    assert min(peaks) > 10.0
 
 
 def test_a_replay_gives_the_channels_again() -> None:

@@ -1,5 +1,6 @@
 """What the device measured itself gives back the models, and the device."""
 
+from dataclasses import replace
 from math import radians
 from pathlib import Path
 
@@ -108,6 +109,25 @@ def test_samples_without_a_number_are_left_out_and_counted(tmp_path: Path) -> No
     with pytest.warns(RecordingWarning, match=words):
         movement = read_movement(path)
     assert movement.time.size == recording.n_presented - 50
+
+
+def test_a_sensor_that_failed_is_said_again_where_it_is_read(tmp_path: Path) -> None:
+    recording = measured(STANDARD_MODELS["HM3"], stretch(90.0))
+    path = tmp_path / "a.npz"
+    facts = {**recording.facts, "channel_faults": "measured_torque_nm: stays at 1 N·m"}
+    write_recording(replace(recording, facts=facts), path)
+    with pytest.warns(RecordingWarning, match=r"a\.npz: measured_torque_nm: stays"):
+        read_movement(path)
+
+
+def test_presentations_of_two_models_are_not_fitted_as_one(tmp_path: Path) -> None:
+    paths = [tmp_path / "a.npz", tmp_path / "b.npz"]
+    for path, model in zip(paths, ("HM2", "HM1"), strict=True):
+        recording = measured(STANDARD_MODELS[model], stretch(90.0))
+        facts = {**recording.facts, "model": model}
+        write_recording(replace(recording, facts=facts), path)
+    with pytest.raises(RecordingError, match=r"one model, .* got some of HM1, HM2"):
+        fit(paths)
 
 
 @pytest.mark.parametrize("compensation", [0.0, 0.9])

@@ -197,7 +197,8 @@ def fit(
     ParameterError
         If an option is outside its range.
     RecordingError
-        If a recording is not usable, there is no slow stretch, the slow stretches do
+        If a recording is not usable, they are presentations of several models, there
+        is no slow stretch, the slow stretches do
         not tell b from k, or what comes out cannot be the law: b or k below 0 or Q of 1
         or more, by more than their error.
 
@@ -235,6 +236,7 @@ def fit(
         entry if isinstance(entry, Movement) else read_movement(Path(entry))
         for entry in recordings
     ]
+    _check_models(movements)
     stretches, rest_sd = _stretches(movements, options)
     slow = _slow_trials(stretches, options.slow_below)
     result = _rounds(_Material(movements, stretches, slow, rest_sd), options)
@@ -770,6 +772,15 @@ def _correlation(joint: JointFit, estimates: Sequence[FittedParameter]) -> _Floa
     with np.errstate(invalid="ignore", divide="ignore"):
         whole[:-1, :-1] = joint.fit.covariance / np.outer(sd, sd)
     return whole[np.ix_(places, places)]
+
+
+def _check_models(movements: Sequence[Movement]) -> None:
+    models = sorted({m.model for m in movements if m.model is not None})
+    if len(models) > 1:
+        raise RecordingError(
+            "recordings: a fit needs presentations of one model, which the .json "
+            f"beside each recording names; got some of {', '.join(models)}"
+        )
 
 
 def _torque_remarks(movements: Sequence[Movement]) -> tuple[str, ...]:

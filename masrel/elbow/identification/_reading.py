@@ -71,6 +71,8 @@ class Movement:
     torque_source : {"recorded", "sensor", "model"}
         Where the torque is from: somebody's recording; in one of masrel's driver the
         sensor of the device, or what the joint model asked for.
+    model : str or None
+        The model that was presented, in a recording of masrel's driver.
     sha256 : str or None
         Checksum of the file, if it is from one.
 
@@ -94,6 +96,7 @@ class Movement:
     saturated: NDArray[np.bool_] = field(init=False, compare=False, repr=False)
     simulated: bool = False
     torque_source: TorqueSource = "recorded"
+    model: str | None = None
     sha256: str | None = None
 
     def __post_init__(self) -> None:
@@ -282,6 +285,7 @@ class _Archive:
     path: Path
     arrays: dict[str, NDArray[np.generic]] = field(repr=False)
     simulated: bool
+    model: str | None = None
 
     @property
     def names(self) -> list[str]:
@@ -320,7 +324,11 @@ def _read_archive(path: Path) -> _Archive:
         shown: dict[str, NDArray[np.generic]] = {
             name: column[: local.n_presented] for name, column in local.columns.items()
         }
-        return _Archive(path=path, arrays=shown, simulated=simulated)
+        if faults := local.facts.get("channel_faults"):
+            warnings.warn(f"{path}: {faults}", RecordingWarning, stacklevel=4)
+        model = local.facts.get("model")
+        named = model if isinstance(model, str) else None
+        return _Archive(path=path, arrays=shown, simulated=simulated, model=named)
     simulated = bool(np.any(arrays.pop("simulated", False)))
     return _Archive(path=path, arrays=arrays, simulated=simulated)
 
@@ -332,6 +340,7 @@ class _Text:
     rows: list[list[str]] = field(repr=False)
     lines: list[int] = field(repr=False)  # where each row stands, from 1 on
     simulated: bool
+    model: None = None
 
     def column(self, name: str) -> _Floats:
         place = self.names.index(name)
@@ -458,7 +467,8 @@ def read_movement(
     Warns
     -----
     RecordingWarning
-        If rows are left out, or the torque is saturated.
+        If rows are left out, the torque is saturated, or the driver says of a channel
+        that it failed.
 
     Notes
     -----
@@ -500,6 +510,7 @@ def read_movement(
         velocity=si.get("velocity"),
         simulated=table.simulated,
         torque_source=source,
+        model=table.model,
         sha256=hashlib.sha256(content).hexdigest(),
     )
 
