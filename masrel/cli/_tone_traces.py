@@ -12,6 +12,10 @@ if TYPE_CHECKING:
     from masrel.elbow import JointModel, Motion
 
 
+START_DEG, END_DEG = 30.0, 146.0
+"""Where a stretch starts and ends unless it is said, deg."""
+
+
 def joint_of_kind(kind: str, settings: Sequence[str]) -> "JointModel":
     """Return a joint of a kind with numbers, each KEY=VALUE."""
     from masrel.protocol._kinds import (
@@ -45,7 +49,7 @@ def end_within(joint: "JointModel", end_deg: float | None) -> float:
     """Return where a stretch ends, deg: at most where the range of the joint does."""
     limit = math.degrees(joint.range_end)
     if end_deg is None:
-        return min(146.0, limit)
+        return min(END_DEG, limit)
     if end_deg > limit + 1e-9:
         raise ParameterError(
             f"--to-deg: needs at most the end of range of every model, {limit:g} deg, "
@@ -59,8 +63,7 @@ def tone_scene(
     joint: "JointModel",
     kind: str,
     speed: float | None,
-    start: float,
-    end: float,
+    ends_deg: tuple[float, float],
     motion: "Motion",
 ) -> ToneScene:
     """Return the scene of a joint that is no spastic elbow; kind: of the motion."""
@@ -72,8 +75,8 @@ def tone_scene(
         model=name,
         kind=kind,
         speed_deg_s=speed,
-        start_deg=start,
-        end_deg=end,
+        start_deg=ends_deg[0],
+        end_deg=ends_deg[1],
         joint=joint,
         motion=motion,
     )
@@ -84,15 +87,8 @@ def write_tardieu(
     start_deg: float,
     speeds: Sequence[float],
     output: OutputOptions,
-    *,
-    plain: bool,
 ) -> None:
-    """Write R2, R1 and the catches of joints; plain: nothing else is requested."""
-    if not plain or output.figure is not None:
-        raise ParameterError(
-            "--tardieu: stretches at constant speed to the end of range and says "
-            "angles alone; it goes with --from-deg, --speed-deg-s and --json"
-        )
+    """Write R2, R1 and the catches of joints."""
     if speeds and len(speeds) != 3:
         raise ParameterError(
             f"--speed-deg-s: needs V1, V2 and V3 with --tardieu, got {len(speeds)}"

@@ -1,21 +1,17 @@
 """``masrel trace``: events, torque and samples of stretches of models."""
 
-import csv
-import io
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING
 
 import click
 from tqdm import tqdm
 
-from masrel._files import new_file, write_file
+from masrel._files import write_file
 from masrel.cli._options import (
     OutputOptions,
-    check_folder,
     figure_form,
     grouped,
     output_options,
@@ -23,12 +19,16 @@ from masrel.cli._options import (
 )
 from masrel.cli._paths import InputFile, OutputFile
 from masrel.cli._tone_traces import (
+    END_DEG,
+    START_DEG,
     end_within,
     joint_of_kind,
     tone_scene,
     write_tardieu,
 )
+from masrel.cli._trace_samples import check_samples, write_samples
 from masrel.errors import ParameterError
+from masrel.report._tone_scenes import Quantities
 from masrel.report._traced_scenes import (
     SCENE_OUTPUTS,
     SCENE_VIEWS,
@@ -42,16 +42,13 @@ from masrel.report._traced_scenes import (
 )
 
 if TYPE_CHECKING:
-    from masrel.elbow import ElbowParameters, JointModel, Motion
+    from masrel.elbow import JointModel, Motion
 
 _KINDS = ("constant", "minimum-jerk", "trapezoid", "recording")
-_COLUMNS = ("time_s", "angle_deg", "velocity_deg_s", "torque_nm", "phase")
 _PATH = click.Path(path_type=Path)
 
 _MAX_SPEEDS = 100_000
 _MAX_REPEATS = 1000  # which take a second to solve
-_MAX_SAMPLES = 5_000_000  # rows of a CSV file: at 1 kHz 83 minutes, and some 400 MB
-_N_AT_ONCE = 10_000  # rows between two signs of progress
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,12 +93,6 @@ class _MotionOptions:
                 f"--repeat: needs 1 to {_MAX_REPEATS}, got {self.repeats}"
             )
 
-    @property
-    def ends_deg(self) -> tuple[float, float]:
-        """Where it starts and ends unless it is a recording, deg."""
-        start = 30.0 if self.start is None else self.start
-        return start, 146.0 if self.end is None else self.end
-
 
 _motion_options = grouped(
     "stretch",
@@ -135,48 +126,9 @@ _motion_options = grouped(
 )  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _SampleOptions:
-    """The file of samples."""
-
-    rate_hz: float | None  # samples a second; None for 1000
-    csv_file: Path | None
-
-    def __post_init__(self) -> None:
-        if self.rate_hz is not None and self.csv_file is None:
-            raise ParameterError("--rate-hz: goes with --csv, whose samples it spaces")
-        if self.rate_hz is not None and not math.isfinite(self.rate_hz):
-            raise ParameterError(f"--rate-hz: needs a finite rate, got {self.rate_hz}")
-        if self.csv_file == Path("-"):
-            raise ParameterError("--csv: needs the name of a file, got -")
-
-
-_sample_options = grouped(
-    "samples",
-    _SampleOptions,
-    click.option(
-        "--rate-hz", type=click.FloatRange(min=0.0, min_open=True),
-        help="Samples a second of --csv.  [default: 1000]",
-    ),
-    click.option(
-        "--csv", "csv_file", type=OutputFile(path_type=Path),
-        help="Write the samples here.",
-    ),
-)  # fmt: skip
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _QuantityOptions:
-    """What is computed of every scene beside events and peak."""
-
-    outputs: tuple[str, ...]  # of `SCENE_OUTPUTS`
-    times: tuple[float, ...]  # where torque is computed, s
-    angles: tuple[float, ...]  # where it is computed, deg
-
-
 _quantity_options = grouped(
     "quantities",
-    _QuantityOptions,
+    Quantities,
     click.option(
         "--output", "outputs", type=click.Choice(tuple(SCENE_OUTPUTS)), multiple=True,
         help="What to compute beside events and peak; may be given again.",
@@ -287,7 +239,13 @@ _joint_options = grouped(
 @_motion_options
 @_law_options
 @_quantity_options
-@_sample_options
+@click.option(
+    "--rate-hz", type=click.FloatRange(min=0.0, min_open=True),
+    help="Samples a second of --csv.  [default: 1000]",
+)  # fmt: skip
+@click.option(
+    "--csv", "csv_file", type=OutputFile(path_type=Path), help="Write the samples here."
+)
 @output_options(
     json="Write events and outputs as JSON here; - for the screen.",
     figure="Draw this file: .png, .svg or .pdf.",
@@ -309,8 +267,9 @@ def trace(
     speed_range: tuple[float, float, int] | None,
     stretch: _MotionOptions,
     law: _LawOptions,
-    quantities: _QuantityOptions,
-    samples: _SampleOptions,
+    quantities: Quantities,
+    rate_hz: float | None,
+    csv_file: Path | None,
     output: OutputOptions,
     view: str | None,
     tardieu: bool,
@@ -320,58 +279,54 @@ def trace(
     Events and outputs are exact; the samples of --csv are what the controller commands
     at --rate-hz for that motion. Several models or speeds make one scene of each pair.
     """
+    if csv_file is not None or rate_hz is not None:
+        check_samples(csv_file, rate_hz)
     joints = _joints_of(names, law)
-    speeds = (*speeds, *_spaced(speed_range))
+    if speed_range is not None:
+        low, high, n = speed_range
+        speeds = (*speeds, *(low + (high - low) * i / (n - 1) for i in range(n)))
     if tardieu:
-        plain = (
-            (stretch.kind, stretch.repeats) == ("constant", 1),
-            (stretch.end, stretch.stop, samples.csv_file) == (None, None, None),
-            not (quantities.outputs or quantities.times or quantities.angles),
-        )
-        write_tardieu(joints, stretch.ends_deg[0], speeds, output, plain=all(plain))
+        _check_plain(stretch, quantities, output, csv_file)
+        start = START_DEG if stretch.start is None else stretch.start
+        write_tardieu(joints, start, speeds, output)
         return
     if view is not None and output.figure is None:
         raise ParameterError("--view: goes with --figure, whose contents it chooses")
     scenes = _scenes(joints, stretch, speeds)
-    if samples.csv_file is not None:
-        check_folder("--csv", samples.csv_file)
     output.check_files()
-    view = view or SCENE_VIEWS[0]
     if output.figure is not None:
-        check_view(scenes, view)
-    documents = [
-        scene_document(
-            scene,
-            outputs=quantities.outputs,
-            times=quantities.times,
-            angles=quantities.angles,
-        )
-        for scene in tqdm(
-            scenes, desc="scenes", delay=1.0, disable=output.hides_progress
-        )
-    ]
-    if samples.csv_file is not None:
-        _write_samples(samples, scenes, documents, output.hides_progress)
+        check_view(scenes, view or SCENE_VIEWS[0])
+    bar = tqdm(scenes, desc="scenes", delay=1.0, disable=output.hides_progress)
+    documents = [scene_document(scene, quantities) for scene in bar]
+    if csv_file is not None:
+        rate = 1000.0 if rate_hz is None else rate_hz
+        write_samples(csv_file, rate, scenes, documents, quiet=output.quiet)
     if output.figure is not None:
         form = figure_form(output.figure)
-        write_file(output.figure, scenes_figure(scenes, view, form=form))
-    only = documents[0] if len(documents) == 1 else None
-    write_output(
-        output,
-        document=lambda: {"scenes": documents} if only is None else only,
-        text=lambda: (
-            scenes_text(documents)
-            if only is None
-            else scene_text(only, scenes[0].title)
-        ),
+        picture = scenes_figure(scenes, view or SCENE_VIEWS[0], form=form)
+        write_file(output.figure, picture)
+    if len(documents) == 1:
+        document, text = documents[0], lambda: scene_text(documents[0], scenes[0].title)
+    else:
+        document, text = {"scenes": documents}, lambda: scenes_text(documents)
+    write_output(output, document=lambda: document, text=text)
+
+
+def _check_plain(
+    stretch: _MotionOptions,
+    quantities: Quantities,
+    output: OutputOptions,
+    csv_file: Path | None,
+) -> None:
+    others = (
+        (stretch.kind, stretch.repeats) != ("constant", 1),
+        (stretch.end, stretch.stop, output.figure, csv_file) != (None,) * 4,
     )
-
-
-def _spaced(speed_range: tuple[float, float, int] | None) -> list[float]:
-    if speed_range is None:
-        return []
-    low, high, n = speed_range
-    return [low + (high - low) * i / (n - 1) for i in range(n)]
+    if any(others) or quantities != Quantities():
+        raise ParameterError(
+            "--tardieu: stretches at constant speed to the end of range and says "
+            "angles alone; it goes with --from-deg, --speed-deg-s and --json"
+        )
 
 
 def _scenes(
@@ -384,41 +339,33 @@ def _scenes(
 
     scenes: list[AnyScene] = []
     motions: dict[tuple[float | None, float], Motion] = {}  # by speed and end
+    start = START_DEG if stretch.start is None else stretch.start
     for name, joint in joints.items():
-        start, end = stretch.ends_deg
+        end = END_DEG if stretch.end is None else stretch.end
         if stretch.recording is None and not isinstance(joint, ElbowParameters):
             end = end_within(joint, stretch.end)
         for speed in dict.fromkeys(speeds or (None,)):
-            motion = motions.get((speed, end)) or _motion_of(stretch, speed, end)
-            motions[speed, end] = motion
+            if (speed, end) not in motions:
+                motions[speed, end] = _motion_of(stretch, speed, start, end)
+            motion, ends = motions[speed, end], (start, end)
             if stretch.recording is not None:
-                start, end = math.degrees(motion.start), math.degrees(motion.end)
-            scenes.append(_scene(name, joint, stretch.kind, speed, start, end, motion))
+                ends = math.degrees(motion.start), math.degrees(motion.end)
+            if not isinstance(joint, ElbowParameters):
+                scene = tone_scene(name, joint, stretch.kind, speed, ends, motion)
+                scenes.append(scene)
+                continue
+            scenes.append(
+                Scene(
+                    model=name,
+                    kind=stretch.kind,
+                    speed_deg_s=speed,
+                    start_deg=ends[0],
+                    end_deg=ends[1],
+                    parameters=joint,
+                    motion=motion,
+                )
+            )
     return scenes
-
-
-def _scene(
-    name: str,
-    joint: "JointModel",
-    kind: str,
-    speed: float | None,
-    start: float,
-    end: float,
-    motion: "Motion",
-) -> AnyScene:
-    from masrel.elbow import ElbowParameters
-
-    if not isinstance(joint, ElbowParameters):
-        return tone_scene(name, joint, kind, speed, start, end, motion)
-    return Scene(
-        model=name,
-        kind=kind,
-        speed_deg_s=speed,
-        start_deg=start,
-        end_deg=end,
-        parameters=joint,
-        motion=motion,
-    )
 
 
 def _joints_of(names: _JointOptions, law: _LawOptions) -> dict[str, "JointModel"]:
@@ -428,36 +375,29 @@ def _joints_of(names: _JointOptions, law: _LawOptions) -> dict[str, "JointModel"
         raise ParameterError("--parameter: goes with one --kind, whose it is")
     joints: dict[str, JointModel] = {}
     for model in dict.fromkeys(names.models):
-        is_file = model.endswith(".toml")
-        name = Path(model).stem if is_file else model
+        name = Path(model).stem if model.endswith(".toml") else model
         if name in joints:
             raise ParameterError(
                 f"--model: needs models whose names differ, got two called {name}"
             )
-        joints[name] = law.change(
-            _joint_in_file(model, names.study)
-            if is_file
-            else _named_joint(model, names.study)
-        )
+        joints[name] = law.change(_joint_of(model, names.study))
     for kind in dict.fromkeys(names.kinds):
         joints[kind] = law.change(joint_of_kind(kind, names.parameters))
     return joints
 
 
-def _joint_in_file(model: str, study: Path | None) -> "ElbowParameters":
-    from masrel.protocol import read_model_file
-
-    if study is not None:
-        raise ParameterError(
-            f"--model: needs a model of --study, got the file {model}; without --study "
-            "it is read with the usual constants"
-        )
-    return read_model_file(Path(model))
-
-
-def _named_joint(model: str, study: Path | None) -> "JointModel":
+def _joint_of(model: str, study: Path | None) -> "JointModel":
     from masrel.elbow import STANDARD_MODELS
 
+    if model.endswith(".toml"):
+        from masrel.protocol import read_model_file
+
+        if study is not None:
+            raise ParameterError(
+                f"--model: needs a model of --study, got the file {model}; without "
+                "--study it is read with the usual constants"
+            )
+        return read_model_file(Path(model))
     if study is not None:
         from masrel.protocol import StudyPaths, joint_model, read_protocol
 
@@ -471,11 +411,45 @@ def _named_joint(model: str, study: Path | None) -> "JointModel":
 
 
 def _motion_of(
-    stretch: _MotionOptions, speed_deg_s: float | None, end_deg: float
+    stretch: _MotionOptions, speed_deg_s: float | None, start_deg: float, end_deg: float
 ) -> "Motion":
+    from masrel.elbow import ConstantSpeed, MinimumJerk, Trapezoid
+
+    start, end = math.radians(start_deg), math.radians(end_deg)
+    speed = math.radians(speed_deg_s or 0.0)
+    motion: Motion
+    if stretch.recording is not None:
+        motion = _recorded(stretch.recording, stretch.interpolation, speed_deg_s)
+    elif speed_deg_s is None:
+        raise ParameterError(
+            f"--speed-deg-s: needs a speed for --motion {stretch.kind}"
+        )
+    elif stretch.kind == "constant":
+        motion = ConstantSpeed(start=start, end=end, speed=speed)
+    elif stretch.acceleration is not None:
+        rate = math.radians(stretch.acceleration)
+        motion = Trapezoid(start=start, end=end, speed=speed, acceleration_rate=rate)
+    else:
+        motion = MinimumJerk(start=start, end=end, mean_speed=speed)
+    if stretch.stop is None and stretch.repeats == 1:
+        return motion
+    return _stopped_and_repeated(stretch, motion)
+
+
+def _recorded(
+    file: Path, interpolation: str | None, speed_deg_s: float | None
+) -> "Motion":
+    from masrel.elbow.motions.file import read_motion
+
+    if speed_deg_s is not None:
+        raise ParameterError("--speed-deg-s: a recording has its own speed")
+    is_linear = interpolation == "linear"
+    return read_motion(file, interpolation="linear" if is_linear else "pchip")
+
+
+def _stopped_and_repeated(stretch: _MotionOptions, once: "Motion") -> "Motion":
     from masrel.elbow import Joined, Reversed, interrupted
 
-    once = _plain_motion(stretch, speed_deg_s, end_deg)
     motion = once
     if stretch.stop is not None and stretch.pause is not None:
         if not 0.0 < stretch.stop < once.duration:
@@ -490,95 +464,3 @@ def _motion_of(
     for _ in range(stretch.repeats - 1):
         parts += [Reversed(motion=once), motion]
     return Joined(parts)
-
-
-def _plain_motion(
-    stretch: _MotionOptions, speed_deg_s: float | None, end_deg: float
-) -> "Motion":
-    from masrel.elbow import ConstantSpeed, MinimumJerk, Trapezoid
-    from masrel.elbow.motions.file import read_motion
-
-    if stretch.recording is not None:
-        if speed_deg_s is not None:
-            raise ParameterError("--speed-deg-s: a recording has its own speed")
-        return read_motion(
-            stretch.recording,
-            interpolation="linear" if stretch.interpolation == "linear" else "pchip",
-        )
-    if speed_deg_s is None:
-        raise ParameterError(
-            f"--speed-deg-s: needs a speed for --motion {stretch.kind}"
-        )
-    start, end = math.radians(stretch.ends_deg[0]), math.radians(end_deg)
-    speed = math.radians(speed_deg_s)
-    if stretch.kind == "constant":
-        return ConstantSpeed(start=start, end=end, speed=speed)
-    if stretch.acceleration is not None:
-        rate = math.radians(stretch.acceleration)
-        return Trapezoid(start=start, end=end, speed=speed, acceleration_rate=rate)
-    return MinimumJerk(start=start, end=end, mean_speed=speed)
-
-
-def _write_samples(
-    samples: _SampleOptions,
-    scenes: Sequence[AnyScene],
-    documents: Sequence[dict[str, Any]],
-    hides_progress: bool | None,
-) -> None:
-    if samples.csv_file is None:
-        return
-    rate_hz = 1000.0 if samples.rate_hz is None else samples.rate_hz
-    n_rows = _n_samples(documents, rate_hz)
-    with (
-        new_file(samples.csv_file) as file,
-        io.TextIOWrapper(file, encoding="utf-8", newline="") as out,
-        tqdm(total=n_rows, desc="samples", delay=1.0, disable=hides_progress) as bar,
-    ):
-        _write_rows(out, scenes, rate_hz, bar)
-
-
-def _n_samples(documents: Sequence[dict[str, Any]], rate_hz: float) -> int:
-    durations = [document["phases"][-1]["end_s"] for document in documents]
-    n_samples = sum(durations) * rate_hz + len(durations)
-    if not n_samples <= _MAX_SAMPLES:
-        raise ParameterError(
-            f"--csv: needs at most {_MAX_SAMPLES} samples, got {n_samples:.4g}: "
-            f"{sum(durations):.4g} s at {rate_hz:g} Hz; --rate-hz makes them fewer"
-        )
-    return int(n_samples)
-
-
-def _write_rows(
-    out: TextIO, scenes: Sequence[AnyScene], rate_hz: float, bar: "tqdm[Any]"
-) -> None:
-    # what the controller commands; columns name the scene where there are several
-    several = len(scenes) > 1
-    out.write("# simulated: true\n")
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow((*(("model", "speed_deg_s") if several else ()), *_COLUMNS))
-    for scene in scenes:
-        names = (scene.model, scene.speed_deg_s) if several else ()
-        rows = _rows(scene, rate_hz)
-        while block := list(islice(rows, _N_AT_ONCE)):
-            writer.writerows((*names, *row) for row in block)
-            bar.update(len(block))
-
-
-def _rows(scene: AnyScene, rate_hz: float) -> Iterator[tuple[object, ...]]:
-    import numpy as np
-
-    from masrel import elbow
-    from masrel.recording import PHASES
-
-    joint = scene.parameters if isinstance(scene, Scene) else scene.joint
-    samples = elbow.trace(joint, scene.motion, rate_hz=rate_hz)
-    columns = (
-        samples.time,
-        np.degrees(samples.angle),
-        np.degrees(samples.velocity),
-        samples.torque,
-    )
-    for start in range(0, samples.time.size, _N_AT_ONCE):
-        block = slice(start, start + _N_AT_ONCE)
-        phases = [PHASES[code] for code in samples.phase[block].tolist()]
-        yield from zip(*(c[block].tolist() for c in columns), phases, strict=True)

@@ -16,6 +16,9 @@ from masrel.report._figure_data import StretchLine
 from masrel.report._tables import aligned, fixed_or_significant, significant
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from masrel.elbow import JointModel, Motion
     from masrel.elbow.tone import ToneModel
 
@@ -43,16 +46,18 @@ class ToneScene:
         return f"{self.model}, {self.kind} {significant(self.speed_deg_s)} deg/s"
 
 
-def tone_document(
-    scene: ToneScene,
-    *,
-    outputs: Sequence[str] = (),
-    times: Sequence[float] = (),
-    angles: Sequence[float] = (),
-) -> dict[str, object]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Quantities:
+    """What is computed of every scene beside events and peak."""
+
+    outputs: tuple[str, ...] = ()  # of a spastic elbow
+    times: tuple[float, ...] = ()  # where torque is computed, s
+    angles: tuple[float, ...] = ()  # where it is computed, deg
+
+
+def tone_document(scene: ToneScene, quantities: Quantities) -> dict[str, object]:
     """Return the events of a scene, its peak torque, and torques at places."""
-    # times, angles: where torque is computed, s, deg; outputs: those of an elbow
-    if outputs:
+    if quantities.outputs:
         raise ParameterError(f"--output: needs spastic elbows, got {scene.joint.kind}")
     import numpy as np
 
@@ -93,28 +98,29 @@ def tone_document(
             for event in events
         ],
     }
-    if times:
+    if times := quantities.times:
         late = [time for time in times if not 0.0 <= time <= motion.duration]
         if late:
             raise ParameterError(
                 "--at-s: needs times within the motion, 0 to "
                 f"{significant(motion.duration)} s, got {significant(late[0])}"
             )
-        values = joint.torque(motion, list(times)).tolist()
-        document["torque_at_s"] = _torques("time_s", times, values)
-    if angles:
+        torques = joint.torque(motion, list(times))
+        document["torque_at_s"] = torque_rows("time_s", times, torques)
+    if angles := quantities.angles:
         reached = times_at(motion, [math.radians(angle) for angle in angles])
-        values = joint.torque(motion, reached).tolist()
-        document["torque_at_deg"] = _torques("angle_deg", angles, values)
+        torques = joint.torque(motion, reached)
+        document["torque_at_deg"] = torque_rows("angle_deg", angles, torques)
     return document
 
 
-def _torques(
-    key: str, places: Sequence[float], values: Sequence[float]
+def torque_rows(
+    key: str, places: Sequence[float], torques: "NDArray[np.float64]"
 ) -> list[dict[str, float]]:
+    """Return the torque at each time or angle, which have this key."""
     return [
-        {key: place, "torque_nm": value}
-        for place, value in zip(places, values, strict=True)
+        {key: place, "torque_nm": torque}
+        for place, torque in zip(places, torques.tolist(), strict=True)
     ]
 
 

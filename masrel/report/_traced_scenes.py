@@ -17,10 +17,16 @@ from masrel.report._figure_data import (
     StretchPanel,
 )
 from masrel.report._tables import aligned, fixed_or_significant, significant
-from masrel.report._tone_scenes import ToneScene, tone_document, tone_line
+from masrel.report._tone_scenes import (
+    Quantities,
+    ToneScene,
+    tone_document,
+    tone_line,
+    torque_rows,
+)
 
 if TYPE_CHECKING:
-    from masrel.elbow import ElbowParameters, Events, Motion
+    from masrel.elbow import ElbowParameters, Motion
 
 SCENE_OUTPUTS = {
     "residual-torque": "residual_torque_nm",
@@ -67,46 +73,36 @@ AnyScene = Scene | ToneScene
 """Of a spastic elbow, or of a joint of another kind."""
 
 
-def scene_document(
-    scene: AnyScene,
-    *,
-    outputs: Sequence[str] = (),
-    times: Sequence[float] = (),
-    angles: Sequence[float] = (),
-) -> dict[str, object]:
+def scene_document(scene: AnyScene, quantities: Quantities) -> dict[str, object]:
     """Return the events of a scene, its peak torque, and what else was requested."""
-    # outputs: of `SCENE_OUTPUTS`; times, angles: where torque is computed, s, deg
     if isinstance(scene, ToneScene):
-        return tone_document(scene, outputs=outputs, times=times, angles=angles)
+        return tone_document(scene, quantities)
     from masrel import elbow
 
-    joint, motion = scene.parameters, scene.motion
-    events = elbow.events(joint, motion)
+    events = elbow.events(scene.parameters, scene.motion)
+    angle, speed = events.catch_angle, events.mean_speed
     document: dict[str, object] = {
         "model": scene.model,
         "motion": scene.kind,
         "speed_deg_s": scene.speed_deg_s,
         "from_deg": scene.start_deg,
         "to_deg": scene.end_deg,
-        "catch_angle_deg": _degrees(events.catch_angle),
-        "mean_speed_deg_s": _degrees(events.mean_speed),
-        "peak_torque_nm": elbow.peak_torque(joint, motion),
-        "phases": _phases(events),
+        "catch_angle_deg": None if angle is None else math.degrees(angle),
+        "mean_speed_deg_s": None if speed is None else math.degrees(speed),
+        "peak_torque_nm": elbow.peak_torque(scene.parameters, scene.motion),
+        "phases": [
+            {
+                "name": span.name,
+                "start_s": span.start,
+                "end_s": span.end,
+                "start_deg": math.degrees(span.start_angle),
+                "end_deg": math.degrees(span.end_angle),
+            }
+            for span in events.phases
+        ],
     }
-    functions = {
-        "residual-torque": elbow.residual_torque,
-        "work": elbow.work,
-        "impulse": elbow.impulse,
-    }
-    for name in outputs:
-        value = functions[name](joint, motion)
-        document[SCENE_OUTPUTS[name]] = None if math.isnan(value) else value
-    if times:
-        values = elbow.torque(joint, motion, times).tolist()
-        document["torque_at_s"] = _torques("time_s", times, values)
-    if angles:
-        values = elbow.torque_at(joint, motion, [math.radians(a) for a in angles])
-        document["torque_at_deg"] = _torques("angle_deg", angles, values.tolist())
+    if quantities != Quantities():
+        document |= _requested(scene, quantities)
     for key, number in document.items():
         if isinstance(number, float) and not math.isfinite(number):
             raise ParameterError(
@@ -116,30 +112,26 @@ def scene_document(
     return document
 
 
-def _torques(
-    key: str, places: Sequence[float], values: Sequence[float]
-) -> list[dict[str, float]]:
-    return [
-        {key: place, "torque_nm": value}
-        for place, value in zip(places, values, strict=True)
-    ]
+def _requested(scene: Scene, quantities: Quantities) -> dict[str, object]:
+    from masrel import elbow
 
-
-def _degrees(value: float | None) -> float | None:
-    return None if value is None else math.degrees(value)
-
-
-def _phases(events: "Events") -> list[dict[str, object]]:
-    return [
-        {
-            "name": span.name,
-            "start_s": span.start,
-            "end_s": span.end,
-            "start_deg": math.degrees(span.start_angle),
-            "end_deg": math.degrees(span.end_angle),
-        }
-        for span in events.phases
-    ]
+    joint, motion = scene.parameters, scene.motion
+    requested: dict[str, object] = {}
+    functions = {
+        "residual-torque": elbow.residual_torque,
+        "work": elbow.work,
+        "impulse": elbow.impulse,
+    }
+    for name in quantities.outputs:
+        value = functions[name](joint, motion)
+        requested[SCENE_OUTPUTS[name]] = None if math.isnan(value) else value
+    if times := quantities.times:
+        torques = elbow.torque(joint, motion, times)
+        requested["torque_at_s"] = torque_rows("time_s", times, torques)
+    if angles := quantities.angles:
+        torques = elbow.torque_at(joint, motion, [math.radians(a) for a in angles])
+        requested["torque_at_deg"] = torque_rows("angle_deg", angles, torques)
+    return requested
 
 
 def scene_text(document: dict[str, Any], title: str) -> str:
