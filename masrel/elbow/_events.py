@@ -6,7 +6,7 @@ https://doi.org/10.1109/TNSRE.2012.2195330, equations (2), (4), (6) and Fig. 7.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import pairwise
 from typing import NamedTuple, TypeVar
 
@@ -56,7 +56,24 @@ class PhaseSpan:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class StretchEvents:
+class _Reached:
+    """What a stretch may reach."""
+
+    onset: float | None = None
+    catch: float | None = None
+    catch_angle: float | None = None
+    catch_speed: float | None = None
+    mean_speed: float | None = None
+    peak_end: float | None = None
+    catch_end: float | None = None
+    post_catch_end: float | None = None
+
+
+_REACHED = tuple(item.name for item in fields(_Reached))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StretchEvents(_Reached):
     """When one stretch catches and goes on; None for what it does not reach.
 
     Attributes
@@ -80,17 +97,10 @@ class StretchEvents:
     """
 
     onset: float
-    catch: float | None = None
-    catch_angle: float | None = None
-    catch_speed: float | None = None
-    mean_speed: float | None = None
-    peak_end: float | None = None
-    catch_end: float | None = None
-    post_catch_end: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Events:
+class Events(_Reached):
     """When a motion moves, catches, and goes on.
 
     Attributes
@@ -101,60 +111,16 @@ class Events:
         The motion ends, at its own end or at the end of range, s.
     phases : tuple of PhaseSpan
         The phases in order.
-
-    Notes
-    -----
-    `onset`, `catch` and the other attributes of `StretchEvents` are those of the first
-    stretch that catches, or of the first if none does; None if there is none.
+    onset, catch, catch_angle, catch_speed : float or None
+        As of `StretchEvents`, of the first stretch that catches, or of the first if
+        none does; None if there is none.
+    mean_speed, peak_end, catch_end, post_catch_end : float or None
+        Likewise.
     """
 
     stretches: tuple[StretchEvents, ...]
     end: float
     phases: tuple[PhaseSpan, ...]
-
-    @property
-    def _first(self) -> StretchEvents | None:
-        return first_stretch(self.stretches)
-
-    @property
-    def onset(self) -> float | None:
-        """Speed first reaches ν_th, s."""
-        return None if self._first is None else self._first.onset
-
-    @property
-    def catch(self) -> float | None:
-        """The catch begins, s."""
-        return None if self._first is None else self._first.catch
-
-    @property
-    def catch_angle(self) -> float | None:
-        """Angle where the catch begins, rad."""
-        return None if self._first is None else self._first.catch_angle
-
-    @property
-    def catch_speed(self) -> float | None:
-        """v_c of (3), rad/s."""
-        return None if self._first is None else self._first.catch_speed
-
-    @property
-    def mean_speed(self) -> float | None:
-        """Mean speed from onset to catch, rad/s."""
-        return None if self._first is None else self._first.mean_speed
-
-    @property
-    def peak_end(self) -> float | None:
-        """The peak of (3) ends, s."""
-        return None if self._first is None else self._first.peak_end
-
-    @property
-    def catch_end(self) -> float | None:
-        """The catch ends, s."""
-        return None if self._first is None else self._first.catch_end
-
-    @property
-    def post_catch_end(self) -> float | None:
-        """Speed falls below ν_th again after the catch, s."""
-        return None if self._first is None else self._first.post_catch_end
 
 
 def events(parameters: ElbowParameters, motion: Motion) -> Events:
@@ -212,7 +178,11 @@ def events(parameters: ElbowParameters, motion: Motion) -> Events:
         if until.time > start.time  # one of no length is left out
     ]
     stretches = [rounded(stretch, origin, end) for stretch in line.stretches]
-    return Events(stretches=tuple(stretches), end=end.time, phases=tuple(phases))
+    first = first_stretch(stretches)
+    reached = {} if first is None else {name: getattr(first, name) for name in _REACHED}
+    return Events(
+        **reached, stretches=tuple(stretches), end=end.time, phases=tuple(phases)
+    )
 
 
 def first_stretch(stretches: Sequence[_Stretch]) -> _Stretch | None:

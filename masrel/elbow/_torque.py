@@ -218,7 +218,8 @@ def peak_torque(parameters: ElbowParameters, motion: Motion) -> float:
     >>> round(peak_torque(STANDARD_MODELS["HM3"], stretch), 3)
     10.984
     """
-    return loads(parameters, motion, timeline(parameters, motion), "peak_torque")
+    laid = segments(parameters, timeline(parameters, motion))
+    return max(map(section_peak, sections(laid, motion)))
 
 
 def residual_torque(parameters: ElbowParameters, motion: Motion) -> float:
@@ -429,27 +430,16 @@ def loads(p: ElbowParameters, motion: Motion, line: Timeline, name: str) -> floa
         return float(_law.catch(p, first.pre_end, first.rise)[1].level)
     parts = sections(segments(p, line), motion)
     if name == "peak_torque":
-        return functools.reduce(_peak_of_both, parts, -math.inf)
+        return max(map(section_peak, parts))
     of_section = section_work if name == "work" else section_impulse
     return math.fsum(float(np.sum(of_section(part))) for part in parts)
-
-
-def _peak_of_both(best: float, section: Section) -> float:
-    # the larger of a torque and of the largest of a section, or of a column of them
-    length, _, torque = section
-    if not isinstance(length, np.ndarray):
-        return max(best, section_peak(section))
-    best = max(best, float(np.max(np.maximum(torque[0], value(torque, length)))))
-    bounds = functools.reduce(np.maximum, bernstein(torque, length), 0.0 * length)
-    for i in np.flatnonzero(~(bounds <= best)).tolist():
-        one = [float(c[i] if np.ndim(c) else c) for c in torque]
-        best = max(best, section_peak(Section(float(length[i]), [0.0], one)))
-    return best
 
 
 def section_peak(section: Section) -> float:
     """Return the largest torque, N·m: at an end, or where it turns."""
     length, _, torque = section
+    if isinstance(length, np.ndarray):
+        return _column_peak(length, torque)
     if not math.isfinite(sum(map(abs, torque))):
         return math.inf  # more than a float can hold
     peak = float(max(torque[0], value(torque, length)))
@@ -457,6 +447,16 @@ def section_peak(section: Section) -> float:
         return peak
     turns = split_at_roots(derivative(torque), length)[1:-1]
     return float(max([peak, *[value(torque, x) for x in turns]]))
+
+
+def _column_peak(length: Floats, torque: Polynomial) -> float:
+    # the largest of all, where it turns only in rows that may be the largest
+    best = float(np.max(np.maximum(torque[0], value(torque, length))))
+    bounds = functools.reduce(np.maximum, bernstein(torque, length), 0.0 * length)
+    for i in np.flatnonzero(~(bounds <= best)).tolist():
+        one = [float(c[i] if np.ndim(c) else c) for c in torque]
+        best = max(best, section_peak(Section(float(length[i]), [0.0], one)))
+    return best
 
 
 def section_work(section: Section) -> Number:
