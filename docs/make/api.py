@@ -21,6 +21,7 @@ MODULES = (
     "masrel.protocol",
     "masrel.schedule",
     "masrel.run",
+    "masrel.training",
     "masrel.ratings",
     "masrel.analysis",
     "masrel.verification",

@@ -33,6 +33,7 @@ GROUPS = {
         "demo": "The whole flow on the simulated device.",
     },
     "Its conduct": {
+        "train": "Teach a rater on models of known grade, until a test is passed.",
         "run": "Present a schedule's models and record every grade.",
         "ratings": "Turn session logs into the table of ratings.",
         "analyze": "Compute the agreement tables a study asks for.",

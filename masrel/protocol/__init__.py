@@ -28,6 +28,7 @@ from masrel.protocol.definition import (
     SimulatedRaters,
     Stretch,
     Study,
+    Training,
 )
 from masrel.protocol.read import read_model_file, read_protocol
 from masrel.protocol.study import StudyPaths, copy_template, template_names
@@ -50,6 +51,7 @@ __all__ = [
     "Stretch",
     "Study",
     "StudyPaths",
+    "Training",
     "copy_template",
     "elbow_parameters",
     "joint_model",

@@ -31,6 +31,7 @@ def broken_rules(values: Values) -> tuple[str, ...]:
         *_schedules(values),
         *_device(values),
         *_presentation(values),
+        *_training(values),
         *kind_rules(values),
         *joint_rules(values),
         *_plan(values),
@@ -218,6 +219,23 @@ def _cued_speeds(
         yield (
             f"presentation.slow_speed_deg_s: needed a stretch of {end - start:g} deg "
             f"within presentation.stretch_limit_s ({limit:g}), got {slow:g}"
+        )
+
+
+def _training(values: Values) -> Iterator[str]:
+    # two kappas apart, and a window that training can fill
+    rules = values.get("training") or {}
+    low, high = rules.get("kappa_insufficient"), rules.get("kappa_sufficient")
+    if low is not None and high is not None and low >= high:
+        yield (
+            f"training.kappa_insufficient: needed less than training.kappa_sufficient "
+            f"({high:g}), got {low:g}"
+        )
+    window, longest = rules.get("window"), rules.get("max_presentations")
+    if window is not None and longest is not None and window > longest:
+        yield (
+            f"training.window: needed at most training.max_presentations "
+            f"({longest}), got {window}"
         )
 
 

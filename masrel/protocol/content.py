@@ -171,6 +171,17 @@ _LATER: dict[str, dict[str, object]] = {
         "loose_inertia_kg_m2": 0.06,
         "torque_sensor": False,
     },
+    "training": {
+        "kappa_insufficient": 0.6,
+        "kappa_sufficient": 0.8,
+        "weights": "linear",
+        "false_pass": 0.05,
+        "false_fail": 0.1,
+        "window": 48,
+        "order": "blocked",
+        "max_presentations": 96,
+        "seed": 0,
+    },
 }
 """Keys that protocols once had not, by table, with the defaults they then had: these
 do not enter, so that no schedule drawn before turns stale."""
@@ -239,6 +250,8 @@ def _content_hash(content: object, ignored: tuple[str, ...] = ()) -> str:
         for key in ignored:
             model.pop(key, None)
     for table, defaults in _LATER.items():
+        if table not in plain:
+            continue
         for key, default in defaults.items():
             if plain[table][key] == default:
                 del plain[table][key]

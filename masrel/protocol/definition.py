@@ -209,6 +209,20 @@ class SimulatedRaters(_Table, frozen=True, kw_only=True):
     speed_sd_deg_s: _NonNegative = 15.0
 
 
+class Training(_Table, frozen=True, kw_only=True):
+    """``[training]``: when ``masrel train`` has taught a rater enough."""
+
+    kappa_insufficient: Annotated[float, Meta(ge=0, lt=1)] = 0.6
+    kappa_sufficient: Annotated[float, Meta(gt=0, le=1)] = 0.8
+    weights: Literal["identity", "linear", "quadratic"] = "linear"
+    false_pass: Annotated[float, Meta(ge=0.001, le=0.5)] = 0.05
+    false_fail: Annotated[float, Meta(ge=0.001, le=0.5)] = 0.1
+    window: Annotated[int, Meta(ge=2, le=500)] = 48
+    order: Literal["blocked", "adaptive"] = "blocked"
+    max_presentations: Annotated[int, Meta(ge=2, le=500)] = 96
+    seed: Annotated[int, Meta(ge=0, le=2**63 - 1)] = 0
+
+
 class EstimatePlan(_Table, frozen=True, kw_only=True):
     """``[[analysis.estimates]]``: one line of the analysis plan."""
 
@@ -275,5 +289,6 @@ class Protocol(_Table, frozen=True, kw_only=True):
     presentation: PresentationRules = PresentationRules()
     device: DeviceSettings = DeviceSettings()
     simulated_raters: SimulatedRaters = SimulatedRaters()
+    training: Training = Training()
     analysis: Analysis = Analysis()
     report: Report = Report()

@@ -70,6 +70,11 @@ class StudyPaths:
         """The same secret once everybody may know it."""
         return self.root / "published_secret.txt"
 
+    @property
+    def training(self) -> Path:
+        """The folder of training logs and recordings; no rating of the study."""
+        return self.root / "training"
+
     def schedule_file(self, rater: str, session: str) -> Path:
         """Return the file of one rater's schedule; it names the models."""
         return self.schedules / f"{session}_{rater}.csv"
@@ -85,6 +90,10 @@ class StudyPaths:
     def recording_file(self, rater: str, session: str, code: str) -> Path:
         """Return the file of the recording of one presentation."""
         return self.sessions / f"{session}_{rater}" / f"{code}.npz"
+
+    def training_log_file(self, rater: str) -> Path:
+        """Return the file of the log of one rater's training."""
+        return self.training / f"{rater}.jsonl"
 
 
 _BUNDLED = (

@@ -278,6 +278,20 @@ class Differences:
     level: float  # of the intervals
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LearningView:
+    """A training: kappa at the end of each block, and each grade below it."""
+
+    title: str  # whose training, and how it ended
+    # (n_points,): number of the last presentation; kappa and its interval
+    positions: tuple[int, ...]
+    kappas: tuple[tuple[float, float, float], ...]
+    level: float  # of the intervals
+    bounds: tuple[float, float]  # insufficient and sufficient kappa
+    # of every presentation: grades by which it is too high, and whether it counts
+    differences: tuple[tuple[int, bool], ...]
+
+
 Content = (
     GradeGrid
     | Forest
@@ -293,5 +307,6 @@ Content = (
     | FrictionView
     | RaterPairs
     | Differences
+    | LearningView
 )
 """Whatever can be drawn."""

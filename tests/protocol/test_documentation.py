@@ -25,6 +25,7 @@ TABLES = {
     "[presentation]": definition.PresentationRules,
     "[device]": definition.DeviceSettings,
     "[simulated_raters]": definition.SimulatedRaters,
+    "[training]": definition.Training,
     "[analysis]": definition.Analysis,
     "[[analysis.estimates]]": definition.EstimatePlan,
     "[report]": definition.Report,

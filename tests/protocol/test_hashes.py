@@ -63,6 +63,7 @@ def test_what_a_rater_meets_enters_both(
         (("raters",), [{"id": "R1"}, {"id": "R2"}, {"id": "R3"}]),
         (("sessions", 1, "note"), "later"),
         (("analysis", "level"), 0.9),
+        (("training",), {"window": 40}),
         (("report", "title"), "Another"),
     ],
 )

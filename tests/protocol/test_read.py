@@ -160,6 +160,22 @@ NUMBER = "a number above 0 and at most 180"
             "device.standing_torque_nm (2 N·m) where the stretch starts, got 4 N·m/rad "
             'times 30 - 0 deg = 2.09 N·m (id "HM1")',
         ),
+        (
+            ("training",),
+            {"kappa_insufficient": 0.9},
+            "training.kappa_insufficient: needed less than training.kappa_sufficient "
+            "(0.8), got 0.9",
+        ),
+        (
+            ("training",),
+            {"max_presentations": 40},
+            "training.window: needed at most training.max_presentations (40), got 48",
+        ),
+        (
+            ("training",),
+            {"order": "random"},
+            'training.order: needed one of "adaptive", "blocked", got "random"',
+        ),
         # ids
         (
             ("study", "id"),

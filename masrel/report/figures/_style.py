@@ -141,6 +141,10 @@ def _figure(content: data.Content) -> Figure:
             from masrel.report.figures._limits_figure import limits_figure
 
             return limits_figure(content)
+        case data.LearningView():
+            from masrel.report.figures._learning_figure import learning_figure
+
+            return learning_figure(content)
         case data.LatentScale():
             from masrel.report.figures._latent_scale import latent_figure
 

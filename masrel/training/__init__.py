@@ -1,0 +1,60 @@
+"""Training of a rater: models with known grades, feedback, and a test of what is learnt.
+
+In: a protocol. Out: a log of its own for every rater. Nothing of a training enters the
+ratings of the study.
+"""
+
+import importlib
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from masrel.training._simulated_trainee import SimulatedTrainee
+    from masrel.training.criterion import (
+        Calibration,
+        Criterion,
+        TraineeErrors,
+        calibrate,
+        training_criterion,
+    )
+    from masrel.training.learning_curve import CurvePoint, learning_curve
+    from masrel.training.record import Lesson, TrainingRecord, read_training
+    from masrel.training.trainees import confusion
+    from masrel.training.trainer import train_rater
+
+__all__ = [
+    "Calibration",
+    "Criterion",
+    "CurvePoint",
+    "Lesson",
+    "SimulatedTrainee",
+    "TraineeErrors",
+    "TrainingRecord",
+    "calibrate",
+    "confusion",
+    "learning_curve",
+    "read_training",
+    "train_rater",
+    "training_criterion",
+]
+
+_HOMES = {
+    "_simulated_trainee": ("SimulatedTrainee",),
+    "criterion": (
+        "Calibration",
+        "Criterion",
+        "TraineeErrors",
+        "calibrate",
+        "training_criterion",
+    ),
+    "learning_curve": ("CurvePoint", "learning_curve"),
+    "record": ("Lesson", "TrainingRecord", "read_training"),
+    "trainees": ("confusion",),
+    "trainer": ("train_rater",),
+}
+
+
+def __getattr__(name: str) -> object:
+    for module, names in _HOMES.items():
+        if name in names:
+            return getattr(importlib.import_module(f"masrel.training.{module}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
