@@ -1,4 +1,4 @@
-"""Training of a rater: models with known grades, feedback, and a test of what is learnt.
+"""Training of raters: models of known grade, feedback, a test of what is learnt.
 
 In: a protocol. Out: a log of its own for every rater. Nothing of a training enters the
 ratings of the study.

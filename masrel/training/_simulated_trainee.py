@@ -18,8 +18,8 @@ _N_WORDS = 2.0**64
 class SimulatedTrainee:
     """A trainee who confuses neighbouring grades less and less.
 
-    The grade depends on the seed of ``[simulated_raters]``, the rater, the model and the
-    number of the presentation alone. Nothing here models a person.
+    The grade depends on the seed of ``[simulated_raters]``, the rater, the model and
+    the number of the presentation alone. Nothing here models a person.
 
     Parameters
     ----------

@@ -16,9 +16,9 @@ def next_model(
     rater: str,
 ) -> tuple[str, bool]:
     """Return the id of the next model, and whether the criterion counts it."""
-    # intended: of each model. Blocks have every model `BLOCK_REPEATS` times, in an order
-    # of their own; each is drawn by its number alone, so that a training goes on as if
-    # nothing had stopped it.
+    # intended: grade by model. Blocks have every model `BLOCK_REPEATS` times; each is
+    # drawn by its number alone, so that a training goes on as if nothing had stopped
+    # it.
     block_size = BLOCK_REPEATS * len(intended)
     n_counted = sum(lesson.counts for lesson in lessons)
     block, place = divmod(n_counted, block_size)

@@ -119,7 +119,7 @@ class Criterion:
         return float(COHEN_KERNEL.value(sums, self._disagreement()))
 
     def _disagreement(self) -> _Floats:
-        # (n_grades, n_grades)
+        # of every two grades
         return declared_weights(self.weights, self.grades).floats
 
     def _features(self) -> _Floats:
@@ -290,7 +290,7 @@ def _simulated_evidence(
         return None
     shape = n_simulated, criterion.max_presentations
     intended = draw_blocks(criterion.intended, shape, rng)
-    return criterion.evidence(intended, draw_grades(confusion, intended, rng))
+    return criterion.evidence(intended, draw_grades(confusion[intended], rng))
 
 
 def _boundary(largest: _Floats, share: float) -> float:

@@ -114,24 +114,17 @@ def draw_blocks(
     intended: Sequence[int], shape: tuple[int, int], rng: np.random.Generator
 ) -> _Integers:
     """Return intended grades in blocks of random order."""
-    # shape: (n_trainees, n_presentations)
+    # takes and returns the shape (n_trainees, n_presentations)
     block = np.repeat(np.asarray(intended, dtype=np.int64), BLOCK_REPEATS)
     n_blocks = -(-shape[1] // block.size)
     drawn = rng.permuted(np.tile(block, (shape[0], n_blocks, 1)), axis=2)
     return drawn.reshape(shape[0], -1)[:, : shape[1]]
 
 
-def draw_grades(
-    confusions: _Floats, intended: _Integers, rng: np.random.Generator
-) -> _Integers:
-    """Return the grades of simulated trainees."""
-    # confusions (n_grades, n_grades), or (..., n_grades, n_grades) of every
-    # presentation; intended (n_trainees, n_presentations)
-    if confusions.ndim == 2:
-        rows = confusions.cumsum(axis=1)[intended]
-    else:
-        at = intended[..., None, None]
-        rows = np.take_along_axis(confusions, at, axis=-2)[..., 0, :].cumsum(axis=-1)
-    shares = rng.random(intended.shape)[..., None]
-    codes = (shares >= rows).sum(axis=-1)
-    return np.minimum(codes, rows.shape[-1] - 1).astype(np.int64)
+def draw_grades(probabilities: _Floats, rng: np.random.Generator) -> _Integers:
+    """Return a grade for each row of probabilities of the grades."""
+    # one grade a row, whatever shape the rows stand in
+    rows = probabilities.cumsum(axis=-1)
+    shares = rng.random(rows.shape[:-1])[..., None]
+    codes: _Integers = (shares >= rows).sum(axis=-1, dtype=np.int64)
+    return codes.clip(max=rows.shape[-1] - 1)
