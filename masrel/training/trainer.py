@@ -198,10 +198,10 @@ class _Trainer:
         if calibration.false_fail > rules.false_fail:
             raise ProtocolError(
                 f"{self._study.protocol}: training.max_presentations: needed enough to "
-                f"fail at most {rules.false_fail:.1%} of trainees with kappa "
+                f"fail at most {100.0 * rules.false_fail:g} % of trainees with kappa "
                 f"{rules.kappa_sufficient:g}, got {rules.max_presentations}, which "
-                f"fail {calibration.false_fail:.1%}; allow more, with a longer window, "
-                "or put the two kappas further apart"
+                f"fail {100.0 * calibration.false_fail:.1f} %; allow more, with a "
+                "longer window, or put the two kappas further apart"
             )
         # An order that anybody can draw again from the protocol teaches by heart.
         seed = rules.seed if self._grades.simulated else secrets.randbits(53)

@@ -1,0 +1,302 @@
+"""masrel train as a user calls it: taught, killed, gone on with, reported, refused."""
+
+import csv
+import json
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+
+from masrel.agreement import cohen_kappa
+from masrel.protocol import StudyPaths, copy_template, read_protocol
+from masrel.ratings import ratings_from_logs
+from masrel.run import SimulatedGrades, read_log, run_session
+from masrel.schedule import write_schedules
+from masrel.training import (
+    SimulatedTrainee,
+    TrainingRecord,
+    read_training,
+    train_rater,
+)
+from tests.cli.process import Caller
+
+# A test that few presentations decide
+RULES = """
+[training]
+kappa_insufficient = 0.3
+kappa_sufficient = 0.95
+false_pass = 0.2
+window = 24
+max_presentations = 32
+"""
+
+
+def new_study(root: Path) -> Path:
+    copy_template("small", root)
+    with (root / "protocol.toml").open("a", encoding="utf-8") as file:
+        file.write(RULES)
+    return root
+
+
+@pytest.fixture
+def study(tmp_path: Path) -> Path:
+    """A new study whose training is short."""
+    return new_study(tmp_path / "study")
+
+
+@pytest.fixture(scope="module")
+def trained_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same with a simulated training of R1, for tests to copy."""
+    root = new_study(tmp_path_factory.mktemp("trained") / "study")
+    train_simulated(root)
+    return root
+
+
+@pytest.fixture
+def trained(trained_once: Path, tmp_path: Path) -> Path:
+    """A study with a training that has ended."""
+    return Path(shutil.copytree(trained_once, tmp_path / "trained"))
+
+
+def train_simulated(root: Path) -> TrainingRecord:
+    protocol = read_protocol(root / "protocol.toml")
+    trainee = SimulatedTrainee(protocol)
+    return train_rater(
+        StudyPaths(root), protocol, "R1", grades=trainee, clock="simulated"
+    )
+
+
+def changed(root: Path, old: str, new: str) -> None:
+    file = root / "protocol.toml"
+    text = file.read_text(encoding="utf-8")
+    assert old in text
+    file.write_text(text.replace(old, new), encoding="utf-8")
+
+
+def answers(monkeypatch: pytest.MonkeyPatch, *lines: str) -> None:
+    import io
+
+    monkeypatch.setattr("sys.stdin", io.StringIO("".join(f"{x}\n" for x in lines)))
+
+
+def test_a_simulated_trainee_learns_passes_and_is_reported(
+    trained: Path, masrel: Caller, tmp_path: Path
+) -> None:
+    done = masrel("train", trained, "--rater", "R1", "--grades", "simulated")
+    assert done.code in (0, None)
+    assert "training of R1: passed after" in done.out
+    assert "(simulated)" in done.out
+    assert "Nothing of a training enters the ratings" in done.out
+    figure, file = tmp_path / "curve.svg", tmp_path / "training.json"
+    report = ["train", trained, "--rater", "R1", "--report"]
+    shown = masrel(*report, "--figure", figure, "--json", file)
+    assert shown.out.startswith("SIMULATED DATA. Training of R1: passed after")
+    assert "Grades of R1 by intended grade" in shown.out
+    assert b"<svg" in figure.read_bytes()
+    document = json.loads(file.read_text(encoding="utf-8"))
+    assert document["simulated"] is True
+    assert document["enters_ratings"] is False
+    lessons = document["lessons"]
+    pairs = [(one["intended"], one["grade"]) for one in lessons]
+    last = document["curve"][-1]
+    kappa = cohen_kappa(
+        pairs[-last["n_presentations"] :],
+        categories=["0", "1", "1+", "2", "3", "4"],
+        weights="linear",
+    )
+    assert last["kappa"] == pytest.approx(kappa.value, abs=1e-12)
+    assert last["low"] < last["kappa"] <= last["high"]
+    assert last["evidence"] >= document["criterion"]["boundary"]
+    assert all(p["evidence"] < document["criterion"]["boundary"]
+               for p in document["curve"][:-1])  # fmt: skip
+    rows = list(csv.DictReader(masrel(*report, "--csv").out.splitlines()))
+    assert [float(row["kappa"]) for row in rows] == [
+        point["kappa"] for point in document["curve"]
+    ]
+    assert {row["data"] for row in rows} == {"simulated"}
+
+
+def test_what_has_ended_is_left_as_it_is(trained: Path, masrel: Caller) -> None:
+    before = (trained / "training" / "R1.jsonl").read_bytes()
+    again = masrel("train", trained, "--rater", "R1", "--grades", "simulated")
+    assert "training of R1: passed after" in again.out
+    assert (trained / "training" / "R1.jsonl").read_bytes() == before
+
+
+def test_no_rating_of_the_study_comes_from_a_training(trained: Path) -> None:
+    paths = StudyPaths(trained)
+    protocol = read_protocol(paths.protocol)
+    write_schedules(protocol, paths)
+    grades = SimulatedGrades(protocol)
+    run_session(paths, protocol, "R1", "test", grades=grades, clock="simulated")
+    after = ratings_from_logs(paths, protocol)
+    assert len(after.table) == 4
+    shutil.rmtree(paths.training)
+    assert ratings_from_logs(paths, protocol).table.equals(after.table)
+
+
+def test_a_person_is_told_the_grade_after_each_and_goes_on_after_a_stop(
+    study: Path, masrel: Caller, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    call = ["train", study, "--rater", "R1", "--clock", "simulated"]
+    answers(monkeypatch, "", "1", "", "again", "", "2", "stop")
+    stopped = masrel(*call)
+    assert stopped.code == 1
+    assert "presentation 3 of 32; the same command goes on there" in stopped.err
+    record = read_training(
+        StudyPaths(study), read_protocol(study / "protocol.toml"), "R1"
+    )
+    assert [one.grade for one in record.lessons] == ["1", "2"]
+    for one in record.lessons:
+        if one.grade == one.intended:
+            assert f"Right: {one.intended}." in stopped.out
+        else:
+            assert f"Not {one.grade}: it is {one.intended}." in stopped.out
+    assert "HM" not in stopped.out  # no model is named
+    answers(monkeypatch, "stop")
+    assert "Presentation 3 of 32" in masrel(*call).out
+    kinds = [event.kind for event in read_log(study / "training" / "R1.jsonl")]
+    assert kinds == [
+        *("training", "presented", "grade", "presented", "presented", "grade"),
+        *("stopped", "resumed", "stopped"),
+    ]
+
+
+class _Killed(BaseException):
+    """The process is gone."""
+
+
+def die_at(
+    monkeypatch: pytest.MonkeyPatch, fatal_line: int, n_bytes: int
+) -> pytest.MonkeyPatch:
+    """Let `os.write` write some bytes of the n-th line of a log, and then die."""
+    write, n_lines = os.write, 0
+
+    def write_or_die(descriptor: int, data: bytes) -> int:
+        nonlocal n_lines
+        is_log = os.readlink(f"/proc/self/fd/{descriptor}").endswith(".jsonl")
+        n_lines += is_log
+        if is_log and n_lines == fatal_line:
+            write(descriptor, bytes(data)[:n_bytes])
+            raise _Killed
+        return write(descriptor, data)
+
+    monkeypatch.setattr(os, "write", write_or_die)
+    return monkeypatch
+
+
+@pytest.mark.slow
+def test_killed_at_line_after_line_it_comes_to_the_same_end(
+    study: Path, trained: Path
+) -> None:
+    n_killed = 0
+    while n_killed < 500:
+        with pytest.MonkeyPatch.context() as patch:
+            # lines of a run: recovered if the last one was torn, resumed, then others
+            die_at(patch, 2 + n_killed % 6, 40 * (n_killed % 2))
+            try:
+                record = train_simulated(study)
+            except _Killed:
+                n_killed += 1
+            else:
+                break
+    protocol = read_protocol(study / "protocol.toml")
+    assert record == read_training(StudyPaths(trained), protocol, "R1")
+    assert n_killed > len(record.lessons)
+    events = read_log(study / "training" / "R1.jsonl")
+    named = {e.fields["recording"] for e in events if e.kind == "presented"}
+    there = {f"R1/{file.name}" for file in (study / "training" / "R1").glob("*.npz")}
+    assert named == there
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (
+            "max_presentations = 32",
+            "max_presentations = 32\nfalse_fail = 0.001",
+            "training.max_presentations: needed enough to fail at most 0.1 % of "
+            "trainees with kappa 0.95, got 32, which fail",
+        ),
+        (
+            "window = 24",
+            "window = 3",
+            "training.window: needed at least one presentation of each of the 4 models "
+            "with an intended grade, got 3",
+        ),
+    ],
+)
+def test_a_test_that_cannot_be_is_refused(
+    study: Path, masrel: Caller, old: str, new: str, message: str
+) -> None:
+    changed(study, old, new)
+    if "false_fail" in new:
+        changed(study, "kappa_insufficient = 0.3", "kappa_insufficient = 0.9")
+    refused = masrel("train", study, "--rater", "R1", "--grades", "simulated")
+    assert refused.code == 2
+    assert message in refused.err
+    assert not (study / "training" / "R1").exists()
+
+
+def test_one_known_grade_teaches_nothing(study: Path, masrel: Caller) -> None:
+    for grade in ("1+", "2", "3"):
+        changed(study, f'intended_grade = "{grade}"', 'intended_grade = "1"')
+    refused = masrel("train", study, "--rater", "R1", "--grades", "simulated")
+    assert refused.code == 2
+    assert "needs two or more different intended grades, got 1" in refused.err
+
+
+def test_bad_calls_are_one_sentence_each(study: Path, masrel: Caller) -> None:
+    def said(*arguments: object) -> str:
+        done = masrel("train", study, *arguments)
+        assert done.code == 2
+        return done.err.strip().splitlines()[-1]
+
+    assert "rater: needed one of R1, R2, got 'R9'" in said("--rater", "R9")
+    assert "no such log" in said("--rater", "R1", "--report")
+    assert "--csv: needed with --report only" in said("--rater", "R1", "--csv")
+    assert "--clock: needed without --report only" in said(
+        "--rater", "R1", "--report", "--clock", "real"
+    )
+
+
+def test_a_training_goes_on_with_what_it_was_begun_with(
+    trained: Path, masrel: Caller
+) -> None:
+    call = ["train", trained, "--rater", "R1", "--grades", "simulated"]
+    log = trained / "training" / "R1.jsonl"
+    changed(trained, "false_pass = 0.2", "false_pass = 0.1")
+    assert "begun with false_pass = 0.2: needed the same" in masrel(*call).err
+    changed(trained, "false_pass = 0.1", "false_pass = 0.2")
+    text = log.read_text(encoding="utf-8")
+    log.write_text(text.replace('"grade": "1"', '"grade": "3"', 1), encoding="utf-8")
+    assert "a line before was changed" in masrel(*call).err
+    log.unlink()
+    gone = masrel(*call)
+    assert gone.code == 2
+    assert "is gone, and there are recordings" in gone.err
+    changed(
+        trained, "catch_angle_constant_deg = 130.0", "catch_angle_constant_deg = 129.0"
+    )
+    log.write_text(text, encoding="utf-8")
+    changed_models = masrel("train", trained, "--rater", "R1", "--report")
+    assert "needed the training of the models that the protocol has now" in (
+        changed_models.err
+    )
+
+
+def test_an_adaptive_training_practises_what_was_wrong_and_does_not_count_it(
+    study: Path, masrel: Caller
+) -> None:
+    changed(study, "[training]", '[training]\norder = "adaptive"')
+    assert masrel("train", study, "--rater", "R1", "--grades", "simulated").code in (
+        0,
+        None,
+    )
+    record = read_training(
+        StudyPaths(study), read_protocol(study / "protocol.toml"), "R1"
+    )
+    assert len(record.counted) < len(record.lessons)
+    shown = masrel("train", study, "--rater", "R1", "--report").out
+    assert "for practice count for nothing" in shown

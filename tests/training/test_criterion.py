@@ -1,0 +1,197 @@
+"""The test that ends a training: its evidence, its kappa, its errors."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from masrel.agreement import cohen_kappa
+from masrel.training import Criterion, calibrate, confusion
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    return np.random.default_rng(20121)
+
+
+MAS = ("0", "1", "1+", "2", "3", "4")
+
+
+def criterion(**changes: object) -> Criterion:
+    settings = {
+        "grades": MAS,
+        "weights": "linear",
+        "intended": (1, 2, 3, 4),
+        "insufficient": 0.6,
+        "sufficient": 0.8,
+        "window": 48,
+        "max_presentations": 96,
+    }
+    return Criterion(**{**settings, **changes})  # type: ignore[arg-type]
+
+
+def test_the_evidence_of_two_models_by_hand() -> None:
+    # Grades a and b, reference 0.5; intended and given:   a b | a b | b a
+    #                                                      a a | a b | b a
+    # After 2: κ = 0 (p_o = 1/2, p_e = 1/2), evidence 2 (0 - 0.5) = -1.
+    # After 4: the last 2 are right, 2 (1 - 0.5) = 1; all 4 have p_o = 3/4, p_e = 1/2,
+    # κ = 1/2, evidence 0. After 6: the last 4 are right, 4 · 0.5 = 2; all 6 have
+    # p_o = 5/6, p_e = 1/2, κ = 2/3, evidence 6 (2/3 - 1/2) = 1.
+    two = criterion(
+        grades=("a", "b"),
+        weights="identity",
+        intended=(0, 1),
+        insufficient=0.25,
+        sufficient=0.75,
+        window=6,
+    )
+    intended, given = np.array([0, 1, 0, 1, 1, 0]), np.array([0, 0, 0, 1, 1, 0])
+    assert two.evidence(intended, given) == pytest.approx([-1.0, 1.0, 2.0], abs=1e-12)
+
+
+@pytest.mark.parametrize("weights", ["identity", "linear", "quadratic"])
+def test_the_evidence_is_that_of_the_best_run_looked_at_one_by_one(
+    weights: str, rng: np.random.Generator
+) -> None:
+    rule = criterion(weights=weights, window=20)
+    intended = rng.integers(1, 5, size=30)
+    codes = np.clip(intended + rng.integers(-1, 2, size=30), 0, 5)
+    pairs = [(MAS[i], MAS[j]) for i, j in zip(intended, codes, strict=True)]
+    expected = []
+    for end in range(4, 29, 4):
+        runs = [
+            n * (value - rule.reference)
+            for n in range(4, min(end, 20) + 1, 4)
+            if np.isfinite(
+                value := cohen_kappa(
+                    pairs[end - n : end], categories=MAS, weights=weights
+                ).value
+            )
+        ]
+        expected.append(max(runs))
+    assert rule.evidence(intended, codes) == pytest.approx(expected, abs=1e-11)
+
+
+def test_the_evidence_of_many_trainees_is_that_of_each(
+    rng: np.random.Generator,
+) -> None:
+    intended, codes = rng.integers(1, 5, (3, 5, 40)), rng.integers(0, 6, (3, 5, 40))
+    together = criterion().evidence(intended, codes)
+    assert together.shape == (3, 5, 10)
+    alone = criterion().evidence(intended[2, 1], codes[2, 1])
+    assert together[2, 1] == pytest.approx(alone, abs=0.0)
+
+
+def test_what_was_before_the_window_says_nothing() -> None:
+    rule = criterion(window=8)
+    right = np.tile([1, 2, 3, 4], 5)
+    wrong_once = right.copy()
+    wrong_once[:12] = 0
+    after_both = rule.evidence(right, wrong_once)[-1]
+    assert after_both == pytest.approx(rule.evidence(right, right)[-1], abs=1e-12)
+    assert after_both == pytest.approx(8 * 0.3, abs=1e-12)
+
+
+def test_kappa_of_two_grades_by_hand() -> None:
+    # an error of one in ten in both grades: p_o = 0.9, p_e = 0.5, κ = 0.8
+    rule = criterion(grades=("a", "b"), weights="identity", intended=(0, 1))
+    assert rule.kappa(np.array([[0.9, 0.1], [0.1, 0.9]])) == pytest.approx(0.8)
+
+
+def test_kappa_of_probabilities_is_that_of_very_many_grades(
+    rng: np.random.Generator,
+) -> None:
+    rule = criterion()
+    table = confusion("shift", 0.6, 6, rule.intended)
+    intended = np.repeat([1, 2, 3, 4], 20_000)
+    codes = (rng.random(80_000)[:, None] > table.cumsum(axis=1)[intended]).sum(axis=1)
+    pairs = np.column_stack([intended, codes])
+    many = cohen_kappa(pairs, categories=range(6), weights="linear")
+    # four standard errors: a false alarm in 16 000
+    assert rule.kappa(table) == pytest.approx(many.value, abs=4.0 * many.standard_error)
+
+
+def test_the_errors_are_those_of_all_courses_a_training_can_take() -> None:
+    # Two models and six presentations: 6 orders of the first block, the first two of 6
+    # orders of the second, and 2^6 ways to err, each with its probability.
+    rule = criterion(
+        grades=("a", "b"),
+        weights="identity",
+        intended=(0, 1),
+        insufficient=0.2,
+        sufficient=0.7,
+        window=6,
+        max_presentations=6,
+    )
+    result = calibrate(rule, false_pass=0.1, rng=5, n_simulated=20_000)
+    orders = sorted(set(itertools.permutations([0, 0, 1, 1])))
+    courses = np.array([[*a, *b[:2]] for a in orders for b in orders])
+    for errors in result.errors:
+        for kappa, share in (
+            (0.2, errors.false_pass),
+            (0.7, None if errors.false_fail is None else 1.0 - errors.false_fail),
+        ):
+            exact = 0.0
+            # κ = 1 - 2 e with errors alike, which "shift" has not
+            if errors.skill == "shift" or share is None:
+                continue
+            chance = 0.5 * (1.0 - kappa)
+            for wrong in itertools.product([0, 1], repeat=6):
+                passes = (
+                    rule.evidence(courses, courses ^ np.array(wrong)) >= result.boundary
+                ).any(axis=1)
+                n_wrong = sum(wrong)
+                exact += (
+                    chance**n_wrong * (1.0 - chance) ** (6 - n_wrong) * passes.mean()
+                )
+            # four standard errors of a share of 20 000
+            assert share == pytest.approx(
+                exact, abs=4.0 * (exact * (1.0 - exact) / 20_000) ** 0.5
+            )
+
+
+def test_no_kind_of_trainee_passes_too_often_and_one_as_often_as_may_be() -> None:
+    result = calibrate(criterion(), false_pass=0.1, rng=2, n_simulated=1_000)
+    shares = [errors.false_pass for errors in result.errors]
+    known = [share for share in shares if share is not None]
+    assert max(known) <= 0.1
+    assert max(known) > 0.09  # the boundary is no higher than it must be
+    assert result.false_fail == max(e.false_fail or 0.0 for e in result.errors)
+
+
+def test_the_boundary_rises_with_fewer_errors_and_with_more_looks() -> None:
+    def boundary(false_pass: float, longest: int) -> float:
+        rule = criterion(max_presentations=longest)
+        return calibrate(rule, false_pass=false_pass, rng=3, n_simulated=500).boundary
+
+    assert boundary(0.2, 48) < boundary(0.02, 48) < boundary(0.02, 160)
+
+
+def test_a_calibration_repeats() -> None:
+    first, second = (
+        calibrate(criterion(), false_pass=0.05, rng=7, n_simulated=200)
+        for _ in range(2)
+    )
+    assert first == second
+
+
+def test_noise_is_a_normal_variable_rounded(rng: np.random.Generator) -> None:
+    table = confusion("noise", 0.7, 5, (0, 1, 2, 3, 4))
+    felt = np.rint(2.0 + 0.7 * rng.standard_normal(100_000)).clip(0, 4)
+    freq = np.bincount(felt.astype(int), minlength=5) / 100_000
+    expected = 0.98 * freq + 0.02 / 5  # lapses give any grade
+    assert table[2] == pytest.approx(expected, abs=4.0 * (0.25 / 100_000) ** 0.5)
+    assert table.sum(axis=1) == pytest.approx(1.0)
+
+
+def test_noise_by_hand() -> None:
+    # P(Z < -0.5) of a standard normal is 0.308538: the lowest of two grades
+    table = confusion("noise", 1.0, 2, (0, 1))
+    assert table[1, 0] == pytest.approx(0.98 * 0.3085375387 + 0.01, abs=1e-9)
+
+
+def test_a_pair_confuses_two_models_alone() -> None:
+    table = confusion("pair", 0.3, 6, (1, 2, 3, 4))
+    assert table[2, 3] == pytest.approx(0.98 * 0.3 + 0.02 / 6)
+    assert table[3, 2] == pytest.approx(table[2, 3])
+    assert table[1, 1] == table[4, 4] == pytest.approx(0.98 + 0.02 / 6)
