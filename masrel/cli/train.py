@@ -104,7 +104,7 @@ def _train(
             rater,
             grades=_source(grades, protocol),
             clock=clock or ("simulated" if grades == "simulated" else "real"),
-            feedback=_tell if grades == "console" else None,
+            feedback=_show_grade if grades == "console" else None,
         )
     if not quiet:
         label = " (simulated)" if record.simulated else ""
@@ -114,7 +114,7 @@ def _train(
         )
 
 
-def _tell(lesson: "Lesson") -> None:
+def _show_grade(lesson: "Lesson") -> None:
     practice = "" if lesson.counts else " (Practice: it does not count.)"
     if lesson.grade == lesson.intended:
         click.echo(f"Right: {lesson.intended}.{practice}\n")

@@ -17,9 +17,9 @@ from masrel.report._tables import (
     number,
     percent,
 )
-from masrel.training.learning_curve import CURVE_BLOCKS, CurvePoint, learning_curve
-from masrel.training.record import TrainingRecord
-from masrel.training.trainees import BLOCK_REPEATS
+from masrel.training._learning_curve import CURVE_BLOCKS, CurvePoint, learning_curve
+from masrel.training._lessons import TrainingRecord
+from masrel.training._trainees import BLOCK_REPEATS
 
 NOT_RATINGS = "Nothing of a training enters the ratings of the study."
 

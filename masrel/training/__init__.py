@@ -8,18 +8,18 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from masrel.training._simulated_trainee import SimulatedTrainee
-    from masrel.training.criterion import (
+    from masrel.training._criterion import (
         Calibration,
         Criterion,
         TraineeErrors,
         calibrate,
         training_criterion,
     )
-    from masrel.training.learning_curve import CurvePoint, learning_curve
-    from masrel.training.record import Lesson, TrainingRecord, read_training
-    from masrel.training.trainees import confusion
-    from masrel.training.trainer import train_rater
+    from masrel.training._learning_curve import CurvePoint, learning_curve
+    from masrel.training._lessons import Lesson, TrainingRecord, read_training
+    from masrel.training._simulated_trainee import SimulatedTrainee
+    from masrel.training._trainees import confusion
+    from masrel.training._trainer import train_rater
 
 __all__ = [
     "Calibration",
@@ -39,17 +39,17 @@ __all__ = [
 
 _HOMES = {
     "_simulated_trainee": ("SimulatedTrainee",),
-    "criterion": (
+    "_criterion": (
         "Calibration",
         "Criterion",
         "TraineeErrors",
         "calibrate",
         "training_criterion",
     ),
-    "learning_curve": ("CurvePoint", "learning_curve"),
-    "record": ("Lesson", "TrainingRecord", "read_training"),
-    "trainees": ("confusion",),
-    "trainer": ("train_rater",),
+    "_learning_curve": ("CurvePoint", "learning_curve"),
+    "_lessons": ("Lesson", "TrainingRecord", "read_training"),
+    "_trainees": ("confusion",),
+    "_trainer": ("train_rater",),
 }
 
 

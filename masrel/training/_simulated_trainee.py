@@ -6,7 +6,7 @@ from typing import ClassVar
 from masrel.protocol import Protocol
 from masrel.run._grade_sources import MAX_FAULTS, GradeRequest
 from masrel.schedule.presentation import _Stream
-from masrel.training.trainees import confusion
+from masrel.training._trainees import confusion
 
 # Noise of perception in grades: at first, in the end, and in how many presentations
 # it comes nearer to the latter by a factor of e.

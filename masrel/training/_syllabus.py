@@ -3,8 +3,8 @@
 from collections.abc import Mapping, Sequence
 
 from masrel.schedule.presentation import _Stream
-from masrel.training.record import Lesson
-from masrel.training.trainees import BLOCK_REPEATS
+from masrel.training._lessons import Lesson
+from masrel.training._trainees import BLOCK_REPEATS
 
 
 def next_model(

@@ -133,18 +133,12 @@ def _figure(content: data.Content) -> Figure:
             from masrel.report.figures._forest import forest_figure
 
             return forest_figure(content)
-        case data.RaterPairs():
-            from masrel.report.figures._rater_pairs import rater_figure
-
-            return rater_figure(content)
+        case data.RaterPairs() | data.LearningView():
+            return _rater_figure(content)
         case data.Differences():
             from masrel.report.figures._limits_figure import limits_figure
 
             return limits_figure(content)
-        case data.LearningView():
-            from masrel.report.figures._learning_figure import learning_figure
-
-            return learning_figure(content)
         case data.LatentScale():
             from masrel.report.figures._latent_scale import latent_figure
 
@@ -155,6 +149,16 @@ def _figure(content: data.Content) -> Figure:
             return scene_figure(content)
         case _:
             return _joint_figure(content)
+
+
+def _rater_figure(content: data.RaterPairs | data.LearningView) -> Figure:
+    if isinstance(content, data.LearningView):
+        from masrel.report.figures._learning_figure import learning_figure
+
+        return learning_figure(content)
+    from masrel.report.figures._rater_pairs import rater_figure
+
+    return rater_figure(content)
 
 
 def _joint_figure(

@@ -15,7 +15,7 @@ import numpy as np
 from masrel.errors import SessionLogError
 from masrel.protocol import Protocol, StudyPaths, presented_hash
 from masrel.run._log import Event, read_log
-from masrel.training.criterion import Criterion, training_criterion
+from masrel.training._criterion import Criterion, training_criterion
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

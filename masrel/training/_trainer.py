@@ -20,22 +20,22 @@ from masrel.errors import (
 from masrel.hess import EmergencyStop
 from masrel.protocol import Protocol, StudyPaths, presented_hash, protocol_hash
 from masrel.recording import _Fact
-from masrel.run._grade_sources import GradeRequest, GradeSource
+from masrel.run._grade_sources import GradeRequest, GradeSource, StretchGrade
 from masrel.run._log import SessionLog, utc_now
-from masrel.run._present import Outcome, present, recover, spool_of
+from masrel.run._present import Outcome, present, presentation_status, recover, spool_of
 from masrel.run._runner import _TERMINATING, CLOCKS, ClockName
 from masrel.run._settings import moves_hardware
 from masrel.run.session import _check_device
 from masrel.schedule import Presentation
-from masrel.training._syllabus import next_model
-from masrel.training.criterion import calibrate, training_criterion
-from masrel.training.record import (
+from masrel.training._criterion import calibrate, training_criterion
+from masrel.training._lessons import (
     SETTINGS,
     Lesson,
     TrainingRecord,
     check_events,
     record_of,
 )
+from masrel.training._syllabus import next_model
 
 _FORMAT = 1
 
@@ -257,15 +257,23 @@ class _Trainer:
             for event in self._log.events
         )
         n_faults, grade = 0, None
-        request = self._request(position, model, attempt + 1, n_faults)
-        attempt += self._recovered(request)
+        attempt += self._recovered(self._request(position, model, attempt + 1))
         while grade is None:
             attempt += 1
-            request = self._request(position, model, attempt, n_faults)
+            request = self._request(position, model, attempt)
+            status = presentation_status(self._protocol, request)
+            request = replace(request, status=status, n_faults=n_faults)
             self._grades.make_ready(request)
-            fault = self._present(request).fault
+            outcome = self._present(request)
+            fault, made = outcome.fault, outcome.made
             n_faults = 0 if fault is None else n_faults + 1
-            request = self._request(position, model, attempt, n_faults)
+            request = replace(
+                request,
+                status=None,
+                n_faults=n_faults,
+                n_stretches=len(made.stretches),
+                felt=made.felt if fault is None else None,
+            )
             if fault is None:
                 grade = self._checked(position, self._grades.grade(request))
             elif not self._grades.present_again(request, fault.message):
@@ -275,9 +283,7 @@ class _Trainer:
                 )
         return grade
 
-    def _request(
-        self, position: int, model: str, attempt: int, n_faults: int
-    ) -> GradeRequest:
+    def _request(self, position: int, model: str, attempt: int) -> GradeRequest:
         return GradeRequest(
             rater=self._rater,
             session=_SESSION,
@@ -286,7 +292,7 @@ class _Trainer:
             ),
             n_presentations=self._protocol.training.max_presentations,
             attempt=attempt,
-            n_faults=n_faults,
+            rules=self._protocol.presentation,
         )
 
     def _file(self, request: GradeRequest) -> Path:
@@ -318,7 +324,8 @@ class _Trainer:
     def _log_presented(
         self, request: GradeRequest, outcome: Outcome, file: Path
     ) -> None:
-        fault, presentation = outcome.fault, request.presentation
+        fault, made = outcome.fault, outcome.made
+        presentation = request.presentation
         fields: dict[str, _Fact] = {
             "position": presentation.position,
             "attempt": request.attempt,
@@ -334,6 +341,8 @@ class _Trainer:
                 "n_missed_ticks": outcome.n_missed_ticks,
                 "fault": None if fault is None else fault.message,
                 "simulated": outcome.simulated,
+                "stretches": made.stretches,
+                "felt": made.felt if fault is None else None,
             },
         )
         if fault is not None:
@@ -341,7 +350,9 @@ class _Trainer:
             self._log.append("fault", {**fields, **facts})
         spool_of(file).unlink(missing_ok=True)  # only now is it of no use
 
-    def _checked(self, position: int, grade: str | None) -> str | None:
+    def _checked(self, position: int, grade: str | StretchGrade | None) -> str | None:
+        if isinstance(grade, StretchGrade):
+            grade = grade.grade
         grades = self._protocol.scale.grades
         if grade is not None and grade not in grades:
             raise ParameterError(

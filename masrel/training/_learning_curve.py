@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from masrel.errors import SmallSampleWarning, UndefinedStatisticWarning
 from masrel.estimates import Estimate
 from masrel.intervals import estimate
-from masrel.training.record import TrainingRecord
-from masrel.training.trainees import BLOCK_REPEATS
+from masrel.training._lessons import TrainingRecord
+from masrel.training._trainees import BLOCK_REPEATS
 
 CURVE_BLOCKS = 2
 """Blocks of which a point is made: fewer say little, more blur what was learnt."""

@@ -23,7 +23,7 @@ from masrel.agreement._data import CodedRatings
 from masrel.agreement._pairs import COHEN_KERNEL
 from masrel.agreement._weights import declared_weights
 from masrel.protocol import Protocol
-from masrel.training.trainees import (
+from masrel.training._trainees import (
     SKILLS,
     Skill,
     confusion_with_kappa,
