@@ -11,6 +11,7 @@ from typing import NoReturn
 import click
 
 import masrel
+from masrel.cli._streams import accept_any_text
 from masrel.errors import (
     ConvergenceError,
     DeviceError,
@@ -104,6 +105,7 @@ def cli() -> None:
 
 def main() -> None:
     """Run the command line and exit with its code."""
+    accept_any_text()
     try:
         cli()
     except (DeviceError, ConvergenceError, SessionStoppedError) as error:

@@ -13,6 +13,7 @@ import click
 
 from masrel._files import write_file
 from masrel.cli._paths import InputFile, OutputFile, note_inputs
+from masrel.cli._streams import is_encodable
 from masrel.errors import MasrelWarning, ParameterError
 
 if TYPE_CHECKING:
@@ -203,7 +204,8 @@ def write_json(document: dict[str, object], file: Path) -> None:
     """Write a document, or print it where the file is "-"."""
     text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
     if file == STDOUT:
-        click.echo(text)
+        # escapes of JSON where the screen cannot show the letters
+        click.echo(text if is_encodable(text) else json.dumps(document, indent=1))
         return
     write_file(file, text + "\n")
 

@@ -128,3 +128,20 @@ def test_a_figure_is_what_loads_matplotlib(study: Path) -> None:
     text = protocol.read_text(encoding="utf-8")
     protocol.write_text(text.replace(', "grades"]', "]"), encoding="utf-8")
     assert "matplotlib" not in loaded_after(call)
+
+
+def test_dollars_in_a_text_are_no_mathematics(masrel: Caller, study: Path) -> None:
+    protocol = study / "protocol.toml"
+    lines = protocol.read_text(encoding="utf-8").splitlines()
+    lines = [
+        f"{key} = 'x $\\frac$ $^$'"
+        if (key := line.partition(" =")[0]) in TEXTS
+        else line
+        for line in lines
+    ]
+    protocol.write_text("\n".join(lines), encoding="utf-8")
+    done = masrel("report", study, "--quiet")
+    assert (done.code, done.err) == (0, "")
+
+
+TEXTS = ("title", "source", "notes")

@@ -286,7 +286,7 @@ def _catch_travels(axes: Axes, fit: ElbowFit, catches: Sequence[Catch]) -> None:
         axes.legend(loc="lower right")
     axes.set_title(_parameter_text(fit, "catch_travel", 2))
     axes.set_xlabel("mean speed during the catch (deg/s)")
-    axes.set_ylabel("ΔT$_c$ · mean speed (deg)")
+    axes.set_ylabel("ΔT$_c$ · mean speed (deg)", parse_math=True)
 
 
 def _through_zero(

@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import LogFormatter
 from numpy.typing import NDArray
 
 from masrel.report._figure_data import DifferencePanel, Differences
@@ -137,6 +138,7 @@ def _draw_hexagons(axes: Axes, panel: DifferencePanel) -> None:
     if figure is not None:
         bar = figure.colorbar(drawn, ax=axes, pad=0.02, shrink=0.8)
         bar.ax.yaxis.set_major_formatter("{x:g}")
+        bar.ax.yaxis.set_minor_formatter(LogFormatter())
         bar.set_label("items in a hexagon")
 
 

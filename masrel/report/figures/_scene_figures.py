@@ -168,7 +168,8 @@ def _catches(catches: CatchCurves) -> Figure:
     )
     handles.append(ring)
     labels.append("ν$_L$ and ν$_H$ of (6)")
-    figure.legend(handles, labels, loc="outside lower center", ncols=6)
+    legend = figure.legend(handles, labels, loc="outside lower center", ncols=6)
+    legend.get_texts()[-1].set_parse_math(True)
     return figure
 
 
@@ -241,11 +242,16 @@ def _levels(axes: Axes, stretch: CatchSchematic) -> None:
     for at, top, text in places:
         _arrow(axes, (at, stretch.pre_end), (at, top))
         axes.text(
-            at, 0.5 * (stretch.pre_end + top), f" {text}", va="center", fontsize=9
+            at,
+            0.5 * (stretch.pre_end + top),
+            f" {text}",
+            va="center",
+            fontsize=9,
+            parse_math=True,
         )
     axes.text(
         stretch.catch_end, stretch.pre_end, r" $\tau_{\mathrm{pre\_end}}$",
-        va="center", fontsize=9,
+        va="center", fontsize=9, parse_math=True,
     )  # fmt: skip
 
 
@@ -258,7 +264,7 @@ def _durations(axes: Axes, stretch: CatchSchematic) -> None:
     for start, end, height, text in rows:
         _arrow(axes, (start, height), (end, height))
         axes.text(0.5 * (start + end), height + 0.3 * gap, text, ha="center",
-                  va="bottom", fontsize=9)  # fmt: skip
+                  va="bottom", fontsize=9, parse_math=True)  # fmt: skip
 
 
 def _arrow(axes: Axes, one: tuple[float, float], other: tuple[float, float]) -> None:

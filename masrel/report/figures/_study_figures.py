@@ -159,6 +159,7 @@ def _speed_row(
         textcoords="offset points",
         va="center",
         color=GREY,
+        parse_math=True,
     )
     axes.set_xticks(range(len(models)), models)
     axes.set_xlim(-0.55, len(models) - 0.45)

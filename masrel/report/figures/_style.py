@@ -36,6 +36,7 @@ SHADES = {"pre-catch": "#FFFFFF", "catch": "#D9D9D9", "post-catch": "#F0F0F0"}
 STYLE: "dict[RcKeyType, object]" = {
     "font.family": "DejaVu Sans",  # ships with matplotlib: the same everywhere
     "font.size": 9,
+    "text.parse_math": False,  # a title or a name may have any letters in it
     "axes.labelsize": 9,
     "axes.titlesize": 9.5,
     "axes.spines.top": False,

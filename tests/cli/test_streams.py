@@ -1,0 +1,106 @@
+"""Streams that cannot show every letter, and any backend of matplotlib."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.flow.cuts import masrel_command
+
+SLOW = pytest.mark.slow
+ENCODINGS = [
+    "cp1252",
+    *(pytest.param(e, marks=SLOW) for e in ("cp949", "ascii", "latin-1", "cp437")),
+]
+TABLE = "item,Łucja,B\n1,0,0\n2,1,1\n3,0,1\n4,1,1\n"
+
+
+def called(
+    environment: dict[str, str], *arguments: object
+) -> "subprocess.CompletedProcess[bytes]":
+    return subprocess.run(
+        masrel_command(*arguments),
+        capture_output=True,
+        check=True,
+        env={**os.environ, **environment},
+    )
+
+
+@pytest.fixture
+def table(tmp_path: Path) -> Path:
+    path = tmp_path / "table.csv"
+    path.write_text(TABLE, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("encoding", ENCODINGS)
+def test_a_table_with_kappa_is_printed(encoding: str, table: Path) -> None:
+    environment = {"PYTHONIOENCODING": encoding}
+    done = called(environment, "agree", table, "--target", "items")
+    shown = done.stdout.decode("utf-8" if encoding == "ascii" else encoding)
+    assert "Fleiss' " in shown
+    assert "kappa" in shown or "κ" in shown
+
+
+@SLOW
+def test_json_stays_json_with_every_letter(table: Path) -> None:
+    done = called(
+        {"PYTHONIOENCODING": "cp1252"},
+        "agree",
+        table,
+        "--target",
+        "items",
+        "--json",
+        "-",
+    )
+    assert "Łucja" in json.dumps(json.loads(done.stdout), ensure_ascii=False)
+
+
+def test_letters_are_spelled_and_names_escaped() -> None:
+    code = (
+        "from masrel.cli._streams import accept_any_text; accept_any_text();"
+        "print('κ = −0.5, Δ, Łucja, m²')"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        check=True,
+        env={**os.environ, "PYTHONIOENCODING": "cp437:strict"},
+    )
+    shown = done.stdout.decode("cp437")
+    assert shown.strip() == r"kappa = -0.5, Delta, \u0141ucja, m²"
+
+
+@pytest.mark.parametrize(
+    "backend",
+    [
+        "module://matplotlib_inline.backend_inline",
+        pytest.param("nonsense", marks=SLOW),
+    ],
+)
+def test_any_backend_of_matplotlib_draws(
+    backend: str, table: Path, tmp_path: Path
+) -> None:
+    figure = tmp_path / "figure.svg"
+    called(
+        {"MPLBACKEND": backend}, "agree", table, "--target", "items", "--figure", figure
+    )
+    assert b"</svg>" in figure.read_bytes()
+
+
+@SLOW
+def test_the_backend_of_a_notebook_stays_the_one_it_has() -> None:
+    code = (
+        "import os, masrel.report.figures, matplotlib as m;"
+        "print(m.get_backend(), os.environ['MPLBACKEND'])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        check=True,
+        env={**os.environ, "MPLBACKEND": "pdf"},
+    )
+    assert done.stdout.split() == [b"pdf", b"pdf"]
