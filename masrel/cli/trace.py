@@ -17,7 +17,7 @@ from masrel.cli._options import (
     output_options,
     write_output,
 )
-from masrel.cli._paths import InputFile, OutputFile
+from masrel.cli._paths import InputFile, OutputFile, note_inputs
 from masrel.cli._tone_traces import (
     END_DEG,
     START_DEG,
@@ -208,7 +208,7 @@ _joint_options = grouped(
     "names",
     _JointOptions,
     click.option(
-        "--model", "models", multiple=True, type=InputFile(),
+        "--model", "models", multiple=True,
         help="HM1 to HM4, a model of --study, or a model file (.toml); may be given "
         "again.",
     ),
@@ -397,6 +397,7 @@ def _joint_of(model: str, study: Path | None) -> "JointModel":
                 f"--model: needs a model of --study, got the file {model}; without "
                 "--study it is read with the usual constants"
             )
+        note_inputs(Path(model))
         return read_model_file(Path(model))
     if study is not None:
         from masrel.protocol import StudyPaths, joint_model, read_protocol
