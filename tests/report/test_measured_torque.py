@@ -4,10 +4,9 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
-import pytest
 
 from masrel.analysis import analyze
-from masrel.errors import RecordingError
+from masrel.protocol import Protocol
 from masrel.recording import (
     MEASURED_TORQUE,
     RECORDING_COLUMNS,
@@ -35,20 +34,10 @@ def recorded(file: Path, model: str, *, fault: str | None = None) -> None:
     write_recording(recording, file)
 
 
-def page(folder: Path, *, has_sensor: bool = True) -> str:
-    """The Markdown of the traces of two simulated raters of HM1 and HM2."""
-    protocol, ratings = protocol_with(sections=("traces",)), simulated_ratings()
+def with_sensor(has_sensor: bool = True) -> Protocol:
+    protocol = protocol_with(sections=("traces",))
     device = msgspec.structs.replace(protocol.device, torque_sensor=has_sensor)
-    protocol = msgspec.structs.replace(protocol, device=device)
-    files = write_report(
-        protocol,
-        ratings,
-        analyze(protocol, ratings),
-        folder / "report",
-        recordings=folder / "sessions",
-    )
-    assert {path.suffix for path in files.figures} == {".png", ".svg"}
-    return files.markdown.read_text(encoding="utf-8")
+    return msgspec.structs.replace(protocol, device=device)
 
 
 def test_one_presentation_of_each_model_is_drawn(tmp_path: Path) -> None:
@@ -56,26 +45,16 @@ def test_one_presentation_of_each_model_is_drawn(tmp_path: Path) -> None:
     recorded(folder / "A1.npz", "HM2", fault="speed")
     recorded(folder / "A2.npz", "HM2")
     recorded(folder / "A3.npz", "HM1")
-    text = page(tmp_path)
+    protocol, ratings = with_sensor(), simulated_ratings()
+    files = write_report(
+        protocol,
+        ratings,
+        analyze(protocol, ratings),
+        tmp_path / "report",
+        recordings=folder.parent,
+    )
+    text = files.markdown.read_text(encoding="utf-8")
     assert "the device's sensor measured of HM1, HM2 (line)" in text
     assert "the largest measured torque is 3.3 N·m" in text
-
-
-def test_only_models_that_were_recorded_are_drawn(tmp_path: Path) -> None:
-    recorded(tmp_path / "sessions" / "retest_R2" / "A1.npz", "HM2")
-    assert "the device's sensor measured of HM2 (line)" in page(tmp_path)
-
-
-def test_recordings_that_are_not_there_are_missed(tmp_path: Path) -> None:
-    assert "Measured torque is not in these data: no recording has it." in page(
-        tmp_path
-    )
-
-
-def test_without_a_sensor_no_recording_is_looked_at(tmp_path: Path) -> None:
-    file = tmp_path / "sessions" / "test_R1" / "A1.npz"
-    file.parent.mkdir(parents=True)
-    file.write_bytes(b"no recording")
-    assert "easured torque" not in page(tmp_path, has_sensor=False)
-    with pytest.raises(RecordingError, match=r"A1\.json: no such file"):
-        page(tmp_path)
+    drawn = [path for path in files.figures if path.name.startswith("measured_1")]
+    assert {path.suffix for path in drawn} == {".png", ".svg"}
