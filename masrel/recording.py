@@ -41,8 +41,9 @@ PHASES: tuple[Phase, ...] = ("pre-catch", "catch", "post-catch")
 """Names of the phases; their positions are the codes in the column `phase`."""
 
 RAMPS = ("none", "post-catch", "end", "fault")
-"""Why a torque is not the law's: post-catch, the presentation or a fault has ended it,
-and it is on its way from there. Positions are the codes in the column `ramp`."""
+"""Why a torque is not the law's: it is on its way from the end of a catch or
+post-catch, from that of the presentation, or from a fault. Positions are the codes in
+the column `ramp`."""
 
 RECORDING_COLUMNS = (
     "time_s",  # since the presentation began

@@ -28,6 +28,10 @@ _REST_S = 0.05  # without a change of angle: the arm has come to rest
 _WINDOW_TICKS = 100
 
 
+# As near to where the first stretch began an arm is back there.
+_BACK = math.radians(3.0)
+
+
 class Guard:
     """Check readings and torques against limits that look at more than one tick."""
 
@@ -273,6 +277,7 @@ class ActiveGuard:
 
     __slots__ = (
         "_angle",
+        "_first_angle",
         "_held",
         "_max_energy",
         "_max_speed",
@@ -284,8 +289,17 @@ class ActiveGuard:
         self._max_torque = limits.active_torque
         self._max_energy = limits.active_energy
         self._max_speed = limits.active_speed
+        self._first_angle = math.nan  # where the first stretch began, rad
         self._angle = self._held = 0.0  # of the last tick: rad, N·m
         self.energy_given = 0.0  # to the arm, less what was taken from it, J
+
+    def begin_stretch(self, angle: float) -> None:
+        """Let the model give back no more what it took in earlier stretches."""
+        # Only where the first stretch began holds no spring what it took.
+        if angle <= self._first_angle + _BACK:
+            self.energy_given = max(self.energy_given, 0.0)
+        if math.isnan(self._first_angle):
+            self._first_angle = angle
 
     def check(self, angle: float, velocity: float, torque: float) -> None:
         """Check what a model asks for before it is sent."""

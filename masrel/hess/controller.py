@@ -16,7 +16,7 @@ from masrel.hess._velocity import CUTOFF_RAD_S
 from masrel.hess.friction import Friction, FrictionCompensation
 from masrel.recording import PHASES
 
-_PRE_CATCH, _POST_CATCH = PHASES.index("pre-catch"), PHASES.index("post-catch")
+_PRE_CATCH = PHASES.index("pre-catch")
 _INFINITE = math.inf
 _SLIP_WINDOW_S = 0.010  # twice the delay of the estimated speed
 _LOOSE_WINDOW_S = 0.005  # under 3 N·m a loose arm loses 18 times the speed's noise
@@ -35,9 +35,9 @@ class Controller:
     at once and stays there until the arm has been moved back, faster than ν_th. Within
     3 deg of the end of range no loss counts: there it is the joint that stops the arm.
 
-    Where post-catch ends otherwise, the torque goes from where it stands to that of the
-    law within `post_catch_ramp`, along a raised cosine. A grip that is lost meanwhile
-    ends this at once.
+    Where a catch or post-catch ends otherwise, the torque goes from where it stands to
+    that of the law within `post_catch_ramp`, along a raised cosine. A grip that is lost
+    meanwhile ends this at once.
 
     A model that is not passive is guarded: a fall of speed by more than
     `slip_speed_drop` within 10 ms is a fault in every phase, while the model resists
@@ -68,8 +68,8 @@ class Controller:
         Inertia of device and arm that nobody holds, kg·m². Too large a number takes a
         soft hand for a lost grip, too small a one notices a lost grip late.
     post_catch_ramp : float, optional
-        How long the end of post-catch takes, s, 0 to 1; 0 is the step of Fig. 7. A
-        guarded model has its own law there.
+        How long the end of a catch or post-catch takes, s, 0 to 1; 0 is the step of
+        Fig. 7. A guarded model has its own law there.
     rate_hz : int, optional
         Steps a second.
 
@@ -84,7 +84,7 @@ class Controller:
     is_guarded : bool
         Whether the model runs behind `DeviceLimits.active_energy` and `active_torque`.
     is_easing : bool
-        Whether the last torque was on its way from the end of a post-catch.
+        Whether the last torque was on its way from the end of a catch or post-catch.
     is_new : bool
         Whether it has never been stepped: one controller makes one presentation.
     rate_hz : int
@@ -257,7 +257,7 @@ class Controller:
             self._late_torque, self._taken = self._command, 0.0
             self._time = time_s
             self._past.extend([-_INFINITE] * len(self._past))  # nothing to fall from
-        ends = self.phase == _POST_CATCH and phase == _PRE_CATCH
+        ends = self.phase != _PRE_CATCH and phase == _PRE_CATCH
         if ends and self._post_catch_ramp and not self.is_guarded:
             self._easing = iter(self._post_catch_ramp)
             self._stood = self._command

@@ -57,7 +57,7 @@ class DeviceLimits:
         Largest torque of a model behind the guard (`Controller.is_guarded`), N·m.
     active_energy : float, optional
         Energy that such a model may have given to the arm on balance, J: what it gave
-        less what it took since the presentation began.
+        less what it took. What it took in one stretch it may not give in the next.
     active_speed : float, optional
         Speed at which an arm may move the way such a model pushes it, rad/s: faster
         it is not led by a hand, but thrown.

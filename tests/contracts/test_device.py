@@ -23,18 +23,21 @@ from masrel.hess import (
     Device,
     DeviceLimits,
     Hand,
+    PresentationStatus,
+    Presented,
     Reading,
     ReplayOptions,
     SimulatedClock,
     SimulatedHand,
     SimulatedOptions,
+    StretchRules,
     TorqueSensor,
     backends,
     device_names,
     open_device,
     run_presentation,
 )
-from masrel.recording import MEASURED_TORQUE, Channel, Recording
+from masrel.recording import MEASURED_TORQUE, Channel, Recording, stretches
 from tests.hess.rig import ScriptedDevice
 
 START, END = radians(30.0), radians(146.0)
@@ -63,14 +66,25 @@ def _scripted_with_channels(clock: SimulatedClock, _hand: Hand) -> Device:
 SENSING = SimulatedOptions(torque_sensor=TorqueSensor())
 
 
+def _stretching(n_stretches: int = 1) -> SimulatedHand:
+    speed = radians(90.0)
+    again = (speed,) * (n_stretches - 1)
+    return SimulatedHand(start=START, end=END, mean_speed=speed, again=again)
+
+
 @cache
-def _recording(options: BackendOptions | None = None) -> Recording:
-    clock = SimulatedClock()
-    hand = SimulatedHand(start=START, end=END, mean_speed=radians(90.0))
+def _recording(
+    options: BackendOptions | None = None, n_stretches: int = 1
+) -> Recording:
+    clock, hand = SimulatedClock(), _stretching(n_stretches)
     controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
     with open_device("simulated", clock=clock, hand=hand, options=options) as device:
         return run_presentation(
-            device, controller, clock=clock, limits=DeviceLimits()
+            device,
+            controller,
+            clock=clock,
+            limits=DeviceLimits(),
+            stretches=StretchRules(n=n_stretches),
         ).recording
 
 
@@ -486,3 +500,84 @@ def test_a_presentation_runs_on_it(
     assert presented.recording.facts["simulated"] is opened.simulated
     assert presented.recording.facts["ended"] == "arrived"
     assert opened.is_open
+
+
+# Many stretches, and their soft ends
+
+
+def open_for_many(backend: str, clock: SimulatedClock) -> Device:
+    """A device whose arm, or whose recording, is stretched twice."""
+    hand = _stretching(2)
+    if backend == "scripted":
+        device = ScriptedDevice(clock, lambda time_s: hand.intended(time_s)[0])
+        device.open()
+        return device
+    options = None
+    if backend == "replay":
+        options = ReplayOptions(recording=_recording(n_stretches=2))
+    return open_device(backend, clock=clock, hand=hand, options=options)
+
+
+class Saying(SimulatedClock):
+    """A clock on which the rater says done at a time."""
+
+    def __init__(self, status: PresentationStatus) -> None:
+        super().__init__()
+        self.done_ns, self.status = math.inf, status
+
+    def sleep_until_ns(self, deadline_ns: int) -> None:
+        super().sleep_until_ns(deadline_ns)
+        if deadline_ns >= self.done_ns:
+            self.status.done()
+
+
+def presented_many(backend: str, done_s: float = math.inf) -> Presented:
+    status = PresentationStatus()
+    clock = Saying(status)
+    with open_for_many(backend, clock) as device:
+        clock.done_ns = clock.now_ns() + done_s * 1e9
+        presented = run_presentation(
+            device,
+            Controller(STANDARD_MODELS["HM4"], start_angle=START),
+            clock=clock,
+            limits=DeviceLimits(),
+            stretches=StretchRules(n=2),
+            status=status,
+        )
+        assert device.is_open
+    assert status.n_stretches == len(stretches(presented.recording))
+    return presented
+
+
+def assert_softly(presented: Presented) -> None:
+    """A catch, a post-catch and a presentation end within 100 ms, by no more a tick."""
+    columns = presented.recording.columns
+    torque, phase = columns["command_torque_nm"], columns["phase"]
+    ends = np.flatnonzero((phase[:-1] > 0.0) & (phase[1:] == 0.0))
+    for stands in [*ends, presented.recording.n_presented - 1]:
+        falls = -np.diff(np.abs(torque[stands : stands + 101]))
+        most = math.pi / 2.0 * abs(torque[stands]) / 100.0 + 1e-9
+        assert falls.max() <= most
+    assert torque[-1] == 0.0
+
+
+def test_an_arm_may_be_stretched_many_times(backend: str) -> None:
+    presented = presented_many(backend)
+    assert presented.fault is None
+    assert presented.recording.facts["ended"] == "stretches"
+    made = stretches(presented.recording)
+    assert [one.number for one in made] == [1, 2]
+    for one in made:
+        assert one.phases == ("pre-catch", "catch", "post-catch", "pre-catch")
+        assert one.mean_speed_deg_s == pytest.approx(89.2, abs=1.0)
+        assert one.catch_angle_deg == pytest.approx(made[0].catch_angle_deg, abs=0.3)
+    assert_softly(presented)
+
+
+@pytest.mark.parametrize("done_s", [0.65, 3.0])
+def test_a_rater_may_be_done_at_any_time(backend: str, done_s: float) -> None:
+    presented = presented_many(backend, done_s)
+    assert presented.fault is None
+    assert presented.recording.facts["ended"] == "done"
+    assert presented.recording.n_presented == pytest.approx(1000 * done_s, abs=2)
+    assert_softly(presented)

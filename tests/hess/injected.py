@@ -19,7 +19,14 @@ from unittest import mock
 import numpy as np
 
 from masrel.errors import OverrunWarning
-from masrel.hess import Controller, Device, SimulatedClock, SimulatedHand, open_device
+from masrel.hess import (
+    Controller,
+    Device,
+    SimulatedClock,
+    SimulatedHand,
+    StretchRules,
+    open_device,
+)
 from masrel.protocol import Protocol, StudyPaths, read_protocol
 from masrel.recording import read_recording
 from masrel.run import SimulatedGrades, model_controller, read_log, run_session
@@ -57,6 +64,16 @@ speed_sd_deg_s = 0.0
 
 # HM3 at 92 deg/s: pre-catch until 0.63 s, catch until 0.96 s, then post-catch
 PRE, CATCH, POST = 0.4, 0.68, 1.1
+
+N_STRETCHES = 3  # where there are many
+
+
+def later_s(stretch: int, speed_deg_s: float = 92.0) -> float:
+    """Return how long after the first the simulated hand begins a stretch, s."""
+    # 118.5 deg there and, at 60 deg/s, back: each way its ramps, and a rest after it
+    there_and_back = 118.5 / speed_deg_s + 118.5 / 60.0 + 2.0 * (0.06 + 0.3)
+    return round((stretch - 1) * there_and_back, 3)
+
 
 Wrap = Callable[[Device], Device]
 
@@ -171,178 +188,182 @@ def _fail(_torque: float) -> float:
     raise ZeroDivisionError("float division by zero")
 
 
-def injections() -> list[Injection]:
+def injections(stretch: int = 1) -> list[Injection]:
+    """Return the faults, put into a stretch."""
+    pre, catch, post = (at_s + later_s(stretch) for at_s in (PRE, CATCH, POST))
+    slow = 4.0 + later_s(stretch, 15.0)
+
     def device(name: str, at_s: float, expected: str | None, wrap: Wrap, **options):
         return Injection(name=name, at_s=at_s, expected=expected, wrap=wrap, **options)
 
     def check(error) -> Wrap:
         return lambda inner: f.FaultyDevice(
-            inner, send_fault=f.ignored(CATCH), check_fault=f.says(CATCH, error)
+            inner, send_fault=f.ignored(catch), check_fault=f.says(catch, error)
         )
 
     lost = "missed-replies"
     return [
-        device("one reply dropped", CATCH, None, reading(f.dropped(CATCH, 1))),
-        device("two replies dropped", CATCH, None, reading(f.dropped(CATCH, 2))),
-        device("three replies dropped", CATCH, lost, reading(f.dropped(CATCH, 3))),
+        device("one reply dropped", catch, None, reading(f.dropped(catch, 1))),
+        device("two replies dropped", catch, None, reading(f.dropped(catch, 2))),
+        device("three replies dropped", catch, lost, reading(f.dropped(catch, 3))),
         device(
             "every fourth reply dropped",
-            CATCH,
+            catch,
             lost,
-            reading(f.dropped(CATCH, every=4)),
+            reading(f.dropped(catch, every=4)),
         ),
         device(
             "every tenth reply dropped",
-            CATCH,
+            catch,
             None,
-            reading(f.dropped(CATCH, every=10)),
+            reading(f.dropped(catch, every=10)),
         ),
-        device("replies cease in pre-catch", PRE, lost, reading(f.dropped(PRE))),
-        device("replies cease in the catch", CATCH, lost, reading(f.dropped(CATCH))),
-        device("replies cease in post-catch", POST, lost, reading(f.dropped(POST))),
-        device("one reply late by 2 ms", CATCH, None, reading(f.late(CATCH, 2e-3, 1))),
-        device("replies late by 3 ms", CATCH, lost, reading(f.late(CATCH, 3e-3))),
-        device("replies late by 8 ms", CATCH, lost, reading(f.late(CATCH, 8e-3))),
-        device("a reply twice", CATCH, None, reading(f.repeated(CATCH, 1))),
-        device("the same reply for ever", CATCH, lost, reading(f.repeated(CATCH))),
-        device("replies from the future", CATCH, "stale", reading(f.early(CATCH, 1.0))),
-        device("encoder frozen in pre-catch", PRE, "frozen", reading(f.frozen(PRE))),
+        device("replies cease in pre-catch", pre, lost, reading(f.dropped(pre))),
+        device("replies cease in the catch", catch, lost, reading(f.dropped(catch))),
+        device("replies cease in post-catch", post, lost, reading(f.dropped(post))),
+        device("one reply late by 2 ms", catch, None, reading(f.late(catch, 2e-3, 1))),
+        device("replies late by 3 ms", catch, lost, reading(f.late(catch, 3e-3))),
+        device("replies late by 8 ms", catch, lost, reading(f.late(catch, 8e-3))),
+        device("a reply twice", catch, None, reading(f.repeated(catch, 1))),
+        device("the same reply for ever", catch, lost, reading(f.repeated(catch))),
+        device("replies from the future", catch, "stale", reading(f.early(catch, 1.0))),
+        device("encoder frozen in pre-catch", pre, "frozen", reading(f.frozen(pre))),
         device(
-            "encoder frozen in the catch", CATCH, "frozen", reading(f.frozen(CATCH))
+            "encoder frozen in the catch", catch, "frozen", reading(f.frozen(catch))
         ),
-        device("encoder frozen in post-catch", POST, "frozen", reading(f.frozen(POST))),
+        device("encoder frozen in post-catch", post, "frozen", reading(f.frozen(post))),
         device(
             "encoder frozen at 15 deg/s",
-            4.0,
+            slow,
             "standing-torque",
-            reading(f.frozen(4.0)),
+            reading(f.frozen(slow)),
             speed=15.0,
         ),
         device(
-            "encoder jumps by 1 deg", CATCH, "jump", reading(f.shifted(CATCH, f.JUMP))
+            "encoder jumps by 1 deg", catch, "jump", reading(f.shifted(catch, f.JUMP))
         ),
         device(
             "encoder off by -1 deg once",
-            CATCH,
+            catch,
             "jump",
-            reading(f.shifted(CATCH, -f.JUMP, 1)),
+            reading(f.shifted(catch, -f.JUMP, 1)),
         ),
         device(
-            "encoder wraps at 22 bits", PRE, "range", reading(f.shifted(PRE, f.WRAP))
+            "encoder wraps at 22 bits", pre, "range", reading(f.shifted(pre, f.WRAP))
         ),
         device(
             "encoder drifts by 400 deg/s",
-            PRE,
+            pre,
             "jump",
-            reading(f.drifting(PRE, radians(400.0))),
+            reading(f.drifting(pre, radians(400.0))),
         ),
-        device("no number", CATCH, "range", reading(f.shifted(CATCH, math.nan))),
+        device("no number", catch, "range", reading(f.shifted(catch, math.nan))),
         device(
             "bus off while reading",
-            CATCH,
+            catch,
             "device",
-            reading(f.broken(CATCH, f.BUS_OFF)),
+            reading(f.broken(catch, f.BUS_OFF)),
         ),
         device(
             "OSError of the backend while reading",
-            CATCH,
+            catch,
             "device",
-            reading(f.broken(CATCH, OSError(5, "Input/output error"))),
+            reading(f.broken(catch, OSError(5, "Input/output error"))),
         ),
         device(
             "ValueError of the backend while reading",
-            CATCH,
+            catch,
             "device",
-            reading(f.broken(CATCH, ValueError("no such count"))),
+            reading(f.broken(catch, ValueError("no such count"))),
         ),
         device(
             "OSError of the backend while sending",
-            CATCH,
+            catch,
             "device",
-            sending(f.failing(CATCH, OSError(5, "Input/output error"))),
+            sending(f.failing(catch, OSError(5, "Input/output error"))),
         ),
         device(
-            "one torque not taken", CATCH, "no-answer", sending(f.not_taken(CATCH, 1))
+            "one torque not taken", catch, "no-answer", sending(f.not_taken(catch, 1))
         ),
         device(
-            "no torque taken any more", CATCH, "no-answer", sending(f.not_taken(CATCH))
+            "no torque taken any more", catch, "no-answer", sending(f.not_taken(catch))
         ),
         device(
             "bus cut for good",
-            CATCH,
+            catch,
             "no-answer",
             lambda inner: f.FaultyDevice(
-                inner, send_fault=f.not_taken(CATCH), cut_s=CATCH
+                inner, send_fault=f.not_taken(catch), cut_s=catch
             ),
         ),
-        device("idled from outside", CATCH, "device", check(f.IDLED)),
+        device("idled from outside", catch, "device", check(f.IDLED)),
         device(
-            "emergency stop of the device", CATCH, "emergency-stop", check(f.STOPPED)
+            "emergency stop of the device", catch, "emergency-stop", check(f.STOPPED)
         ),
         Injection(
             name="emergency stop by Ctrl-C",
-            at_s=CATCH,
+            at_s=catch,
             expected="emergency-stop",
-            clock=lambda: Signalling(CATCH),
+            clock=lambda: Signalling(catch),
         ),
         Injection(
             name="loop away for 10 ms",
-            at_s=CATCH,
+            at_s=catch,
             expected=None,
-            clock=lambda: Late({CATCH: 0.010}),
+            clock=lambda: Late({catch: 0.010}),
         ),
         Injection(
             name="loop away for 25 ms",
-            at_s=CATCH,
+            at_s=catch,
             expected="overrun",
-            clock=lambda: Late({CATCH: 0.025}),
+            clock=lambda: Late({catch: 0.025}),
         ),
         Injection(
             name="five times 5 ms in 50 ms",
-            at_s=CATCH,
+            at_s=catch,
             expected="overrun",
-            clock=lambda: Late({CATCH + 0.01 * n: 0.005 for n in range(5)}),
+            clock=lambda: Late({catch + 0.01 * n: 0.005 for n in range(5)}),
         ),
         Injection(
             name="loop away for 60 ms",
-            at_s=CATCH,
+            at_s=catch,
             expected="overrun",
-            clock=lambda: Late({CATCH: 0.060}),
+            clock=lambda: Late({catch: 0.060}),
         ),
         Injection(
             name="exception in the model",
-            at_s=CATCH,
+            at_s=catch,
             expected="controller",
-            controller=model(CATCH, _fail),
+            controller=model(catch, _fail),
         ),
         Injection(
             name="model gives no number",
-            at_s=CATCH,
+            at_s=catch,
             expected="model",
-            controller=model(CATCH, lambda _: math.nan),
+            controller=model(catch, lambda _: math.nan),
         ),
         Injection(
             name="model gives nothing",
-            at_s=CATCH,
+            at_s=catch,
             expected="model",
-            controller=model(CATCH, lambda _: None),
+            controller=model(catch, lambda _: None),
         ),
         Injection(
             name="model gives 35 N·m",
-            at_s=CATCH,
+            at_s=catch,
             expected="torque",
-            controller=model(CATCH, lambda _: 35.0),
+            controller=model(catch, lambda _: 35.0),
         ),
         Injection(
             name="model jumps to 17 N·m",
-            at_s=PRE,
+            at_s=pre,
             expected="torque-rate",
-            controller=model(PRE, lambda _: 17.0),
+            controller=model(pre, lambda _: 17.0),
         ),
-        Injection(name="grip lost in pre-catch", at_s=PRE, expected=None, slip=True),
-        Injection(name="grip lost in the catch", at_s=CATCH, expected=None, slip=True),
-        Injection(name="grip lost in post-catch", at_s=POST, expected=None, slip=True),
-        Injection(name="full disk", at_s=CATCH, expected="process", full_disk=True),
+        Injection(name="grip lost in pre-catch", at_s=pre, expected=None, slip=True),
+        Injection(name="grip lost in the catch", at_s=catch, expected=None, slip=True),
+        Injection(name="grip lost in post-catch", at_s=post, expected=None, slip=True),
+        Injection(name="full disk", at_s=catch, expected="process", full_disk=True),
     ]
 
 
@@ -350,12 +371,13 @@ def outcome(
     injection: Injection,
     folder: pathlib.Path,
     opener: Callable[..., Device] = open_device,
+    n_stretches: int = 1,
 ) -> Outcome:
     """Run a session whose first presentation has the fault, to its end."""
     study, protocol = small_study(folder, injection.speed)
     made = Outcome(name=injection.name)
     devices: list[f.FaultyDevice] = []
-    with warnings.catch_warnings(), _injected(injection, opener, devices):
+    with warnings.catch_warnings(), _injected(injection, opener, devices, n_stretches):
         warnings.simplefilter("ignore", OverrunWarning)
         grades = SimulatedGrades(protocol)
         try:
@@ -419,9 +441,10 @@ def _injected(
     injection: Injection,
     opener: Callable[..., Device],
     devices: list[f.FaultyDevice],
+    n_stretches: int,
 ) -> Iterator[None]:
-    # The first presentation alone gets the fault
-    first = {"device": True, "clock": True, "controller": True, "hand": True}
+    # The first presentation alone gets the fault, and as many stretches
+    first = {"device": True, "clock": True, "controller": True}
 
     def is_first(what: str) -> bool:
         was, first[what] = first[what], False
@@ -445,10 +468,6 @@ def _injected(
         use = is_first("controller") and injection.controller is not None
         return (injection.controller if use else model_controller)(protocol, name)
 
-    def hand(**options) -> SimulatedHand:
-        slips = is_first("hand") and injection.slip
-        return SimulatedHand(**options, slip_time=injection.at_s if slips else None)
-
     written = presenting.write_recording
     disk_is_full = [injection.full_disk]
 
@@ -460,9 +479,36 @@ def _injected(
     with (
         mock.patch.object(presenting, "open_device", open_faulty),
         mock.patch.object(presenting, "model_controller", controller),
-        mock.patch.object(presenting, "SimulatedHand", hand),
         mock.patch.object(presenting, "write_recording", write),
         mock.patch.dict(CLOCKS, {"simulated": clock}),
+        _stretching(injection, n_stretches),
+    ):
+        yield
+
+
+@contextlib.contextmanager
+def _stretching(injection: Injection, n_stretches: int) -> Iterator[None]:
+    # The hand of the first presentation slips, and stretches so often
+    first = {"hand", "loop"}
+    run = presenting.run_presentation
+
+    def hand(**options) -> SimulatedHand:
+        if "hand" in first:
+            first.remove("hand")
+            options["again"] = (options["mean_speed"],) * (n_stretches - 1)
+            options["slip_time"] = injection.at_s if injection.slip else None
+        return SimulatedHand(**options)
+
+    def run_first(*arguments, **options):
+        if "loop" in first and n_stretches > 1:
+            first.remove("loop")
+            options["stretches"] = StretchRules(n=n_stretches)
+            options["max_duration_s"] = None
+        return run(*arguments, **options)
+
+    with (
+        mock.patch.object(presenting, "SimulatedHand", hand),
+        mock.patch.object(presenting, "run_presentation", run_first),
     ):
         yield
 

@@ -27,6 +27,7 @@ from masrel.hess import (
     MotionHand,
     Presented,
     SimulatedClock,
+    StretchRules,
     open_device,
     run_presentation,
 )
@@ -157,6 +158,29 @@ def test_the_balance_counts_so_that_a_spring_may_give_back_what_it_took() -> Non
     assert presented.fault is not None
     assert presented.fault.kind == "energy"
     assert presented.fault.time_s > 1.0
+
+
+def test_what_a_model_took_in_one_stretch_it_may_not_give_in_the_next() -> None:
+    # Three stretches by 100 deg in a second each. By hand: the damper takes
+    # 0.8 ∫v² dt = 0.8·(100 deg·π/2)²/2 = 3.0 J every second until 4 s, and then gives
+    # it: 1 J when ∫v² has come to a third of that, 0.414 s later.
+    joint = Joint(lambda t, _a, velocity: math.copysign(0.8, 4.0 - t) * velocity)
+    clock = SimulatedClock()
+    device = ScriptedDevice(
+        clock, lambda t: START + radians(50.0) * (1.0 - math.cos(math.pi * t))
+    )
+    with device:
+        presented = run_presentation(
+            device,
+            Controller(joint, start_angle=START),
+            clock=clock,
+            limits=LIMITS,
+            end_angle=4.0,
+            stretches=StretchRules(n=3),
+        )
+    assert presented.fault is not None
+    assert presented.fault.kind == "energy"
+    assert presented.fault.time_s == pytest.approx(4.414 + 1.0 / 180.0, abs=0.005)
 
 
 def test_a_larger_tank_lets_more_pass() -> None:

@@ -14,14 +14,17 @@ from masrel.hess import (
     Controller,
     DeviceLimits,
     EmergencyStop,
+    HandDistribution,
+    HumanHand,
     Presented,
     SimulatedClock,
     SimulatedHand,
+    StretchRules,
     YieldingHand,
     open_device,
     run_presentation,
 )
-from masrel.recording import RAMPS
+from masrel.recording import RAMPS, stretches
 
 from . import faults as f
 from .rig import LIMITS, START, ScriptedDevice, present
@@ -131,15 +134,15 @@ def test_two_controllers_differ_under_the_ramp_alone(model: str) -> None:
         for ramp in (0.1, 0.0)
     )
     n_easing = 0
-    for tick in range(2000):
+    for tick in range(6000):  # three times there and back
         time_s = tick * 1e-3
-        angle = START + radians(58.0) * (1.0 - math.cos(math.pi * time_s / 2.0))
-        speed = radians(58.0) * math.pi / 2.0 * math.sin(math.pi * time_s / 2.0)
+        angle = START + radians(58.0) * (1.0 - math.cos(math.pi * time_s))
+        speed = radians(58.0) * math.pi * math.sin(math.pi * time_s)
         command, plain = (c.step(time_s, angle, speed) for c in (soft, hard))
         n_easing += soft.is_easing
         assert soft.model_torque == hard.model_torque
         assert command == plain or soft.is_easing
-    assert n_easing in (0, 99)
+    assert n_easing == 3 * 99
 
 
 def test_a_grip_that_is_lost_under_the_ramp_ends_it_at_once() -> None:
@@ -220,42 +223,65 @@ def test_both_may_be_at_once() -> None:
 # Random ones
 
 
-def random_presentation(seed: int) -> int:
-    """Present at random, hold every end to its bound -> how many ramps there were."""
-    rng = np.random.default_rng([2012, seed])
-    stop = EmergencyStop()
-    gaps = {float(at): 0.004 for at in rng.uniform(0.0, 1.5, rng.integers(0, 3))}
-    clock = Disturbed(gaps, stop)
+def random_clock(rng: np.random.Generator, longest_s: float) -> Disturbed:
+    """A clock that is away at times, and may press the emergency stop."""
+    gaps = {float(at): 0.004 for at in rng.uniform(0.0, longest_s, rng.integers(0, 3))}
+    clock = Disturbed(gaps, EmergencyStop())
     if rng.random() < 0.1:
-        clock.press_at = float(rng.uniform(0.1, 2.0))
-    start, end = radians(rng.uniform(10.0, 80.0)), radians(rng.uniform(110.0, 146.0))
-    slips = float(rng.uniform(0.2, 1.5)) if rng.random() < 0.15 else None
-    speed = radians(rng.uniform(15.0, 140.0))
-    if rng.random() < 0.6:
-        hand = SimulatedHand(
-            start=start,
-            end=end,
-            mean_speed=speed,
-            slip_time=slips,
-            stiffness=rng.uniform(100.0, 600.0),
-            damping=rng.uniform(5.0, 40.0),
-            ramp_down=rng.uniform(0.05, 0.3),
+        clock.press_at = float(rng.uniform(0.1, longest_s))
+    return clock
+
+
+def random_hand(
+    rng: np.random.Generator, start: float, end: float, n_stretches: int
+) -> SimulatedHand:
+    """A clamp, a hand that yields or that of a person; it may let go."""
+    speeds = [radians(speed) for speed in rng.uniform(15.0, 140.0, n_stretches)]
+    if n_stretches > 1:
+        speeds = [max(speed, radians(60.0)) for speed in speeds]
+    slips = float(rng.uniform(0.2, 1.5 * n_stretches)) if rng.random() < 0.15 else None
+    way = {"start": start, "end": end, "mean_speed": speeds[0], "again": speeds[1:]}
+    rest, back = float(rng.uniform(0.0, 0.2)), radians(rng.uniform(40.0, 130.0))
+    kind = rng.random()
+    if kind < 0.4:
+        return YieldingHand(**way, slip_time=slips, rest=0.5 * rest)
+    if kind < 0.6 and n_stretches > 1:
+        traits = HandDistribution().sample(rng)
+        return HumanHand(
+            traits, **way, slip_time=slips, rest=2.0 * rest, return_speed=back
         )
-    else:
-        hand = YieldingHand(start=start, end=end, mean_speed=speed, slip_time=slips)
+    return SimulatedHand(
+        **way,
+        slip_time=slips,
+        stiffness=rng.uniform(100.0, 600.0),
+        damping=rng.uniform(5.0, 40.0),
+        ramp_down=rng.uniform(0.05, 0.3),
+        rest=rest,
+        return_speed=back,
+    )
+
+
+def random_presentation(seed: int, n_stretches: int = 1) -> tuple[int, int]:
+    """Present at random, hold every end to its bound -> its ramps and its stretches."""
+    rng = np.random.default_rng([2012, n_stretches, seed])
+    longest_s = 1.5 * n_stretches
+    clock = random_clock(rng, longest_s)
+    start, end = radians(rng.uniform(10.0, 80.0)), radians(rng.uniform(110.0, 146.0))
+    hand = random_hand(rng, start, end, n_stretches)
     limits = DeviceLimits(
         ramp_time=float(rng.uniform(0.02, 0.1)),
         end_ramp_time=float(rng.uniform(0.05, 0.3)),
     )
     post_catch_s = float(rng.uniform(0.05, 0.3))
+    at_s = rng.uniform(0.1, longest_s)
     fault = [
         None,
         None,
         None,
-        f.dropped(rng.uniform(0.1, 1.5), 3),
-        f.dropped(rng.uniform(0.1, 1.5), 2),
-        f.shifted(rng.uniform(0.1, 1.5), f.JUMP),
-        f.frozen(rng.uniform(0.1, 1.5)),
+        f.dropped(at_s, 3),
+        f.dropped(at_s, 2),
+        f.shifted(at_s, f.JUMP),
+        f.frozen(at_s),
     ][rng.integers(7)]
     model = STANDARD_MODELS[f"HM{rng.integers(1, 5)}"]
     model = dataclasses.replace(model, catch_rise=float(rng.choice([0.0, 0.03])))
@@ -263,6 +289,7 @@ def random_presentation(seed: int) -> int:
     device = f.FaultyDevice(inner, read_fault=fault)
     device.open()
     controller = Controller(model, start_angle=start, post_catch_ramp=post_catch_s)
+    rules = StretchRules(n=n_stretches if rng.random() < 0.5 else None)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", OverrunWarning)
         presented = run_presentation(
@@ -270,31 +297,54 @@ def random_presentation(seed: int) -> int:
             controller,
             clock=clock,
             limits=limits,
-            stop=stop,
+            stop=clock.stop,
             end_angle=end,
-            max_duration_s=float(rng.uniform(0.3, 3.0)),
+            stretches=rules if n_stretches > 1 else None,
+            max_duration_s=float(rng.uniform(0.2, 2.0)) * longest_s,
         )
     try:
         device.close()
     finally:
         inner.close()
-    return assert_soft(presented, limits, post_catch_s)
+    assert_no_catch_ends_at_once(presented)
+    n_ramps = assert_soft(presented, limits, post_catch_s)
+    return n_ramps, len(stretches(presented.recording))
 
 
-def assert_random_ones_are_soft(n: int) -> None:
-    n_ramps = sum(random_presentation(seed) for seed in range(n))
+def assert_no_catch_ends_at_once(presented: Presented) -> None:
+    """A ramp begins where a catch or post-catch ends, unless a grip is lost."""
+    columns = presented.recording.columns
+    phase, ramp = columns["phase"], columns["ramp"]
+    ends = np.flatnonzero((phase[:-1] != 0.0) & (phase[1:] == 0.0)) + 1
+    if not presented.recording.facts["grip_lost"]:
+        assert np.all(ramp[ends] != 0.0)
+
+
+def assert_random_ones_are_soft(n: int, n_stretches: int = 1) -> None:
+    made = [random_presentation(seed, n_stretches) for seed in range(n)]
+    n_ramps, n_made = np.sum(made, axis=0)
     assert n_ramps > 1.1 * n  # hardly one is without an end under torque
+    assert n_made > 0.4 * n_stretches * n
 
 
 def test_some_random_presentations_end_softly() -> None:
     assert_random_ones_are_soft(20)
 
 
+def test_some_random_presentations_of_many_stretches_end_softly() -> None:
+    assert_random_ones_are_soft(5, 3)
+
+
 @pytest.mark.slow
-def test_hundreds_of_random_presentations_end_softly() -> None:
-    assert_random_ones_are_soft(400)
+def test_a_thousand_random_presentations_of_many_stretches_end_softly() -> None:
+    assert_random_ones_are_soft(1000, 3)
 
 
 @pytest.mark.long
 def test_ten_thousand_random_presentations_end_softly() -> None:
     assert_random_ones_are_soft(10_000)
+
+
+@pytest.mark.long
+def test_ten_thousand_random_presentations_of_many_stretches_end_softly() -> None:
+    assert_random_ones_are_soft(10_000, 3)

@@ -15,6 +15,7 @@ from masrel.hess import (
     Presented,
     SimulatedClock,
     SimulatedHand,
+    StretchRules,
     open_device,
     run_presentation,
 )
@@ -34,8 +35,10 @@ PUCK = Transmission(counts_per_turn=4096, units_per_nm=2700)
 _channels = count()
 
 
-def stretching(speed_deg_s: float = 92.0) -> SimulatedHand:
-    return SimulatedHand(start=START, end=END, mean_speed=radians(speed_deg_s))
+def stretching(speed_deg_s: float = 92.0, n_stretches: int = 1) -> SimulatedHand:
+    speed = radians(speed_deg_s)
+    again = (speed,) * (n_stretches - 1)
+    return SimulatedHand(start=START, end=END, mean_speed=speed, again=again)
 
 
 def loose(start_deg: float = 90.0) -> SimulatedHand:
@@ -91,14 +94,23 @@ def opened(
 
 
 def presented(
-    *faults: InjectedFault, model: str = "HM3", speed_deg_s: float = 92.0, **changes
+    *faults: InjectedFault,
+    model: str = "HM3",
+    speed_deg_s: float = 92.0,
+    n_stretches: int = 1,
+    **changes,
 ) -> tuple[Presented, EmulatedPuckDevice, SimulatedClock]:
     """One presentation on an emulated puck; the device is closed afterwards."""
-    clock, hand = SimulatedClock(), stretching(speed_deg_s)
+    clock, hand = SimulatedClock(), stretching(speed_deg_s, n_stretches)
     controller = Controller(STANDARD_MODELS[model], start_angle=START)
     with opened(clock, hand, emulator={"faults": faults, **changes}) as device:
         done = run_presentation(
-            device, controller, clock=clock, limits=LIMITS, end_angle=END
+            device,
+            controller,
+            clock=clock,
+            limits=LIMITS,
+            end_angle=END,
+            stretches=StretchRules(n=n_stretches),
         )
     return done, device, clock
 

@@ -6,7 +6,7 @@
 import math
 import tempfile
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from unittest import mock
 
@@ -21,7 +21,7 @@ from masrel.hess.puck import InjectedFault
 from masrel.recording import read_recording
 from masrel.run import SimulatedGrades, read_log, run_session
 from masrel.run import _present as presenting
-from tests.hess.injected import small_study
+from tests.hess.injected import N_STRETCHES, later_s, small_study
 from tests.hess.puck.rig import (
     PUCK,
     EmulatedPuckDevice,
@@ -62,10 +62,10 @@ def held(device: EmulatedPuckDevice) -> list[tuple[int, float]]:
     return steps
 
 
-def outcome(injected: InjectedFault) -> Outcome:
+def outcome(injected: InjectedFault, n_stretches: int = 1) -> Outcome:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", OverrunWarning)
-        done, device, _ = presented(injected)
+        done, device, _ = presented(injected, n_stretches=n_stretches)
     facts, columns = done.recording.facts, done.recording.columns
     if facts["fault_kind"] is None:
         return Outcome(kind=None, whole=whole(columns["time_s"], facts))
@@ -175,19 +175,61 @@ def test_a_fault_of_the_bus(
     name: str, injected: InjectedFault, kind: str | None
 ) -> None:
     made = outcome(injected)
+    assert_as_expected(made, name, kind, within_ms=31.0)
+    assert row(name, made) in PAGE.read_text(encoding="utf-8")
+
+
+def assert_as_expected(
+    made: Outcome, name: str, kind: str | None, *, within_ms: float
+) -> None:
     assert made.kind == kind
     assert made.whole
-    assert row(name, made) in PAGE.read_text(encoding="utf-8")
     if kind is None:
         return
     assert made.peak_nm <= made.held_nm
-    assert made.noticed_ms <= 31.0
+    assert made.noticed_ms <= within_ms
     if name in OUT_OF_REACH:
         assert math.isnan(made.zero_ms)
         assert made.words is not None
         assert "SWITCH ITS SUPPLY OFF" in made.words
     else:
         assert made.zero_ms <= 205.0
+
+
+LATER = [(*one, stretch) for stretch in range(1, N_STRETCHES + 1) for one in FAULTS]
+
+
+ON_THE_LIMIT = "every tenth reply lost"  # 10 of 100 pass, 11 do not
+
+
+def assert_it_is_in_each_stretch_as_in_a_single_one(
+    name: str, injected: InjectedFault, kind: str | None, stretch: int
+) -> None:
+    later = later_s(stretch)
+    put_later = replace(
+        injected, start_s=injected.start_s + later, end_s=injected.end_s + later
+    )
+    made = outcome(put_later, N_STRETCHES)
+    if name == ON_THE_LIMIT and made.kind == LOST:
+        return
+    # In a catch the torque stands, and to lose it makes no difference
+    assert_as_expected(made, name, kind, within_ms=60.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "injected", "kind", "stretch"), LATER[::10])
+def test_a_tenth_of_the_faults_of_the_bus_in_each_stretch(
+    name: str, injected: InjectedFault, kind: str | None, stretch: int
+) -> None:
+    assert_it_is_in_each_stretch_as_in_a_single_one(name, injected, kind, stretch)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("name", "injected", "kind", "stretch"), LATER)
+def test_every_fault_of_the_bus_in_each_stretch(
+    name: str, injected: InjectedFault, kind: str | None, stretch: int
+) -> None:
+    assert_it_is_in_each_stretch_as_in_a_single_one(name, injected, kind, stretch)
 
 
 @dataclass(frozen=True, kw_only=True)
