@@ -61,6 +61,11 @@ class StudyPaths:
         return self.root / "analysis.json"
 
     @property
+    def report(self) -> Path:
+        """The folder of the report."""
+        return self.root / "report"
+
+    @property
     def secret_file(self) -> Path:
         """The secret that decides orders and codes; its folder is its owner's alone."""
         return self.root / ".key" / "secret.txt"
@@ -74,6 +79,10 @@ class StudyPaths:
     def training(self) -> Path:
         """The folder of training logs and recordings; no rating of the study."""
         return self.root / "training"
+
+    def logs(self) -> list[Path]:
+        """Return the session logs that are there, whosever they are."""
+        return sorted(path for path in self.sessions.glob("*.jsonl") if path.is_file())
 
     def schedule_file(self, rater: str, session: str) -> Path:
         """Return the file of one rater's schedule; it names the models."""

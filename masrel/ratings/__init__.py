@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from masrel.ratings.reader import RatingsFile, read_ratings
     from masrel.ratings.study_data import (
         StudyData,
+        in_person_of,
         read_study_data,
         table_differences,
     )
@@ -45,6 +46,7 @@ __all__ = [
     "Repeated",
     "RetestPairs",
     "StudyData",
+    "in_person_of",
     "rating_matrix",
     "ratings_csv",
     "ratings_from_logs",
@@ -63,7 +65,12 @@ _HOMES = {
     "logs": ("ratings_from_logs",),
     "_parts": ("RatingsPart", "Repeated"),
     "reader": ("RatingsFile", "read_ratings"),
-    "study_data": ("StudyData", "read_study_data", "table_differences"),
+    "study_data": (
+        "StudyData",
+        "in_person_of",
+        "read_study_data",
+        "table_differences",
+    ),
     "study_file": ("read_study_ratings",),
 }
 """Module to the names in it; all other names are of `table`."""

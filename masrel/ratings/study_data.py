@@ -71,7 +71,7 @@ def read_study_data(
     ScheduleError
         If the schedule of a log is missing, damaged or stale.
     """
-    if file is None and any(study.sessions.glob("*.jsonl")):
+    if file is None and study.logs():
         ratings = ratings_from_logs(study, protocol)
         _check_table(study.ratings_file, ratings)
         read = f"{len(ratings.table)} ratings from the logs in {study.sessions}"
@@ -79,16 +79,38 @@ def read_study_data(
         source = file or _file_of(study)
         ratings = read_study_ratings(source, scale_of(protocol))
         read = f"{len(ratings.table)} ratings from {source}"
-    in_person = None
-    if study.in_person_file.is_file() and not ratings.simulated:
-        in_person = read_in_person(study.in_person_file)
     return StudyData(
         paths=study,
         protocol=protocol,
         ratings=ratings,
-        in_person=in_person,
+        in_person=in_person_of(study, ratings),
         read=read,
     )
+
+
+def in_person_of(study: StudyPaths, ratings: Ratings) -> InPerson | None:
+    """Read the grades given in person that belong to a study's ratings.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is.
+    ratings : Ratings
+        Its ratings.
+
+    Returns
+    -------
+    InPerson or None
+        None where there are none, and for simulated ratings.
+
+    Raises
+    ------
+    RatingsError
+        If the file is not a table of grades given in person.
+    """
+    if not study.in_person_file.is_file() or ratings.simulated:
+        return None
+    return read_in_person(study.in_person_file)
 
 
 def _file_of(study: StudyPaths) -> Path:

@@ -1,6 +1,7 @@
 """The runner of one session: present, ask for the grade, and log both at once."""
 
 import dataclasses
+import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -268,6 +269,7 @@ class SessionRunner:
         self, request: GradeRequest, outcome: Outcome, file: Path
     ) -> None:
         fault, made = outcome.fault, outcome.made
+        facts = file.with_suffix(".json").read_bytes()
         self._n_faults += fault is not None
         fields: dict[str, _Fact] = {
             "code": request.presentation.code,
@@ -280,6 +282,7 @@ class SessionRunner:
                 **fields,
                 "recording": file.relative_to(self._study.sessions).as_posix(),
                 "sha256": outcome.sha256,
+                "facts_sha256": hashlib.sha256(facts).hexdigest(),
                 "mean_speed_deg_s": outcome.mean_speed_deg_s,
                 "n_missed_ticks": outcome.n_missed_ticks,
                 "fault": None if fault is None else fault.message,

@@ -39,6 +39,7 @@ EVENTS: dict[str, tuple[str, ...]] = {
         "attempt",
         "recording",
         "sha256",
+        "facts_sha256",
         "mean_speed_deg_s",
         "n_missed_ticks",
         "fault",
@@ -69,12 +70,20 @@ EVENTS: dict[str, tuple[str, ...]] = {
 """Every kind of event with the fields it has."""
 
 _LATER = {
-    "presented": {"stretches", "ended", "n_stretches", "felt", "r1_deg", "r2_deg"},
+    "presented": {
+        "facts_sha256",
+        "stretches",
+        "ended",
+        "n_stretches",
+        "felt",
+        "r1_deg",
+        "r2_deg",
+    },
     "grade": {"stretch"},
     "session": {"rehearsal"},
 }
-"""Fields that events had not when every presentation was one stretch, and none was
-rehearsed."""
+"""Fields that events had not when every presentation was one stretch, none was
+rehearsed, and only the columns of a recording were hashed."""
 
 
 @dataclass(slots=True, kw_only=True)

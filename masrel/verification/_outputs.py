@@ -1,37 +1,65 @@
-"""The table of ratings and the analysis, held against what they were made from."""
+"""Table of ratings, analysis and report, held against what they were made from."""
 
+import hashlib
 import json
 import warnings
 from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
 
+from masrel._input import MAX_RECORDING, MAX_TABLE, parse_json, read_regular
 from masrel.errors import MasrelError, MasrelWarning
 from masrel.protocol import Protocol, StudyPaths
 from masrel.verification._finding import Finding, broken, doubt
+
+if TYPE_CHECKING:
+    from masrel.analysis import Analysis
+    from masrel.ratings import Ratings
 
 _SHOWN = 20  # differences of the table that are listed
 
 
 def output_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]:
     """Yield what is wrong with everything that was made from the logs."""
-    # pandas is loaded only when there is such a thing
-    has_logs = any(study.sessions.glob("*.jsonl"))
-    if study.ratings_file.is_file() and not has_logs:
-        yield doubt(study.ratings_file, "no session log stands behind this table")
-    elif study.ratings_file.is_file():
-        yield from _table_findings(study, protocol)
-    if study.analysis_file.is_file():
-        yield from _analysis_findings(study, protocol)
+    table, manifest = study.ratings_file, study.report / "manifest.json"
+    files = [f for f in (table, study.analysis_file, manifest) if f.is_file()]
+    if not files:
+        return  # nothing is loaded for it
+    from masrel.ratings import ratings_from_logs, read_study_data
 
-
-def _table_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]:
-    from masrel.ratings import ratings_from_logs, table_differences
-
-    path = study.ratings_file
     try:
-        ratings = ratings_from_logs(study, protocol)
+        if study.logs():
+            ratings = ratings_from_logs(study, protocol)
+            yield from _table_findings(table, ratings)
+        else:
+            ratings = read_study_data(study, protocol).ratings
+            if table.is_file():
+                yield doubt(table, "no session log stands behind this table")
+        analysis = _analysis_of(study, protocol, ratings)
     except MasrelError as error:
-        yield broken(path, f"cannot be held against the logs: {error}")
+        for path in files:
+            yield broken(path, f"cannot be held against what it is made from: {error}")
         return
+    if study.analysis_file.is_file():
+        yield from _analysis_findings(study.analysis_file, analysis)
+    if manifest.is_file():
+        yield from _report_findings(manifest, analysis)
+
+
+def _analysis_of(
+    study: StudyPaths, protocol: Protocol, ratings: "Ratings"
+) -> "Analysis":
+    from masrel.analysis import analyze
+    from masrel.ratings import in_person_of
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", MasrelWarning)  # of statistics
+        return analyze(protocol, ratings, in_person=in_person_of(study, ratings))
+
+
+def _table_findings(path: Path, ratings: "Ratings") -> Iterator[Finding]:
+    from masrel.ratings import table_differences
+
     differences = list(table_differences(path, ratings))
     for difference in differences[:_SHOWN]:
         yield broken(path, difference)
@@ -39,37 +67,25 @@ def _table_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]:
         yield broken(path, f"there are {len(differences) - _SHOWN} more differences")
 
 
-def _analysis_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]:
-    from masrel.analysis import analyze, as_analysis_document
-    from masrel.ratings import read_study_data
+def _analysis_findings(path: Path, analysis: "Analysis") -> Iterator[Finding]:
+    from masrel.analysis import as_analysis_document
 
-    path = study.analysis_file
-    try:
-        document = json.loads(path.read_bytes())
-    except (ValueError, RecursionError):
-        document = None
-    if not isinstance(document, dict):
+    document = _document(path)
+    if document is None:
         yield broken(path, "needed a JSON object, got none")
         return
-    try:
-        data = read_study_data(study, protocol)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", MasrelWarning)  # of statistics
-            analysis = analyze(protocol, data.ratings, in_person=data.in_person)
-    except MasrelError as error:
-        yield broken(path, f"cannot be computed again: {error}")
-        return
     needed = json.loads(json.dumps(as_analysis_document(analysis)))
-    if document.get("masrel_version") != needed["masrel_version"]:
+    version = document.get("masrel_version")
+    if version != analysis.masrel_version:
         yield doubt(
             path,
-            f"is of masrel {document.get('masrel_version')}, this is "
-            f"{needed['masrel_version']}: only what it was made from is looked at",
+            f"is of masrel {version}, this is {analysis.masrel_version}: only what it "
+            "was made from is looked at",
         )
         document, needed = ({"inputs": d.get("inputs")} for d in (document, needed))
-    place = _first_difference(document, needed)
-    if place is not None:
-        yield broken(path, f"{place}, computed again from {data.read}")
+    difference = _first_difference(document, needed)
+    if difference is not None:
+        yield broken(path, f"{difference} when it is computed again")
 
 
 def _first_difference(got: object, needed: object, place: str = "") -> str | None:
@@ -83,6 +99,39 @@ def _first_difference(got: object, needed: object, place: str = "") -> str | Non
     elif got == needed and type(got) is type(needed):
         return None
     else:
-        return f"{place}: got {json.dumps(got):.60}, but {json.dumps(needed):.60}"
+        return f"{place} is {json.dumps(got):.60}, but {json.dumps(needed):.60}"
     differences = (_first_difference(g, n, p) for p, g, n in pairs)
     return next((difference for difference in differences if difference), None)
+
+
+def _report_findings(manifest: Path, analysis: "Analysis") -> Iterator[Finding]:
+    # of the pages and assets that a report consists of, and what it was made from
+    document = _document(manifest)
+    files = None if document is None else document.get("files")
+    if document is None or not isinstance(files, dict):
+        yield broken(manifest, "needed the manifest of a report, got none")
+        return
+    if document.get("inputs") != analysis.inputs:
+        yield broken(
+            manifest, "the report is of another protocol or of other ratings: make anew"
+        )
+    for name, needed in files.items():
+        path = manifest.parent / name
+        if not path.resolve().is_relative_to(manifest.parent.resolve()):
+            yield broken(manifest, f"names a file outside the report, {name}")
+        elif not path.is_file():
+            yield broken(path, "needed a file of the report, got none")
+        elif _sha256(path) != needed:
+            yield broken(path, "is not the file that the report was written with")
+
+
+def _sha256(path: Path) -> str:
+    return hashlib.sha256(read_regular(path, most=MAX_RECORDING)).hexdigest()
+
+
+def _document(path: Path) -> dict[str, object] | None:
+    try:
+        document = parse_json(read_regular(path, most=MAX_TABLE))
+    except ValueError:
+        return None
+    return document if isinstance(document, dict) else None

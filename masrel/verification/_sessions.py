@@ -8,6 +8,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Literal
 
+from masrel._input import MAX_RECORDING, MAX_SMALL, parse_json, read_regular
 from masrel.errors import SessionLogError
 from masrel.protocol import Protocol, StudyPaths
 from masrel.run._log import Event, read_log
@@ -209,7 +210,8 @@ def _recording_findings(
         if not file.is_file():
             yield broken(file, f"needed a recording that {where} names, got no file")
             return
-        if sha256 not in (None, hashlib.sha256(file.read_bytes()).hexdigest()):
+        data = read_regular(file, most=MAX_RECORDING)
+        if sha256 not in (None, hashlib.sha256(data).hexdigest()):
             yield broken(file, f"is not the file whose SHA-256 {where} has")
     yield from _fact_findings(path.with_suffix(".json"), shown, schedule, event, where)
 
@@ -219,8 +221,8 @@ def _fact_findings(
 ) -> Iterator[Finding]:
     # what a file says that was not hashed once must at least agree with what was
     try:
-        facts = json.loads(path.read_bytes())
-    except (ValueError, RecursionError):
+        facts = parse_json(read_regular(path, most=MAX_SMALL))
+    except ValueError:
         facts = None
     if not isinstance(facts, dict):
         yield broken(path, "needed a JSON object, got none")

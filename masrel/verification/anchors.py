@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from masrel._files import write_file
+from masrel._input import MAX_TABLE, read_regular
 from masrel.errors import ParameterError
 from masrel.protocol import StudyPaths
 from masrel.run._log import line_hashes
@@ -56,16 +57,12 @@ def anchors_of(study: StudyPaths) -> tuple[Anchor, ...]:
         If a log cannot be read.
     """
     anchors = []
-    for log in _logs(study):
+    for log in study.logs():
         hashes = line_hashes(log)
         if hashes:
             name = log.relative_to(study.root).as_posix()
             anchors.append(Anchor(log=name, line=len(hashes), sha256=hashes[-1]))
     return tuple(anchors)
-
-
-def _logs(study: StudyPaths) -> list[Path]:
-    return sorted(p for p in study.root.rglob("*.jsonl") if p.is_file())
 
 
 def read_anchors(path: Path) -> tuple[Anchor, ...]:
@@ -89,7 +86,7 @@ def read_anchors(path: Path) -> tuple[Anchor, ...]:
         If the file cannot be read.
     """
     anchors = []
-    text = path.read_text(encoding="utf-8", errors="replace")
+    text = read_regular(path, most=MAX_TABLE).decode("utf-8", errors="replace")
     for number, line in enumerate(text.splitlines(), start=1):
         if line.startswith("#") or not line.strip():
             continue
@@ -151,7 +148,7 @@ def anchor_findings(
 
 
 def _findings(study: StudyPaths, anchors: Iterable[Anchor]) -> Iterator[Finding]:
-    logs = {log.relative_to(study.root).as_posix(): log for log in _logs(study)}
+    logs = {log.relative_to(study.root).as_posix(): log for log in study.logs()}
     hashes: dict[str, tuple[str, ...]] = {}
     for anchor in anchors:
         path = study.root / anchor.log

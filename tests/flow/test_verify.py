@@ -68,6 +68,17 @@ def chained_anew(log: Path, documents: list[dict[str, dict[str, object]]]) -> Pa
     return log
 
 
+def corrected(study: StudyPaths) -> None:
+    log = logs(study)[0]
+    session, rater = log.stem.split("_")
+    fields = next(e["fields"] for e in events(log) if e["event"] == "grade")
+    run(
+        *("run", str(study.root), "--rater", rater, "--session", session),
+        *("--correct", str(fields["code"]), "--who", "me", "--why", "a slip"),
+        *("--grade", "4" if fields["grade"] != "4" else "0"),
+    )
+
+
 def a_grade_in_the_table(study: StudyPaths) -> Path:
     lines = study.ratings_file.read_text().splitlines()
     cells = lines[-1].split(",")
@@ -156,6 +167,31 @@ def the_model_beside_a_recording(study: StudyPaths) -> Path:
     return path
 
 
+def any_fact_beside_a_recording(study: StudyPaths) -> Path:
+    path = recording(study).with_suffix(".json")
+    return edited(path, b'"rate_hz": 1000', b'"rate_hz": 1001')
+
+
+def a_page_of_the_report(study: StudyPaths) -> Path:
+    run("report", str(study.root), "--quiet")
+    return edited(study.report / "report.html", b"<p>", b"<p> ")
+
+
+def a_table_of_the_report_taken_away(study: StudyPaths) -> Path:
+    run("report", str(study.root), "--quiet")
+    path = sorted(study.report.glob("tables/*"))[0]
+    path.unlink()
+    return path
+
+
+def a_report_of_before_a_correction(study: StudyPaths) -> Path:
+    run("report", str(study.root), "--quiet")
+    corrected(study)
+    run("ratings", str(study.root))
+    run("analyze", str(study.root))
+    return study.report
+
+
 def a_schedule(study: StudyPaths) -> Path:
     path = next(p for p in study.schedules.glob("*.csv") if "sheet" not in p.name)
     lines = path.read_text().splitlines()
@@ -181,7 +217,11 @@ FORGERIES: list[Forgery] = [
     a_recording_nobody_logged,
     the_speed_beside_a_recording,
     the_model_beside_a_recording,
+    any_fact_beside_a_recording,
     a_schedule,
+    a_page_of_the_report,
+    a_table_of_the_report_taken_away,
+    a_report_of_before_a_correction,
 ]
 
 
@@ -241,13 +281,7 @@ def test_with_an_anchor_a_chain_computed_anew_is_found(
 
 def test_a_log_that_has_grown_still_fits_its_anchor(study: StudyPaths) -> None:
     anchors = anchors_of(study)
-    log = logs(study)[0]
-    session, rater = log.stem.split("_")
-    code = next(e["fields"]["code"] for e in events(log) if e["event"] == "grade")
-    run(
-        *("run", str(study.root), "--rater", rater, "--session", session),
-        *("--correct", str(code), "--grade", "2", "--who", "me", "--why", "a slip"),
-    )
+    corrected(study)
     assert anchor_findings(study, anchors) == ()
     assert {a.log for a in anchors_of(study)} == {a.log for a in anchors}
     assert anchors_of(study) != anchors
