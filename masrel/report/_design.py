@@ -4,6 +4,7 @@ from typing import Any
 
 import msgspec
 
+from masrel.protocol import PresentationRules
 from masrel.protocol._kinds import DEFAULT_KIND, all_values
 from masrel.report._material import Material, Paragraph, Section
 from masrel.report._tables import (
@@ -76,6 +77,9 @@ def design_section(material: Material) -> Section:
         f"{counted(len(protocol.sessions), 'session')}; scale {protocol.scale.name}: "
         f"{', '.join(protocol.scale.grades)}."
     ]
+    stretches = _stretches_asked_for(protocol.presentation)
+    if stretches:
+        texts[0] += f" {stretches}"
     if study.notes:
         texts.append(study.notes)
     if study.source and material.data != "published":  # else it is in the head
@@ -96,6 +100,22 @@ def design_section(material: Material) -> Section:
     )
     paragraphs = (Paragraph(text=text) for text in texts)
     return Section(name="design", title="Design", blocks=(*paragraphs, *tables))
+
+
+def _stretches_asked_for(rules: PresentationRules) -> str:
+    # how often a rater stretches the arm for one grade, unless it is once
+    if rules.stretches == "free":
+        return "Before each grade a rater stretches the arm as often as wanted."
+    if isinstance(rules.stretches, tuple):
+        speeds = {
+            "slow": f"slow (V1, at most {as_entered(rules.slow_speed_deg_s)} deg/s)",
+            "fast": f"fast (V3, at least {as_entered(rules.fast_speed_deg_s)} deg/s)",
+        }
+        cues = ", then ".join(speeds[cue] for cue in rules.stretches)
+        return f"Before each grade a rater stretches the arm as told: {cues}."
+    if rules.stretches > 1:
+        return f"Before each grade a rater stretches the arm {rules.stretches} times."
+    return ""
 
 
 def _models(material: Material) -> Table:

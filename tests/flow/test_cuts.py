@@ -44,7 +44,7 @@ def to_schedule(root: Path, study: Path) -> None:
 def to_ratings(root: Path, study: Path) -> None:
     shutil.copytree(study, root)
     ratings = root / "ratings" / "ratings.csv"
-    ratings.write_text(ratings.read_text().replace("simulated\n", "foreign\n"))
+    ratings.write_text(ratings.read_text().replace(",simulated,", ",foreign,"))
 
 
 def to_analyze(root: Path, study: Path) -> None:
@@ -61,7 +61,8 @@ def to_report(root: Path, study: Path) -> None:
     run("report", str(root), "--quiet")
     ratings = root / "ratings" / "ratings.csv"
     lines = ratings.read_text().splitlines()
-    lines[-1] = lines[-1].replace(lines[-1].split(",")[4], "NA", 1)
+    cells = lines[-1].split(",")
+    lines[-1] = ",".join([*cells[:4], "NA", *cells[5:]])
     ratings.write_text("\n".join(lines) + "\n")
 
 

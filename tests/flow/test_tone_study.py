@@ -42,7 +42,7 @@ def test_every_model_of_every_kind_was_presented_without_a_fault(
             file = rated.recording_file(rater, "test", shown.code)
             facts = read_recording(file).facts
             assert facts["fault"] is None
-            assert facts["ended"] == "arrived"
+            assert facts["ended"] == "done"
             assert facts["simulated"] is True
             phases[shown.model] = facts["phases"]
     assert len(phases) == 10
