@@ -9,30 +9,21 @@ import warnings
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from masrel.elbow.identification._catches import (
-    Arm,
-    Catch,
-    CatchLevels,
-    PreCatchLaw,
     Trial,
-    catch_levels,
-    fast_trial,
     slow_trial,
 )
 from masrel.elbow.identification._drifts import own_drifts
-from masrel.elbow.identification._equations import Equations, Known, Spreads
+from masrel.elbow.identification._fit_options import FitOptions, Term, check_options
 from masrel.elbow.identification._joint_fit import (
     JointFit,
-    Solution,
-    fit_together,
     joint_fit,
 )
 from masrel.elbow.identification._lack_of_fit import LEVEL, p_text
@@ -54,25 +45,24 @@ from masrel.elbow.identification._results import (
     Step,
     fitted,
 )
+from masrel.elbow.identification._rounds import (
+    ALWAYS,
+    Round,
+    fit_in_rounds,
+    locals_of,
+    untimed,
+)
 from masrel.elbow.identification._steps import (
     SlowFit,
-    can_be_censored,
-    fit_catch_line,
-    fit_catch_torque,
-    fit_catch_travel,
-    fit_post_catch,
     fit_slow,
-    on_the_line,
 )
 from masrel.elbow.identification._stretches import (
     Stretch,
     check_velocity,
     find_stretches,
 )
-from masrel.elbow.identification._travels import DetectionLimit, detection_limit
 from masrel.elbow.parameters import STANDARD_MODELS, ElbowParameters
 from masrel.errors import (
-    ParameterError,
     RecordingError,
     RecordingWarning,
     SmallSampleWarning,
@@ -80,58 +70,9 @@ from masrel.errors import (
 
 _Floats = NDArray[np.float64]
 
-Term = float | Literal["off", "fitted"]
-"""What an arm has: nothing of it, a fixed value in SI units, or what is fitted."""
-
 _WINDOW = 0.06  # of the filter of speeds, s: 20.5 Hz at 1 kHz
 # Two slow trials say little of how they differ, but not nothing of b.
 _MIN_DF = 4.0
-
-# Of catches and fit, where what an arm has moves the catches, or makes them last.
-_ROUNDS, _TIMED_ROUNDS = 2, 8
-
-# Where the search for what takes time begins, s, and its floor in periods of samples.
-_STARTS = {"lag": (0.004, 0.016), "catch_rise": (0.01, 0.04, 0.08)}
-_FLOORS = {"lag": 0.2, "catch_rise": 3.0}
-_ALWAYS = ("damping", "stiffness", "inertia")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Options:
-    constants: ElbowParameters
-    terms: Mapping[str, Term]  # of the arm
-    gravity_angle: float
-    with_inertia: bool
-    slow_below: float
-    window: float
-    level: float
-
-    @property
-    def fitted(self) -> tuple[str, ...]:
-        """Return the names of what is fitted of the arm."""
-        return tuple(name for name, term in self.terms.items() if term == "fitted")
-
-    @property
-    def offset(self) -> float | None:
-        """Return the constant torque of every trial, N·m; None if it is fitted."""
-        term = self.terms["offset"]
-        return None if term == "fitted" else _number(term)
-
-    def arm(self) -> Arm:
-        """Return the arm as the first round knows it."""
-        values: dict[str, Any] = {
-            name: _STARTS.get(name, (0.0,))[0] if term == "fitted" else _number(term)
-            for name, term in self.terms.items()
-            if name != "offset"
-        }
-        fits = "arm_inertia" in self.fitted
-        return replace(
-            Arm(gravity_angle=self.gravity_angle, fits_inertia=fits), **values
-        )
-
-
-def _number(term: Term) -> float:
-    return 0.0 if isinstance(term, str) else float(term)
 
 
 def fit(
@@ -215,7 +156,7 @@ def fit(
        section II and Figs. 3-5. https://doi.org/10.1109/TNSRE.2012.2195330
     """
     held = STANDARD_MODELS["HM1"] if constants is None else constants
-    options = _Options(
+    options = FitOptions(
         constants=held,
         terms={
             "gravity": gravity,
@@ -231,7 +172,7 @@ def fit(
         window=window,
         level=level,
     )
-    _check_options(options, inertia)
+    check_options(options, inertia)
     movements = [
         entry if isinstance(entry, Movement) else read_movement(Path(entry))
         for entry in recordings
@@ -239,7 +180,7 @@ def fit(
     _check_models(movements)
     stretches, rest_sd = _stretches(movements, options)
     slow = _slow_trials(stretches, options.slow_below)
-    result = _rounds(_Material(movements, stretches, slow, rest_sd), options)
+    result = _identified(_Material(movements, stretches, slow, rest_sd), options)
     _warn_of_lone(result)
     return result
 
@@ -252,67 +193,8 @@ class _Material:
     rest_sd: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Fitted:
-    # one round: trials, what was read off them, steps and the last fit
-    fast: Sequence[Trial]
-    trials: list[Trial]  # slow and fast ones that are used
-    arm: Arm
-    limits: list[DetectionLimit | None]
-    steps: list[Step]
-    equations: list[Equations]
-    solution: Solution
-
-
-def _check_options(options: _Options, inertia: str) -> None:
-    held = options.constants
-    if not 0.5 < options.level < 1.0:
-        raise ParameterError(
-            f"level: needs more than 0.5 and less than 1, got {options.level}"
-        )
-    if held.residual_reading != "residual" or held.catch_rise != 0.0:
-        raise ParameterError(
-            "constants: a fit reads Q as section II does and takes the rise of a catch "
-            'from its option; needs residual_reading "residual" and catch_rise 0, got '
-            f"{held.residual_reading!r} and {held.catch_rise:g}"
-        )
-    if not 0.0 < options.slow_below < math.inf:
-        raise ParameterError(f"slow_below: needs more than 0, got {options.slow_below}")
-    if inertia not in ("zero", "fitted"):
-        raise ParameterError(f'inertia: needs "zero" or "fitted", got {inertia!r}')
-    if inertia == "fitted" and held.post_catch == "additive":
-        raise ParameterError(
-            'inertia: with post_catch "additive", m is in every phase but the catch, '
-            "and where one ends cannot be told from the jump of m·θ̈; needs "
-            '"zero", got "fitted"'
-        )
-    for name, term in options.terms.items():
-        _check_term({"catch_rise": "rise"}.get(name, name), term, held)
-    if not math.isfinite(options.gravity_angle):
-        raise ParameterError(
-            f"gravity_angle: needs a finite angle, got {options.gravity_angle}"
-        )
-
-
-def _check_term(name: str, term: object, held: ElbowParameters) -> None:
-    if isinstance(term, str):
-        if term not in ("off", "fitted"):
-            raise ParameterError(
-                f'{name}: needs "off", "fitted" or a number, got {term!r}'
-            )
-        return
-    if not isinstance(term, int | float) or not math.isfinite(term):
-        raise ParameterError(f'{name}: needs "off", "fitted" or a number, got {term!r}')
-    if name in ("arm_inertia", "lag", "rise") and term < 0.0:
-        raise ParameterError(f"{name}: needs 0 or more, got {term:g}")
-    if name == "rise" and term > held.peak_duration:
-        raise ParameterError(
-            f"rise: needs 0 to ΔT_peak, {held.peak_duration:g} s, got {term:g} s"
-        )
-
-
 def _stretches(
-    movements: Sequence[Movement], options: _Options
+    movements: Sequence[Movement], options: FitOptions
 ) -> tuple[dict[str, Stretch], float]:
     named: dict[str, Stretch] = {}
     noise = []
@@ -362,12 +244,11 @@ def _no_slow(stretches: Mapping[str, Stretch], limit: float) -> str:
     )
 
 
-def _rounds(
+def _identified(
     material: _Material,
-    options: _Options,
+    options: FitOptions,
     reasons: Mapping[str, str] | None = None,
 ) -> ElbowFit:
-    # What an arm has moves catches, and catches tell what an arm has: both in turn.
     arm = options.arm()
     to_fit = (*options.fitted, *(["inertia"] if options.with_inertia else []))
     slow = fit_slow(
@@ -379,83 +260,18 @@ def _rounds(
         level=options.level,
     )
     _check_slow(slow, material.stretches, options)
-    law, arm = slow.law, replace(arm, gravity=slow.gravity)
-    tries = [
-        _round(material, slow, law, each, options) for each in _starts(options, arm)
-    ]
-    made = min(tries, key=lambda each: each.solution.typical)
-    n_rounds = _ROUNDS if set(options.fitted) - {"offset"} else 1
-    for _ in range((_TIMED_ROUNDS if made.arm.takes_time else n_rounds) - 1):
-        law, arm = _next(law, made)
-        instants = _instants(made)
-        settled = instants and _is_settled(made)
-        made = _round(material, slow, law, arm, options, instants)
-        if settled:
-            break
-    none = _no_time(made)
+    made = fit_in_rounds(material.stretches, slow, arm, options)
+    none = untimed(made)
     if none and not reasons:
         terms: dict[str, Term] = dict(options.terms)
         terms.update(dict.fromkeys(none, 0.0))
-        return _rounds(material, replace(options, terms=terms), none)
+        return _identified(material, replace(options, terms=terms), none)
     _warn_of_parts([*slow.trials, *made.fast])
     return _result(material, slow, made, options, reasons or {})
 
 
-def _starts(options: _Options, arm: Arm) -> list[Arm]:
-    # the sum of squares has a valley for each of several lags and rises
-    timed = [name for name in _STARTS if name in options.fitted]
-    starts: list[dict[str, Any]] = [
-        dict(zip(timed, each, strict=True))
-        for each in product(*(_STARTS[name] for name in timed))
-    ]
-    return [replace(arm, **each) for each in starts]
-
-
-def _round(
-    material: _Material,
-    slow: SlowFit,
-    law: PreCatchLaw,
-    arm: Arm,
-    options: _Options,
-    instants: Mapping[str, float] | None = None,
-) -> _Fitted:
-    fast = [
-        fast_trial(
-            stretch,
-            name,
-            options.constants,
-            law,
-            options.window,
-            arm,
-            (instants or {}).get(name),
-        )
-        for name, stretch in material.stretches.items()
-        if stretch.pace == "fast"
-    ]
-    return _fit_trials(slow, fast, arm, options)
-
-
-def _is_settled(made: _Fitted) -> bool:
-    # no catch moves by more than a sample
-    period = _floor("catch_rise", made.equations) / _FLOORS["catch_rise"]
-    return all(abs(local.get("shift", 0.0)) < period for local in _local(made))
-
-
-def _no_time(made: _Fitted) -> dict[str, str]:
-    # why a lag or a rise is not fitted: the samples do not tell it from none
-    names = made.equations[0].known.names
-    values = dict(zip(names, made.solution.shared.tolist(), strict=True))
-    floors = {n: _floor(n, made.equations) for n in _STARTS if n in values}
-    return {
-        name: f"shorter than {1000.0 * floor:.2g} ms, which these samples do not tell "
-        "from nothing: taken as 0"
-        for name, floor in floors.items()
-        if values[name] <= 1.001 * floor
-    }
-
-
 def _check_slow(
-    slow: SlowFit, stretches: Mapping[str, Stretch], options: _Options
+    slow: SlowFit, stretches: Mapping[str, Stretch], options: FitOptions
 ) -> None:
     # b and k are told by their error: what it does to the torque of these stretches
     torque = [float(np.ptp(t.pre_catch.torque)) for t in slow.trials]
@@ -483,7 +299,7 @@ def _check_slow(
             )
 
 
-def _untold(name: str, value: float, slow: SlowFit, options: _Options) -> str:
+def _untold(name: str, value: float, slow: SlowFit, options: FitOptions) -> str:
     symbol, error = QUANTITIES[name].symbol, slow.errors[name]
     if not math.isnan(error):
         symbol += f" ({value:.3g}, standard error {error:.2g})"
@@ -506,172 +322,11 @@ def _untold(name: str, value: float, slow: SlowFit, options: _Options) -> str:
     )
 
 
-def _fit_trials(
-    slow: SlowFit,
-    fast: Sequence[Trial],
-    arm: Arm,
-    options: _Options,
-) -> _Fitted:
-    constants, level = options.constants, options.level
-    trials = [*slow.trials, *(trial for trial in fast if trial.catch is not None)]
-    read = [catch_levels(trial, slow.law, constants, arm) for trial in trials]
-    post = fit_post_catch([each for each in read if each is not None], level=level)
-    stiffness = post["post_catch_stiffness"].value
-    limits = _limits(trials, read, slow, stiffness, options)
-    steps = [slow.step]
-    if len(trials) > len(slow.trials):
-        steps += [*_catch_steps(trials, read, limits, constants, level), post]
-    start = _start(steps, options, arm)
-    names = tuple(name for name, value in start.items() if not math.isnan(value))
-    lines = _on_line(trials, constants)
-    equations = [
-        Equations(
-            trial,
-            Known(
-                names=names,
-                constants=constants,
-                spreads=_spreads(steps),
-                arm=arm,
-                offset=options.offset,
-                drifts="drift" in options.fitted,
-                on_line=on_line,
-                limit=limit,
-            ),
-        )
-        for trial, on_line, limit in zip(trials, lines, limits, strict=True)
-    ]
-    floors = {name: _floor(name, equations) for name in _STARTS if name in start}
-    return _Fitted(
-        fast=fast,
-        trials=trials,
-        arm=arm,
-        limits=limits,
-        steps=steps,
-        equations=equations,
-        solution=fit_together(equations, start, floors),
-    )
-
-
-def _floor(name: str, equations: Sequence[Equations]) -> float:
-    return _FLOORS[name] * float(np.median(np.diff(equations[0].time)))
-
-
-def _start(steps: Sequence[Step], options: _Options, arm: Arm) -> dict[str, float]:
-    start = dict.fromkeys(QUANTITIES, math.nan)
-    start |= {e.name: e.value for step in steps for e in step.estimates}
-    has_catch = not math.isnan(start["catch_torque_constant"])
-    for name in ARM_QUANTITIES:
-        needs_catch = name in ("lag", "catch_rise")
-        if name in options.fitted and (has_catch or not needs_catch):
-            start[name] = float(getattr(arm, name))
-    return start
-
-
-def _local(made: _Fitted) -> list[dict[str, float]]:
-    # each trial's own parameters, by name
-    return [
-        dict(zip(e.local, values.tolist(), strict=True))
-        for e, values in zip(made.equations, made.solution.local, strict=True)
-    ]
-
-
-def _next(law: PreCatchLaw, made: _Fitted) -> tuple[PreCatchLaw, Arm]:
-    # what the fit says of the law before a catch, and of the arm
-    names = made.equations[0].known.names
-    values = dict(zip(names, made.solution.shared.tolist(), strict=True))
-    drifts = {
-        trial.name: local["drift"]
-        for trial, local in zip(made.trials, _local(made), strict=True)
-        if "drift" in local
-    }
-    of_arm: dict[str, Any] = {n: values[n] for n in ARM_QUANTITIES if n in values}
-    of_law = {n: values[n] for n in _ALWAYS if n in values}
-    return replace(law, **of_law), replace(made.arm, **of_arm, drifts=drifts)
-
-
-def _instants(made: _Fitted) -> dict[str, float]:
-    # where the fit has each catch begin
-    return {
-        trial.name: trial.catch.time + local["shift"]
-        for trial, local in zip(made.trials, _local(made), strict=True)
-        if trial.catch is not None and "shift" in local
-    }
-
-
-def _limits(
-    trials: Sequence[Trial],
-    read: Sequence[CatchLevels | None],
-    slow: SlowFit,
-    stiffness: float,
-    options: _Options,
-) -> list[DetectionLimit | None]:
-    # Of catches that do not end, if those that do tell how much travels differ. With
-    # m, or where the pre-catch law goes on after a catch, the torque may climb or not
-    # whatever k_post is: what could have been seen is not one angle.
-    used = [trial.catch for trial, levels in zip(trials, read, strict=True) if levels]
-    seen = [c.travel for c in used if c is not None and c.end is not None]
-    climbs_alone = options.constants.post_catch == "continuous"
-    climbs_alone &= slow.law.inertia == 0.0
-    if not climbs_alone or not can_be_censored(seen):
-        return [None] * len(trials)
-    return [
-        detection_limit(trial, stiffness, options.constants)
-        if levels is not None and trial.catch is not None and trial.catch.end is None
-        else None
-        for trial, levels in zip(trials, read, strict=True)
-    ]
-
-
-def _catch_steps(
-    trials: Sequence[Trial],
-    read: Sequence[CatchLevels | None],
-    limits: Sequence[DetectionLimit | None],
-    constants: ElbowParameters,
-    level: float,
-) -> list[Step]:
-    catches = [trial.catch for trial in trials if trial.catch is not None]
-    pairs: list[tuple[Catch, CatchLevels]] = [
-        (trial.catch, levels)
-        for trial, levels in zip(trials, read, strict=True)
-        if trial.catch is not None and levels is not None
-    ]
-    used, levels = [catch for catch, _ in pairs], [read for _, read in pairs]
-    behind = [each for each in limits if each is not None]
-    return [
-        fit_catch_line(catches, constants, level=level),
-        *fit_catch_torque(used, levels, level=level),
-        fit_catch_travel(used, behind, level=level),
-    ]
-
-
-def _spreads(steps: Sequence[Step]) -> Spreads:
-    def size_of(name: str) -> float:
-        for step in steps:
-            if any(estimate.name == name for estimate in step.estimates):
-                # of one trial, or of none that differ, any size serves
-                return step.residual_sd if step.residual_sd > 0.0 else 1.0
-        return 1.0
-
-    return Spreads(
-        torque=size_of("damping"),
-        peak=size_of("catch_torque_constant"),
-        residual=size_of("residual_ratio"),
-        catch_angle=size_of("catch_slope"),
-        travel=size_of("catch_travel"),
-    )
-
-
-def _on_line(trials: Sequence[Trial], held: ElbowParameters) -> list[bool]:
-    catches = [trial.catch for trial in trials if trial.catch is not None]
-    lies = iter(on_the_line(catches, held).tolist() if catches else [])
-    return [trial.catch is not None and next(lies) for trial in trials]
-
-
 def _result(
     material: _Material,
     slow: SlowFit,
-    made: _Fitted,
-    options: _Options,
+    made: Round,
+    options: FitOptions,
     no_time: Mapping[str, str],
 ) -> ElbowFit:
     joint, steps = (
@@ -681,7 +336,7 @@ def _result(
     reasons = {**_reasons(steps, made.fast, options), **no_time}
     estimates = _all_estimates(joint, made, reasons, options)
     _check_ratio(estimates)
-    local = _local(made)
+    local = locals_of(made)
     return ElbowFit(
         estimates=estimates,
         correlation=_correlation(joint, estimates),
@@ -722,14 +377,14 @@ def _check_ratio(estimates: Sequence[FittedParameter]) -> None:
 
 
 def _reasons(
-    steps: Sequence[Step], fast: Sequence[Trial], options: _Options
+    steps: Sequence[Step], fast: Sequence[Trial], options: FitOptions
 ) -> dict[str, str]:
     # why the steps do not determine what they do not
     if all(trial.catch is None for trial in fast):
         why = "there are only slow stretches, in which nothing catches"
         if fast:
             why = "no fast stretch has a catch that can be used"
-        names = [name for name in QUANTITIES if name not in _ALWAYS]
+        names = [name for name in QUANTITIES if name not in ALWAYS]
         names += [name for name in options.fitted if name in ("lag", "catch_rise")]
         return dict.fromkeys(names, why)
     return {
@@ -741,7 +396,7 @@ def _reasons(
 
 
 def _all_estimates(
-    joint: JointFit, made: _Fitted, reasons: Mapping[str, str], options: _Options
+    joint: JointFit, made: Round, reasons: Mapping[str, str], options: FitOptions
 ) -> tuple[FittedParameter, ...]:
     # Where travels are censored, D is that of its step. Least squares hold the spread
     # of travels and know less than they say; and they draw each end towards D, by
@@ -798,7 +453,7 @@ def _torque_remarks(movements: Sequence[Movement]) -> tuple[str, ...]:
     )
 
 
-def _remarks(estimates: Sequence[FittedParameter], made: _Fitted) -> tuple[str, ...]:
+def _remarks(estimates: Sequence[FittedParameter], made: Round) -> tuple[str, ...]:
     remarks = [
         f"{ALL_QUANTITIES[e.name].symbol}: {e.reason}"
         for e in estimates

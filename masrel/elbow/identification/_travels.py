@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import erfcx, log_ndtr, stdtrit
 
-from masrel.elbow.identification._catches import MIN_GAIN, MIN_SIGNAL, Trial
+from masrel.elbow.identification._catches import Trial
+from masrel.elbow.identification._changes import MIN_GAIN, MIN_SIGNAL
 from masrel.elbow.parameters import ElbowParameters
 from masrel.errors import ConvergenceError
 
