@@ -235,9 +235,11 @@ def presented_hash(protocol: Protocol) -> str:
     Notes
     -----
     Raters, sessions, texts, the analysis plan and the report do not enter: adding
-    a rater or wording a title better makes nobody's drawn schedule stale.
+    a rater or wording a title better makes nobody's drawn schedule stale. Nor does
+    ``device.torque_sensor``, which no rater feels.
     """
     tables = {name: getattr(protocol, name) for name in _PRESENTED}
+    tables["device"] = msgspec.structs.replace(protocol.device, torque_sensor=False)
     content = {"study": protocol.study.id, **tables}
     return _content_hash(content, ignored=("file", "simulated"))  # numbers are felt
 

@@ -70,6 +70,7 @@ def test_what_a_rater_meets_enters_both(
         (("sessions", 1, "note"), "later"),
         (("analysis", "level"), 0.9),
         (("training",), {"window": 40}),
+        (("device",), {"torque_sensor": True}),
         (("report", "title"), "Another"),
     ],
 )
