@@ -29,7 +29,11 @@ _LONGEST_S = 86_400.0
 # Where a study's primary records are, which no output replaces
 _PROTOCOL = "protocol.toml"
 _RECORD_FOLDERS = ("schedules", "sessions", ".key")
-_SOURCES = (("ratings", "published.csv"), ("ratings", "in_person.csv"))
+_SOURCES = (
+    ("ratings", "published.csv"),
+    ("ratings", "in_person.csv"),
+    ("conduct.jsonl",),
+)
 
 
 def write_file(path: Path, data: bytes | str, *, within: Path | None = None) -> None:

@@ -41,6 +41,8 @@ GROUPS = {
         "grading": "Regress grades on the models' parameters and the speed.",
         "report": "Write the report of a study.",
         "verify": "Hold every file of a study against the one before it.",
+        "withdraw": "Record that a rater has left; the grades are kept.",
+        "unblind": "Say which model a code stands for, and record who asked.",
     },
     "The joint and the device": {
         "trace": "Torque trace of one stretch of one model.",

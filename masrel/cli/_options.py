@@ -64,16 +64,23 @@ ratings_option = click.option(
 
 
 def read_study(root: Path, ratings_file: Path | None) -> "StudyData":
-    """Return a study's protocol and its ratings."""
+    """Return a study's protocol and its ratings; say what must be known beside."""
     from masrel.protocol import StudyPaths, read_protocol
-    from masrel.ratings import read_study_data
+    from masrel.ratings import read_study_data, study_remarks
 
     paths = StudyPaths(root)
     protocol = read_protocol(paths.protocol)
     models = [paths.root / model.file for model in protocol.models if model.file]
     tables = (paths.ratings_file, paths.published_file, paths.in_person_file)
     note_inputs(*tables, *models)
+    # Said first: it may be why the ratings are refused.
+    echo_remarks(study_remarks(paths, protocol, file=ratings_file))
     return read_study_data(paths, protocol, file=ratings_file)
+
+
+def echo_remarks(remarks: Sequence[str]) -> None:
+    """Print on stderr what a reader of a study's ratings must know beside them."""
+    echo_notes(tuple(f"note: {remark}" for remark in remarks))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

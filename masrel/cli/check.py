@@ -1,14 +1,16 @@
 """``masrel check``: everything that is wrong with a study, at once."""
 
+import contextlib
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 import click
 
-from masrel.cli._options import echo_notes
+from masrel.cli._options import echo_remarks
 from masrel.errors import MasrelError, ParameterError, ProtocolError
 from masrel.protocol import Protocol, StudyPaths, read_protocol, scale_of
+from masrel.ratings import study_remarks
 from masrel.schedule import concealment_notes, schedule_problems
 
 
@@ -16,27 +18,31 @@ from masrel.schedule import concealment_notes, schedule_problems
 @click.argument("study", type=click.Path(path_type=Path))
 def check(study: Path) -> None:
     """Check protocol, schedules, record and ratings of STUDY; say every problem."""
-    paths = StudyPaths(study)
-    problems = _check_study(paths)
+    problems, notes = _check_study(StudyPaths(study))
     for problem in problems:
         click.echo(problem, err=True)
+    echo_remarks(notes)
     if problems:
         click.echo(f"masrel: {study}: {_count(len(problems), 'problem')}", err=True)
         sys.exit(2)
-    protocol = read_protocol(paths.protocol)
-    click.echo(_summary(protocol, paths))
-    echo_notes(tuple(f"note: {note}" for note in concealment_notes(protocol, paths)))
+    click.echo(_summary(StudyPaths(study)))
 
 
-def _check_study(study: StudyPaths) -> tuple[str, ...]:
-    """Gather the problems of a study from every checker."""
+def _check_study(study: StudyPaths) -> tuple[Sequence[str], Sequence[str]]:
+    """Gather the problems of a study from every checker, and what to know beside."""
     try:
         protocol = read_protocol(study.protocol)
     except ProtocolError as error:
-        return error.problems
-    return tuple(
+        return error.problems, ()
+    problems = [
         problem for checker in _CHECKERS for problem in checker(protocol, study)
-    )
+    ]
+    notes: list[str] = []
+    with contextlib.suppress(MasrelError):  # a checker has said it
+        notes += concealment_notes(protocol, study)
+    with contextlib.suppress(MasrelError):
+        notes += study_remarks(study, protocol)
+    return problems, notes
 
 
 def _plan_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
@@ -67,7 +73,7 @@ def _device_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
 
 
 def _record_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
-    if not study.sessions.is_dir():
+    if not _has_record(study):
         return
     from masrel.verification import verify_sessions
 
@@ -89,6 +95,10 @@ def _ratings_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
             yield str(error)
 
 
+def _has_record(study: StudyPaths) -> bool:
+    return study.sessions.is_dir() or study.conduct_file.exists()
+
+
 _CHECKERS: tuple[Callable[[Protocol, StudyPaths], Iterable[str]], ...] = (
     _plan_problems,
     _device_problems,
@@ -98,7 +108,8 @@ _CHECKERS: tuple[Callable[[Protocol, StudyPaths], Iterable[str]], ...] = (
 )
 
 
-def _summary(protocol: Protocol, study: StudyPaths) -> str:
+def _summary(study: StudyPaths) -> str:
+    protocol = read_protocol(study.protocol)
     pairs = [(rater, s.id) for s in protocol.sessions for rater in s.raters]
     n_drawn = sum(study.schedule_file(*pair).is_file() for pair in pairs)
     return (

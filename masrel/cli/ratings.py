@@ -4,6 +4,7 @@ from pathlib import Path
 
 import click
 
+from masrel.cli._options import echo_remarks
 from masrel.cli._paths import OutputFile, note_inputs
 from masrel.protocol import StudyPaths, read_protocol
 
@@ -22,11 +23,12 @@ def ratings(study: Path, output: Path | None) -> None:
     Every chain of hashes is verified, and every recording that is there is held
     against its checksum. Corrections take the place of the grades they correct.
     """
-    from masrel.ratings import ratings_from_logs, write_ratings
+    from masrel.ratings import ratings_from_logs, study_remarks, write_ratings
 
     paths = StudyPaths(study)
     protocol = read_protocol(paths.protocol)
     note_inputs(*(study / model.file for model in protocol.models if model.file))
+    echo_remarks(study_remarks(paths, protocol))
     ratings = ratings_from_logs(paths, protocol)
     destination = output or paths.ratings_file
     write_ratings(ratings, destination, within=None if output else study)

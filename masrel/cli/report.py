@@ -38,6 +38,7 @@ def report(
     same bytes.
     """
     from masrel.analysis import analyze
+    from masrel.ratings import study_remarks
     from masrel.report import write_report
 
     if destination is None:
@@ -59,6 +60,7 @@ def report(
             destination,
             in_person=data.in_person,
             recordings=data.paths.sessions,
+            remarks=study_remarks(data.paths, data.protocol, file=ratings_file),
             progress=progress,
         )
     click.echo(f"read: {data.read}", err=True)

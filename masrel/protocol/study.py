@@ -66,6 +66,11 @@ class StudyPaths:
         return self.root / "report"
 
     @property
+    def conduct_file(self) -> Path:
+        """The log of what happened beside the sessions."""
+        return self.root / "conduct.jsonl"
+
+    @property
     def secret_file(self) -> Path:
         """The secret that decides orders and codes; its folder is its owner's alone."""
         return self.root / ".key" / "secret.txt"

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from masrel.ratings._parts import RatingsPart, Repeated
+    from masrel.ratings.completeness import study_remarks
     from masrel.ratings.in_person import InPerson, InPersonRow, read_in_person
     from masrel.ratings.logs import ratings_from_logs
     from masrel.ratings.reader import RatingsFile, read_ratings
@@ -56,11 +57,13 @@ __all__ = [
     "read_study_data",
     "read_study_ratings",
     "retest_pairs",
+    "study_remarks",
     "table_differences",
     "write_ratings",
 ]
 
 _HOMES = {
+    "completeness": ("study_remarks",),
     "in_person": ("InPerson", "InPersonRow", "read_in_person"),
     "logs": ("ratings_from_logs",),
     "_parts": ("RatingsPart", "Repeated"),

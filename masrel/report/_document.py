@@ -86,6 +86,7 @@ def write_report(
     *,
     in_person: InPerson | None = None,
     recordings: Path | None = None,
+    remarks: Sequence[str] = (),
     progress: Progress | None = None,
 ) -> ReportFiles:
     """Write the report a protocol asks for.
@@ -107,6 +108,9 @@ def write_report(
         Grades given in person, whose notes are shown below their table.
     recordings : Path, optional
         The folder of the sessions' recordings, of which measured torque is drawn.
+    remarks : sequence of str
+        What a reader must know beside the ratings (`masrel.ratings.study_remarks`);
+        where there is any, the report begins with it.
     progress : callable, optional
         Called with the name of each figure, and of the pages, once it is made.
 
@@ -124,6 +128,10 @@ def write_report(
     """
     material = gather(protocol, ratings, analysis, in_person, recordings)
     sections = [SECTIONS[name](material) for name in protocol.report.sections]
+    if remarks:
+        blocks = tuple(Paragraph(text=text) for text in remarks)
+        conduct = Section(name="conduct", title="Conduct of the study", blocks=blocks)
+        sections.insert(0, conduct)
     assets = Assets()
     shown = _make_blocks(sections, assets, progress)
     replace_report(destination, assets, _pages(material, shown), analysis.inputs)

@@ -8,6 +8,11 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from masrel.run._conduct import (
+        read_conduct,
+        record_unblinding,
+        record_withdrawal,
+    )
     from masrel.run._grade_sources import (
         GradeRequest,
         GradeSource,
@@ -32,8 +37,11 @@ __all__ = [
     "SimulatedGrades",
     "StretchGrade",
     "model_controller",
+    "read_conduct",
     "read_log",
     "record_correction",
+    "record_unblinding",
+    "record_withdrawal",
     "run_session",
 ]
 
@@ -43,6 +51,7 @@ _HOMES = {
     "_runner": ("SessionSummary",),
     "_settings": ("model_controller",),
     "_simulated_raters": ("SimulatedGrades",),
+    "_conduct": ("read_conduct", "record_unblinding", "record_withdrawal"),
     "console": ("ConsoleGrades",),
     "session": ("record_correction", "run_session"),
 }

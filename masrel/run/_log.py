@@ -78,7 +78,7 @@ def read_log(path: Path) -> tuple[Event, ...]:
     if torn:
         raise SessionLogError(
             f"{path}: line {len(lines) + 1}: ends without a newline, its writing was "
-            "interrupted; masrel run for this rater and session recovers the log"
+            "interrupted; the command that wrote it recovers the log when called again"
         )
     return _verify(path, lines)
 

@@ -16,6 +16,7 @@ from masrel.errors import (
     SessionLogError,
 )
 from masrel.protocol import Protocol, StudyPaths
+from masrel.run._conduct import refuse_withdrawn, stated
 from masrel.run._grade_sources import GradeSource
 from masrel.run._log import Event, SessionLog, utc_now
 from masrel.run._present import spool_of
@@ -85,8 +86,8 @@ def run_session(
     ProtocolError
         If a model asks for more torque than the device may send.
     ParameterError
-        If the device or `clock` is unknown or they do not fit each other, or the
-        source gives a grade that is not of the scale.
+        If the device or `clock` is unknown or they do not fit each other, the rater
+        was withdrawn, or the source gives a grade that is not of the scale.
     DeviceError
         If the device cannot be used, or faults are not to be tried again.
     SessionStoppedError
@@ -107,6 +108,16 @@ def run_session(
         schedule, checksum = rehearsal_schedule(protocol, rater, session, number)
     else:
         schedule, checksum = _drawn_schedule(study, protocol, rater, session)
+    refuse_withdrawn(study, rater)
+    path = study.schedule_file(rater, session)
+    schedule = read_schedule(path)
+    check_schedule(schedule, protocol)
+    if (schedule.rater, schedule.session) != (rater, session):
+        raise ScheduleError(
+            f"{path}: needed the schedule of rater {rater} in session {session}, "
+            f"got that of {schedule.rater} in {schedule.session}"
+        )
+    checksum = hashlib.sha256(path.read_bytes()).hexdigest()
     log_file = study.log_file(rater, session)
     if not log_file.exists():
         _check_recordings(schedule, log_file, ())  # before an empty log is made
@@ -216,9 +227,7 @@ def record_correction(
         raise ParameterError(
             f"grade: needed one of {', '.join(protocol.scale.grades)}, got {grade!r}"
         )
-    for name, text in (("who", who), ("why", why)):
-        if not text.strip():
-            raise ParameterError(f"{name}: needed text, got none")
+    reasons = stated(who=who, why=why)
     path = study.log_file(rater, session)
     if not path.is_file():
         raise SessionLogError(f"{path}: no such session log")
@@ -229,7 +238,4 @@ def record_correction(
             raise SessionLogError(
                 f"{path}: needed a code that has a grade ({known}), got {code!r}"
             )
-        log.append(
-            "correction",
-            {"code": code, "grade": grade, "who": who.strip(), "why": why.strip()},
-        )
+        log.append("correction", {"code": code, "grade": grade, **reasons})

@@ -4,8 +4,9 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from masrel.errors import ProtocolError, ScheduleError
+from masrel.errors import ProtocolError, ScheduleError, SessionLogError
 from masrel.protocol import Protocol, StudyPaths, read_protocol
+from masrel.run import read_conduct
 from masrel.schedule import read_schedule, schedule_problems
 from masrel.verification._finding import Finding, broken, doubt
 from masrel.verification._outputs import output_findings
@@ -92,7 +93,8 @@ def verify_sessions(study: StudyPaths, protocol: Protocol) -> Verification:
     Returns
     -------
     Verification
-        Every session of the protocol, and what is wrong in ``sessions/``.
+        Every session of the protocol, and what is wrong in ``sessions/`` and in the
+        log of what happened beside them.
 
     Raises
     ------
@@ -109,8 +111,17 @@ def verify_sessions(study: StudyPaths, protocol: Protocol) -> Verification:
         findings=(
             *(finding for of_session in checked for finding in of_session.findings),
             *_unnamed(study, checked),
+            *_conduct_findings(study),
         ),
     )
+
+
+def _conduct_findings(study: StudyPaths) -> tuple[Finding, ...]:
+    try:
+        read_conduct(study)
+    except SessionLogError as error:
+        return _of_problems(study.conduct_file, (str(error),))
+    return ()
 
 
 def _of_problems(path: Path, problems: Iterable[str]) -> tuple[Finding, ...]:

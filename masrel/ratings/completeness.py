@@ -1,0 +1,121 @@
+"""What a study's table of ratings leaves out, and what happened to the study."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from masrel.errors import MasrelError
+from masrel.protocol import Protocol, StudyPaths
+from masrel.run._conduct import read_conduct
+from masrel.run._log import Event, read_log
+from masrel.run._state import replay
+
+
+def study_remarks(
+    study: StudyPaths, protocol: Protocol, *, file: Path | None = None
+) -> tuple[str, ...]:
+    """Say everything that a reader of a study's ratings must know beside them.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is.
+    protocol : Protocol
+        The study's protocol.
+    file : Path, optional
+        A table that is used whatever the session logs say.
+
+    Returns
+    -------
+    tuple of str
+        A sentence each for raters who were withdrawn, codes that were unblinded, logs
+        of no rater of the protocol, empty logs, recordings without a log, and ratings
+        that are not from the logs that there are. Empty when there is nothing to say.
+
+    Raises
+    ------
+    SessionLogError
+        If the log of the study's conduct is damaged.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from masrel.protocol import read_protocol, StudyPaths
+    >>> study = StudyPaths(Path("studies/hess2012"))
+    >>> study_remarks(study, read_protocol(study.protocol))
+    ()
+    """
+    remarks = [_of_event(study, event) for event in read_conduct(study)]
+    remarks += _of_sessions(study, protocol)
+    if file not in (None, study.published_file) and any(study.sessions.glob("*.jsonl")):
+        remarks.append(
+            f"The ratings are from {file.name}, a file named by hand, and not from the "
+            "session logs."
+        )
+    return tuple(remarks)
+
+
+def _of_event(study: StudyPaths, event: Event) -> str:
+    fields, day = event.fields, event.time_utc[:10]
+    if event.kind == "withdrawn":
+        n_graded = _n_graded(study, str(fields["rater"]))
+        return (
+            f"Rater {fields['rater']} was withdrawn on {day} by {fields['who']}: "
+            f"{fields['why']}. Grades given before, {n_graded} by the logs, are kept "
+            "and counted."
+        )
+    where = "".join(
+        f" of {name} {fields[key]}"
+        for key, name in (("rater", "rater"), ("session", "session"))
+        if fields[key] is not None
+    )
+    what = "All codes" if fields["code"] is None else f"Code {fields['code']}"
+    verb = "were" if fields["code"] is None else "was"
+    return (
+        f"{what}{where} {verb} unblinded on {day} by {fields['who']}: {fields['why']}."
+    )
+
+
+def _n_graded(study: StudyPaths, rater: str) -> int:
+    # of the logs that can be read; the others are said to be damaged where they are
+    count = 0
+    for log in sorted(study.sessions.glob(f"*_{rater}.jsonl")):
+        try:
+            state = replay(log, read_log(log))
+        except MasrelError:
+            continue
+        if state.header.get("rater") == rater:
+            count += len(state.grades)
+    return count
+
+
+def _of_sessions(study: StudyPaths, protocol: Protocol) -> Iterator[str]:
+    expected = {
+        study.log_file(rater, session.id)
+        for session in protocol.sessions
+        for rater in session.raters
+    }
+    there = sorted(study.sessions.glob("*.jsonl"))
+    for log in there:
+        if log not in expected:
+            yield (
+                f"{_name(study, log)} is of no rater and session of the protocol: its "
+                "grades are not among the ratings. Put the rater back into the session "
+                "(masrel withdraw keeps the grades of one who left, and says so), or "
+                "move the log out of the study."
+            )
+        elif not log.stat().st_size:
+            yield (
+                f"{_name(study, log)} is empty: its grades, if there were any, are not "
+                "among the ratings. Put a copy of it back, or run the session."
+            )
+    for folder in sorted(path for path in study.sessions.glob("*") if path.is_dir()):
+        if folder.with_name(f"{folder.name}.jsonl") not in there:
+            yield (
+                f"{_name(study, folder)} has recordings and there is no log of them: "
+                "their grades are not among the ratings. Put a copy of the log back."
+            )
+
+
+def _name(study: StudyPaths, path: Path) -> str:
+    # below the study's folder, so that a report does not depend on where that is
+    return path.relative_to(study.root).as_posix()

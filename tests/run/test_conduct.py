@@ -1,0 +1,139 @@
+"""Withdrawals and unblindings are events of a chain, and nothing happens without."""
+
+import json
+
+import pytest
+
+from masrel.errors import ParameterError, ScheduleError, SessionLogError
+from masrel.protocol import Protocol, StudyPaths
+from masrel.run import (
+    ScriptGrades,
+    read_conduct,
+    record_correction,
+    record_unblinding,
+    record_withdrawal,
+    run_session,
+)
+from masrel.schedule import read_schedule
+
+Small = tuple[StudyPaths, Protocol]
+BY = {"who": " MK ", "why": "moved away"}
+
+
+def codes(study: StudyPaths, rater: str) -> list[str]:
+    schedule = read_schedule(study.schedule_file(rater, "test"))
+    return [shown.code for shown in schedule.presentations]
+
+
+def test_a_study_to_which_nothing_happened_has_no_log(small: Small) -> None:
+    assert read_conduct(small[0]) == ()
+    assert not small[0].conduct_file.exists()
+
+
+def test_events_are_a_chain_with_a_head(small: Small) -> None:
+    study, protocol = small
+    record_withdrawal(study, protocol, "R2", **BY)
+    record_unblinding(study, protocol, None, rater="R1", who="A", why="b")
+    kinds = [event.kind for event in read_conduct(study)]
+    assert kinds == ["withdrawn", "unblinded"]
+    first, second, _ = study.conduct_file.read_text(encoding="utf-8").splitlines()
+    head = json.loads(first)
+    assert (head["event"], head["fields"]["format"]) == ("conduct", 1)
+    assert json.loads(second)["fields"] == {
+        "rater": "R2",
+        "who": "MK",
+        "why": "moved away",
+    }
+
+
+def test_a_changed_line_is_found(small: Small) -> None:
+    study, protocol = small
+    record_withdrawal(study, protocol, "R2", **BY)
+    record_unblinding(study, protocol, None, who="A", why="b")
+    text = study.conduct_file.read_text(encoding="utf-8")
+    study.conduct_file.write_text(text.replace('"R2"', '"R1"'), encoding="utf-8")
+    with pytest.raises(SessionLogError, match="line 3: needed previous"):
+        read_conduct(study)
+    with pytest.raises(SessionLogError, match="line 3: needed previous"):
+        record_withdrawal(study, protocol, "R1", **BY)
+
+
+def test_a_session_log_in_its_place_is_refused(small: Small) -> None:
+    study, protocol = small
+    run(small, "R1")
+    study.conduct_file.write_bytes(study.log_file("R1", "test").read_bytes())
+    with pytest.raises(SessionLogError, match="needed an event of conduct, withdrawn"):
+        read_conduct(study)
+    with pytest.raises(SessionLogError, match="line 1: needed an event"):
+        record_withdrawal(study, protocol, "R2", **BY)
+
+
+def run(small: Small, rater: str) -> None:
+    grades = ScriptGrades(["1", "2", "3"])
+    run_session(*small, rater, "test", grades=grades, clock="simulated")
+
+
+def test_a_withdrawn_rater_goes_on_with_no_session_but_is_corrected(
+    small: Small,
+) -> None:
+    study, protocol = small
+    run(small, "R1")
+    before = study.log_file("R1", "test").read_bytes()
+    record_withdrawal(study, protocol, "R1", **BY)
+    assert study.log_file("R1", "test").read_bytes() == before
+    with pytest.raises(ParameterError, match=r"R1 was withdrawn on \d{4}-.* by MK"):
+        run(small, "R1")
+    with pytest.raises(ParameterError, match="R1 was withdrawn"):
+        record_withdrawal(study, protocol, "R1", **BY)
+    record_correction(
+        study, protocol, "R1", "test", code=codes(study, "R1")[0], grade="4", **BY
+    )
+
+
+@pytest.mark.parametrize("blank", ["who", "why"])
+def test_nobody_is_withdrawn_and_nothing_unblinded_without_a_reason(
+    small: Small, blank: str
+) -> None:
+    study, protocol = small
+    with pytest.raises(ParameterError, match=f"{blank}: needed text"):
+        record_withdrawal(study, protocol, "R1", **{**BY, blank: " "})
+    with pytest.raises(ParameterError, match=f"{blank}: needed text"):
+        record_unblinding(study, protocol, None, **{**BY, blank: ""})
+    assert not study.conduct_file.exists()
+
+
+def test_a_rater_the_protocol_does_not_have_is_refused(small: Small) -> None:
+    with pytest.raises(ParameterError, match="rater: needed one of R1, R2, got 'R7'"):
+        record_withdrawal(*small, "R7", **BY)
+
+
+def test_a_code_is_unblinded_after_the_event_is_on_disk(small: Small) -> None:
+    study, protocol = small
+    code = codes(study, "R2")[1]
+    ((schedule, shown),) = record_unblinding(study, protocol, code, **BY)
+    assert (schedule.rater, schedule.session, shown.position) == ("R2", "test", 2)
+    (event,) = read_conduct(study)
+    assert event.fields["code"] == code
+    assert (event.fields["rater"], event.fields["session"]) == ("R2", "test")
+    # the log says who asked for what, and names no model itself
+    text = study.conduct_file.read_text(encoding="utf-8")
+    assert not [model.id for model in protocol.models if f'"{model.id}"' in text]
+
+
+def test_a_code_of_nobody_unblinds_nothing(small: Small) -> None:
+    with pytest.raises(ScheduleError, match="needed one of a drawn schedule"):
+        record_unblinding(*small, "00A", **BY)
+    assert not small[0].conduct_file.exists()
+
+
+def test_a_code_on_two_sheets_needs_its_rater(small: Small) -> None:
+    study, protocol = small
+    file = study.schedule_file("R2", "test")
+    first, other = codes(study, "R1")[0], codes(study, "R2")[0]
+    text = file.read_text(encoding="utf-8").replace(other, first)
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(ScheduleError, match=r"R1 in session test and R2 in .*--rater"):
+        record_unblinding(study, protocol, first, **BY)
+    assert not study.conduct_file.exists()
+    ((schedule, _),) = record_unblinding(study, protocol, first, rater="R2", **BY)
+    assert schedule.rater == "R2"
