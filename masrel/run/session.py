@@ -102,22 +102,13 @@ def run_session(
         If the control loop missed ticks.
     """
     _check_device(clock, protocol)
+    refuse_withdrawn(study, rater)
     if rehearsal:
         study = next_rehearsal(study, rater, session)
         number = study.number
         schedule, checksum = rehearsal_schedule(protocol, rater, session, number)
     else:
         schedule, checksum = _drawn_schedule(study, protocol, rater, session)
-    refuse_withdrawn(study, rater)
-    path = study.schedule_file(rater, session)
-    schedule = read_schedule(path)
-    check_schedule(schedule, protocol)
-    if (schedule.rater, schedule.session) != (rater, session):
-        raise ScheduleError(
-            f"{path}: needed the schedule of rater {rater} in session {session}, "
-            f"got that of {schedule.rater} in {schedule.session}"
-        )
-    checksum = hashlib.sha256(path.read_bytes()).hexdigest()
     log_file = study.log_file(rater, session)
     if not log_file.exists():
         _check_recordings(schedule, log_file, ())  # before an empty log is made

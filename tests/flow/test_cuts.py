@@ -126,7 +126,8 @@ def full_at_each_call(
         with full_disk_at(place):
             done = masrel(*call)
         assert done.code == 2
-        (said,) = done.err.splitlines()
+        *notes, said = done.err.splitlines()
+        assert all(note.startswith("note: ") for note in notes)
         assert "No space left on device" in said
         assert str(root) in said
         assert not list(root.rglob(".masrel-*"))
