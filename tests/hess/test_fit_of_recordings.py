@@ -53,7 +53,7 @@ def test_measured_torque_gives_the_model_back(fitted: ElbowFit) -> None:
     assert ratio == pytest.approx(joint.residual_ratio, rel=0.015)
     after = fitted["post_catch_stiffness"].value
     assert after == pytest.approx(joint.post_catch_stiffness, rel=0.015)
-    # This hand is 6 deg/s slower some ms after a catch, where the fit has one speed
+    # This hand is 7 deg/s slower some ms after a catch, where the fit has one speed
     height = fitted["catch_torque_constant"].value
     assert height == pytest.approx(joint.catch_torque_constant, rel=0.05)
 
