@@ -3,16 +3,18 @@
 In: a study's recordings. Out: figures of one presentation of each model.
 """
 
+import math
 from pathlib import Path
 
 import numpy as np
 
-from masrel.recording import MEASURED_TORQUE, Recording, read_recording
+from masrel.recording import MEASURED_TORQUE, Recording, read_recording, stretches
 from masrel.report._figure_data import MeasuredPanel, MeasuredTorque
 from masrel.report._material import Drawing, Material, Paragraph
 from masrel.report._tables import SIMULATED, number
 
 _PANELS_PER_FIGURE = 4
+_AROUND_S = 0.25  # shown before and after a stretch
 
 
 def measured_blocks(material: Material) -> tuple[Paragraph | Drawing, ...]:
@@ -49,15 +51,27 @@ def _first_of_each_model(material: Material, folder: Path) -> list[Recording]:
 
 
 def measured_panel(recording: Recording, title: str) -> MeasuredPanel:
-    """Return what is drawn of one presentation."""
-    columns = recording.columns
+    """Return what is drawn of one presentation: its first stretch."""
+    first, last = _shown(recording)
+    time = recording.columns["time_s"]
+    shown = (time >= first) & (time <= last)
+    columns = {name: column[shown] for name, column in recording.columns.items()}
     return MeasuredPanel(
         title=title,
-        time=columns["time_s"],
+        time=columns["time_s"] - max(first, 0.0),
         angle=columns["angle_deg"],
         sent=columns["command_torque_nm"],
         measured=columns[MEASURED_TORQUE.column],
     )
+
+
+def _shown(recording: Recording) -> tuple[float, float]:
+    # when the first stretch that could catch begins and ends, s, with some time around
+    made = stretches(recording)
+    if not made:
+        return 0.0, math.inf
+    stretch = next((each for each in made if each.reached_threshold), made[0])
+    return stretch.onset_s - _AROUND_S, stretch.end_s + _AROUND_S
 
 
 def _drawing(material: Material, recordings: list[Recording], nth: int) -> Drawing:
@@ -75,9 +89,10 @@ def _drawing(material: Material, recordings: list[Recording], nth: int) -> Drawi
         name=f"measured_{nth}",
         caption=(
             f"Torque that the device's sensor measured of {listed} (line), and torque "
-            "that was sent (dashed), above the angle: the first presentation of each. "
-            "The measured torque also has the device's friction and the inertia of its "
-            "motor, and what was sent has the compensation of friction taken off."
+            "that was sent (dashed), above the angle: of the first presentation of "
+            "each the first stretch that was fast enough for a catch. The measured "
+            "torque also has the device's friction and the inertia of its motor, and "
+            "what was sent has the compensation of friction taken off."
         ),
         alt=(
             f"Measured and sent torque against time for {listed}; the largest "

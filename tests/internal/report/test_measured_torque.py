@@ -2,12 +2,14 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from masrel.analysis import analyze
 from masrel.errors import RecordingError
+from masrel.recording import MEASURED_TORQUE, RECORDING_COLUMNS, Recording
 from masrel.report._material import Drawing, Paragraph, gather
-from masrel.report._measured_torque import measured_blocks
+from masrel.report._measured_torque import measured_blocks, measured_panel
 from tests.report.pages import simulated_ratings
 from tests.report.test_measured_torque import recorded, with_sensor
 
@@ -32,6 +34,20 @@ def test_the_first_session_and_rater_that_have_a_model_are_drawn(
         recorded(tmp_path / place / "A1.npz", "HM1")
     (drawing,) = blocks(tmp_path)
     assert [panel.title for panel in drawing.content.panels] == ["HM1\nR1, test"]
+
+
+def test_of_many_stretches_the_first_that_could_catch_is_drawn() -> None:
+    # 0.4 s at 10 deg/s, back, then 0.4 s at 60 deg/s: with 0.25 s around it
+    time = np.arange(3000) * 1e-3
+    columns = {name: np.zeros(3000) for name in RECORDING_COLUMNS} | {"time_s": time}
+    columns |= {MEASURED_TORQUE.column: time}
+    for number, start, speed in ((1, 500, 10.0), (2, 1500, 60.0)):
+        columns["stretch"][start : start + 400] = number
+        columns["velocity_deg_s"][start : start + 400] = speed
+    recording = Recording(columns=columns, facts={}, channels=(MEASURED_TORQUE,))
+    panel = measured_panel(recording, "HM1")
+    assert panel.time[0] == pytest.approx(0.0, abs=1e-9)
+    assert panel.measured[[0, -1]] == pytest.approx([1.25, 2.149])
 
 
 def test_recordings_that_are_not_there_are_missed(tmp_path: Path) -> None:
