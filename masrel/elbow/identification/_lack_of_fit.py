@@ -23,7 +23,7 @@ from masrel.elbow.identification._equations import Equations
 
 _Floats = NDArray[np.float64]
 
-LEVEL = 0.01
+LEVEL = 0.02
 """Of all tests together: how often a fit of the right law is called a wrong one."""
 
 # What is tried for lag and rise, s: of the size that a sensor and a muscle have.
