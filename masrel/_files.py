@@ -16,10 +16,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
+from masrel._input import regular
 from masrel.errors import ParameterError
 
 # What Windows alone has, and what it lacks
 _NO_FOLLOW = getattr(os, "O_NOFOLLOW", 0)
+_NO_WAIT = getattr(os, "O_NONBLOCK", 0)
 _BINARY = getattr(os, "O_BINARY", 0)
 
 # Names of files that are not whole yet
@@ -216,12 +218,13 @@ def refuse_record(path: Path) -> None:
 
 
 def no_follow(path: str, flags: int) -> int:
-    """Open a file that is added to, an `opener` for ``open``; refuse a link."""
+    """Open a file that is added to, an `opener` for ``open``; refuse a link or pipe."""
     try:
-        return os.open(path, flags | _NO_FOLLOW | _BINARY, 0o666)
+        descriptor = os.open(path, flags | _NO_FOLLOW | _NO_WAIT | _BINARY, 0o666)
     except OSError as error:
         if error.errno == errno.ELOOP:
             raise OSError(
                 errno.ELOOP, "is a link, which is not followed", path
             ) from None
         raise
+    return regular(descriptor, Path(path))

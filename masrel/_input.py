@@ -17,8 +17,8 @@ from typing import Any
 MAX_SMALL = 1_000_000
 # of a table of ratings, or a session log
 MAX_TABLE = 64_000_000
-# of a recording, or of what one is unpacked to
-MAX_RECORDING = 256_000_000
+# of a recording, and of what one is unpacked to: half an hour at 1 kHz
+MAX_RECORDING = 128_000_000
 
 # Each missing on some systems
 _NO_WAIT = getattr(os, "O_NONBLOCK", 0)
@@ -26,21 +26,22 @@ _BINARY = getattr(os, "O_BINARY", 0)
 
 # Tables and arrays inside each other; a protocol has four
 _MAX_DEPTH = 32
-_LARGEST_INTEGER = 2**63  # TOML promises no more
+_MAX_BITS = 1024  # of a whole number: what is longer cannot always be shown
 
 
 def read_regular(path: Path, *, most: int) -> bytes:
     """Return the bytes of a regular file of at most so many."""
     # A pipe without a writer would keep it waiting, and a device never ends.
     descriptor = os.open(path, os.O_RDONLY | _NO_WAIT | _BINARY)
-    with os.fdopen(_regular(descriptor, path), "rb") as file:
+    with os.fdopen(regular(descriptor, path), "rb") as file:
         data = file.read(most + 1)
     if len(data) > most:
         raise OSError(errno.EFBIG, f"larger than {most} bytes", str(path))
     return data
 
 
-def _regular(descriptor: int, path: Path) -> int:
+def regular(descriptor: int, path: Path) -> int:
+    """Return a descriptor that is of a file; close any other and refuse it."""
     mode = os.fstat(descriptor).st_mode
     if stat.S_ISREG(mode):
         return descriptor
@@ -74,8 +75,8 @@ def parse_toml(data: bytes) -> dict[str, Any]:
 
 
 def _parts(value: object) -> list[object]:
-    if isinstance(value, int) and not -_LARGEST_INTEGER <= value < _LARGEST_INTEGER:
-        raise ValueError("a whole number of more than 64 bits")
+    if isinstance(value, int) and value.bit_length() > _MAX_BITS:
+        raise ValueError(f"a whole number of more than {_MAX_BITS} bits")
     if isinstance(value, Mapping):
         return list(value.values())
     return value if isinstance(value, list) else []

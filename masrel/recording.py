@@ -9,15 +9,17 @@ import io
 import json
 import re
 import zipfile
+import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from masrel._files import write_files
+from masrel._input import MAX_RECORDING, MAX_SMALL, parse_json, read_regular
 from masrel.errors import ParameterError, RecordingError
 
 __all__ = [
@@ -426,21 +428,18 @@ def read_recording(path: Path) -> Recording:
         if not needed.is_file():
             raise RecordingError(f"{needed}: no such file")
     try:
-        facts = json.loads(facts_path.read_text(encoding="utf-8"))
+        facts = parse_json(read_regular(facts_path, most=MAX_SMALL))
     except ValueError as error:
         raise RecordingError(f"{facts_path}: not JSON ({error})") from error
     if not isinstance(facts, dict) or "sha256" not in facts:
         raise RecordingError(f"{facts_path}: needs an object with the key sha256")
-    checksum = hashlib.sha256(path.read_bytes()).hexdigest()
+    data = read_regular(path, most=MAX_RECORDING)
+    checksum = hashlib.sha256(data).hexdigest()
     if facts.pop("sha256") != checksum:
         raise RecordingError(
             f"{path}: is not the file whose checksum {facts_path} holds"
         )
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            columns = {name: archive[name] for name in archive.files}
-    except (ValueError, EOFError, OSError, zipfile.BadZipFile) as error:
-        raise RecordingError(f"{path}: not an archive of columns ({error})") from error
+    columns = _read_columns(path, data)
     try:
         channels = _channels_of(facts.pop("channels", []))
     except ValueError as error:
@@ -458,3 +457,27 @@ def _channels_of(plain: object) -> tuple[Channel, ...]:
             case _:
                 raise ValueError(f"channels: needs name and unit of each, got {entry}")
     return tuple(channels)
+
+
+def _read_columns(path: Path, data: bytes) -> dict[str, NDArray[Any]]:
+    """Return the arrays of an npz archive, if they are not too large."""
+    if data.startswith(b"\x93NUMPY"):
+        raise RecordingError(
+            f"{path}: not an archive of columns (one array without a name)"
+        )
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as members:
+            n_bytes = sum(member.file_size for member in members.infolist())
+        if n_bytes > MAX_RECORDING:
+            raise ValueError(f"its columns are larger than {MAX_RECORDING} bytes")
+        with np.load(io.BytesIO(data), allow_pickle=False) as archive:
+            return {name: archive[name] for name in archive.files}
+    except _DAMAGES as error:
+        raise RecordingError(f"{path}: not an archive of columns ({error})") from error
+
+
+_DAMAGES = (
+    *(ValueError, EOFError, OSError, zipfile.BadZipFile, zlib.error),
+    *(RuntimeError, NotImplementedError),  # encrypted, packed in another way
+    MemoryError,  # a column that says it is longer than the file
+)

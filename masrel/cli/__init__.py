@@ -11,7 +11,7 @@ from typing import NoReturn
 import click
 
 import masrel
-from masrel.cli._streams import accept_any_text
+from masrel.cli._encodings import accept_any_text
 from masrel.errors import (
     ConvergenceError,
     DeviceError,

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from masrel._files import write_file
+from masrel.cli._encodings import is_encodable
 from masrel.cli._paths import InputFile, OutputFile, note_inputs
-from masrel.cli._streams import is_encodable
 from masrel.errors import MasrelWarning, ParameterError
 
 if TYPE_CHECKING:

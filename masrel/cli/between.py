@@ -1,7 +1,6 @@
 """``masrel between``: model files at even steps between models."""
 
 import hashlib
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,7 @@ import click
 
 import masrel
 from masrel._files import write_file
+from masrel._input import MAX_SMALL, parse_toml, read_regular
 from masrel.cli._options import OutputOptions, output_options, write_output
 from masrel.cli._paths import InputFile, refuse_inputs
 from masrel.errors import ParameterError
@@ -112,8 +112,8 @@ def _read_source(model: str) -> _Source:
         return _Source(name=model, label=model, joint=joint, simulated=False)
     path = Path(model)
     joint = read_model_file(path)
-    content = path.read_bytes()
-    simulated = tomllib.loads(content.decode("utf-8-sig")).get("simulated")
+    content = read_regular(path, most=MAX_SMALL)
+    simulated = parse_toml(content).get("simulated")
     if not isinstance(simulated, bool):
         raise ParameterError(
             f"{path}: simulated must be true or false: what is made of the model says "

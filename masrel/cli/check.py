@@ -83,7 +83,7 @@ def _record_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
 
 
 def _ratings_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
-    files = [f for f in (study.ratings_file, study.published_file) if f.is_file()]
+    files = [f for f in (study.ratings_file, study.published_file) if f.exists()]
     if not files:
         return
     from masrel.ratings import read_study_ratings  # loads pandas

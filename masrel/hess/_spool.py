@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel._files import make_folder, no_follow
+from masrel._input import MAX_RECORDING, parse_json, read_regular
 from masrel.errors import ParameterError, RecordingError
 from masrel.hess.limits import DeviceLimits
 from masrel.recording import RECORDING_COLUMNS, Channel, _channels_of, _Fact
@@ -225,11 +226,11 @@ class Spooled:
 
 def read_spool(path: Path) -> Spooled | None:
     """Return the samples that a dead process left; None when it left none."""
-    data = path.read_bytes()
+    data = read_regular(path, most=MAX_RECORDING + _HEADER)
     if len(data) < _HEADER + _WORD or not data[:_HEADER].strip():
         return None  # it died while it allocated the file
     try:
-        return _spooled(json.loads(data[:_HEADER]), data)
+        return _spooled(parse_json(data[:_HEADER]), data)
     except (ValueError, KeyError, TypeError) as error:
         raise RecordingError(
             f"{path}: needs the samples of a presentation that was cut off, got "

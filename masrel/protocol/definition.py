@@ -144,8 +144,8 @@ class PresentationRules(_Table, frozen=True, kw_only=True):
     ) = 1
     time_limit_s: Annotated[float, Meta(gt=0, le=3600)] = 60.0
     stretch_limit_s: Annotated[float, Meta(gt=0, le=600)] = 20.0
-    slow_speed_deg_s: Annotated[float, Meta(gt=0, le=600)] = 10.0  # V1
-    fast_speed_deg_s: Annotated[float, Meta(gt=0, le=600)] = 120.0  # V3
+    slow_speed_deg_s: Annotated[float, Meta(ge=1, le=600)] = 10.0  # V1
+    fast_speed_deg_s: Annotated[float, Meta(ge=1, le=600)] = 120.0  # V3
     done_with: Literal["enter", "button"] = "enter"
 
 
@@ -205,7 +205,7 @@ class SimulatedRaters(_Table, frozen=True, kw_only=True):
     seed: Annotated[int, Meta(ge=0, le=2**63 - 1)] = 0
     accuracy: Annotated[float, Meta(ge=0, le=1)] = 0.84
     retest_agreement: Annotated[float, Meta(ge=0, le=1)] = 0.85
-    mean_speed_deg_s: _Positive = 85.0
+    mean_speed_deg_s: Annotated[float, Meta(ge=1, le=_LARGEST)] = 85.0
     speed_sd_deg_s: _NonNegative = 15.0
 
 

@@ -1,6 +1,5 @@
 """Read a protocol file, or a model file, and say everything wrong with it at once."""
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -8,6 +7,7 @@ from typing import Any
 
 import msgspec
 
+from masrel._input import MAX_SMALL, parse_toml, read_regular
 from masrel.elbow.identification._model_file import (
     CONSTANT_KEYS,
     FORMAT,
@@ -83,8 +83,7 @@ def read_protocol(path: Path) -> Protocol:
 
 def _read_toml(path: Path) -> dict[str, object]:
     try:
-        # utf-8-sig: some editors put a byte order mark first.
-        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+        return parse_toml(read_regular(path, most=MAX_SMALL))
     except OSError as error:
         reason = error.strerror or str(error)
         raise ProtocolError(f"{path}: needed a protocol file, got: {reason}") from error
@@ -154,7 +153,7 @@ def read_model_file(path: Path) -> ElbowParameters:
 def _read_tables(path: Path) -> dict[str, Any] | str:
     # the tables of a model file, or what is wrong with it
     try:
-        content = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+        content = parse_toml(read_regular(path, most=MAX_SMALL))
     except OSError as error:
         return f"needed a model file, got {path}: {error.strerror or error}"
     except ValueError as error:  # not UTF-8, or not TOML

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from masrel._input import MAX_RECORDING, MAX_SMALL, read_regular
 from masrel.errors import RatingsError
 from masrel.protocol import Protocol, StudyPaths, scale_of
 from masrel.ratings.table import Ratings, ratings_from_rows
@@ -111,7 +112,8 @@ def _schedule(
     path = study.schedule_file(rater, session)
     schedule = read_schedule(path)
     check_schedule(schedule, protocol)
-    if state.header["schedule_sha256"] != hashlib.sha256(path.read_bytes()).hexdigest():
+    data = read_regular(path, most=MAX_SMALL)
+    if state.header["schedule_sha256"] != hashlib.sha256(data).hexdigest():
         raise RatingsError(f"{log}: was recorded with another schedule than {path}")
     return schedule
 
@@ -120,7 +122,8 @@ def _check_recording(study: StudyPaths, log: Path, event: Event) -> None:
     path = study.sessions / str(event.fields["recording"])
     if not path.is_file():
         return
-    if hashlib.sha256(path.read_bytes()).hexdigest() != event.fields["sha256"]:
+    data = read_regular(path, most=MAX_RECORDING)
+    if hashlib.sha256(data).hexdigest() != event.fields["sha256"]:
         raise RatingsError(
             f"{log}: line {event.line}: {path} is not the recording whose checksum "
             "this line holds"

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from masrel._input import MAX_TABLE, read_regular
 from masrel.errors import RatingsError
 from masrel.ratings.table import (
     DEFAULT_SESSION,
@@ -254,9 +255,12 @@ def _read_rows(path: Path) -> _CsvRows:
     """Read a CSV file as text, without guessing any type."""
     # A byte order mark, either line ending, blank lines, and blanks around cells do
     # not matter.
-    if not path.is_file():
-        raise RatingsError(f"{path}: no such file")
-    data = path.read_bytes()
+    try:
+        data = read_regular(path, most=MAX_TABLE)
+    except OSError as error:
+        is_absent = isinstance(error, FileNotFoundError)
+        reason = "no such file" if is_absent else error.strerror
+        raise RatingsError(f"{path}: {reason}") from error
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -322,13 +326,15 @@ def _check_header(path: Path, line: int, header: tuple[str, ...]) -> None:
             f"{header[0]!r}"
         )
     problems: list[_Problem] = []
+    seen: set[str] = set()
     for position, name in enumerate(header, start=1):
         if not name:
             problems.append((line, None, f"column {position} needs a name, got none"))
-        elif name in header[: position - 1]:
+        elif name in seen:
             problems.append(
                 (line, name, "needed different names, this one is there twice")
             )
+        seen.add(name)
     if problems:
         raise _refusal(path, problems)
 

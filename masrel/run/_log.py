@@ -17,6 +17,7 @@ from types import MappingProxyType, TracebackType
 from typing import TYPE_CHECKING, Self
 
 from masrel._files import make_folder, no_follow, sync_folder
+from masrel._input import MAX_TABLE, parse_json, read_regular
 from masrel.errors import SessionLogError
 
 if TYPE_CHECKING:
@@ -72,15 +73,20 @@ def read_log(path: Path) -> tuple[Event, ...]:
         If the file is missing, a line is not an event, a line does not carry the
         hash of the line before, or the last line is torn.
     """
-    if not path.is_file():
-        raise SessionLogError(f"{path}: no such session log")
-    lines, torn = _split_lines(path.read_bytes())
+    lines, torn = _split_lines(_read(path))
     if torn:
         raise SessionLogError(
             f"{path}: line {len(lines) + 1}: ends without a newline, its writing was "
             "interrupted; the command that wrote it recovers the log when called again"
         )
     return _verify(path, lines)
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return read_regular(path, most=MAX_TABLE)
+    except FileNotFoundError as error:
+        raise SessionLogError(f"{path}: no such session log") from error
 
 
 def _split_lines(data: bytes) -> tuple[list[bytes], bytes]:
@@ -96,7 +102,7 @@ def _line_hash(line: bytes) -> str:
 
 def line_hashes(path: Path) -> tuple[str, ...]:
     """Return the SHA-256 of every whole line of a log, whatever is in it."""
-    return tuple(_line_hash(line) for line in _split_lines(path.read_bytes())[0])
+    return tuple(_line_hash(line) for line in _split_lines(_read(path))[0])
 
 
 def _verify(path: Path, lines: list[bytes]) -> tuple[Event, ...]:
@@ -119,7 +125,7 @@ def _verify(path: Path, lines: list[bytes]) -> tuple[Event, ...]:
 def _parse_line(path: Path, number: int, line: bytes) -> tuple[Event, object]:
     """Return the event of one line, and what it carries as the hash before it."""
     try:
-        document = json.loads(line.decode("utf-8"))
+        document = parse_json(line.decode("utf-8"))
     except ValueError as error:
         raise SessionLogError(
             f"{path}: line {number}: needed one JSON object, got {line[:40]!r} "
@@ -227,7 +233,7 @@ class SessionLog:
 
     @classmethod
     def _recover(cls, path: Path, descriptor: int, now: Callable[[], datetime]) -> Self:
-        data = path.read_bytes()
+        data = _read(path)
         lines, torn = _split_lines(data)
         events = list(_verify(path, lines))
         previous = _line_hash(lines[-1]) if lines else _FIRST_PREVIOUS

@@ -7,6 +7,7 @@ import secrets
 from pathlib import Path
 
 from masrel._files import make_folder, write_files
+from masrel._input import MAX_SMALL, read_regular
 from masrel.errors import ScheduleError
 from masrel.protocol import StudyPaths
 
@@ -55,7 +56,8 @@ def secret_text(secret: bytes) -> str:
 
 
 def _read(file: Path) -> bytes:
-    match = _TEXT.fullmatch(file.read_text(encoding="utf-8", errors="replace"))
+    text = read_regular(file, most=MAX_SMALL).decode("utf-8", errors="replace")
+    match = _TEXT.fullmatch(text)
     if match is None:
         raise ScheduleError(
             f"{file}: needed a line 'format: 1' and a line 'secret: ' with "

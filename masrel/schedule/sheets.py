@@ -1,6 +1,5 @@
 """The files of schedules and raters' sheets: read, drawn once, kept, found stale."""
 
-import csv
 import os
 import re
 import shlex
@@ -9,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from masrel._files import make_folder, write_files
+from masrel._input import MAX_SMALL, read_regular
 from masrel.errors import ScheduleError
 from masrel.protocol import Protocol, StudyPaths
 from masrel.schedule._secret import commitment_of, find_secret, new_secret
@@ -23,7 +23,7 @@ _HEAD = {
     "study": r"\S+",
     "rater": r"\S+",
     "session": r"\S+",
-    "seed": r"[0-9]+",
+    "seed": r"[0-9]{1,19}",
     "scheme": r"\S+",
     "protocol_sha256": r"[0-9a-f]{64}",
     "presented_sha256": r"[0-9a-f]{64}",
@@ -96,7 +96,7 @@ def read_schedule(path: Path) -> Schedule:
 
 def _read_lines(path: Path) -> list[str]:
     try:
-        return path.read_text(encoding="utf-8").splitlines()
+        return read_regular(path, most=MAX_SMALL).decode("utf-8").splitlines()
     except OSError as error:
         reason = error.strerror or str(error)
         raise ScheduleError(f"{path}: needed a schedule file, got: {reason}") from error
@@ -130,7 +130,8 @@ def _read_head(lines: list[str], path: Path, problems: list[str]) -> dict[str, s
 def _read_rows(
     lines: list[str], n_head: int, path: Path, problems: list[str]
 ) -> Iterator[Presentation]:
-    table = list(csv.reader(lines[n_head:]))
+    # a cell longer than csv takes is in no schedule
+    table = [line.split(",") if line else [] for line in lines[n_head:]]
     if not table or table[0] != _COLUMNS:
         header = ",".join(table[0]) if table else "nothing"
         problems.append(
@@ -385,16 +386,20 @@ def _refusal(files: _ScheduleFiles, fault: str, *, redraw: bool) -> str | None:
 
 def _is_filled_in(sheet: Path) -> bool:
     # A blank sheet's rows, and none but they, end at the comma before the grade.
-    rows = sheet.read_text(encoding="utf-8", errors="replace").splitlines()[1:]
+    rows = _sheet_lines(sheet)[1:]
     return any(not row.endswith(",") for row in rows if row)
+
+
+def _sheet_lines(sheet: Path) -> list[str]:
+    data = read_regular(sheet, most=MAX_SMALL)
+    return data.decode("utf-8", errors="replace").splitlines()
 
 
 def _sheet_fault(files: _ScheduleFiles, schedule: Schedule) -> str | None:
     # The sheet may be missing or have grades, but its codes are the schedule's.
     if not files.sheet.exists():
         return None
-    text = files.sheet.read_text(encoding="utf-8", errors="replace").splitlines()[1:]
-    rows = [tuple(row.split(",")[:2]) for row in text if row]
+    rows = [tuple(row.split(",")[:2]) for row in _sheet_lines(files.sheet)[1:] if row]
     expected = [(str(s.position), s.code) for s in schedule.presentations]
     if rows == expected:
         return None

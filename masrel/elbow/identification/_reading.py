@@ -9,8 +9,6 @@ import hashlib
 import json
 import math
 import warnings
-import zipfile
-import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,8 +17,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from masrel._input import MAX_RECORDING, read_regular
 from masrel.errors import ParameterError, RecordingError, RecordingWarning
-from masrel.recording import _FIRST_COLUMNS, MEASURED_TORQUE, read_recording
+from masrel.recording import (
+    _FIRST_COLUMNS,
+    MEASURED_TORQUE,
+    _read_columns,
+    read_recording,
+)
 
 TorqueSource = Literal["recorded", "sensor", "model"]
 
@@ -308,16 +312,8 @@ class _Archive:
         return numbers
 
 
-def _read_archive(path: Path) -> _Archive:
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
-    except (ValueError, EOFError, OSError, zipfile.BadZipFile, zlib.error) as error:
-        raise RecordingError(f"{path}: not an archive of columns ({error})") from error
-    except TypeError as error:  # numpy gives the one array of an npy file
-        raise RecordingError(
-            f"{path}: not an archive of columns (one array without a name)"
-        ) from error
+def _read_archive(path: Path, content: bytes) -> _Archive:
+    arrays = _read_columns(path, content)
     if _is_own(arrays) and path.with_suffix(".json").is_file():
         local = read_recording(path)  # holds it to its checksum
         simulated = local.facts.get("simulated") is True
@@ -477,8 +473,12 @@ def read_movement(
     if not path.is_file():
         why = "a folder; needs a file" if path.is_dir() else "no such file"
         raise RecordingError(f"{path}: {why}")
-    content = path.read_bytes()
-    table = _read_archive(path) if path.suffix == ".npz" else _read_text(path, content)
+    content = read_regular(path, most=MAX_RECORDING)
+    table = (
+        _read_archive(path, content)
+        if path.suffix == ".npz"
+        else _read_text(path, content)
+    )
     source: TorqueSource = "recorded"
     if _is_own(table.names) and "torque" not in (columns or {}):
         source = "sensor" if MEASURED_TORQUE.column in table.names else "model"

@@ -1,12 +1,14 @@
 """Motions from files: a table of times and angles, or a recording of the loop."""
 
 import csv
+import io
 import math
 from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
 
+from masrel._input import MAX_RECORDING, read_regular
 from masrel.elbow.motions._recorded import Interpolation, Recorded
 from masrel.errors import ParameterError, RecordingError
 from masrel.recording import read_recording
@@ -78,8 +80,8 @@ def _checked_pair(path: Path) -> Path:
 
 def _read_table(path: Path) -> list[list[float]]:
     try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = list(csv.reader(file))
+        text = read_regular(path, most=MAX_RECORDING).decode("utf-8-sig")
+        rows = list(csv.reader(io.StringIO(text, newline="")))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise RecordingError(f"{path}: cannot be read: {error}") from error
     head = 1 + sum(1 for _ in takewhile(_is_remark, rows))  # row of the names

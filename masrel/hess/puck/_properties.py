@@ -5,11 +5,11 @@ may move an arm: a firmware whose numbers are not known is refused. In: the vers
 a firmware, or a TOML file. Out: a `PropertyTable`.
 """
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from masrel._input import MAX_SMALL, parse_toml, read_regular
 from masrel.errors import DeviceError, ParameterError
 
 # The same for every type and firmware
@@ -210,7 +210,7 @@ def read_property_table(path: Path) -> PropertyTable:
         If it cannot be read.
     """
     try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
+        document = parse_toml(read_regular(path, most=MAX_SMALL))
     except ValueError as error:
         raise ParameterError(f"{path}: not TOML ({error})") from error
     if set(document) != {"properties"} or not isinstance(document["properties"], dict):
