@@ -40,6 +40,7 @@ def report(
     from masrel.analysis import analyze
     from masrel.ratings import study_remarks
     from masrel.report import write_report
+    from masrel.verification import anchors_of
 
     if destination is None:
         destination = study / "report"
@@ -60,6 +61,8 @@ def report(
             destination,
             in_person=data.in_person,
             recordings=data.paths.sessions,
+            # of what is simulated none, so that it repeats byte for byte
+            anchors=() if data.ratings.simulated else anchors_of(data.paths),
             remarks=study_remarks(data.paths, data.protocol, file=ratings_file),
             progress=progress,
         )

@@ -25,6 +25,7 @@ from masrel.report._material import Drawing, Material, Paragraph, Section, gathe
 from masrel.report._report_folder import MANIFEST, Assets, replace_report
 from masrel.report._stretches import speeds_section, traces_section
 from masrel.report._tables import Table, as_csv, page_cells
+from masrel.verification import Anchor
 
 Progress = Callable[[str], object]
 """Called with the name of each figure, and of the pages, once it is made."""
@@ -87,6 +88,7 @@ def write_report(
     in_person: InPerson | None = None,
     recordings: Path | None = None,
     remarks: Sequence[str] = (),
+    anchors: Sequence[Anchor] = (),
     progress: Progress | None = None,
 ) -> ReportFiles:
     """Write the report a protocol asks for.
@@ -111,6 +113,9 @@ def write_report(
     remarks : sequence of str
         What a reader must know beside the ratings (`masrel.ratings.study_remarks`);
         where there is any, the report begins with it.
+    anchors : sequence of Anchor, optional
+        Hashes of the session logs (`masrel.verification.anchors_of`), printed at the
+        end: a report kept elsewhere shows whether the logs were written anew.
     progress : callable, optional
         Called with the name of each figure, and of the pages, once it is made.
 
@@ -134,7 +139,8 @@ def write_report(
         sections.insert(0, conduct)
     assets = Assets()
     shown = _make_blocks(sections, assets, progress)
-    replace_report(destination, assets, _pages(material, shown), analysis.inputs)
+    pages = _pages(material, shown, anchors)
+    replace_report(destination, assets, pages, analysis.inputs)
     if progress is not None:
         progress("pages")
     return ReportFiles(
@@ -183,7 +189,9 @@ def _make_blocks(
 
 
 def _pages(
-    material: Material, sections: Sequence[Mapping[str, object]]
+    material: Material,
+    sections: Sequence[Mapping[str, object]],
+    anchors: Sequence[Anchor],
 ) -> dict[str, str]:
     # Imported here: a section's tables alone load no templates.
     from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
@@ -204,8 +212,11 @@ def _pages(
         "provenance": material.provenance,
         "sections": sections,
         "inputs": [
-            (f"SHA-256 of the {_INPUTS[name]}", digest)
-            for name, digest in analysis.inputs.items()
+            *(
+                (f"SHA-256 of the {_INPUTS[name]}", digest)
+                for name, digest in analysis.inputs.items()
+            ),
+            *((f"SHA-256 of line {a.line} of {a.log}", a.sha256) for a in anchors),
         ],
         "style": style.read_text(encoding="utf-8"),
         "version": analysis.masrel_version,

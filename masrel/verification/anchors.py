@@ -49,7 +49,7 @@ def anchors_of(study: StudyPaths) -> tuple[Anchor, ...]:
     Returns
     -------
     tuple of Anchor
-        Of the last whole line of each, logs in alphabetical order.
+        Of the last whole line of each: of the study's conduct, then of every session.
 
     Raises
     ------
@@ -57,12 +57,17 @@ def anchors_of(study: StudyPaths) -> tuple[Anchor, ...]:
         If a log cannot be read.
     """
     anchors = []
-    for log in study.logs():
+    for log in _logs(study):
         hashes = line_hashes(log)
         if hashes:
             name = log.relative_to(study.root).as_posix()
             anchors.append(Anchor(log=name, line=len(hashes), sha256=hashes[-1]))
     return tuple(anchors)
+
+
+def _logs(study: StudyPaths) -> list[Path]:
+    is_there = study.conduct_file.is_file()
+    return [*([study.conduct_file] if is_there else []), *study.logs()]
 
 
 def read_anchors(path: Path) -> tuple[Anchor, ...]:
@@ -148,7 +153,7 @@ def anchor_findings(
 
 
 def _findings(study: StudyPaths, anchors: Iterable[Anchor]) -> Iterator[Finding]:
-    logs = {log.relative_to(study.root).as_posix(): log for log in study.logs()}
+    logs = {log.relative_to(study.root).as_posix(): log for log in _logs(study)}
     hashes: dict[str, tuple[str, ...]] = {}
     for anchor in anchors:
         path = study.root / anchor.log

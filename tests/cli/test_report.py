@@ -141,7 +141,7 @@ def test_dollars_in_a_text_are_no_mathematics(masrel: Caller, study: Path) -> No
     ]
     protocol.write_text("\n".join(lines), encoding="utf-8")
     done = masrel("report", study, "--quiet")
-    assert (done.code, done.err) == (0, "")
+    assert (done.code, done.err) == (0, READ.format(study))
 
 
 TEXTS = ("title", "source", "notes")
