@@ -139,3 +139,60 @@ def test_killed_in_the_middle_of_a_presentation_its_recording_is_kept(
     assert np.all(np.diff(recording.columns["time_s"]) > 0.0)
     assert not list(study.sessions.glob("*/*.partial"))
     assert ratings_from_logs(study, protocol).table["grade"].notna().all()
+
+
+FREE = ("[schedule]", '[presentation]\nstretches = "free"\n\n[schedule]')
+MOMENTS = Path(__file__).with_name("kill_at_moments.py")
+
+
+def n_kept(study: StudyPaths) -> dict[str, int]:
+    # Samples of presentations that were going on, by the file that will have them
+    kept = {}
+    for partial in study.sessions.glob("*/*.partial"):
+        words = partial.read_bytes()[4096:4104]
+        if not partial.with_suffix(".npz").exists() and len(words) == 8:
+            kept[partial.stem] = int(np.frombuffer(words)[0])
+    return kept
+
+
+@pytest.mark.parametrize(
+    "n_kills",
+    [
+        pytest.param(20, marks=pytest.mark.slow),
+        pytest.param(200, marks=pytest.mark.long),
+    ],
+)
+def test_killed_at_any_moment_of_many_stretches_nothing_that_was_logged_is_lost(
+    new_study: Callable[..., Small], tmp_path: Path, n_kills: int
+) -> None:
+    study, protocol = new_study(FREE)
+    whole = StudyPaths(tmp_path / "whole")
+    copies = [StudyPaths(tmp_path / f"killed_{n}") for n in range(n_kills)]
+    for copy in (whole, *copies):
+        shutil.copytree(study.root, copy.root)
+    roots = [str(copy.root) for copy in (whole, *copies)]
+    command = [sys.executable, str(MOMENTS), str(n_kills), *roots]
+    killed = subprocess.run(command, capture_output=True, text=True)
+    assert killed.returncode == 0, killed.stderr
+    expected = ratings_from_logs(whole, protocol).table
+    assert expected["n_stretches"].max() > 1
+    n_cut = 0
+    for copy in copies:
+        log = copy.log_file("R1", "test")
+        before, kept = whole_lines(log), n_kept(copy)
+        go_on((copy, protocol))
+        after = whole_lines(log)
+        assert after[: len(before)] == before
+        events = read_log(log)
+        graded = [e.fields["code"] for e in events if e.kind == "grade"]
+        assert len(graded) == len(set(graded)) == 3
+        named = {e.fields["recording"] for e in events if e.kind == "presented"}
+        assert named == {f"test_R1/{f.name}" for f in copy.sessions.glob("*/*.npz")}
+        assert not list(copy.sessions.glob("*/*.partial"))
+        for stem, n_samples in kept.items():
+            if n_samples > 0:  # else it had not begun
+                file = copy.sessions / "test_R1" / f"{stem}.npz"
+                assert read_recording(file).n_samples == n_samples
+                n_cut += 1
+        assert ratings_from_logs(copy, protocol).table.equals(expected)
+    assert n_cut > n_kills / 2
