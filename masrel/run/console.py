@@ -120,7 +120,10 @@ class ConsoleGrades:
                 str, range(1, n_stretches + 1)
             ):
                 return StretchGrade(grade=grade.strip(), stretch=int(stretch))
-            self._say(f"{answer!r} is not a grade: needed one of {grades}{rests}.\n")
+            if answer:  # else it was an Enter too many
+                self._say(
+                    f"{answer!r} is not a grade: needed one of {grades}{rests}.\n"
+                )
 
     def present_again(self, request: GradeRequest, fault: str) -> bool:
         """Ask whether to present the model again after a fault.
