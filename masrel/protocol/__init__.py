@@ -7,6 +7,7 @@ the joint parameters of each model in SI units, and two hashes.
 from masrel.protocol.content import (
     elbow_parameters,
     joint_model,
+    presented_content,
     presented_hash,
     protocol_hash,
     scale_of,
@@ -55,6 +56,7 @@ __all__ = [
     "copy_template",
     "elbow_parameters",
     "joint_model",
+    "presented_content",
     "presented_hash",
     "protocol_hash",
     "read_model_file",

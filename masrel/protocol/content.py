@@ -214,7 +214,7 @@ def protocol_hash(protocol: Protocol) -> str:
         file do not enter. Of a model file its numbers enter, its name, and whether
         it comes from simulated recordings.
     """
-    return _content_hash(protocol)
+    return hashlib.sha256(_canonical(protocol)).hexdigest()
 
 
 def presented_hash(protocol: Protocol) -> str:
@@ -238,13 +238,29 @@ def presented_hash(protocol: Protocol) -> str:
     a rater or wording a title better makes nobody's drawn schedule stale. Nor does
     ``device.torque_sensor``, which no rater feels.
     """
+    return hashlib.sha256(presented_content(protocol)).hexdigest()
+
+
+def presented_content(protocol: Protocol) -> bytes:
+    """Return the part of a protocol that decides what a rater meets, as JSON.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        A protocol.
+
+    Returns
+    -------
+    bytes
+        UTF-8, keys sorted, no spaces: what :func:`presented_hash` hashes.
+    """
     tables = {name: getattr(protocol, name) for name in _PRESENTED}
     tables["device"] = msgspec.structs.replace(protocol.device, torque_sensor=False)
     content = {"study": protocol.study.id, **tables}
-    return _content_hash(content, ignored=("file", "simulated"))  # numbers are felt
+    return _canonical(content, ignored=("file", "simulated"))  # numbers are felt
 
 
-def _content_hash(content: object, ignored: tuple[str, ...] = ()) -> str:
+def _canonical(content: object, ignored: tuple[str, ...] = ()) -> bytes:
     # ignored: keys of models that do not enter
     plain: dict[str, Any] = msgspec.to_builtins(content)
     for model in plain["models"]:
@@ -259,8 +275,7 @@ def _content_hash(content: object, ignored: tuple[str, ...] = ()) -> str:
                 del plain[table][key]
         if not plain[table]:
             del plain[table]
-    canonical = msgspec.json.encode(plain, order="sorted")
-    return hashlib.sha256(canonical).hexdigest()
+    return msgspec.json.encode(plain, order="sorted")
 
 
 def _drop_defaults(model: dict[str, Any], elbow: dict[str, Any]) -> None:

@@ -205,13 +205,10 @@ def check_schedule(schedule: Schedule, protocol: Protocol) -> None:
             f"{where}: needed study {protocol.study.id}, got {schedule.study}"
         )
     _require_place(protocol, schedule.rater, schedule.session)
-    now = presented_hash(protocol)
-    if schedule.presented_sha256 != now:
+    if schedule.presented_sha256 != presented_hash(protocol):
         raise ScheduleError(
             f"{where}: needed one drawn from the protocol as it is, got one from "
-            "before a change in its study id, scale, elbow, models, schedule, stretch "
-            f"or device (presented_sha256 {now[:12]} and "
-            f"{schedule.presented_sha256[:12]})"
+            "before a change in what it presents; masrel check names the keys"
         )
     expected = Counter(
         (model.id, repeat)

@@ -10,7 +10,13 @@ from pathlib import Path
 from masrel._files import make_folder, write_files
 from masrel._input import MAX_SMALL, read_regular
 from masrel.errors import ScheduleError
-from masrel.protocol import Protocol, StudyPaths
+from masrel.protocol import (
+    Protocol,
+    StudyPaths,
+    presented_content,
+    presented_hash,
+)
+from masrel.schedule._changes import content_file, stale_sentences
 from masrel.schedule._secret import commitment_of, find_secret, new_secret
 from masrel.schedule.presentation import (
     Presentation,
@@ -205,22 +211,34 @@ def write_schedules(
     OSError
         If the system refuses a folder or file.
     """
+    every = _every_schedule(protocol, study)
     problems: list[str] = []
-    texts: dict[Path, str] = {}
+    texts: dict[Path, str | bytes] = {}
     to_draw: list[_ScheduleFiles] = []
-    for files in _every_schedule(protocol, study):
+    stale: list[str] = []
+    for files in every:
         fault = _fault(files, protocol)
         if fault is None:
             if not files.sheet.exists():
                 texts[files.sheet] = _sheet_text(read_schedule(files.schedule))
             continue
         to_draw.append(files)
-        problem = _refusal(files, fault, redraw=redraw)
+        if fault.drawn_from is not None and not redraw:
+            stale.append(fault.drawn_from)
+            continue
+        problem = _refusal(files, fault.message, redraw=redraw)
         if problem is not None:
             problems.append(problem)
+    problems += (
+        f"{sentence}; --redraw draws those anew whose sessions have not begun"
+        for sentence in stale_sentences(protocol, study, stale, len(every))
+    )
     if problems:
         raise ScheduleError("\n".join(problems))
     if to_draw:
+        kept = content_file(study, presented_hash(protocol))
+        if not kept.exists():
+            texts[kept] = presented_content(protocol)
         secret = find_secret(study) or new_secret(study)
         for files in to_draw:
             drawn = draw_schedule(protocol, files.rater, files.session, secret=secret)
@@ -255,14 +273,21 @@ def schedule_problems(protocol: Protocol, study: StudyPaths) -> tuple[str, ...]:
         return (str(error),)
     every = _every_schedule(protocol, study)
     problems: list[str] = []
+    stale: list[str] = []
     for files in every:
-        if files.schedule.exists():
-            fault = _fault(files, protocol)
-            if fault is None:
-                schedule = read_schedule(files.schedule)
-                fault = _sheet_fault(files, schedule)
-                fault = fault or _draw_fault(files, schedule, protocol, secret)
-            problems.extend([fault] if fault else [])
+        if not files.schedule.exists():
+            continue
+        fault = _fault(files, protocol)
+        if fault is None:
+            schedule = read_schedule(files.schedule)
+            problem = _sheet_fault(files, schedule)
+            problem = problem or _draw_fault(files, schedule, protocol, secret)
+            problems += filter(None, [problem])
+        elif fault.drawn_from is None:
+            problems.append(fault.message)
+        else:
+            stale.append(fault.drawn_from)
+    problems += stale_sentences(protocol, study, stale, len(every))
     expected = {path for files in every for path in (files.schedule, files.sheet)}
     for path in sorted(study.schedules.glob("*.csv")):
         if path not in expected:
@@ -346,23 +371,36 @@ def _every_schedule(protocol: Protocol, study: StudyPaths) -> list[_ScheduleFile
     ]
 
 
-def _fault(files: _ScheduleFiles, protocol: Protocol) -> str | None:
-    # Why the schedule's file cannot be used as it is, or None.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Fault:
+    """Why the file of a schedule cannot be used as it is."""
+
+    message: str
+    # of a stale one the hash of what was presented when it was drawn
+    drawn_from: str | None = None
+
+
+def _fault(files: _ScheduleFiles, protocol: Protocol) -> _Fault | None:
     if not files.schedule.exists():
-        return f"{files.schedule}: needed a schedule file, got none"
+        return _Fault(message=f"{files.schedule}: needed a schedule file, got none")
     try:
         schedule = read_schedule(files.schedule)
     except ScheduleError as error:
-        return str(error)
+        return _Fault(message=str(error))
     if (schedule.rater, schedule.session) != (files.rater, files.session):
-        return (
-            f"{files.schedule}: needed the schedule of rater {files.rater} in session "
-            f"{files.session}, got that of {schedule.rater} in {schedule.session}"
+        return _Fault(
+            message=f"{files.schedule}: needed the schedule of rater {files.rater} in "
+            f"session {files.session}, got that of {schedule.rater} in "
+            f"{schedule.session}"
         )
     try:
         check_schedule(schedule, protocol)
     except ScheduleError as error:
-        return f"{files.schedule}: {error}"
+        is_stale = schedule.presented_sha256 != presented_hash(protocol)
+        return _Fault(
+            message=f"{files.schedule}: {error}",
+            drawn_from=schedule.presented_sha256 if is_stale else None,
+        )
     return None
 
 

@@ -175,8 +175,9 @@ def test_check_finds_stale_schedules_and_wrong_ratings_at_once(study: Path) -> N
         "session,rater,model,grade\ntest,R1,HM1,9\n", encoding="utf-8"
     )
     _, errors = masrel("check", study, code=2)
-    for name in ("test_R1.csv", "test_R2.csv", "ratings.csv"):
-        assert name in errors
+    sentence = "schedule.seed was 20240 and is 1 since the draw: 2 of 2 schedules are"
+    assert f"{protocol}: {sentence} stale\n" in errors
+    assert "ratings.csv" in errors
 
 
 def test_a_changed_protocol_is_refused_until_redrawn(study: Path) -> None:
@@ -185,7 +186,7 @@ def test_a_changed_protocol_is_refused_until_redrawn(study: Path) -> None:
     text = protocol.read_text(encoding="utf-8").replace("seed = 20240", "seed = 1")
     protocol.write_text(text, encoding="utf-8")
     _, errors = masrel("schedule", study, code=2)
-    assert "--redraw draws it anew" in errors
+    assert "--redraw draws those anew whose sessions have not begun" in errors
     (study / "sessions").mkdir()
     log = study / "sessions" / "test_R1.jsonl"
     log.write_text("{}\n")

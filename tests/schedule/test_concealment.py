@@ -148,7 +148,7 @@ def test_the_secret_is_drawn_once_and_is_in_no_other_file(tmp_path: Path) -> Non
     secret = kept.split()[-1]
     assert len(secret) == 32
     others = {f for f in tmp_path.rglob("*") if f.is_file()} - {study.secret_file}
-    assert len(others) == 4
+    assert len(others) == 5
     assert not [file for file in others if secret in file.read_bytes()]
 
 

@@ -1,12 +1,20 @@
 """Schedules are drawn once: kept byte for byte, refused when stale, never lost."""
 
+import hashlib
 from pathlib import Path
 
+import msgspec
 import pytest
 
 import masrel
 from masrel.errors import ScheduleError
-from masrel.protocol import Protocol, StudyPaths
+from masrel.protocol import (
+    ElbowConstants,
+    Protocol,
+    Stretch,
+    StudyPaths,
+    presented_hash,
+)
 from masrel.schedule import (
     draw_schedule,
     read_schedule,
@@ -36,7 +44,9 @@ def contents(study: StudyPaths) -> dict[str, bytes]:
 def test_each_rater_gets_a_schedule_and_a_sheet(study: StudyPaths) -> None:
     protocol = protocol_of()
     written = write_schedules(protocol, study)
-    assert sorted(path.name for path in written) == [
+    content, *schedules = sorted(path.name for path in written)
+    assert content == f"presented_{presented_hash(protocol)[:12]}.json"
+    assert schedules == [
         "test_R1.csv",
         "test_R1_sheet.csv",
         "test_R2.csv",
@@ -101,21 +111,75 @@ def test_a_changed_protocol_is_refused_and_nothing_is_written(
     study: StudyPaths,
 ) -> None:
     before = contents(study)
-    with pytest.raises(ScheduleError, match="before a change") as caught:
+    with pytest.raises(ScheduleError) as caught:
         write_schedules(protocol_of(seed=2, raters=("R1", "R2", "R3")), study)
-    lines = str(caught.value).splitlines()
-    assert [line.split(": ")[0] for line in lines] == [
-        str(study.schedule_file(rater, "test")) for rater in ("R1", "R2")
-    ]
-    assert all(line.endswith("--redraw draws it anew") for line in lines)
+    assert str(caught.value) == (
+        f"{study.protocol}: schedule.seed was 1 and is 2 since the draw: 2 of 3 "
+        "schedules are stale; --redraw draws those anew whose sessions have not begun"
+    )
     assert contents(study) == before
+
+
+CHANGED = [
+    (protocol_of(seed=2, repeats=3), "schedule.repeats was 1 and is 3, schedule.seed"),
+    (
+        protocol_of(models=("HM1", "HM2", "HM4")),
+        'models was ["HM1", "HM2", "HM3", "HM4"] and is ["HM1", "HM2", "HM4"] since',
+    ),
+    (
+        protocol_of(models=("HM1", "HM2", "HM4", "HM3")),
+        'models was ["HM1", "HM2", "HM3", "HM4"] and is ["HM1", "HM2", "HM4", "HM3"] ',
+    ),
+    (
+        msgspec.structs.replace(protocol_of(), stretch=Stretch(largest_speed_deg_s=90)),
+        "stretch.largest_speed_deg_s was not set and is 90",
+    ),
+    (
+        msgspec.structs.replace(
+            protocol_of(),
+            elbow=ElbowConstants(
+                damping_nms_rad=1.0,
+                stiffness_nm_rad=1.0,
+                catch_slope_s=0.1,
+                peak_duration_s=0.2,
+                range_end_deg=140.0,
+                catch_rise_s=0.1,
+            ),
+        ),
+        "elbow.damping_nms_rad was 1.26 and is 1.0, elbow.peak",
+    ),
+]
+
+
+@pytest.mark.parametrize(("protocol", "sentence"), CHANGED)
+def test_a_change_is_one_sentence_with_key_old_value_and_new_one(
+    study: StudyPaths, protocol: Protocol, sentence: str
+) -> None:
+    write_schedules(protocol_of(), study)
+    (problem,) = schedule_problems(protocol, study)
+    assert sentence in problem
+    assert problem.endswith("since the draw: 2 of 2 schedules are stale")
+
+
+def test_what_was_presented_is_kept_once_and_by_its_hash(study: StudyPaths) -> None:
+    write_schedules(protocol_of(raters=("R1",)), study)
+    (file,) = study.schedules.glob("presented_*.json")
+    digest = hashlib.sha256(file.read_bytes()).hexdigest()
+    assert digest == presented_hash(protocol_of())
+    written = write_schedules(protocol_of(), study)
+    assert [path.name for path in written] == ["test_R2_sheet.csv", "test_R2.csv"]
+    file.write_bytes(b"{}")  # another is not believed, one that is gone not needed
+    for _ in range(2):
+        (problem,) = schedule_problems(protocol_of(seed=2), study)
+        assert "a key of the study id, scale, elbow, models" in problem
+        file.unlink(missing_ok=True)
 
 
 def test_a_redraw_follows_the_changed_protocol(
     drawn: Protocol, study: StudyPaths
 ) -> None:
     changed = protocol_of(seed=2)
-    assert len(write_schedules(changed, study, redraw=True)) == 4
+    assert len(write_schedules(changed, study, redraw=True)) == 5
     kept = read_schedule(study.schedule_file("R2", "test"))
     assert kept == draw_schedule(changed, "R2", "test", secret=SECRET)
     before = draw_schedule(drawn, "R2", "test", secret=SECRET)

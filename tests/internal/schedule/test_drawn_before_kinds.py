@@ -59,6 +59,7 @@ def test_they_are_kept_and_a_rater_who_comes_later_has_a_concealed_order(
     paths.protocol.write_text(text, encoding="utf-8")
     changed = read_protocol(paths.protocol)
     written = write_schedules(changed, paths)
-    assert [file.name for file in written] == ["test_R3_sheet.csv", "test_R3.csv"]
-    assert "# commitment: " in written[1].read_text(encoding="utf-8")
+    _, sheet, schedule = written
+    assert (sheet.name, schedule.name) == ("test_R3_sheet.csv", "test_R3.csv")
+    assert "# commitment: " in schedule.read_text(encoding="utf-8")
     assert schedule_problems(changed, paths) == ()
