@@ -190,30 +190,17 @@ def lack_of_fit(
     in_common = [t for i, name in enumerate(names) if (t := _test(i, name, reduced))]
     tests = _holm([*in_common, *_own_drifts(equations)])
     phases = _phases(equations, laws)
-    before = [p for p in phases if p.phase in ("slow", "pre-catch")]
-    after = [p for p in phases if p.phase not in ("slow", "pre-catch")]
-    ratio = math.nan
-    if after and before and _pooled(before) > 0.0:
-        ratio = _pooled(after) / _pooled(before)
+    ratio = _after_to_before(phases)
     verdict: Literal["fits", "does not fit", "undecided"] = "undecided"
     if ratio > _MAX_RATIO or (tests and tests[0].adjusted < LEVEL):
         verdict = "does not fit"
     elif tests:
         verdict = "fits"
-    left = sum(
-        float(((e.measured - law) ** 2).sum())
-        for e, law in zip(equations, laws, strict=True)
-    )
-    whole = sum(
-        float(((e.measured - e.measured.mean()) ** 2).sum())
-        for e in equations
-        if e.measured.size
-    )
     return LackOfFit(
         verdict=verdict,
         level=LEVEL,
         tests=tests,
-        explained=1.0 - left / whole if whole > 0.0 else math.nan,
+        explained=_explained(equations, laws),
         phases=phases,
         after_to_before=ratio,
         rest_sd=rest_sd,
@@ -227,6 +214,27 @@ def p_text(p_value: float) -> str:
     ('= 0.012', '< 0.0001')
     """
     return "< 0.0001" if p_value < 1e-4 else f"= {p_value:.2g}"
+
+
+def _explained(equations: Sequence[Equations], laws: Sequence[_Floats]) -> float:
+    left = sum(
+        float(((e.measured - law) ** 2).sum())
+        for e, law in zip(equations, laws, strict=True)
+    )
+    whole = sum(
+        float(((e.measured - e.measured.mean()) ** 2).sum())
+        for e in equations
+        if e.measured.size
+    )
+    return 1.0 - left / whole if whole > 0.0 else math.nan
+
+
+def _after_to_before(phases: Sequence[PhaseResidual]) -> float:
+    before = [p for p in phases if p.phase in ("slow", "pre-catch")]
+    after = [p for p in phases if p.phase not in ("slow", "pre-catch")]
+    if not (after and before and _pooled(before) > 0.0):
+        return math.nan
+    return _pooled(after) / _pooled(before)
 
 
 def _pooled(phases: Sequence[PhaseResidual]) -> float:
