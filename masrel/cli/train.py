@@ -115,11 +115,10 @@ def _train(
 
 
 def _show_grade(lesson: "Lesson") -> None:
-    practice = "" if lesson.counts else " (Practice: it does not count.)"
     if lesson.grade == lesson.intended:
-        click.echo(f"Right: {lesson.intended}.{practice}\n")
+        click.echo(f"Right: {lesson.intended}.\n")
     else:
-        click.echo(f"Not {lesson.grade}: it is {lesson.intended}.{practice}\n")
+        click.echo(f"Not {lesson.grade}: it is {lesson.intended}.\n")
 
 
 def _source(

@@ -280,7 +280,7 @@ class Differences:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LearningView:
-    """A training: kappa at the end of each block, and each grade below it."""
+    """A training: kappa time and again, and each grade below it."""
 
     title: str  # whose training, and how it ended
     # (n_points,): number of the last presentation; kappa and its interval
@@ -288,8 +288,7 @@ class LearningView:
     kappas: tuple[tuple[float, float, float], ...]
     level: float  # of the intervals
     bounds: tuple[float, float]  # insufficient and sufficient kappa
-    # of every presentation: grades by which it is too high, and whether it counts
-    differences: tuple[tuple[int, bool], ...]
+    differences: tuple[int, ...]  # grades by which each grade is too high
 
 
 Content = (

@@ -17,9 +17,8 @@ from masrel.report._tables import (
     number,
     percent,
 )
-from masrel.training._learning_curve import CURVE_BLOCKS, CurvePoint, learning_curve
+from masrel.training._learning_curve import CURVE_SETS, CurvePoint, learning_curve
 from masrel.training._lessons import TrainingRecord
-from masrel.training._trainees import BLOCK_REPEATS
 
 NOT_RATINGS = "Nothing of a training enters the ratings of the study."
 
@@ -88,11 +87,10 @@ def _ends(interval: Interval | None) -> tuple[float, float]:
 
 def _notes(record: TrainingRecord) -> tuple[str, ...]:
     criterion = record.criterion
-    practised = len(record.lessons) - len(record.counted)
     return (
         f"κ with the intended grades, {criterion.weights} weights, of the last "
-        f"{CURVE_BLOCKS * BLOCK_REPEATS * criterion.n_models} presentations that "
-        "count; each interval holds by itself.",
+        f"{CURVE_SETS * criterion.n_models} presentations; each interval holds by "
+        "itself.",
         f"Passed at evidence {number(record.boundary, 2)}: the largest, of all runs of "
         f"at most {criterion.window} presentations up to the last, of their number "
         f"times what κ has above {criterion.reference:g}.",
@@ -100,10 +98,8 @@ def _notes(record: TrainingRecord) -> tuple[str, ...]:
         f"{100.0 * record.false_pass:.1f} % pass; of raters whose κ is at "
         f"{criterion.sufficient:g} from the start, at most "
         f"{100.0 * record.false_fail:.1f} % fail, as measured on simulated trainees.",
-        *([f"{counted(practised, 'presentation')} for practice count for nothing."]
-          if practised else []),
         NOT_RATINGS,
-    )  # fmt: skip
+    )
 
 
 def _confusion_table(record: TrainingRecord) -> Table:
@@ -141,6 +137,7 @@ def training_document(record: TrainingRecord, *, level: float) -> dict[str, obje
             "kappa_sufficient": criterion.sufficient,
             "window": criterion.window,
             "max_presentations": criterion.max_presentations,
+            "order": criterion.order,
             "boundary": record.boundary,
             "false_pass": record.false_pass,
             "false_fail": record.false_fail,
@@ -153,7 +150,6 @@ def training_document(record: TrainingRecord, *, level: float) -> dict[str, obje
                 "model": one.model,
                 "intended": one.intended,
                 "grade": one.grade,
-                "counts": one.counts,
             }
             for one in record.lessons
         ],
@@ -191,6 +187,6 @@ def learning_view(record: TrainingRecord, *, level: float) -> LearningView:
         level=level,
         bounds=(criterion.insufficient, criterion.sufficient),
         differences=tuple(
-            (code[one.grade] - code[one.intended], one.counts) for one in record.lessons
+            code[one.grade] - code[one.intended] for one in record.lessons
         ),
     )

@@ -27,8 +27,7 @@ from masrel.training._trainees import (
     SKILLS,
     Skill,
     confusion_with_kappa,
-    draw_blocks,
-    draw_grades,
+    draw_training,
 )
 
 _Floats = NDArray[np.float64]
@@ -56,6 +55,8 @@ class Criterion:
         Presentations of the longest run.
     max_presentations : int
         After as many the training ends.
+    order : {"blocked", "adaptive"}
+        How models are drawn.
     """
 
     grades: tuple[str, ...]
@@ -65,6 +66,7 @@ class Criterion:
     sufficient: float
     window: int
     max_presentations: int
+    order: str = "blocked"
 
     @property
     def reference(self) -> float:
@@ -214,6 +216,7 @@ def training_criterion(protocol: Protocol) -> Criterion:
         sufficient=rules.kappa_sufficient,
         window=rules.window,
         max_presentations=rules.max_presentations,
+        order=rules.order,
     )
 
 
@@ -289,8 +292,8 @@ def _simulated_evidence(
     if confusion is None:
         return None
     shape = n_simulated, criterion.max_presentations
-    intended = draw_blocks(criterion.intended, shape, rng)
-    return criterion.evidence(intended, draw_grades(confusion[intended], rng))
+    drawn = draw_training(confusion, criterion.intended, criterion.order, shape, rng)
+    return criterion.evidence(*drawn)
 
 
 def _boundary(largest: _Floats, share: float) -> float:

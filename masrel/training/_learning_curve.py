@@ -1,4 +1,4 @@
-"""The learning curve of a training: kappa of the last presentations, block by block."""
+"""The learning curve of a training: kappa of the last presentations, time and again."""
 
 import warnings
 from dataclasses import dataclass, field
@@ -7,22 +7,24 @@ from masrel.errors import SmallSampleWarning, UndefinedStatisticWarning
 from masrel.estimates import Estimate
 from masrel.intervals import estimate
 from masrel.training._lessons import TrainingRecord
-from masrel.training._trainees import BLOCK_REPEATS
 
-CURVE_BLOCKS = 2
-"""Blocks of which a point is made: fewer say little, more blur what was learnt."""
+CURVE_SETS = 4
+"""Sets of presentations of which a point is made: fewer say little, more blur."""
+
+STEP_SETS = 2
+"""Sets from one point to the next."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CurvePoint:
-    """Kappa with the intended grades at the end of a block.
+    """Kappa with the intended grades of the last presentations.
 
     Attributes
     ----------
     position : int
-        Number of the last presentation of the block.
+        Number of the last presentation.
     n_presentations : int
-        Counted presentations of which kappa is.
+        Presentations of which kappa is.
     n_right : int
         Of these, those with the intended grade.
     kappa : Estimate
@@ -53,8 +55,8 @@ def learning_curve(
     Returns
     -------
     tuple of CurvePoint
-        One a block that came to its end, and one where the training ended; each of the
-        last two blocks, or of the one there is.
+        One every two sets of as many presentations as there are models, and one where
+        the training ended; each of the last four sets, or of those there are.
 
     Raises
     ------
@@ -66,16 +68,14 @@ def learning_curve(
     The intervals hold at each point, not at all points together, and not for the point
     at which a training is passed: it stops where kappa happens to be high.
     """
-    counted, criterion = record.counted, record.criterion
-    block = BLOCK_REPEATS * criterion.n_models
-    ends = list(range(block, len(counted) + 1, block))
-    whole_sets = len(counted) - len(counted) % criterion.n_models
-    if whole_sets and whole_sets not in ends:
-        ends.append(whole_sets)
-    evidence = record.evidence()
+    criterion, evidence = record.criterion, record.evidence()
+    n_sets = evidence.size
+    ends = {*range(STEP_SETS, n_sets + 1, STEP_SETS), n_sets} - {0}
     points = []
-    for end in ends:
-        lessons = counted[max(0, end - CURVE_BLOCKS * block) : end]
+    for end in sorted(ends):
+        first, last = max(0, end - CURVE_SETS), end
+        n_models = criterion.n_models
+        lessons = record.lessons[first * n_models : last * n_models]
         pairs = [(lesson.intended, lesson.grade) for lesson in lessons]
         with warnings.catch_warnings():  # a point says itself on how much it rests
             warnings.simplefilter("ignore", SmallSampleWarning)
@@ -94,7 +94,7 @@ def learning_curve(
                 n_presentations=len(lessons),
                 n_right=sum(a == b for a, b in pairs),
                 kappa=kappa,
-                evidence=float(evidence[end // criterion.n_models - 1]),
+                evidence=float(evidence[end - 1]),
             )
         )
     return tuple(points)

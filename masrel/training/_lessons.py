@@ -49,7 +49,7 @@ EVENTS: dict[str, tuple[str, ...]] = {
     "resumed": ("n_graded",),
     "presented": ("position", "attempt", "model", "recording", "sha256", "fault"),
     "fault": ("position", "attempt", "kind", "words"),
-    "grade": ("position", "model", "intended", "grade", "counts"),
+    "grade": ("position", "model", "intended", "grade"),
     "stopped": ("position", "why"),
     "recovered": (),
     "complete": ("passed", "n_presentations"),
@@ -69,15 +69,12 @@ class Lesson:
         Id of the haptic model.
     intended, grade : str
         The intended grade and the rater's.
-    counts : bool
-        Whether the criterion counts it; what is practised again does not count.
     """
 
     position: int
     model: str
     intended: str
     grade: str
-    counts: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,8 +91,6 @@ class TrainingRecord:
         The evidence that passes.
     false_pass, false_fail : float
         The largest chances of both errors, the latter as calibrated.
-    order : str
-        Order of the models.
     order_seed : int
         What the order was drawn from.
     lessons : tuple of Lesson
@@ -111,19 +106,13 @@ class TrainingRecord:
     boundary: float
     false_pass: float
     false_fail: float
-    order: str
     order_seed: int
     lessons: tuple[Lesson, ...]
     passed: bool | None
     simulated: bool
 
-    @property
-    def counted(self) -> tuple[Lesson, ...]:
-        """The lessons that the criterion counts."""
-        return tuple(lesson for lesson in self.lessons if lesson.counts)
-
     def evidence(self) -> "NDArray[np.float64]":
-        """Return the evidence after each set of counted lessons.
+        """Return the evidence after each set of lessons.
 
         Returns
         -------
@@ -131,7 +120,7 @@ class TrainingRecord:
             As `Criterion.evidence` has it.
         """
         code = {grade: at for at, grade in enumerate(self.criterion.grades)}
-        pairs = [(code[one.intended], code[one.grade]) for one in self.counted]
+        pairs = [(code[one.intended], code[one.grade]) for one in self.lessons]
         codes = np.array(pairs, dtype=np.int64).reshape(-1, 2)
         return self.criterion.evidence(codes[:, 0], codes[:, 1])
 
@@ -210,7 +199,6 @@ def record_of(
         boundary=float(str(header["boundary"])),
         false_pass=float(str(header["false_pass"])),
         false_fail=float(str(header["calibrated_false_fail"])),
-        order=str(header["order"]),
         order_seed=int(str(header["order_seed"])),
         lessons=tuple(_lesson(e) for e in events if e.kind == "grade"),
         passed=bool(ended[-1]["passed"]) if ended else None,
@@ -226,6 +214,7 @@ def _criterion_of(header: Mapping[str, object], protocol: Protocol) -> Criterion
         sufficient=float(str(header["kappa_sufficient"])),
         window=int(str(header["window"])),
         max_presentations=int(str(header["max_presentations"])),
+        order=str(header["order"]),
     )
 
 
@@ -236,5 +225,4 @@ def _lesson(event: Event) -> Lesson:
         model=str(fields["model"]),
         intended=str(fields["intended"]),
         grade=str(fields["grade"]),
-        counts=bool(fields["counts"]),
     )

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from masrel.schedule.presentation import _Stream
 from masrel.training._lessons import Lesson
-from masrel.training._trainees import BLOCK_REPEATS
+from masrel.training._trainees import BLOCK_SETS
 
 
 def next_model(
@@ -14,31 +14,28 @@ def next_model(
     order: str,
     seed: int,
     rater: str,
-) -> tuple[str, bool]:
-    """Return the id of the next model, and whether the criterion counts it."""
-    # intended: grade by model. Blocks have every model `BLOCK_REPEATS` times; each is
-    # drawn by its number alone, so that a training goes on as if nothing had stopped
-    # it.
-    block_size = BLOCK_REPEATS * len(intended)
-    n_counted = sum(lesson.counts for lesson in lessons)
-    block, place = divmod(n_counted, block_size)
-    if order == "adaptive" and place == 0 and block > 0:
-        again = _misgraded(intended, lessons, block_size)
-        _Stream(seed, "practice", rater, str(block)).shuffle(again)
-        practised = 0
-        while not lessons[-1 - practised].counts:
-            practised += 1
-        if practised < len(again):
-            return again[practised], False
-    models = [model for model in intended for _ in range(BLOCK_REPEATS)]
-    _Stream(seed, "training", rater, str(block)).shuffle(models)
-    return models[place], True
+) -> str:
+    """Return the id of the next model."""
+    # intended: grade by model. Each draw is of its number alone, or of that and the
+    # grades before, so that a training goes on as if nothing had stopped it.
+    models = list(intended)
+    if order == "blocked":
+        block, place = divmod(len(lessons), BLOCK_SETS * len(models))
+        return _block(models, _Stream(seed, "training", rater, str(block)))[place]
+    last = {one.model: one.grade for one in lessons}
+    wrong = [
+        model for model in models if last.get(model, intended[model]) != intended[model]
+    ]
+    tickets = [*models, *wrong]  # what was misgraded the last time, twice
+    stream = _Stream(seed, "training", rater, str(len(lessons)))
+    return tickets[stream.below(len(tickets))]
 
 
-def _misgraded(
-    intended: Mapping[str, str], lessons: Sequence[Lesson], block_size: int
-) -> list[str]:
-    # models of the last block to which the rater gave another grade, each once
-    counted = [lesson for lesson in lessons if lesson.counts][-block_size:]
-    missed = {lesson.model for lesson in counted if lesson.grade != lesson.intended}
-    return [model for model in intended if model in missed]
+def _block(models: Sequence[str], stream: _Stream) -> list[str]:
+    # Only that each comes at all is certain: who counts knows next to nothing.
+    while True:
+        block = [
+            models[stream.below(len(models))] for _ in range(BLOCK_SETS * len(models))
+        ]
+        if set(block) == set(models):
+            return block

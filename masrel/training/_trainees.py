@@ -20,12 +20,10 @@ Skill = Literal["noise", "lapses", "shift", "pair"]
 
 SKILLS: tuple[Skill, ...] = get_args(Skill)
 
-BLOCK_REPEATS = 2
-"""How often a block presents each model."""
+BLOCK_SETS = 3
+"""Presentations of a block, for each model one time."""
 
-LAPSES = 0.02
-"""Share of presentations to which a trainee gives any grade."""
-
+_LAPSES = 0.02  # share of presentations to which any grade is given
 _MANY_LAPSES = 0.1  # of the kind "lapses"
 _SHIFT = 0.4  # of the kind "shift", in grades
 _MAX_NOISE = 50.0  # grades: what is perceived then says nothing
@@ -39,8 +37,8 @@ def confusion(
     Parameters
     ----------
     skill : {"noise", "lapses", "shift", "pair"}
-        "noise" confuses neighbours, "lapses" does and lapses in a tenth of the
-        presentations, "shift" does and grades too high, "pair" confuses the two
+        "noise" confuses neighbours, "lapses" does and gives any grade in a tenth of
+        the presentations, "shift" does and grades too high, "pair" confuses the two
         middle models alone.
     amount : float
         Standard deviation of the noise in grades; of "pair" the probability of giving
@@ -68,7 +66,7 @@ def confusion(
         table[low, [low, high]] = table[high, [high, low]] = 1.0 - amount, amount
     else:
         table = _noisy(amount, _SHIFT if skill == "shift" else 0.0, n_grades)
-    lapses = _MANY_LAPSES if skill == "lapses" else LAPSES
+    lapses = _MANY_LAPSES if skill == "lapses" else _LAPSES
     return (1.0 - lapses) * table + lapses / n_grades
 
 
@@ -110,15 +108,50 @@ def confusion_with_kappa(
     return confusion(skill, low, n_grades, intended)
 
 
+def draw_training(
+    confusion: _Floats,
+    intended: Sequence[int],
+    order: str,
+    shape: tuple[int, int],
+    rng: np.random.Generator,
+) -> tuple[_Integers, _Integers]:
+    """Return codes of intended grades and of those given, both of the shape."""
+    # of so many trainees and presentations
+    codes = np.asarray(intended, dtype=np.int64)
+    if order == "blocked":
+        met = codes[draw_blocks(codes.size, shape, rng)]
+        return met, draw_grades(confusion[met], rng)
+    trainees = np.arange(shape[0])
+    wrong = np.zeros((shape[0], codes.size), dtype=np.int64)  # the last time
+    met, grades = np.empty(shape, dtype=np.int64), np.empty(shape, dtype=np.int64)
+    for at in range(shape[1]):
+        shares = (1 + wrong).cumsum(axis=1)
+        drawn = rng.integers(0, shares[:, -1])
+        models = (drawn[:, None] >= shares).sum(axis=1)
+        met[:, at] = codes[models]
+        grades[:, at] = draw_grades(confusion[met[:, at]], rng)
+        wrong[trainees, models] = grades[:, at] != met[:, at]
+    return met, grades
+
+
 def draw_blocks(
-    intended: Sequence[int], shape: tuple[int, int], rng: np.random.Generator
+    n_models: int, shape: tuple[int, int], rng: np.random.Generator
 ) -> _Integers:
-    """Return intended grades in blocks of random order."""
+    """Return models in random order, each at least once in every block."""
     # takes and returns the shape (n_trainees, n_presentations)
-    block = np.repeat(np.asarray(intended, dtype=np.int64), BLOCK_REPEATS)
-    n_blocks = -(-shape[1] // block.size)
-    drawn = rng.permuted(np.tile(block, (shape[0], n_blocks, 1)), axis=2)
-    return drawn.reshape(shape[0], -1)[:, : shape[1]]
+    size = BLOCK_SETS * n_models
+    n_blocks = -(-shape[1] // size)
+    models = rng.integers(0, n_models, (shape[0] * n_blocks, size))
+    while (lacking := ~_have_all(models, n_models)).any():
+        models[lacking] = rng.integers(0, n_models, (int(lacking.sum()), size))
+    return models.reshape(shape[0], -1)[:, : shape[1]]
+
+
+def _have_all(blocks: _Integers, n_models: int) -> NDArray[np.bool_]:
+    # (n_blocks, size) -> (n_blocks,)
+    met = np.zeros((len(blocks), n_models), dtype=bool)
+    np.put_along_axis(met, blocks, True, axis=1)
+    return np.asarray(met.all(axis=1))
 
 
 def draw_grades(probabilities: _Floats, rng: np.random.Generator) -> _Integers:

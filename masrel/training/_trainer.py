@@ -228,10 +228,10 @@ class _Trainer:
         return record
 
     def _teach(self, record: TrainingRecord) -> Lesson:
-        model, counts = next_model(
+        model = next_model(
             self._intended,
             record.lessons,
-            order=record.order,
+            order=record.criterion.order,
             seed=record.order_seed,
             rater=self._rater,
         )
@@ -246,7 +246,6 @@ class _Trainer:
             model=model,
             intended=self._intended[model],
             grade=grade,
-            counts=counts,
         )
         self._log.append("grade", asdict(lesson))
         return lesson

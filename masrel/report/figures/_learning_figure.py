@@ -9,11 +9,11 @@ from matplotlib.ticker import MaxNLocator
 
 from masrel.report._figure_data import LearningView
 from masrel.report._tables import percent
-from masrel.report.figures._style import BLACK, BLUE, DASHES, GREY, ORANGE, VERMILLION
+from masrel.report.figures._style import BLACK, BLUE, DASHES, GREY, VERMILLION
 
 
 def learning_figure(content: LearningView) -> Figure:
-    """Return kappa block by block, and below it how far each grade was off."""
+    """Return kappa time and again, and below it how far each grade was off."""
     figure = Figure(figsize=(6.0, 4.2))
     upper, lower = figure.subplots(2, sharex=True, height_ratios=(2.2, 1.0))
     _draw_curve(upper, content)
@@ -61,12 +61,10 @@ def _draw_curve(axes: Axes, content: LearningView) -> None:
 
 def _draw_grades(axes: Axes, content: LearningView) -> None:
     places = np.arange(1, len(content.differences) + 1)
-    offsets = np.array([d for d, _ in content.differences], dtype=np.int64)
-    counts = np.array([c for _, c in content.differences], dtype=bool)
+    offsets = np.array(content.differences, dtype=np.int64)
     for at, colour, marker, label in (
-        (counts & (offsets == 0), BLUE, "o", "right"),
-        (counts & (offsets != 0), VERMILLION, "X", "wrong"),
-        (~counts, ORANGE, "s", "practice"),
+        (offsets == 0, BLUE, "o", "right"),
+        (offsets != 0, VERMILLION, "X", "wrong"),
     ):
         if at.any():
             axes.plot(

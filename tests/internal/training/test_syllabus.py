@@ -1,67 +1,85 @@
-"""Which model comes next: blocks, and practice of what was misgraded."""
+"""Which model comes next: blocks, and what was misgraded more often."""
 
 from collections import Counter
 
+import numpy as np
 import pytest
 
 from masrel.training import Lesson
 from masrel.training._syllabus import next_model
+from masrel.training._trainees import draw_blocks, draw_training
 
 INTENDED = {"A": "1", "B": "2", "C": "3"}
 
 
-def taught(order: str, wrong: set[int], n_lessons: int, seed: int = 4) -> list[Lesson]:
-    """Lessons of a rater who is wrong at some positions."""
+def taught(
+    order: str, n_lessons: int, wrong: frozenset[str] = frozenset(), seed: int = 4
+) -> list[str]:
+    """Models of the lessons of a rater who misgrades some of them."""
     lessons: list[Lesson] = []
-    while len(lessons) < n_lessons:
-        model, counts = next_model(
-            INTENDED, lessons, order=order, seed=seed, rater="R1"
-        )
-        position = len(lessons) + 1
+    for position in range(1, n_lessons + 1):
+        model = next_model(INTENDED, lessons, order=order, seed=seed, rater="R1")
         lessons.append(
             Lesson(
                 position=position,
                 model=model,
                 intended=INTENDED[model],
-                grade="4" if position in wrong else INTENDED[model],
-                counts=counts,
+                grade="4" if model in wrong else INTENDED[model],
             )
         )
-    return lessons
+    return [lesson.model for lesson in lessons]
 
 
-@pytest.mark.parametrize("order", ["blocked", "adaptive"])
-def test_every_block_has_each_model_twice(order: str) -> None:
-    lessons = taught(order, set(), 24)
-    assert all(lesson.counts for lesson in lessons)
-    for start in range(0, 24, 6):
-        models = Counter(lesson.model for lesson in lessons[start : start + 6])
-        assert models == {"A": 2, "B": 2, "C": 2}
+def test_every_block_has_each_model() -> None:
+    for seed in range(50):
+        models = taught("blocked", 18, seed=seed)
+        assert set(models[:9]) == set(models[9:]) == {"A", "B", "C"}
 
 
-def test_the_order_is_of_its_seed_and_block() -> None:
-    one, two = (
-        [lesson.model for lesson in taught("blocked", set(), 36, seed=s)]
-        for s in (4, 5)
+def test_the_blocks_of_trainees_have_each_model_and_are_otherwise_free() -> None:
+    blocks = draw_blocks(3, (4_000, 18), np.random.default_rng(3))
+    blocks = blocks.reshape(-1, 9)
+    assert all(len(set(block)) == 3 for block in blocks.tolist())
+    # Of 3^9 sequences 3^9 - 3 * 2^9 + 3 = 18 150 have all three, 9!/(3!)^3 = 1680 of
+    # them each three times; four standard errors of a share of 8 000
+    even = np.mean([Counter(b) == {0: 3, 1: 3, 2: 3} for b in blocks.tolist()])
+    share = 1680 / 18150
+    assert even == pytest.approx(share, abs=4.0 * (share * (1 - share) / 8_000) ** 0.5)
+
+
+def test_the_order_is_of_its_seed_and_the_same_each_time() -> None:
+    assert taught("blocked", 36) == taught("blocked", 36)
+    assert taught("blocked", 36) != taught("blocked", 36, seed=5)
+    # what was graded moves nothing
+    assert taught("blocked", 36) == taught("blocked", 36, frozenset("AB"))
+
+
+def test_adaptive_presents_what_is_misgraded_twice_as_often() -> None:
+    models = Counter(
+        model
+        for seed in range(100)
+        for model in taught("adaptive", 60, frozenset("C"), seed=seed)
     )
-    assert one != two
-    assert one[:6] != one[6:12] or one[6:12] != one[12:18]
+    # 1/2 once C has come for the first time; four standard errors of a share of 6 000
+    # and the first few presentations
+    assert models["C"] / 6_000 == pytest.approx(0.5, abs=0.026 + 0.01)
+    assert models["A"] / 6_000 == pytest.approx(0.25, abs=0.023)
 
 
-def test_what_was_misgraded_is_practised_once_after_its_block() -> None:
-    first = taught("blocked", set(), 6)
-    missed = {first[1].model, first[3].model}
-    lessons = taught("adaptive", {2, 4}, 6 + len(missed) + 6)
-    practice = lessons[6 : 6 + len(missed)]
-    assert {lesson.model for lesson in practice} == missed
-    assert not any(lesson.counts for lesson in practice)
-    # the next block is the one that it would have been, wrong in practice or not
-    assert [lesson.model for lesson in lessons[6 + len(missed) :]] == [
-        lesson.model for lesson in taught("blocked", set(), 12)[6:]
-    ]
-    assert all(lesson.counts for lesson in lessons[6 + len(missed) :])
-
-
-def test_what_is_misgraded_in_practice_is_not_practised_again_at_once() -> None:
-    lessons = taught("adaptive", {2, 7}, 8)
-    assert [lesson.counts for lesson in lessons] == [True] * 6 + [False, True]
+def test_the_adaptive_order_of_trainees_is_that_of_raters() -> None:
+    # the third grade is always given wrong
+    table = np.eye(4)
+    table[2] = [1.0, 0.0, 0.0, 0.0]
+    intended, codes = draw_training(
+        table, (0, 1, 2), "adaptive", (2_000, 60), np.random.default_rng(1)
+    )
+    assert (codes[intended == 2] == 0).all()
+    assert (codes[intended < 2] == intended[intended < 2]).all()
+    rater = Counter(
+        model
+        for seed in range(300)
+        for model in taught("adaptive", 60, frozenset("C"), seed=seed)
+    )
+    shares = np.bincount(intended.ravel()) / intended.size
+    expected = [rater[model] / 18_000 for model in "ABC"]
+    assert shares == pytest.approx(expected, abs=0.02)
