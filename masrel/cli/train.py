@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from masrel.run import GradeSource
     from masrel.training import Lesson, TrainingRecord
 
+_WIDTH = 88  # of notes below a table
+
 
 @click.command("train")
 @click.argument("study", type=click.Path(path_type=Path))
@@ -157,4 +159,5 @@ def _report(
         figure=lambda: learning_view(record, level=level),
         stamp=SIMULATED if record.simulated else f"{protocol.study.id}, training",
         more=() if output.csv else (confusion,),
+        width=_WIDTH,
     )
