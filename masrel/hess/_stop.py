@@ -1,5 +1,6 @@
 """The emergency stop: a key, a signal, or anything else that can press a button."""
 
+import io
 import os
 import select
 import signal
@@ -103,7 +104,7 @@ def stop_on_key(
     settings = termios.tcgetattr(terminal)
     tty.setcbreak(terminal)  # a key counts at once, without Enter
     try:
-        with _waiting_for_key(stop, terminal, enter):
+        with _waiting(lambda over: _wait_for_key(stop, terminal, over, enter)):
             yield
     finally:
         with suppress(termios.error):  # it may have gone away meanwhile
@@ -111,13 +112,28 @@ def stop_on_key(
 
 
 @contextmanager
-def _waiting_for_key(
-    stop: EmergencyStop, terminal: int, enter: Callable[[], object] | None
+def enter_on_empty_line(
+    lines: TextIO | None, enter: Callable[[], object]
 ) -> Iterator[None]:
+    """Take an empty line that comes now for Enter, where the input is no terminal."""
+    buffer = getattr(lines, "buffer", None)
+    is_terminal = lines is None or lines.isatty()
+    if (
+        sys.platform == "win32"
+        or is_terminal
+        or not isinstance(buffer, io.BufferedReader)
+    ):
+        yield
+        return
+    with _waiting(lambda over: _wait_for_line(buffer, over, enter)):
+        yield
+
+
+@contextmanager
+def _waiting(wait: Callable[[int], None]) -> Iterator[None]:
+    # Waits in a thread, which is given what can be read from once this is over
     read_end, write_end = os.pipe()
-    thread = threading.Thread(
-        target=_wait_for_key, args=(stop, terminal, read_end, enter), daemon=True
-    )
+    thread = threading.Thread(target=wait, args=(read_end,), daemon=True)
     thread.start()
     try:
         yield
@@ -125,6 +141,18 @@ def _waiting_for_key(
         os.close(write_end)
         thread.join()
         os.close(read_end)
+
+
+def _wait_for_line(
+    buffer: io.BufferedReader, read_end: int, enter: Callable[[], object]
+) -> None:
+    # What else stands at the beginning of a line answers a question that is to come
+    while True:
+        ready, _, _ = select.select([buffer.fileno(), read_end], [], [])
+        if read_end in ready or buffer.peek(1)[:1] != b"\n":
+            return
+        buffer.read(1)
+        enter()
 
 
 def _wait_for_key(

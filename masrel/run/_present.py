@@ -25,7 +25,7 @@ from masrel.hess import (
     open_device,
     run_presentation,
 )
-from masrel.hess._stop import stop_on_key, stop_on_signals
+from masrel.hess._stop import enter_on_empty_line, stop_on_key, stop_on_signals
 from masrel.hess._watchdog import watched
 from masrel.protocol import PresentationRules, Protocol, joint_model
 from masrel.recording import (
@@ -104,12 +104,25 @@ def present(
     with contextlib.ExitStack() as stack:
         stack.enter_context(stop_on_signals(stop))
         if isinstance(clock, RealClock):
-            enter = _enter(protocol.presentation, status)
-            stack.enter_context(stop_on_key(stop, sys.stdin, enter))
-            stack.enter_context(_cues_shown(protocol.presentation, status, sys.stdin))
+            _listen(stack, protocol.presentation, status, stop)
         spool = spool_of(file)
         presented = _on_device(protocol, request, status, clock, limits, stop, spool)
     return _keep(presented, protocol, request, file)
+
+
+def _listen(
+    stack: contextlib.ExitStack,
+    rules: PresentationRules,
+    status: PresentationStatus,
+    stop: EmergencyStop,
+) -> None:
+    # to the person at the console, to whom Enter is never an emergency stop
+    enter: Callable[[], object] = lambda: None  # noqa: E731 - nothing at all
+    if rules.stretches != 1 and rules.done_with == "enter":
+        enter = status.done
+        stack.enter_context(enter_on_empty_line(sys.stdin, enter))
+    stack.enter_context(stop_on_key(stop, sys.stdin, enter))
+    stack.enter_context(_cues_shown(rules, status, sys.stdin))
 
 
 def recover(protocol: Protocol, request: GradeRequest, *, file: Path) -> Outcome | None:
@@ -225,15 +238,6 @@ def _max_duration_s(
     if protocol_rules.stretches == 1:
         return max(_ONE_STRETCH_S, longest_s)
     return rules.stretch_limit  # of the one that is cued
-
-
-def _enter(
-    rules: PresentationRules, status: PresentationStatus
-) -> Callable[[], object]:
-    # what Enter does at the console: it is never an emergency stop
-    if rules.stretches != 1 and rules.done_with == "enter":
-        return status.done
-    return lambda: None
 
 
 def _keep(

@@ -42,6 +42,13 @@ def test_the_peaks_are_those_of_the_law(published: ReportFiles) -> None:
     assert (float(hm1["least_nm"]), float(hm1["most_nm"])) == (min(own), max(own))
 
 
+def test_the_design_says_how_often_the_arm_is_stretched(
+    published: ReportFiles,
+) -> None:
+    text = published.markdown.read_text(encoding="utf-8")
+    assert "Before each grade a rater stretches the arm as often as wanted." in text
+
+
 def test_traces_are_called_reconstructions(published: ReportFiles) -> None:
     text = published.markdown.read_text(encoding="utf-8")
     assert "reconstructions, not measurements" in text

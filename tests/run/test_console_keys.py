@@ -117,3 +117,23 @@ def test_enter_does_not_stop_a_presentation_of_one_stretch(tmp_path: Path) -> No
         terminal.read_until("is complete")
     log = read_log(study.log_file("R1", "test"))
     assert (log[1].fields["ended"], log[1].fields["n_stretches"]) == ("arrived", 1)
+
+
+def test_a_program_that_answers_says_done_with_an_empty_line(tmp_path: Path) -> None:
+    study, _ = small_study(tmp_path / "study", 30.0, device=FREE)
+    command = (sys.executable, "-u", "-m", "masrel", "run", str(study.root))
+    with subprocess.Popen(
+        (*command, "--rater", "R1", "--session", "test", "--clock", "real"),
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+    ) as program:
+        assert program.stdin is not None
+        program.stdin.write(b"\n")
+        program.stdin.flush()
+        wait_for_presentation(study)
+        program.stdin.write(b"\n2\n")  # done, and a grade that comes early
+        program.stdin.flush()
+        assert program.wait(60.0) == 0
+    log = read_log(study.log_file("R1", "test"))
+    assert (log[1].fields["ended"], log[2].fields["grade"]) == ("done", "2")

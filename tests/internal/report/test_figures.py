@@ -1,5 +1,6 @@
 """Figures: what they say, that they repeat, and that they stay inside their data."""
 
+import dataclasses
 from typing import Any
 
 import matplotlib as mpl
@@ -21,6 +22,7 @@ from masrel.report._figure_data import (
 from masrel.report.figures import draw
 from masrel.report.figures._forest import forest_figure
 from masrel.report.figures._rater_pairs import rater_figure
+from masrel.report.figures._study_figures import speed_figure, trace_figure
 from masrel.report.figures._style import STYLE, house_style
 
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -262,6 +264,30 @@ def test_pairs_are_written_in_their_cells_and_long_names_are_shortened(
     many = draw(of_many, stamp="", forms=("svg",))["svg"].decode()
     assert ">a long nam…" in many
     assert ">.05</text>" not in many
+
+
+def test_a_stretch_that_a_grade_rests_on_is_ringed_and_drawn_thicker() -> None:
+    column = SpeedColumn(
+        model="HM1",
+        session="first",
+        speeds=((80.0, 95.0),),
+        mean=85.0,
+        graded=((95.0,),),
+    )
+    (axes,) = speed_figure(
+        SpeedDots(columns=(column,), raters=("R1",), slowest=60.0)
+    ).axes
+    ringed = [line for line in axes.lines if line.get_fillstyle() == "none"]
+    assert [list(line.get_ydata()) for line in ringed] == [[95.0]]
+    plain = panel()
+    widths = []
+    for graded in (False, True):
+        one = dataclasses.replace(
+            plain, stretches=plain.stretches[:1], graded=(graded,)
+        )
+        top = trace_figure(TraceColumns(panels=(one,))).axes[0]
+        widths.append(top.lines[0].get_linewidth())
+    assert widths[1] > 2.0 * widths[0]
 
 
 def test_two_raters_have_a_map_and_nothing_beside_it() -> None:

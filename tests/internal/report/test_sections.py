@@ -12,6 +12,7 @@ from masrel.elbow import ConstantSpeed, peak_torque
 from masrel.protocol import elbow_parameters
 from masrel.ratings import Ratings
 from masrel.report._document import SECTIONS
+from masrel.report._figure_data import SpeedDots, TraceColumns
 from masrel.report._material import Drawing, Material, Paragraph, gather
 from masrel.report._tables import Table, as_text
 from masrel.report.figures import draw
@@ -250,6 +251,43 @@ def test_of_repeated_presentations_every_speed_counts() -> None:
     summary = speeds.blocks[1]
     assert isinstance(summary, Table)
     assert summary.rows[0][:4] == ("HM1", "test", 2, 100.0)
+
+
+def test_stretches_are_counted_and_the_one_a_grade_rests_on_is_marked() -> None:
+    of_two = {
+        "n_stretches": 2,
+        "speeds_deg_s": (120.0, 80.0),
+        "graded_stretch": 2,
+        "mean_speed_deg_s": 100.0,
+        "min_speed_deg_s": 80.0,
+        "max_speed_deg_s": 120.0,
+        "felt": "felt",
+    }
+    made = material(
+        ratings(*of_session("test", R1=("1",)), **of_two), "traces", "speeds", "grades"
+    )
+    traces, speeds, grades = build_sections(made)
+    summary, dots = speeds.blocks[1:3]
+    assert isinstance(summary, Table)
+    assert summary.rows[0][:4] == ("HM1", "test", 2, 100.0)
+    assert isinstance(dots, Drawing)
+    assert isinstance(dots.content, SpeedDots)
+    (column,) = dots.content.columns
+    assert (column.speeds, column.graded) == (((120.0, 80.0),), ((80.0,),))
+    assert "Ringed: the stretch" in dots.caption
+    about, drawing, peaks = traces.blocks
+    assert isinstance(about, Paragraph)
+    assert "one line a stretch" in about.text
+    assert "A thicker line is the stretch" in about.text
+    assert isinstance(drawing, Drawing)
+    assert isinstance(drawing.content, TraceColumns)
+    assert drawing.content.panels[0].graded == (False, True)
+    assert isinstance(peaks, Table)
+    assert peaks.notes[-1] == "Of several stretches the largest peak is given."
+    (counted, *_) = grades.blocks
+    assert isinstance(counted, Paragraph)
+    said = "Raters stretched the arm 2 times in 1 presentation, 2.0 times each."
+    assert counted.text == said
 
 
 def test_the_forest_shows_the_posterior_behind_an_interval(
