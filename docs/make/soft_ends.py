@@ -16,27 +16,32 @@ from masrel.hess import (
     DeviceLimits,
     SimulatedClock,
     SimulatedHand,
+    StretchRules,
     open_device,
     run_presentation,
 )
 from masrel.recording import Recording
 
 FIGURE = Path(__file__).parents[1] / "figures" / "soft_ends.png"
-START, END = math.radians(30.0), math.radians(146.0)
+START = math.radians(30.0)
 
-SCENES = {  # title: model, speed in deg/s, longest duration in s
-    "HM4 at 92 deg/s, arrives": ("HM4", 92.0, 10.0),
-    "HM3 at 92 deg/s, time limit in the catch": ("HM3", 92.0, 0.8),
+SCENES = {  # title: model, where to, deg, how often, longest, s; from when behind, s
+    "HM4, arrives": ("HM4", 146.0, 1, 10.0, 1.1),
+    "HM3, done in its catch": ("HM3", 146.0, 1, 0.8, 0.75),
+    "HM3, brought back from its catch and stretched again": ("HM3", 100.0, 2, 3.9, 1.1),
 }
+SPEED = math.radians(92.0)
 RAMPS = {"at once": (0.0, "#D55E00", "--"), "soft": (0.1, "#0072B2", "-")}
 
 
 def presented(
-    model: str, speed_deg_s: float, longest_s: float, ramp_s: float
+    model: str, end_deg: float, n_stretches: int, longest_s: float, ramp_s: float
 ) -> Recording:
     """One presentation on the simulated device, both ramps of one length."""
     clock = SimulatedClock()
-    hand = SimulatedHand(start=START, end=END, mean_speed=math.radians(speed_deg_s))
+    again = [SPEED] * (n_stretches - 1)
+    end = math.radians(end_deg)
+    hand = SimulatedHand(start=START, end=end, mean_speed=SPEED, again=again)
     controller = Controller(
         STANDARD_MODELS[model], start_angle=START, post_catch_ramp=ramp_s
     )
@@ -47,6 +52,7 @@ def presented(
             clock=clock,
             limits=DeviceLimits(end_ramp_time=ramp_s),
             max_duration_s=longest_s,
+            stretches=StretchRules(n=n_stretches),
         ).recording
 
 
@@ -61,13 +67,15 @@ def main() -> None:
     """Draw, and print what falls most."""
     mpl.rcParams.update({"font.size": 9, "savefig.dpi": 200})
     mpl.rcParams.update({"axes.spines.top": False, "axes.spines.right": False})
-    figure = Figure(figsize=(5.6, 5.0), layout="constrained")
-    for axes, (title, scene) in zip(figure.subplots(2), SCENES.items(), strict=True):
+    figure = Figure(figsize=(5.6, 7.2), layout="constrained")
+    panels = figure.subplots(len(SCENES))
+    for axes, (title, scene) in zip(panels, SCENES.items(), strict=True):
+        *shown, behind_s = scene
         for name, (ramp_s, colour, line) in RAMPS.items():
-            time_s, torque = sent(presented(*scene, ramp_s))
+            time_s, torque = sent(presented(*shown, ramp_s))
             axes.plot(time_s, torque, line, color=colour, label=name, linewidth=1.3)
-            late = time_s > (1.1 if scene[0] == "HM4" else 0.75)  # behind the catch
-            print(f"{title}, {name}: {(-np.diff(torque[late])).max():.3f} N·m")
+            is_end = (time_s > behind_s) & (time_s < behind_s + 0.6)
+            print(f"{title}, {name}: {(-np.diff(torque[is_end])).max():.3f} N·m")
         axes.set_title(f"{title}, simulated", fontsize=9)
         axes.set_ylabel("torque commanded (N·m)")
         axes.grid(color="#DDDDDD", linewidth=0.6)

@@ -7,6 +7,8 @@ from masrel.hess._velocity import speed_noise
 from masrel.hess.limits import DeviceLimits
 from masrel.hess.stretching import PresentationStatus, StretchRules
 
+_NEVER = math.inf
+
 # A hundred ticks at rest all lie within so many standard deviations of the speed.
 _ARRIVAL_DEVIATIONS = 5.0
 
@@ -50,7 +52,7 @@ class Course:
         self._arrival_speed = limits.arrival_speed + _ARRIVAL_DEVIATIONS * noise
         self._arrival_time = limits.arrival_time
         self._end_angle = end_angle - limits.arrival_angle
-        self._resting_since = math.inf
+        self._resting_since = _NEVER
         self._is_single = rules.n == 1
         self._n = math.inf if rules.n is None else rules.n
         self._time_limit, self._stretch_limit = rules.time_limit, rules.stretch_limit
@@ -67,11 +69,13 @@ class Course:
         """Take one sample in -> why the presentation is over, empty while it is not."""
         if self.status.is_done:
             return "done"
+        has_arrived = False
         if angle < self._end_angle or abs(velocity) > self._arrival_speed:
-            self._resting_since = math.inf
-        elif self._resting_since == math.inf:
+            self._resting_since = _NEVER
+        elif self._resting_since == _NEVER:
             self._resting_since = time_s
-        has_arrived = time_s - self._resting_since >= self._arrival_time
+        else:
+            has_arrived = time_s - self._resting_since >= self._arrival_time
         if self._is_single:
             if not self.stretch:
                 self._watch_for_onset(time_s, angle)

@@ -24,6 +24,11 @@ _EVEN = (0.75, 1.25)
 _LEAST_START = math.radians(0.03)
 _REST_S = 0.05  # without a change of angle: the arm has come to rest
 
+# What is too slow for that is told by going so much further without ever being faster:
+# at an even 4 deg/s the estimated speed is up to half a step's 0.8 deg/s above it.
+_CREEP_SPEED = math.radians(4.5)
+_CREEP_DRIFTS = 5.0  # in drift angles
+
 # Of so many ticks `DeviceLimits.missed_replies_per_100` may be without a reading.
 _WINDOW_TICKS = 100
 
@@ -37,6 +42,7 @@ class Guard:
 
     __slots__ = (
         "_angle",
+        "_creep_angle",
         "_drift",
         "_limits",
         "_moved_at",
@@ -44,6 +50,7 @@ class Guard:
         "_raw_speed",
         "_sent",
         "_sent_at",
+        "_slow_from",
         "_stopped_dead",
         "_time",
         "dropouts",
@@ -56,6 +63,8 @@ class Guard:
         self._angle = 0.0
         self._raw_speed = 0.0  # between the last two readings, rad/s
         self._moved_at = 0.0  # when the angle changed last, s
+        self._slow_from: float | None = None  # where it was faster than a creep, rad
+        self._creep_angle = _CREEP_DRIFTS * limits.drift_angle
         self._stopped_dead = False  # whether it moved fast one tick before that
         self._sent = 0.0  # the last torque, N·m
         self._sent_at = math.inf  # nothing yet: the device holds zero
@@ -147,6 +156,15 @@ class Guard:
                 f"speed: needs at most {math.degrees(limit):.0f} deg/s, the arm "
                 f"moves at {math.degrees(velocity):.0f} deg/s",
                 "speed",
+            )
+        if self._slow_from is None or not -_CREEP_SPEED < velocity < _CREEP_SPEED:
+            self._slow_from = self._angle
+        elif abs(self._angle - self._slow_from) > self._creep_angle:
+            raise LimitExceededError(
+                f"drift: needs an arm that rests or is faster than "
+                f"{math.degrees(_CREEP_SPEED):g} deg/s, got an encoder that crept "
+                f"by {math.degrees(self._creep_angle):g} deg",
+                "drift",
             )
 
     def torque(self, time_s: float, torque: float) -> None:

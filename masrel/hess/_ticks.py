@@ -188,8 +188,10 @@ class Ticks:
             return "" if self._last_torques else "at rest"
         if controller.is_easing:
             self.samples.flag(_POST_CATCH)
+        if self._active_guard is None:
+            return course.update(time_s, angle, velocity)
         stretch, ended = course.stretch, course.update(time_s, angle, velocity)
-        if self._active_guard is not None and course.stretch > stretch:
+        if course.stretch > stretch:
             self._active_guard.begin_stretch(angle)
         return ended
 

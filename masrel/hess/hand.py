@@ -2,7 +2,8 @@
 
 import math
 from collections.abc import Sequence
-from typing import ClassVar, NamedTuple, Protocol
+from dataclasses import dataclass
+from typing import ClassVar, Protocol
 
 from masrel.errors import ParameterError
 
@@ -68,7 +69,8 @@ class Hand(Protocol):
         ...
 
 
-class _Leg(NamedTuple):
+@dataclass(slots=True, kw_only=True)
+class _Leg:
     """One way of a hand, there or back: a trapezoid of speed between two rests."""
 
     start: float  # rad
@@ -81,7 +83,8 @@ class _Leg(NamedTuple):
     cruise_angle: float  # where it has it, rad
     brake_time: float  # when it begins to brake, s
     final_time: float  # when it is there, s
-    until: float  # and when it leaves again
+    since: float = -math.inf  # when it comes after the leg before, s
+    until: float = math.inf  # and when the next one comes
 
 
 def _leg(
@@ -92,7 +95,6 @@ def _leg(
     delay: float,
     ramp_up: float,
     ramp_down: float,
-    rest: float,
 ) -> _Leg:
     # Raises ParameterError where the ramps leave nothing between them
     way = end - start
@@ -117,7 +119,6 @@ def _leg(
         cruise_angle=start + 0.5 * speed * ramp_up,
         brake_time=brake_time,
         final_time=brake_time + ramp_down,
-        until=brake_time + ramp_down + rest,
     )
 
 
@@ -226,9 +227,11 @@ class SimulatedHand:
         self._legs: list[_Leg] = []
         for way in ways:
             ramps = {"ramp_up": ramp_up, "ramp_down": ramp_down}
-            leg = _leg(*way, delay=delay, rest=rest, **ramps)
-            delay = leg.until
+            leg = _leg(*way, delay=delay, **ramps)
+            if self._legs:
+                self._legs[-1].until = leg.since = delay
             self._legs.append(leg)
+            delay = leg.final_time + rest
         self._leg = self._legs[0]
 
     def _check(
@@ -276,7 +279,7 @@ class SimulatedHand:
             Intended angle, rad, and speed, rad/s.
         """
         leg = self._leg
-        if time_s >= leg.until or time_s < leg.delay:
+        if not leg.since <= time_s < leg.until:
             leg = self._leg = self._leg_at(time_s)
         speed = leg.speed
         if leg.cruise_time <= time_s < leg.brake_time:
@@ -294,9 +297,7 @@ class SimulatedHand:
         return leg.end - 0.5 * fall * left * left, fall * left
 
     def _leg_at(self, time_s: float) -> _Leg:
-        # The last that it has left, or the first
-        left = (leg for leg in reversed(self._legs) if leg.delay <= time_s)
-        return next(left, self._legs[0])
+        return next(leg for leg in self._legs if leg.since <= time_s < leg.until)
 
     def feel(self, time_s: float, torque: float) -> None:
         """Feel nothing: this hand goes on whatever the torque."""

@@ -15,6 +15,7 @@ from masrel.hess import (
     Reading,
     SimulatedClock,
     SimulatedHand,
+    StretchRules,
     YieldingHand,
     open_device,
     run_presentation,
@@ -28,7 +29,8 @@ def presented(
     hand: Hand,
     fault: f.ReadFault | None = None,
     limits: DeviceLimits | None = None,
-    longest_s: float = 10.0,
+    longest_s: float | None = 10.0,
+    stretches: StretchRules | None = None,
 ) -> Presented:
     clock = SimulatedClock()
     inner = open_device("simulated", clock=clock, hand=hand)
@@ -40,11 +42,12 @@ def presented(
             clock=clock,
             limits=limits or DeviceLimits(),
             max_duration_s=longest_s,
+            stretches=stretches,
         )
 
 
 def resting() -> SimulatedHand:
-    return SimulatedHand(start=START, end=END, mean_speed=1.0, delay=30.0)
+    return SimulatedHand(start=START, end=END, mean_speed=1.0, delay=60.0)
 
 
 # Drift
@@ -63,6 +66,39 @@ def test_a_resting_arm_that_creeps_is_a_fault_below_half_a_newton_metre(
     )
     assert shown.fault.time_s == pytest.approx(start_s + 3.0 / abs(rate), abs=0.005)
     assert np.abs(shown.recording.columns["command_torque_nm"]).max() < 0.5
+
+
+@pytest.mark.parametrize("start_s", [0.0, 1.23])
+@pytest.mark.parametrize("rate", [-3.0, -2.0, 1.0, 2.5, 3.0])
+def test_one_that_creeps_too_slowly_for_that_is_one_below_a_newton_metre(
+    rate: float, start_s: float
+) -> None:
+    # Long before this hand moves, in as many stretches as it likes
+    shown = presented(resting(), f.drifting(start_s, radians(rate)), longest_s=60.0)
+    assert shown.fault is not None
+    assert shown.fault.kind == "drift"
+    assert shown.fault.message == (
+        "drift: needs an arm that rests or is faster than 4.5 deg/s, got an encoder "
+        "that crept by 15 deg"
+    )
+    assert shown.fault.time_s == pytest.approx(start_s + 15.0 / abs(rate), rel=0.02)
+    assert np.abs(shown.recording.columns["command_torque_nm"]).max() < 1.0
+
+
+def test_one_that_creeps_slower_still_is_a_stretch_that_does_not_end() -> None:
+    fault = f.drifting(0.0, radians(0.5))
+    rules = StretchRules(n=None, stretch_limit=5.0)
+    shown = presented(resting(), fault, None, None, rules)
+    assert shown.fault is not None
+    assert shown.fault.kind == "stretch-limit"
+    assert np.abs(shown.recording.columns["command_torque_nm"]).max() < 1.0
+
+
+@pytest.mark.parametrize("speed", [5.0, 10.0])
+def test_a_whole_stretch_that_is_slow_does_not_creep(speed: float) -> None:
+    hand = SimulatedHand(start=START, end=END, mean_speed=radians(speed))
+    shown = presented(hand, longest_s=30.0)
+    assert (shown.fault, shown.recording.facts["ended"]) == (None, "arrived")
 
 
 def test_an_encoder_that_drifts_in_whole_steps_is_one_too() -> None:
