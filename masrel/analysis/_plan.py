@@ -1,6 +1,8 @@
 """Compute what a study's plan asks for, line by line, and nothing else."""
 
 import hashlib
+import random
+import warnings
 
 import masrel
 from masrel.agreement import coefficient, cohen_kappa
@@ -11,7 +13,13 @@ from masrel.analysis._descriptions import (
     stretching_speeds,
 )
 from masrel.analysis._results import Analysis, PlannedEstimate, RaterEstimate
-from masrel.errors import CountsError, ParameterError, ProtocolError, RatingsError
+from masrel.errors import (
+    CountsError,
+    MasrelWarning,
+    ParameterError,
+    ProtocolError,
+    RatingsError,
+)
 from masrel.estimates import Estimate
 from masrel.protocol import EstimatePlan, Protocol, protocol_hash, scale_of
 from masrel.ratings import (
@@ -20,6 +28,7 @@ from masrel.ratings import (
     RetestPairs,
     rating_matrix,
     ratings_csv,
+    ratings_from_rows,
     retest_pairs,
 )
 
@@ -140,7 +149,37 @@ def _estimate(
             return PlannedEstimate(line=line, reason=reason)
         return compute(line, protocol, ratings, models)
     except (ParameterError, CountsError, RatingsError) as error:
-        raise ProtocolError(f"analysis.estimates {line.id!r}: {error}") from error
+        if not _fits_whole_study(line, protocol):
+            raise ProtocolError(f"analysis.estimates {line.id!r}: {error}") from error
+        reason = f"not with the ratings that are there: {error}"
+        return PlannedEstimate(line=line, reason=reason)
+
+
+def _fits_whole_study(line: EstimatePlan, protocol: Protocol) -> bool:
+    # Whether there is an estimate once every rating is there, whatever the grades
+    grades, rng = protocol.scale.grades, random.Random(line.id)
+    rows = [
+        {
+            "session": session.id,
+            "rater": rater,
+            "model": model.id,
+            "repeat": repeat,
+            "grade": rng.choice(grades),
+        }
+        for session in protocol.sessions
+        for rater in session.raters
+        for model in protocol.models
+        for repeat in range(1, protocol.schedule.repeats + 1)
+    ]
+    whole = ratings_from_rows(rows, scale_of(protocol))
+    compute = _inter_rater if line.kind == "inter-rater" else _retest
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", MasrelWarning)
+        try:
+            models, reason = _rated_models(line, protocol, whole)
+            return reason is None and bool(compute(line, protocol, whole, models))
+        except (ParameterError, CountsError, RatingsError):
+            return False
 
 
 def _rated_models(

@@ -41,7 +41,7 @@ def refusal(line: EstimatePlan, rows: Ratings) -> str | None:
         (found,) = analyze(protocol_with(line), rows).estimates
     except MasrelError as error:
         return str(error)
-    return None if found.estimate is not None or found.by_rater else ""
+    return None if found.estimate is not None or found.by_rater else found.reason
 
 
 def test_a_session_without_ratings_is_a_reason() -> None:
@@ -124,7 +124,12 @@ def test_a_plan_that_does_not_fit_is_said_with_its_line(
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", MasrelWarning)
             said = refusal(line, TWO)
-        assert said is None or "analysis.estimates 'mine'" in said
+        needs_more = "not with the ratings that are there: target:"
+        assert (
+            said is None
+            or "analysis.estimates 'mine'" in said
+            or said.startswith(needs_more)
+        )
 
 
 def test_cohens_kappa_of_three_raters_names_the_line_of_the_plan() -> None:
@@ -132,6 +137,30 @@ def test_cohens_kappa_of_three_raters_names_the_line_of_the_plan() -> None:
     line = plan(id="pairwise", coefficient="cohen_kappa")
     with pytest.raises(MasrelError, match=r"analysis\.estimates 'pairwise'.*3"):
         analyze(protocol_with(line), three)
+
+
+@pytest.mark.parametrize("target", ["items", "raters", "both"])
+@pytest.mark.parametrize("kind", ["inter-rater", "test-retest"])
+def test_a_plan_that_fits_the_whole_study_waits_for_its_ratings(
+    kind: str, target: str
+) -> None:
+    # one rater back, two raters, one item: every part of a study that is under way
+    retest = kind == "test-retest"
+    line = plan(
+        kind=kind,
+        coefficient="stratified_kappa" if retest else "fleiss_kappa",
+        sessions=["test", "retest"] if retest else ["test"],
+        interval="auto",
+        target=target,
+    )
+    one, all_four = ("1",), ("1", "1+", "2", "3")
+    for test in ({"R1": one}, {"R1": all_four}, {"R1": all_four, "R2": all_four}):
+        for back in ({}, {"R1": one}, {"R1": all_four}):
+            rows = [*of_session("test", **test), *of_session("retest", **back)]
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", MasrelWarning)
+                (found,) = analyze(protocol_with(line), ratings(*rows)).estimates
+            assert (found.estimate is None) == (found.reason is not None)
 
 
 def test_a_line_more_moves_no_other_lines_numbers() -> None:
