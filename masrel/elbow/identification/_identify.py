@@ -285,8 +285,8 @@ def _check_slow(
         unsure = 2.0 * half > abs(estimate.value) and 2.0 * half * size > max(torque)
         if math.isnan(estimate.value) or unsure:
             raise RecordingError(_untold(name, estimate.value, slow, options))
+        symbol = QUANTITIES[name].symbol
         if estimate.high < 0.0:
-            symbol = QUANTITIES[name].symbol
             raise RecordingError(
                 f"recordings: this is not the law: {symbol} is {estimate.value:.4g}, "
                 f"below 0 by more than its error (to {estimate.high:.4g}); torque must "
@@ -294,7 +294,7 @@ def _check_slow(
             )
         if estimate.value < 0.0:
             _warn(
-                f"{name} is negative ({estimate.value:.4g}): torque must resist "
+                f"{symbol} is negative ({estimate.value:.4g}): torque must resist "
                 "extension, and the angle grow with it; are both signs right?"
             )
 
@@ -495,7 +495,7 @@ def _warn_of_parts(trials: Sequence[Trial]) -> None:
 
 def _warn_of_lone(result: ElbowFit) -> None:
     lone = [
-        estimate.name
+        ALL_QUANTITIES[estimate.name].symbol
         for estimate in result.estimates
         if estimate.reason is not None and not math.isnan(estimate.value)
     ]
