@@ -94,7 +94,8 @@ def light_kappa(
     >>> light_kappa([["a", "a"], ["a", "b"], ["b", "b"], ["b", "b"]]).value
     0.5
     """
-    coded = raters_who_rate(code_ratings(ratings, categories))
+    everybody = code_ratings(ratings, categories)
+    coded = raters_who_rate(everybody)
     if deletion not in get_args(Deletion):
         raise ParameterError(
             f"deletion: needs one of {', '.join(get_args(Deletion))}, got {deletion!r}"
@@ -109,7 +110,7 @@ def light_kappa(
     pairs = list(itertools.combinations(range(n_raters), 2))
     tables = [pairs_of(coded, pair, v) for pair in pairs]
     sums = [PairSums.of(table, v) for table in tables]
-    reason = _reason(pairs, sums, v)
+    reason = _reason(everybody, pairs, sums, v)
     error: float | Callable[[], float] = math.nan
     if reason is None:
         error = partial(
@@ -157,11 +158,17 @@ def _mean(values: list[Fraction]) -> float:
 
 
 def _reason(
-    pairs: list[tuple[int, int]], sums: list[PairSums], v: Weights
+    everybody: CodedRatings,
+    pairs: list[tuple[int, int]],
+    sums: list[PairSums],
+    v: Weights,
 ) -> str | None:
     if v.reason is not None:
         return undefined("Light's kappa", v.reason)
-    for (first, second), of_two in zip(pairs, sums, strict=True):
+    rate = np.flatnonzero((everybody.codes >= 0).any(axis=0))
+    for pair, of_two in zip(pairs, sums, strict=True):
+        # of raters who rate, unless hardly anybody does
+        first, second = rate[list(pair)] if len(rate) > 1 else pair
         of_pair = f"of the raters in columns {first} and {second}"
         if of_two.n == 0:
             return undefined("Light's kappa", f"no item has both ratings {of_pair}")

@@ -1,9 +1,10 @@
 """Parts of a file of ratings: what they are called, and who rated what."""
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 from masrel.agreement import CodedRatings, code_ratings
-from masrel.errors import RatingsError
+from masrel.errors import ParameterError, RatingsError
 from masrel.ratings import RatingsFile, RatingsPart
 
 _SHOWN = 6  # names that a note lists
@@ -37,6 +38,21 @@ def coded_part(part: RatingsPart, option: str) -> CodedRatings:
         return code_ratings(part.ratings)
     except RatingsError as error:
         raise RatingsError(f"{option}: {error}") from error
+
+
+def without_reference(part: RatingsPart, reference: str) -> RatingsPart:
+    """Return the ratings of all but the rater whom the others are held against."""
+    coded = coded_part(part, "--diagnose")
+    if reference not in part.raters:
+        raise ParameterError(
+            f"--reference: needs one of {', '.join(part.raters)}, got {reference!r}"
+        )
+    others = [place for place, name in enumerate(part.raters) if name != reference]
+    return replace(
+        part,
+        raters=tuple(part.raters[place] for place in others),
+        ratings=replace(coded, codes=coded.codes[:, others]),
+    )
 
 
 def two_raters(file: RatingsFile, part: RatingsPart, option: str) -> CodedRatings:

@@ -108,6 +108,15 @@ class FurtherOptions:
             )
         return replace(options, target="items")
 
+    def other_raters(self, file: "RatingsFile") -> "RatingsFile":
+        """Return the ratings of all but the reference."""
+        if self.reference is None:
+            return file
+        from masrel.analysis._file_parts import without_reference
+
+        parts = (without_reference(part, self.reference) for part in file.parts)
+        return replace(file, parts=tuple(parts))
+
     def between_raters(
         self, file: "RatingsFile", options: EstimateOptions
     ) -> EstimateOptions | None:
@@ -187,12 +196,14 @@ further_options = grouped(
 
 def further_tables(
     file: "RatingsFile",
+    others: "RatingsFile",
     further: FurtherOptions,
     options: EstimateOptions,
     *,
     explain: bool,
 ) -> "list[FurtherTable]":
     """Return the tables that were chosen; of those that were not nothing is loaded."""
+    # others: the same without the reference
     if not further.record():
         return []
     check_order(options, file.scale, file.is_ordered)
@@ -206,21 +217,21 @@ def further_tables(
             if further.retest:
                 tables.append(retest_table(file, options, explain=explain))
             if further.each_category:
-                tables.append(category_table(file, options, explain=explain))
+                tables.append(category_table(others, options, explain=explain))
         if further.diagnose:
             tables += _diagnosis(file, further, options)
         if further.symmetry or further.indices:
             from masrel.report._two_rater_tables import index_table, symmetry_table
 
-            tables += [symmetry_table(file)] if further.symmetry else []
-            tables += [index_table(file)] if further.indices else []
+            tables += [symmetry_table(others)] if further.symmetry else []
+            tables += [index_table(others)] if further.indices else []
         if further.limits_of_agreement:
             from masrel.report._limits_table import limits_table
 
-            tables.append(limits_table(file, level=options.level, unit=further.unit))
-        between = further.between_raters(file, options)
+            tables.append(limits_table(others, level=options.level, unit=further.unit))
+        between = further.between_raters(others, options)
         if further.compare and between is not None:
-            tables += _comparisons(file, between)
+            tables += _comparisons(others, between)
     return tables
 
 

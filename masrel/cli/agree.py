@@ -173,14 +173,15 @@ def agree(
         )
     ratings = read_file(file, reading)
     by, groups = _groups(ratings, further, file)
+    others = further.other_raters(ratings)
     # what does not fit these tables is said first: it says most
-    tables = further_tables(ratings, further, options, explain=explain)
+    tables = further_tables(ratings, others, further, options, explain=explain)
     agreement = FileAgreement(
         ratings=ratings,
         reading=reading,
         options=options,
         by=by,
-        rows=_estimate(ratings, groups, further.between_raters(ratings, options)),
+        rows=_estimate(others, groups, further.between_raters(others, options)),
         further=tables,
         explain=explain,
     )

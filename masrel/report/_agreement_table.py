@@ -194,18 +194,20 @@ def _noted(row: AgreementRow, explain: bool) -> NotedRow:
     estimate, interval = row.estimate, row.estimate.interval
     texts = [] if estimate.reason is None else [f"undefined: {estimate.reason}"]
     texts += row.notes
+    of_interval = None
     if interval is not None:
+        of_interval = []
         if interval.reason is None:
-            texts.append(_interval_note(interval, explain))
+            of_interval.append(_interval_note(interval, explain))
         elif interval.reason != estimate.reason:
-            texts.append(f"no interval ({interval.method}): {interval.reason}")
+            of_interval.append(f"no interval ({interval.method}): {interval.reason}")
         brief = filter(None, map(_brief, interval.notes))
-        texts += interval.notes if explain else brief
+        of_interval += interval.notes if explain else brief
     return NotedRow(
         title=row.title,
         group=row.group,
         texts=tuple(texts),
-        has_interval=interval is not None,
+        interval_texts=None if of_interval is None else tuple(of_interval),
     )
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from masrel.agreement import Coefficient
 from masrel.analysis._file_estimates import EstimateOptions, on_grades
 from masrel.analysis._file_parts import coded_part, label, part_names
-from masrel.errors import MasrelError, MasrelWarning, ParameterError
+from masrel.errors import MasrelError, MasrelWarning
 from masrel.intervals import Diagnosis, diagnose
 from masrel.ratings import RatingsFile, RatingsPart
 from masrel.report._figure_data import RaterPairs
@@ -66,10 +66,6 @@ def _diagnosed(
     options: EstimateOptions,
     reference: str | None,
 ) -> _Diagnosed:
-    if reference is not None and reference not in part.raters:
-        raise ParameterError(
-            f"--reference: needs one of {', '.join(part.raters)}, got {reference!r}"
-        )
     group = label(part_names(file, part).values())
     ratings = on_grades(coded_part(part, "--diagnose"), entry, file.scale)
     try:
@@ -151,7 +147,9 @@ def _table(
     on_page = [column.key for column in columns if column.where != "csv"]
     shown, notes = rows, [note for key, note in _NOTES.items() if key in on_page]
     if kind == "raters" and reference is not None:
-        notes.append(f"{reference} is the reference, and in none of the other columns.")
+        notes.append(
+            f"{reference} is the reference, and in no other estimate between raters."
+        )
     elif kind == "pairs" and len(parts[0].result.raters) > _MANY:
         shown = sorted(rows, key=_agreement)[:_SHOWN]
         notes.append(

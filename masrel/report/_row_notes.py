@@ -15,21 +15,24 @@ class NotedRow:
     title: str
     group: str
     texts: tuple[str, ...]  # without the end of the sentence
-    has_interval: bool = True
+    # the same of its interval; None where it has none
+    interval_texts: tuple[str, ...] | None = ()
 
 
 def row_notes(rows: Sequence[NotedRow], by: str | None) -> tuple[str, ...]:
     """Return the notes on rows, what is of the same rows as one note."""
     # A note names its rows, unless it holds for all that it could be of.
     # by: what groups are called, if there are any
-    rows_of: dict[str, list[NotedRow]] = {}
+    rows_of: dict[tuple[str, bool], list[NotedRow]] = {}
     for row in rows:
         for text in row.texts:
-            rows_of.setdefault(text, []).append(row)
-    with_interval = [row for row in rows if row.has_interval]
+            rows_of.setdefault((text, False), []).append(row)
+        for text in row.interval_texts or ():
+            rows_of.setdefault((text, True), []).append(row)
+    n_intervals = sum(row.interval_texts is not None for row in rows)
     texts_of: dict[str, list[str]] = {}
-    for text, subset in rows_of.items():
-        is_of_all = subset == with_interval or len(subset) == len(rows)
+    for (text, is_of_interval), subset in rows_of.items():
+        is_of_all = len(subset) == (n_intervals if is_of_interval else len(rows))
         start = text if is_of_all else _names(subset, rows, by)
         texts_of.setdefault(start, []).extend([] if is_of_all else [text])
     return tuple(
