@@ -6,6 +6,7 @@ from dataclasses import replace
 from masrel.agreement import CodedRatings, code_ratings
 from masrel.errors import ParameterError, RatingsError
 from masrel.ratings import RatingsFile, RatingsPart
+from masrel.ratings._doubts import doubt_of_name
 
 _SHOWN = 6  # names that a note lists
 
@@ -40,8 +41,17 @@ def coded_part(part: RatingsPart, option: str) -> CodedRatings:
         raise RatingsError(f"{option}: {error}") from error
 
 
-def without_reference(part: RatingsPart, reference: str) -> RatingsPart:
+def without_reference(file: RatingsFile, reference: str) -> RatingsFile:
     """Return the ratings of all but the rater whom the others are held against."""
+    doubt = doubt_of_name(reference)
+    return replace(
+        file,
+        parts=tuple(_without(part, reference) for part in file.parts),
+        warnings=tuple(text for text in file.warnings if not text.startswith(doubt)),
+    )
+
+
+def _without(part: RatingsPart, reference: str) -> RatingsPart:
     coded = coded_part(part, "--diagnose")
     if reference not in part.raters:
         raise ParameterError(

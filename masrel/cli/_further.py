@@ -114,8 +114,7 @@ class FurtherOptions:
             return file
         from masrel.analysis._file_parts import without_reference
 
-        parts = (without_reference(part, self.reference) for part in file.parts)
-        return replace(file, parts=tuple(parts))
+        return without_reference(file, self.reference)
 
     def between_raters(
         self, file: "RatingsFile", options: EstimateOptions
@@ -178,7 +177,8 @@ further_options = grouped(
     click.option(
         "--reference",
         metavar="RATER",
-        help="With --diagnose, the rater that the others are held against.",
+        help="With --diagnose, the rater that the others are held against, and that is "
+        "in no estimate between raters.",
     ),
     click.option(
         "--limits-of-agreement",

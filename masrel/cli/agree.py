@@ -177,7 +177,7 @@ def agree(
     # what does not fit these tables is said first: it says most
     tables = further_tables(ratings, others, further, options, explain=explain)
     agreement = FileAgreement(
-        ratings=ratings,
+        ratings=others,
         reading=reading,
         options=options,
         by=by,

@@ -68,6 +68,11 @@ def doubt_errors(sheet: Sheet) -> list[str]:
     return [f"errors of formulas in the workbook are read as empty cells: {listed}"]
 
 
+def doubt_of_name(column: str) -> str:
+    """Return how the warning of a column begins that is called as no rater is."""
+    return f"column {column!r} counts as a rater"
+
+
 def doubt_columns(
     sheet: Sheet,
     layout: Layout,
@@ -95,8 +100,7 @@ def doubt_columns(
             "rate"
         )
     warnings += [
-        f"column {names[k]!r} counts as a rater; if it is none, --ignore "
-        f"{quoted([names[k]])}"
+        f"{doubt_of_name(names[k])}; if it is none, --ignore {quoted([names[k]])}"
         for k in sorted(named)
     ]
     alone = [names[k] for k in sorted(odd - named)][:_SHOWN]

@@ -18,7 +18,7 @@ from masrel.analysis._file_parts import coded_part, label, part_names
 from masrel.errors import MasrelError, MasrelWarning
 from masrel.intervals import Diagnosis, diagnose
 from masrel.ratings import RatingsFile, RatingsPart
-from masrel.report._figure_data import RaterPairs
+from masrel.report._figure_data import PairMaps, RaterPairs
 from masrel.report._further_tables import (
     FurtherTable,
     data_of,
@@ -168,7 +168,7 @@ def _table(
             {**part.keys, **{key: finite(value) for key, value in row.items()}}
             for part, row in rows
         ],
-        figure=_figure(parts[0], title) if kind == "pairs" else None,
+        figure=_figure(parts, title) if kind == "pairs" else None,
     )
 
 
@@ -336,7 +336,11 @@ def _cell(value: float) -> float | None:
     return None if math.isnan(value) else float(value)
 
 
-def _figure(part: _Diagnosed, title: str) -> RaterPairs:
+def _figure(parts: Sequence[_Diagnosed], title: str) -> PairMaps:
+    return PairMaps(groups=tuple(_map(part, title) for part in parts))
+
+
+def _map(part: _Diagnosed, title: str) -> RaterPairs:
     result = part.result
     # the raters who agree best with the others come first
     means = np.where(np.isnan(result.mean_values), -math.inf, result.mean_values)

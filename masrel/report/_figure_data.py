@@ -244,7 +244,7 @@ class FrictionView:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RaterPairs:
-    """How well every two raters agree, and what each of them adds."""
+    """How well every two raters of a group agree, and what each of them adds."""
 
     title: str  # the coefficient
     raters: tuple[str, ...]  # first on top
@@ -254,6 +254,13 @@ class RaterPairs:
     changes: tuple[float, ...]  # by rater, of the coefficient of all without
     change_ends: tuple[tuple[float, float], ...]
     level: float  # of the intervals
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PairMaps:
+    """How well every two raters agree, in every group."""
+
+    groups: tuple[RaterPairs, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -304,7 +311,7 @@ Content = (
     | ToneView
     | JointFitView
     | FrictionView
-    | RaterPairs
+    | PairMaps
     | Differences
     | LearningView
 )

@@ -161,3 +161,20 @@ def test_wrong_calls_are_one_sentence() -> None:
         light_kappa(SMALL, deletion="omit")  # type: ignore[arg-type]
     with pytest.raises(RatingsError, match="at least two raters, got 1"):
         light_kappa([["a"], ["b"]])
+
+
+def test_the_reason_names_columns_of_the_table_as_given() -> None:
+    # the second rater rates nothing and is left out; first and fourth have no item
+    table: Table = [["a", None, "a", None], ["b", None, "b", None]]
+    table += [[None, None, "a", "a"], [None, None, "b", "a"]]
+    with pytest.warns(UndefinedStatisticWarning):
+        found = light_kappa(table, deletion="pairwise")
+    assert found.reason is not None
+    assert "no item has both ratings of the raters in columns 0 and 3" in found.reason
+
+
+def test_the_reason_of_a_table_that_nobody_rates_names_its_columns() -> None:
+    with pytest.warns(UndefinedStatisticWarning):
+        found = light_kappa([[None, None], [None, None]], categories=["a", "b"])
+    assert found.reason is not None
+    assert "of the raters in columns 0 and 1" in found.reason

@@ -95,6 +95,38 @@ def test_a_diagnosis_is_that_of_the_library(masrel: Caller, wide: Path) -> None:
     assert document["estimates"]  # the first table is there, too
 
 
+def test_the_reference_is_in_no_estimate_between_raters(
+    masrel: Caller, wide: Path
+) -> None:
+    ratings = (wide, "--ignore", "site", "--coefficients", "gwet_ac")
+    further = ("--each-category", "--target", "items")
+    with_it = record(masrel, *ratings, *further, "--diagnose", "--reference", "Gold")
+    without = record(masrel, *ratings, *further, "--ignore", "Gold")
+    assert with_it["estimates"] == without["estimates"]
+    assert with_it["categories"] == without["categories"]
+    (estimate,) = with_it["estimates"]
+    for row in with_it["diagnosis_raters"]:
+        assert row["without"] - row["change"] == pytest.approx(estimate["value"])
+    assert with_it["notes"] == []  # not that Gold counts as a rater
+    two = ("--raters", "Kim,Lee,Gold", "--symmetry")
+    tables = [
+        record(masrel, wide, *two, "--diagnose", "--reference", "Gold"),
+        record(masrel, wide, "--raters", "Kim,Lee", "--symmetry"),
+    ]
+    assert tables[0]["symmetry"] == tables[1]["symmetry"]
+
+
+def test_a_reference_is_left_out_of_the_differences_of_groups(
+    masrel: Caller, wide: Path
+) -> None:
+    call = (wide, "--by", "site", "--coefficients", "fleiss_kappa", "--compare")
+    with_it = record(masrel, *call, "--diagnose", "--reference", "Gold")
+    assert (
+        with_it["differences"]
+        == record(masrel, *call, "--ignore", "Gold")["differences"]
+    )
+
+
 def test_groups_are_diagnosed_each_and_without_a_target_there_are_no_intervals(
     masrel: Caller, wide: Path
 ) -> None:

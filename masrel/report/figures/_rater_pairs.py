@@ -2,6 +2,7 @@
 
 import math
 import textwrap
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from matplotlib.textpath import TextPath
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from masrel.report._figure_data import RaterPairs
+from masrel.report._figure_data import PairMaps, RaterPairs
 from masrel.report._tables import number, percent
 from masrel.report.figures._style import BLACK, BLUE, DASHES, GREY
 
@@ -38,41 +39,87 @@ _DOT: dict[str, Any] = {"marker": "o", "color": BLACK, "linestyle": "none"}
 _ZERO: dict[str, Any] = {"color": GREY, "linewidth": 0.8, "linestyle": DASHES}
 
 
-def rater_figure(content: RaterPairs) -> Figure:
-    """Return the heatmap of pairs, with the change without each rater at its right."""
-    r = len(content.raters)
-    cell = next(inches for most, inches in _CELLS if r <= most)
-    size = 9.0 if cell > 0.25 else 7.5 if cell > 0.15 else 6.0
-    names = [_short(name) for name in content.raters]
-    labels = [
-        *names,
-        *([] if content.reference is None else [_short(content.reference)]),
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Layout:
+    """Where the map of a group and the panel beside it are, in inches."""
+
+    # so that cells stay square, and rows of both the same
+    labels: list[str]
+    letters: float  # points
+    cell: float
+    room: float  # of the labels
+    across: float  # the map
+    has_panel: bool
+
+    @classmethod
+    def of(cls, group: RaterPairs) -> "_Layout":
+        r = len(group.raters)
+        cell = next(inches for most, inches in _CELLS if r <= most)
+        letters = 9.0 if cell > 0.25 else 7.5 if cell > 0.15 else 6.0
+        names = [*group.raters, *filter(None, [group.reference])]
+        labels = [_short(name) for name in names]
+        return cls(
+            labels=labels,
+            letters=letters,
+            cell=cell,
+            room=max(_width(label, letters) for label in labels) + 0.12,
+            across=cell * (r if group.reference is None else r + 1.0 + _GAP),
+            has_panel=any(math.isfinite(change) for change in group.changes),
+        )
+
+    @property
+    def left(self) -> float:
+        """Where the panel begins, or the figure ends."""
+        return self.room + max(self.across, _MIN_BAR) + _BETWEEN
+
+    @property
+    def width(self) -> float:
+        return self.left + _PANEL + 0.2 if self.has_panel else self.left
+
+    @property
+    def above(self) -> float:
+        return max(self.room, 0.5 if self.has_panel else 0.0) + _STAMP
+
+
+def rater_figure(content: PairMaps) -> Figure:
+    """Return a heatmap of pairs a group, with the change without each rater beside."""
+    layouts = [_Layout.of(group) for group in content.groups]
+    heights = [
+        at.above + at.cell * len(group.raters) + _BELOW
+        for group, at in zip(content.groups, layouts, strict=True)
     ]
-    room = max(_width(label, size) for label in labels) + 0.12
-    has_panel = any(math.isfinite(change) for change in content.changes)
-    # all places are in inches: cells stay square, and rows of both panels the same
-    across = cell * (r if content.reference is None else r + 1.0 + _GAP)
-    left = room + max(across, _MIN_BAR) + _BETWEEN
-    width = left + _PANEL + 0.2 if has_panel else left
-    above = max(room, 0.5 if has_panel else 0.0) + _STAMP
-    height = above + cell * r + _BELOW
-    figure = Figure(figsize=(width, height))
+    figure = Figure(figsize=(max(at.width for at in layouts), sum(heights)))
     figure.set_layout_engine("none")
+    below = sum(heights)
+    for group, layout, height in zip(content.groups, layouts, heights, strict=True):
+        below -= height
+        _group(figure, group, layout, below)
+    return figure
+
+
+def _group(figure: Figure, group: RaterPairs, at: _Layout, below: float) -> None:
+    # below: inches of the figure below the group
+    width, height = figure.get_size_inches()
+    high = at.cell * len(group.raters)
 
     def axes(left: float, bottom: float, wide: float, high: float) -> Axes:
         return figure.add_axes(
-            (left / width, bottom / height, wide / width, high / height)
+            (left / width, (below + bottom) / height, wide / width, high / height)
         )
 
-    image = _heatmap(axes(room, _BELOW, across, cell * r), content, labels, size)
-    at = axes(room, _BELOW - 0.27, max(across, _MIN_BAR), 0.12)
-    bar = figure.colorbar(image, cax=at, orientation="horizontal")
-    bar.set_label(f"{content.title} of two raters")
+    image = _heatmap(
+        axes(at.room, _BELOW, at.across, high), group, at.labels, at.letters
+    )
+    bar = figure.colorbar(
+        image,
+        cax=axes(at.room, _BELOW - 0.27, max(at.across, _MIN_BAR), 0.12),
+        orientation="horizontal",
+    )
+    bar.set_label(f"{group.title} of two raters")
     bar.outline.set_visible(False)
-    if has_panel:
-        left = room + max(across, 1.5) + _BETWEEN
-        _influence(axes(left, _BELOW, _PANEL, cell * r), content, cell)
-    return figure
+    if at.has_panel:
+        left = at.room + max(at.across, 1.5) + _BETWEEN
+        _influence(axes(left, _BELOW, _PANEL, high), group, at.cell)
 
 
 def _width(text: str, size: float) -> float:

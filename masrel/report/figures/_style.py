@@ -134,7 +134,7 @@ def _figure(content: data.Content) -> Figure:
             from masrel.report.figures._forest import forest_figure
 
             return forest_figure(content)
-        case data.RaterPairs() | data.LearningView():
+        case data.PairMaps() | data.LearningView():
             return _rater_figure(content)
         case data.Differences():
             from masrel.report.figures._limits_figure import limits_figure
@@ -152,7 +152,7 @@ def _figure(content: data.Content) -> Figure:
             return _joint_figure(content)
 
 
-def _rater_figure(content: data.RaterPairs | data.LearningView) -> Figure:
+def _rater_figure(content: data.PairMaps | data.LearningView) -> Figure:
     if isinstance(content, data.LearningView):
         from masrel.report.figures._learning_figure import learning_figure
 

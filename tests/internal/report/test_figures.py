@@ -13,6 +13,7 @@ from masrel.report._figure_data import (
     Forest,
     ForestRow,
     GradeGrid,
+    PairMaps,
     RaterPairs,
     SpeedColumn,
     SpeedDots,
@@ -117,7 +118,7 @@ DRAWINGS = {
         raters=("R1", "R2"),
         slowest=60.0,
     ),
-    "pairs": pairs(3),
+    "pairs": PairMaps(groups=(pairs(3),)),
     "traces": TraceColumns(panels=(panel(),)),
 }
 
@@ -261,7 +262,7 @@ def test_pairs_are_written_in_their_cells_and_long_names_are_shortened(
     assert few.count(">−.05</text>") == 1
     assert ">95 % confidence interval</text>" in few
     of_many = pairs(15, reference="a long name " * 4)
-    many = draw(of_many, stamp="", forms=("svg",))["svg"].decode()
+    many = draw(PairMaps(groups=(of_many,)), stamp="", forms=("svg",))["svg"].decode()
     assert ">a long nam…" in many
     assert ">.05</text>" not in many
 
@@ -301,5 +302,18 @@ def test_two_raters_have_a_map_and_nothing_beside_it() -> None:
         change_ends=((nan, nan), (nan, nan)),
         level=0.95,
     )
-    assert len(rater_figure(content).axes) == 2  # the map and its colours
-    assert len(rater_figure(pairs(3)).axes) == 3
+    assert (
+        len(rater_figure(PairMaps(groups=(content,))).axes) == 2
+    )  # the map and its colours
+    assert len(rater_figure(PairMaps(groups=(pairs(3),))).axes) == 3
+
+
+def test_every_group_has_its_map_one_below_the_other() -> None:
+    figure = rater_figure(PairMaps(groups=(pairs(3), pairs(12, reference="Gold"))))
+    maps = [axes for axes in figure.axes if axes.images]
+    first, *second = (axes.get_position() for axes in maps)
+    assert len(second) == 1
+    assert second[0].y1 < first.y0
+    cells = (first.height / 3, second[0].height / 12)
+    inches = figure.get_figheight()
+    assert [cell * inches for cell in cells] == pytest.approx([0.42, 0.33])
