@@ -63,7 +63,7 @@ class Course:
         self._lowest_angle = math.inf  # since the next stretch is armed, rad
         self.stretch = 0  # the number of the one that goes on, 0 between
         self.status = status
-        status.is_armed = True
+        status.is_armed, status.n_stretches = True, 0
 
     def update(self, time_s: float, angle: float, velocity: float) -> str:
         """Take one sample in -> why the presentation is over, empty while it is not."""
@@ -120,8 +120,8 @@ class Course:
                 self._arm(angle)
         elif time_s - self._begun_at > self._stretch_limit:
             raise LimitExceededError(
-                f"stretch: needs one that has ended within {self._stretch_limit:g} s, "
-                f"stretch {self.stretch} has not",
+                f"stretch limit: needs a stretch that ends within "
+                f"{self._stretch_limit:g} s, number {self.stretch} has not ended",
                 "stretch-limit",
             )
         return ""

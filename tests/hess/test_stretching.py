@@ -210,7 +210,7 @@ def test_a_stretch_that_does_not_end_is_a_fault_with_a_ramp() -> None:
     assert fault is not None
     assert (fault.kind, recording.facts["ended"]) == ("stretch-limit", "fault")
     assert fault.message == (
-        "stretch: needs one that has ended within 2 s, stretch 1 has not"
+        "stretch limit: needs a stretch that ends within 2 s, number 1 has not ended"
     )
     assert fault.time_s == pytest.approx(2.54, abs=0.02)
     falls = -np.diff(recording.columns["command_torque_nm"][recording.n_presented :])
