@@ -9,7 +9,7 @@ import json
 import os
 import stat
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,7 @@ _BINARY = getattr(os, "O_BINARY", 0)
 
 # Tables and arrays inside each other; a protocol has four
 _MAX_DEPTH = 32
+_MAX_LISTED = 40
 _MAX_BITS = 1024  # of a whole number: what is longer cannot always be shown
 
 
@@ -49,6 +50,13 @@ def regular(descriptor: int, path: Path) -> int:
     if stat.S_ISDIR(mode):
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     raise OSError(errno.EINVAL, "not a regular file", str(path))
+
+
+def listed(names: Iterable[str]) -> str:
+    """Return names as a message has them: the first of them where they are many."""
+    names = list(names)
+    more = len(names) - _MAX_LISTED
+    return ", ".join(names[:_MAX_LISTED]) + (f" and {more} more" if more > 0 else "")
 
 
 def parse_json(text: str | bytes) -> Any:

@@ -1,6 +1,7 @@
 """A rating scale: its grades in order, as text, with the values weights use."""
 
 import math
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
@@ -49,7 +50,7 @@ class Scale:
                     f"scale {self.name!r}: grades must be text, got {grade!r}"
                 )
         if len(set(self.grades)) < len(self.grades):
-            repeated = sorted({g for g in self.grades if self.grades.count(g) > 1})
+            repeated = sorted(g for g, n in Counter(self.grades).items() if n > 1)
             raise ParameterError(
                 f"scale {self.name!r}: grades must differ, repeated: {repeated}"
             )

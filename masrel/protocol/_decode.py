@@ -14,6 +14,8 @@ import msgspec
 from msgspec import inspect
 from msgspec.structs import FieldInfo
 
+_MAX_HINTS = 20
+
 Table = dict[str, typing.Any]
 
 
@@ -40,9 +42,11 @@ def decode_table(
         return Decoded(values=msgspec.to_builtins(whole))
     fields = {info.encode_name: info for info in msgspec.structs.fields(struct)}
     prefix = f"{at}." if at else ""
-    for key in raw:
-        if key not in fields:
-            decoded.problems.append(_unknown(f"{prefix}{key}", key, fields))
+    unknown = [key for key in raw if key not in fields]
+    for place, key in enumerate(unknown):
+        # what was meant takes long to find, and helps with the first few
+        known = fields if place < _MAX_HINTS else {}
+        decoded.problems.append(_unknown(f"{prefix}{key}", key, known))
     for key, info in fields.items():
         where = f"{prefix}{key}"
         if key in raw:
@@ -135,7 +139,7 @@ def _leaf_problem(value: object, annotation: object, where: str) -> str | None:
 
 def _unknown(where: str, key: str, fields: Mapping[str, FieldInfo]) -> str:
     hint = _closest(key, list(fields))
-    known = "" if hint else f" ({', '.join(fields)})"
+    known = "" if hint or not fields else f" ({', '.join(fields)})"
     return f"{where}: needed a known key{known}, got {got(key)}{hint}"
 
 

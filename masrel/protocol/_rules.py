@@ -2,10 +2,12 @@
 
 import math
 from collections.abc import Iterator, Sequence
+from itertools import chain
 from typing import Any
 
 import msgspec
 
+from masrel._input import listed
 from masrel.protocol._decode import got, needed, with_id
 from masrel.protocol._kinds import DEFAULT_KIND, kind_problem, value_problems
 from masrel.protocol.definition import Model, PresentationRules
@@ -15,6 +17,12 @@ Values = dict[str, Any]
 MAX_PRESENTATIONS = 500
 """Presentations of one session; blinded codes are drawn from 1800."""
 
+_DEVICES = {
+    *("CON", "PRN", "AUX", "NUL"),
+    *(f"{port}{number}" for port in ("COM", "LPT") for number in range(1, 10)),
+}
+"""Names that Windows keeps for devices, whatever stands behind a dot."""
+
 MISSING_MARKS = ("NA",)
 """Marks of a missing rating in a ratings file; no grade may be called that."""
 
@@ -22,19 +30,19 @@ SESSIONS_NEEDED = {"inter-rater": 1, "test-retest": 2}
 """Kind of an estimate to the number of sessions it is made from."""
 
 
-def broken_rules(values: Values) -> tuple[str, ...]:
+def broken_rules(values: Values) -> Iterator[str]:
     """Check the rules across keys."""
-    return (
-        *_scale(values),
-        *_ids(values),
-        *_references(values),
-        *_schedules(values),
-        *_device(values),
-        *_presentation(values),
-        *_training(values),
-        *kind_rules(values),
-        *joint_rules(values),
-        *_plan(values),
+    return chain(
+        _scale(values),
+        _ids(values),
+        _references(values),
+        _schedules(values),
+        _device(values),
+        _presentation(values),
+        _training(values),
+        kind_rules(values),
+        joint_rules(values),
+        _plan(values),
     )
 
 
@@ -46,12 +54,14 @@ def _entries(values: Values, key: str) -> list[tuple[int, Values]]:
 def _scale(values: Values) -> Iterator[str]:
     # grades that a file of ratings can hold, each once
     grades = (values.get("scale") or {}).get("grades") or []
+    seen: set[str] = set()
     for index, grade in enumerate(grades):
         where = f"scale.grades[{index}]"
         if grade is None:
             continue
-        if grade in grades[:index]:
+        if grade in seen:
             yield f"{where}: needed grades that differ, got {got(grade)} again"
+        seen.add(grade)
         if grade != grade.strip() or not grade.isprintable():
             yield (
                 f"{where}: needed a grade without spaces around it or control "
@@ -81,37 +91,47 @@ def _ids(values: Values) -> Iterator[str]:
                     f"{key}[{index}].id: needed ids that differ by more than case, "
                     f"got {got(name)} where {key}[{earlier[0]}] has {got(earlier[1])}"
                 )
+            if name.partition(".")[0].upper() in _DEVICES:
+                yield (
+                    f"{key}[{index}].id: needed an id that Windows takes as the name "
+                    f"of a file, got {got(name)}"
+                )
 
 
 def _references(values: Values) -> Iterator[str]:
     # grades of models that the scale has, raters of sessions that the study has
     grades = (values.get("scale") or {}).get("grades")
+    on_scale = {None, *(grades or ())}
     for index, model in _entries(values, "models"):
         grade = model.get("intended_grade")
         # With an unusable grade in the scale, none can be said to be unknown.
-        if grades and None not in grades and grade not in (None, *grades):
+        if grades and None not in grades and grade not in on_scale:
             yield (
                 f"models[{index}].intended_grade: needed a grade of the scale "
-                f"({', '.join(grades)}), got {got(grade)}{with_id(model)}"
+                f"({listed(grades)}), got {got(grade)}{with_id(model)}"
             )
     raters = values.get("raters") or []
-    known: list[Any] = [None if r is None else r.get("id") for r in raters]
-    known = list(dict.fromkeys(known))
+    known: dict[Any, None] = dict.fromkeys(
+        None if rater is None else rater.get("id") for rater in raters
+    )
     for index, session in _entries(values, "sessions"):
-        named = session.get("raters") or []
-        for place, rater in enumerate(named):
+        named: set[Any] = set()
+        for place, rater in enumerate(session.get("raters") or []):
             where = f"sessions[{index}].raters[{place}]"
-            if rater is not None and rater in named[:place]:
+            if rater is not None and rater in named:
                 yield (
                     f"{where}: needed each rater once, got {got(rater)} again"
                     f"{with_id(session)}"
                 )
             # With an unusable rater in the list, nobody can be said to be unknown.
-            elif known and None not in known and rater not in (None, *known):
+            elif (
+                known and None not in known and rater is not None and rater not in known
+            ):
                 yield (
-                    f"{where}: needed a rater of [[raters]] ({', '.join(known)}), "
+                    f"{where}: needed a rater of [[raters]] ({listed(known)}), "
                     f"got {got(rater)}{with_id(session)}"
                 )
+            named.add(rater)
 
 
 def _schedules(values: Values) -> Iterator[str]:

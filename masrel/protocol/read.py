@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,8 @@ from masrel.protocol._decode import decode_table, got
 from masrel.protocol._rules import broken_rules, joint_rules, kind_rules
 from masrel.protocol.content import _joint_of
 from masrel.protocol.definition import ElbowConstants, Model, Protocol
+
+_MAX_PROBLEMS = 200
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,8 +55,8 @@ def read_protocol(path: Path) -> Protocol:
     ------
     ProtocolError
         If there is no such file, it is not TOML, or any key is wrong. Its
-        `problems` are all there are, each ``FILE: key[index].key: needed ..., got
-        ...``, entries counted from 0.
+        `problems` are all there are, or the first 200, each ``FILE: key[index].key:
+        needed ..., got ...``, entries counted from 0.
 
     Notes
     -----
@@ -68,15 +71,15 @@ def read_protocol(path: Path) -> Protocol:
     decoded = decode_table(raw, Protocol)
     # A model whose file could not be used lacks its keys for that reason alone.
     unread = tuple(f"models[{index}]." for index in resolved.unread)
-    problems = [
-        *resolved.problems,
-        *(
-            problem
-            for problem in (*decoded.problems, *broken_rules(decoded.values))
-            if not (problem.startswith(unread) and ", got none" in problem)
-        ),
-    ]
+    found = (
+        problem
+        for problem in chain(decoded.problems, broken_rules(decoded.values))
+        if not (problem.startswith(unread) and ", got none" in problem)
+    )
+    problems = list(islice(chain(resolved.problems, found), _MAX_PROBLEMS + 1))
     if problems:
+        if len(problems) > _MAX_PROBLEMS:
+            problems[-1] = "there are more problems"
         raise ProtocolError(*(f"{path}: {problem}" for problem in problems))
     return msgspec.convert(raw, Protocol)
 

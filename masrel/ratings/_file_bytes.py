@@ -8,8 +8,11 @@ import sys
 import zipfile
 import zlib
 from pathlib import Path
+from typing import IO
 
 from masrel.errors import ParameterError, RatingsError
+
+_MAX_UNPACKED = 256_000_000
 
 _BOMS = (
     (codecs.BOM_UTF8, "utf-8"),
@@ -45,6 +48,8 @@ def bytes_of(path: Path | str) -> bytes:
         raise RatingsError(f"{path}: needed a file, got a folder")
     if not path.exists():
         raise RatingsError(f"{path}: no such file")
+    if path.is_char_device() or path.is_block_device():
+        raise RatingsError(f"{path}: needed a file or a pipe, got a device")
     return path.read_bytes()
 
 
@@ -56,9 +61,9 @@ def unpacked(name: str, data: bytes, *, is_export: bool) -> tuple[str, bytes]:
     stem = stem if name.lower().endswith(suffix) else name
     try:
         if suffix == ".gz":
-            return stem, gzip.decompress(data)
+            return stem, _within(name, gzip.GzipFile(fileobj=io.BytesIO(data)))
         if suffix == ".xz":
-            return stem, lzma.decompress(data)
+            return stem, _within(name, lzma.LZMAFile(io.BytesIO(data)))
         if suffix == ".zip":
             with zipfile.ZipFile(io.BytesIO(data)) as archive:
                 members = [m for m in archive.namelist() if not m.endswith("/")]
@@ -69,7 +74,8 @@ def unpacked(name: str, data: bytes, *, is_export: bool) -> tuple[str, bytes]:
                         f"{name}: needed one file in it, got {len(members)}: "
                         f"{', '.join(members[:5])}"
                     )
-                return members[0], archive.read(members[0])
+                with archive.open(members[0]) as member:
+                    return members[0], _within(name, member)
     except (
         *(OSError, EOFError, zlib.error, lzma.LZMAError, zipfile.BadZipFile),
         *(RuntimeError, NotImplementedError),  # encrypted, packed in another way
@@ -78,6 +84,17 @@ def unpacked(name: str, data: bytes, *, is_export: bool) -> tuple[str, bytes]:
             f"{name}: is damaged, or no {suffix} file ({error})"
         ) from error
     return name, data
+
+
+def _within(name: str, packed: IO[bytes] | gzip.GzipFile) -> bytes:
+    # What is in a packed file, if it is not so much that it fills the memory
+    data = packed.read(_MAX_UNPACKED + 1)
+    if len(data) > _MAX_UNPACKED:
+        raise RatingsError(
+            f"{name}: is more than {_MAX_UNPACKED} bytes when it is unpacked: unpack "
+            "it, since a large table is read piece by piece"
+        )
+    return data
 
 
 def decoded(name: str, data: bytes, encoding: str | None, n_before: int = 0) -> str:

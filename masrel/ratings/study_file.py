@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from masrel._input import MAX_TABLE, read_regular
+from masrel._input import MAX_TABLE, listed, read_regular
 from masrel.errors import RatingsError
 from masrel.ratings.table import (
     DEFAULT_SESSION,
@@ -118,7 +118,7 @@ def read_study_ratings(path: Path | str, scale: Scale) -> Ratings:
             raise _error(
                 rows,
                 f"needed a column for the {role} named {' or '.join(_NAMES[role])}, "
-                f"got {', '.join(rows.header)}; masrel agree reads other tables",
+                f"got {listed(rows.header)}; masrel agree reads other tables",
             )
     problems: list[_Problem] = []
     cells = _long_cells(rows, places, problems)
@@ -185,8 +185,8 @@ def _extra_values(texts: Mapping[str, str], problems: _Problems) -> dict[str, An
         values[name] = _speed(name, texts.get(name, ""), problems)
     for name, known in (("source", SOURCES), ("felt", (*FELT, None))):
         if values[name] not in known:
-            listed = ", ".join(text for text in known if text is not None)
-            problems.append((name, f"needed one of {listed}, got {values[name]!r}"))
+            names = listed(text for text in known if text is not None)
+            problems.append((name, f"needed one of {names}, got {values[name]!r}"))
     return values
 
 
@@ -197,7 +197,8 @@ def _whole(
     text = texts.get(name, "NA")
     if text in _MISSING and name != "repeat":
         return None
-    if text.isascii() and text.isdigit() and int(text) >= least:
+    # more digits than any count has
+    if text.isascii() and text.isdigit() and len(text) < 19 and int(text) >= least:
         return int(text)
     problems.append((name, f"needed a whole number from {least}, got {text!r}"))
     return None
@@ -245,7 +246,7 @@ def _check_cells(cells: list[_Cell], scale: Scale, problems: list[_Problem]) -> 
             problems.append((cell.line, cell.column, message))
         if cell.grade is not None and cell.grade not in scale.grades:
             message = (
-                f"needed one of {', '.join(scale.grades)}, or an empty cell or NA when "
+                f"needed one of {listed(scale.grades)}, or an empty cell or NA when "
                 f"missing, got {cell.grade!r}"
             )
             problems.append((cell.line, cell.column, message))

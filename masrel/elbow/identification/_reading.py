@@ -472,6 +472,7 @@ def read_movement(
     """
     if not path.is_file():
         why = "a folder; needs a file" if path.is_dir() else "no such file"
+        why = "not a regular file" if path.exists() and not path.is_dir() else why
         raise RecordingError(f"{path}: {why}")
     content = read_regular(path, most=MAX_RECORDING)
     table = (

@@ -83,7 +83,8 @@ def _read_table(path: Path) -> list[list[float]]:
         text = read_regular(path, most=MAX_RECORDING).decode("utf-8-sig")
         rows = list(csv.reader(io.StringIO(text, newline="")))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise RecordingError(f"{path}: cannot be read: {error}") from error
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise RecordingError(f"{path}: cannot be read: {reason}") from error
     head = 1 + sum(1 for _ in takewhile(_is_remark, rows))  # row of the names
     names = [name.strip() for name in rows[head - 1]] if len(rows) >= head else []
     absent = [name for name in _COLUMNS if name not in names]
