@@ -152,7 +152,7 @@ def _speeds_of(row: Mapping[Hashable, Any]) -> Iterator[Speed]:
     if row["speeds_deg_s"] is not None:
         made = {**dict(enumerate(row["speeds_deg_s"], start=1))}
     for stretch, speed in made.items():
-        if not math.isnan(speed):
+        if speed is not None:
             yield Speed(
                 session=row["session"],
                 rater=row["rater"],

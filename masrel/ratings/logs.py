@@ -137,9 +137,8 @@ def _of_stretches(presented: list[Event]) -> dict[str, object]:
     fields = presented[-1].fields
     one = [{"mean_speed_deg_s": fields["mean_speed_deg_s"]}]
     made: Any = fields.get("stretches", one)  # there once was one, and no list
-    known = [stretch["mean_speed_deg_s"] for stretch in made]
-    speeds = tuple(math.nan if speed is None else float(speed) for speed in known)
-    moved = [speed for speed in speeds if not math.isnan(speed)]
+    speeds = tuple(stretch["mean_speed_deg_s"] for stretch in made)
+    moved = [speed for speed in speeds if speed is not None]
     return {
         "n_stretches": len(speeds),
         "mean_speed_deg_s": statistics.fmean(moved) if moved else math.nan,

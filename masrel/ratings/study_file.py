@@ -73,7 +73,7 @@ class _Cell:
     n_stretches: int | None
     min_speed_deg_s: float
     max_speed_deg_s: float
-    speeds_deg_s: tuple[float, ...] | None
+    speeds_deg_s: tuple[float | None, ...] | None
     graded_stretch: int | None
     felt: str | None
 
@@ -218,7 +218,7 @@ def _speed(name: str, text: str, problems: _Problems) -> float:
 
 def _speeds(
     texts: Mapping[str, str], n_stretches: int | None, problems: _Problems
-) -> tuple[float, ...] | None:
+) -> tuple[float | None, ...] | None:
     # one a stretch, separated by semicolons
     text = texts.get("speeds_deg_s", "NA")
     if text in _MISSING and n_stretches != 1:
@@ -227,7 +227,12 @@ def _speeds(
     if len(cells) != n_stretches:
         message = f"needed {n_stretches} separated by semicolons, got {text!r}"
         problems.append(("speeds_deg_s", message))
-    return tuple(_speed("speeds_deg_s", cell.strip(), problems) for cell in cells)
+    return tuple(
+        None
+        if cell.strip() in _MISSING
+        else _speed("speeds_deg_s", cell.strip(), problems)
+        for cell in cells
+    )
 
 
 def _check_cells(cells: list[_Cell], scale: Scale, problems: list[_Problem]) -> None:

@@ -27,7 +27,7 @@ RATING_COLUMNS = (
     "n_stretches",  # whole number; None when unknown
     "min_speed_deg_s",  # slowest and fastest mean speed of a stretch; nan when unknown
     "max_speed_deg_s",
-    "speeds_deg_s",  # mean speed of each, in order, nan where it has none; or None
+    "speeds_deg_s",  # mean speed of each, in order, None where it has none; or None
     "graded_stretch",  # number of the one that the grade rests on; None when not said
     "felt",  # one of masrel.run's FELT; None when unknown
 )
@@ -436,7 +436,7 @@ def _body(ratings: Ratings) -> str:
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
     table = ratings.table
-    has_stretches = table["n_stretches"].notna().any()
+    has_stretches = table[list(RATING_COLUMNS[_N_ALWAYS:])].notna().any(axis=None)
     names = RATING_COLUMNS if has_stretches else RATING_COLUMNS[:_N_ALWAYS]
     writer.writerow(names)
     for row in zip(*(table[name].tolist() for name in names), strict=True):

@@ -134,6 +134,26 @@ def test_a_bad_cell_is_named_with_file_line_and_column(
 
 
 @pytest.mark.parametrize(
+    ("cells", "where"),
+    [
+        ("2.5,,,", "'n_stretches': needed a whole number from 0, got '2.5'"),
+        ("2,60,,", "'speeds_deg_s': needed 2 separated by semicolons, got '60'"),
+        ("1,slow,,", "'speeds_deg_s': needed a speed of 0 or more, got 'slow'"),
+        ("2,,3,", "'graded_stretch': needed at most n_stretches, got 3"),
+        (",,1,", "'graded_stretch': needed at most n_stretches, got 1"),
+        ("2,,0,", "'graded_stretch': needed a whole number from 1, got '0'"),
+        ("1,,,no", "'felt': needed one of felt, below-threshold, no-catch, got 'no'"),
+    ],
+)
+def test_a_bad_cell_of_stretches_is_named(
+    tmp_path: Path, cells: str, where: str
+) -> None:
+    names = "rater,item,grade,n_stretches,speeds_deg_s,graded_stretch,felt"
+    with pytest.raises(RatingsError, match=rf"r\.csv: line 2, column {where}"):
+        read(tmp_path, f"{names}\nR1,a,1,{cells}\n")
+
+
+@pytest.mark.parametrize(
     ("text", "message"),
     [
         ("", "needed a header and rows, the file has none"),

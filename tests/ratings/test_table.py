@@ -16,9 +16,27 @@ from masrel.ratings import (
     read_study_ratings,
     write_ratings,
 )
+from masrel.run._state import FELT
 from masrel.scales import MODIFIED_ASHWORTH
 
 ROW = {"rater": "R1", "model": "HM1", "grade": "1+"}
+
+SPEEDS = st.floats(0, 1e6) | st.just(float("nan"))
+
+
+@st.composite
+def stretches(draw: st.DrawFn) -> dict[str, object]:
+    """What a row may say of its stretches, or nothing."""
+    n = draw(st.none() | st.integers(0, 4))
+    row: dict[str, object] = {"felt": draw(st.sampled_from([*FELT, None]))}
+    if n is not None:
+        row |= {"n_stretches": n, "min_speed_deg_s": draw(SPEEDS)}
+        speeds = st.floats(0, 1e6) | st.none()
+        row["speeds_deg_s"] = tuple(draw(st.lists(speeds, min_size=n, max_size=n)))
+    if n:
+        row["graded_stretch"] = draw(st.none() | st.integers(1, n))
+    return row
+
 
 ROWS = st.lists(
     st.fixed_dictionaries(
@@ -28,10 +46,11 @@ ROWS = st.lists(
             "model": st.sampled_from(["HM1", "HM2"]),
             "repeat": st.integers(1, 3),
             "grade": st.sampled_from([*MODIFIED_ASHWORTH.grades, None]),
-            "mean_speed_deg_s": st.floats(0, 1e6) | st.just(float("nan")),
+            "mean_speed_deg_s": SPEEDS,
             "source": st.sampled_from(SOURCES),
+            "stretches": st.just({}) | stretches(),
         }
-    ),
+    ).map(lambda row: {**row.pop("stretches"), **row}),
     unique_by=lambda row: (row["session"], row["rater"], row["model"], row["repeat"]),
     max_size=12,
 )
@@ -67,6 +86,42 @@ def test_the_file_is_what_the_documentation_says(tmp_path: Path) -> None:
         b"test,R1,HM1,1,1+,81.25,foreign",
         b"test,R1,HM2,1,NA,NA,foreign",
     ]
+
+
+def test_what_is_known_of_stretches_is_in_the_file(tmp_path: Path) -> None:
+    known = {
+        "mean_speed_deg_s": 70.5,
+        "n_stretches": 3,
+        "min_speed_deg_s": 60.0,
+        "max_speed_deg_s": 81.0,
+        "speeds_deg_s": (60.0, None, 81.0),
+        "graded_stretch": 3,
+        "felt": "felt",
+    }
+    rows = [{**ROW, **known}, {**ROW, "model": "HM2"}]
+    write_ratings(ratings_from_rows(rows, MODIFIED_ASHWORTH), tmp_path / "r.csv")
+    assert (tmp_path / "r.csv").read_text(encoding="utf-8").splitlines()[1:] == [
+        ",".join(RATING_COLUMNS),
+        "test,R1,HM1,1,1+,70.5,foreign,3,60.0,81.0,60.0;NA;81.0,3,felt",
+        "test,R1,HM2,1,1+,NA,foreign,NA,NA,NA,NA,NA,NA",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"n_stretches": -1}, "n_stretches: needed a whole number from 0, got -1"),
+        ({"n_stretches": 2, "speeds_deg_s": (1.0,)}, "one for each of 2 stretches"),
+        ({"graded_stretch": 1}, "graded_stretch: needed one of 0 stretches, got 1"),
+        ({"felt": "maybe"}, "felt: needed one of felt, below-threshold, no-catch"),
+        ({"max_speed_deg_s": "fast"}, "max_speed_deg_s: needed a number, got 'fast'"),
+    ],
+)
+def test_what_cannot_be_of_stretches_is_refused(
+    wrong: dict[str, object], message: str
+) -> None:
+    with pytest.raises(RatingsError, match=message):
+        ratings_from_rows([{**ROW, **wrong}], MODIFIED_ASHWORTH)
 
 
 def test_a_file_of_simulated_ratings_says_so_first(tmp_path: Path) -> None:
