@@ -177,9 +177,9 @@ _LATER: dict[str, dict[str, object]] = {
         "weights": "linear",
         "false_pass": 0.05,
         "false_fail": 0.1,
-        "window": 48,
+        "window": 60,
         "order": "blocked",
-        "max_presentations": 96,
+        "max_presentations": 120,
         "seed": 0,
     },
 }

@@ -217,9 +217,9 @@ class Training(_Table, frozen=True, kw_only=True):
     weights: Literal["identity", "linear", "quadratic"] = "linear"
     false_pass: Annotated[float, Meta(ge=0.001, le=0.5)] = 0.05
     false_fail: Annotated[float, Meta(ge=0.001, le=0.5)] = 0.1
-    window: Annotated[int, Meta(ge=2, le=500)] = 48
+    window: Annotated[int, Meta(ge=2, le=500)] = 60
     order: Literal["blocked", "adaptive"] = "blocked"
-    max_presentations: Annotated[int, Meta(ge=2, le=500)] = 96
+    max_presentations: Annotated[int, Meta(ge=2, le=500)] = 120
     seed: Annotated[int, Meta(ge=0, le=2**63 - 1)] = 0
 
 

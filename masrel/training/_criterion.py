@@ -14,6 +14,7 @@ was before the run says nothing about the rater as he or she is now.
    Medicine, 29(18), 1900-1909. https://doi.org/10.1002/sim.3947
 """
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -244,13 +245,14 @@ def calibrate(
     Returns
     -------
     Calibration
-        The smallest boundary that holds `false_pass`, and the errors it makes.
+        The smallest boundary at which fewer than `false_pass` do, by two standard
+        errors of the simulation, and the errors it makes.
 
     Examples
     --------
     >>> criterion = Criterion(
     ...     grades=("0", "1", "2", "3"), weights="linear", intended=(0, 1, 2, 3),
-    ...     insufficient=0.4, sufficient=0.8, window=24, max_presentations=32)
+    ...     insufficient=0.4, sufficient=0.8, window=48, max_presentations=48)
     >>> result = calibrate(criterion, false_pass=0.05, rng=1, n_simulated=500)
     >>> result.false_fail < 0.1
     True
@@ -297,10 +299,11 @@ def _simulated_evidence(
 
 
 def _boundary(largest: _Floats, share: float) -> float:
-    # the smallest that at most this share comes to: (n_simulated,)
-    values = np.sort(largest)[::-1]
-    last = int(share * values.size)  # so many may come to it
-    return float(np.nextafter(values[last], np.inf))
+    # largest evidence of each trainee: (n_simulated,). Two standard errors fewer come
+    # to the boundary than may, so that other trainees seldom pass more often.
+    values, n = np.sort(largest)[::-1], largest.size
+    n_passing = share * n - 2.0 * math.sqrt(share * (1.0 - share) * n)
+    return float(np.nextafter(values[max(0, int(n_passing))], np.inf))
 
 
 def _errors(

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 _Floats = NDArray[np.float64]
 _Integers = NDArray[np.int64]
 
-Skill = Literal["noise", "lapses", "shift", "pair"]
+Skill = Literal["noise", "range", "lapses", "shift", "pair"]
 """How a trainee errs; what varies from trainee to trainee of a kind is one number."""
 
 SKILLS: tuple[Skill, ...] = get_args(Skill)
@@ -36,10 +36,10 @@ def confusion(
 
     Parameters
     ----------
-    skill : {"noise", "lapses", "shift", "pair"}
-        "noise" confuses neighbours, "lapses" does and gives any grade in a tenth of
-        the presentations, "shift" does and grades too high, "pair" confuses the two
-        middle models alone.
+    skill : {"noise", "range", "lapses", "shift", "pair"}
+        "noise" confuses neighbours; "range" does, and gives no grade that no model has;
+        "lapses" does, and gives any grade in a tenth of the presentations; "shift"
+        does, and grades too high; "pair" confuses the two middle models alone.
     amount : float
         Standard deviation of the noise in grades; of "pair" the probability of giving
         the other's grade.
@@ -67,7 +67,11 @@ def confusion(
     else:
         table = _noisy(amount, _SHIFT if skill == "shift" else 0.0, n_grades)
     lapses = _MANY_LAPSES if skill == "lapses" else _LAPSES
-    return (1.0 - lapses) * table + lapses / n_grades
+    table = (1.0 - lapses) * table + lapses / n_grades
+    if skill == "range":
+        table *= np.isin(np.arange(n_grades), intended)
+        table /= table.sum(axis=1, keepdims=True)
+    return table
 
 
 def _middle(intended: Sequence[int]) -> tuple[int, int]:

@@ -169,7 +169,7 @@ NUMBER = "a number above 0 and at most 180"
         (
             ("training",),
             {"max_presentations": 40},
-            "training.window: needed at most training.max_presentations (40), got 48",
+            "training.window: needed at most training.max_presentations (40), got 60",
         ),
         (
             ("training",),

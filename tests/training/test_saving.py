@@ -54,7 +54,7 @@ def test_who_counts_what_came_gains_next_to_nothing() -> None:
     boundary = calibrated(rule).boundary
     shares = []
     for is_even in (None, False, True):
-        drawn, _ = counting(rule, is_even, N, rng)
+        drawn = counting(rule, is_even, N, rng)
         passed, _ = lengths(rule, rule.evidence(*drawn), boundary)
         shares.append(float(passed.mean()))
     plain, counts, in_even_blocks = shares
