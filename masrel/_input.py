@@ -7,6 +7,7 @@ ends in an error of the parser.
 import errno
 import json
 import os
+import re
 import stat
 import tomllib
 from collections.abc import Iterable, Mapping
@@ -26,6 +27,10 @@ _BINARY = getattr(os, "O_BINARY", 0)
 
 # Tables and arrays inside each other; a protocol has four
 _MAX_DEPTH = 32
+_PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""  # of a key
+_LONG_KEY = re.compile(
+    rf"""(?<![\w"'.-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{_MAX_DEPTH}}}"""
+)
 _MAX_LISTED = 40
 _MAX_BITS = 1024  # of a whole number: what is longer cannot always be shown
 
@@ -69,9 +74,12 @@ def parse_json(text: str | bytes) -> Any:
 
 def parse_toml(data: bytes) -> dict[str, Any]:
     """Return what a TOML file holds; ValueError says why it cannot be read."""
+    # utf-8-sig: some editors put a byte order mark first.
+    text = data.decode("utf-8-sig")
+    if _LONG_KEY.search(text):  # tomllib takes the square of its length
+        raise ValueError(f"a key of more than {_MAX_DEPTH} parts, nested too deep")
     try:
-        # utf-8-sig: some editors put a byte order mark first.
-        content = tomllib.loads(data.decode("utf-8-sig"))
+        content = tomllib.loads(text)
     except RecursionError:
         raise ValueError("nested too deep") from None
     level: list[object] = [content]

@@ -1,0 +1,198 @@
+"""Files that would fill the memory, hold a verb up or break a parser: one sentence."""
+
+import gzip
+import io
+import json
+import os
+import re
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from masrel.protocol import copy_template
+from tests.cli.process import Caller, Done
+
+
+@pytest.fixture
+def study(tmp_path: Path) -> Path:
+    """The small study, without schedules."""
+    root = tmp_path / "study"
+    copy_template("small", root)
+    return root
+
+
+def changed(study: Path, pattern: str, new: str) -> None:
+    path = study / "protocol.toml"
+    text, n_changed = re.subn(pattern, lambda _: new, path.read_text(), count=1)
+    assert n_changed == 1
+    path.write_text(text)
+
+
+def refused(done: Done, words: str, most: int = 2) -> None:
+    assert done.code == 2, done
+    assert words in done.err
+    assert len(done.err.splitlines()) <= most  # problems, and how many there are
+
+
+def names_model(study: Path, file: str) -> None:
+    entry = f'[[models]]\nid = "F1"\nrole = "dummy"\nfile = "{file}"\n\n[[raters]]'
+    changed(study, r"(?m)^\[\[raters\]\]$", entry)
+
+
+def test_what_is_no_file_is_not_waited_for(
+    study: Path, tmp_path: Path, masrel: Caller
+) -> None:
+    pipe = tmp_path / "pipe.toml"
+    os.mkfifo(pipe)
+    schedules = study / "schedules"
+    schedules.mkdir(mode=0o700)
+    schedule = schedules / "test_R1.csv"
+    for odd in (pipe, Path("/dev/zero")):
+        schedule.symlink_to(odd)
+        refused(masrel("check", study), "not a regular file")
+        schedule.unlink()
+        refused(masrel("fit", odd), "not a regular file")
+    refused(masrel("agree", "/dev/zero", "--target", "items"), "got a device")
+    refused(masrel("between", "HM1", pipe, "-n", "1"), "not a regular file")
+    log = study / "sessions" / "test_R1.jsonl"
+    log.parent.mkdir()
+    os.mkfifo(log)
+    assert masrel("schedule", study).code == 2  # a session seems to have begun
+    names_model(study, "/dev/zero")
+    refused(masrel("check", study), "not a regular file", 3)
+    (study / "protocol.toml").unlink()
+    (study / "protocol.toml").symlink_to(pipe)
+    refused(masrel("check", study), "not a regular file")
+
+
+def test_a_protocol_is_at_most_a_megabyte(study: Path, masrel: Caller) -> None:
+    with (study / "protocol.toml").open("a") as file:
+        file.write("#" * 1_000_000)
+    refused(masrel("check", study), "larger than 1000000 bytes")
+
+
+def bomb(path: Path, n_samples: int) -> None:
+    # columns of zeros: some 7 kB for each MB
+    header = io.BytesIO()
+    form = {"descr": "<f8", "fortran_order": False, "shape": (n_samples,)}
+    np.lib.format.write_array_header_1_0(header, form)
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name in ("time_s", "angle_deg", "command_torque_nm"):
+            with archive.open(f"{name}.npy", "w") as file:
+                file.write(header.getvalue())
+                for _ in range(n_samples // 1_000_000):
+                    file.write(bytes(8_000_000))
+
+
+@pytest.mark.slow
+def test_a_small_archive_of_large_columns(tmp_path: Path, masrel: Caller) -> None:
+    bomb(tmp_path / "bomb.npz", 6_000_000)
+    refused(masrel("fit", tmp_path / "bomb.npz"), "larger than 128000000 bytes")
+    bomb(tmp_path / "short.npz", 999_999)  # the header promises what is not there
+    refused(masrel("fit", tmp_path / "short.npz"), "not an archive of columns")
+
+
+def test_a_small_packed_table_that_is_large(
+    tmp_path: Path, masrel: Caller, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("masrel.ratings._file_bytes._MAX_UNPACKED", 1000)
+    packed = tmp_path / "table.csv.gz"
+    packed.write_bytes(gzip.compress(b"item,A,B\n" + b"1,1,1\n" * 1000))
+    done = masrel("agree", packed, "--target", "items")
+    refused(done, "more than 1000 bytes when it is unpacked")
+
+
+def test_a_simulated_hand_does_not_take_an_hour(study: Path, masrel: Caller) -> None:
+    slow = "[simulated_raters]\nmean_speed_deg_s = 0.1"
+    changed(study, r"(?m)^\[simulated_raters\]$", slow)
+    text = (study / "protocol.toml").read_text()
+    (study / "protocol.toml").write_text(text.replace("mean_speed_deg_s = 85.0", ""))
+    refused(masrel("check", study), "needed a number at least 1, got 0.1")
+
+
+DEEP = {
+    "arrays": "x = " + "[" * 100_000,
+    "tables": "x = " + "{a=" * 50_000,
+    "dotted": ".".join(["a"] * 100_000) + " = 1",
+    "closed": "x = " + "[" * 100 + "]" * 100,
+}
+
+
+@pytest.mark.parametrize("text", DEEP.values(), ids=DEEP.keys())
+def test_deep_toml(text: str, study: Path, masrel: Caller) -> None:
+    protocol = study / "protocol.toml"
+    before = protocol.read_text()
+    protocol.write_text(f"{text}\n{before}")
+    refused(masrel("check", study), "nested")
+    protocol.write_text(before)
+    (study / "deep.toml").write_text(text)
+    refused(masrel("between", "HM1", study / "deep.toml", "-n", "1"), "nested")
+
+
+@pytest.mark.parametrize("number", ["9" * 5000, "0x" + "f" * 5000])
+def test_long_numbers_of_a_protocol(number: str, study: Path, masrel: Caller) -> None:
+    changed(study, r"(?m)^seed = .*$", f"seed = {number}")
+    refused(masrel("check", study), "needed valid TOML")
+
+
+def test_long_numbers_and_cells_of_other_files(study: Path, masrel: Caller) -> None:
+    assert masrel("schedule", study).code == 0
+    schedule = study / "schedules" / "test_R1.csv"
+    whole = schedule.read_text()
+    edits: list[Callable[[str], str]] = [
+        lambda text: re.sub(r"# seed: .*", f"# seed: {'9' * 5000}", text),
+        lambda text: f"{text}5,{'A' * 200_000},HM1,1\n",
+        lambda text: f"{text}{'9' * 5000},ABC,HM1,1\n",
+    ]
+    for edit in edits:
+        schedule.write_text(edit(whole))
+        refused(masrel("check", study), str(schedule))
+    schedule.write_text(whole)
+    ratings = study / "ratings" / "ratings.csv"
+    ratings.parent.mkdir()
+    for row in (f"R1,HM1,1,{'9' * 5000}", f"R1,HM1,{'1' * 200_000},1"):
+        ratings.write_text(f"rater,model,grade,repeat\n{row}\n")
+        refused(masrel("check", study), str(ratings))
+
+
+@pytest.mark.slow
+def test_wide_headers_take_linear_time(study: Path, masrel: Caller) -> None:
+    ratings = study / "ratings" / "ratings.csv"
+    ratings.parent.mkdir()
+    ratings.write_text(",".join(f"c{i}" for i in range(200_000)) + "\n")
+    done = masrel("check", study)
+    refused(done, "and 199960 more")
+    ratings.write_text(",".join(["c"] * 200_000) + "\n")
+    refused(masrel("check", study), "and 199979 more", 22)
+
+
+def test_long_lists_of_a_protocol_take_linear_time(study: Path, masrel: Caller) -> None:
+    names = ", ".join('"R1"' for _ in range(100_000))
+    changed(study, r"(?m)^raters = \[.*\]$", f"raters = [{names}]")
+    refused(masrel("check", study), "there are more problems", 202)
+
+
+def test_deep_and_long_values_of_a_log(study: Path, masrel: Caller) -> None:
+    assert masrel("schedule", study).code == 0
+    log = study / "sessions" / "test_R1.jsonl"
+    log.parent.mkdir(exist_ok=True)
+    for value in ("[" * 100_000, "9" * 5000):
+        log.write_text(f'{{"event": {value}\n')
+        refused(masrel("ratings", study), "line 1: needed one JSON object")
+
+
+def test_deep_facts_of_a_recording(tmp_path: Path, masrel: Caller) -> None:
+    (tmp_path / "a.npz").write_bytes(b"")
+    (tmp_path / "a.json").write_text("[" * 100_000)
+    motion = ("--motion", "recording", "--recording", tmp_path / "a.npz")
+    refused(masrel("trace", "--model", "HM1", *motion), "nested too deep")
+
+
+@pytest.mark.parametrize("name", ["CON", "nul", "Com1", "LPT9.x"])
+def test_names_of_devices_are_no_ids(name: str, study: Path, masrel: Caller) -> None:
+    with (study / "protocol.toml").open("a") as file:
+        file.write(f'\n[[raters]]\nid = "{name}"\n')
+    refused(masrel("check", study), f"got {json.dumps(name)}")
