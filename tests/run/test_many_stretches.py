@@ -231,6 +231,26 @@ def test_a_session_of_format_1_is_read_and_finished(tmp_path: Path) -> None:
     assert after["mean_speed_deg_s"][0] == before["mean_speed_deg_s"][0]
 
 
+def test_a_table_from_before_stretches_were_counted_is_what_its_logs_say(
+    tmp_path: Path,
+) -> None:
+    shutil.copytree(OLD, tmp_path / "study")
+    study = StudyPaths(tmp_path / "study")
+    write_ratings(
+        ratings_from_logs(study, read_protocol(study.protocol)), study.ratings_file
+    )
+    lines = study.ratings_file.read_text(encoding="utf-8").splitlines()
+    cut = [",".join(line.split(",")[:7]) for line in lines]
+    study.ratings_file.write_text("\n".join(cut) + "\n", encoding="utf-8")
+    for verb in ("analyze", "verify", "check"):
+        done = CliRunner().invoke(cli, [verb, str(study.root)])
+        assert "is not what the session logs say" not in done.output
+        assert done.exit_code == 0, done.output
+    study.ratings_file.write_text("\n".join(cut[:-1]) + "\n", encoding="utf-8")
+    done = CliRunner().invoke(cli, ["analyze", str(study.root)])
+    assert "is not what the session logs say" in done.output
+
+
 def test_nothing_of_a_rehearsal_is_a_rating(new_study: New) -> None:
     small = with_rules(new_study, 'stretches = "free"')
     study, protocol = small
