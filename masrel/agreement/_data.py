@@ -433,6 +433,14 @@ def complete_values(
     return values[~np.isnan(values).any(axis=1)]
 
 
+def rated_part(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the table without items and raters that have no rating."""
+    rated = ~np.isnan(values)
+    if rated.all():
+        return values
+    return np.asarray(values[np.ix_(rated.any(axis=1), rated.any(axis=0))])
+
+
 def rating_values(
     ratings: Any, categories: Sequence[Label] | None
 ) -> NDArray[np.float64]:

@@ -14,6 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from masrel.agreement._data import rated_part
+
 _Floats = NDArray[np.float64]
 
 _EXACT = 1e-24
@@ -141,14 +143,6 @@ def _components(values: _Floats, *, has_raters: bool) -> Components:
     sums = _sums(centred, rated, fixed)
     ratios = _maximum(sums, fixed.df / fixed.squares, has_raters)
     return _estimated(blank, sums, ratios, has_raters)
-
-
-def rated_part(values: _Floats) -> _Floats:
-    """Return the table without items and raters that have no rating."""
-    rated = ~np.isnan(values)
-    if rated.all():
-        return values
-    return np.asarray(values[np.ix_(rated.any(axis=1), rated.any(axis=0))])
 
 
 def _in_order(values: _Floats) -> _Floats:

@@ -7,24 +7,20 @@ maximum likelihood, and the interval is read from its profile.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement._data import complete_values, rating_values
+from masrel.agreement._data import complete_values, rated_part, rating_values
 from masrel.agreement._kernel import check_level, undefined
 from masrel.agreement._labels import Label
-from masrel.agreement._reml import (
-    Components,
-    crossed_components,
-    icc_ends,
-    nested_components,
-    rated_part,
-)
 from masrel.agreement.significance import Significance
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Interval, Target
+
+if TYPE_CHECKING:
+    from masrel.agreement._reml import Components
 
 IccForm = Literal["ICC(1)", "ICC(1,k)", "ICC(C,1)", "ICC(C,k)", "ICC(A,1)", "ICC(A,k)"]
 """One-way; consistency and absolute agreement; of one rating and of the mean of k."""
@@ -400,6 +396,12 @@ def _with_gaps(
     values: NDArray[np.float64], form: IccForm, level: float
 ) -> tuple[float, Interval | None, str | None]:
     """Return value, interval and reason of a table with missing ratings."""
+    from masrel.agreement._reml import (
+        crossed_components,
+        icc_ends,
+        nested_components,
+    )
+
     one_way = form.startswith("ICC(1")
     components = (nested_components if one_way else crossed_components)(values)
     if components.reason is not None:
@@ -423,7 +425,7 @@ def _with_gaps(
     return components.items / (components.items + error / k), interval, None
 
 
-def _gap_notes(components: Components, form: str) -> tuple[str, ...]:
+def _gap_notes(components: "Components", form: str) -> tuple[str, ...]:
     """Return what to know of an estimate from a table with gaps."""
     notes = [components.words]
     if form.endswith("k)"):

@@ -3,18 +3,20 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement._data import rating_values
+from masrel.agreement._data import rated_part, rating_values
 from masrel.agreement._kernel import check_level, undefined
 from masrel.agreement._labels import Label
-from masrel.agreement._reml import Components, crossed_components, rated_part
 from masrel.agreement.icc import _Anova, _n_categories
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Interval
+
+if TYPE_CHECKING:
+    from masrel.agreement._reml import Components
 
 ErrorKind = Literal["agreement", "consistency"]
 """Whether what raters differ by on average is error, or not."""
@@ -197,6 +199,8 @@ def _squares(values: NDArray[np.float64]) -> tuple[_Squares | None, str | None]:
     if n < 2 or k < 2:
         return None, "fewer than two items" if n < 2 else "fewer than two raters"
     if np.isnan(values).any():
+        from masrel.agreement._reml import crossed_components
+
         components = crossed_components(values)
         if components.reason is not None:
             return None, components.reason
@@ -213,7 +217,7 @@ def _squares(values: NDArray[np.float64]) -> tuple[_Squares | None, str | None]:
     ), None
 
 
-def _equivalent(components: Components) -> _Squares:
+def _equivalent(components: "Components") -> _Squares:
     """Return the squares of the complete table that would say as much."""
     # With covariance V of the variances, n = -V_ee / V_re makes σ²_e + n σ²_r and σ²_e
     # uncorrelated; of a complete table it is its number of items.

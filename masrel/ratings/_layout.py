@@ -1,6 +1,5 @@
 """Which column of a sheet is what: named by the caller, else by its usual name."""
 
-import difflib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -123,7 +122,9 @@ def resolve_names(option: str, values: Sequence[str], sheet: Sheet) -> tuple[str
 
 def unknown_column(sheet: Sheet, option: str, name: str) -> RatingsError:
     """Return the error of a column that is not there."""
-    near = difflib.get_close_matches(name, sheet.header, n=1)
+    from difflib import get_close_matches  # loaded only for an error
+
+    near = get_close_matches(name, sheet.header, n=1)
     hint = f"; did you mean {near[0]!r}?" if near else ""
     return sheet.error(f"{option}: there is no column {name!r}, {_listed(sheet)}{hint}")
 

@@ -43,7 +43,6 @@ from masrel.ratings._parts import (
     put_together,
     without_repeats,
 )
-from masrel.ratings._stream_contents import stream_contents
 from masrel.ratings._tables_of_counts import counts_contents
 from masrel.ratings._text_cells import Sheet, SheetOptions, read_sheet
 from masrel.scales import Scale
@@ -241,6 +240,8 @@ def _streamed(
     progress: Callable[[int, int], None] | None,
 ) -> RatingsFile | None:
     # batch by batch; None if the file is to be read as a whole
+    from masrel.ratings._stream_contents import stream_contents
+
     sheet, warnings = without_second_header(large.sheet)
     if warnings or not len(sheet.cells):
         return None
