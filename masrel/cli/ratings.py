@@ -35,6 +35,8 @@ def ratings(study: Path, output: Path | None) -> None:
     n_rows = len(ratings.table)
     n_missing = int(ratings.table["grade"].isna().sum())
     label = " (simulated)" if ratings.simulated else ""
+    if ratings.n_from_persons == n_rows and label:
+        label = " (simulated device)"
     click.echo(
         f"{n_rows - n_missing} ratings{label}, {n_missing} missing: {destination}"
     )

@@ -121,7 +121,8 @@ def _run(
             progress=lambda _: bar.update(),
         )
     if not quiet:
-        label = " (simulated)" if done.simulated else ""
+        what = "simulated" if grades == "simulated" else "simulated device"
+        label = f" ({what})" if done.simulated else ""
         what = "the rehearsal of session" if done.rehearsal else "session"
         click.echo(
             f"{what} {done.session} of {done.rater} is complete: "

@@ -95,6 +95,8 @@ def _rows(
             "repeat": shown.repeat,
             "grade": grade,
             "source": "simulated" if _is_simulated(state) else "recorded",
+            "grades_from": str(state.header["grades"]),
+            "device": _device(state),
             "graded_stretch": state.graded_stretches.get(shown.code),
             **_of_stretches(state.presented.get(shown.code, [])),
         }
@@ -147,6 +149,14 @@ def _of_stretches(presented: list[Event]) -> dict[str, object]:
         "speeds_deg_s": speeds,
         "felt": fields.get("felt"),
     }
+
+
+def _device(state: SessionState) -> str:
+    name = str(state.header["device"])
+    moved = [event for events in state.presented.values() for event in events]
+    if name != "simulated" and any(event.fields["simulated"] for event in moved):
+        return f"simulated {name}"  # such as an amplifier that is emulated
+    return name
 
 
 def _is_simulated(state: SessionState) -> bool:

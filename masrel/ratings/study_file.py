@@ -76,6 +76,8 @@ class _Cell:
     speeds_deg_s: tuple[float | None, ...] | None
     graded_stretch: int | None
     felt: str | None
+    grades_from: str | None
+    device: str | None
 
 
 def read_study_ratings(path: Path | str, scale: Scale) -> Ratings:
@@ -175,12 +177,14 @@ def _extra_values(texts: Mapping[str, str], problems: _Problems) -> dict[str, An
     values: dict[str, Any] = {
         "repeat": _whole({"repeat": "1", **texts}, "repeat", 1, problems),
         "source": texts.get("source", "foreign"),
-        "felt": texts.get("felt", "NA"),
+        **{
+            name: None if (text := texts.get(name, "NA")) in _MISSING else text
+            for name in ("felt", "grades_from", "device")
+        },
         "n_stretches": n_stretches,
         "speeds_deg_s": speeds,
         "graded_stretch": graded,
     }
-    values["felt"] = None if values["felt"] in _MISSING else values["felt"]
     for name in ("mean_speed_deg_s", "min_speed_deg_s", "max_speed_deg_s"):
         values[name] = _speed(name, texts.get(name, ""), problems)
     for name, known in (("source", SOURCES), ("felt", (*FELT, None))):

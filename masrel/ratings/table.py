@@ -12,7 +12,7 @@ import pandas as pd
 
 from masrel._files import write_file
 from masrel.errors import RatingsError
-from masrel.run._state import FELT
+from masrel.run._state import FELT, FROM_PERSONS
 from masrel.scales import Scale
 
 RATING_COLUMNS = (
@@ -23,13 +23,17 @@ RATING_COLUMNS = (
     "grade",  # text, a grade of the scale; None when missing
     "mean_speed_deg_s",  # mean speed before the catch, deg/s; nan when unknown
     "source",  # one of SOURCES
-    # of the stretches before the grade; a table without them has no such columns
+    # what a table that is not of session logs may lack; of the stretches before the
+    # grade:
     "n_stretches",  # whole number; None when unknown
     "min_speed_deg_s",  # slowest and fastest mean speed of a stretch; nan when unknown
     "max_speed_deg_s",
     "speeds_deg_s",  # mean speed of each, in order, None where it has none; or None
     "graded_stretch",  # number of the one that the grade rests on; None when not said
     "felt",  # one of masrel.run's FELT; None when unknown
+    # and of its session:
+    "grades_from",  # name of the source of its grades; None when unknown
+    "device",  # name of the device, "simulated" with others before it; or None
 )
 
 _N_ALWAYS = 7
@@ -50,7 +54,7 @@ class Ratings:
 
     Attributes
     ----------
-    table : DataFrame, shape (n_ratings, 13)
+    table : DataFrame, shape (n_ratings, 15)
         One row a rating, columns `RATING_COLUMNS`; session, rater, model and repeat
         together are unique; a missing grade is None.
     scale : Scale
@@ -58,13 +62,18 @@ class Ratings:
     source_path : Path or None
         The file it was read from.
     simulated : bool
-        Whether any rating is simulated.
+        Whether any rating is simulated: its grade, or the device, or both.
     """
 
     table: pd.DataFrame = field(compare=False, repr=False)
     scale: Scale
     source_path: Path | None = None
     simulated: bool
+
+    @property
+    def n_from_persons(self) -> int:
+        """How many ratings are of sessions in which a person gave the grades."""
+        return int(self.table["grades_from"].isin(FROM_PERSONS).sum())
 
 
 def ratings_from_rows(
@@ -154,6 +163,8 @@ _DEFAULTS: dict[str, object] = {
     "speeds_deg_s": None,
     "graded_stretch": None,
     "felt": None,
+    "grades_from": None,
+    "device": None,
 }
 
 
@@ -176,6 +187,11 @@ def _problems(row: Mapping[str, object], scale: Scale) -> list[str]:
         problems.append(
             f"source: needed one of {', '.join(SOURCES)}, got {row['source']!r}"
         )
+    problems += [
+        f"{name}: needed text or None, got {row[name]!r}"
+        for name in ("grades_from", "device")
+        if row[name] is not None and (not isinstance(row[name], str) or not row[name])
+    ]
     problems += _stretch_problems(row)
     unknown = sorted(set(row) - set(RATING_COLUMNS))
     if unknown:
@@ -436,8 +452,8 @@ def _body(ratings: Ratings) -> str:
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
     table = ratings.table
-    has_stretches = table[list(RATING_COLUMNS[_N_ALWAYS:])].notna().any(axis=None)
-    names = RATING_COLUMNS if has_stretches else RATING_COLUMNS[:_N_ALWAYS]
+    has_more = table[list(RATING_COLUMNS[_N_ALWAYS:])].notna().any(axis=None)
+    names = RATING_COLUMNS if has_more else RATING_COLUMNS[:_N_ALWAYS]
     writer.writerow(names)
     for row in zip(*(table[name].tolist() for name in names), strict=True):
         writer.writerow([_csv_cell(value) for value in row])

@@ -1,6 +1,6 @@
 """Section `design`: what was presented to whom, with the constants of the joints."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
@@ -14,6 +14,9 @@ from masrel.report._tables import (
     as_entered,
     counted,
 )
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _PARAMETERS = (
     ("catch_angle_constant_deg", "L (deg)"),
@@ -84,7 +87,8 @@ def design_section(material: Material) -> Section:
         texts.append(study.notes)
     if study.source and material.data != "published":  # else it is in the head
         texts.append(f"The study follows {study.source}.")
-    if material.ratings.simulated:
+    n_simulated = len(material.ratings.table) - material.ratings.n_from_persons
+    if material.ratings.simulated and n_simulated:
         texts.append(
             "The grades are simulated: every simulated rater gives the intended grade "
             f"with probability {as_entered(settings.accuracy)} and repeats a grade at "
@@ -240,18 +244,38 @@ def _other_kinds(material: Material) -> list[Table]:
     ]
 
 
+def _by_rater(table: "pd.DataFrame", key: str) -> str | None:
+    # the value of a column, with the raters who have it where it is not everybody's
+    raters: dict[str, dict[str, None]] = {}
+    for value, rater in zip(table[key], table["rater"], strict=True):
+        if value is not None:
+            raters.setdefault(value, {})[rater] = None
+    if len(raters) < 2:
+        return next(iter(raters), None)
+    return "; ".join(f"{value}: {', '.join(who)}" for value, who in raters.items())
+
+
 def _sessions(material: Material) -> Table:
     protocol, table = material.protocol, material.ratings.table
     graded = table[table["grade"].notna()]
     rated = set(graded["model"])
+    # known of ratings from session logs
+    origins = {
+        key: heading
+        for key, heading in (("grades_from", "Grades from"), ("device", "Device"))
+        if table[key].notna().any()
+    }
     rows, absent = [], []
     for session in protocol.sessions:
         n_raters = len(session.raters)
         n_planned = n_raters * len(protocol.models) * protocol.schedule.repeats
         n_given = int((graded["session"] == session.id).sum())
         names = ", ".join(session.raters)
+        facts = [
+            _by_rater(table[table["session"] == session.id], key) for key in origins
+        ]
         note = session.note or None
-        rows.append((session.id, n_raters, names, n_planned, n_given, note))
+        rows.append((session.id, n_raters, names, n_planned, n_given, *facts, note))
         if n_given == 0:
             absent.append(session.id)
     notes = []
@@ -269,6 +293,7 @@ def _sessions(material: Material) -> Table:
             Column(key="raters", heading="Who", align="left"),
             Column(key="n_planned", heading="Ratings planned"),
             Column(key="n_given", heading="Ratings given"),
+            *(Column(key=k, heading=text, align="left") for k, text in origins.items()),
             Column(key="note", heading="Note", align="left"),
         ),
         rows=tuple(rows),

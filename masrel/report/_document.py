@@ -24,7 +24,7 @@ from masrel.report._grades import grades_section, in_person_section, intended_se
 from masrel.report._material import Drawing, Material, Paragraph, Section, gather
 from masrel.report._report_folder import MANIFEST, Assets, replace_report
 from masrel.report._stretches import speeds_section, traces_section
-from masrel.report._tables import Table, as_csv, page_cells
+from masrel.report._tables import Table, as_csv, page_cells, tag_of
 from masrel.verification import Anchor
 
 Progress = Callable[[str], object]
@@ -41,8 +41,6 @@ SECTIONS: dict[str, Callable[[Material], Section]] = {
     "traces": traces_section,
 }
 """Name in ``report.sections`` to what makes it: only what a protocol names is made."""
-
-_BANNER = "SIMULATED DATA – no person gave these grades"
 
 _INPUTS = {
     "protocol_sha256": "protocol",
@@ -207,8 +205,8 @@ def _pages(
     style = Path(__file__).with_name("templates") / "report.css"
     context = {
         "title": material.protocol.report.title or study.title,
-        "simulated": material.ratings.simulated,
-        "banner": _BANNER,
+        "tag": tag_of(material.data),
+        "banner": material.banner,
         "provenance": material.provenance,
         "sections": sections,
         "inputs": [

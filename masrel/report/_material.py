@@ -7,7 +7,19 @@ from masrel.analysis import Analysis
 from masrel.protocol import Protocol
 from masrel.ratings import InPerson, Ratings
 from masrel.report._figure_data import Content
-from masrel.report._tables import SIMULATED, Table
+from masrel.report._tables import SIMULATED, SIMULATED_DEVICE, Table
+
+_SIMULATED_GRADES = (
+    "SIMULATED DATA – no person gave these grades",
+    "The grades and speeds in this report are simulated. They show that the study "
+    "runs; they say nothing about people or about the models.",
+)
+_SIMULATED_IN_PART = (
+    "SIMULATED DATA – no person gave some of these grades",
+    "Some of the grades in this report are simulated; the table of sessions says of "
+    "which. Together they say nothing about people or about the models.",
+)
+"""Banner and sentence of a report, by who gave the grades."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,6 +33,7 @@ class Material:
     in_person: InPerson | None
     # where the data come from, in one word; more than one joined by "+"
     data: str
+    banner: str  # what every page says in large letters, if anything
     provenance: str  # the sentence at the head of the pages
     stamp: str  # the line every figure carries
     trace_stamp: str  # the line a figure of reconstructed traces carries
@@ -43,15 +56,19 @@ def gather(
     if ratings.simulated and "simulated" not in sources:
         sources.append("simulated")
     data = "+".join(sources) or "foreign"
-    study, stamp = protocol.study, ""
+    study, stamp, banner = protocol.study, "", ""
     provenance = f"Study {study.id}, {data} ratings."
     trace_stamp = "Model reconstruction at recorded mean speeds, not a measurement"
     if ratings.simulated:
-        provenance = (
-            "The grades and speeds in this report are simulated. They show that the "
-            "study runs; they say nothing about people or about the models."
-        )
+        banner, provenance = _SIMULATED_GRADES
         stamp = trace_stamp = SIMULATED
+        if ratings.n_from_persons == len(table):
+            data = data.replace("simulated", "simulated device")
+            how_many = "none" if sources == ["simulated"] else "not all"
+            banner, provenance = _on_simulated_device(how_many)
+            stamp = trace_stamp = SIMULATED_DEVICE
+        elif ratings.n_from_persons:
+            banner, provenance = _SIMULATED_IN_PART
     elif data == "published":
         provenance = f"Published grades and speeds: {study.source}".rstrip(": ")
         stamp = f"Published data: {study.source}".rstrip(": ")
@@ -64,12 +81,23 @@ def gather(
         analysis=analysis,
         in_person=in_person,
         data=data,
+        banner=banner,
         provenance=provenance,
         stamp=stamp,
         trace_stamp=trace_stamp,
         sessions=tuple(s.id for s in protocol.sessions if s.id in sessions),
         raters=tuple(r.id for r in protocol.raters if r.id in raters),
         recordings=recordings,
+    )
+
+
+def _on_simulated_device(how_many: str) -> tuple[str, str]:
+    # banner and sentence where persons gave all grades; how many of them on hardware
+    return (
+        f"SIMULATED DEVICE – persons gave these grades, {how_many} of them on hardware",
+        f"Persons gave the grades in this report, {how_many} of them on hardware: on "
+        "the simulated device nobody felt a model, and the speeds are those of a "
+        "simulated hand. Such grades say nothing about the models.",
     )
 
 

@@ -175,6 +175,7 @@ def traces_section(material: Material) -> Section:
     kind = {
         "published": "published mean speeds",
         "simulated": "mean speeds of the simulated hands",
+        "simulated device": "mean speeds of the simulated hands",
     }.get(material.data, "recorded mean speeds")
     each = "stretch" if _has_many(values) else "rater"
     text = (

@@ -22,6 +22,17 @@ UNDEFINED = "undefined"
 """What is shown for ``nan``."""
 
 SIMULATED = "SIMULATED DATA"
+SIMULATED_DEVICE = "SIMULATED DEVICE"
+
+
+def tag_of(data: str) -> str:
+    """Return what is said before anything made of simulated data, else nothing."""
+    if "simulated" not in data:
+        return ""
+    label = SIMULATED_DEVICE if "simulated device" in data else SIMULATED
+    return f"{label.capitalize()}."
+
+
 """What tables and figures of simulated data carry."""
 
 Value = str | int | float | None
@@ -58,14 +69,19 @@ class Table:
     in_units: tuple[int, ...] = ()  # rows of numbers that may be of any size
     notes: tuple[str, ...] = ()  # what the reader must know, below the table
     read: tuple[str, ...] = ()  # what was read for it, above the table
-    # where the data come from: "simulated", "published", "recorded" or "foreign"
+    # where the data come from: "simulated", "simulated device" where persons gave the
+    # grades, "published", "recorded" or "foreign"
     data: str
+
+    @property
+    def tag(self) -> str:
+        """What is said before the caption of data that are simulated."""
+        return tag_of(self.data)
 
     @property
     def labelled_caption(self) -> str:
         """The caption, after the label of simulated data where any are."""
-        is_simulated = "simulated" in self.data
-        return f"{SIMULATED}. {self.caption}" if is_simulated else self.caption
+        return f"{self.tag.upper()} {self.caption}".strip()
 
 
 def number(value: Value, digits: int | None, *, in_units: bool = False) -> str:

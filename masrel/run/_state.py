@@ -16,6 +16,9 @@ Felt = Literal["felt", "below-threshold", "no-catch"]
 
 FELT: tuple[Felt, ...] = get_args(Felt)
 
+FROM_PERSONS = ("console",)
+"""Sources of grades, by the names that logs have them by, that are a person's."""
+
 EVENTS: dict[str, tuple[str, ...]] = {
     "session": (
         "format",

@@ -236,9 +236,9 @@ def write_schedules(
     if problems:
         raise ScheduleError("\n".join(problems))
     if to_draw:
-        kept = content_file(study, presented_hash(protocol))
-        if not kept.exists():
-            texts[kept] = presented_content(protocol)
+        drawn_from = content_file(study, presented_hash(protocol))
+        if not drawn_from.exists():
+            texts[drawn_from] = presented_content(protocol)
         secret = find_secret(study) or new_secret(study)
         for files in to_draw:
             drawn = draw_schedule(protocol, files.rater, files.session, secret=secret)
