@@ -97,13 +97,15 @@ def test_what_is_known_of_stretches_is_in_the_file(tmp_path: Path) -> None:
         "speeds_deg_s": (60.0, None, 81.0),
         "graded_stretch": 3,
         "felt": "felt",
+        "grades_from": "console",
+        "device": "puck",
     }
     rows = [{**ROW, **known}, {**ROW, "model": "HM2"}]
     write_ratings(ratings_from_rows(rows, MODIFIED_ASHWORTH), tmp_path / "r.csv")
     assert (tmp_path / "r.csv").read_text(encoding="utf-8").splitlines()[1:] == [
         ",".join(RATING_COLUMNS),
-        "test,R1,HM1,1,1+,70.5,foreign,3,60.0,81.0,60.0;NA;81.0,3,felt",
-        "test,R1,HM2,1,1+,NA,foreign,NA,NA,NA,NA,NA,NA",
+        "test,R1,HM1,1,1+,70.5,foreign,3,60.0,81.0,60.0;NA;81.0,3,felt,console,puck",
+        "test,R1,HM2,1,1+,NA,foreign,NA,NA,NA,NA,NA,NA,NA,NA",
     ]
 
 
@@ -114,6 +116,7 @@ def test_what_is_known_of_stretches_is_in_the_file(tmp_path: Path) -> None:
         ({"n_stretches": 2, "speeds_deg_s": (1.0,)}, "one for each of 2 stretches"),
         ({"graded_stretch": 1}, "graded_stretch: needed one of 0 stretches, got 1"),
         ({"felt": "maybe"}, "felt: needed one of felt, below-threshold, no-catch"),
+        ({"device": ""}, "device: needed text or None, got ''"),
         ({"max_speed_deg_s": "fast"}, "max_speed_deg_s: needed a number, got 'fast'"),
     ],
 )
