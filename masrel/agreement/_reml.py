@@ -258,30 +258,64 @@ def _point(sums: _Sums, ratios: _Floats, ways: _Floats) -> _Point:
     """Return the deviance, its slopes, and how these change in some ways."""
     # the ratios (2,), and m ways from there, (2, m)
     bent = ratios + 1j * _TINY * ways.T if ways.size else ratios[None]
-    deviances, squares, slopes = _with_slopes(sums, bent)
+    solved = _solved(sums, bent)
+    slopes = solved.slopes()
     return _Point(
-        deviance=float(deviances[0]),
-        squares=float(squares[0]),
+        deviance=float(solved.deviances[0]),
+        squares=float(solved.squares[0].real),
         slopes=slopes[0].real,
         curvatures=np.moveaxis(slopes.imag, 0, -1) / _TINY,
     )
 
 
-def _with_slopes(
-    sums: _Sums, ratios: NDArray[Any]
-) -> tuple[_Floats, _Floats, NDArray[Any]]:
-    # ratios (m, 2), real or complex -> deviances (m,), y' P y (m,) and slopes
-    # (m, 2, 2): of the logarithms of determinants and of squares, in both ratios
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Solved:
+    """The deviance at m ratios, real or complex, and what its slopes are made from."""
+
+    sums: _Sums
+    ratios: NDArray[Any]  # (m, 2)
+    deviances: _Floats  # (m,)
+    squares: NDArray[Any]  # (m,): y' P y
+    of_mean: NDArray[Any]  # (m,): μ' V⁻¹ μ
+    mean: NDArray[Any]  # (m,)
+    # (m, k + 1, k + 3): Z' W Z, where W is the inverse variance of items and residual
+    z: NDArray[Any]
+    inverse: NDArray[Any]  # (m, k, k)
+    left: NDArray[Any]  # (m, k + 1, 2): V⁻¹ (μ, y), by raters
+
+    def slopes(self) -> NDArray[Any]:
+        """Return those of the logarithms of determinants and of squares."""
+        # (m, 2, 2): part, ratio
+        sums, k = self.sums, len(self.sums.levels)
+        of_items, of_raters = self.ratios.T[:, :, None]
+        shrink = 1.0 + of_items * sums.sizes
+        # of Z' W Z in the ratio of items
+        z_a = (-(shrink**-2) @ sums.products).reshape(self.z.shape)[..., : k + 1]
+        right = self.inverse @ self.z[:, :k, k + 1 :]
+        # of μ' V⁻¹ μ, and of y' P y, which is that of y less its mean
+        left = self.left.copy()
+        left[..., 1] -= self.mean[:, None] * left[..., 0]
+        right[..., 1] -= self.mean[:, None] * right[..., 0]
+        slopes = np.empty((len(self.ratios), 2, 2), dtype=self.z.dtype)
+        slopes[..., 0] = (z_a @ left * left).sum(axis=1)
+        slopes[..., 1] = -(right**2).sum(axis=1)
+        slopes[:, 0] /= self.of_mean[:, None]
+        slopes[:, 1] *= (sums.n_ratings - 1) / self.squares[:, None]
+        slopes[:, 0, 0] += (sums.freq * sums.sizes / shrink).sum(axis=1)
+        transposed = self.inverse.mT
+        traces = (transposed * z_a[:, :k, :k]).sum(axis=(1, 2))
+        slopes[:, 0, 0] += of_raters[:, 0] * traces
+        slopes[:, 0, 1] += (transposed * self.z[:, :k, :k]).sum(axis=(1, 2))
+        return slopes
+
+
+def _solved(sums: _Sums, ratios: NDArray[Any]) -> _Solved:
     m, k = len(ratios), len(sums.levels)
     of_items, of_raters = ratios.T[:, :, None]  # (m, 1) each
     shrink = 1.0 + of_items * sums.sizes
-    # Z' W Z, where W is the inverse variance of items and residual, and its slope in
-    # the ratio of items
-    shares = np.stack([1.0 / (sums.sizes * shrink), -(shrink**-2)])
-    z, z_a = (shares @ sums.products).reshape(2, m, k + 1, k + 3)
+    z = (1.0 / (sums.sizes * shrink) @ sums.products).reshape(m, k + 1, k + 3)
     z = z + sums.within
-    raters, z_a = z[:, :k, :k], z_a[..., : k + 1]
-    between = np.eye(k) + of_raters[..., None] * raters
+    between = np.eye(k) + of_raters[..., None] * z[:, :k, :k]
     inverse = np.linalg.inv(between)
     # by Woodbury's formula: s = (μ, y)' V⁻¹ (μ, y)
     left = np.empty((m, k + 1, 2), dtype=z.dtype)
@@ -289,22 +323,10 @@ def _with_slopes(
     left[:, :k, 1] -= of_raters * z[:, :k, k]
     left[:, :k] = inverse @ left[:, :k]
     left[:, k] = 0.0, 1.0
-    right = inverse @ z[:, :k, k + 1 :]
     s = left.mT @ z[..., k + 1 :]
     of_mean, mean = s[:, 0, 0], s[:, 0, 1] / s[:, 0, 0]
     squares = s[:, 1, 1] - mean * s[:, 0, 1]
-    # slopes of μ' V⁻¹ μ, and of y' P y, which is that of y less its mean
-    left[..., 1] -= mean[:, None] * left[..., 0]
-    right[..., 1] -= mean[:, None] * right[..., 0]
     df = sums.n_ratings - 1
-    slopes = np.empty((m, 2, 2), dtype=z.dtype)
-    slopes[..., 0] = (z_a @ left * left).sum(axis=1)
-    slopes[..., 1] = -(right**2).sum(axis=1)
-    slopes[:, 0] /= of_mean[:, None]
-    slopes[:, 1] *= df / squares[:, None]
-    slopes[:, 0, 0] += (sums.freq * sums.sizes / shrink).sum(axis=1)
-    slopes[:, 0, 0] += of_raters[:, 0] * (inverse.mT * z_a[:, :k, :k]).sum(axis=(1, 2))
-    slopes[:, 0, 1] += (inverse.mT * raters).sum(axis=(1, 2))
     deviances = (
         np.log(shrink.real) @ sums.freq
         + np.linalg.slogdet(between)[1]
@@ -312,7 +334,17 @@ def _with_slopes(
         # not above 0 where raters are so far from the likeliest that all is rounding
         + df * np.log(np.where(squares.real > 0.0, squares.real, np.inf))
     )
-    return deviances, squares.real, slopes
+    return _Solved(
+        sums=sums,
+        ratios=ratios,
+        deviances=deviances,
+        squares=squares,
+        of_mean=of_mean,
+        mean=mean,
+        z=z,
+        inverse=inverse,
+        left=left,
+    )
 
 
 def _lowest(
@@ -374,7 +406,7 @@ def _maximum(sums: _Sums, precision: float, has_raters: bool) -> _Floats:
     grid = np.concatenate([[0.0], np.geomspace(1e-3, 30.0 * max(1.0, precision), 6)])
     others = grid if has_raters else np.zeros(1)
     starts = np.array([(a, b) for a in grid for b in others])
-    start = starts[np.argmin(_with_slopes(sums, starts)[0])]
+    start = starts[np.argmin(_solved(sums, starts).deviances)]
     way = np.eye(2)[:, : 1 + has_raters]
     x, _ = _lowest(sums, np.zeros(2), way, start @ way)
     return way @ x
@@ -495,5 +527,5 @@ class _Profile:
         if not self.has_raters or len(self.fit.sums.levels) > _MANY:
             return np.full(way.shape[1], self.last)
         starts = np.array([[*_RATIOS, self.last]]).T
-        heights, *_ = _with_slopes(self.fit.sums, base + starts @ way.T)
-        return np.asarray(starts[np.argmin(heights)])
+        solved = _solved(self.fit.sums, base + starts @ way.T)
+        return np.asarray(starts[np.argmin(solved.deviances)])
