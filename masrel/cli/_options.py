@@ -91,6 +91,7 @@ class OutputOptions:
     figure: Path | None = None  # where a figure goes
     # csv, latex: in which form the table is printed; as text when neither
     csv: bool = False
+    raw_csv: bool = False  # whether cells of CSV are as they are
     latex: bool = False
     sentence: bool = False  # whether sentences are printed instead of a table
     quiet: bool = False  # whether there is no progress bar
@@ -122,22 +123,28 @@ class OutputOptions:
         return self.quiet or None
 
 
+_RAW = "With --csv: no apostrophe before a text that a spreadsheet would run."
+
+
 def output_options(
     *,
     json: str | None = None,
     figure: str | None = None,
     csv: str | None = None,
+    raw_csv: str | None = None,
     latex: str | None = None,
     sentence: str | None = None,
     quiet: str | None = None,
 ) -> Decorator:
     """Return the options with these helps, as one argument `output` of a command."""
+    raw_csv = raw_csv or (_RAW if csv is not None else None)
     path = OutputFile(path_type=Path, dir_okay=False)
     json_path = OutputFile(path_type=Path, allow_dash=True)
     options = [
         (json, click.option("--json", "json_file", type=json_path, help=json)),
         (figure, click.option("--figure", type=path, help=figure)),
         (csv, click.option("--csv", is_flag=True, help=csv)),
+        (raw_csv, click.option("--raw-csv", is_flag=True, help=raw_csv)),
         (latex, click.option("--latex", is_flag=True, help=latex)),
         (sentence, click.option("--sentence", is_flag=True, help=sentence)),
         (quiet, click.option("--quiet", is_flag=True, help=quiet)),
@@ -197,7 +204,7 @@ def _print_table(table: "Table", output: OutputOptions, width: int | None) -> No
     from masrel.report._tables import as_csv, as_latex, as_text
 
     if output.csv:
-        shown = as_csv(table)
+        shown = as_csv(table, raw=output.raw_csv)
     elif output.latex:
         shown = as_latex(table)
     else:

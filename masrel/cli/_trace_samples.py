@@ -9,6 +9,7 @@ from typing import Any
 
 from tqdm import tqdm
 
+from masrel._cells import safe_cell
 from masrel._files import new_file
 from masrel.cli._options import check_folder
 from masrel.errors import ParameterError
@@ -51,7 +52,7 @@ def write_samples(
         writer = csv.writer(out, lineterminator="\n")
         writer.writerow((*(("model", "speed_deg_s") if several else ()), *_COLUMNS))
         for scene in scenes:
-            names = (scene.model, scene.speed_deg_s) if several else ()
+            names = (safe_cell(scene.model), scene.speed_deg_s) if several else ()
             _write_rows(writer, names, scene, rate_hz, bar)
 
 

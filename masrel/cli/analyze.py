@@ -47,11 +47,11 @@ def analyze(study: Path, ratings_file: Path | None, output: OutputOptions) -> No
     library.write_analysis(
         analysis, destination, within=None if output.json_file else study
     )
-    _show(data, analysis, csv=output.csv)
+    _show(data, analysis, csv=output.csv, raw=output.raw_csv)
     click.echo(f"read: {data.read}\nanalysis: {destination}", err=True)
 
 
-def _show(data: "StudyData", analysis: "Analysis", *, csv: bool) -> None:
+def _show(data: "StudyData", analysis: "Analysis", *, csv: bool, raw: bool) -> None:
     from masrel.report._document import SECTIONS
     from masrel.report._grades import felt_sentences
     from masrel.report._material import Paragraph, gather
@@ -64,7 +64,7 @@ def _show(data: "StudyData", analysis: "Analysis", *, csv: bool) -> None:
     for name in _computed(analysis):
         for block in SECTIONS[name](material).blocks:
             if isinstance(block, Table):
-                click.echo(as_csv(block) if csv else as_text(block) + "\n")
+                click.echo(as_csv(block, raw=raw) if csv else as_text(block) + "\n")
             elif isinstance(block, Paragraph) and block.absent:
                 click.echo(f"{name}: {block.text}\n", err=csv)
             elif isinstance(block, Paragraph) and not csv:

@@ -25,7 +25,10 @@ from masrel.cli._options import (
     help="Folder to write into; default: STUDY/report.",
 )
 @ratings_option
-@output_options(quiet="No progress bar.")
+@output_options(
+    raw_csv="No apostrophe before a text that a spreadsheet would run.",
+    quiet="No progress bar.",
+)
 def report(
     study: Path,
     destination: Path | None,
@@ -65,6 +68,7 @@ def report(
             anchors=() if data.ratings.simulated else anchors_of(data.paths),
             remarks=study_remarks(data.paths, data.protocol, file=ratings_file),
             progress=progress,
+            raw_csv=output.raw_csv,
         )
     click.echo(f"read: {data.read}", err=True)
     click.echo(files.html)

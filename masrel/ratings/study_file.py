@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from masrel._cells import from_safe_cell
 from masrel._input import MAX_TABLE, listed, read_regular
 from masrel.errors import RatingsError
 from masrel.ratings.table import (
@@ -318,7 +319,7 @@ def _records(path: Path, text: str) -> list[tuple[int, tuple[str, ...]]]:
     begins = n_before + 1
     try:
         for cells in reader:
-            stripped = tuple(cell.strip() for cell in cells)
+            stripped = tuple(from_safe_cell(cell.strip()) for cell in cells)
             if any(stripped):
                 records.append((begins, stripped))
             begins = n_before + reader.line_num + 1

@@ -10,6 +10,7 @@ from typing import Any
 
 import pandas as pd
 
+from masrel._cells import safe_cell
 from masrel._files import write_file
 from masrel.errors import RatingsError
 from masrel.run._state import FELT, FROM_PERSONS
@@ -465,4 +466,4 @@ def _csv_cell(value: object) -> str:
         return "NA"
     if isinstance(value, tuple):
         return ";".join(_csv_cell(part) for part in value)
-    return repr(value) if isinstance(value, float) else str(value)
+    return repr(value) if isinstance(value, float) else safe_cell(str(value))

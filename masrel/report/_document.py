@@ -88,6 +88,7 @@ def write_report(
     remarks: Sequence[str] = (),
     anchors: Sequence[Anchor] = (),
     progress: Progress | None = None,
+    raw_csv: bool = False,
 ) -> ReportFiles:
     """Write the report a protocol asks for.
 
@@ -116,6 +117,9 @@ def write_report(
         end: a report kept elsewhere shows whether the logs were written anew.
     progress : callable, optional
         Called with the name of each figure, and of the pages, once it is made.
+    raw_csv : bool, optional
+        Whether texts of the tables' files are as they are. Else those that a
+        spreadsheet would run as formulas stand after an apostrophe.
 
     Returns
     -------
@@ -136,7 +140,7 @@ def write_report(
         conduct = Section(name="conduct", title="Conduct of the study", blocks=blocks)
         sections.insert(0, conduct)
     assets = Assets()
-    shown = _make_blocks(sections, assets, progress)
+    shown = _make_blocks(sections, assets, progress, raw_csv=raw_csv)
     pages = _pages(material, shown, anchors)
     replace_report(destination, assets, pages, analysis.inputs)
     if progress is not None:
@@ -153,7 +157,11 @@ def write_report(
 
 
 def _make_blocks(
-    sections: Sequence[Section], assets: Assets, progress: Progress | None
+    sections: Sequence[Section],
+    assets: Assets,
+    progress: Progress | None,
+    *,
+    raw_csv: bool,
 ) -> list[dict[str, object]]:
     # what templates show, every block with its number among those of its kind
     shown: list[dict[str, object]] = []
@@ -167,7 +175,8 @@ def _make_blocks(
             blocks.append(entry)
             if isinstance(block, Table):
                 entry["columns"], entry["rows"] = page_cells(block)
-                assets.add("tables", block.name, "csv", as_csv(block).encode())
+                content = as_csv(block, raw=raw_csv).encode()
+                assets.add("tables", block.name, "csv", content)
             elif isinstance(block, Drawing):
                 # Imported here: a report without figures loads nothing that draws.
                 from masrel.report.figures import draw

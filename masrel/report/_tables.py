@@ -15,6 +15,8 @@ from dataclasses import dataclass
 from decimal import Decimal
 from typing import Literal
 
+from masrel._cells import safe_cell
+
 ABSENT = "–"
 """What is shown where there is nothing."""
 
@@ -167,18 +169,21 @@ def page_cells(table: Table) -> tuple[list[Column], list[list[str]]]:
     return [column for _, column in places], rows
 
 
-def as_csv(table: Table) -> str:
+def as_csv(table: Table, *, raw: bool = False) -> str:
     """Return a table as CSV, every digit kept, with its provenance in each row."""
+    # raw: whether texts are as they are, also such as a spreadsheet would run
+    cell = str if raw else safe_cell
     places = [(i, c) for i, c in enumerate(table.columns) if c.where != "page"]
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
-    writer.writerow([*(column.key for _, column in places), "data"])
+    writer.writerow([*(cell(column.key) for _, column in places), "data"])
     for row in table.rows:
         cells = [row[i] for i, _ in places]
         known = [
             None if isinstance(c, float) and not math.isfinite(c) else c for c in cells
         ]
-        writer.writerow([*known, table.data])  # None is written as nothing
+        shown = [cell(c) if isinstance(c, str) else c for c in known]
+        writer.writerow([*shown, table.data])  # None is written as nothing
     return out.getvalue()
 
 
