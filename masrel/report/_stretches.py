@@ -61,7 +61,10 @@ def speeds_section(material: Material) -> Section:
     if speeds.n_missing:
         text += f" Ratings whose speed is not known: {speeds.n_missing}."
     if _has_many(speeds.values):
-        text += " Where a rater stretched the arm more than once, n counts stretches."
+        text += (
+            " Where a rater stretched the arm more than once, n counts stretches that "
+            "reached ν_th."
+        )
     digits = whole_or_tenths([speed.mean_speed_deg_s for speed in speeds.values])
     return Section(
         name="speeds",
