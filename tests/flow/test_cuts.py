@@ -59,11 +59,11 @@ def to_report(root: Path, study: Path) -> None:
     text = protocol.read_text().partition("[report]")[0]
     protocol.write_text(f'{text}[report]\nsections = ["grades", "intended"]\n')
     run("report", str(root), "--quiet")
-    ratings = root / "ratings" / "ratings.csv"
-    lines = ratings.read_text().splitlines()
-    cells = lines[-1].split(",")
-    lines[-1] = ",".join([*cells[:4], "NA", *cells[5:]])
-    ratings.write_text("\n".join(lines) + "\n")
+    sheet = root / "schedules" / "test_R2_sheet.csv"
+    code = sheet.read_text().splitlines()[1].split(",")[1]
+    where = (str(root), "--rater", "R2", "--session", "test")
+    run("run", *where, "--correct", code, "--grade", "4", "--who", "A", "--why", "b")
+    run("ratings", str(root))
 
 
 PREPARE: dict[str, Callable[[Path, Path], None]] = {
