@@ -15,7 +15,7 @@ from docs.make.training import (
 )
 from masrel.agreement import cohen_kappa
 
-N = 1_500
+N = 1_000
 
 
 @pytest.mark.slow
