@@ -8,7 +8,6 @@ after one pass over the ratings a step costs what a few matrices of raters by ra
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from statistics import NormalDist
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,15 +29,6 @@ _LAST = 1e-10
 _TINY = 1e-30
 """Imaginary step of which the square is nothing: slopes then have no rounding."""
 
-_MANY = 100
-"""Raters from which on the profile is taken to have one valley: looking costs much."""
-
-_LOW, _LOWEST = -7.0, -50.0
-"""Logits of a correlation of next to nothing, and of one as good as 0."""
-
-_RATIOS = (0.0, *np.geomspace(1e-3, 1e3, 10))
-"""Ratios of raters to the residual, among which the way down to a valley begins."""
-
 _TO_ZERO = -0.3
 """Step of a logarithm from which on 0 is tried: towards 0 they tend to -1."""
 
@@ -58,7 +48,7 @@ class Components:
     n_ratings: int
     unit: float = 1.0  # in those of the ratings
     has_raters: bool  # whether they are told from the residual
-    fit: "_Fit | None" = None  # None without residual
+    fit: "Fit | None" = None  # None without residual
     reason: str | None = None  # why they are undefined, or None
 
     @property
@@ -91,10 +81,11 @@ class _Sums:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Fit:
-    # where the likelihood is highest: ratios (2,) of items and raters to the residual
+class Fit:
+    """Where the likelihood is highest."""
+
     sums: _Sums
-    ratios: _Floats
+    ratios: _Floats  # (2,): of items and raters to the residual
     deviance: float
 
 
@@ -258,11 +249,11 @@ def _point(sums: _Sums, ratios: _Floats, ways: _Floats) -> _Point:
     """Return the deviance, its slopes, and how these change in some ways."""
     # the ratios (2,), and m ways from there, (2, m)
     bent = ratios + 1j * _TINY * ways.T if ways.size else ratios[None]
-    solved = _solved(sums, bent)
-    slopes = solved.slopes()
+    there = solved(sums, bent)
+    slopes = there.slopes()
     return _Point(
-        deviance=float(solved.deviances[0]),
-        squares=float(solved.squares[0].real),
+        deviance=float(there.deviances[0]),
+        squares=float(there.squares[0].real),
         slopes=slopes[0].real,
         curvatures=np.moveaxis(slopes.imag, 0, -1) / _TINY,
     )
@@ -309,7 +300,8 @@ class _Solved:
         return slopes
 
 
-def _solved(sums: _Sums, ratios: NDArray[Any]) -> _Solved:
+def solved(sums: _Sums, ratios: NDArray[Any]) -> _Solved:
+    """Return the deviance at ratios (m, 2), without its slopes as yet."""
     m, k = len(ratios), len(sums.levels)
     of_items, of_raters = ratios.T[:, :, None]  # (m, 1) each
     shrink = 1.0 + of_items * sums.sizes
@@ -347,7 +339,7 @@ def _solved(sums: _Sums, ratios: NDArray[Any]) -> _Solved:
     )
 
 
-def _lowest(
+def lowest(
     sums: _Sums, base: _Floats, way: _Floats, x: _Floats
 ) -> tuple[_Floats, _Point]:
     """Return x, 0 or more, where the deviance of `base + way @ x` is lowest."""
@@ -406,9 +398,9 @@ def _maximum(sums: _Sums, precision: float, has_raters: bool) -> _Floats:
     grid = np.concatenate([[0.0], np.geomspace(1e-3, 30.0 * max(1.0, precision), 6)])
     others = grid if has_raters else np.zeros(1)
     starts = np.array([(a, b) for a in grid for b in others])
-    start = starts[np.argmin(_solved(sums, starts).deviances)]
+    start = starts[np.argmin(solved(sums, starts).deviances)]
     way = np.eye(2)[:, : 1 + has_raters]
-    x, _ = _lowest(sums, np.zeros(2), way, start @ way)
+    x, _ = lowest(sums, np.zeros(2), way, start @ way)
     return way @ x
 
 
@@ -435,97 +427,5 @@ def _estimated(
         raters=float(ratios[1]) * residual,
         residual=residual,
         covariance=covariance * residual**2,
-        fit=_Fit(sums=sums, ratios=ratios, deviance=point.deviance),
+        fit=Fit(sums=sums, ratios=ratios, deviance=point.deviance),
     )
-
-
-def icc_ends(
-    components: Components, *, absolute: bool, level: float
-) -> tuple[float, float]:
-    """Return the ends of the interval of a single rating's intraclass correlation."""
-    # absolute: whether the variance of raters counts as error
-    fit = components.fit
-    if fit is None:
-        return _ends_without_residual(components, absolute, level)
-    profile = _Profile(
-        fit=fit,
-        absolute=absolute,
-        has_raters=components.has_raters,
-        last=float(fit.ratios[1]),
-    )
-    height = NormalDist().inv_cdf(0.5 + 0.5 * level)
-    return profile.end(height, -1.0), profile.end(height, 1.0)
-
-
-def _ends_without_residual(
-    components: Components, absolute: bool, level: float
-) -> tuple[float, float]:
-    # of two variances that are known but for their degrees of freedom
-    if not absolute or components.raters == 0.0:
-        return 1.0, 1.0
-    from scipy.special import fdtri
-
-    of_items, of_raters = components.n_items - 1, components.n_raters - 1
-    upper = 0.5 + 0.5 * level
-    ratio = components.items / components.raters
-    low = ratio / float(fdtri(of_items, of_raters, upper))
-    high = ratio * float(fdtri(of_raters, of_items, upper))
-    return low / (1.0 + low), high / (1.0 + high)
-
-
-@dataclass(slots=True, kw_only=True)
-class _Profile:
-    # The highest likelihood of each intraclass correlation ρ, by its logit: the log
-    # ratio of items to error.
-    fit: _Fit
-    absolute: bool
-    has_raters: bool
-    last: float  # ratio of raters that was likeliest last
-
-    def end(self, height: float, side: float) -> float:
-        """Return ρ where the root of the deviance above the least is so high."""
-        if side < 0.0 and self._root(-math.inf)[0] <= height:
-            return 0.0
-        # from where the likelihood is highest, outwards until it is low enough
-        of_items, of_raters = self.fit.ratios
-        best = of_items / (1.0 + of_raters * self.absolute)
-        inner = math.log(best) if best > 0.0 else -math.inf
-        outer = max(inner, _LOW) + 1.0 if side > 0.0 else inner - 1.0
-        root, slope = self._root(outer)
-        step = side
-        while root < height:
-            inner, step = outer, 2.0 * step
-            outer += step
-            root, slope = self._root(outer)
-        # Newton's steps, and halves where they leave the bracket
-        at, inner = outer, max(inner, _LOWEST)
-        for _ in range(_STEPS):
-            step = (height - root) / slope if slope else math.nan
-            if abs(step) < 1e-7:  # the next would be some 1e-14
-                at += step
-                break
-            if not min(inner, outer) < at + step < max(inner, outer):
-                step = 0.5 * (inner + outer) - at
-            at += step
-            root, slope = self._root(at)
-            inner, outer = (inner, at) if root >= height else (at, outer)
-        return 1.0 / (1.0 + math.exp(-at))
-
-    def _root(self, logit: float) -> tuple[float, float]:
-        # √(deviance - least), whatever raters are likeliest, and its slope
-        odds = math.exp(logit)
-        base = np.array([odds, 0.0])
-        way = np.array([[odds * self.absolute], [1.0]])[:, : int(self.has_raters)]
-        x, point = _lowest(self.fit.sums, base, way, self._start(base, way))
-        self.last = float((base + way @ x)[1])
-        above = math.sqrt(max(point.deviance - self.fit.deviance, 0.0))
-        slope = point.slopes[:, 0].sum() * (base + way @ x)[0]
-        return above, slope / (2.0 * above) if above else 0.0
-
-    def _start(self, base: _Floats, way: _Floats) -> _Floats:
-        # the best of some ratios of raters: there may be more than one valley
-        if not self.has_raters or len(self.fit.sums.levels) > _MANY:
-            return np.full(way.shape[1], self.last)
-        starts = np.array([[*_RATIOS, self.last]]).T
-        solved = _solved(self.fit.sums, base + starts @ way.T)
-        return np.asarray(starts[np.argmin(solved.deviances)])

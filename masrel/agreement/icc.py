@@ -396,11 +396,8 @@ def _with_gaps(
     values: NDArray[np.float64], form: IccForm, level: float
 ) -> tuple[float, Interval | None, str | None]:
     """Return value, interval and reason of a table with missing ratings."""
-    from masrel.agreement._reml import (
-        crossed_components,
-        icc_ends,
-        nested_components,
-    )
+    from masrel.agreement._icc_profile import icc_ends
+    from masrel.agreement._reml import crossed_components, nested_components
 
     one_way = form.startswith("ICC(1")
     components = (nested_components if one_way else crossed_components)(values)
