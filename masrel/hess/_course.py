@@ -6,7 +6,9 @@ from masrel.errors import LimitExceededError
 from masrel.hess._velocity import speed_noise
 from masrel.hess.limits import DeviceLimits
 from masrel.hess.stretching import PresentationStatus, StretchRules
+from masrel.recording import PHASES
 
+_PRE_CATCH = PHASES.index("pre-catch")
 _NEVER = math.inf
 
 # A hundred ticks at rest all lie within so many standard deviations of the speed.
@@ -23,10 +25,12 @@ class Course:
     __slots__ = (
         "_arrival_speed",
         "_arrival_time",
+        "_back_at",
         "_begins_after",
         "_begun_at",
         "_end_angle",
         "_flexing_speed",
+        "_has_caught",
         "_is_single",
         "_lowest_angle",
         "_n",
@@ -60,12 +64,14 @@ class Course:
         self._flexing_speed = -speed_threshold
         self._begins_after = limits.arrival_angle
         self._begun_at = 0.0  # the stretch, s
+        self._has_caught = False  # in the stretch
+        self._back_at = -math.inf  # where the arm is brought back, rad
         self._lowest_angle = math.inf  # since the next stretch is armed, rad
         self.stretch = 0  # the number of the one that goes on, 0 between
         self.status = status
         status.is_armed, status.n_stretches = True, 0
 
-    def update(self, time_s: float, angle: float, velocity: float) -> str:
+    def update(self, time_s: float, angle: float, velocity: float, phase: int) -> str:
         """Take one sample in -> why the presentation is over, empty while it is not."""
         if self.status.is_done:
             return "done"
@@ -81,13 +87,14 @@ class Course:
                 self._watch_for_onset(time_s, angle)
             return "arrived" if has_arrived else ""
         if self.stretch:
+            self._has_caught = self._has_caught or phase != _PRE_CATCH
             return self._goes_on(time_s, angle, velocity, has_arrived)
         if time_s >= self._over_at:
             return "time-limit"
         if self.status.is_armed:
             self._watch_for_onset(time_s, angle)
-        elif velocity <= self._flexing_speed:
-            self._arm(angle)
+        else:
+            self._watch_for_return(angle, velocity)
         return ""
 
     def end(self) -> None:
@@ -103,7 +110,8 @@ class Course:
         elif angle > self._lowest_angle + self._begins_after:
             self.status.is_armed = False
             self.stretch = self.status.n_stretches + 1
-            self._begun_at = time_s
+            self._begun_at, self._has_caught = time_s, False
+            self._back_at = self._lowest_angle + _BROUGHT_BACK * self._begins_after
             if self._over_at == math.inf:
                 self._over_at = time_s + self._time_limit
 
@@ -111,13 +119,11 @@ class Course:
         self, time_s: float, angle: float, velocity: float, has_arrived: bool
     ) -> str:
         is_flexed = velocity <= self._flexing_speed
-        near = self._lowest_angle + _BROUGHT_BACK * self._begins_after
-        if has_arrived or is_flexed or angle <= near:
+        if has_arrived or is_flexed or angle <= self._back_at:
             self.end()
             if self.status.n_stretches == self._n:
                 return "stretches"
-            if is_flexed:
-                self._arm(angle)
+            self._watch_for_return(angle, velocity)
         elif time_s - self._begun_at > self._stretch_limit:
             raise LimitExceededError(
                 f"stretch limit: needs a stretch that ends within "
@@ -126,6 +132,9 @@ class Course:
             )
         return ""
 
-    def _arm(self, angle: float) -> None:
-        self._lowest_angle = angle
-        self.status.is_armed = True
+    def _watch_for_return(self, angle: float, velocity: float) -> None:
+        # The law catches again when the arm was flexed, or if it has not caught yet
+        is_back = angle <= self._back_at and not self._has_caught
+        if velocity <= self._flexing_speed or is_back:
+            self._lowest_angle = angle
+            self.status.is_armed = True

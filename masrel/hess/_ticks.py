@@ -188,11 +188,10 @@ class Ticks:
             return "" if self._last_torques else "at rest"
         if controller.is_easing:
             self.samples.flag(_POST_CATCH)
-        if self._active_guard is None:
-            return course.update(time_s, angle, velocity)
-        stretch, ended = course.stretch, course.update(time_s, angle, velocity)
-        if course.stretch > stretch:
-            self._active_guard.begin_stretch(angle)
+        stretch, guard_of_model = course.stretch, self._active_guard
+        ended = course.update(time_s, angle, velocity, controller.phase)
+        if guard_of_model is not None and course.stretch > stretch:
+            guard_of_model.begin_stretch(angle)
         return ended
 
     def _decide(self, time_s: float, angle: float, velocity: float) -> float:

@@ -52,7 +52,8 @@ def run_presentation(
     stretches each ends so, or when the arm is brought back: flexed faster than ν_th, or
     near where the stretch began. A stretch begins when the arm was extended by
     `arrival_angle`; the next one only after the arm was flexed faster than ν_th, as the
-    law has it. All the while the controller goes on.
+    law has it, or was brought back without a catch. All the while the controller goes
+    on.
 
     The presentation is over after the last stretch (``"arrived"`` where there is one,
     else ``"stretches"``), after the time limit (``"time-limit"``), when `status` says

@@ -231,6 +231,17 @@ def test_an_arm_that_is_brought_back_slowly_ends_its_stretch_and_arms_none() -> 
     assert np.count_nonzero(catches) == 1
 
 
+def test_a_slow_way_back_without_a_catch_arms_the_next_as_the_law_is() -> None:
+    gently = [(0.0, 30.0), (0.05, 30.1), (0.1, 30.4), (0.2, 31.5)]
+    slow = [*gently, (5.0, 100.0), (10.0, 30.0), (10.2, 30.0), (11.2, 125.0)]
+    presented = scripted([*slow, (12.4, 30.0)], StretchRules(n=2))
+    assert presented.recording.facts["ended"] == "stretches"
+    first, second = stretches(presented.recording)
+    assert (first.phases, first.reached_threshold) == (("pre-catch",), False)
+    assert second.phases[:2] == ("pre-catch", "catch")
+    assert presented.recording.facts["mean_speed_deg_s"] == second.mean_speed_deg_s
+
+
 def test_an_arm_that_trembles_is_not_stretched() -> None:
     to_and_fro = [(0.05 * n, 30.0 + 2.5 * (n % 2)) for n in range(40)]
     rules = StretchRules(n=None, time_limit=0.5, stretch_limit=0.5)
