@@ -284,7 +284,7 @@ def test_a_stale_schedule_is_refused(small: Small) -> None:
     study, protocol = small
     slower = DeviceSettings(speed_limit_deg_s=30.0)
     changed = msgspec.structs.replace(protocol, device=slower)
-    with pytest.raises(ScheduleError, match="presented_sha256"):
+    with pytest.raises(ScheduleError, match="from before a change in what it presents"):
         run((study, changed), ScriptGrades(["1", "1", "1"]))
 
 
