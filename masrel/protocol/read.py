@@ -71,12 +71,12 @@ def read_protocol(path: Path) -> Protocol:
     decoded = decode_table(raw, Protocol)
     # A model whose file could not be used lacks its keys for that reason alone.
     unread = tuple(f"models[{index}]." for index in resolved.unread)
-    found = (
+    of_content = (
         problem
         for problem in chain(decoded.problems, broken_rules(decoded.values))
         if not (problem.startswith(unread) and ", got none" in problem)
     )
-    problems = list(islice(chain(resolved.problems, found), _MAX_PROBLEMS + 1))
+    problems = list(islice(chain(resolved.problems, of_content), _MAX_PROBLEMS + 1))
     if problems:
         if len(problems) > _MAX_PROBLEMS:
             problems[-1] = "there are more problems"
