@@ -138,7 +138,8 @@ def _of_stretches(presented: list[Event]) -> dict[str, object]:
         return {}
     fields = presented[-1].fields
     one = [{"mean_speed_deg_s": fields["mean_speed_deg_s"]}]
-    made: Any = fields.get("stretches", one)  # there once was one, and no list
+    listed = fields.get("stretches")
+    made: Any = one if listed is None else listed  # there once was one, and no list
     speeds = tuple(stretch["mean_speed_deg_s"] for stretch in made)
     moved = [speed for speed in speeds if speed is not None]
     return {

@@ -126,6 +126,9 @@ def _contradiction(state: SessionState, event: Event) -> str | None:
             f"needed the fields {', '.join(EVENTS[event.kind])}, "
             f"got {', '.join(event.fields)}"
         )
+    wrong = _of_another_type(event)
+    if wrong is not None:
+        return f"needed another value of {wrong}, got {event.fields[wrong]!r}"
     if event.kind == "recovered":
         return None
     if (event.kind == "session") == bool(state.header):
@@ -133,6 +136,25 @@ def _contradiction(state: SessionState, event: Event) -> str | None:
     if state.is_complete and event.kind != "correction":
         return "needed no event but a correction after complete"
     return _contradiction_of_code(state, event)
+
+
+def _of_another_type(event: Event) -> str | None:
+    # the field that has no value of its type, or None
+    if not isinstance(event.fields.get("code"), str | None):
+        return "code"
+    speed = event.fields.get("mean_speed_deg_s")
+    if not isinstance(speed, float | int | None):
+        return "mean_speed_deg_s"
+    stretches = event.fields.get("stretches")
+    are_stretches = stretches is None or (
+        isinstance(stretches, list)
+        and all(
+            isinstance(stretch, Mapping)
+            and isinstance(stretch.get("mean_speed_deg_s", ""), float | int | None)
+            for stretch in stretches
+        )
+    )
+    return None if are_stretches else "stretches"
 
 
 def _contradiction_of_code(state: SessionState, event: Event) -> str | None:

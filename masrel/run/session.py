@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from datetime import datetime
 from pathlib import Path
 
+from masrel._files import check_inside
 from masrel.errors import (
     ParameterError,
     ProtocolError,
@@ -110,6 +111,7 @@ def run_session(
     else:
         schedule, checksum = _drawn_schedule(study, protocol, rater, session)
     log_file = study.log_file(rater, session)
+    check_inside(log_file.parent, study.root)
     if not log_file.exists():
         _check_recordings(schedule, log_file, ())  # before an empty log is made
     with SessionLog.open(log_file, now=now) as log:

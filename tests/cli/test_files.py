@@ -108,3 +108,18 @@ def test_an_output_that_is_a_link_is_replaced_and_not_followed(
     assert masrel("analyze", study).code == 0
     assert profile.read_text() == "umask 077\n"
     assert not (study / "analysis.json").is_symlink()
+
+
+def test_a_session_does_not_leave_the_study(
+    study: Path, tmp_path: Path, masrel: Caller
+) -> None:
+    shutil.rmtree(study / "sessions")
+    assert masrel("schedule", study).code == 0
+    home = tmp_path / "home"
+    home.mkdir()
+    (study / "sessions").symlink_to(home)
+    names = ("--rater", "R1", "--session", "test", "--grades", "simulated")
+    done = masrel("run", study, *names, "--clock", "simulated")
+    assert done.code == 2
+    assert f"got a link to {home}" in done.err
+    assert not list(home.iterdir())

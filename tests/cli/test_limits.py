@@ -1,6 +1,7 @@
 """Files that would fill the memory, hold a verb up or break a parser: one sentence."""
 
 import gzip
+import hashlib
 import io
 import json
 import os
@@ -196,3 +197,25 @@ def test_names_of_devices_are_no_ids(name: str, study: Path, masrel: Caller) -> 
     with (study / "protocol.toml").open("a") as file:
         file.write(f'\n[[raters]]\nid = "{name}"\n')
     refused(masrel("check", study), f"got {json.dumps(name)}")
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [("mean_speed_deg_s", "fast"), ("stretches", 7), ("code", [{"a": 1}])],
+)
+def test_a_value_of_another_type_in_a_log(
+    field: str, value: object, study: Path, masrel: Caller
+) -> None:
+    assert masrel("schedule", study).code == 0
+    names = ("--rater", "R1", "--session", "test", "--grades", "simulated")
+    assert masrel("run", study, *names, "--clock", "simulated", "--quiet").code == 0
+    log = study / "sessions" / "test_R1.jsonl"
+    previous, lines = "0" * 64, []
+    for line in log.read_text().splitlines():
+        event = {**json.loads(line), "previous": previous}
+        if event["event"] == "presented":
+            event["fields"][field] = value
+        lines.append(json.dumps(event, ensure_ascii=False))
+        previous = hashlib.sha256(lines[-1].encode()).hexdigest()
+    log.write_text("\n".join(lines) + "\n")
+    refused(masrel("ratings", study), f"needed another value of {field}")
