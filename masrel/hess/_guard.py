@@ -29,9 +29,17 @@ _REST_S = 0.05  # without a change of angle: the arm has come to rest
 _CREEP_SPEED = math.radians(4.5)
 _CREEP_DRIFTS = 5.0  # in drift angles
 
+# An arm that stands still after it was no faster than a creep was brought to rest, by
+# friction and a hand that holds it: so long, in standing times, may that last.
+_HELD_TIMES = 20.0
+
 # Of so many ticks `DeviceLimits.missed_replies_per_100` may be without a reading.
 _WINDOW_TICKS = 100
 
+
+# What a hand may be asked to take up from one stretch to the next, W: clonus that does
+# not fade gives a third of that.
+_FORGIVEN_W = 0.2
 
 # As near to where the first stretch began an arm is back there.
 _BACK = math.radians(3.0)
@@ -51,6 +59,7 @@ class Guard:
         "_sent",
         "_sent_at",
         "_slow_from",
+        "_speed",
         "_stopped_dead",
         "_time",
         "dropouts",
@@ -63,6 +72,7 @@ class Guard:
         self._angle = 0.0
         self._raw_speed = 0.0  # between the last two readings, rad/s
         self._moved_at = 0.0  # when the angle changed last, s
+        self._speed = 0.0  # estimated when the angle changed last, rad/s
         self._slow_from: float | None = None  # where it was faster than a creep, rad
         self._creep_angle = _CREEP_DRIFTS * limits.drift_angle
         self._stopped_dead = False  # whether it moved fast one tick before that
@@ -141,9 +151,16 @@ class Guard:
         if duration_s > limits.standing_time and not (
             -limits.standing_torque <= self._sent <= limits.standing_torque
         ):
+            self._not_held_for(duration_s)
+
+    def _not_held_for(self, duration_s: float) -> None:
+        limits = self._limits
+        was_held = -_CREEP_SPEED < self._speed < _CREEP_SPEED
+        longest = limits.standing_time * (_HELD_TIMES if was_held else 1.0)
+        if duration_s > longest:
             raise LimitExceededError(
                 f"standing torque: needs at most {limits.standing_torque:g} N·m on an "
-                f"arm that has not moved for {limits.standing_time * 1e3:g} ms, "
+                f"arm that has not moved for {longest * 1e3:g} ms, "
                 f"got {self._sent:.3f} N·m",
                 "standing-torque",
             )
@@ -151,6 +168,8 @@ class Guard:
     def speed(self, velocity: float) -> None:
         """Check the estimated speed."""
         limit = self._limits.speed
+        if self._raw_speed != 0.0:
+            self._speed = velocity
         if not -limit <= velocity <= limit:
             raise LimitExceededError(
                 f"speed: needs at most {math.degrees(limit):.0f} deg/s, the arm "
@@ -296,6 +315,7 @@ class ActiveGuard:
     __slots__ = (
         "_angle",
         "_first_angle",
+        "_forgiven_at",
         "_held",
         "_max_energy",
         "_max_speed",
@@ -308,16 +328,19 @@ class ActiveGuard:
         self._max_energy = limits.active_energy
         self._max_speed = limits.active_speed
         self._first_angle = math.nan  # where the first stretch began, rad
+        self._forgiven_at = 0.0  # when the last stretch from there began, s
         self._angle = self._held = 0.0  # of the last tick: rad, N·m
         self.energy_given = 0.0  # to the arm, less what was taken from it, J
 
-    def begin_stretch(self, angle: float) -> None:
+    def begin_stretch(self, time_s: float, angle: float) -> None:
         """Let the model give back no more what it took in earlier stretches."""
         # Only where the first stretch began holds no spring what it took.
-        if angle <= self._first_angle + _BACK:
-            self.energy_given = max(self.energy_given, 0.0)
         if math.isnan(self._first_angle):
             self._first_angle = angle
+        if angle <= self._first_angle + _BACK:
+            forgiven = _FORGIVEN_W * (time_s - self._forgiven_at)
+            self.energy_given = max(self.energy_given - forgiven, 0.0)
+            self._forgiven_at = time_s
 
     def check(self, angle: float, velocity: float, torque: float) -> None:
         """Check what a model asks for before it is sent."""

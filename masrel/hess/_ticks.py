@@ -191,7 +191,7 @@ class Ticks:
         stretch, guard_of_model = course.stretch, self._active_guard
         ended = course.update(time_s, angle, velocity, controller.phase)
         if guard_of_model is not None and course.stretch > stretch:
-            guard_of_model.begin_stretch(angle)
+            guard_of_model.begin_stretch(time_s, angle)
         return ended
 
     def _decide(self, time_s: float, angle: float, velocity: float) -> float:

@@ -7,6 +7,7 @@ https://doi.org/10.1109/TNSRE.2012.2195330, section III.B and Fig. 7.
 import math
 from collections import deque
 from collections.abc import Iterator
+from typing import NoReturn
 
 from masrel.elbow.joint_model import JointModel
 from masrel.elbow.parameters import ElbowParameters
@@ -23,6 +24,11 @@ _LOOSE_WINDOW_S = 0.005  # under 3 N·m a loose arm loses 18 times the speed's n
 # Share of the speed a loose arm would lose: an arm in people's hands loses at most two
 # fifths, a loose one all but what the low-pass holds back.
 _LOOSE_SHARE = 0.6
+# Behind the guard a beat of clonus throws light hands back as well, and a hand may turn
+# the arm by itself, at up to 30 rad/s²: more counts, of what 2.4 N·m take in 6 ms.
+_GUARDED_SHARE = 0.75
+_GUARDED_WINDOW_S = 0.006
+_LEAST_LOSS = math.radians(14.0)
 _RANGE_END_MARGIN = math.radians(3.0)  # what the loop takes for arrived, too
 
 
@@ -39,10 +45,11 @@ class Controller:
     that of the law within `post_catch_ramp`, along a raised cosine. A grip that is lost
     meanwhile ends this at once.
 
-    A model that is not passive is guarded: a fall of speed by more than
-    `slip_speed_drop` within 10 ms is a fault in every phase, while the model resists
-    extension. The paper's own law has a trigger too, and is released as the paper has
-    it instead.
+    A model that is not passive is guarded: in every phase it is a fault when the arm
+    gets within 6 ms more than 0.75 of the speed that the torque would give it if nobody
+    held it, from 2.4 N·m on, or when its speed falls by more than `slip_speed_drop`
+    within 10 ms while the model resists extension. The paper's own law has a trigger
+    too, and is released as the paper has it instead.
 
     Parameters
     ----------
@@ -119,7 +126,8 @@ class Controller:
         "_gain",
         "_joint",
         "_late_torque",
-        "_loose_share",
+        "_loose_inertia",
+        "_loose_past",
         "_past",
         "_post_catch_ramp",
         "_slip_speed_drop",
@@ -170,11 +178,11 @@ class Controller:
             full_speed=full_speed,
         )
         self._slip_speed_drop = slip_speed_drop
-        self._loose_share = _LOOSE_SHARE / loose_inertia
+        self._loose_inertia = loose_inertia
         self._gain = -math.expm1(-CUTOFF_RAD_S / rate_hz)
         self._late_torque = 0.0  # that was sent, as late as the speed is, N·m
-        self._taken = 0.0  # speed that share of it has taken since the catch, rad/s
-        self._time = 0.0  # of the last sample in catch or post-catch, s
+        self._taken = 0.0  # speed that it takes off a loose arm since the catch, rad/s
+        self._time = 0.0  # up to when that has been counted, s
         self._post_catch_ramp = raised_cosine(post_catch_ramp, rate_hz)
         self._easing: Iterator[float] = iter(())
         self._command = self._stood = 0.0  # the torque now, at the last such end, N·m
@@ -184,6 +192,9 @@ class Controller:
         window_s = _SLIP_WINDOW_S if self.is_guarded else _LOOSE_WINDOW_S
         n_past = max(1, round(window_s * rate_hz))
         self._past = deque([0.0] * n_past, maxlen=n_past)  # speeds, rad/s
+        n_past = max(1, round(_GUARDED_WINDOW_S * rate_hz))
+        # Speeds, and what has been taken, behind the guard
+        self._loose_past = deque([(0.0, 0.0)] * n_past, maxlen=n_past)
         self.speed_threshold = model.speed_threshold
         self.grip_lost = False
         self.model_torque = 0.0
@@ -218,13 +229,9 @@ class Controller:
         self.is_new = False
         joint = self._joint
         if self.is_guarded:
-            self._check_slip(angle, velocity)
+            self._check_slip(time_s, angle, velocity)
         elif self.phase != _PRE_CATCH or self.is_easing:
-            late = self._late_torque
-            self._late_torque = late = late + self._gain * (self._command - late)
-            taken = self._taken + self._loose_share * late * (time_s - self._time)
-            self._taken, self._time = taken, time_s
-            restored = velocity + taken
+            restored = velocity + _LOOSE_SHARE * self._take(time_s)
             past = self._past
             if restored < past[0] and angle < self._free_end:
                 joint.release()
@@ -279,18 +286,44 @@ class Controller:
         self.is_easing = share > 0.0 or eased != command
         return eased
 
-    def _check_slip(self, angle: float, velocity: float) -> None:
-        past = self._past
+    def _take(self, time_s: float) -> float:
+        # Counts what the torque takes off a loose arm -> all of it so far, rad/s
+        late = self._late_torque
+        self._late_torque = late = late + self._gain * (self._command - late)
+        self._taken += late * (time_s - self._time) / self._loose_inertia
+        self._time = time_s
+        return self._taken
+
+    def _check_slip(self, time_s: float, angle: float, velocity: float) -> None:
+        past, loose_past = self._past, self._loose_past
         drop = past[0] - velocity
+        before, taken_before = loose_past[0]
+        taken = self._take(time_s)
         past.append(velocity)
-        limit = self._slip_speed_drop
-        if drop <= limit or angle >= self._free_end or self.model_torque <= 0.0:
+        loose_past.append((velocity, taken))
+        if angle >= self._free_end:
             return
+        of_loose = taken - taken_before
+        lost = before - velocity if of_loose > 0.0 else velocity - before
+        if abs(of_loose) > _LEAST_LOSS and lost > _GUARDED_SHARE * abs(of_loose):
+            self._release_at_once(
+                f"speed changes by at most {_GUARDED_SHARE:g} of a loose arm's "
+                f"{math.degrees(abs(of_loose)):.0f}",
+                _GUARDED_WINDOW_S,
+                lost,
+            )
+        if drop > self._slip_speed_drop and self.model_torque > 0.0:
+            self._release_at_once(
+                f"speed falls by at most {math.degrees(self._slip_speed_drop):g}",
+                _SLIP_WINDOW_S,
+                drop,
+            )
+
+    def _release_at_once(self, needs: str, window_s: float, lost: float) -> NoReturn:
         self._joint.release()
         self.grip_lost = True
         raise LimitExceededError(
-            f"slip: needs an arm whose speed falls by at most "
-            f"{math.degrees(limit):g} deg/s in {_SLIP_WINDOW_S * 1e3:g} ms, "
-            f"got {math.degrees(drop):.0f} deg/s",
+            f"slip: needs an arm whose {needs} deg/s in {window_s * 1e3:g} ms, "
+            f"got {math.degrees(lost):.0f} deg/s",
             "slip",
         )

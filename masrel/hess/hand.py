@@ -127,11 +127,11 @@ class SimulatedHand:
 
     The intention is a trapezoid: rest for `delay`, a short ramp up, constant speed, a
     ramp down. For every speed in `again` it then rests, brings the arm back, rests and
-    stretches once more; at last it holds. So the mean speed before the catch, which the
-    catch angle depends on, falls at most 2 % short of the intended one. It is a clamp
-    rather than a hand: the damper keeps the speed within 12 deg/s of the intention when
-    the catch adds 7 N·m at once, and the spring lags by about 1 deg. It has no mass,
-    does not tremble and does not react: `HumanHand` does.
+    stretches once more; at last it holds, or brings it back. So the mean speed before
+    the catch, which the catch angle depends on, falls at most 2 % short of the intended
+    one. It is a clamp rather than a hand: the damper keeps the speed within 12 deg/s of
+    the intention when the catch adds 7 N·m at once, and the spring lags by about 1 deg.
+    It has no mass, does not tremble and does not react: `HumanHand` does.
 
     Parameters
     ----------
@@ -160,6 +160,8 @@ class SimulatedHand:
         Speed at which it brings the arm back between two of them, rad/s.
     rest : float, optional
         How long it rests at either end between them, s.
+    returns : bool, optional
+        Whether it rests and brings the arm back after the last stretch, too.
 
     Raises
     ------
@@ -208,6 +210,7 @@ class SimulatedHand:
         again: Sequence[float] = (),
         return_speed: float = math.radians(60.0),
         rest: float = 0.3,
+        returns: bool = False,
     ) -> None:
         self.start = start
         self.end = end
@@ -224,9 +227,13 @@ class SimulatedHand:
         ways = [(start, final, mean_speed)]  # there, and again back and there
         for speed in again:
             ways += [(final, start, return_speed), (start, final, speed)]
+        if returns:
+            ways.append((final, start, return_speed))
         self._legs: list[_Leg] = []
         for way in ways:
-            ramps = {"ramp_up": ramp_up, "ramp_down": ramp_down}
+            # No hand is as brisk where it brings the arm back
+            brisk = ramp_up if way[1] > way[0] else max(ramp_up, ramp_down)
+            ramps = {"ramp_up": brisk, "ramp_down": ramp_down}
             leg = _leg(*way, delay=delay, **ramps)
             if self._legs:
                 self._legs[-1].until = leg.since = delay
@@ -264,6 +271,11 @@ class SimulatedHand:
                 "start, end: need 0 <= start < end <= 180 degrees, "
                 f"got {self.start} and {self.end} rad"
             )
+
+    @property
+    def final_time(self) -> float:
+        """When it means to have made its last way, s."""
+        return self._legs[-1].final_time
 
     def intended(self, time_s: float) -> tuple[float, float]:
         """Return where the hand means to be.

@@ -180,6 +180,8 @@ class HumanHand(SimulatedHand):
         Speed at which it brings the arm back between two of them, rad/s.
     rest : float, optional
         How long it rests at either end between them, s.
+    returns : bool, optional
+        Whether it rests and brings the arm back after the last stretch, too.
 
     Attributes
     ----------
@@ -226,6 +228,7 @@ class HumanHand(SimulatedHand):
         again: Sequence[float] = (),
         return_speed: float = math.radians(60.0),
         rest: float = 0.5,
+        returns: bool = False,
     ) -> None:
         super().__init__(
             start=start,
@@ -239,6 +242,7 @@ class HumanHand(SimulatedHand):
             again=again,
             return_speed=return_speed,
             rest=rest,
+            returns=returns,
         )
         self.inertia = traits.inertia
         self._traits = traits

@@ -54,6 +54,8 @@ from masrel.run.console import _cues_shown
 # After this a presentation of one stretch ends, wherever the arm is.
 _ONE_STRETCH_S = 10.0
 
+_REST_S = 0.3  # of a simulated hand between two ways
+
 # How much of the recording before a fault goes into the log
 _BEFORE_FAULT_S = 0.2
 
@@ -163,7 +165,15 @@ def _on_device(
     speeds = _hand_speeds(protocol, request)
     if speeds:
         first, *again = speeds
-        hand = SimulatedHand(start=start, end=end, mean_speed=first, again=again)
+        hold_s = protocol.simulated_raters.hold_s
+        hand = SimulatedHand(
+            start=start,
+            end=end,
+            mean_speed=first,
+            again=again,
+            rest=_REST_S + hold_s,
+            returns=hold_s > 0.0,
+        )
         # A simulated hand that means to be slow gets the time it needs.
         longest_s = 2.0 * (end - start) / min(speeds)
     rules = stretch_rules(protocol.presentation, longest_s)
@@ -205,7 +215,7 @@ def presentation_status(
     speeds = _hand_speeds(protocol, request)
     if not speeds or protocol.presentation.stretches != "free":
         return PresentationStatus()
-    return StatusOfHand(len(speeds))
+    return StatusOfHand(len(speeds), holds=protocol.simulated_raters.hold_s > 0.0)
 
 
 def _hand_speeds(protocol: Protocol, request: GradeRequest) -> list[float]:

@@ -25,13 +25,28 @@ class StretchFacts:
 
 
 class StatusOfHand(PresentationStatus):
-    """Of a presentation to a simulated hand, which is done when it has made its way."""
+    """Of a presentation to a simulated hand, which is done when it has made its way.
 
-    __slots__ = ("_n_over", "_n_planned")
+    One that holds is done when it brings the arm back after the last stretch.
+    """
 
-    def __init__(self, n_planned: int) -> None:
+    __slots__ = ("_holds", "_is_armed", "_n_over", "_n_planned")
+
+    def __init__(self, n_planned: int, *, holds: bool = False) -> None:
         self._n_planned = n_planned
+        self._holds = holds
         super().__init__()
+
+    @property
+    def is_armed(self) -> bool:
+        """Whether the next extension begins a stretch."""
+        return self._is_armed
+
+    @is_armed.setter
+    def is_armed(self, is_armed: bool) -> None:
+        self._is_armed = is_armed
+        if is_armed and self._n_over >= self._n_planned:
+            self.done()
 
     @property
     def n_stretches(self) -> int:
@@ -41,7 +56,7 @@ class StatusOfHand(PresentationStatus):
     @n_stretches.setter
     def n_stretches(self, n_over: int) -> None:
         self._n_over = n_over
-        if n_over >= self._n_planned:
+        if n_over >= self._n_planned and not self._holds:
             self.done()
 
 

@@ -1,7 +1,8 @@
 """People's hands on the simulated arm, held and let go, before and after.
 
 ``before`` is how a lost grip was noticed once: by a fall of speed by more than 40 deg/s
-within 10 ms, or by an arm that moved backwards faster than 20 deg/s.
+within 10 ms, or by an arm that moved backwards faster than 20 deg/s. An arm that stood
+for half a second under 2 N·m was a fault once, however it had come to rest.
 """
 
 import math
@@ -56,7 +57,7 @@ class Outcome:
     is_law: bool  # whether the torque is that of the law, fed what was read
     recoiled: bool  # whether the arm sprang back so fast that the law ended the catch
     lost_before: bool
-    clamp_fault: str | None  # of a clamp of the same stiffness and damping
+    clamp_stood: bool  # a clamp of the same stiffness and damping, for half a second
     clamp_lost_before: bool
     slip_s: float  # until the model was released
 
@@ -113,7 +114,9 @@ def outcome(person: Person) -> Outcome:
             damping=person.traits.damping,
         ),
     )
-    columns = _held(made)
+    columns, clamped = _held(made), _held(clamp)
+    stood = _stood_at(clamped)
+    clamped = {name: column[:stood] for name, column in clamped.items()}
     return Outcome(
         person=person,
         fault=_kind(made),
@@ -121,8 +124,8 @@ def outcome(person: Person) -> Outcome:
         is_law=_is_law(person, columns),
         recoiled=_recoiled(columns),
         lost_before=_lost_before(columns),
-        clamp_fault=_kind(clamp),
-        clamp_lost_before=_lost_before(_held(clamp)),
+        clamp_stood=stood is not None,
+        clamp_lost_before=_lost_before(clamped),
         slip_s=_released_after(person, columns),
     )
 
@@ -131,6 +134,15 @@ def _held(made: Presented) -> dict[str, NDArray[np.float64]]:
     # Without the ramp at the end
     n_rows = made.recording.n_presented
     return {name: column[:n_rows] for name, column in made.recording.columns.items()}
+
+
+def _stood_at(columns: dict[str, NDArray[np.float64]]) -> int | None:
+    # Where an arm had stood for half a second under 2 N·m, which was a fault once
+    moved = np.flatnonzero(np.diff(columns["angle_deg"], prepend=math.nan) != 0.0)
+    since = np.searchsorted(moved, np.arange(columns["time_s"].size), side="right")
+    stood = columns["time_s"] - columns["time_s"][moved[since - 1]]
+    at = np.flatnonzero((stood > 0.5) & (np.abs(columns["command_torque_nm"]) > 2.0))
+    return int(at[0]) if at.size else None
 
 
 def _kind(made: Presented) -> str | None:
@@ -204,7 +216,7 @@ def row(low: float, high: float, outcomes: list[Outcome]) -> str:
     slips = [1e3 * o.slip_s for o in chosen]
     counts = (
         sum(o.clamp_lost_before for o in chosen),
-        sum(o.clamp_fault == "standing-torque" for o in chosen),
+        sum(o.clamp_stood for o in chosen),
         sum(o.lost_before for o in chosen),
         sum(o.lost for o in chosen),
         sum(o.fault is not None for o in chosen),

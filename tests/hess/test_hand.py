@@ -73,3 +73,9 @@ def test_it_means_to_press_against_the_end() -> None:
 def test_an_impossible_hand_is_refused(change: dict[str, float], words: str) -> None:
     with pytest.raises(ParameterError, match=words):
         hand(**change)
+
+
+def test_it_may_bring_the_arm_back_after_the_last_stretch_too() -> None:
+    hand = SimulatedHand(start=0.5, end=2.5, mean_speed=1.5, rest=1.0, returns=True)
+    assert hand.intended(2.4)[0] == pytest.approx(2.5 + math.radians(2.5))
+    assert hand.intended(hand.final_time + 1.0) == (0.5, 0.0)

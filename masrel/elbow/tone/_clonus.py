@@ -26,7 +26,8 @@ class Clonus(ToneModel):
 
     τ = τ0 + A·exp(-(t - t0)/T)·sin²(π·x/w) for x = frac(f·(t - t0)) < w, and τ0 else. A
     stretch as fast as ω_c at or beyond θ_c sets the beats off, t0 is a delay d later,
-    and they go on until the arm is moved back: faster than ν_th, or beyond θ_c.
+    and they go on as long as the stretch is held: until the arm is back by ρ from the
+    farthest it has been since, or beyond θ_c. A beat itself throws it back by less.
 
     Attributes
     ----------
@@ -45,6 +46,8 @@ class Clonus(ToneModel):
         ω_c, rad/s. A choice of ours, not from a source.
     trigger_angle : float
         θ_c, rad. A choice of ours, not from a source.
+    return_travel : float
+        ρ, rad. A choice of ours, not from a source.
     delay : float
         d, s. The reflex of the ankle follows a stretch after 50 to 70 ms [2]_.
     range_end : float
@@ -79,6 +82,7 @@ class Clonus(ToneModel):
     fade_time: float = quantity(2.0, "s", "not negative")
     trigger_speed: float = quantity(math.radians(60.0), "rad/s", "positive")
     trigger_angle: float = quantity(math.radians(90.0), "rad", "angle")
+    return_travel: float = quantity(math.radians(20.0), "rad", "angle")
     delay: float = quantity(0.060, "s", "not negative", is_choice=False)
 
     @classmethod
@@ -112,19 +116,25 @@ class Clonus(ToneModel):
         beat = math.sin(math.pi * x)
         return self.base_torque + self.beat_torque * left * beat * beat
 
+    def _given_up(self, farthest: float) -> float:
+        # where the stretch is given up that has been so far, rad
+        return max(self.trigger_angle, farthest - self.return_travel)
+
     def _trains(self, motion: Motion) -> list[tuple[float, float]]:
         # when a stretch sets beats off and when it is given up, s
         trains: list[tuple[float, float]] = []
-        begun: float | None = None
+        begun, farthest = None, 0.0
         for part in one_way(motion):
-            far = part.beyond(self.trigger_angle)
-            if part.direction > 0 and begun is None:
-                begun = part.reached(part.faster(self.trigger_speed, 1), far)
+            if part.direction > 0:
+                if begun is None:
+                    far = part.beyond(self.trigger_angle)
+                    begun = part.reached(part.faster(self.trigger_speed, 1), far)
+                    farthest = 0.0
+                farthest = max(farthest, float(part.angle_at(part.end)))
             elif part.direction < 0 and begun is not None:
-                given_up = (part.faster(self.speed_threshold, -1), negative(far))
-                ends = [t for t in map(part.reached, given_up) if t is not None]
-                if ends:
-                    trains.append((begun, min(ends)))
+                until = part.reached(negative(part.beyond(self._given_up(farthest))))
+                if until is not None:
+                    trains.append((begun, until))
                     begun = None
         return trains if begun is None else [*trains, (begun, math.inf)]
 
@@ -152,29 +162,32 @@ class Clonus(ToneModel):
 class ClonusStepper:
     """Clonus that sees one sample at a time."""
 
-    __slots__ = ("_begun", "_is_given_up", "_model", "phase")
+    __slots__ = ("_begun", "_farthest", "_is_released", "_model", "phase")
 
     def __init__(self, model: Clonus) -> None:
         self._model = model
         self._begun = math.nan  # when the beats were set off, s
-        self._is_given_up = False
+        self._farthest = 0.0  # that the arm has been since, rad
+        self._is_released = False
         self.phase = _IDLE
 
     def release(self) -> None:
         """Stop the beats until the arm has been moved back."""
-        self._is_given_up = True
+        self._is_released = True
         self.phase = _IDLE
 
     def step(self, time_s: float, angle: float, velocity: float) -> float:
         """Decide the torque of one sample, N·m."""
         model = self._model
-        is_back = velocity <= -model.speed_threshold or angle < model.trigger_angle
-        if is_back:
-            self.phase, self._is_given_up = _IDLE, False
-        elif self._is_given_up:
-            return model.base_torque
-        elif self.phase == _IDLE and velocity >= model.trigger_speed:
-            self.phase, self._begun = _BEATS, time_s
+        is_far = angle >= model.trigger_angle
+        if self._is_released:
+            self._is_released = is_far and velocity > -model.speed_threshold
+        elif self.phase == _BEATS:
+            self._farthest = max(self._farthest, angle)
+            if angle < model._given_up(self._farthest):
+                self.phase = _IDLE
+        elif is_far and velocity >= model.trigger_speed:
+            self.phase, self._begun, self._farthest = _BEATS, time_s, angle
         if self.phase == _IDLE:
             return model.base_torque
         return model._law(time_s - self._begun - model.delay)

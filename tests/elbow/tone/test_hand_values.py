@@ -82,12 +82,15 @@ def test_clonus() -> None:
 
 
 @pytest.mark.parametrize(
-    ("speed", "angle"), [(60, 130.0), (10, 90.0)], ids=["briskly", "slowly"]
+    ("end", "angle"), [(130.0, 110.0), (100.0, 90.0)], ids=["from far", "from near"]
 )
-def test_clonus_stops_where_the_arm_is_moved_back(speed: float, angle: float) -> None:
-    """At once at 20 deg/s or more, else at the angle that set the beats off."""
-    there = ConstantSpeed(start=START, end=END, speed=radians(90))
-    back = ConstantSpeed(start=START, end=END, speed=radians(speed))
+@pytest.mark.parametrize("speed", [60, 10])
+def test_clonus_stops_where_the_arm_is_moved_back(
+    end: float, angle: float, speed: float
+) -> None:
+    """By 20 deg from the farthest, or to the angle that set the beats off."""
+    there = ConstantSpeed(start=START, end=radians(end), speed=radians(90))
+    back = ConstantSpeed(start=START, end=radians(end), speed=radians(speed))
     motion = Joined([there, Reversed(motion=back)])
     model = Clonus.of_tardieu(4)
     (stop,) = (e for e in model.events(motion) if e.name == "stop")
@@ -96,6 +99,21 @@ def test_clonus_stops_where_the_arm_is_moved_back(speed: float, angle: float) ->
     assert times[np.flatnonzero(phase)[-1]] == pytest.approx(stop.time, abs=2e-3)
     assert np.all(torque[times > stop.time + 1e-3] == 1.5)
     assert np.all(model.torque(motion, times[times > stop.time]) == 1.5)
+
+
+def test_clonus_goes_on_where_a_beat_throws_the_arm_back() -> None:
+    # by 8 deg at 60 deg/s, as in a soft hand, and forth again: one train of beats
+    there = ConstantSpeed(start=START, end=END, speed=radians(90))
+    thrown = ConstantSpeed(start=END - radians(8), end=END, speed=radians(60))
+    hold = Hold(start=END, duration=0.5)
+    motion = Joined([there, hold, Reversed(motion=thrown), thrown, hold])
+    model = Clonus.of_tardieu(4)
+    assert [e.name for e in model.events(motion) if e.name != "beat"] == ["trigger"]
+    times, torque, phase = stepped(model, motion)
+    assert np.flatnonzero(np.diff(phase)).size == 1
+    (trigger,) = (e for e in model.events(motion) if e.name == "trigger")
+    near = np.abs((times - trigger.time - 0.06) % 0.2 - 0.04) < 1e-3
+    assert np.all(torque[near & (times > trigger.time + 0.06)] > 5.4)
 
 
 PEAKS = [

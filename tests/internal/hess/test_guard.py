@@ -204,18 +204,29 @@ def test_a_slow_arm_may_come_to_rest() -> None:
     assert made.is_new(1.020)
 
 
-def test_a_standing_torque_on_an_arm_at_rest_is_named_after_half_a_second() -> None:
+@pytest.mark.parametrize(
+    ("speed_deg_s", "after_s"), [(5.0, 0.5), (-5.0, 0.5), (4.0, 10.0), (0.0, 10.0)]
+)
+def test_a_standing_torque_is_named_after_half_a_second_or_10_s_if_it_was_held(
+    speed_deg_s: float, after_s: float
+) -> None:
     made = begun()
     made.torque(0.0, 2.1)
-    fed(made, [1.5] * 501)
+    fed(made, [1.5, 1.5 + STEP])
+    made.speed(radians(speed_deg_s))
+    fed(made, [1.5 + STEP] * round(after_s * 1000), start=2)
     with raises_limit(
-        "standing-torque", r"standing torque: needs at most 2 N·m .* 2\.100"
+        "standing-torque",
+        rf"standing torque: needs at most 2 N·m .* {after_s * 1e3:g} ms, got 2\.100",
     ):
-        made.reading(0.5015, 1.5, 0.0)
+        made.reading(after_s + 0.0025, 1.5 + STEP, 0.0)
+
+
+def test_at_most_2_n_m_may_stand_for_ever() -> None:
     made = guard()
     made.torque(0.0, -2.0)
-    fed(made, [1.5] * 2000)
-    assert made.is_new(2.0)
+    fed(made, [1.5] * 12000)
+    assert made.is_new(12.0)
 
 
 def test_an_arm_that_trembles_by_one_step_may_be_held_for_long() -> None:

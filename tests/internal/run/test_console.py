@@ -46,6 +46,17 @@ def test_a_hand_is_done_when_it_has_made_its_stretches() -> None:
     assert status.is_done
 
 
+def test_a_hand_that_holds_is_done_when_it_brings_the_arm_back_at_last() -> None:
+    status = StatusOfHand(2, holds=True)
+    for n_over in (1, 2):
+        status.is_armed = True
+        status.is_armed = False
+        status.n_stretches = n_over
+        assert not status.is_done
+    status.is_armed = True
+    assert status.is_done
+
+
 def recording(speed_deg_s: float, phase: float = 0.0) -> Recording:
     # the arm goes from 30 deg for 0.2 s at a speed, and stops
     n = 400
