@@ -336,8 +336,8 @@ class ActiveGuard:
         """Let the model give back no more what it took in earlier stretches."""
         # Only where the first stretch began holds no spring what it took.
         if math.isnan(self._first_angle):
-            self._first_angle = angle
-        if angle <= self._first_angle + _BACK:
+            self._first_angle, self._forgiven_at = angle, time_s
+        elif angle <= self._first_angle + _BACK:
             forgiven = _FORGIVEN_W * (time_s - self._forgiven_at)
             self.energy_given = max(self.energy_given - forgiven, 0.0)
             self._forgiven_at = time_s
