@@ -170,6 +170,7 @@ def test_a_protocol_without_files_has_the_hash_it_had_before_there_were_any() ->
     assert content["stretch"].pop("largest_speed_deg_s") == 131.0
     assert content.pop("presentation")["stretches"] == 1
     assert content.pop("training")["order"] == "blocked"
+    assert content["simulated_raters"].pop("hold_s") == 0.0
     assert content["elbow"].pop("rest_angle_deg") is None
     assert content["elbow"].pop("residual_reading") == "residual"
     assert content["elbow"].pop("catch_rise_s") == 0.0
