@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 from tqdm import tqdm
 
-from masrel._files import check_inside
+from masrel._files import check_inside, refuse_record
 from masrel.cli._options import (
     OutputOptions,
     output_options,
@@ -48,6 +48,7 @@ def report(
     if destination is None:
         destination = study / "report"
         check_inside(destination, study)
+    refuse_record(destination / "report.html")  # before anything is computed
     data = read_study(study, ratings_file)
     with warnings_as_notes():
         analysis = analyze(data.protocol, data.ratings, in_person=data.in_person)

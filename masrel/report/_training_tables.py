@@ -93,11 +93,11 @@ def _notes(record: TrainingRecord) -> tuple[str, ...]:
         "itself.",
         f"Passed at evidence {number(record.boundary, 2)}: the largest, of all runs of "
         f"at most {criterion.window} presentations up to the last, of their number "
-        f"times what κ has above {criterion.reference:g}.",
-        f"Of raters whose κ stays at {criterion.insufficient:g}, at most "
-        f"{100.0 * record.false_pass:.1f} % pass; of raters whose κ is at "
-        f"{criterion.sufficient:g} from the start, at most "
-        f"{100.0 * record.false_fail:.1f} % fail, as measured on simulated trainees.",
+        f"times what κ has above {criterion.reference}.",
+        f"Of raters whose κ stays at {criterion.insufficient}, at most "
+        f"{number(100.0 * record.false_pass, 1)} % pass; of raters whose κ is at "
+        f"{criterion.sufficient} from the start, at most "
+        f"{number(100.0 * record.false_fail, 1)} % fail, as measured on simulated trainees.",
         NOT_RATINGS,
     )
 

@@ -71,6 +71,7 @@ def test_a_study_can_name_them_and_has_the_published_dummies(
             continue
         kept.append(line)
     protocol.write_text("\n".join(kept) + "\n", encoding="utf-8")
+    (study / "published_secret.txt").unlink()
     done = masrel("check", study)
     assert (done.code, done.err) == (0, "")
     written, named = read_protocol(PUBLISHED), read_protocol(protocol)

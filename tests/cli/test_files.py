@@ -102,6 +102,7 @@ def test_default_outputs_do_not_leave_the_study(
 def test_an_output_that_is_a_link_is_replaced_and_not_followed(
     study: Path, tmp_path: Path, masrel: Caller
 ) -> None:
+    shutil.rmtree(study / "sessions")
     profile = tmp_path / ".profile"
     profile.write_text("umask 077\n")
     (study / "analysis.json").symlink_to(profile)
