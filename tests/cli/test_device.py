@@ -118,7 +118,11 @@ def test_friction_does_not_move_an_arm_unasked(masrel: Caller) -> None:
         (("zero", *EMULATED), 2, "Missing option '--angle-deg'"),
         (("zero", "--angle-deg", 200, *EMULATED), 2, "200.0 is not in the range"),
         (("zero", "--angle-deg", "nan", *EMULATED), 2, "angle: needs 0 to 180 deg"),
-        (("probe", *EMULATED, "--json", "/dev/full"), 2, "/dev/full: needs to be a file"),
+        (
+            ("probe", *EMULATED, "--json", "/dev/full"),
+            2,
+            "/dev/full: needs to be a file",
+        ),
         (("probe", *EMULATED, "--json", "no/x"), 2, "--json: needs a folder that"),
         (("check", "--properties", "none.toml"), 2, "none.toml: No such file"),
         (("check", "--channel", "can-none"), 1, "cannot open channel 'can-none'"),
