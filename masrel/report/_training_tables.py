@@ -97,7 +97,8 @@ def _notes(record: TrainingRecord) -> tuple[str, ...]:
         f"Of raters whose κ stays at {criterion.insufficient}, at most "
         f"{number(100.0 * record.false_pass, 1)} % pass; of raters whose κ is at "
         f"{criterion.sufficient} from the start, at most "
-        f"{number(100.0 * record.false_fail, 1)} % fail, as measured on simulated trainees.",
+        f"{number(100.0 * record.false_fail, 1)} % fail, as measured on simulated "
+        "trainees.",
         NOT_RATINGS,
     )
 
