@@ -36,9 +36,14 @@ if TYPE_CHECKING:
     help="Only rehearse: nothing of it enters the ratings of STUDY.",
 )
 @click.option("--correct", metavar="CODE", help="Correct the grade of this code.")
-@click.option("--grade", help="With --correct: what the grade should have been.")
-@click.option("--who", help="With --correct: who corrects it.")
-@click.option("--why", help="With --correct: for what reason.")
+@click.option(
+    "--grade", help="With --correct: what the grade should have been, NA for missing."
+)
+@click.option(
+    "--skip", metavar="CODE", help="Leave this code, after a fault, without a grade."
+)
+@click.option("--who", help="With --correct and --skip: who says so.")
+@click.option("--why", help="With --correct and --skip: for what reason.")
 def run(
     study: Path,
     rater: str,
@@ -49,37 +54,78 @@ def run(
     rehearse: bool,
     correct: str | None,
     grade: str | None,
+    skip: str | None,
     who: str | None,
     why: str | None,
 ) -> None:
     """Run one rater's session of STUDY, or go on with it where it stopped.
 
     The rater is shown blinded codes only. With --rehearse the order and the codes are
-    other ones, and log and recordings are kept in STUDY/rehearsals. With --correct no
-    model is presented: the correction is added to the session's log, where the first
-    grade stays.
+    other ones, and log and recordings are kept in STUDY/rehearsals. With --correct or
+    --skip no model is presented: what is said is added to the session's log, where the
+    first grade stays.
     """
     paths = StudyPaths(study)
     protocol = read_protocol(paths.protocol)
-    if correct is None:
-        _refuse_strays({"--grade": grade, "--who": who, "--why": why})
-        options = {"rehearse": rehearse, "quiet": output.quiet}
-        _run(paths, protocol, rater, session, grades, clock, **options)
+    options = {"--grade": grade, "--who": who, "--why": why}
+    if correct is None and skip is None:
+        _refuse_strays(options)
+        flags = {"rehearse": rehearse, "quiet": output.quiet}
+        _run(paths, protocol, rater, session, grades, clock, **flags)
         return
     if rehearse:
-        raise click.UsageError("--rehearse presents models, and --correct none")
+        verb = "--skip" if correct is None else "--correct"
+        raise click.UsageError(f"--rehearse presents models, and {verb} none")
+    if correct is not None and skip is not None:
+        raise click.UsageError("--correct and --skip are said one at a time")
+    message = (
+        _correct(paths, protocol, rater, session, correct, grade, who, why)
+        if correct is not None
+        else _skip(paths, rater, session, str(skip), grade, who, why)
+    )
+    if not output.quiet:
+        click.echo(f"{message} {paths.log_file(rater, session)}. Then: masrel ratings")
+
+
+def _correct(
+    paths: StudyPaths,
+    protocol: Protocol,
+    rater: str,
+    session: str,
+    code: str,
+    grade: str | None,
+    who: str | None,
+    why: str | None,
+) -> str:
     from masrel.run import record_correction
 
     if grade is None or who is None or why is None:
         raise click.UsageError("--correct needs --grade, --who and --why too")
+    corrected = None if grade == "NA" else grade  # no scale has such a grade
     record_correction(
-        paths, protocol, rater, session, code=correct, grade=grade, who=who, why=why
+        paths, protocol, rater, session, code=code, grade=corrected, who=who, why=why
     )
-    if not output.quiet:
-        click.echo(
-            f"{correct} of {rater}, session {session}, is now {grade}; the first grade "
-            f"stays in {paths.log_file(rater, session)}. Then: masrel ratings"
-        )
+    what = "missing" if corrected is None else grade
+    return f"{code} of {rater}, session {session}, is now {what}; what was is in"
+
+
+def _skip(
+    paths: StudyPaths,
+    rater: str,
+    session: str,
+    code: str,
+    grade: str | None,
+    who: str | None,
+    why: str | None,
+) -> str:
+    from masrel.run import record_skip
+
+    if grade is not None:
+        raise click.UsageError("--grade needs --correct CODE, not --skip")
+    if who is None or why is None:
+        raise click.UsageError("--skip needs --who and --why too")
+    record_skip(paths, rater, session, code=code, who=who, why=why)
+    return f"{code} of {rater}, session {session}, is skipped, as is said in"
 
 
 def _refuse_strays(options: dict[str, str | None]) -> None:
@@ -123,10 +169,12 @@ def _run(
     if not quiet:
         what = "simulated" if grades == "simulated" else "simulated device"
         label = f" ({what})" if done.simulated else ""
+        n_missing = done.n_presentations - done.n_graded
+        missing = f", {n_missing} missing," if n_missing else ""
         what = "the rehearsal of session" if done.rehearsal else "session"
         click.echo(
             f"{what} {done.session} of {done.rater} is complete: "
-            f"{done.n_presentations} grades{label} in {done.log_file}"
+            f"{done.n_graded} grades{label}{missing} in {done.log_file}"
             + ("; none is a rating of the study" if done.rehearsal else "")
         )
 

@@ -99,8 +99,10 @@ def _stage_of(record: "SessionRecord") -> str:
     if record.stage in ("not begun", "unreadable"):
         return record.stage
     counts = f"{record.n_graded} of {record.n_presentations} graded"
+    skipped = f", {record.n_skipped} skipped" if record.n_skipped else ""
     corrected = f", {record.n_corrections} corrected" if record.n_corrections else ""
-    return f"{record.stage}, {counts}{corrected}, {record.n_recordings} recordings"
+    counts += skipped + corrected
+    return f"{record.stage}, {counts}, {record.n_recordings} recordings"
 
 
 def _show(

@@ -7,7 +7,7 @@ from masrel.errors import MasrelError
 from masrel.protocol import Protocol, StudyPaths
 from masrel.run._conduct import read_conduct
 from masrel.run._log import Event, read_log
-from masrel.run._state import replay
+from masrel.run._state import SessionState, replay
 
 
 def study_remarks(
@@ -28,8 +28,9 @@ def study_remarks(
     -------
     tuple of str
         A sentence each for raters who were withdrawn, codes that were unblinded, logs
-        of no rater of the protocol, empty logs, recordings without a log, and ratings
-        that are not from the logs that there are. Empty when there is nothing to say.
+        of no rater of the protocol, skipped presentations, empty logs, recordings
+        without a log, and ratings that are not from the logs that there are. Empty when
+        there is nothing to say.
 
     Raises
     ------
@@ -76,13 +77,9 @@ def _of_event(study: StudyPaths, event: Event) -> str:
 
 
 def _n_graded(study: StudyPaths, rater: str) -> int:
-    # of the logs that can be read; the others are said to be damaged where they are
     count = 0
     for log in sorted(study.sessions.glob(f"*_{rater}.jsonl")):
-        try:
-            state = replay(log, read_log(log))
-        except MasrelError:
-            continue
+        state = _state_of(log)
         if state.header.get("rater") == rater:
             count += len(state.grades)
     return count
@@ -103,7 +100,9 @@ def _of_sessions(study: StudyPaths, protocol: Protocol) -> Iterator[str]:
                 "(masrel withdraw keeps the grades of one who left, and says so), or "
                 "move the log out of the study."
             )
-        elif not log.stat().st_size:
+        elif log.stat().st_size:
+            yield from _of_skips(study, log)
+        else:
             yield (
                 f"{_name(study, log)} is empty: its grades, if there were any, are not "
                 "among the ratings. Put a copy of it back, or run the session."
@@ -114,6 +113,26 @@ def _of_sessions(study: StudyPaths, protocol: Protocol) -> Iterator[str]:
                 f"{_name(study, folder)} has recordings and there is no log of them: "
                 "their grades are not among the ratings. Put a copy of the log back."
             )
+
+
+def _of_skips(study: StudyPaths, log: Path) -> Iterator[str]:
+    # those that did not get their grade later
+    state = _state_of(log)
+    for code, event in state.skipped.items():
+        if code not in state.grades:
+            yield (
+                f"{_name(study, log)}: presentation {event.fields['position']}, code "
+                f"{code}, was skipped after a fault by {event.fields['who']}: "
+                f"{event.fields['why']}. Its grade is missing."
+            )
+
+
+def _state_of(log: Path) -> SessionState:
+    # of a log that cannot be read none; it is said to be damaged where it is read
+    try:
+        return replay(log, read_log(log))
+    except MasrelError:
+        return SessionState()
 
 
 def _name(study: StudyPaths, path: Path) -> str:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
         GradeRequest,
         GradeSource,
         ScriptGrades,
+        Skip,
         StretchGrade,
     )
     from masrel.run._log import Event, SessionLog, read_log
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from masrel.run._settings import model_controller
     from masrel.run._simulated_raters import SimulatedGrades
     from masrel.run.console import ConsoleGrades
-    from masrel.run.session import record_correction, run_session
+    from masrel.run.session import record_correction, record_skip, run_session
 
 __all__ = [
     "ConsoleGrades",
@@ -35,25 +36,33 @@ __all__ = [
     "SessionLog",
     "SessionSummary",
     "SimulatedGrades",
+    "Skip",
     "StretchGrade",
     "model_controller",
     "read_conduct",
     "read_log",
     "record_correction",
+    "record_skip",
     "record_unblinding",
     "record_withdrawal",
     "run_session",
 ]
 
 _HOMES = {
-    "_grade_sources": ("GradeRequest", "GradeSource", "ScriptGrades", "StretchGrade"),
+    "_grade_sources": (
+        "GradeRequest",
+        "GradeSource",
+        "ScriptGrades",
+        "Skip",
+        "StretchGrade",
+    ),
     "_log": ("Event", "SessionLog", "read_log"),
     "_runner": ("SessionSummary",),
     "_settings": ("model_controller",),
     "_simulated_raters": ("SimulatedGrades",),
     "_conduct": ("read_conduct", "record_unblinding", "record_withdrawal"),
     "console": ("ConsoleGrades",),
-    "session": ("record_correction", "run_session"),
+    "session": ("record_correction", "record_skip", "run_session"),
 }
 
 

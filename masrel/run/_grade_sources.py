@@ -44,6 +44,8 @@ class GradeRequest:
         Whether what the model has could be felt: no stretch was fast enough, or none
         came to the catch that the model has at that speed. None before, and after a
         fault.
+    may_skip: bool
+        Whether the presentation can be left without a grade after a fault.
     """
 
     rater: str
@@ -57,6 +59,7 @@ class GradeRequest:
     status: "PresentationStatus | None" = None
     n_stretches: int = 0
     felt: Felt | None = None
+    may_skip: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,6 +76,20 @@ class StretchGrade:
 
     grade: str
     stretch: int | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Skip:
+    """That a presentation is left without a grade after a fault.
+
+    Attributes
+    ----------
+    who, why : str
+        Who says so, and for what reason.
+    """
+
+    who: str
+    why: str
 
 
 class GradeSource(Protocol):
@@ -96,8 +113,8 @@ class GradeSource(Protocol):
         """Return the grade, or None to have it presented again first."""
         ...
 
-    def present_again(self, request: GradeRequest, fault: str) -> bool:
-        """Return whether to go on after a fault by presenting it again."""
+    def present_again(self, request: GradeRequest, fault: str) -> bool | Skip:
+        """Return whether to present it again after a fault, or that it is skipped."""
         ...
 
 

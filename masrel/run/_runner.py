@@ -17,7 +17,8 @@ from masrel.errors import (
 from masrel.hess import Clock, EmergencyStop, RealClock, SimulatedClock
 from masrel.protocol import Protocol, StudyPaths, presented_hash, protocol_hash
 from masrel.recording import _Fact
-from masrel.run._grade_sources import GradeRequest, GradeSource, StretchGrade
+from masrel.run._conduct import stated
+from masrel.run._grade_sources import GradeRequest, GradeSource, Skip, StretchGrade
 from masrel.run._log import SessionLog
 from masrel.run._present import (
     Outcome,
@@ -55,7 +56,9 @@ class SessionSummary:
     rater, session : str
         Whose session.
     n_presentations : int
-        Presentations of the schedule; all are graded.
+        Presentations of the schedule.
+    n_graded : int
+        Those that have a grade: all but those skipped or corrected to missing.
     n_graded_before : int
         Those already graded when it was started.
     n_again : int
@@ -73,6 +76,7 @@ class SessionSummary:
     rater: str
     session: str
     n_presentations: int
+    n_graded: int
     n_graded_before: int
     n_again: int
     n_faults: int
@@ -100,7 +104,7 @@ class SessionRunner:
         self._clock = clock
         self._log = log
         self._state: SessionState = replay(log.path, log.events)
-        self._n_graded_before = len(self._state.first_grades)
+        self._n_graded_before = len(self._state.grades)
         self._n_again = 0
         self._n_faults = 0
 
@@ -151,10 +155,10 @@ class SessionRunner:
             )
 
     def run(self, progress: Callable[[Presentation], object] | None) -> SessionSummary:
-        """Present and ask for grades until every presentation has one."""
+        """Present and ask until every presentation has its grade or is skipped."""
         schedule = self._schedule
         for presentation in schedule.presentations:
-            if presentation.code not in self._state.first_grades:
+            if presentation.code not in self._state.settled:
                 self._rate(presentation)
             if progress is not None:
                 progress(presentation)
@@ -165,6 +169,7 @@ class SessionRunner:
             rater=schedule.rater,
             session=schedule.session,
             n_presentations=len(schedule.presentations),
+            n_graded=len(replay(self._log.path, self._log.events).grades),
             n_graded_before=self._n_graded_before,
             n_again=self._n_again,
             n_faults=self._n_faults,
@@ -183,11 +188,15 @@ class SessionRunner:
         except SessionStoppedError as error:
             self._log.append("stopped", {**fields, "why": str(error)})
             raise
+        if isinstance(grade, Skip):
+            reasons = stated(who=grade.who, why=grade.why)
+            self._log.append("skipped", {**fields, **reasons})
+            return
         self._log.append(
             "grade", {**fields, "grade": grade.grade, "stretch": grade.stretch}
         )
 
-    def _until_graded(self, presentation: Presentation) -> StretchGrade:
+    def _until_graded(self, presentation: Presentation) -> StretchGrade | Skip:
         before = self._state.presented.get(presentation.code, [])
         for event in before:  # a process may have died between the log and this
             file = self._study.sessions / str(event.fields["recording"])
@@ -213,7 +222,11 @@ class SessionRunner:
             )
             if fault is None:
                 grade = self._checked(request, self._grades.grade(request))
-            elif not self._grades.present_again(request, fault.message):
+                continue
+            answer = self._grades.present_again(request, fault.message)
+            if isinstance(answer, Skip):
+                return answer
+            if not answer:
                 raise DeviceError(
                     f"session {request.session} of {request.rater}: presentation "
                     f"{presentation.position}, code {presentation.code}, was stopped "
@@ -233,6 +246,7 @@ class SessionRunner:
             n_faults=n_faults,
             rehearsal=self._is_rehearsal,
             rules=self._protocol.presentation,
+            may_skip=True,
         )
 
     def _file(self, request: GradeRequest) -> Path:

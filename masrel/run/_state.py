@@ -66,6 +66,7 @@ EVENTS: dict[str, tuple[str, ...]] = {
     ),
     "grade": ("code", "position", "grade", "stretch"),
     "correction": ("code", "grade", "who", "why"),
+    "skipped": ("code", "position", "who", "why"),
     "stopped": ("code", "position", "why"),
     "recovered": ("line", "n_bytes", "sha256", "kept", "moved_to"),
     "complete": ("n_presentations",),
@@ -99,7 +100,12 @@ class SessionState:
     presented: dict[str, list[Event]] = field(default_factory=dict)
     # grade of each graded code as the rater gave it
     first_grades: dict[str, str] = field(default_factory=dict)
-    grades: dict[str, str] = field(default_factory=dict)  # the same with corrections
+    # grade of each code that has one, with corrections
+    grades: dict[str, str] = field(default_factory=dict)
+    # why each skipped code has no grade of the session
+    skipped: dict[str, Event] = field(default_factory=dict)
+    # codes that are not presented any more: graded, skipped, or corrected
+    settled: set[str] = field(default_factory=set)
     # the stretch each grade rests on, where the rater said so
     graded_stretches: dict[str, int] = field(default_factory=dict)
     is_complete: bool = False  # whether the session came to its end
@@ -140,8 +146,9 @@ def _contradiction(state: SessionState, event: Event) -> str | None:
 
 def _of_another_type(event: Event) -> str | None:
     # the field that has no value of its type, or None
-    if not isinstance(event.fields.get("code"), str | None):
-        return "code"
+    for name in ("code", "grade", "who", "why"):
+        if not isinstance(event.fields.get(name), str | None):
+            return name
     speed = event.fields.get("mean_speed_deg_s")
     if not isinstance(speed, float | int | None):
         return "mean_speed_deg_s"
@@ -159,36 +166,44 @@ def _of_another_type(event: Event) -> str | None:
 
 def _contradiction_of_code(state: SessionState, event: Event) -> str | None:
     code = event.fields.get("code")
-    if event.kind == "presented" and code in state.first_grades:
-        return f"needed a code that is not graded yet, got {code}"
-    if event.kind == "fault":
-        before = state.presented.get(str(code), [])
+    before = state.presented.get(str(code), [])
+    if event.kind in ("presented", "skipped") and code in state.settled:
+        return f"needed a code that is neither graded nor skipped, got {code}"
+    if event.kind in ("fault", "skipped"):
         if not before or before[-1].fields["fault"] is None:
             return f"needed a presentation of {code} that a fault stopped before it"
     if event.kind == "grade":
-        if code in state.first_grades:
+        if code in state.settled:
             return f"needed one grade of {code}, got another"
-        before = state.presented.get(str(code), [])
         if not before or before[-1].fields["fault"] is not None:
             return f"needed a presentation of {code} without fault before its grade"
-    if event.kind == "correction" and code not in state.first_grades:
-        return f"needed a code that is graded, got {code}"
+    if event.kind == "correction" and not before:
+        return f"needed a code that was presented, got {code}"
+    if event.kind == "correction" and event.fields["grade"] is None:
+        if code not in state.grades:
+            return f"needed a code that has a grade, got {code}"
     return None
 
 
 def _apply(state: SessionState, event: Event) -> None:
-    code, grade = str(event.fields.get("code")), str(event.fields.get("grade"))
+    code, grade = str(event.fields.get("code")), event.fields.get("grade")
+    if event.kind in ("grade", "skipped", "correction"):
+        state.settled.add(code)
     if event.kind == "session":
         state.header = event.fields
     elif event.kind == "presented":
         state.presented.setdefault(code, []).append(event)
     elif event.kind == "grade":
-        state.first_grades[code] = state.grades[code] = grade
+        state.first_grades[code] = state.grades[code] = str(grade)
         stretch = event.fields.get("stretch")
         if isinstance(stretch, int):
             state.graded_stretches[code] = stretch
     elif event.kind == "correction":
-        state.grades[code] = grade
+        state.grades.pop(code, None)
+        if grade is not None:
+            state.grades[code] = str(grade)
         state.graded_stretches.pop(code, None)  # what was felt was another grade's
+    elif event.kind == "skipped":
+        state.skipped[code] = event
     elif event.kind == "complete":
         state.is_complete = True

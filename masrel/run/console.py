@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar, TextIO
 
 from masrel.errors import SessionStoppedError
 from masrel.protocol import PresentationRules
-from masrel.run._grade_sources import GradeRequest, StretchGrade
+from masrel.run._grade_sources import GradeRequest, Skip, StretchGrade
 from masrel.scales import Scale
 
 if TYPE_CHECKING:
@@ -125,7 +125,7 @@ class ConsoleGrades:
                     f"{answer!r} is not a grade: needed one of {grades}{rests}.\n"
                 )
 
-    def present_again(self, request: GradeRequest, fault: str) -> bool:
+    def present_again(self, request: GradeRequest, fault: str) -> bool | Skip:
         """Ask whether to present the model again after a fault.
 
         Parameters
@@ -137,8 +137,8 @@ class ConsoleGrades:
 
         Returns
         -------
-        bool
-            Whether to present it again.
+        bool or Skip
+            Whether to present it again; `Skip` when it is to have no grade.
 
         Raises
         ------
@@ -146,10 +146,16 @@ class ConsoleGrades:
             If the input ends.
         """
         self._say(f"The presentation was stopped: {fault}.\n")
+        choices = "yes, no, or skip and why" if request.may_skip else "yes, no"
         while True:
-            answer = self._ask(request, "Present it again? (yes, no): ").casefold()
-            if answer in ("yes", "y", "no", "n"):
-                return answer.startswith("y")
+            answer = self._ask(request, f"Present it again? ({choices}): ")
+            if answer.casefold() in ("yes", "y", "no", "n"):
+                return answer[0] in "yY"
+            word, _, why = answer.partition(" ")
+            if request.may_skip and word.casefold() == "skip":
+                if why.strip():
+                    return Skip(who=request.rater, why=why.strip())
+                self._say("To skip it needs a reason: skip the motor is hot.\n")
 
     def _ask(self, request: GradeRequest, question: str) -> str:
         self._say(question)

@@ -1,11 +1,11 @@
-"""Run one session, from its schedule to the last grade, and correct a grade in it.
+"""Run one session, from its schedule to the last grade; correct or skip one of it.
 
 Started again, a session goes on where its log ends: what has a grade keeps it, and
 what was presented but not graded is presented again and logged as another attempt.
 """
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from datetime import datetime
 from pathlib import Path
 
@@ -183,12 +183,14 @@ def record_correction(
     session: str,
     *,
     code: str,
-    grade: str,
+    grade: str | None,
     who: str,
     why: str,
     now: Callable[[], datetime] = utc_now,
 ) -> None:
     """Append a correction to a session's log; the first grade stays in it.
+
+    A presentation that has no grade, as one that was skipped, gets it so too: late.
 
     Parameters
     ----------
@@ -199,9 +201,9 @@ def record_correction(
     rater, session : str
         Whose session.
     code : str
-        The blinded code of a presentation that has a grade.
-    grade : str
-        What the grade should have been.
+        The blinded code of a presentation that was presented.
+    grade : str or None
+        What the grade should have been; None for a missing one.
     who, why : str
         Who corrects it, and for what reason.
     now : callable, optional
@@ -212,23 +214,82 @@ def record_correction(
     ParameterError
         If the grade is not of the scale, or `who` or `why` is blank.
     SessionLogError
-        If there is no such log, it is damaged, or the code has no grade.
+        If there is no such log, it is damaged, the code was not presented, or has
+        no grade to be taken away.
     OSError
         If the log cannot be written.
     """
-    if grade not in protocol.scale.grades:
+    if grade is not None and grade not in protocol.scale.grades:
         raise ParameterError(
             f"grade: needed one of {', '.join(protocol.scale.grades)}, got {grade!r}"
         )
     reasons = stated(who=who, why=why)
+    with _begun_log(study, rater, session, now) as log:
+        state = replay(log.path, log.events)
+        known = state.presented if grade is not None else state.grades
+        what = "was presented" if grade is not None else "has a grade"
+        _check_code(log.path, code, known, what)
+        log.append("correction", {"code": code, "grade": grade, **reasons})
+
+
+def record_skip(
+    study: StudyPaths,
+    rater: str,
+    session: str,
+    *,
+    code: str,
+    who: str,
+    why: str,
+    now: Callable[[], datetime] = utc_now,
+) -> None:
+    """Record that a presentation that a fault stopped is left without a grade.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is.
+    rater, session : str
+        Whose session.
+    code : str
+        The blinded code of a presentation whose last attempt a fault stopped.
+    who, why : str
+        Who says so, and for what reason.
+    now : callable, optional
+        Gives the time of day for the log, aware.
+
+    Raises
+    ------
+    ParameterError
+        If `who` or `why` is blank.
+    SessionLogError
+        If there is no such log, it is damaged, or no fault stopped the code last.
+    OSError
+        If the log cannot be written.
+    """
+    reasons = stated(who=who, why=why)
+    with _begun_log(study, rater, session, now) as log:
+        state = replay(log.path, log.events)
+        faulted = {
+            each: events[-1].fields["position"]
+            for each, events in state.presented.items()
+            if each not in state.settled and events[-1].fields["fault"] is not None
+        }
+        _check_code(log.path, code, faulted, "a fault stopped and is not skipped yet")
+        log.append("skipped", {"code": code, "position": faulted[code], **reasons})
+
+
+def _begun_log(
+    study: StudyPaths, rater: str, session: str, now: Callable[[], datetime]
+) -> SessionLog:
     path = study.log_file(rater, session)
     if not path.is_file():
         raise SessionLogError(f"{path}: no such session log")
-    with SessionLog.open(path, now=now) as log:
-        state = replay(path, log.events)
-        if code not in state.first_grades:
-            known = ", ".join(state.first_grades) or "none"
-            raise SessionLogError(
-                f"{path}: needed a code that has a grade ({known}), got {code!r}"
-            )
-        log.append("correction", {"code": code, "grade": grade, **reasons})
+    return SessionLog.open(path, now=now)
+
+
+def _check_code(path: Path, code: str, known: Iterable[str], what: str) -> None:
+    if code not in known:
+        raise SessionLogError(
+            f"{path}: needed a code that {what} ({', '.join(known) or 'none'}), "
+            f"got {code!r}"
+        )

@@ -33,8 +33,9 @@ class SessionRecord:
         Whose session.
     stage : {"not begun", "begun", "complete", "unreadable"}
         How far it came.
-    n_presentations, n_graded, n_corrections : int
-        Presentations of the schedule, those with a grade, and corrections.
+    n_presentations, n_graded, n_skipped, n_corrections : int
+        Presentations of the schedule, those with a grade, those skipped after a
+        fault, and corrections.
     n_recordings : int
         Recordings that the log names.
     """
@@ -44,6 +45,7 @@ class SessionRecord:
     stage: Stage
     n_presentations: int = 0
     n_graded: int = 0
+    n_skipped: int = 0
     n_corrections: int = 0
     n_recordings: int = 0
 
@@ -88,7 +90,8 @@ def check_session(
         rater=rater,
         stage="complete" if state.is_complete else "begun",
         n_presentations=len(schedule.presentations),
-        n_graded=len(state.first_grades),
+        n_graded=len(state.grades),
+        n_skipped=len(state.skipped),
         n_corrections=sum(event.kind == "correction" for event in events),
         n_recordings=len(presented),
     )
@@ -132,11 +135,11 @@ def _head_findings(
                 log, f"line 1: {name}: needed {value}, got {state.header[name]}"
             )
     n_presentations = len(schedule.presentations)
-    if state.is_complete and len(state.first_grades) != n_presentations:
+    if state.is_complete and len(state.settled) != n_presentations:
         yield broken(
             log,
-            f"is complete: needed {n_presentations} grades, "
-            f"got {len(state.first_grades)}",
+            f"is complete: needed {n_presentations} presentations graded or skipped, "
+            f"got {len(state.settled)}",
         )
 
 

@@ -59,7 +59,7 @@ def test_no_output_before_unblinding_names_a_model_to_a_rater(
         shown += call(monkeypatch, *where, *simulated, typed="\n")
     assert all(code in shown for code in codes[:2])
     assert "Grade of" in shown
-    assert "needed a code that has a grade" in shown
+    assert "needed a code that was presented" in shown
     assert not [name for _, name in NAMES if name in shown]
     # and the models are there to be named
     file.write_bytes(whole)

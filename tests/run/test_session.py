@@ -223,7 +223,7 @@ def test_a_person_decides_whether_to_try_again_after_a_fault(faulty: Small) -> N
     with pytest.raises(DeviceError, match="stopped by a fault"):
         run(faulty, source)
     assert events(faulty) == ["session", *["presented", "fault"] * 2]
-    assert said.getvalue().count("Present it again? (yes, no): ") == 3
+    assert said.getvalue().count("Present it again? (yes, no, or skip and why): ") == 3
 
 
 def contents(small: Small) -> dict[str, bytes]:
@@ -404,11 +404,12 @@ def test_a_correction_is_a_new_event_and_the_grade_stays(small: Small) -> None:
         ({"grade": "7"}, "grade: needed one of"),
         ({"who": " "}, "who: needed text"),
         ({"why": ""}, "why: needed text"),
-        ({"code": "nope"}, r"needed a code that has a grade \("),
+        ({"code": "nope"}, r"needed a code that was presented \("),
+        ({"code": "nope", "grade": None}, r"needed a code that has a grade \("),
     ],
 )
 def test_a_correction_needs_a_code_a_grade_a_person_and_a_reason(
-    small: Small, change: dict[str, str], message: str
+    small: Small, change: dict[str, str | None], message: str
 ) -> None:
     study, protocol = small
     run(small, ScriptGrades(["1", "1+", "3"]))

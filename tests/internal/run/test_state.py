@@ -28,6 +28,7 @@ A_SHOWN, A_GRADED = step("presented", code="A"), step("grade", code="A", grade="
 B_SHOWN, B_GRADED = step("presented", code="B"), step("grade", code="B", grade="2")
 FAULT = step("presented", code="A", fault="too fast")
 CORRECTED = step("correction", code="A", grade="3")
+TAKEN, SKIPPED = step("correction", code="A"), step("skipped", code="A")
 RECOVERED, DONE = step("recovered"), step("complete")
 
 
@@ -48,6 +49,18 @@ def test_the_last_correction_counts_also_after_the_end() -> None:
     assert (state.grades, state.is_complete) == ({"A": "4"}, True)
 
 
+def test_a_skipped_code_is_settled_and_may_get_its_grade_late() -> None:
+    state = replayed(BEGUN, FAULT, SKIPPED, DONE)
+    assert (state.grades, state.settled, state.is_complete) == ({}, {"A"}, True)
+    late = replayed(BEGUN, FAULT, SKIPPED, DONE, CORRECTED)
+    assert (late.first_grades, late.grades) == ({}, {"A": "3"})
+
+
+def test_a_correction_to_missing_takes_the_grade_away() -> None:
+    state = replayed(BEGUN, A_SHOWN, A_GRADED, TAKEN, B_SHOWN, CORRECTED, TAKEN)
+    assert (state.first_grades, state.grades) == ({"A": "1"}, {})
+
+
 def test_no_events_are_no_session() -> None:
     assert replayed() == SessionState()
 
@@ -63,8 +76,15 @@ def test_no_events_are_no_session() -> None:
         ([BEGUN, FAULT, A_GRADED], "line 3: grade: .* without fault before"),
         ([BEGUN, A_SHOWN, FAULT, A_GRADED], "line 4: grade: .* without fault"),
         ([BEGUN, A_SHOWN, A_GRADED, A_GRADED], "line 4: grade: needed one grade"),
-        ([BEGUN, A_SHOWN, A_GRADED, A_SHOWN], "line 4: presented: .* not graded yet"),
-        ([BEGUN, A_SHOWN, CORRECTED], "line 3: correction: needed a code that is"),
+        ([BEGUN, A_SHOWN, A_GRADED, A_SHOWN], "line 4: presented: .* neither gr"),
+        ([BEGUN, CORRECTED], "line 2: correction: needed a code that was presented"),
+        ([BEGUN, A_SHOWN, TAKEN], "line 3: correction: needed a code that has a gra"),
+        ([BEGUN, FAULT, SKIPPED, TAKEN], "line 4: correction: needed a code that has"),
+        ([BEGUN, SKIPPED], "line 2: skipped: needed a presentation of A that a fault"),
+        ([BEGUN, A_SHOWN, SKIPPED], "line 3: skipped: needed a presentation of A tha"),
+        ([BEGUN, FAULT, SKIPPED, SKIPPED], "line 4: skipped: .* nor skipped, got A"),
+        ([BEGUN, FAULT, SKIPPED, A_SHOWN], "line 4: presented: .* nor skipped, got A"),
+        ([BEGUN, FAULT, step("skipped", code="A", who=3)], "line 3: .* value of who"),
         ([BEGUN, DONE, A_SHOWN], "line 3: presented: needed no event but a corr"),
     ],
 )

@@ -1,0 +1,165 @@
+"""A presentation without a grade: skipped, corrected to missing, graded late."""
+
+import io
+from collections.abc import Callable
+
+import pytest
+from click.testing import CliRunner
+
+from masrel.cli import cli
+from masrel.errors import DeviceError, SessionLogError
+from masrel.protocol import Protocol, StudyPaths
+from masrel.ratings import ratings_from_logs, study_remarks
+from masrel.run import (
+    ConsoleGrades,
+    ScriptGrades,
+    SessionSummary,
+    read_log,
+    record_correction,
+    record_skip,
+    run_session,
+)
+from masrel.scales import MODIFIED_ASHWORTH
+from masrel.schedule import read_schedule
+from masrel.verification import verify_study
+
+Small = tuple[StudyPaths, Protocol]
+
+BY = {"who": "Kim", "why": "the motor is hot"}
+
+
+@pytest.fixture
+def faulty(new_study: Callable[..., Small]) -> Small:
+    """A study whose speed limit every stretch exceeds."""
+    limit = "[device]\nspeed_limit_deg_s = 30.0\n\n[schedule]"
+    return new_study(("[schedule]", limit))
+
+
+def run(small: Small, answers: str) -> tuple[SessionSummary, str]:
+    said = io.StringIO()
+    source = ConsoleGrades(
+        MODIFIED_ASHWORTH, answers=io.StringIO(answers), questions=said
+    )
+    summary = run_session(*small, "R1", "test", grades=source, clock="simulated")
+    return summary, said.getvalue()
+
+
+def codes(small: Small) -> list[str]:
+    schedule = read_schedule(small[0].schedule_file("R1", "test"))
+    return [shown.code for shown in schedule.presentations]
+
+
+def grades(small: Small) -> list[object]:
+    table = ratings_from_logs(*small).table
+    return [None if grade != grade else grade for grade in table["grade"]]
+
+
+def call(*words: object, code: int = 0) -> str:
+    result = CliRunner().invoke(cli, [str(word) for word in words])
+    assert result.exit_code == code, result.output
+    return result.output
+
+
+def test_a_person_skips_what_faults_and_the_session_becomes_complete(
+    faulty: Small,
+) -> None:
+    study, protocol = faulty
+    summary, said = run(faulty, "\nskip\nskip too fast\n" + "\nSKIP again\n" * 2)
+    assert "To skip it needs a reason" in said
+    assert (summary.n_presentations, summary.n_graded) == (3, 0)
+    log = read_log(study.log_file("R1", "test"))
+    assert [event.kind for event in log[1:]] == [
+        *["presented", "fault", "skipped"] * 3,
+        "complete",
+    ]
+    assert log[3].fields == {
+        **{"code": codes(faulty)[0], "position": 1},
+        **{"who": "R1", "why": "too fast"},
+    }
+    assert grades(faulty) == [None, None, None]
+    verification = verify_study(study)
+    assert not verification.findings
+    (record,) = (r for r in verification.sessions if r.stage == "complete")
+    assert (record.n_graded, record.n_skipped) == (0, 3)
+    remarks = study_remarks(study, protocol)
+    assert len(remarks) == 3
+    assert "skipped after a fault by R1: too fast. Its grade is missing" in remarks[0]
+    assert "complete, 0 of 3 graded, 3 skipped, 3 rec" in call("verify", study.root)
+
+
+def test_a_fault_is_skipped_later_and_its_grade_given_later_still(
+    faulty: Small,
+) -> None:
+    study, protocol = faulty
+    with pytest.raises(DeviceError):
+        run(faulty, "\nno\n")
+    first, second, _ = codes(faulty)
+    who = ("--rater", "R1", "--session", "test")
+    by = ("--who", "Kim", "--why", "too fast")
+    said = call("run", study.root, *who, "--skip", first, *by)
+    assert f"{first} of R1, session test, is skipped" in said
+    with pytest.raises(SessionLogError, match=r"and is not skipped yet \(none\)"):
+        record_skip(study, "R1", "test", code=first, **BY)
+    with pytest.raises(SessionLogError, match=r"was presented \(.*\), got"):
+        record_correction(*faulty, "R1", "test", code=second, grade="1", **BY)
+    _, said = run(faulty, "\nskip a\n\nskip b\n")
+    assert "Presentation 1 of 3" not in said
+    call("run", study.root, *who, "--correct", first, "--grade", "1+", *by)
+    assert grades(faulty) == ["1+", None, None]
+    assert len(study_remarks(study, protocol)) == 2
+    assert not verify_study(study).findings
+
+
+def test_a_grade_is_corrected_to_missing_and_back(small: Small) -> None:
+    study, _ = small
+    run_session(
+        *small, "R1", "test", grades=ScriptGrades(["1", "2", "3"]), clock="simulated"
+    )
+    first = codes(small)[0]
+    words = ("run", study.root, "--rater", "R1", "--session", "test")
+    correct = (*words, "--correct", first, "--who", "Kim", "--why", "wrong arm")
+    said = call(*correct, "--grade", "NA")
+    assert f"{first} of R1, session test, is now missing" in said
+    assert grades(small) == [None, "2", "3"]
+    with pytest.raises(SessionLogError, match="needed a code that has a grade"):
+        record_correction(*small, "R1", "test", code=first, grade=None, **BY)
+    assert not verify_study(study).findings
+    call(*correct, "--grade", "4")
+    assert grades(small) == ["4", "2", "3"]
+
+
+def test_what_was_presented_and_graded_late_is_not_presented_again(
+    small: Small,
+) -> None:
+    study, _ = small
+    words = ("run", small[0].root, "--rater", "R1", "--session", "test")
+    CliRunner().invoke(cli, [*map(str, words), "--clock", "simulated"], input="\nstop")
+    first = codes(small)[0]
+    record_correction(*small, "R1", "test", code=first, grade="2", **BY)
+    summary, said = run(small, "\n1\n\n3\n")
+    assert "Presentation 1 of 3" not in said
+    assert summary.n_graded == summary.n_presentations == 3
+    assert grades(small) == ["2", "1", "3"]
+    assert not verify_study(study).findings
+
+
+def test_a_graded_presentation_is_not_skipped(small: Small) -> None:
+    run_session(*small, "R1", "test", grades=ScriptGrades(["1"] * 3), clock="simulated")
+    with pytest.raises(SessionLogError, match="needed a code that a fault stopped"):
+        record_skip(small[0], "R1", "test", code=codes(small)[0], **BY)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--skip", "X"], "--skip needs --who and --why too"),
+        (["--skip", "X", "--grade", "1"], "--grade needs --correct CODE, not --skip"),
+        (["--skip", "X", "--correct", "X"], "are said one at a time"),
+        (["--skip", "X", "--rehearse"], "presents models, and --skip none"),
+    ],
+)
+def test_a_skip_that_makes_no_sense_is_refused(
+    small: Small, options: list[str], message: str
+) -> None:
+    who = ("--rater", "R1", "--session", "test")
+    assert message in call("run", small[0].root, *who, *options, code=2)
