@@ -170,11 +170,11 @@ def _run(
         what = "simulated" if grades == "simulated" else "simulated device"
         label = f" ({what})" if done.simulated else ""
         n_missing = done.n_presentations - done.n_graded
-        missing = f", {n_missing} missing," if n_missing else ""
+        without = f", {n_missing} missing," if n_missing else ""
         what = "the rehearsal of session" if done.rehearsal else "session"
         click.echo(
             f"{what} {done.session} of {done.rater} is complete: "
-            f"{done.n_graded} grades{label}{missing} in {done.log_file}"
+            f"{done.n_graded} grades{label}{without} in {done.log_file}"
             + ("; none is a rating of the study" if done.rehearsal else "")
         )
 
