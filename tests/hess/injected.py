@@ -70,8 +70,8 @@ N_STRETCHES = 3  # where there are many
 
 def later_s(stretch: int, speed_deg_s: float = 92.0) -> float:
     """Return how long after the first the simulated hand begins a stretch, s."""
-    # 118.5 deg there and, at 60 deg/s, back: each way its ramps, and a rest after it
-    there_and_back = 118.5 / speed_deg_s + 118.5 / 60.0 + 2.0 * (0.06 + 0.3)
+    # 118.5 deg there and, at 60 deg/s, back: half the ramps, and a rest after each
+    there_and_back = 118.5 / speed_deg_s + 0.06 + 118.5 / 60.0 + 0.1 + 2.0 * 0.3
     return round((stretch - 1) * there_and_back, 3)
 
 
