@@ -41,7 +41,7 @@ def report(
     same bytes.
     """
     from masrel.analysis import analyze
-    from masrel.ratings import study_remarks
+    from masrel.ratings import corrections_of, study_remarks
     from masrel.report import write_report
     from masrel.verification import anchors_of
 
@@ -68,6 +68,10 @@ def report(
             # of what is simulated none, so that it repeats byte for byte
             anchors=() if data.ratings.simulated else anchors_of(data.paths),
             remarks=study_remarks(data.paths, data.protocol, file=ratings_file),
+            # a table named by hand is not the logs'
+            corrections=corrections_of(data.paths, data.protocol)
+            if ratings_file is None
+            else (),
             progress=progress,
             raw_csv=output.raw_csv,
         )

@@ -9,7 +9,11 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from masrel.ratings._parts import RatingsPart, Repeated
-    from masrel.ratings.completeness import study_remarks
+    from masrel.ratings.completeness import (
+        Correction,
+        corrections_of,
+        study_remarks,
+    )
     from masrel.ratings.in_person import InPerson, InPersonRow, read_in_person
     from masrel.ratings.logs import ratings_from_logs
     from masrel.ratings.reader import RatingsFile, read_ratings
@@ -38,6 +42,7 @@ __all__ = [
     "DEFAULT_SESSION",
     "RATING_COLUMNS",
     "SOURCES",
+    "Correction",
     "InPerson",
     "InPersonRow",
     "RatingMatrix",
@@ -47,6 +52,7 @@ __all__ = [
     "Repeated",
     "RetestPairs",
     "StudyData",
+    "corrections_of",
     "in_person_of",
     "rating_matrix",
     "ratings_csv",
@@ -63,7 +69,7 @@ __all__ = [
 ]
 
 _HOMES = {
-    "completeness": ("study_remarks",),
+    "completeness": ("Correction", "corrections_of", "study_remarks"),
     "in_person": ("InPerson", "InPersonRow", "read_in_person"),
     "logs": ("ratings_from_logs",),
     "_parts": ("RatingsPart", "Repeated"),

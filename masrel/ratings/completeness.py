@@ -1,6 +1,7 @@
 """What a study's table of ratings leaves out, and what happened to the study."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 from masrel.errors import MasrelError
@@ -8,6 +9,91 @@ from masrel.protocol import Protocol, StudyPaths
 from masrel.run._conduct import read_conduct
 from masrel.run._log import Event, read_log
 from masrel.run._state import SessionState, replay
+from masrel.schedule import read_schedule
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Correction:
+    """A grade that was corrected, or given late.
+
+    Attributes
+    ----------
+    session, rater : str
+        Whose grade.
+    model : str
+        The model that was presented.
+    repeat : int
+        Which of its presentations in the session, from 1.
+    first_grade : str or None
+        What the rater gave; None where that was nothing.
+    grade : str or None
+        What it should have been; None for a missing one.
+    who, why : str
+        Who corrected it, and for what reason.
+    """
+
+    session: str
+    rater: str
+    model: str
+    repeat: int
+    first_grade: str | None
+    grade: str | None
+    who: str
+    why: str
+
+
+def corrections_of(study: StudyPaths, protocol: Protocol) -> tuple[Correction, ...]:
+    """Collect the corrections of a study from its session logs.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is.
+    protocol : Protocol
+        The study's protocol.
+
+    Returns
+    -------
+    tuple of Correction
+        Sessions and raters in the protocol's order, then in order of time.
+
+    Raises
+    ------
+    SessionLogError
+        If a log is damaged.
+    ScheduleError
+        If the schedule of a log is missing or damaged.
+    """
+    return tuple(
+        correction
+        for session in protocol.sessions
+        for rater in session.raters
+        if study.log_file(rater, session.id).exists()
+        for correction in _corrections(study, rater, session.id)
+    )
+
+
+def _corrections(study: StudyPaths, rater: str, session: str) -> Iterator[Correction]:
+    log = study.log_file(rater, session)
+    events = read_log(log)
+    corrected = [event.fields for event in events if event.kind == "correction"]
+    if not corrected:
+        return
+    state = replay(log, events)
+    schedule = read_schedule(study.schedule_file(rater, session))
+    shown = {each.code: each for each in schedule.presentations}
+    for fields in corrected:
+        code, grade = str(fields["code"]), fields["grade"]
+        yield Correction(
+            session=session,
+            rater=rater,
+            model=shown[code].model,
+            repeat=shown[code].repeat,
+            first_grade=state.first_grades.get(code),
+            grade=None if grade is None else str(grade),
+            who=str(fields["who"]),
+            why=str(fields["why"]),
+        )
 
 
 def study_remarks(

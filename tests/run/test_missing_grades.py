@@ -9,7 +9,7 @@ from click.testing import CliRunner
 from masrel.cli import cli
 from masrel.errors import DeviceError, SessionLogError
 from masrel.protocol import Protocol, StudyPaths
-from masrel.ratings import ratings_from_logs, study_remarks
+from masrel.ratings import Correction, corrections_of, ratings_from_logs, study_remarks
 from masrel.run import (
     ConsoleGrades,
     ScriptGrades,
@@ -126,6 +126,38 @@ def test_a_grade_is_corrected_to_missing_and_back(small: Small) -> None:
     assert not verify_study(study).findings
     call(*correct, "--grade", "4")
     assert grades(small) == ["4", "2", "3"]
+
+
+def test_corrections_are_in_the_report_and_only_if_there_are_any(
+    new_study: Callable[..., Small],
+) -> None:
+    brief = '[report]\nsections = ["design"]\n\n[schedule]'
+    study, protocol = new_study(("[schedule]", brief))
+    run_session(
+        *(study, protocol, "R1", "test"),
+        grades=ScriptGrades(["1", "2", "3"]),
+        clock="simulated",
+    )
+    call("report", study.root)
+    page = study.root / "report" / "report.md"
+    assert "Corrected grades" not in page.read_text(encoding="utf-8")
+    shown = read_schedule(study.schedule_file("R1", "test")).presentations[1]
+    for grade in (None, "4"):
+        where = (study, protocol, "R1", "test")
+        record_correction(*where, code=shown.code, grade=grade, **BY)
+    facts = {
+        **{"session": "test", "rater": "R1", "model": shown.model, "repeat": 1},
+        **{"first_grade": "2", **BY},
+    }
+    assert corrections_of(study, protocol) == (
+        Correction(grade=None, **facts),  # type: ignore[arg-type]
+        Correction(grade="4", **facts),  # type: ignore[arg-type]
+    )
+    call("report", study.root)
+    text = page.read_text(encoding="utf-8")
+    assert "Corrected grades" in text
+    (row,) = [row for row in text.splitlines() if "| 2 | 4 | Kim |" in row]
+    assert "the motor is hot" in row and shown.model in row
 
 
 def test_what_was_presented_and_graded_late_is_not_presented_again(
