@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from masrel.errors import MasrelError
+from masrel.errors import MasrelError, SessionLogError
 from masrel.protocol import Protocol, StudyPaths
 from masrel.run._conduct import read_conduct
 from masrel.run._log import Event, read_log
@@ -60,7 +60,7 @@ def corrections_of(study: StudyPaths, protocol: Protocol) -> tuple[Correction, .
     Raises
     ------
     SessionLogError
-        If a log is damaged.
+        If a log is damaged, or corrects a code that its schedule has not.
     ScheduleError
         If the schedule of a log is missing or damaged.
     """
@@ -84,6 +84,8 @@ def _corrections(study: StudyPaths, rater: str, session: str) -> Iterator[Correc
     shown = {each.code: each for each in schedule.presentations}
     for fields in corrected:
         code, grade = str(fields["code"]), fields["grade"]
+        if code not in shown:
+            raise SessionLogError(f"{log}: needed a code of the schedule, got {code!r}")
         yield Correction(
             session=session,
             rater=rater,
