@@ -106,7 +106,8 @@ def _correct(
         paths, protocol, rater, session, code=code, grade=corrected, who=who, why=why
     )
     what = "missing" if corrected is None else grade
-    return f"{code} of {rater}, session {session}, is now {what}; what was is in"
+    now = f"{code} of {rater}, session {session}, is now {what}"
+    return f"{now}; what it was before stays in"
 
 
 def _skip(

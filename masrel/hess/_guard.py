@@ -52,6 +52,7 @@ class Guard:
         "_angle",
         "_creep_angle",
         "_drift",
+        "_held_time",
         "_limits",
         "_moved_at",
         "_period",
@@ -65,9 +66,13 @@ class Guard:
         "dropouts",
     )
 
-    def __init__(self, limits: DeviceLimits, period_s: float) -> None:
+    def __init__(
+        self, limits: DeviceLimits, period_s: float, *, has_hand: bool = True
+    ) -> None:
+        # has_hand: whether a hand may hold the arm at rest
         self._limits = limits
         self._period = period_s
+        self._held_time = limits.standing_time * (_HELD_TIMES if has_hand else 1.0)
         self._time = -math.inf  # of the last reading, s
         self._angle = 0.0
         self._raw_speed = 0.0  # between the last two readings, rad/s
@@ -156,7 +161,7 @@ class Guard:
     def _not_held_for(self, duration_s: float) -> None:
         limits = self._limits
         was_held = -_CREEP_SPEED < self._speed < _CREEP_SPEED
-        longest = limits.standing_time * (_HELD_TIMES if was_held else 1.0)
+        longest = self._held_time if was_held else limits.standing_time
         if duration_s > longest:
             raise LimitExceededError(
                 f"standing torque: needs at most {limits.standing_torque:g} N·m on an "

@@ -215,7 +215,7 @@ class _TurningArm:
         self._watchdog = watchdog
         self._stop = stop
         self._estimate = VelocityEstimate()
-        self._guard = Guard(LIMITS, _PERIOD_NS * 1e-9)
+        self._guard = Guard(LIMITS, _PERIOD_NS * 1e-9, has_hand=False)
         self._start_ns = self._due_ns = self._sent_ns = clock.now_ns()
         self.angle = math.nan  # until it has been read
         self._velocity = 0.0
