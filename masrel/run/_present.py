@@ -32,6 +32,7 @@ from masrel.recording import (
     RECORDING_COLUMNS,
     Recording,
     _Fact,
+    _Facts,
     read_recording,
     write_recording,
 )
@@ -307,3 +308,35 @@ def _before(fault: Fault, recording: Recording) -> str:
         )
         lines.append(",".join(cells))
     return "\n".join(lines) + "\n"
+
+
+def presented_fields(outcome: Outcome, file: Path, folder: Path) -> dict[str, _Facts]:
+    """Return what a log says of every presentation, whatever it is for."""
+    fault, made = outcome.fault, outcome.made
+    facts = file.with_suffix(".json").read_bytes()
+    return {
+        "recording": file.relative_to(folder).as_posix(),
+        "sha256": outcome.sha256,
+        "facts_sha256": hashlib.sha256(facts).hexdigest(),
+        "mean_speed_deg_s": outcome.mean_speed_deg_s,
+        "n_missed_ticks": outcome.n_missed_ticks,
+        "fault": None if fault is None else fault.message,
+        "simulated": outcome.simulated,
+        "stretches": made.stretches,
+        "ended": outcome.ended,
+        "n_stretches": len(made.stretches),
+        "felt": made.felt if fault is None else None,
+        "r1_deg": made.r1_deg,
+        "r2_deg": made.r2_deg,
+    }
+
+
+def fault_fields(fault: Fault, outcome: Outcome) -> dict[str, _Facts]:
+    """Return what a log says of the fault that stopped a presentation."""
+    return {
+        "kind": fault.kind,
+        "words": fault.message,
+        "time_s": fault.time_s,
+        "torque_nm": fault.torque_nm,
+        "last_200_ms": outcome.last_200_ms,
+    }

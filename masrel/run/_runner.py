@@ -1,7 +1,6 @@
 """The runner of one session: present, ask for the grade, and log both at once."""
 
 import dataclasses
-import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,14 +15,16 @@ from masrel.errors import (
 )
 from masrel.hess import Clock, EmergencyStop, RealClock, SimulatedClock
 from masrel.protocol import Protocol, StudyPaths, presented_hash, protocol_hash
-from masrel.recording import _Fact
+from masrel.recording import _Fact, _Facts
 from masrel.run._conduct import stated
 from masrel.run._grade_sources import GradeRequest, GradeSource, Skip, StretchGrade
 from masrel.run._log import SessionLog
 from masrel.run._present import (
     Outcome,
+    fault_fields,
     present,
     presentation_status,
+    presented_fields,
     recover,
     spool_of,
 )
@@ -282,45 +283,17 @@ class SessionRunner:
     def _log_presented(
         self, request: GradeRequest, outcome: Outcome, file: Path
     ) -> None:
-        fault, made = outcome.fault, outcome.made
-        facts = file.with_suffix(".json").read_bytes()
+        fault = outcome.fault
         self._n_faults += fault is not None
-        fields: dict[str, _Fact] = {
+        fields: dict[str, _Facts] = {
             "code": request.presentation.code,
             "position": request.presentation.position,
             "attempt": request.attempt,
         }
-        self._log.append(
-            "presented",
-            {
-                **fields,
-                "recording": file.relative_to(self._study.sessions).as_posix(),
-                "sha256": outcome.sha256,
-                "facts_sha256": hashlib.sha256(facts).hexdigest(),
-                "mean_speed_deg_s": outcome.mean_speed_deg_s,
-                "n_missed_ticks": outcome.n_missed_ticks,
-                "fault": None if fault is None else fault.message,
-                "simulated": outcome.simulated,
-                "stretches": made.stretches,
-                "ended": outcome.ended,
-                "n_stretches": len(made.stretches),
-                "felt": made.felt if fault is None else None,
-                "r1_deg": made.r1_deg,
-                "r2_deg": made.r2_deg,
-            },
-        )
+        presented = presented_fields(outcome, file, self._study.sessions)
+        self._log.append("presented", {**fields, **presented})
         if fault is not None:
-            self._log.append(
-                "fault",
-                {
-                    **fields,
-                    "kind": fault.kind,
-                    "words": fault.message,
-                    "time_s": fault.time_s,
-                    "torque_nm": fault.torque_nm,
-                    "last_200_ms": outcome.last_200_ms,
-                },
-            )
+            self._log.append("fault", {**fields, **fault_fields(fault, outcome)})
         spool_of(file).unlink(missing_ok=True)  # only now is it of no use
 
     def _checked(

@@ -19,10 +19,18 @@ from masrel.errors import (
 )
 from masrel.hess import EmergencyStop
 from masrel.protocol import Protocol, StudyPaths, presented_hash, protocol_hash
-from masrel.recording import _Fact
+from masrel.recording import _Fact, _Facts
 from masrel.run._grade_sources import GradeRequest, GradeSource, StretchGrade
 from masrel.run._log import SessionLog, utc_now
-from masrel.run._present import Outcome, present, presentation_status, recover, spool_of
+from masrel.run._present import (
+    Outcome,
+    fault_fields,
+    present,
+    presentation_status,
+    presented_fields,
+    recover,
+    spool_of,
+)
 from masrel.run._runner import _TERMINATING, CLOCKS, ClockName
 from masrel.run._settings import moves_hardware
 from masrel.run.session import _check_device
@@ -323,30 +331,16 @@ class _Trainer:
     def _log_presented(
         self, request: GradeRequest, outcome: Outcome, file: Path
     ) -> None:
-        fault, made = outcome.fault, outcome.made
-        presentation = request.presentation
-        fields: dict[str, _Fact] = {
+        fault, presentation = outcome.fault, request.presentation
+        fields: dict[str, _Facts] = {
             "position": presentation.position,
             "attempt": request.attempt,
         }
-        self._log.append(
-            "presented",
-            {
-                **fields,
-                "model": presentation.model,
-                "recording": file.relative_to(self._study.training).as_posix(),
-                "sha256": outcome.sha256,
-                "mean_speed_deg_s": outcome.mean_speed_deg_s,
-                "n_missed_ticks": outcome.n_missed_ticks,
-                "fault": None if fault is None else fault.message,
-                "simulated": outcome.simulated,
-                "stretches": made.stretches,
-                "felt": made.felt if fault is None else None,
-            },
-        )
+        presented = presented_fields(outcome, file, self._study.training)
+        model: dict[str, _Facts] = {"model": presentation.model}
+        self._log.append("presented", {**fields, **model, **presented})
         if fault is not None:
-            facts: dict[str, _Fact] = {"kind": fault.kind, "words": fault.message}
-            self._log.append("fault", {**fields, **facts})
+            self._log.append("fault", {**fields, **fault_fields(fault, outcome)})
         spool_of(file).unlink(missing_ok=True)  # only now is it of no use
 
     def _checked(self, position: int, grade: str | StretchGrade | None) -> str | None:
