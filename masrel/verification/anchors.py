@@ -7,9 +7,9 @@ from pathlib import Path
 
 from masrel._files import write_file
 from masrel._input import MAX_TABLE, read_regular
-from masrel.errors import ParameterError
+from masrel.errors import ParameterError, SessionLogError
 from masrel.protocol import StudyPaths
-from masrel.run._log import line_hashes
+from masrel.run._log import line_hashes, read_log
 from masrel.verification._finding import Finding, broken
 
 _LINE = re.compile(r"([0-9a-f]{64})  (\d{1,9})  (\S.*)")
@@ -39,7 +39,7 @@ class Anchor:
 
 
 def anchors_of(study: StudyPaths) -> tuple[Anchor, ...]:
-    """Return an anchor for every log of a study that has a line.
+    """Return an anchor for every log of a study that has a line and a chain that holds.
 
     Parameters
     ----------
@@ -49,7 +49,8 @@ def anchors_of(study: StudyPaths) -> tuple[Anchor, ...]:
     Returns
     -------
     tuple of Anchor
-        Of the last whole line of each: of the study's conduct, then of every session.
+        Of the last line of each: of the study's conduct, then of every session. A log
+        whose chain does not hold has none.
 
     Raises
     ------
@@ -58,6 +59,10 @@ def anchors_of(study: StudyPaths) -> tuple[Anchor, ...]:
     """
     anchors = []
     for log in _logs(study):
+        try:
+            read_log(log)
+        except SessionLogError:
+            continue  # its last line says nothing of those before it
         hashes = line_hashes(log)
         if hashes:
             name = log.relative_to(study.root).as_posix()

@@ -150,7 +150,15 @@ def _checked(
 def _unnamed(study: StudyPaths, checked: list[CheckedSession]) -> Iterator[Finding]:
     # what lies in sessions/ and no log speaks for
     named = {path for of_session in checked for path in of_session.files}
+    # what a log that cannot be read names, nobody can say
+    unknown = {
+        study.log_file(of_session.record.rater, of_session.record.session)
+        for of_session in checked
+        if of_session.record.stage == "unreadable"
+    }
     for path in sorted(study.sessions.rglob("*")):
+        if path.parent.with_name(f"{path.parent.name}.jsonl") in unknown:
+            continue
         if path in named or (path.is_dir() and any(path.iterdir())):
             continue
         if path.name.endswith(".jsonl.torn") and path.with_suffix("") in named:

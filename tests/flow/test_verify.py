@@ -236,6 +236,14 @@ def test_a_forgery_that_leaves_the_chain_is_found(
     assert any(path == place or path.is_relative_to(place) for path in broken)
 
 
+def test_of_a_broken_chain_nothing_but_the_chain_is_said(study: StudyPaths) -> None:
+    log = a_line_changed(study)
+    broken = [f.path for f in verify_study(study).findings if f.weight == "broken"]
+    assert log in broken
+    assert not any(path.parent == log.with_suffix("") for path in broken)
+    assert f"sessions/{log.name}" not in {anchor.log for anchor in anchors_of(study)}
+
+
 @pytest.mark.parametrize(
     ("forge", "verb"),
     [
