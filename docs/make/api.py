@@ -20,6 +20,7 @@ MODULES = (
     "masrel.hess.puck",
     "masrel.protocol",
     "masrel.schedule",
+    "masrel.conduct",
     "masrel.run",
     "masrel.training",
     "masrel.ratings",

@@ -28,7 +28,7 @@ def unblind(
 
     It is an event of STUDY/conduct.jsonl, and the report says so.
     """
-    from masrel.run import record_unblinding
+    from masrel.conduct import record_unblinding
 
     if (code is None) != every:
         raise click.UsageError("needs either a CODE or --all")

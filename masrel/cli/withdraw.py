@@ -18,7 +18,7 @@ def withdraw(study: Path, rater: str, who: str, why: str) -> None:
     The rater stays in the protocol, the grades given before stay in the study and are
     counted, and the report says so. No session of the rater goes on.
     """
-    from masrel.run import record_withdrawal
+    from masrel.conduct import record_withdrawal
 
     paths = StudyPaths(study)
     record_withdrawal(paths, read_protocol(paths.protocol), rater, who=who, why=why)

@@ -4,10 +4,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from masrel._event_log import Event, read_log
+from masrel.conduct import read_conduct
 from masrel.errors import MasrelError, SessionLogError
 from masrel.protocol import Protocol, StudyPaths
-from masrel.run._conduct import read_conduct
-from masrel.run._log import Event, read_log
 from masrel.run._state import SessionState, replay
 from masrel.schedule import read_schedule
 

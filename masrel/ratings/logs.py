@@ -7,11 +7,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from masrel._event_log import Event, read_log
 from masrel._input import MAX_RECORDING, MAX_SMALL, read_regular
 from masrel.errors import RatingsError
 from masrel.protocol import Protocol, StudyPaths, scale_of
 from masrel.ratings.table import Ratings, ratings_from_rows
-from masrel.run._log import Event, read_log
 from masrel.run._state import SessionState, replay
 from masrel.schedule import Schedule, check_schedule, read_schedule
 

@@ -8,11 +8,7 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from masrel.run._conduct import (
-        read_conduct,
-        record_unblinding,
-        record_withdrawal,
-    )
+    from masrel._event_log import Event, SessionLog, read_log
     from masrel.run._grade_sources import (
         GradeRequest,
         GradeSource,
@@ -20,7 +16,6 @@ if TYPE_CHECKING:
         Skip,
         StretchGrade,
     )
-    from masrel.run._log import Event, SessionLog, read_log
     from masrel.run._runner import SessionSummary
     from masrel.run._settings import model_controller
     from masrel.run._simulated_raters import SimulatedGrades
@@ -39,35 +34,31 @@ __all__ = [
     "Skip",
     "StretchGrade",
     "model_controller",
-    "read_conduct",
     "read_log",
     "record_correction",
     "record_skip",
-    "record_unblinding",
-    "record_withdrawal",
     "run_session",
 ]
 
 _HOMES = {
-    "_grade_sources": (
+    "masrel.run._grade_sources": (
         "GradeRequest",
         "GradeSource",
         "ScriptGrades",
         "Skip",
         "StretchGrade",
     ),
-    "_log": ("Event", "SessionLog", "read_log"),
-    "_runner": ("SessionSummary",),
-    "_settings": ("model_controller",),
-    "_simulated_raters": ("SimulatedGrades",),
-    "_conduct": ("read_conduct", "record_unblinding", "record_withdrawal"),
-    "console": ("ConsoleGrades",),
-    "session": ("record_correction", "record_skip", "run_session"),
+    "masrel._event_log": ("Event", "SessionLog", "read_log"),
+    "masrel.run._runner": ("SessionSummary",),
+    "masrel.run._settings": ("model_controller",),
+    "masrel.run._simulated_raters": ("SimulatedGrades",),
+    "masrel.run.console": ("ConsoleGrades",),
+    "masrel.run.session": ("record_correction", "record_skip", "run_session"),
 }
 
 
 def __getattr__(name: str) -> object:
     for module, names in _HOMES.items():
         if name in names:
-            return getattr(importlib.import_module(f"masrel.run.{module}"), name)
+            return getattr(importlib.import_module(module), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

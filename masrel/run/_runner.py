@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import Literal
 
 import masrel
+from masrel._event_log import SessionLog
+from masrel.conduct._study_log import stated
 from masrel.errors import (
     DeviceError,
     ParameterError,
@@ -16,9 +18,7 @@ from masrel.errors import (
 from masrel.hess import Clock, EmergencyStop, RealClock, SimulatedClock
 from masrel.protocol import Protocol, StudyPaths, presented_hash, protocol_hash
 from masrel.recording import _Fact, _Facts
-from masrel.run._conduct import stated
 from masrel.run._grade_sources import GradeRequest, GradeSource, Skip, StretchGrade
-from masrel.run._log import SessionLog
 from masrel.run._present import (
     Outcome,
     fault_fields,

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
 
+from masrel._event_log import Event
 from masrel.errors import SessionLogError
-from masrel.run._log import Event
 
 if TYPE_CHECKING:
     from masrel.recording import _Facts  # loads numpy

@@ -9,7 +9,10 @@ from collections.abc import Callable, Iterable, Sequence
 from datetime import datetime
 from pathlib import Path
 
+from masrel._event_log import Event, SessionLog, utc_now
 from masrel._files import check_inside
+from masrel.conduct._study_log import stated
+from masrel.conduct._withdrawal import refuse_withdrawn
 from masrel.errors import (
     ParameterError,
     ProtocolError,
@@ -17,9 +20,7 @@ from masrel.errors import (
     SessionLogError,
 )
 from masrel.protocol import Protocol, StudyPaths
-from masrel.run._conduct import refuse_withdrawn, stated
 from masrel.run._grade_sources import GradeSource
-from masrel.run._log import Event, SessionLog, utc_now
 from masrel.run._present import spool_of
 from masrel.run._rehearsal import next_rehearsal, rehearsal_schedule
 from masrel.run._runner import CLOCKS, ClockName, SessionRunner, SessionSummary

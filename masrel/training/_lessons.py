@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from masrel._event_log import Event, read_log
 from masrel.errors import SessionLogError
 from masrel.protocol import Protocol, StudyPaths, presented_hash
-from masrel.run._log import Event, read_log
 from masrel.training._criterion import Criterion, training_criterion
 
 if TYPE_CHECKING:

@@ -10,6 +10,7 @@ from datetime import datetime
 from pathlib import Path
 
 import masrel
+from masrel._event_log import SessionLog, utc_now
 from masrel.errors import (
     DeviceError,
     ParameterError,
@@ -21,7 +22,6 @@ from masrel.hess import EmergencyStop
 from masrel.protocol import Protocol, StudyPaths, presented_hash, protocol_hash
 from masrel.recording import _Fact, _Facts
 from masrel.run._grade_sources import GradeRequest, GradeSource, StretchGrade
-from masrel.run._log import SessionLog, utc_now
 from masrel.run._present import (
     Outcome,
     fault_fields,

@@ -8,10 +8,10 @@ from datetime import datetime
 from pathlib import Path
 from typing import Literal
 
+from masrel._event_log import Event, read_log
 from masrel._input import MAX_RECORDING, MAX_SMALL, parse_json, read_regular
 from masrel.errors import SessionLogError
 from masrel.protocol import Protocol, StudyPaths
-from masrel.run._log import Event, read_log
 from masrel.run._state import SessionState, replay
 from masrel.schedule import Presentation, Schedule
 from masrel.verification._finding import Finding, broken, doubt

@@ -5,11 +5,11 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from masrel._event_log import line_hashes, read_log
 from masrel._files import write_file
 from masrel._input import MAX_TABLE, read_regular
 from masrel.errors import ParameterError, SessionLogError
 from masrel.protocol import StudyPaths
-from masrel.run._log import line_hashes, read_log
 from masrel.verification._finding import Finding, broken
 
 _LINE = re.compile(r"([0-9a-f]{64})  (\d{1,9})  (\S.*)")

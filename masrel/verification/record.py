@@ -4,9 +4,9 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from masrel.conduct import read_conduct
 from masrel.errors import ProtocolError, ScheduleError, SessionLogError
 from masrel.protocol import Protocol, StudyPaths, read_protocol
-from masrel.run._conduct import read_conduct
 from masrel.schedule import read_schedule, schedule_problems
 from masrel.verification._finding import Finding, broken, doubt
 from masrel.verification._outputs import output_findings

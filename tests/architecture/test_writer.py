@@ -10,7 +10,7 @@ PACKAGE = Path(masrel.__file__).parent
 
 WRITERS = {
     "_files.py",
-    "run/_log.py",  # lines are added to a log
+    "_event_log.py",  # lines are added to a log
     "hess/_spool.py",  # samples while they are taken
     "ratings/_typed_files.py",  # a temporary file for a library that reads no bytes
 }

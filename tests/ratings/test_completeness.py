@@ -8,18 +8,14 @@ import pytest
 from click.testing import CliRunner
 
 from masrel.cli import cli
+from masrel.conduct import record_unblinding, record_withdrawal
 from masrel.protocol import Protocol, StudyPaths, read_protocol
 from masrel.ratings import (
     ratings_from_logs,
     study_remarks,
     write_ratings,
 )
-from masrel.run import (
-    SimulatedGrades,
-    record_unblinding,
-    record_withdrawal,
-    run_session,
-)
+from masrel.run import SimulatedGrades, run_session
 from tests.run.conftest import PROTOCOL
 from tests.schedule.studies import with_secret
 

@@ -4,16 +4,10 @@ import json
 
 import pytest
 
+from masrel.conduct import read_conduct, record_unblinding, record_withdrawal
 from masrel.errors import ParameterError, ScheduleError, SessionLogError
 from masrel.protocol import Protocol, StudyPaths
-from masrel.run import (
-    ScriptGrades,
-    read_conduct,
-    record_correction,
-    record_unblinding,
-    record_withdrawal,
-    run_session,
-)
+from masrel.run import ScriptGrades, record_correction, run_session
 from masrel.schedule import read_schedule
 
 Small = tuple[StudyPaths, Protocol]

@@ -1,0 +1,99 @@
+"""The log of a study: what happened beside its sessions, event after event.
+
+``conduct.jsonl`` is a chain of events as a session log is one.
+"""
+
+from collections.abc import Callable, Mapping
+from datetime import datetime
+from typing import TYPE_CHECKING
+
+import masrel
+from masrel._event_log import Event, SessionLog, read_log, utc_now
+from masrel.errors import ParameterError, SessionLogError
+from masrel.protocol import Protocol, StudyPaths
+
+if TYPE_CHECKING:
+    from masrel.recording import _Fact  # loads numpy
+
+_FORMAT = 1
+
+_EVENTS = {
+    "conduct": ("format", "study", "masrel_version"),
+    "withdrawn": ("rater", "who", "why"),
+    "unblinded": ("rater", "session", "code", "who", "why"),
+    "recovered": ("line", "n_bytes", "sha256", "kept", "moved_to"),
+}
+"""Every kind of event with the fields it has."""
+
+_SHOWN = ("withdrawn", "unblinded")
+
+
+def read_conduct(study: StudyPaths) -> tuple[Event, ...]:
+    """Read what happened to a study beside its sessions, and verify its chain.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is.
+
+    Returns
+    -------
+    tuple of Event
+        In order of time: ``"withdrawn"`` with `rater`, `who` and `why`, and
+        ``"unblinded"`` with `rater`, `session`, `code`, `who` and `why`, where None
+        stands for all. Empty when nothing happened.
+
+    Raises
+    ------
+    SessionLogError
+        If the log is damaged or holds what is no such event.
+    """
+    path = study.conduct_file
+    if not path.exists():
+        return ()
+    return tuple(e for e in _checked(study, read_log(path)) if e.kind in _SHOWN)
+
+
+def append_event(
+    study: StudyPaths,
+    protocol: Protocol,
+    kind: str,
+    fields: "Mapping[str, _Fact]",
+    *,
+    now: Callable[[], datetime] = utc_now,
+) -> None:
+    """Append an event to the log of a study; the first one comes after a head."""
+    with SessionLog.open(study.conduct_file, now=now) as log:
+        _checked(study, log.events)
+        if not any(event.kind == "conduct" for event in log.events):
+            head: dict[str, _Fact] = {
+                "format": _FORMAT,
+                "study": protocol.study.id,
+                "masrel_version": masrel.__version__,
+            }
+            log.append("conduct", head)
+        log.append(kind, fields)
+
+
+def stated(**texts: str) -> dict[str, str]:
+    """Return the texts without blanks around them; refuse one that is blank."""
+    for name, text in texts.items():
+        if not text.strip():
+            raise ParameterError(f"{name}: needed text, got none")
+    return {name: text.strip() for name, text in texts.items()}
+
+
+def _checked(study: StudyPaths, events: tuple[Event, ...]) -> tuple[Event, ...]:
+    """Return the events of a log of conduct; refuse any other."""
+    for event in events:
+        where = f"{study.conduct_file}: line {event.line}"
+        if event.kind not in _EVENTS:
+            raise SessionLogError(
+                f"{where}: needed an event of {', '.join(_EVENTS)}, got {event.kind!r}"
+            )
+        if set(event.fields) != set(_EVENTS[event.kind]):
+            raise SessionLogError(
+                f"{where}: {event.kind}: needed the fields "
+                f"{', '.join(_EVENTS[event.kind])}, got {', '.join(event.fields)}"
+            )
+    return events
