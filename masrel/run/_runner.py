@@ -1,51 +1,24 @@
 """The runner of one session: present, ask for the grade, and log both at once."""
 
-import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import masrel
 from masrel._event_log import SessionLog
 from masrel.conduct._study_log import stated
-from masrel.errors import (
-    DeviceError,
-    ParameterError,
-    SessionLogError,
-    SessionStoppedError,
-)
-from masrel.hess import Clock, EmergencyStop, RealClock, SimulatedClock
+from masrel.errors import SessionLogError
 from masrel.protocol import Protocol, StudyPaths, presented_hash, protocol_hash
-from masrel.recording import _Fact, _Facts
-from masrel.run._grade_sources import GradeRequest, GradeSource, Skip, StretchGrade
-from masrel.run._present import (
-    Outcome,
-    fault_fields,
-    present,
-    presentation_status,
-    presented_fields,
-    recover,
-    spool_of,
-)
+from masrel.recording import _Fact
+from masrel.run._grade_sources import GradeRequest, GradeSource, Skip
+from masrel.run._presenter import ClockName, Presenter
 from masrel.run._rehearsal import RehearsalPaths
 from masrel.run._settings import moves_hardware
 from masrel.run._state import SessionState, replay
 from masrel.schedule import Presentation, Schedule
 
-ClockName = Literal["real", "simulated"]
-
-CLOCKS: dict[str, Callable[[], Clock]] = {
-    "real": RealClock,
-    "simulated": SimulatedClock,
-}
-"""The clocks a control loop can run on, by name."""
-
 _FORMAT = 2
 _FORMATS = (1, _FORMAT)  # a session begun with one of these is finished as it was begun
-
-# Emergency stops by somebody who wants the process to end; Ctrl-C may be a rater's.
-_TERMINATING = ("signal SIGTERM", "signal SIGHUP")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,8 +79,14 @@ class SessionRunner:
         self._log = log
         self._state: SessionState = replay(log.path, log.events)
         self._n_graded_before = len(self._state.grades)
-        self._n_again = 0
-        self._n_faults = 0
+        self._presenter = Presenter(
+            protocol,
+            grades,
+            clock,
+            log,
+            occasion=f"session {schedule.session} of {schedule.rater}",
+            named_by=("code", "position"),
+        )
 
     @property
     def _is_simulated(self) -> bool:
@@ -172,8 +151,8 @@ class SessionRunner:
             n_presentations=len(schedule.presentations),
             n_graded=len(replay(self._log.path, self._log.events).grades),
             n_graded_before=self._n_graded_before,
-            n_again=self._n_again,
-            n_faults=self._n_faults,
+            n_again=self._presenter.n_again,
+            n_faults=self._presenter.n_faults,
             simulated=self._is_simulated,
             rehearsal=self._is_rehearsal,
             log_file=self._log.path,
@@ -184,11 +163,7 @@ class SessionRunner:
             "code": presentation.code,
             "position": presentation.position,
         }
-        try:
-            grade = self._until_graded(presentation)
-        except SessionStoppedError as error:
-            self._log.append("stopped", {**fields, "why": str(error)})
-            raise
+        grade = self._presenter.rate(self._request(presentation))
         if isinstance(grade, Skip):
             reasons = stated(who=grade.who, why=grade.why)
             self._log.append("skipped", {**fields, **reasons})
@@ -197,121 +172,14 @@ class SessionRunner:
             "grade", {**fields, "grade": grade.grade, "stretch": grade.stretch}
         )
 
-    def _until_graded(self, presentation: Presentation) -> StretchGrade | Skip:
-        before = self._state.presented.get(presentation.code, [])
-        for event in before:  # a process may have died between the log and this
-            file = self._study.sessions / str(event.fields["recording"])
-            spool_of(file).unlink(missing_ok=True)
-        attempt = len(before)
-        n_faults, grade = 0, None
-        attempt += self._recovered(self._request(presentation, attempt + 1, 0))
-        while grade is None:
-            attempt += 1
-            request = self._request(presentation, attempt, n_faults)
-            status = presentation_status(self._protocol, request)
-            request = dataclasses.replace(request, status=status)
-            self._grades.make_ready(request)
-            outcome = self._present(request)
-            fault, made = outcome.fault, outcome.made
-            n_faults = 0 if fault is None else n_faults + 1
-            request = dataclasses.replace(
-                request,
-                status=None,
-                n_faults=n_faults,
-                n_stretches=len(made.stretches),
-                felt=made.felt if fault is None else None,
-            )
-            if fault is None:
-                grade = self._checked(request, self._grades.grade(request))
-                continue
-            answer = self._grades.present_again(request, fault.message)
-            if isinstance(answer, Skip):
-                return answer
-            if not answer:
-                raise DeviceError(
-                    f"session {request.session} of {request.rater}: presentation "
-                    f"{presentation.position}, code {presentation.code}, was stopped "
-                    f"by a fault: {fault.message}"
-                )
-        return grade
-
-    def _request(
-        self, presentation: Presentation, attempt: int, n_faults: int
-    ) -> GradeRequest:
+    def _request(self, presentation: Presentation) -> GradeRequest:
         return GradeRequest(
             rater=self._schedule.rater,
             session=self._schedule.session,
             presentation=presentation,
             n_presentations=len(self._schedule.presentations),
-            attempt=attempt,
-            n_faults=n_faults,
+            attempt=1,
             rehearsal=self._is_rehearsal,
             rules=self._protocol.presentation,
             may_skip=True,
         )
-
-    def _file(self, request: GradeRequest) -> Path:
-        code = request.presentation.code
-        file = self._study.recording_file(request.rater, request.session, code)
-        if request.attempt > 1:
-            return file.with_name(f"{code}-{request.attempt}.npz")
-        return file
-
-    def _recovered(self, request: GradeRequest) -> bool:
-        # Whether a process died while it presented this, and its data are now logged
-        file = self._file(request)
-        outcome = recover(self._protocol, request, file=file)
-        if outcome is not None:
-            self._log_presented(request, outcome, file)
-        return outcome is not None
-
-    def _present(self, request: GradeRequest) -> Outcome:
-        file = self._file(request)
-        # A new one each time, so that the simulated clock starts at zero.
-        clock, stop = CLOCKS[self._clock](), EmergencyStop()
-        outcome = present(self._protocol, request, clock=clock, file=file, stop=stop)
-        self._n_again += request.attempt > 1
-        self._log_presented(request, outcome, file)
-        if stop.reason in _TERMINATING:
-            raise SessionStoppedError(
-                f"session {request.session} of {request.rater} was stopped by "
-                f"{stop.reason} at presentation {request.presentation.position}; "
-                "the same command goes on there"
-            )
-        return outcome
-
-    def _log_presented(
-        self, request: GradeRequest, outcome: Outcome, file: Path
-    ) -> None:
-        fault = outcome.fault
-        self._n_faults += fault is not None
-        fields: dict[str, _Facts] = {
-            "code": request.presentation.code,
-            "position": request.presentation.position,
-            "attempt": request.attempt,
-        }
-        presented = presented_fields(outcome, file, self._study.sessions)
-        self._log.append("presented", {**fields, **presented})
-        if fault is not None:
-            self._log.append("fault", {**fields, **fault_fields(fault, outcome)})
-        spool_of(file).unlink(missing_ok=True)  # only now is it of no use
-
-    def _checked(
-        self, request: GradeRequest, grade: str | StretchGrade | None
-    ) -> StretchGrade | None:
-        if grade is None:
-            return None
-        if isinstance(grade, str):
-            grade = StretchGrade(grade=grade)
-        grades, code = self._protocol.scale.grades, request.presentation.code
-        if grade.grade not in grades:
-            raise ParameterError(
-                f"grade of {code}: needed one of {', '.join(grades)}, "
-                f"got {grade.grade!r}"
-            )
-        stretch, n_stretches = grade.stretch, request.n_stretches
-        if stretch is not None and not 1 <= stretch <= n_stretches:
-            raise ParameterError(
-                f"stretch of {code}: needed one of {n_stretches}, from 1, got {stretch}"
-            )
-        return grade

@@ -22,8 +22,9 @@ from masrel.errors import (
 from masrel.protocol import Protocol, StudyPaths
 from masrel.run._grade_sources import GradeSource
 from masrel.run._present import spool_of
+from masrel.run._presenter import CLOCKS, ClockName
 from masrel.run._rehearsal import next_rehearsal, rehearsal_schedule
-from masrel.run._runner import CLOCKS, ClockName, SessionRunner, SessionSummary
+from masrel.run._runner import SessionRunner, SessionSummary
 from masrel.run._settings import (
     check_backend,
     check_button,

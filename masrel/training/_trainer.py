@@ -7,31 +7,14 @@ import secrets
 from collections.abc import Callable
 from dataclasses import asdict, replace
 from datetime import datetime
-from pathlib import Path
 
 import masrel
 from masrel._event_log import SessionLog, utc_now
-from masrel.errors import (
-    DeviceError,
-    ParameterError,
-    ProtocolError,
-    SessionLogError,
-    SessionStoppedError,
-)
-from masrel.hess import EmergencyStop
+from masrel.errors import ParameterError, ProtocolError, SessionLogError
 from masrel.protocol import Protocol, StudyPaths, presented_hash, protocol_hash
-from masrel.recording import _Fact, _Facts
-from masrel.run._grade_sources import GradeRequest, GradeSource, StretchGrade
-from masrel.run._present import (
-    Outcome,
-    fault_fields,
-    present,
-    presentation_status,
-    presented_fields,
-    recover,
-    spool_of,
-)
-from masrel.run._runner import _TERMINATING, CLOCKS, ClockName
+from masrel.recording import _Fact
+from masrel.run._grade_sources import GradeRequest, GradeSource, Skip
+from masrel.run._presenter import ClockName, Presenter
 from masrel.run._settings import moves_hardware
 from masrel.run.session import _check_device
 from masrel.schedule import Presentation
@@ -161,6 +144,15 @@ class _Trainer:
         self._grades = grades
         self._clock = clock
         self._log = log
+        self._presenter = Presenter(
+            protocol,
+            grades,
+            clock,
+            log,
+            occasion=f"training of {rater}",
+            named_by=("position",),
+            known_by=("model",),  # it has no schedule that says so
+        )
         self._intended = {
             model.id: model.intended_grade
             for model in protocol.models
@@ -244,53 +236,21 @@ class _Trainer:
             rater=self._rater,
         )
         position = len(record.lessons) + 1
-        try:
-            grade = self._until_graded(position, model)
-        except SessionStoppedError as error:
-            self._log.append("stopped", {"position": position, "why": str(error)})
-            raise
+        grade = self._presenter.rate(self._request(position, model))
+        if isinstance(grade, Skip):  # no training can do without a grade
+            raise ParameterError(
+                f"grade of presentation {position}: needed one, got that it is skipped"
+            )
         lesson = Lesson(
             position=position,
             model=model,
             intended=self._intended[model],
-            grade=grade,
+            grade=grade.grade,
         )
         self._log.append("grade", asdict(lesson))
         return lesson
 
-    def _until_graded(self, position: int, model: str) -> str:
-        attempt = sum(
-            event.kind == "presented" and event.fields["position"] == position
-            for event in self._log.events
-        )
-        n_faults, grade = 0, None
-        attempt += self._recovered(self._request(position, model, attempt + 1))
-        while grade is None:
-            attempt += 1
-            request = self._request(position, model, attempt)
-            status = presentation_status(self._protocol, request)
-            request = replace(request, status=status, n_faults=n_faults)
-            self._grades.make_ready(request)
-            outcome = self._present(request)
-            fault, made = outcome.fault, outcome.made
-            n_faults = 0 if fault is None else n_faults + 1
-            request = replace(
-                request,
-                status=None,
-                n_faults=n_faults,
-                n_stretches=len(made.stretches),
-                felt=made.felt if fault is None else None,
-            )
-            if fault is None:
-                grade = self._checked(position, self._grades.grade(request))
-            elif not self._grades.present_again(request, fault.message):
-                raise DeviceError(
-                    f"training of {self._rater}: presentation {position} was stopped "
-                    f"by a fault: {fault.message}"
-                )
-        return grade
-
-    def _request(self, position: int, model: str, attempt: int) -> GradeRequest:
+    def _request(self, position: int, model: str) -> GradeRequest:
         return GradeRequest(
             rater=self._rater,
             session=_SESSION,
@@ -298,61 +258,9 @@ class _Trainer:
                 position=position, code=f"{position:03d}", model=model, repeat=position
             ),
             n_presentations=self._protocol.training.max_presentations,
-            attempt=attempt,
+            attempt=1,
             rules=self._protocol.presentation,
         )
-
-    def _file(self, request: GradeRequest) -> Path:
-        again = f"-{request.attempt}" if request.attempt > 1 else ""
-        name = f"{request.presentation.code}{again}.npz"
-        return self._log.path.with_suffix("") / name
-
-    def _recovered(self, request: GradeRequest) -> bool:
-        # Whether a process died while it presented this, and its data are now logged
-        file = self._file(request)
-        outcome = recover(self._protocol, request, file=file)
-        if outcome is not None:
-            self._log_presented(request, outcome, file)
-        return outcome is not None
-
-    def _present(self, request: GradeRequest) -> Outcome:
-        file = self._file(request)
-        clock, stop = CLOCKS[self._clock](), EmergencyStop()
-        outcome = present(self._protocol, request, clock=clock, file=file, stop=stop)
-        self._log_presented(request, outcome, file)
-        if stop.reason in _TERMINATING:
-            raise SessionStoppedError(
-                f"training of {self._rater} was stopped by {stop.reason} at "
-                f"presentation {request.presentation.position}; the same command goes "
-                "on there"
-            )
-        return outcome
-
-    def _log_presented(
-        self, request: GradeRequest, outcome: Outcome, file: Path
-    ) -> None:
-        fault, presentation = outcome.fault, request.presentation
-        fields: dict[str, _Facts] = {
-            "position": presentation.position,
-            "attempt": request.attempt,
-        }
-        presented = presented_fields(outcome, file, self._study.training)
-        model: dict[str, _Facts] = {"model": presentation.model}
-        self._log.append("presented", {**fields, **model, **presented})
-        if fault is not None:
-            self._log.append("fault", {**fields, **fault_fields(fault, outcome)})
-        spool_of(file).unlink(missing_ok=True)  # only now is it of no use
-
-    def _checked(self, position: int, grade: str | StretchGrade | None) -> str | None:
-        if isinstance(grade, StretchGrade):
-            grade = grade.grade
-        grades = self._protocol.scale.grades
-        if grade is not None and grade not in grades:
-            raise ParameterError(
-                f"grade of presentation {position}: needed one of {', '.join(grades)}, "
-                f"got {grade!r}"
-            )
-        return grade
 
 
 def _has_passed(record: TrainingRecord) -> bool:

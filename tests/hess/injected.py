@@ -31,7 +31,7 @@ from masrel.protocol import Protocol, StudyPaths, read_protocol
 from masrel.recording import read_recording
 from masrel.run import SimulatedGrades, model_controller, read_log, run_session
 from masrel.run import _present as presenting
-from masrel.run._runner import CLOCKS
+from masrel.run._presenter import CLOCKS
 from masrel.schedule import write_schedules
 
 from . import faults as f

@@ -14,7 +14,7 @@ from pathlib import Path
 from masrel.hess import SimulatedClock
 from masrel.protocol import StudyPaths, read_protocol
 from masrel.run import SimulatedGrades, run_session
-from masrel.run._runner import CLOCKS
+from masrel.run._presenter import CLOCKS
 
 FILE_CALLS = ("write", "fsync", "replace", "ftruncate")
 

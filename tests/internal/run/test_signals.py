@@ -7,7 +7,7 @@ import pytest
 from masrel.errors import SessionStoppedError
 from masrel.hess import SimulatedClock
 from masrel.run import SimulatedGrades, read_log
-from masrel.run._runner import CLOCKS
+from masrel.run._presenter import CLOCKS
 from tests.run.test_session import Small, events, run
 
 
