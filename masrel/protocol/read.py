@@ -19,6 +19,7 @@ from masrel.elbow.identification._model_file import (
 from masrel.elbow.parameters import ElbowParameters
 from masrel.errors import ProtocolError
 from masrel.protocol._decode import decode_table, got
+from masrel.protocol._published_scale import spell_out_scale
 from masrel.protocol._rules import broken_rules, joint_rules, kind_rules
 from masrel.protocol.content import _joint_of
 from masrel.protocol.definition import ElbowConstants, Model, Protocol
@@ -68,9 +69,13 @@ def read_protocol(path: Path) -> Protocol:
     """
     resolved = _resolve_model_files(_read_toml(path), path.parent)
     raw = resolved.raw
-    decoded = decode_table(raw, Protocol)
-    # A model whose file could not be used lacks its keys for that reason alone.
+    # A model whose file could not be used lacks its keys for that reason alone; so
+    # does a protocol its scale.
     unread = tuple(f"models[{index}]." for index in resolved.unread)
+    if (problem := spell_out_scale(raw)) is not None:
+        resolved.problems.append(problem)
+        unread += ("scale:",)
+    decoded = decode_table(raw, Protocol)
     of_content = (
         problem
         for problem in chain(decoded.problems, broken_rules(decoded.values))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, ClassVar, TextIO
 from masrel.errors import SessionStoppedError
 from masrel.protocol import PresentationRules
 from masrel.run._grade_sources import GradeRequest, Skip, StretchGrade
-from masrel.scales import Scale
+from masrel.scales import PublishedScale, Scale, published_scale
 
 if TYPE_CHECKING:
     from masrel.hess import PresentationStatus  # loads numpy
@@ -21,8 +21,8 @@ class ConsoleGrades:
     """A person at the console, who is told positions and blinded codes only.
 
     The words ``again`` and ``stop`` in place of a grade present the model again and
-    stop the session. After more than one stretch, ``1+ 2`` is the grade 1+ that rests
-    on stretch 2.
+    stop the session; a ``?`` says what the grades of a scale of the literature mean.
+    After more than one stretch, ``1+ 2`` is the grade 1+ that rests on stretch 2.
 
     Parameters
     ----------
@@ -45,6 +45,7 @@ class ConsoleGrades:
         questions: TextIO | None = None,
     ) -> None:
         self._scale = scale
+        self._published = published_scale(scale)
         self._answers = sys.stdin if answers is None else answers
         self._questions = sys.stdout if questions is None else questions
 
@@ -100,14 +101,17 @@ class ConsoleGrades:
             self._say(
                 "That was too slow to feel the catch: once more? Then say again.\n"
             )
-        rests = ""
+        rests, meanings = (
+            "",
+            "" if self._published is None else "; ? for their meanings",
+        )
         if n_stretches > 1:
             rests = f", and the stretch it rests on, 1 to {n_stretches}, if any"
         while True:
             answer = self._ask(
                 request,
                 f"Grade of {request.presentation.code} ({grades}{rests}; again; "
-                "stop): ",
+                f"stop{meanings}): ",
             )
             if answer in self._scale.grades:
                 return answer
@@ -115,6 +119,9 @@ class ConsoleGrades:
                 return None
             if answer == "stop":
                 raise _stopped(request, "on request")
+            if answer == "?" and self._published is not None:
+                self._say(_meanings_in_words(self._scale, self._published))
+                continue
             grade, _, stretch = answer.rpartition(" ")
             if grade.strip() in self._scale.grades and stretch in map(
                 str, range(1, n_stretches + 1)
@@ -170,6 +177,17 @@ class ConsoleGrades:
     def _say(self, text: str) -> None:
         self._questions.write(text)
         self._questions.flush()
+
+
+def _meanings_in_words(scale: Scale, published: PublishedScale) -> str:
+    # where the words of a scale are, and in short what each grade means
+    words = f"{published.title}. Its own words: {published.source}.\n"
+    lines = [
+        f"  {grade:3} {published.meanings[grade]}\n"
+        for grade in scale.grades
+        if grade in published.meanings
+    ]
+    return words + ("In short, in masrel's words:\n" if lines else "") + "".join(lines)
 
 
 def _instruction(rules: PresentationRules) -> str:

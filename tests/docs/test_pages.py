@@ -12,7 +12,7 @@ import msgspec
 import pytest
 
 from docs.make.pages import ROOT, Block, PageError, pages, read, renewed
-from masrel.protocol import DeviceSettings, Model
+from masrel.protocol import DeviceSettings, Model, ScaleDefinition
 from tests.architecture.test_names import DIALECT, PREFIXES, bound
 from tests.protocol.documents import VALID
 
@@ -44,6 +44,7 @@ NOT_RUN = [
 PIECES = {
     "device": (DeviceSettings, {}),
     "models": (Model, VALID["models"][0]),
+    "scale": (ScaleDefinition, {}),
 }
 
 

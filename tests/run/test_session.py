@@ -477,3 +477,13 @@ def test_a_sensor_is_recorded_with_noise_of_its_own_each_time(
         measured.append(recording.columns[MEASURED_TORQUE.column][:20].tolist())
     assert len(measured) == 3
     assert all(one != other for one, other in pairwise(measured))
+
+
+def test_a_question_mark_says_what_the_grades_mean(small: Small) -> None:
+    source, said = console("\n?\n1\n\n2\n\n3\n")
+    run(small, source)
+    text = said.getvalue()
+    assert "stop; ? for their meanings): " in text
+    assert "  1+  tone slightly up: a catch, then" in text
+    assert "Phys Ther 1987" in text
+    assert "is not a grade" not in text
