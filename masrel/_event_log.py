@@ -223,25 +223,26 @@ class SessionLog:
         """
         make_folder(path.parent, mode=0o700)  # recordings in it name their models
         descriptor = no_follow(str(path), os.O_RDWR | os.O_CREAT)
+        # It closes its descriptor once, also when the disk refuses what is recovered.
+        log = cls(path, descriptor, [], _FIRST_PREVIOUS, now)
         try:
             _lock(descriptor, path)
             sync_folder(path.parent)  # also of a log that a dead process made
-            return cls._recover(path, descriptor, now)
+            log._recover(descriptor)
         except BaseException:
-            os.close(descriptor)
+            log.close()
             raise
+        return log
 
-    @classmethod
-    def _recover(cls, path: Path, descriptor: int, now: Callable[[], datetime]) -> Self:
-        data = _read(path)
+    def _recover(self, descriptor: int) -> None:
+        data = _read(self.path)
         lines, torn = _split_lines(data)
-        events = list(_verify(path, lines))
-        previous = _line_hash(lines[-1]) if lines else _FIRST_PREVIOUS
-        log = cls(path, descriptor, events, previous, now)
+        self._events += _verify(self.path, lines)
+        if lines:
+            self._previous = _line_hash(lines[-1])
         os.lseek(descriptor, len(data) - len(torn), os.SEEK_SET)
         if torn:
-            log._take_in(torn, len(lines) + 1)
-        return log
+            self._take_in(torn, len(lines) + 1)
 
     def _take_in(self, torn: bytes, line: int) -> None:
         facts: dict[str, _Fact] = {

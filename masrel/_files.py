@@ -127,15 +127,16 @@ def _new_part(
     return part, descriptor
 
 
+def is_part(path: Path) -> bool:
+    """Return whether a file is one that is not whole yet, by its name."""
+    return path.name.startswith(_PART_BEGINS) and path.name.endswith(_PART_ENDS)
+
+
 def _remove_left_over(folder: Path) -> None:
     """Take away parts of processes that died: no file takes a day to write."""
     with contextlib.suppress(OSError):  # of what another process took away
         for path in folder.iterdir():
-            if (
-                path.name.startswith(_PART_BEGINS)
-                and path.name.endswith(_PART_ENDS)
-                and path.lstat().st_mtime < time.time() - _LONGEST_S
-            ):
+            if is_part(path) and path.lstat().st_mtime < time.time() - _LONGEST_S:
                 path.unlink()
 
 

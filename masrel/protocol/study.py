@@ -1,10 +1,11 @@
 """Where the files of a study are, and copying a bundled study as a new one."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import masrel
-from masrel._files import write_files
+from masrel._files import is_part, write_files
 from masrel.errors import ParameterError
 
 
@@ -139,6 +140,8 @@ def template_names() -> tuple[str, ...]:
 def copy_template(name: str, destination: Path) -> None:
     """Copy a bundled study into a new or empty folder, its protocol last.
 
+    A copy that was killed leaves no protocol, and the same call again completes it.
+
     Parameters
     ----------
     name : str
@@ -158,15 +161,31 @@ def copy_template(name: str, destination: Path) -> None:
         raise ParameterError(f"study: needed one of {known}, got {name!r}")
     if destination.exists() and not destination.is_dir():
         raise ParameterError(f"{destination}: needed a new or empty folder, got a file")
-    if destination.is_dir() and (held := sorted(p.name for p in destination.iterdir())):
+    # Contents only: an installed file may be read-only, a study is edited.
+    sources = {destination / part: _home() / name / part for part in _BUNDLED}
+    contents = {to: of.read_bytes() for to, of in sources.items() if of.is_file()}
+    if held := _foreign_names(destination, contents):
         raise ParameterError(
             f"{destination}: needed a new or empty folder, got one that holds {held[0]}"
             + (f" and {len(held) - 1} more" if len(held) > 1 else "")
         )
-    # Contents only: an installed file may be read-only, a study is edited.
-    sources = {destination / part: _home() / name / part for part in _BUNDLED}
-    contents = {to: of.read_bytes() for to, of in sources.items() if of.is_file()}
     write_files(contents, within=destination)
+
+
+def _foreign_names(folder: Path, contents: Mapping[Path, bytes]) -> list[str]:
+    """Return what a folder holds beside what a copy that was killed has left."""
+    if not folder.is_dir():
+        return []
+    begun = not StudyPaths(folder).protocol.exists()  # which a copy writes last
+    folders = {path.parent for path in contents if begun and path.parent.is_dir()}
+    return [
+        path.name
+        for inside in sorted(folders | {folder})
+        for path in sorted(inside.iterdir())
+        if path not in folders
+        and not is_part(path)
+        and not (begun and path in contents and path.read_bytes() == contents[path])
+    ]
 
 
 def _home() -> Path:

@@ -9,6 +9,7 @@ import msgspec
 
 from masrel.protocol import Protocol, StudyPaths
 from masrel.schedule import Schedule, draw_schedule
+from masrel.schedule._secret import find_secret, new_secret
 
 _COMPLETE = b'{"event": "complete"'  # how the last line of a finished log begins
 
@@ -33,27 +34,37 @@ class RehearsalPaths(StudyPaths):
         return self.sessions / f"rehearsal_{session}_{rater}" / f"{code}.npz"
 
 
-def next_rehearsal(study: StudyPaths, rater: str, session: str) -> RehearsalPaths:
+def begin_rehearsal(
+    study: StudyPaths, protocol: Protocol, rater: str, session: str
+) -> tuple[RehearsalPaths, Schedule, str]:
     """Return the rehearsal that is not finished, or a new one."""
-    paths = RehearsalPaths(study.root, 1)
-    while _is_complete(paths.log_file(rater, session)):
-        paths = RehearsalPaths(study.root, paths.number + 1)
-    return paths
+    # Its folder, an order and codes that no session has, and their hash
+    secret = find_secret(study) or new_secret(study)
+    number = 0
+    while True:
+        number += 1
+        paths = RehearsalPaths(study.root, number)
+        schedule = _draw(protocol, rater, session, number, secret)
+        shown = [[p.code, p.model, p.repeat] for p in schedule.presentations]
+        checksum = hashlib.sha256(json.dumps(shown).encode()).hexdigest()
+        if not _is_over(paths.log_file(rater, session), checksum):
+            return paths, schedule, checksum
 
 
-def _is_complete(log: Path) -> bool:
-    return log.exists() and _COMPLETE in log.read_bytes()
+def _is_over(log: Path, checksum: str) -> bool:
+    """Return whether a log is complete, or of another draw: of another secret, say."""
+    data = log.read_bytes() if log.exists() else b""
+    is_begun = b"\n" in data
+    return is_begun and (_COMPLETE in data or checksum.encode() not in data)
 
 
-def rehearsal_schedule(
-    protocol: Protocol, rater: str, session: str, number: int
-) -> tuple[Schedule, str]:
-    """Draw an order and codes that no session has, and return them with their hash."""
+def _draw(
+    protocol: Protocol, rater: str, session: str, number: int, secret: bytes
+) -> Schedule:
     name = json.dumps([protocol.schedule.seed, "rehearsal", number])
     seed = int.from_bytes(hashlib.sha256(name.encode()).digest()[:8], "big") >> 1
-    scheme = msgspec.structs.replace(protocol.schedule, seed=seed)
-    drawn = draw_schedule(
-        msgspec.structs.replace(protocol, schedule=scheme), rater, session
+    scheme = msgspec.structs.replace(
+        protocol.schedule, seed=seed, scheme="random-order"
     )
-    shown = json.dumps([[p.code, p.model, p.repeat] for p in drawn.presentations])
-    return drawn, hashlib.sha256(shown.encode()).hexdigest()
+    of_rehearsal = msgspec.structs.replace(protocol, schedule=scheme)
+    return draw_schedule(of_rehearsal, rater, session, secret=secret)

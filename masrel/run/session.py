@@ -23,7 +23,7 @@ from masrel.protocol import Protocol, StudyPaths
 from masrel.run._grade_sources import GradeSource
 from masrel.run._present import spool_of
 from masrel.run._presenter import CLOCKS, ClockName
-from masrel.run._rehearsal import next_rehearsal, rehearsal_schedule
+from masrel.run._rehearsal import begin_rehearsal
 from masrel.run._runner import SessionRunner, SessionSummary
 from masrel.run._settings import (
     check_backend,
@@ -107,9 +107,8 @@ def run_session(
     _check_device(clock, protocol)
     refuse_withdrawn(study, rater)
     if rehearsal:
-        study = next_rehearsal(study, rater, session)
-        number = study.number
-        schedule, checksum = rehearsal_schedule(protocol, rater, session, number)
+        begun = begin_rehearsal(study, protocol, rater, session)
+        study, schedule, checksum = begun
     else:
         schedule, checksum = _drawn_schedule(study, protocol, rater, session)
     log_file = study.log_file(rater, session)

@@ -150,6 +150,11 @@ def test_a_full_disk_at_any_call_of_what_computes(
     full_at_each_call(verb, 8, prepared, masrel, tmp_path)
 
 
+def is_done(verb: str, root: Path) -> bool:
+    # a study that is there is not made again
+    return verb == "init" and (root / "protocol.toml").exists()
+
+
 def each_syscall(verb: str, share: float, prepared: Prepared, tmp_path: Path) -> None:
     # Kills the process before every call, or a seeded share of the calls.
     if shutil.which("strace") is None:
@@ -170,9 +175,9 @@ def each_syscall(verb: str, share: float, prepared: Prepared, tmp_path: Path) ->
         check_old_or_new(before, [contents(root)], after)
         check_links(root)
         # and the same call again does it all, whatever the kill left
-        if verb != "init":
+        if not is_done(verb, root):
             assert CliRunner().invoke(cli, call).exit_code == 0
-            assert contents(root) == after
+        assert contents(root) == after
 
 
 @pytest.mark.slow

@@ -68,6 +68,27 @@ def test_a_folder_that_holds_anything_is_refused_and_left_alone(tmp_path: Path) 
     assert contents(tmp_path) == {".hidden": b"mine"}
 
 
+def test_a_copy_that_was_killed_is_completed(tmp_path: Path) -> None:
+    copy_template("hess2012", tmp_path / "whole")
+    whole = contents(tmp_path / "whole")
+    half = tmp_path / "half"
+    (half / "ratings").mkdir(parents=True)
+    (half / "README.md").write_bytes(whole["README.md"])
+    (half / "ratings" / ".masrel-0123456789abcdef.part").write_text("half of it")
+    copy_template("hess2012", half)
+    (half / "ratings" / ".masrel-0123456789abcdef.part").unlink()
+    assert contents(half) == whole
+    with pytest.raises(ParameterError, match=r"got one that holds README\.md and"):
+        copy_template("hess2012", half)
+
+
+def test_a_folder_that_another_study_was_begun_in_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "ratings").mkdir()
+    (tmp_path / "ratings" / "published.csv").write_text("mine")
+    with pytest.raises(ParameterError, match=r"got one that holds published\.csv"):
+        copy_template("hess2012", tmp_path)
+
+
 def test_a_file_in_the_place_of_the_folder_is_refused(tmp_path: Path) -> None:
     (tmp_path / "study").write_text("mine")
     with pytest.raises(ParameterError, match="empty folder, got a file"):

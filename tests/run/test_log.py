@@ -220,6 +220,29 @@ def test_after_a_failed_write_nothing_follows_on_the_line(
     assert [event.kind for event in read_log(path)] == ["grade", "recovered", "grade"]
 
 
+@pytest.mark.parametrize("call", ["write", "fsync", "ftruncate"])
+def test_a_full_disk_during_the_recovery_closes_the_log_once(
+    call: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = filled(tmp_path / "a.jsonl", 2)
+    path.write_bytes(path.read_bytes()[:-10])
+    torn = path.read_bytes()
+
+    def full_disk(descriptor: int, *_: object) -> int:
+        if os.path.samestat(os.fstat(descriptor), path.stat()):
+            raise OSError(28, "No space left on device")
+        return 0
+
+    monkeypatch.setattr(os, call, full_disk)
+    with pytest.raises(OSError, match="No space left"):
+        SessionLog.open(path, now=noon)
+    monkeypatch.undo()
+    if call == "write":
+        assert path.read_bytes() == torn
+    SessionLog.open(path, now=noon).close()
+    assert [event.kind for event in read_log(path)][-1] == "recovered"
+
+
 def test_a_log_has_one_writer(tmp_path: Path) -> None:
     with (
         SessionLog.open(tmp_path / "a.jsonl"),

@@ -302,3 +302,31 @@ def test_a_rehearsal_that_was_stopped_is_gone_on_with(small: Small) -> None:
     summary = run(small, console("\n2\n\n3\n")[0], rehearsal=True)
     assert (summary.n_graded_before, summary.rehearsal) == (1, True)
     assert summary.log_file.parent.name == "1"
+
+
+def rehearsed(small: Small) -> list[object]:
+    # the codes of a whole rehearsal, in order
+    log = run(small, SimulatedGrades(small[1]), rehearsal=True).log_file
+    return [e.fields["code"] for e in read_log(log) if e.kind == "grade"]
+
+
+def test_a_rehearsal_is_drawn_from_the_secret(small: Small, tmp_path: Path) -> None:
+    other = (StudyPaths(tmp_path / "other"), small[1])
+    same = (StudyPaths(tmp_path / "same"), small[1])
+    shutil.copytree(small[0].root, same[0].root)
+    other[0].root.mkdir()  # it draws a secret of its own
+    codes = rehearsed(small)
+    assert rehearsed(same) == codes
+    assert rehearsed(other) != codes
+    assert other[0].secret_file.is_file()
+
+
+def test_a_rehearsal_of_another_secret_is_left_and_another_begun(small: Small) -> None:
+    with pytest.raises(RuntimeError, match="presentation 2 of 3"):
+        run(small, console("\n1\n\nstop\n")[0], rehearsal=True)
+    before = small[0].root / "rehearsals" / "1" / "rehearsal_test_R1.jsonl"
+    lines = before.read_bytes()
+    small[0].published_secret_file.unlink()
+    summary = run(small, SimulatedGrades(small[1]), rehearsal=True)
+    assert (summary.n_graded_before, summary.log_file.parent.name) == (0, "2")
+    assert before.read_bytes() == lines
