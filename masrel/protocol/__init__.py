@@ -4,6 +4,8 @@ Goes in: ``protocol.toml``. Comes out: a :class:`Protocol`, and from it the scal
 the joint parameters of each model in SI units, and two hashes.
 """
 
+from masrel.protocol._occasions import Occasions
+from masrel.protocol._questions import Question, Questionnaire
 from masrel.protocol.content import (
     elbow_parameters,
     joint_model,
@@ -41,8 +43,11 @@ __all__ = [
     "EstimatePlan",
     "Model",
     "ModelConstants",
+    "Occasions",
     "PresentationRules",
     "Protocol",
+    "Question",
+    "Questionnaire",
     "Rater",
     "Report",
     "ScaleDefinition",

@@ -10,6 +10,8 @@ import msgspec
 from masrel._input import listed
 from masrel.protocol._decode import got, needed, with_id
 from masrel.protocol._kinds import DEFAULT_KIND, kind_problem, value_problems
+from masrel.protocol._occasions import occasion_rules
+from masrel.protocol._questions import question_rules
 from masrel.protocol.definition import Model, PresentationRules
 
 Values = dict[str, Any]
@@ -40,6 +42,8 @@ def broken_rules(values: Values) -> Iterator[str]:
         _device(values),
         _presentation(values),
         _training(values),
+        occasion_rules(values),
+        question_rules(values),
         kind_rules(values),
         joint_rules(values),
         _plan(values),
@@ -76,7 +80,8 @@ def _scale(values: Values) -> Iterator[str]:
 
 def _ids(values: Values) -> Iterator[str]:
     # ids that no file system takes for one: to some, R1 and r1 are the same name
-    arrays = {key: _entries(values, key) for key in ("models", "raters", "sessions")}
+    keys = ("models", "raters", "sessions", "questionnaires")
+    arrays = {key: _entries(values, key) for key in keys}
     analysis = values.get("analysis") or {}
     arrays["analysis.estimates"] = _entries(analysis, "estimates")
     for key, entries in arrays.items():

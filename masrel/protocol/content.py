@@ -137,6 +137,7 @@ _PRESENTED = (
     "schedule",
     "stretch",
     "presentation",
+    "occasions",
     "device",
 )
 """The tables that decide what a rater meets, besides the study's id."""
@@ -155,6 +156,13 @@ _LATER: dict[str, dict[str, object]] = {
         "slow_speed_deg_s": 10.0,
         "fast_speed_deg_s": 120.0,
         "done_with": "enter",
+    },
+    "occasions": {
+        "instructions": "",
+        "practice": (),
+        "break_after": None,
+        "break_minutes": 5.0,
+        "resume": "always",
     },
     "device": {
         "active_torque_limit_nm": 10.0,
@@ -187,6 +195,17 @@ _LATER: dict[str, dict[str, object]] = {
 """Keys that protocols once had not, by table, with the defaults they then had: these
 do not enter, so that no schedule drawn before turns stale."""
 
+
+_LATER_ARRAYS = ("questionnaires",)
+"""Arrays of tables that protocols once had not: empty, they do not enter."""
+
+_LATER_OF_SESSIONS: dict[str, object] = {
+    "after": None,
+    "at_least_days": None,
+    "at_most_days": None,
+    "order_policy": "refuse",
+}
+"""Keys of sessions that do not enter where they are these."""
 
 _ABSENT: dict[str, object] = {
     "file": None,
@@ -230,8 +249,8 @@ def presented_hash(protocol: Protocol) -> str:
     -------
     str
         SHA-256, 64 hexadecimal digits, of the study's id and the tables
-        ``scale``, ``elbow``, ``models``, ``schedule``, ``stretch``, ``presentation``
-        and ``device``.
+        ``scale``, ``elbow``, ``models``, ``schedule``, ``stretch``, ``presentation``,
+        ``occasions`` (practice and breaks alone) and ``device``.
 
     Notes
     -----
@@ -256,6 +275,9 @@ def presented_content(protocol: Protocol) -> bytes:
         UTF-8, keys sorted, no spaces: what :func:`presented_hash` hashes.
     """
     tables = {name: getattr(protocol, name) for name in _PRESENTED}
+    tables["occasions"] = msgspec.structs.replace(
+        protocol.occasions, instructions="", resume="always"
+    )
     tables["device"] = msgspec.structs.replace(protocol.device, torque_sensor=False)
     content = {"study": protocol.study.id, **tables}
     return _canonical(content, ignored=("file", "simulated"))  # numbers are felt
@@ -268,15 +290,29 @@ def _canonical(content: object, ignored: tuple[str, ...] = ()) -> bytes:
         _drop_defaults(model, plain["elbow"])
         for key in ignored:
             model.pop(key, None)
+    _drop_later(plain)
+    return msgspec.json.encode(plain, order="sorted")
+
+
+def _drop_later(plain: dict[str, Any]) -> None:
+    # takes out what protocols once had not, where it says nothing
+    for session in plain.get("sessions", ()):
+        _drop(session, _LATER_OF_SESSIONS)
+    for array in _LATER_ARRAYS:
+        if not plain.get(array, True):
+            del plain[array]
     for table, defaults in _LATER.items():
         if table not in plain:
             continue
-        for key, default in defaults.items():
-            if plain[table][key] == default:
-                del plain[table][key]
+        _drop(plain[table], defaults)
         if not plain[table]:
             del plain[table]
-    return msgspec.json.encode(plain, order="sorted")
+
+
+def _drop(table: dict[str, Any], absent: dict[str, object]) -> None:
+    for key, value in absent.items():
+        if table[key] == value:
+            del table[key]
 
 
 def _drop_defaults(model: dict[str, Any], elbow: dict[str, Any]) -> None:
@@ -290,6 +326,4 @@ def _drop_defaults(model: dict[str, Any], elbow: dict[str, Any]) -> None:
     for key, values in (("constants", constants), ("parameters", parameters)):
         if values:
             model[key] = values
-    for key, absent in _ABSENT.items():
-        if model[key] == absent:
-            del model[key]
+    _drop(model, _ABSENT)

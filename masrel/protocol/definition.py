@@ -7,26 +7,22 @@ Every field has its unit in its name, its range in its type, and its meaning in
 import sys
 from typing import Annotated, Literal
 
-import msgspec
 from msgspec import Meta
 
 from masrel.elbow.parameters import PostCatch, ResidualReading
 from masrel.estimates import Target
+from masrel.protocol._keys import _Identifier, _Table, _Text
+from masrel.protocol._occasions import Occasions
+from masrel.protocol._questions import Questionnaire
 
 # TOML has inf and nan, no key of a protocol does: every float here has its limits.
 _LARGEST = sys.float_info.max
 
-_Identifier = Annotated[str, Meta(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,31}\Z")]
-_Text = Annotated[str, Meta(min_length=1)]
 _Angle = Annotated[float, Meta(gt=0, le=180)]
 _RestAngle = Annotated[float, Meta(ge=0, le=180)]
 _Positive = Annotated[float, Meta(gt=0, le=_LARGEST)]
 _Finite = Annotated[float, Meta(ge=-_LARGEST, le=_LARGEST)]
 _NonNegative = Annotated[float, Meta(ge=0, le=_LARGEST)]
-
-
-class _Table(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A table of the protocol file; unknown keys are errors."""
 
 
 class Study(_Table, frozen=True, kw_only=True):
@@ -96,7 +92,7 @@ class Model(_Table, frozen=True, kw_only=True):
     file: _Text | None = None
     simulated: bool = False
     constants: ModelConstants = ModelConstants()
-    parameters: dict[str, _Finite] = {}
+    parameters: dict[str, _Finite] = {}  # noqa: RUF012 - msgspec makes each its own
 
 
 class Rater(_Table, frozen=True, kw_only=True):
@@ -112,6 +108,10 @@ class Session(_Table, frozen=True, kw_only=True):
     id: _Identifier
     raters: Annotated[tuple[str, ...], Meta(min_length=1)]
     note: str = ""
+    after: str | None = None
+    at_least_days: Annotated[int, Meta(ge=0, le=36_500)] | None = None
+    at_most_days: Annotated[int, Meta(ge=0, le=36_500)] | None = None
+    order_policy: Literal["refuse", "warn"] = "refuse"
 
 
 class ScheduleScheme(_Table, frozen=True, kw_only=True):
@@ -288,6 +288,8 @@ class Protocol(_Table, frozen=True, kw_only=True):
     schedule: ScheduleScheme
     stretch: Stretch = Stretch()
     presentation: PresentationRules = PresentationRules()
+    occasions: Occasions = Occasions()
+    questionnaires: tuple[Questionnaire, ...] = ()
     device: DeviceSettings = DeviceSettings()
     simulated_raters: SimulatedRaters = SimulatedRaters()
     training: Training = Training()

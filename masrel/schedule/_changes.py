@@ -38,7 +38,7 @@ def _changes(protocol: Protocol, file: Path, sha256: str) -> str:
     if hashlib.sha256(drawn).hexdigest() != sha256:
         return (
             "a key of the study id, scale, elbow, models, schedule, stretch, "
-            "presentation or device has changed"
+            "presentation, occasions or device has changed"
         )
     before, now = (
         dict(_leaves(json.loads(text))) for text in (drawn, presented_content(protocol))

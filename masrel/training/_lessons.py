@@ -190,7 +190,7 @@ def record_of(
         raise SessionLogError(
             f"{path}: needed the training of the models that the protocol has now, "
             "got one from before a change in its study id, scale, elbow, models, "
-            "schedule, stretch or device"
+            "schedule, stretch, presentation, occasions or device"
         )
     ended = [event.fields for event in events if event.kind == "complete"]
     return TrainingRecord(

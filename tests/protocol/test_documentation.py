@@ -23,6 +23,9 @@ TABLES = {
     "[schedule]": definition.ScheduleScheme,
     "[stretch]": definition.Stretch,
     "[presentation]": definition.PresentationRules,
+    "[occasions]": definition.Occasions,
+    "[[questionnaires]]": definition.Questionnaire,
+    "[[questionnaires.questions]]": definition.Question,
     "[device]": definition.DeviceSettings,
     "[simulated_raters]": definition.SimulatedRaters,
     "[training]": definition.Training,
@@ -65,7 +68,8 @@ def test_every_key_is_there_with_its_default(heading: str) -> None:
 def test_every_table_of_a_protocol_is_there() -> None:
     names = {heading.strip("[]") for heading in TABLES}
     fields = {field.name for field in msgspec.structs.fields(Protocol)}
-    assert names == fields | {"analysis.estimates", "models.constants"}
+    inner = {"analysis.estimates", "models.constants", "questionnaires.questions"}
+    assert names == fields | inner
 
 
 def test_the_default_sections_are_all_but_in_person() -> None:

@@ -15,6 +15,15 @@ from masrel.protocol import (
 )
 from tests.protocol.documents import VALID, changed, write
 
+QUESTIONNAIRE = {
+    "id": "realism",
+    "title": "Realism",
+    "when": "session",
+    "questions": [
+        {"id": "score", "text": "How real?", "type": "whole", "low": 1, "high": 10}
+    ],
+}
+
 
 def hashes(document: dict[str, Any], folder: Path) -> tuple[str, str]:
     protocol = read_protocol(write(document, folder))
@@ -51,6 +60,8 @@ def test_comments_layout_order_and_defaults_do_not_enter(tmp_path: Path) -> None
         (("presentation",), {"stretches": "free"}),
         (("presentation",), {"stretches": 3}),
         (("presentation",), {"stretches": ["slow", "fast"]}),
+        (("occasions",), {"practice": ["D1"]}),
+        (("occasions",), {"break_after": 1}),
         (("device", "torque_limit_nm"), 19.0),
     ],
 )
@@ -70,6 +81,9 @@ def test_what_a_rater_meets_enters_both(
         (("sessions", 1, "note"), "later"),
         (("analysis", "level"), 0.9),
         (("training",), {"window": 40}),
+        (("occasions",), {"instructions": "Hold the wrist.", "resume": "ask"}),
+        (("sessions", 1, "after"), "test"),
+        (("questionnaires",), [QUESTIONNAIRE]),
         (("device",), {"torque_sensor": True}),
         (("report", "title"), "Another"),
     ],
@@ -164,6 +178,14 @@ def test_one_stretch_is_what_protocols_always_had(tmp_path: Path) -> None:
     before = hashes(VALID, tmp_path)
     said = {"stretches": 1, "stretch_limit_s": 20.0, "done_with": "enter"}
     assert hashes(changed("presentation", to=said), tmp_path) == before
+
+
+def test_occasions_at_their_defaults_are_no_change(tmp_path: Path) -> None:
+    before = hashes(VALID, tmp_path)
+    document = changed("occasions", to={"practice": [], "resume": "always"})
+    document["questionnaires"] = []
+    document["sessions"][1]["order_policy"] = "refuse"
+    assert hashes(document, tmp_path) == before
 
 
 def test_a_model_that_says_what_all_follow_is_no_change(tmp_path: Path) -> None:

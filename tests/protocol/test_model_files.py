@@ -159,6 +159,7 @@ def test_a_protocol_without_files_has_the_hash_it_had_before_there_were_any() ->
     protocol = msgspec.structs.replace(
         read_protocol(folder / "hess2012" / "protocol.toml"),
         presentation=PresentationRules(),  # as it was then
+        questionnaires=(),
     )
     content = msgspec.to_builtins(protocol)
     for model in content["models"]:
@@ -169,6 +170,12 @@ def test_a_protocol_without_files_has_the_hash_it_had_before_there_were_any() ->
         assert model.pop("parameters") == {}
     assert content["stretch"].pop("largest_speed_deg_s") == 131.0
     assert content.pop("presentation")["stretches"] == 1
+    assert content.pop("occasions")["resume"] == "always"
+    assert content.pop("questionnaires") == ()
+    for session in content["sessions"]:
+        for key in ("after", "at_least_days", "at_most_days"):
+            assert session.pop(key) is None
+        assert session.pop("order_policy") == "refuse"
     assert content.pop("training")["order"] == "blocked"
     assert content["simulated_raters"].pop("hold_s") == 0.0
     assert content["elbow"].pop("rest_angle_deg") is None
