@@ -27,6 +27,7 @@ MODULES = (
     "masrel.analysis",
     "masrel.verification",
     "masrel.report",
+    "masrel.checklist",
     "masrel.scales",
     "masrel.estimates",
     "masrel.recording",

@@ -80,7 +80,7 @@ def design_section(material: Material) -> Section:
         f"{counted(len(protocol.sessions), 'session')}; scale {protocol.scale.name}: "
         f"{', '.join(protocol.scale.grades)}."
     ]
-    stretches = _stretches_asked_for(protocol.presentation)
+    stretches = stretches_asked_for(protocol.presentation)
     if stretches:
         texts[0] += f" {stretches}"
     if study.notes:
@@ -106,7 +106,7 @@ def design_section(material: Material) -> Section:
     return Section(name="design", title="Design", blocks=(*paragraphs, *tables))
 
 
-def _stretches_asked_for(rules: PresentationRules) -> str:
+def stretches_asked_for(rules: PresentationRules) -> str:
     # how often a rater stretches the arm for one grade, unless it is once
     if rules.stretches == "free":
         return "Before each grade a rater stretches the arm as often as wanted."
