@@ -9,7 +9,6 @@ import json
 import os
 import re
 import stat
-import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -74,6 +73,8 @@ def parse_json(text: str | bytes) -> Any:
 
 def parse_toml(data: bytes) -> dict[str, Any]:
     """Return what a TOML file holds; ValueError says why it cannot be read."""
+    import tomllib  # a file of ratings needs none
+
     # utf-8-sig: some editors put a byte order mark first.
     text = data.decode("utf-8-sig")
     if _LONG_KEY.search(text):  # tomllib takes the square of its length

@@ -8,11 +8,12 @@ import math
 import re
 import shlex
 import unicodedata
+from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from functools import cache
-from itertools import pairwise
+from itertools import count, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,11 +78,13 @@ def coded_texts(cells: NDArray[np.object_]) -> tuple[NDArray[np.int64], list[str
     """Return the texts of cells and where each occurs; blanks around them go."""
     # (n,) -> (n,) places in the texts
     listed = cells.tolist()
-    uniques = list(dict.fromkeys(listed))
+    number: dict[str, int] = defaultdict(count().__next__)  # a new one is the next
     codes = np.arange(len(listed))
-    if len(uniques) < len(listed):
-        number = dict(zip(uniques, range(len(uniques)), strict=True))
+    if _are_different(listed):
+        uniques = listed
+    else:
         codes = np.fromiter(map(number.__getitem__, listed), np.int64, len(listed))
+        uniques = list(number)
     if not _UNPLAIN.search("".join(uniques)):
         return codes, uniques
     texts = [_plain(text) for text in uniques]
@@ -90,6 +93,12 @@ def coded_texts(cells: NDArray[np.object_]) -> tuple[NDArray[np.int64], list[str
     if len(place) < len(texts):
         codes = np.array(places, dtype=np.int64)[codes]
     return codes, list(place)
+
+
+def _are_different(texts: Sequence[str]) -> bool:
+    # a few tell of nearly all columns that texts are there twice
+    few = texts[:1000]
+    return len(set(few)) == len(few) and len(set(texts)) == len(texts)
 
 
 def _plain(text: str) -> str:
@@ -331,10 +340,9 @@ def normal_form(text: str) -> str:
 
 
 def alike_texts(texts: Sequence[str]) -> list[list[str]]:
-    """Return the texts that differ by spelling alone, together."""
-    if max(map(len, texts), default=0) < 19 and all(map(str.isdecimal, texts)):
-        if len(set(map(int, texts))) == len(texts):  # as most names of items are
-            return []
+    """Return the texts, all different, that differ by spelling alone, together."""
+    if _differ_plainly(texts):
+        return []
     forms = list(map(normal_form, texts))
     if len(set(forms)) == len(forms):
         return []
@@ -342,6 +350,21 @@ def alike_texts(texts: Sequence[str]) -> list[list[str]]:
     for form, text in zip(forms, texts, strict=True):
         groups.setdefault(form, []).append(text)
     return [group for group in groups.values() if len(group) > 1]
+
+
+def _differ_plainly(texts: Sequence[str]) -> bool:
+    # whether all are numbers without a zero in front, or names of letters and digits
+    # that differ in small letters, too, as most names of items are
+    joined = "".join(texts)
+    if not (joined.isascii() and joined.isalnum()):
+        return False
+    lines = "\n".join(["", *texts, ""]).lower()
+    if joined.isdecimal():
+        is_short = lines.count("\n0") == lines.count("\n0\n")
+        return is_short or len(set(map(len, texts))) == 1
+    if re.search(r"\n\d", lines):
+        return False
+    return len(set(lines.split("\n"))) == len(texts) + 1
 
 
 def _doubts_of_grades(

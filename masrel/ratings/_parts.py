@@ -97,7 +97,7 @@ class Contents:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Triples:
-    """Ratings as places in lists of names, one entry a rating."""
+    """Ratings as places in lists of names, in the order met, one entry a rating."""
 
     # (n_ratings,) each; a grade of -1 is missing; row: of the sheet
     item: Codes
@@ -107,13 +107,17 @@ class Triples:
     item_names: list[str]
     rater_names: list[str]
 
-    def __getitem__(self, chosen: NDArray[np.bool_] | Codes) -> "Triples":
-        return replace(
-            self,
-            item=self.item[chosen],
-            rater=self.rater[chosen],
+    def part(self, chosen: NDArray[np.bool_] | Codes) -> "Triples":
+        """Return some of the ratings, with the names of these alone."""
+        item, item_names = _names_met(self.item[chosen], self.item_names)
+        rater, rater_names = _names_met(self.rater[chosen], self.rater_names)
+        return Triples(
+            item=item,
+            rater=rater,
             grade=self.grade[chosen],
             row=self.row[chosen],
+            item_names=item_names,
+            rater_names=rater_names,
         )
 
 
@@ -137,7 +141,7 @@ def part_codes(
         columns.append((codes, list(texts)))
     (of_group, groups), (of_session, sessions) = columns
     key = of_group * len(sessions) + of_session
-    codes, met = _first_met(key)
+    codes, met = first_met(key)
     n = len(sessions)
     names = [(groups[k // n], sessions[k % n]) for k in met.tolist()]
     return codes[rows], names
@@ -153,6 +157,8 @@ def without_repeats(
 ) -> tuple[Triples, Codes, Scale, int]:
     """Keep one rating of each item by each rater; say how many others there were."""
     n_items, n_raters = len(triples.item_names), len(triples.rater_names)
+    if layout.kind == "wide" and n_items == len(sheet.cells):  # a row each
+        return triples, parts, scale, 0
     key = (parts * n_items + triples.item) * n_raters + triples.rater
     n_keys = (int(parts.max(initial=0)) + 1) * n_items * n_raters
     if n_keys <= max(_MAX_DENSE, _MAX_SPARSE * len(key)):
@@ -173,7 +179,7 @@ def without_repeats(
     chosen = np.sort(order[np.unique(key[order], return_index=True)[1]])
     if repeated == "mean":
         triples, scale = _means(sheet, triples, of_key, len(keys), scale)
-    return triples[chosen], parts[chosen], scale, n_repeated
+    return triples.part(chosen), parts[chosen], scale, n_repeated
 
 
 def _repeats(
@@ -233,9 +239,8 @@ def put_together(
     triples: Triples, scale: Scale, names: tuple[str | None, str | None]
 ) -> RatingsPart:
     """Arrange the ratings of one part item by rater."""
-    item, items = _names_met(triples.item, triples.item_names)
-    rater, raters = _names_met(triples.rater, triples.rater_names)
-    shape, q = (len(items), len(raters)), len(scale.grades)
+    item, rater, q = triples.item, triples.rater, len(scale.grades)
+    shape = len(triples.item_names), len(triples.rater_names)
     dense = partial(_dense, item, rater, triples.grade, shape, scale)
     n_places = shape[0] * shape[1]
     ratings: CodedRatings | CountedRatings
@@ -255,7 +260,11 @@ def put_together(
             source=dense,  # only if a coefficient needs to know who rated what
         )
     return RatingsPart(
-        group=names[0], session=names[1], items=items, raters=raters, ratings=ratings
+        group=names[0],
+        session=names[1],
+        items=tuple(triples.item_names),
+        raters=tuple(triples.rater_names),
+        ratings=ratings,
     )
 
 
@@ -294,7 +303,7 @@ def part_clusters(
 ) -> tuple[str, ...]:
     """Return the cluster of every item, in the order of the part's items."""
     # of_row (n_rows,): the cluster of every row of the sheet, a place in the names
-    item, items = _names_met(triples.item, triples.item_names)
+    item, items = triples.item, triples.item_names
     of_rating = of_row[triples.row]
     of_item = np.zeros(len(items), dtype=np.int64)
     of_item[item] = of_rating
@@ -315,8 +324,8 @@ def part_clusters(
     return tuple(names[cluster] for cluster in of_item.tolist())
 
 
-def _first_met(codes: Codes) -> tuple[Codes, Codes]:
-    # codes in the order in which they are met, and which they were
+def first_met(codes: Codes) -> tuple[Codes, Codes]:
+    """Return codes numbered in the order in which they are met, and which they were."""
     first = np.full(int(codes.max(initial=0)) + 1, len(codes))
     first[codes[::-1]] = np.arange(len(codes) - 1, -1, -1)
     places = np.argsort(first, kind="stable")[: int((first < len(codes)).sum())]
@@ -325,10 +334,10 @@ def _first_met(codes: Codes) -> tuple[Codes, Codes]:
     return rank[codes], places
 
 
-def _names_met(codes: Codes, names: list[str]) -> tuple[Codes, tuple[str, ...]]:
+def _names_met(codes: Codes, names: list[str]) -> tuple[Codes, list[str]]:
     # codes of the names that occur, in the order in which they do
-    met, places = _first_met(codes)
-    return met, tuple(map(names.__getitem__, places.tolist()))
+    met, places = first_met(codes)
+    return met, list(map(names.__getitem__, places.tolist()))
 
 
 def _dense(

@@ -284,6 +284,9 @@ class _Lines:
         # pandas takes its time to load, and for every column
         is_small = len(self._body) < _LARGE and self._delimiter != _BLANKS
         if is_small or self.width > _MANY_COLUMNS:
+            plain = self._plain_cells()
+            if plain is not None:
+                return plain
             rows = self._checked_records()
             if self.has_row_names:
                 rows[0] = [*rows[0], ""]
@@ -291,6 +294,24 @@ class _Lines:
             cells = np.fromiter(every, dtype=object, count=len(rows) * self.width)
             return self._named(cells.reshape(len(rows), self.width))
         return self._named(self._parsed())
+
+    def _plain_cells(self) -> Cells | None:
+        # where nothing but separators and ends of lines makes cells, else None
+        delimiter, body = self._delimiter, self._body.replace("\r\n", "\n")
+        if delimiter == _BLANKS or not delimiter.isascii() or self.has_row_names:
+            return None
+        skipped = () if delimiter == "\t" else (f"{delimiter} ", "\n ")
+        if any(mark in body for mark in ('"', "\r", *skipped)) or body[0] == " ":
+            return None
+        body = body if body.endswith("\n") else f"{body}\n"
+        line = (delimiter * (self.width - 1) + "\n").encode()
+        marks = body.encode().translate(None, bytes({*range(256)} - {*line}))
+        n_records = len(marks) // self.width
+        if marks != line * n_records:
+            return None
+        every = body.replace("\n", delimiter).split(delimiter)
+        cells = np.fromiter(every, dtype=object, count=n_records * self.width)
+        return cells.reshape(n_records, self.width)
 
     def _checked_records(self) -> list[list[str]]:
         # by the csv module, a quote that is not closed refused

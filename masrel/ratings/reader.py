@@ -38,6 +38,7 @@ from masrel.ratings._parts import (
     RatingsPart,
     Repeated,
     Triples,
+    first_met,
     part_clusters,
     part_codes,
     put_together,
@@ -274,7 +275,7 @@ def _rated(
     rated = triples.grade[triples.grade >= 0]
     of_parts = [triples]
     if len(names) > 1:
-        of_parts = [triples[part_of == k] for k in range(len(names))]
+        of_parts = [triples.part(part_of == k) for k in range(len(names))]
     parts = [
         put_together(part, scale, name)
         for part, name in zip(of_parts, names, strict=True)
@@ -365,8 +366,11 @@ def _named(sheet: Sheet, role: str, places: tuple[int, ...]) -> tuple[Codes, lis
         _refuse_unnamed(sheet, role, place, more, texts)
         joint = codes * len(texts) + more
         met, codes = np.unique(joint, return_inverse=True)
-        names = [f"{names[k // len(texts)]} {texts[k % len(texts)]}" for k in met]
-    return np.asarray(codes, dtype=np.int64), names
+        codes, order = first_met(codes)
+        names = [
+            f"{names[k // len(texts)]} {texts[k % len(texts)]}" for k in met[order]
+        ]
+    return codes, names
 
 
 def _refuse_unnamed(
@@ -387,7 +391,7 @@ def _wide(
 ) -> tuple[Triples, Grades, list[str]]:
     n_rows, n_raters = len(sheet.cells), len(layout.raters)
     places = list(layout.raters)
-    cells = sheet.cells[:, places].ravel()
+    cells = np.take(sheet.cells, places, axis=1).ravel()
     grade, grades = _grades_of(sheet, cells, places, options)
     doubts = doubt_columns(sheet, layout, grade.reshape(n_rows, n_raters), grades.scale)
     if layout.item:
