@@ -37,7 +37,8 @@ def _check_study(study: StudyPaths) -> tuple[Sequence[str], Sequence[str]]:
     problems = [
         problem for checker in _CHECKERS for problem in checker(protocol, study)
     ]
-    notes: list[str] = []
+    # What only may happen is for a study of which all else is right.
+    notes = [] if problems else list(_device_notes(protocol, study))
     with contextlib.suppress(MasrelError):  # a checker has said it
         notes += concealment_notes(protocol, study)
     with contextlib.suppress(MasrelError):
@@ -70,6 +71,12 @@ def _device_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
         yield f"{study.protocol}: {error}"
     for problem in torque_problems(protocol):
         yield f"{study.protocol}: {problem}"
+
+
+def _device_notes(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
+    from masrel.run._settings import torque_notes  # loads numpy
+
+    return (f"{study.protocol}: {note}" for note in torque_notes(protocol))
 
 
 def _record_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:

@@ -31,7 +31,7 @@ _CREEP_DRIFTS = 5.0  # in drift angles
 
 # An arm that stands still after it was no faster than a creep was brought to rest, by
 # friction and a hand that holds it: so long, in standing times, may that last.
-_HELD_TIMES = 20.0
+HELD_TIMES = 20.0
 
 # Of so many ticks `DeviceLimits.missed_replies_per_100` may be without a reading.
 _WINDOW_TICKS = 100
@@ -72,7 +72,7 @@ class Guard:
         # has_hand: whether a hand may hold the arm at rest
         self._limits = limits
         self._period = period_s
-        self._held_time = limits.standing_time * (_HELD_TIMES if has_hand else 1.0)
+        self._held_time = limits.standing_time * (HELD_TIMES if has_hand else 1.0)
         self._time = -math.inf  # of the last reading, s
         self._angle = 0.0
         self._raw_speed = 0.0  # between the last two readings, rad/s

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from masrel._input import listed
 from masrel.errors import ParameterError
 from masrel.hess import (
     BackendOptions,
@@ -15,6 +16,7 @@ from masrel.hess import (
     TorqueSensor,
     device_names,
 )
+from masrel.hess._guard import HELD_TIMES
 from masrel.hess._velocity import passive_damping
 from masrel.protocol import DeviceSettings, Model, Protocol, joint_model
 from masrel.protocol._kinds import DEFAULT_KIND
@@ -23,6 +25,7 @@ if TYPE_CHECKING:
     from masrel.hess.puck import PuckOptions
 
 
+_SPEED_DEG_S = 0.01  # to which speeds are determined that are shown whole
 _WITH_BUTTON = ("simulated",)  # which the simulated hand presses
 
 
@@ -70,9 +73,8 @@ def _torque_problems(protocol: Protocol, model: Model) -> Iterator[str]:
             f"{math.degrees(joint.range_end):g} deg"
         )
         return
-    speed = math.radians(stretch.largest_speed_deg_s)
     key, limit = _torque_limit(protocol, model)
-    largest = joint.largest_torque(start_angle=start, speed=speed)
+    largest = _largest_torque(protocol, model, stretch.largest_speed_deg_s)
     if not largest <= limit:
         yield (
             f"at most device.{key} ({limit:g} N·m) at stretch.largest_speed_deg_s "
@@ -85,7 +87,57 @@ def _torque_problems(protocol: Protocol, model: Model) -> Iterator[str]:
             f"where the stretch starts, got {first:.3f} N·m"
         )
     if model.kind != DEFAULT_KIND:
+        speed = math.radians(stretch.largest_speed_deg_s)
         yield from _stiffness_problems(settings, *joint.largest_slope(speed=speed))
+
+
+def torque_notes(protocol: Protocol) -> Iterator[str]:
+    """Yield where the device stops a model though it may be presented."""
+    # A sentence for each limit that some motion passes
+    settings = protocol.device
+    fastest: dict[str, list[tuple[float, str]]] = {}
+    held = []
+    for model in protocol.models:
+        key, limit = _torque_limit(protocol, model)
+        speed = _speed_of_torque(protocol, model, limit)
+        if speed < settings.speed_limit_deg_s:
+            fastest.setdefault(key, []).append((speed, model.id))
+        if _largest_torque(protocol, model, 0.0) > settings.standing_torque_nm:
+            held.append(model.id)
+    for key, models in fastest.items():
+        speeds = (f"{name} {math.floor(speed)} deg/s" for speed, name in sorted(models))
+        yield (
+            f"device.{key} ({getattr(settings, key):g} N·m) may be passed, and the "
+            f"model stopped, in a stretch faster than this: {listed(speeds)}"
+        )
+    if held:
+        longest = settings.standing_limit_ms * 1e-3 * HELD_TIMES
+        yield (
+            f"device.standing_torque_nm ({settings.standing_torque_nm:g} N·m) stops an "
+            f"arm that is held still for {longest:g} s against more, which these ask "
+            "for: "
+            + ("all models" if len(held) == len(protocol.models) else listed(held))
+        )
+
+
+def _speed_of_torque(protocol: Protocol, model: Model, torque: float) -> float:
+    # the speed up to which a model never asks for more, deg/s, by bisection
+    low, high = 0.0, protocol.device.speed_limit_deg_s
+    if _largest_torque(protocol, model, high) <= torque:
+        return high
+    while high - low > _SPEED_DEG_S:
+        middle = 0.5 * (low + high)
+        is_within = _largest_torque(protocol, model, middle) <= torque
+        low, high = (middle, high) if is_within else (low, middle)
+    return low
+
+
+def _largest_torque(protocol: Protocol, model: Model, speed_deg_s: float) -> float:
+    # in every phase of every motion up to a speed, N·m
+    return joint_model(protocol, model.id).largest_torque(
+        start_angle=math.radians(protocol.stretch.start_deg),
+        speed=math.radians(speed_deg_s),
+    )
 
 
 def _torque_limit(protocol: Protocol, model: Model) -> tuple[str, float]:
