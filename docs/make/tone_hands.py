@@ -23,7 +23,7 @@ def draw(path: Path) -> None:
     """Draw angle and torque of one presentation of clonus."""
     mpl.rcParams.update({"font.size": 9, "axes.spines.top": False})
     mpl.rcParams.update({"axes.spines.right": False, "savefig.dpi": 200})
-    (rater,) = raters("clonus", 1, seed=5)
+    (rater,) = raters("clonus", [5])
     soft = HandTraits(stiffness=40.0, damping=2.0)
     columns = presented(replace(rater, traits=soft)).recording.columns
     figure = Figure(figsize=(7.2, 4.0), layout="constrained")
@@ -47,4 +47,4 @@ if __name__ == "__main__":
     draw(FIGURE)
     print(HEAD)
     for kind in KINDS if n_hands else ():
-        print(row(kind, [outcome(r) for r in raters(kind, n_hands, 0)]), flush=True)
+        print(row(kind, [outcome(r) for r in raters(kind, range(n_hands))]), flush=True)

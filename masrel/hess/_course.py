@@ -93,9 +93,8 @@ class Course:
             return "time-limit"
         if self.status.is_armed:
             self._watch_for_onset(time_s, angle)
-        else:
-            self._watch_for_return(angle, velocity)
-        return ""
+            return ""
+        return self._watch_for_return(angle, velocity)
 
     def end(self) -> None:
         """Let the stretch that goes on be over."""
@@ -118,13 +117,10 @@ class Course:
     def _goes_on(
         self, time_s: float, angle: float, velocity: float, has_arrived: bool
     ) -> str:
-        is_flexed = velocity <= self._flexing_speed
-        if has_arrived or is_flexed or angle <= self._back_at:
+        if has_arrived or self._is_brought_back(angle, velocity):
             self.end()
-            if self.status.n_stretches == self._n:
-                return "stretches"
-            self._watch_for_return(angle, velocity)
-        elif time_s - self._begun_at > self._stretch_limit:
+            return self._watch_for_return(angle, velocity)
+        if time_s - self._begun_at > self._stretch_limit:
             raise LimitExceededError(
                 f"stretch limit: needs a stretch that ends within "
                 f"{self._stretch_limit:g} s, number {self.stretch} has not ended",
@@ -132,9 +128,17 @@ class Course:
             )
         return ""
 
-    def _watch_for_return(self, angle: float, velocity: float) -> None:
+    def _is_brought_back(self, angle: float, velocity: float) -> bool:
+        return velocity <= self._flexing_speed or angle <= self._back_at
+
+    def _watch_for_return(self, angle: float, velocity: float) -> str:
+        # Until then the last stretch is held, as every other is
+        if not self._is_brought_back(angle, velocity):
+            return ""
+        if self.status.n_stretches == self._n:
+            return "stretches"
         # The law catches again when the arm was flexed, or if it has not caught yet
-        is_back = angle <= self._back_at and not self._has_caught
-        if velocity <= self._flexing_speed or is_back:
+        if velocity <= self._flexing_speed or not self._has_caught:
             self._lowest_angle = angle
             self.status.is_armed = True
+        return ""

@@ -9,7 +9,7 @@ from masrel.errors import (
     LimitExceededError,
 )
 from masrel.hess._course import Course
-from masrel.hess._guard import ActiveGuard, Guard, SoftStops, check_overrun
+from masrel.hess._guard import ActiveGuard, Guard, Overruns, SoftStops
 from masrel.hess._soft_end import raised_cosine
 from masrel.hess._spool import Samples
 from masrel.hess._stop import EmergencyStop
@@ -48,7 +48,7 @@ class Ticks:
         "clock",
         "device",
         "guard",
-        "n_missed",
+        "overruns",
         "period_ns",
         "ramp_ns",
         "samples",
@@ -87,7 +87,7 @@ class Ticks:
         self._limits = limits
         self._stops = SoftStops(limits)
         self.guard = Guard(limits, 1.0 / rate_hz)
-        self.n_missed = 0
+        self.overruns = Overruns(limits)
         self.sent = 0.0
         self.samples = samples
         self._has_channels = bool(samples.channels)
@@ -136,9 +136,9 @@ class Ticks:
         n_skipped = (now_ns - due_ns) // self.period_ns
         if n_skipped <= 0:
             return tick
-        self.n_missed += min(n_skipped, self._n_ticks - tick)  # none after the last
         gap_s = (now_ns - self._sent_ns) * 1e-9
-        check_overrun(self._limits, self.n_missed, gap_s)
+        # none after the last
+        self.overruns.count(tick, min(tick + n_skipped, self._n_ticks), gap_s)
         return tick + n_skipped
 
     def _tick(self) -> str:

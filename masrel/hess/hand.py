@@ -341,6 +341,8 @@ class YieldingHand(SimulatedHand):
         Speeds of the stretches after the first, rad/s.
     rest : float, optional
         How long it rests at either end between them where nothing resists, s.
+    returns : bool, optional
+        Whether it rests and brings the arm back after the last stretch, too.
 
     Raises
     ------
@@ -371,6 +373,7 @@ class YieldingHand(SimulatedHand):
         reaction_time: float = 0.08,
         again: Sequence[float] = (),
         rest: float = 0.1,
+        returns: bool = False,
     ) -> None:
         super().__init__(
             start=start,
@@ -379,6 +382,7 @@ class YieldingHand(SimulatedHand):
             slip_time=slip_time,
             again=again,
             rest=rest,
+            returns=returns,
         )
         if not 0.0 <= yielding < math.inf:
             raise ParameterError(f"yielding: needs 0 or more, got {yielding}")

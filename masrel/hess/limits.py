@@ -71,7 +71,7 @@ class DeviceLimits:
     soft_stop_torque : float, optional
         What it reaches at them, N·m; 0 for no soft stop.
     missed_ticks : int, optional
-        Missed ticks that a presentation may have; one more stops it.
+        Missed ticks that any 2000 may have; one more stops the presentation.
     missed_replies : int, optional
         Ticks in a row without a new reading that are let pass, torque held.
     missed_replies_per_100 : int, optional

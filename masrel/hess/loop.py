@@ -55,12 +55,12 @@ def run_presentation(
     law has it, or was brought back without a catch. All the while the controller goes
     on.
 
-    The presentation is over after the last stretch (``"arrived"`` where there is one,
-    else ``"stretches"``), after the time limit (``"time-limit"``), when `status` says
-    that the rater is done (``"done"``), or at `max_duration_s` (``"max-duration"``).
-    Then the torque goes from where it stands to zero within
-    `DeviceLimits.end_ramp_time`, along a raised cosine, while readings are taken and
-    checked as before. A limit, an error of the device or
+    The presentation is over when one stretch has arrived (``"arrived"``), when the arm
+    is brought back after the last of many (``"stretches"``), after the time limit
+    (``"time-limit"``), when `status` says that the rater is done (``"done"``), or at
+    `max_duration_s` (``"max-duration"``). Then the torque goes from where it stands to
+    zero within `DeviceLimits.end_ramp_time`, along a raised cosine, while readings are
+    taken and checked as before. A limit, an error of the device or
     of the controller, or an emergency stop ends it with a fault: the torque goes to
     zero within `DeviceLimits.ramp_time`, and the device is closed. Any other exception
     closes it at once and goes on to the caller, with a note when the device did not
@@ -169,8 +169,8 @@ def run_presentation(
         with scheduled(clock) as facts["scheduling"], collector_off():
             ended, fault = run_to_the_end(ticks)
         columns = samples.columns()
-    if ticks.n_missed:
-        message = f"the control loop missed {ticks.n_missed} ticks; they were skipped"
+    if n_missed := ticks.overruns.n_missed:
+        message = f"the control loop missed {n_missed} ticks; they were skipped"
         warnings.warn(message, OverrunWarning, stacklevel=2)
     presented = as_presented(
         columns,
@@ -179,7 +179,7 @@ def run_presentation(
         ended=ended,
         fault=fault,
         grip_lost=controller.grip_lost,
-        n_missed_ticks=ticks.n_missed,
+        n_missed_ticks=n_missed,
         n_missed_replies=ticks.guard.dropouts.n_missed,
     )
     silent = presented.recording.facts.get("channel_faults")

@@ -13,7 +13,8 @@ class StretchRules:
     With one stretch the presentation is over when the arm has arrived; the times below
     do not matter then. With several, a stretch is over when the arm has arrived or was
     brought back, and the next one is armed by flexing it faster than ν_th, as the law
-    arms its next catch; where nothing was caught, by bringing it back at any speed.
+    arms its next catch; where nothing was caught, by bringing it back at any speed. The
+    last one can be held like every other: all is over when the arm is brought back.
 
     Attributes
     ----------

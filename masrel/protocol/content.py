@@ -179,7 +179,7 @@ _LATER: dict[str, dict[str, object]] = {
         "loose_inertia_kg_m2": 0.06,
         "torque_sensor": False,
     },
-    "simulated_raters": {"hold_s": 0.0},
+    "simulated_raters": {"hold_s": 0.0, "hand": "clamp"},
     "training": {
         "kappa_insufficient": 0.6,
         "kappa_sufficient": 0.8,

@@ -208,6 +208,7 @@ class SimulatedRaters(_Table, frozen=True, kw_only=True):
     mean_speed_deg_s: Annotated[float, Meta(ge=1, le=_LARGEST)] = 85.0
     speed_sd_deg_s: _NonNegative = 15.0
     hold_s: Annotated[float, Meta(ge=0, le=60)] = 0.0
+    hand: Literal["clamp", "person"] = "clamp"
 
 
 class Training(_Table, frozen=True, kw_only=True):

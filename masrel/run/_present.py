@@ -2,6 +2,7 @@
 
 import contextlib
 import dataclasses
+import functools
 import hashlib
 import math
 import sys
@@ -16,6 +17,8 @@ from masrel.hess import (
     DeviceLimits,
     EmergencyStop,
     Fault,
+    HandDistribution,
+    HumanHand,
     PresentationStatus,
     Presented,
     RealClock,
@@ -43,7 +46,7 @@ from masrel.run._settings import (
     has_simulated_hand,
     model_controller,
 )
-from masrel.run._simulated_raters import intended_speeds, sensor_seed
+from masrel.run._simulated_raters import hand_seed, intended_speeds, sensor_seed
 from masrel.run._stretch_facts import (
     StatusOfHand,
     StretchFacts,
@@ -163,18 +166,8 @@ def _on_device(
     start = math.radians(stretch.start_deg)
     end = min(math.radians(stretch.end_deg), range_end)  # of a contracture sooner
     hand, longest_s = None, 0.0
-    speeds = _hand_speeds(protocol, request)
-    if speeds:
-        first, *again = speeds
-        hold_s = protocol.simulated_raters.hold_s
-        hand = SimulatedHand(
-            start=start,
-            end=end,
-            mean_speed=first,
-            again=again,
-            rest=_REST_S + hold_s,
-            returns=hold_s > 0.0,
-        )
+    if speeds := _hand_speeds(protocol, request):
+        hand = _hand(protocol, request.rater, speeds, start, end)
         # A simulated hand that means to be slow gets the time it needs.
         longest_s = 2.0 * (end - start) / min(speeds)
     rules = stretch_rules(protocol.presentation, longest_s)
@@ -232,6 +225,25 @@ def _hand_speeds(protocol: Protocol, request: GradeRequest) -> list[float]:
         presentation.repeat,
     )
     return [math.radians(speed) for speed in speeds]
+
+
+def _hand(
+    protocol: Protocol, rater: str, speeds: list[float], start: float, end: float
+) -> SimulatedHand:
+    settings, (first, *again) = protocol.simulated_raters, speeds
+    make: Callable[..., SimulatedHand] = SimulatedHand
+    if settings.hand == "person":
+        rng = np.random.default_rng(hand_seed(protocol, rater))
+        make = functools.partial(HumanHand, HandDistribution().sample(rng))
+    return make(
+        start=start,
+        end=end,
+        mean_speed=first,
+        again=again,
+        rest=_REST_S + settings.hold_s,
+        # Of a number of stretches the last is over when the arm is brought back
+        returns=settings.hold_s > 0.0 or protocol.presentation.stretches != "free",
+    )
 
 
 def _sensor_seed(protocol: Protocol, request: GradeRequest) -> int:

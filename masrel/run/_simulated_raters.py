@@ -15,7 +15,14 @@ from masrel.protocol import Model, Protocol, scale_of
 from masrel.run._grade_sources import MAX_FAULTS, GradeRequest
 
 _Purpose = Literal[
-    "accuracy", "neighbour", "severity", "retest", "speed", "sensor", "stretches"
+    "accuracy",
+    "neighbour",
+    "severity",
+    "retest",
+    "speed",
+    "sensor",
+    "stretches",
+    "hand",
 ]
 
 _MOST_STRETCHES = 3  # of a simulated rater who may stretch as often as wanted
@@ -170,6 +177,12 @@ def sensor_seed(
     """Return the seed of a simulated torque sensor's noise, another one each time."""
     seed = protocol.simulated_raters.seed
     return int(2**52 * _uniform(seed, "sensor", rater, session, model, repeat))
+
+
+def hand_seed(protocol: Protocol, rater: str) -> int:
+    """Return the seed of what a rater's hand is like, in every presentation."""
+    seed = protocol.simulated_raters.seed
+    return int(2**52 * _uniform(seed, "hand", rater, "", "", 0))
 
 
 def _interpolated(height: float, anchors: list[tuple[float, float]]) -> float:

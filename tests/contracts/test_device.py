@@ -69,7 +69,9 @@ SENSING = SimulatedOptions(torque_sensor=TorqueSensor())
 def _stretching(n_stretches: int = 1) -> SimulatedHand:
     speed = radians(90.0)
     again = (speed,) * (n_stretches - 1)
-    return SimulatedHand(start=START, end=END, mean_speed=speed, again=again)
+    return SimulatedHand(
+        start=START, end=END, mean_speed=speed, again=again, returns=True
+    )
 
 
 @cache

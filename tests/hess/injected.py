@@ -496,6 +496,7 @@ def _stretching(injection: Injection, n_stretches: int) -> Iterator[None]:
         if "hand" in first:
             first.remove("hand")
             options["again"] = (options["mean_speed"],) * (n_stretches - 1)
+            options["returns"] = n_stretches > 1
             options["slip_time"] = injection.at_s if injection.slip else None
         return SimulatedHand(**options)
 

@@ -109,7 +109,9 @@ def test_the_noise_is_that_of_the_seed() -> None:
 def test_every_stretch_of_a_presentation_has_its_measured_torque() -> None:
     clock = SimulatedClock()
     speed = radians(92.0)
-    hand = SimulatedHand(start=START, end=END, mean_speed=speed, again=(speed, speed))
+    hand = SimulatedHand(
+        start=START, end=END, mean_speed=speed, again=(speed, speed), returns=True
+    )
     with open_device("simulated", clock=clock, hand=hand, options=SENSING) as device:
         presentation = run_presentation(
             device,

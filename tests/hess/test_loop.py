@@ -259,11 +259,24 @@ def test_more_missed_ticks_than_allowed_are_a_fault() -> None:
     with pytest.warns(OverrunWarning, match="missed 3 ticks"):
         device, presented = rest(clock, limits=limits_with(missed_ticks=2))
     assert presented.fault.message == (
-        "missed ticks: needs at most 2 in a presentation, the loop missed 3"
+        "missed ticks: needs at most 2 of any 2000, the loop missed 3 of 3"
     )
     assert device.commands[-1] == (8_400_000, 0.0)
     assert presented.n_missed_ticks == 3
     assert presented.recording.columns["time_s"][-1] == pytest.approx(8.4e-3)
+
+
+@pytest.mark.parametrize(("apart_s", "fault"), [(0.11, None), (0.09, "overrun")])
+def test_a_long_presentation_may_miss_ticks_at_the_rate_of_a_short_one(
+    apart_s: float, fault: str | None
+) -> None:
+    # one tick every 0.11 s: 18 or 19 of any 2000, but 45 in 5 s
+    at = (round(n * apart_s * 1e3) for n in range(1, 500))
+    clock = LateClock({tick * PERIOD_NS: 1_200_000 for tick in at if tick < 5000})
+    with pytest.warns(OverrunWarning):
+        _, presented = rest(clock, max_duration_s=5.0)
+    assert (presented.fault and presented.fault.kind) == fault
+    assert presented.n_missed_ticks == (45 if fault is None else 21)
 
 
 def test_a_torque_above_the_limit_is_never_sent_and_stops_the_presentation() -> None:

@@ -241,6 +241,7 @@ def random_hand(
         speeds = [max(speed, radians(60.0)) for speed in speeds]
     slips = float(rng.uniform(0.2, 1.5 * n_stretches)) if rng.random() < 0.15 else None
     way = {"start": start, "end": end, "mean_speed": speeds[0], "again": speeds[1:]}
+    way["returns"] = n_stretches > 1
     rest, back = float(rng.uniform(0.0, 0.2)), radians(rng.uniform(40.0, 130.0))
     kind = rng.random()
     if kind < 0.4:

@@ -28,6 +28,7 @@ from .rig import END, LIMITS, START, ScriptedDevice, present
 
 SPEEDS = (radians(92.0), radians(60.0), radians(110.0))
 WAY = {"start": START, "end": END, "mean_speed": SPEEDS[0], "again": SPEEDS[1:]}
+BACK = {**WAY, "returns": True}
 
 
 def shown(
@@ -94,9 +95,9 @@ class Saying(SimulatedClock):
 @pytest.mark.parametrize(
     "hand",
     [
-        lambda: SimulatedHand(**WAY),
-        lambda: YieldingHand(**WAY),
-        lambda: HumanHand(HandTraits(), **WAY),
+        lambda: SimulatedHand(**BACK),
+        lambda: YieldingHand(**BACK),
+        lambda: HumanHand(HandTraits(), **BACK),
     ],
     ids=["clamp", "yielding", "human"],
 )
@@ -119,7 +120,7 @@ def test_every_hand_may_stretch_again(
 
 
 def test_the_law_goes_on_through_all_of_them() -> None:
-    columns = shown(SimulatedHand(**WAY), StretchRules(n=3)).recording.columns
+    columns = shown(SimulatedHand(**BACK), StretchRules(n=3)).recording.columns
     joint = SampledJoint(STANDARD_MODELS["HM3"], start_angle=START)
     for time_s, angle, velocity, torque, phase in zip(
         columns["time_s"].tolist(),
@@ -134,7 +135,7 @@ def test_the_law_goes_on_through_all_of_them() -> None:
 
 
 def test_the_first_stretch_is_that_of_a_presentation_of_one() -> None:
-    many = shown(SimulatedHand(**WAY), StretchRules(n=3)).recording
+    many = shown(SimulatedHand(**BACK), StretchRules(n=3)).recording
     one = present("HM3", 92.0).recording
     for name, column in one.columns.items():
         n_rows = one.n_presented
@@ -143,11 +144,33 @@ def test_the_first_stretch_is_that_of_a_presentation_of_one() -> None:
 
 
 def test_the_column_is_zero_before_between_and_after() -> None:
-    columns = shown(SimulatedHand(**WAY), StretchRules(n=3)).recording.columns
+    columns = shown(SimulatedHand(**BACK), StretchRules(n=3)).recording.columns
     changes = columns["stretch"][np.flatnonzero(np.diff(columns["stretch"], prepend=9))]
     assert changes.tolist() == [0.0, 1.0, 0.0, 2.0, 0.0, 3.0, 0.0]
     first = int(np.argmax(columns["stretch"] == 1.0))
     assert columns["velocity_deg_s"][first - 1] == 0.0  # from the very first movement
+
+
+def test_the_last_stretch_is_held_until_the_arm_is_brought_back() -> None:
+    hand = SimulatedHand(**BACK, rest=1.5)
+    recording = shown(hand, StretchRules(n=3)).recording
+    last = stretches(recording)[-1]
+    assert recording.facts["ended"] == "stretches"
+    held_s = recording.n_presented * 1e-3 - last.end_s
+    assert held_s == pytest.approx(1.5, abs=0.15)
+    columns = recording.columns
+    assert columns["velocity_deg_s"][recording.n_presented - 1] < -15.0
+    assert not columns["ramp"][: recording.n_presented][-1000:].any()
+
+
+def test_an_arm_that_is_not_brought_back_is_held_to_the_time_limit() -> None:
+    path = [(0.0, 30.0), (0.5, 30.0), (1.5, 146.0), (9.0, 146.0)]
+    presented = scripted(path, StretchRules(n=1, time_limit=3.0))
+    assert presented.recording.facts["ended"] == "arrived"
+    path = [*path[:2], (1.5, 120.0), (2.5, 30.0), (3.5, 146.0), (9.0, 146.0)]
+    presented = scripted(path, StretchRules(n=2, time_limit=4.0))
+    assert presented.recording.facts["ended"] == "time-limit"
+    assert presented.recording.n_presented == pytest.approx(4550, abs=100)
 
 
 def test_free_stretches_end_where_the_rater_says_done() -> None:

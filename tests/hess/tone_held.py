@@ -1,7 +1,7 @@
 """Every kind of tone in people's hands: stretched, held, brought back, and let go."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from math import radians
 
@@ -64,10 +64,10 @@ class Rater:
     slips: float  # where among the samples it may be lost at, 0 to 1
 
 
-def raters(kind: str, n_hands: int, seed: int) -> Iterator[Rater]:
-    """Yield hands of people that stretch a kind of tone at 60 to 130 deg/s."""
-    rng = np.random.default_rng([seed, list(KINDS).index(kind)])
-    for index in range(n_hands):
+def raters(kind: str, seeds: Iterable[int]) -> Iterator[Rater]:
+    """Yield the hand of each seed, which stretches at 60 to 130 deg/s."""
+    for seed in seeds:
+        rng = np.random.default_rng([seed, list(KINDS).index(kind)])
         range_end = min(END, KINDS[kind].range_end)
         traits = HandDistribution().sample(rng)
         speeds = rng.uniform(60.0, 130.0, N_STRETCHES)
@@ -76,7 +76,7 @@ def raters(kind: str, n_hands: int, seed: int) -> Iterator[Rater]:
             kind=kind,
             speeds=tuple(np.radians(speeds).tolist()),
             # One half press against the joint's end, the other half stop before it
-            end=range_end if index % 2 else range_end - radians(rng.uniform(5.0, 30.0)),
+            end=range_end if seed % 2 else range_end - radians(rng.uniform(5.0, 30.0)),
             slips=rng.random(),
         )
 

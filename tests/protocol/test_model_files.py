@@ -178,6 +178,7 @@ def test_a_protocol_without_files_has_the_hash_it_had_before_there_were_any() ->
         assert session.pop("order_policy") == "refuse"
     assert content.pop("training")["order"] == "blocked"
     assert content["simulated_raters"].pop("hold_s") == 0.0
+    assert content["simulated_raters"].pop("hand") == "clamp"
     assert content["elbow"].pop("rest_angle_deg") is None
     assert content["elbow"].pop("residual_reading") == "residual"
     assert content["elbow"].pop("catch_rise_s") == 0.0

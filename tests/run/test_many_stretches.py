@@ -6,13 +6,20 @@ import threading
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
 from masrel.cli import cli
 from masrel.elbow import tardieu
 from masrel.errors import ParameterError, RatingsError
-from masrel.protocol import Protocol, StudyPaths, joint_model, read_protocol
+from masrel.protocol import (
+    Protocol,
+    StudyPaths,
+    joint_model,
+    presented_hash,
+    read_protocol,
+)
 from masrel.ratings import (
     ratings_from_logs,
     read_study_data,
@@ -99,6 +106,30 @@ def test_a_cued_presentation_has_r1_and_r2(new_study: New) -> None:
         assert fields["r2_deg"] == pytest.approx(
             math.degrees(exact.range_angle), abs=0.5
         )
+
+
+def test_a_persons_hand_may_move_the_arm(new_study: New) -> None:
+    person = '[simulated_raters]\nhand = "person"\n\n'
+    small = new_study(("[simulated_raters]\n", person))
+    run(small, SimulatedGrades(small[1]))
+    clamp = new_study(name="clamp")
+    run(clamp, SimulatedGrades(clamp[1]))
+    assert presented_hash(small[1]) == presented_hash(clamp[1])
+    # A person takes 0.15 s to get up speed, the clamp 0.02 s
+    gently, at_once = (
+        [until_fast(study, str(event.fields["code"])) for event in shown(study)]
+        for study in (small, clamp)
+    )
+    assert min(gently) > 0.1
+    assert max(at_once) < 0.05
+
+
+def until_fast(study: Small, code: str) -> float:
+    """From a tenth to nine tenths of the speed at the catch, s."""
+    file = study[0].recording_file("R1", "test", code)
+    columns = read_recording(file).columns
+    speed = columns["velocity_deg_s"][: int(np.argmax(columns["phase"] > 0.0))]
+    return float(np.sum((speed > 0.1 * speed[-1]) & (speed < 0.9 * speed[-1]))) * 1e-3
 
 
 def test_uncued_presentations_have_neither(small: Small) -> None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from masrel.errors import DeviceError, DeviceTimeoutError, ParameterError
-from masrel.hess._guard import Guard, check_overrun
+from masrel.hess._guard import Guard, check_silence
 from masrel.hess._stop import EmergencyStop
 from masrel.hess._velocity import VelocityEstimate
 from masrel.hess._watchdog import NoWatchdog, Watching
@@ -269,7 +269,7 @@ class _TurningArm:
         self._due_ns = max(self._due_ns, now_ns - _PERIOD_NS) + _PERIOD_NS
         self._stop.check()
         guard = self._guard
-        check_overrun(LIMITS, 0, (now_ns - self._sent_ns) * 1e-9)  # silence alone
+        check_silence(LIMITS, (now_ns - self._sent_ns) * 1e-9)
         try:
             time_ns, angle, _ = self._device.read()
         except DeviceTimeoutError as error:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from masrel.elbow import STANDARD_MODELS, MinimumJerk, trace
 from masrel.errors import LimitExceededError
 from masrel.hess import DeviceLimits
-from masrel.hess._guard import Dropouts, Guard, SoftStops, check_overrun
+from masrel.hess._guard import Dropouts, Guard, Overruns, SoftStops, check_silence
 
 PERIOD = 0.001
 STEP = radians(0.005)  # of the encoder
@@ -308,19 +308,21 @@ def test_every_refusal_says_degrees_where_it_speaks_of_angles() -> None:
 
 
 def test_one_missed_tick_too_many_is_named() -> None:
-    limits = DeviceLimits(missed_ticks=3)
-    check_overrun(limits, 3, 0.005)
-    with pytest.raises(LimitExceededError, match=r"at most 3 .* missed 4") as caught:
-        check_overrun(limits, 4, 0.005)
-    assert caught.value.kind == "overrun"
+    overruns = Overruns(DeviceLimits(missed_ticks=3))
+    for first, after in ((5, 8), (2007, 2008), (2100, 2102)):
+        overruns.count(first, after, 0.005)
+    words = r"at most 3 of any 2000, the loop missed 4 of 1994"
+    with pytest.raises(LimitExceededError, match=words) as caught:
+        overruns.count(4000, 4001, 0.005)
+    assert (caught.value.kind, overruns.n_missed) == ("overrun", 7)
 
 
 def test_a_gap_as_long_as_the_watchdog_waits_is_named() -> None:
-    limits = DeviceLimits(missed_ticks=100)
-    check_overrun(limits, 49, 0.0499)
+    limits = DeviceLimits()
+    check_silence(limits, 0.0499)
     words = r"silence: needs a command every 50 ms.* for 50\.0 ms"
     with pytest.raises(LimitExceededError, match=words) as caught:
-        check_overrun(limits, 49, 0.05)
+        check_silence(limits, 0.05)
     assert caught.value.kind == "overrun"
 
 
