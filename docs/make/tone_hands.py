@@ -1,7 +1,7 @@
 """What docs/tone.md says of tone in people's hands: its table and its figure.
 
-``python -m docs.make.tone_hands [HANDS]`` draws the figure and prints the table; twelve
-hands of each kind take some minutes.
+``python -m docs.make.tone_hands [HANDS]`` draws the figure and prints the table; 250
+hands of each kind take some 20 minutes.
 """
 
 import sys
@@ -12,10 +12,9 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from masrel.hess import HandTraits
-from tests.hess.tone_held import HEAD, KINDS, outcome, presented, raters, row
+from tests.hess.tone_held import HEAD, KINDS, N_HANDS, outcome, presented, raters, row
 
 FIGURE = Path(__file__).parents[1] / "figures" / "tone_held.png"
-N_HANDS = 12
 BLUE, VERMILLION, GREY = "#0072B2", "#D55E00", "#6B6B6B"
 
 

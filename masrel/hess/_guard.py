@@ -36,8 +36,8 @@ HELD_TIMES = 20.0
 # Of so many ticks `DeviceLimits.missed_replies_per_100` may be without a reading.
 _WINDOW_TICKS = 100
 
-# And of so many `DeviceLimits.missed_ticks` may be missed: at 1 kHz a stretch of 116 deg
-# at 60 deg/s, the slowest that the paper's models distinguish, takes 1.9 s.
+# And of so many `DeviceLimits.missed_ticks` may be missed: at 1 kHz a stretch of 116
+# deg at 60 deg/s, the slowest that the paper's models distinguish, takes 1.9 s.
 _STRETCH_TICKS = 2000
 
 

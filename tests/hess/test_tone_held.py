@@ -12,6 +12,7 @@ from masrel.recording import stretches
 from .tone_held import (
     HOLD_S,
     KINDS,
+    N_HANDS,
     N_STRETCHES,
     NOTICE_S,
     Outcome,
