@@ -38,11 +38,17 @@ _SOURCES = (
 )
 
 
-def write_file(path: Path, data: bytes | str, *, within: Path | None = None) -> None:
+def write_file(
+    path: Path,
+    data: bytes | str,
+    *,
+    within: Path | None = None,
+    mode: int | None = None,
+) -> None:
     """Write an output: whole, on disk and under its name, or not at all."""
-    # within: a folder that it may not leave by a link
+    # within: a folder that it may not leave by a link; mode: as `write_files` has it
     refuse_record(path)
-    write_files({path: data}, within=within)
+    write_files({path: data}, within=within, mode=mode)
 
 
 def write_files(

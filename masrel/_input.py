@@ -5,6 +5,7 @@ ends in an error of the parser.
 """
 
 import errno
+import io
 import json
 import os
 import re
@@ -30,6 +31,8 @@ _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""  # of a key
 _LONG_KEY = re.compile(
     rf"""(?<![\w"'.-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{_MAX_DEPTH}}}"""
 )
+# A spreadsheet fills a line up with separators
+_CSV_FORMAT = re.compile(r"# ?format: *([^\s,;]{1,18})")
 _MAX_LISTED = 40
 _MAX_BITS = 1024  # of a whole number: what is longer cannot always be shown
 
@@ -61,6 +64,25 @@ def listed(names: Iterable[str]) -> str:
     names = list(names)
     more = len(names) - _MAX_LISTED
     return ", ".join(names[:_MAX_LISTED]) + (f" and {more} more" if more > 0 else "")
+
+
+def csv_format(text: str) -> object:
+    """Return the version that a CSV file names at its head; 1 where it names none."""
+    for line in io.StringIO(text):
+        if not line.startswith("#"):
+            break
+        named = _CSV_FORMAT.match(line)
+        if named:
+            return int(named[1]) if named[1].isdecimal() else named[1]
+    return 1
+
+
+def format_problem(version: object, *, newest: int) -> str | None:
+    """Return why a file of this version of its format is not read, or None."""
+    if type(version) is int and 1 <= version <= newest:  # true is no number
+        return None
+    known = "1" if newest == 1 else f"1 to {newest}"
+    return f"needed format {known}, got {version!r}"
 
 
 def parse_json(text: str | bytes) -> Any:

@@ -11,8 +11,8 @@ from masrel._event_log import Event, read_log
 from masrel._input import MAX_RECORDING, MAX_SMALL, read_regular
 from masrel.errors import RatingsError
 from masrel.protocol import Protocol, StudyPaths, scale_of
-from masrel.ratings.table import Ratings, ratings_from_rows
-from masrel.run._state import SessionState, replay
+from masrel.ratings.table import _NEEDED_TIME, Ratings, _is_utc, ratings_from_rows
+from masrel.run._state import FROM_PERSONS, SessionState, replay
 from masrel.schedule import Schedule, check_schedule, read_schedule
 
 
@@ -98,8 +98,23 @@ def _rows(
             "grades_from": str(state.header["grades"]),
             "device": _device(state),
             "graded_stretch": state.graded_stretches.get(shown.code),
+            "position": shown.position,
+            "code": shown.code,
+            "n_attempts": len(state.presented.get(shown.code, [])),
+            "first_grade": state.first_grades.get(shown.code),
+            "graded_at": _graded_at(state, shown.code, log),
             **_of_stretches(state.presented.get(shown.code, [])),
         }
+
+
+def _graded_at(state: SessionState, code: str, log: Path) -> str | None:
+    # of a simulated grade it is when a computer came to it: it differs from run to run
+    time = state.graded_at.get(code)
+    if time is None or state.header["grades"] not in FROM_PERSONS:
+        return None
+    if not _is_utc(time):
+        raise RatingsError(f"{log}: grade of {code}: {_NEEDED_TIME}, got {time!r}")
+    return time
 
 
 def _schedule(

@@ -1,7 +1,6 @@
 """A study's ratings: from its logs where it has some, from a file where it has not."""
 
 import csv
-import dataclasses
 import io
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -12,7 +11,7 @@ from masrel.protocol import Protocol, StudyPaths, scale_of
 from masrel.ratings.in_person import InPerson, read_in_person
 from masrel.ratings.logs import ratings_from_logs
 from masrel.ratings.study_file import read_study_ratings
-from masrel.ratings.table import RATING_COLUMNS, Ratings, ratings_csv
+from masrel.ratings.table import Ratings, _texts
 
 _KEY = ("session", "rater", "model", "repeat")
 
@@ -153,21 +152,19 @@ def table_differences(path: Path, ratings: Ratings) -> Iterator[str]:
     if not path.is_file():
         return
     text = path.read_bytes().decode("utf-8", errors="replace")
-    logged = ratings_csv(ratings)
-    if text in (logged, ratings_csv(_as_once(ratings))):
+    texts = _texts(ratings)
+    if text in texts:
         return
+    logged = next((t for t in texts if _names(t) == _names(text)), texts[0])
     rows, needed = _rows(text), _rows(logged)
     if rows == needed:
         yield "the ratings are the same, but not what stands around them"
     yield from _differences(rows, needed)
 
 
-def _as_once(ratings: Ratings) -> Ratings:
-    # as a table was written of logs that say nothing of stretches
-    if ratings.table["felt"].notna().any():
-        return ratings
-    columns = dict.fromkeys(RATING_COLUMNS[7:])
-    return dataclasses.replace(ratings, table=ratings.table.assign(**columns))
+def _names(text: str) -> str | None:
+    # the line of the names of a table's columns
+    return next((line for line in text.splitlines() if line[:1] != "#"), None)
 
 
 def _rows(text: str) -> dict[tuple[str, ...], Mapping[str, str]]:

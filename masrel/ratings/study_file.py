@@ -9,14 +9,23 @@ from pathlib import Path
 from typing import Any
 
 from masrel._cells import from_safe_cell
-from masrel._input import MAX_TABLE, listed, read_regular
+from masrel._input import (
+    MAX_TABLE,
+    csv_format,
+    format_problem,
+    listed,
+    read_regular,
+)
 from masrel.errors import RatingsError
 from masrel.ratings.table import (
+    _FORMAT,
+    _NEEDED_TIME,
     DEFAULT_SESSION,
     RATING_COLUMNS,
     SOURCES,
     Ratings,
     _assemble,
+    _is_utc,
 )
 from masrel.run._state import FELT
 from masrel.scales import Scale
@@ -79,6 +88,11 @@ class _Cell:
     felt: str | None
     grades_from: str | None
     device: str | None
+    position: int | None
+    code: str | None
+    n_attempts: int | None
+    first_grade: str | None
+    graded_at: str | None
 
 
 def read_study_ratings(path: Path | str, scale: Scale) -> Ratings:
@@ -180,8 +194,10 @@ def _extra_values(texts: Mapping[str, str], problems: _Problems) -> dict[str, An
         "source": texts.get("source", "foreign"),
         **{
             name: None if (text := texts.get(name, "NA")) in _MISSING else text
-            for name in ("felt", "grades_from", "device")
+            for name in _TEXTS
         },
+        "position": _whole(texts, "position", 1, problems),
+        "n_attempts": _whole(texts, "n_attempts", 0, problems),
         "n_stretches": n_stretches,
         "speeds_deg_s": speeds,
         "graded_stretch": graded,
@@ -192,6 +208,9 @@ def _extra_values(texts: Mapping[str, str], problems: _Problems) -> dict[str, An
         if values[name] not in known:
             names = listed(text for text in known if text is not None)
             problems.append((name, f"needed one of {names}, got {values[name]!r}"))
+    time = values["graded_at"]
+    if time is not None and not _is_utc(time):
+        problems.append(("graded_at", f"{_NEEDED_TIME}, got {time!r}"))
     return values
 
 
@@ -240,6 +259,10 @@ def _speeds(
     )
 
 
+_TEXTS = ("felt", "grades_from", "device", "code", "first_grade", "graded_at")
+"""Columns of text that a file may lack."""
+
+
 def _check_cells(cells: list[_Cell], scale: Scale, problems: list[_Problem]) -> None:
     first_lines: dict[tuple[str, str, str, int], int] = {}
     for cell in cells:
@@ -254,12 +277,14 @@ def _check_cells(cells: list[_Cell], scale: Scale, problems: list[_Problem]) -> 
                 f"{cell.session!r}, line {first} has one already"
             )
             problems.append((cell.line, cell.column, message))
-        if cell.grade is not None and cell.grade not in scale.grades:
-            message = (
-                f"needed one of {listed(scale.grades)}, or an empty cell or NA when "
-                f"missing, got {cell.grade!r}"
-            )
-            problems.append((cell.line, cell.column, message))
+        grades = {cell.column: cell.grade, "first_grade": cell.first_grade}
+        for column, grade in grades.items():
+            if grade is not None and grade not in scale.grades:
+                message = (
+                    f"needed one of {listed(scale.grades)}, or an empty cell or NA "
+                    f"when missing, got {grade!r}"
+                )
+                problems.append((cell.line, column, message))
 
 
 def _read_rows(path: Path) -> _CsvRows:
@@ -283,6 +308,9 @@ def _read_rows(path: Path) -> _CsvRows:
     if "\0" in text:
         line = text.count("\n", 0, text.index("\0")) + 1
         raise RatingsError(f"{path}: line {line}: needed text, got a zero byte")
+    problem = format_problem(csv_format(text), newest=_FORMAT)
+    if problem is not None:
+        raise RatingsError(f"{path}: {problem}")
     records = _records(path, text)
     if not records:
         raise RatingsError(f"{path}: needed a header and rows, the file has none")

@@ -5,6 +5,7 @@ import io
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -35,10 +36,22 @@ RATING_COLUMNS = (
     # and of its session:
     "grades_from",  # name of the source of its grades; None when unknown
     "device",  # name of the device, "simulated" with others before it; or None
+    # and of the presentation; None when unknown:
+    "position",  # whole number from 1: its place in the session
+    "code",  # text: the blinded code the rater knew it by
+    "n_attempts",  # whole number from 0: how often it was presented
+    "first_grade",  # text: what the rater gave; other than grade when corrected
+    "graded_at",  # time in UTC, ISO 8601, when a person gave the first grade
 )
 
 _N_ALWAYS = 7
 """Columns that every table has."""
+
+_FORMAT = 2
+"""Version of the file of a study's ratings."""
+
+_N_FORMERLY = 15
+"""Columns of a table of format 1, which does not name its format."""
 
 SOURCES = ("published", "recorded", "simulated", "foreign")
 """Where a rating comes from; "foreign" is a file that does not say."""
@@ -55,7 +68,7 @@ class Ratings:
 
     Attributes
     ----------
-    table : DataFrame, shape (n_ratings, 15)
+    table : DataFrame, shape (n_ratings, 20)
         One row a rating, columns `RATING_COLUMNS`; session, rater, model and repeat
         together are unique; a missing grade is None.
     scale : Scale
@@ -166,6 +179,11 @@ _DEFAULTS: dict[str, object] = {
     "felt": None,
     "grades_from": None,
     "device": None,
+    "position": None,
+    "code": None,
+    "n_attempts": None,
+    "first_grade": None,
+    "graded_at": None,
 }
 
 
@@ -190,14 +208,46 @@ def _problems(row: Mapping[str, object], scale: Scale) -> list[str]:
         )
     problems += [
         f"{name}: needed text or None, got {row[name]!r}"
-        for name in ("grades_from", "device")
+        for name in ("grades_from", "device", "code")
         if row[name] is not None and (not isinstance(row[name], str) or not row[name])
     ]
     problems += _stretch_problems(row)
+    problems += _presentation_problems(row, scale)
     unknown = sorted(set(row) - set(RATING_COLUMNS))
     if unknown:
         problems.append(f"unknown columns {', '.join(unknown)}")
     return problems
+
+
+def _presentation_problems(row: Mapping[str, object], scale: Scale) -> list[str]:
+    """Return what is wrong with what a row says of its presentation."""
+    problems = []
+    for name, least in (("position", 1), ("n_attempts", 0)):
+        number = row[name]
+        if number is not None and not (isinstance(number, int) and number >= least):
+            problems.append(
+                f"{name}: needed a whole number from {least}, got {number!r}"
+            )
+    first, time = row["first_grade"], row["graded_at"]
+    if first is not None and first not in scale.grades:
+        problems.append(
+            f"first_grade: needed one of {', '.join(scale.grades)} or None, "
+            f"got {first!r}"
+        )
+    if time is not None and not (isinstance(time, str) and _is_utc(time)):
+        problems.append(f"graded_at: {_NEEDED_TIME}, got {time!r}")
+    return problems
+
+
+_NEEDED_TIME = "needed a time in UTC such as 2026-05-04T09:30:00Z"
+
+
+def _is_utc(text: str) -> bool:
+    """Return whether a text is a time in UTC as ISO 8601 writes it."""
+    try:
+        return datetime.fromisoformat(text).utcoffset() == timedelta(0)
+    except ValueError:
+        return False
 
 
 def _stretch_problems(row: Mapping[str, object]) -> list[str]:
@@ -411,6 +461,8 @@ def _items(
 def write_ratings(ratings: Ratings, path: Path, *, within: Path | None = None) -> None:
     """Write a table of ratings; the same table gives the same bytes.
 
+    One that has codes says which models they stand for: it is its owner's alone.
+
     Parameters
     ----------
     ratings : Ratings
@@ -427,7 +479,9 @@ def write_ratings(ratings: Ratings, path: Path, *, within: Path | None = None) -
     OSError
         If the file cannot be written; what was there is then there still.
     """
-    write_file(path, ratings_csv(ratings), within=within)
+    names_models = ratings.table["code"].notna().any()
+    mode = 0o600 if names_models else None
+    write_file(path, ratings_csv(ratings), within=within, mode=mode)
 
 
 def ratings_csv(ratings: Ratings) -> str:
@@ -443,20 +497,35 @@ def ratings_csv(ratings: Ratings) -> str:
     str
         What `write_ratings` writes.
     """
-    head = "# Ratings, one row a rating; grades are text; NA is missing.\n"
-    if ratings.simulated:
-        head = f"# SIMULATED: not grades of persons on hardware.\n{head}"
-    return head + _body(ratings)
-
-
-def _body(ratings: Ratings) -> str:
-    text = io.StringIO(newline="")
-    writer = csv.writer(text, lineterminator="\n")
     table = ratings.table
     has_more = table[list(RATING_COLUMNS[_N_ALWAYS:])].notna().any(axis=None)
     names = RATING_COLUMNS if has_more else RATING_COLUMNS[:_N_ALWAYS]
+    return f"{_head(ratings)}# format: {_FORMAT}\n{_body(ratings, names)}"
+
+
+def _texts(ratings: Ratings) -> list[str]:
+    """Return every text that a table of these ratings of logs has ever had."""
+    texts = [ratings_csv(ratings)]
+    head = _head(ratings)
+    texts.append(head + _body(ratings, RATING_COLUMNS[:_N_FORMERLY]))
+    if ratings.table["felt"].isna().all():  # of logs that say nothing of stretches
+        texts.append(head + _body(ratings, RATING_COLUMNS[:_N_ALWAYS]))
+    return texts
+
+
+def _head(ratings: Ratings) -> str:
+    head = "# Ratings, one row a rating; grades are text; NA is missing.\n"
+    if ratings.simulated:
+        return f"# SIMULATED: not grades of persons on hardware.\n{head}"
+    return head
+
+
+def _body(ratings: Ratings, names: Sequence[str]) -> str:
+    text = io.StringIO(newline="")
+    writer = csv.writer(text, lineterminator="\n")
     writer.writerow(names)
-    for row in zip(*(table[name].tolist() for name in names), strict=True):
+    columns = (ratings.table[name].tolist() for name in names)
+    for row in zip(*columns, strict=True):
         writer.writerow([_csv_cell(value) for value in row])
     return text.getvalue()
 

@@ -100,6 +100,8 @@ class SessionState:
     presented: dict[str, list[Event]] = field(default_factory=dict)
     # grade of each graded code as the rater gave it
     first_grades: dict[str, str] = field(default_factory=dict)
+    # time of day of each of these, in UTC
+    graded_at: dict[str, str] = field(default_factory=dict)
     # grade of each code that has one, with corrections
     grades: dict[str, str] = field(default_factory=dict)
     # why each skipped code has no grade of the session
@@ -195,6 +197,7 @@ def _apply(state: SessionState, event: Event) -> None:
         state.presented.setdefault(code, []).append(event)
     elif event.kind == "grade":
         state.first_grades[code] = state.grades[code] = str(grade)
+        state.graded_at[code] = event.time_utc
         stretch = event.fields.get("stretch")
         if isinstance(stretch, int):
             state.graded_stretches[code] = stretch

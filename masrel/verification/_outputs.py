@@ -3,7 +3,8 @@
 import hashlib
 import json
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,6 +27,7 @@ def output_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]:
     if not files:
         return  # nothing is loaded for it
     from masrel.ratings import ratings_from_logs, read_study_data
+    from masrel.ratings.table import _texts
 
     try:
         if study.logs():
@@ -40,10 +42,11 @@ def output_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]:
         for path in files:
             yield broken(path, f"cannot be held against what it is made from: {error}")
         return
+    texts = _texts(ratings) if ratings.source_path is None else []
     if study.analysis_file.is_file():
-        yield from _analysis_findings(study.analysis_file, analysis)
+        yield from _analysis_findings(study.analysis_file, analysis, texts)
     if manifest.is_file():
-        yield from _report_findings(manifest, analysis)
+        yield from _report_findings(manifest, analysis, texts)
 
 
 def _analysis_of(
@@ -67,13 +70,28 @@ def _table_findings(path: Path, ratings: "Ratings") -> Iterator[Finding]:
         yield broken(path, f"there are {len(differences) - _SHOWN} more differences")
 
 
-def _analysis_findings(path: Path, analysis: "Analysis") -> Iterator[Finding]:
+def _of_same_table(
+    analysis: "Analysis", inputs: object, texts: Sequence[str]
+) -> "Analysis":
+    # with the hash that was written if it is of the same table in an earlier format
+    if not isinstance(inputs, dict):
+        return analysis
+    sha256 = inputs.get("ratings_sha256")
+    if sha256 not in [hashlib.sha256(text.encode()).hexdigest() for text in texts]:
+        return analysis
+    return replace(analysis, inputs={**analysis.inputs, "ratings_sha256": sha256})
+
+
+def _analysis_findings(
+    path: Path, analysis: "Analysis", texts: Sequence[str]
+) -> Iterator[Finding]:
     from masrel.analysis import as_analysis_document
 
     document = _document(path)
     if document is None:
         yield broken(path, "needed a JSON object, got none")
         return
+    analysis = _of_same_table(analysis, document.get("inputs"), texts)
     needed = json.loads(json.dumps(as_analysis_document(analysis)))
     version = document.get("masrel_version")
     if version != analysis.masrel_version:
@@ -104,13 +122,16 @@ def _first_difference(got: object, needed: object, place: str = "") -> str | Non
     return next((difference for difference in differences if difference), None)
 
 
-def _report_findings(manifest: Path, analysis: "Analysis") -> Iterator[Finding]:
+def _report_findings(
+    manifest: Path, analysis: "Analysis", texts: Sequence[str]
+) -> Iterator[Finding]:
     # of the pages and assets that a report consists of, and what it was made from
     document = _document(manifest)
     files = None if document is None else document.get("files")
     if document is None or not isinstance(files, dict):
         yield broken(manifest, "needed the manifest of a report, got none")
         return
+    analysis = _of_same_table(analysis, document.get("inputs"), texts)
     if document.get("inputs") != analysis.inputs:
         yield broken(
             manifest, "the report is of another protocol or of other ratings: make anew"

@@ -142,15 +142,23 @@ def test_a_bad_cell_is_named_with_file_line_and_column(
         ("2,,3,", "'graded_stretch': needed at most n_stretches, got 3"),
         (",,1,", "'graded_stretch': needed at most n_stretches, got 1"),
         ("2,,0,", "'graded_stretch': needed a whole number from 1, got '0'"),
+        ("1,,,,0", "'position': needed a whole number from 1, got '0'"),
+        ("1,,,,,x", "'n_attempts': needed a whole number from 0, got 'x'"),
+        ("1,,,,,,5", "'first_grade': needed one of 0, 1, .*, or an empty cell"),
+        ("1,,,,,,,noon", "'graded_at': needed a time in UTC such as .*, got 'noon'"),
         ("1,,,no", "'felt': needed one of felt, below-threshold, no-catch, got 'no'"),
     ],
 )
-def test_a_bad_cell_of_stretches_is_named(
+def test_a_bad_cell_of_a_presentation_is_named(
     tmp_path: Path, cells: str, where: str
 ) -> None:
-    names = "rater,item,grade,n_stretches,speeds_deg_s,graded_stretch,felt"
+    names = (
+        "n_stretches,speeds_deg_s,graded_stretch,felt,"
+        "position,n_attempts,first_grade,graded_at"
+    )
+    cells += "," * (names.count(",") - cells.count(","))
     with pytest.raises(RatingsError, match=rf"r\.csv: line 2, column {where}"):
-        read(tmp_path, f"{names}\nR1,a,1,{cells}\n")
+        read(tmp_path, f"rater,item,grade,{names}\nR1,a,1,{cells}\n")
 
 
 @pytest.mark.parametrize(
@@ -158,6 +166,7 @@ def test_a_bad_cell_of_stretches_is_named(
     [
         ("", "needed a header and rows, the file has none"),
         ("# only a comment\n", "needed a header and rows"),
+        ("#A\n# format: 3\nrater,item,grade\n", "needed format 1 to 2, got 3"),
         ("rater;item;grade\nR1;a;1\n", "separated by commas, got one, 'rater;item"),
         ("item,Kim,Lee\na,1,1\n", "column for the rater.*masrel agree reads other"),
         ("rater,item,,grade\nR1,a,x,1\n", "line 1: column 3 needs a name"),

@@ -38,6 +38,17 @@ def stretches(draw: st.DrawFn) -> dict[str, object]:
     return row
 
 
+PRESENTED = st.fixed_dictionaries(
+    {
+        "position": st.none() | st.integers(1, 99),
+        "code": st.none() | st.from_regex(r"[1-9A-Z]{3}", fullmatch=True),
+        "n_attempts": st.none() | st.integers(0, 9),
+        "first_grade": st.sampled_from([*MODIFIED_ASHWORTH.grades, None]),
+        "graded_at": st.sampled_from([None, "2026-05-04T09:30:00.125Z"]),
+    }
+)
+
+
 ROWS = st.lists(
     st.fixed_dictionaries(
         {
@@ -49,8 +60,9 @@ ROWS = st.lists(
             "mean_speed_deg_s": SPEEDS,
             "source": st.sampled_from(SOURCES),
             "stretches": st.just({}) | stretches(),
+            "presented": st.just({}) | PRESENTED,
         }
-    ).map(lambda row: {**row.pop("stretches"), **row}),
+    ).map(lambda row: {**row.pop("stretches"), **row.pop("presented"), **row}),
     unique_by=lambda row: (row["session"], row["rater"], row["model"], row["repeat"]),
     max_size=12,
 )
@@ -82,6 +94,7 @@ def test_the_file_is_what_the_documentation_says(tmp_path: Path) -> None:
     rows = [{**ROW, "mean_speed_deg_s": 81.25}, {**ROW, "model": "HM2", "grade": None}]
     write_ratings(ratings_from_rows(rows, MODIFIED_ASHWORTH), tmp_path / "r.csv")
     assert (tmp_path / "r.csv").read_bytes().splitlines()[1:] == [
+        b"# format: 2",
         ",".join(RATING_COLUMNS[:7]).encode(),
         b"test,R1,HM1,1,1+,81.25,foreign",
         b"test,R1,HM2,1,NA,NA,foreign",
@@ -99,13 +112,19 @@ def test_what_is_known_of_stretches_is_in_the_file(tmp_path: Path) -> None:
         "felt": "felt",
         "grades_from": "console",
         "device": "puck",
+        "position": 2,
+        "code": "K7Q",
+        "n_attempts": 1,
+        "first_grade": "2",
+        "graded_at": "2026-05-04T09:30:00.125Z",
     }
     rows = [{**ROW, **known}, {**ROW, "model": "HM2"}]
     write_ratings(ratings_from_rows(rows, MODIFIED_ASHWORTH), tmp_path / "r.csv")
-    assert (tmp_path / "r.csv").read_text(encoding="utf-8").splitlines()[1:] == [
+    assert (tmp_path / "r.csv").read_text(encoding="utf-8").splitlines()[2:] == [
         ",".join(RATING_COLUMNS),
-        "test,R1,HM1,1,1+,70.5,foreign,3,60.0,81.0,60.0;NA;81.0,3,felt,console,puck",
-        "test,R1,HM2,1,1+,NA,foreign,NA,NA,NA,NA,NA,NA,NA,NA",
+        "test,R1,HM1,1,1+,70.5,foreign,3,60.0,81.0,60.0;NA;81.0,3,felt,console,puck,"
+        "2,K7Q,1,2,2026-05-04T09:30:00.125Z",
+        "test,R1,HM2,1,1+,NA,foreign" + 13 * ",NA",
     ]
 
 
@@ -117,10 +136,18 @@ def test_what_is_known_of_stretches_is_in_the_file(tmp_path: Path) -> None:
         ({"graded_stretch": 1}, "graded_stretch: needed one of 0 stretches, got 1"),
         ({"felt": "maybe"}, "felt: needed one of felt, below-threshold, no-catch"),
         ({"device": ""}, "device: needed text or None, got ''"),
+        ({"position": 0}, "position: needed a whole number from 1, got 0"),
+        ({"n_attempts": "1"}, "n_attempts: needed a whole number from 0, got '1'"),
+        (
+            {"first_grade": "5"},
+            "first_grade: needed one of 0, .*, 4 or None",
+        ),
+        ({"graded_at": "09:30"}, "graded_at: needed a time in UTC such as 2026-"),
+        ({"graded_at": "2026-05-04T09:30:00"}, "graded_at: needed a time in UTC"),
         ({"max_speed_deg_s": "fast"}, "max_speed_deg_s: needed a number, got 'fast'"),
     ],
 )
-def test_what_cannot_be_of_stretches_is_refused(
+def test_what_cannot_be_of_a_presentation_is_refused(
     wrong: dict[str, object], message: str
 ) -> None:
     with pytest.raises(RatingsError, match=message):

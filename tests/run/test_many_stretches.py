@@ -1,5 +1,7 @@
 """Presentations of many stretches: what is asked, kept of each, and said to a rater."""
 
+import hashlib
+import json
 import math
 import shutil
 import threading
@@ -38,6 +40,7 @@ from masrel.run import (
 )
 from masrel.scales import MODIFIED_ASHWORTH
 from masrel.schedule import read_schedule
+from masrel.verification import verify_study
 from tests.run.test_session import console, run
 
 Small = tuple[StudyPaths, Protocol]
@@ -267,8 +270,9 @@ def test_a_session_of_format_1_is_read_and_finished(tmp_path: Path) -> None:
     assert after["mean_speed_deg_s"][0] == before["mean_speed_deg_s"][0]
 
 
-def test_a_table_from_before_stretches_were_counted_is_what_its_logs_say(
-    tmp_path: Path,
+@pytest.mark.parametrize("n_columns", [7, 15])
+def test_a_table_of_format_1_is_what_its_logs_say(
+    tmp_path: Path, n_columns: int
 ) -> None:
     shutil.copytree(OLD, tmp_path / "study")
     study = StudyPaths(tmp_path / "study")
@@ -276,12 +280,19 @@ def test_a_table_from_before_stretches_were_counted_is_what_its_logs_say(
         ratings_from_logs(study, read_protocol(study.protocol)), study.ratings_file
     )
     lines = study.ratings_file.read_text(encoding="utf-8").splitlines()
-    cut = [",".join(line.split(",")[:7]) for line in lines]
+    cut = [",".join(line.split(",")[:n_columns]) for line in lines]
+    cut.remove("# format: 2")
     study.ratings_file.write_text("\n".join(cut) + "\n", encoding="utf-8")
     for verb in ("analyze", "verify", "check"):
         done = CliRunner().invoke(cli, [verb, str(study.root)])
         assert "is not what the session logs say" not in done.output
         assert done.exit_code == 0, done.output
+    # and so is an analysis that was made when it was the table
+    sha256 = hashlib.sha256(study.ratings_file.read_bytes()).hexdigest()
+    analysis = study.analysis_file.read_text()
+    now = json.loads(analysis)["inputs"]["ratings_sha256"]
+    study.analysis_file.write_text(analysis.replace(now, sha256))
+    assert verify_study(study).is_whole
     study.ratings_file.write_text("\n".join(cut[:-1]) + "\n", encoding="utf-8")
     with pytest.raises(RatingsError, match="is not what the session logs say"):
         read_study_data(study, read_protocol(study.protocol))
