@@ -164,8 +164,8 @@ _TARDIEU_MEANINGS = MappingProxyType(
     }
 )
 
-_R1 = ("R1", "angle of the catch or of the first beat of clonus, stretched fast")
-_R2 = ("R2", "angle at the end of the range, stretched slowly")
+_R1 = ("R1", "angle of catch or clonus, stretched fast")
+_R2 = ("R2", "end of the range, stretched slowly")
 
 _OF_THE_LITERATURE = (
     PublishedScale(

@@ -23,6 +23,7 @@ MODULES = (
     "masrel.conduct",
     "masrel.run",
     "masrel.training",
+    "masrel.paper",
     "masrel.ratings",
     "masrel.analysis",
     "masrel.verification",

@@ -36,6 +36,7 @@ GROUPS = {
     "Its conduct": {
         "train": "Teach a rater on models of known grade, until a test is passed.",
         "run": "Present a schedule's models and record every grade.",
+        "sheet": "Sheets to print for raters who grade on paper.",
         "ratings": "Turn session logs into the table of ratings.",
         "analyze": "Compute the agreement tables a study asks for.",
         "grading": "Regress grades on the models' parameters and the speed.",

@@ -86,6 +86,11 @@ class StudyPaths:
         """The folder of training logs and recordings; no rating of the study."""
         return self.root / "training"
 
+    @property
+    def sheets(self) -> Path:
+        """The folder of sheets to print, and of files to type them into."""
+        return self.root / "sheets"
+
     def logs(self) -> list[Path]:
         """Return the session logs that are there, whosever they are."""
         return sorted(path for path in self.sessions.glob("*.jsonl") if path.is_file())
@@ -97,6 +102,10 @@ class StudyPaths:
     def sheet_file(self, rater: str, session: str) -> Path:
         """Return the file of one rater's blinded sheet."""
         return self.schedules / f"{session}_{rater}_sheet.csv"
+
+    def typed_file(self, rater: str, session: str) -> Path:
+        """Return the file into which one rater's printed sheet is typed."""
+        return self.sheets / f"{session}_{rater}.csv"
 
     def log_file(self, rater: str, session: str) -> Path:
         """Return the file of one rater's session log."""

@@ -40,8 +40,28 @@ def test_a_name_hashes_as_the_table_that_it_stands_for(
     named = with_scale(tmp_path, top=f'scale = "{name}"\n')
     other = with_scale(tmp_path, table=spelled_out)
     assert presented_content(named) == presented_content(other)
-    assert protocol_hash(named) == protocol_hash(other)
     assert scale_of(named) == scale
+    if not PUBLISHED_SCALES[name].angles:
+        assert protocol_hash(named) == protocol_hash(other)
+
+
+def test_the_angles_of_a_scale_are_asked_after_each_presentation(
+    tmp_path: Path,
+) -> None:
+    (angles,) = with_scale(tmp_path, top='scale = "tardieu"\n').questionnaires
+    assert (angles.id, angles.when) == ("tardieu", "presentation")
+    asked = [(q.id, q.type, q.low, q.high, q.required) for q in angles.questions]
+    assert asked == [("R1", "whole", 0, 180, False), ("R2", "whole", 0, 180, False)]
+
+
+def test_a_study_may_ask_for_the_angles_in_a_way_of_its_own(tmp_path: Path) -> None:
+    own = (
+        '[[questionnaires]]\nid = "tardieu"\ntitle = "X"\nwhen = "presentation"\n'
+        '[[questionnaires.questions]]\nid = "X"\ntext = "X, deg"\n'
+        'type = "visual-analogue"\n\n'
+    )
+    protocol = with_scale(tmp_path, top='scale = "tardieu"\n', table=own)
+    assert [q.title for q in protocol.questionnaires] == ["X"]
 
 
 @pytest.mark.parametrize(

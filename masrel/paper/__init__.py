@@ -1,0 +1,12 @@
+"""Sessions on paper: sheets to print, and what was written on them brought back.
+
+In: a protocol and drawn schedules. Out: printable sheets without a model's name, and
+session logs whose grades are from paper.
+"""
+
+from masrel.paper._printing import PaperSheets, write_sheets
+
+__all__ = [
+    "PaperSheets",
+    "write_sheets",
+]

@@ -1,0 +1,227 @@
+"""Sheets to print for raters, and the files into which they are typed afterwards."""
+
+import csv
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import masrel
+from masrel._files import write_files
+from masrel.errors import ParameterError, RatingsError
+from masrel.paper._form import (
+    OF_SESSION,
+    Form,
+    QuestionColumn,
+    form_of,
+)
+from masrel.paper._typed import read_typed
+from masrel.protocol import Protocol, Question, StudyPaths, scale_of
+from masrel.scales import published_scale
+from masrel.schedule import Schedule, check_schedule, read_schedule
+
+_MOST_BOXES = 12
+"""Answers of a question that are boxes; for more there is a blank."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PaperSheets:
+    """The files that were made of sheets.
+
+    Attributes
+    ----------
+    html : Path
+        Every sheet, to be printed; each begins on a new page.
+    typed : tuple of Path
+        For each sheet the file into which it is typed.
+    unchanged : tuple of Path
+        Those of them in which something has been typed: they stay as they are.
+    """
+
+    html: Path
+    typed: tuple[Path, ...]
+    unchanged: tuple[Path, ...]
+
+
+def write_sheets(
+    study: StudyPaths,
+    protocol: Protocol,
+    *,
+    raters: Sequence[str] = (),
+    sessions: Sequence[str] = (),
+) -> PaperSheets:
+    """Write sheets of drawn schedules to print, and files to type them into.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is; its schedules are drawn.
+    protocol : Protocol
+        The study's protocol.
+    raters, sessions : sequence of str, optional
+        Whose sheets; of all unless given.
+
+    Returns
+    -------
+    PaperSheets
+        What was written, in ``sheets/``. No file names a model.
+
+    Raises
+    ------
+    ParameterError
+        If the protocol has no such rater or session, or not the two together.
+    ScheduleError
+        If a schedule is missing, damaged, or stale.
+    OSError
+        If the system refuses a folder or file.
+    """
+    forms = [
+        form_of(protocol, _schedule(study, protocol, rater, session))
+        for rater, session in _places(protocol, raters, sessions)
+    ]
+    html = study.sheets / "sheets.html"
+    typed = tuple(study.typed_file(form.rater, form.session) for form in forms)
+    unchanged = tuple(path for path in typed if path.exists() and _has_answers(path))
+    texts = {
+        path: _typed_text(form)
+        for path, form in zip(typed, forms, strict=True)
+        if path not in unchanged
+    }
+    write_files({**texts, html: _page(protocol, forms)}, within=study.root)
+    return PaperSheets(html=html, typed=typed, unchanged=unchanged)
+
+
+def _places(
+    protocol: Protocol, raters: Sequence[str], sessions: Sequence[str]
+) -> list[tuple[str, str]]:
+    ids = {
+        "rater": [rater.id for rater in protocol.raters],
+        "session": [session.id for session in protocol.sessions],
+    }
+    for name, chosen in (("rater", raters), ("session", sessions)):
+        for each in chosen:
+            if each not in ids[name]:
+                raise ParameterError(
+                    f"{name}: needed one of {', '.join(ids[name])}, got {each!r}"
+                )
+    places = [
+        (rater, session.id)
+        for session in protocol.sessions
+        for rater in session.raters
+        if (not sessions or session.id in sessions) and (not raters or rater in raters)
+    ]
+    if not places:
+        raise ParameterError(
+            f"rater: needed one of session {', '.join(sessions)}, got "
+            f"{', '.join(raters)}"
+        )
+    return places
+
+
+def _schedule(
+    study: StudyPaths, protocol: Protocol, rater: str, session: str
+) -> Schedule:
+    schedule = read_schedule(study.schedule_file(rater, session))
+    check_schedule(schedule, protocol)
+    return schedule
+
+
+def _has_answers(path: Path) -> bool:
+    # what cannot be read is not replaced either
+    blank = {"sheet", "position", "code"}
+    try:
+        rows = read_typed(path).rows
+    except RatingsError:
+        return True
+    return any(
+        cell for row in rows for key, cell in row.cells.items() if key not in blank
+    )
+
+
+def _typed_text(form: Form) -> str:
+    """Return a sheet as the text of the file that it is typed into."""
+    text = io.StringIO(newline="")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(form.columns)
+    blank = [""] * (len(form.columns) - 3)
+    for position, code in enumerate(form.codes, start=1):
+        writer.writerow([form.id, position, code, *blank])
+    if form.of_session:
+        writer.writerow([form.id, OF_SESSION, "", *blank])
+    return text.getvalue()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _ShownQuestion:
+    """A question as it is printed: with boxes, or a blank where there are none."""
+
+    question: Question
+    boxes: tuple[str, ...]
+
+
+def _shown(questions: Sequence[QuestionColumn]) -> list[_ShownQuestion]:
+    return [
+        _ShownQuestion(question=each.question, boxes=_boxes(each.question))
+        for each in questions
+    ]
+
+
+def _boxes(question: Question) -> tuple[str, ...]:
+    if question.type == "choice":
+        return question.choices
+    if question.type != "whole" or question.range is None:
+        return ()
+    low, high = question.range
+    n_answers = high - low + 1
+    return tuple(map(str, range(low, high + 1))) if n_answers <= _MOST_BOXES else ()
+
+
+def _page(protocol: Protocol, forms: Sequence[Form]) -> str:
+    # Imported here: what is entered loads no templates.
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("masrel.paper"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        keep_trailing_newline=True,
+    )
+    style = Path(__file__).with_name("templates") / "sheet.css"
+    scale = published_scale(scale_of(protocol))
+    grades = protocol.scale.grades
+    return environment.get_template("sheet.html").render(
+        version=masrel.__version__,
+        style=style.read_text(encoding="utf-8"),
+        title=protocol.study.title,
+        study=protocol.study.id,
+        instructions=[p for p in protocol.occasions.instructions.split("\n\n") if p],
+        scale=scale,
+        scale_name=protocol.scale.name,
+        meanings=[
+            (grade, scale.meanings[grade])
+            for grade in grades
+            if scale is not None and grade in scale.meanings
+        ],
+        grades=grades,
+        of_presentation=_shown(forms[0].of_presentation),
+        of_session=_shown(forms[0].of_session),
+        sheets=[{"form": form, "rows": _rows(protocol, form)} for form in forms],
+    )
+
+
+def _rows(protocol: Protocol, form: Form) -> list[dict[str, object]]:
+    # position, code, and what comes after the presentation
+    after, minutes = protocol.occasions.break_after, protocol.occasions.break_minutes
+    n_presentations = len(form.codes)
+    return [
+        {
+            "position": position,
+            "code": code,
+            "pause": f"Break of {minutes:g} min"
+            if after is not None
+            and position % after == 0
+            and position < n_presentations
+            else None,
+        }
+        for position, code in enumerate(form.codes, start=1)
+    ]
