@@ -21,6 +21,15 @@ _EVENTS = {
     "conduct": ("format", "study", "masrel_version"),
     "withdrawn": ("rater", "who", "why"),
     "unblinded": ("rater", "session", "code", "who", "why"),
+    "answered": ("rater", "questionnaire", "question", "answer"),
+    "answer-correction": (
+        "rater",
+        "questionnaire",
+        "question",
+        "answer",
+        "who",
+        "why",
+    ),
     "recovered": ("line", "n_bytes", "sha256", "kept", "moved_to"),
 }
 """Every kind of event with the fields it has."""
@@ -48,10 +57,13 @@ def read_conduct(study: StudyPaths) -> tuple[Event, ...]:
     SessionLogError
         If the log is damaged or holds what is no such event.
     """
+    return tuple(event for event in all_events(study) if event.kind in _SHOWN)
+
+
+def all_events(study: StudyPaths) -> tuple[Event, ...]:
+    """Return every event of a study's log; none where there is no log."""
     path = study.conduct_file
-    if not path.exists():
-        return ()
-    return tuple(e for e in _checked(study, read_log(path)) if e.kind in _SHOWN)
+    return _checked(study, read_log(path)) if path.exists() else ()
 
 
 def append_event(

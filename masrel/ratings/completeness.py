@@ -76,7 +76,9 @@ def corrections_of(study: StudyPaths, protocol: Protocol) -> tuple[Correction, .
 def _corrections(study: StudyPaths, rater: str, session: str) -> Iterator[Correction]:
     log = study.log_file(rater, session)
     events = read_log(log)
-    corrected = [event.fields for event in events if event.kind == "correction"]
+    # those before a session began anew are set aside with what they corrected
+    anew = max((e.line for e in events if e.kind == "restarted"), default=0)
+    corrected = [e.fields for e in events if e.kind == "correction" and e.line > anew]
     if not corrected:
         return
     state = replay(log, events)
@@ -116,9 +118,9 @@ def study_remarks(
     -------
     tuple of str
         A sentence each for raters who were withdrawn, codes that were unblinded, logs
-        of no rater of the protocol, skipped presentations, empty logs, recordings
-        without a log, and ratings that are not from the logs that there are. Empty when
-        there is nothing to say.
+        of no rater of the protocol, skipped presentations, sessions that were begun
+        anew, empty logs, recordings without a log, and ratings that are not from the
+        logs that there are. Empty when there is nothing to say.
 
     Raises
     ------
@@ -204,8 +206,13 @@ def _of_sessions(study: StudyPaths, protocol: Protocol) -> Iterator[str]:
 
 
 def _of_skips(study: StudyPaths, log: Path) -> Iterator[str]:
-    # those that did not get their grade later
+    # those that did not get their grade later, and grades that count no more
     state = _state_of(log)
+    if state.n_set_aside:
+        yield (
+            f"{_name(study, log)}: the session was begun anew; grades from before, "
+            f"which stay in the log and are not among the ratings: {state.n_set_aside}."
+        )
     for code, event in state.skipped.items():
         if code not in state.grades:
             yield (

@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from masrel.run._grade_sources import (
         GradeRequest,
         GradeSource,
+        OccasionSource,
+        QuestionRequest,
         ScriptGrades,
         Skip,
         StretchGrade,
@@ -20,13 +22,20 @@ if TYPE_CHECKING:
     from masrel.run._settings import model_controller
     from masrel.run._simulated_raters import SimulatedGrades
     from masrel.run.console import ConsoleGrades
-    from masrel.run.session import record_correction, record_skip, run_session
+    from masrel.run.session import (
+        record_answer,
+        record_correction,
+        record_skip,
+        run_session,
+    )
 
 __all__ = [
     "ConsoleGrades",
     "Event",
     "GradeRequest",
     "GradeSource",
+    "OccasionSource",
+    "QuestionRequest",
     "ScriptGrades",
     "SessionLog",
     "SessionSummary",
@@ -35,6 +44,7 @@ __all__ = [
     "StretchGrade",
     "model_controller",
     "read_log",
+    "record_answer",
     "record_correction",
     "record_skip",
     "run_session",
@@ -44,6 +54,8 @@ _HOMES = {
     "masrel.run._grade_sources": (
         "GradeRequest",
         "GradeSource",
+        "OccasionSource",
+        "QuestionRequest",
         "ScriptGrades",
         "Skip",
         "StretchGrade",
@@ -53,7 +65,12 @@ _HOMES = {
     "masrel.run._settings": ("model_controller",),
     "masrel.run._simulated_raters": ("SimulatedGrades",),
     "masrel.run.console": ("ConsoleGrades",),
-    "masrel.run.session": ("record_correction", "record_skip", "run_session"),
+    "masrel.run.session": (
+        "record_answer",
+        "record_correction",
+        "record_skip",
+        "run_session",
+    ),
 }
 
 

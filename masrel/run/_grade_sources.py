@@ -2,10 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, ClassVar, Protocol
+from typing import TYPE_CHECKING, ClassVar, Protocol, cast
 
 from masrel.errors import ParameterError
-from masrel.protocol import PresentationRules
+from masrel.protocol import PresentationRules, Question, Questionnaire
+from masrel.protocol import Protocol as StudyProtocol
+from masrel.protocol._questions import Answer
 from masrel.run._state import Felt
 from masrel.schedule import Presentation
 
@@ -33,6 +35,8 @@ class GradeRequest:
         Faults in a row so far.
     rehearsal : bool
         Whether nothing of this enters the study's ratings.
+    practice : bool
+        Whether it is for practice; its grade is no rating.
     rules : PresentationRules
         How often the arm may be stretched, and with which cues.
     status : PresentationStatus or None
@@ -55,6 +59,7 @@ class GradeRequest:
     attempt: int
     n_faults: int = 0
     rehearsal: bool = False
+    practice: bool = False
     rules: PresentationRules = field(default_factory=PresentationRules)
     status: "PresentationStatus | None" = None
     n_stretches: int = 0
@@ -92,6 +97,30 @@ class Skip:
     why: str
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class QuestionRequest:
+    """One question to a rater.
+
+    Attributes
+    ----------
+    rater, session : str
+        Who is asked, and in which session.
+    questionnaire : Questionnaire
+        The questionnaire.
+    question : Question
+        The one of its questions; its `needed` says what an answer is.
+    presentation : Presentation or None
+        What it is about; None for the session or the study. A person is told its code,
+        never the model.
+    """
+
+    rater: str
+    session: str
+    questionnaire: Questionnaire
+    question: Question
+    presentation: Presentation | None
+
+
 class GradeSource(Protocol):
     """A source of grades: a person, a script, or simulated raters."""
 
@@ -118,20 +147,73 @@ class GradeSource(Protocol):
         ...
 
 
+class OccasionSource(GradeSource, Protocol):
+    """A source of grades that has instructions, breaks and questions, too.
+
+    A protocol that has any of these needs the method that is for them.
+    """
+
+    def instruct(self, request: GradeRequest, text: str) -> None:
+        """Return when the rater has read the instructions; `request` comes next."""
+        ...
+
+    def take_break(self, request: GradeRequest, minutes: float) -> None:
+        """Return when a break is over; `request` comes next."""
+        ...
+
+    def answer(self, request: QuestionRequest) -> Answer:
+        """Return the answer, or None for none."""
+        ...
+
+    def begins_anew(self, request: GradeRequest, days: int) -> bool:
+        """Return whether a session begins anew that was left so many days ago."""
+        ...
+
+
+def with_occasions(source: GradeSource, protocol: StudyProtocol) -> OccasionSource:
+    """Return a source of grades that has the methods that a protocol needs."""
+    occasions = protocol.occasions
+    needed = {
+        "instruct": ("occasions.instructions", bool(occasions.instructions)),
+        "take_break": ("occasions.break_after", occasions.break_after is not None),
+        "begins_anew": ('occasions.resume = "ask"', occasions.resume == "ask"),
+        "answer": ("questionnaires", bool(protocol.questionnaires)),
+    }
+    for method, (key, is_needed) in needed.items():
+        if is_needed and not hasattr(source, method):
+            raise ParameterError(
+                f"grades: needed a source with a method {method}, as the protocol has "
+                f"{key}, got {type(source).__name__}"
+            )
+    return cast(OccasionSource, source)
+
+
 class ScriptGrades:
-    """Grades fixed beforehand.
+    """Grades and answers fixed beforehand.
 
     Parameters
     ----------
     grades : mapping of str to str, or sequence of str
         Grade by code, or one grade a position.
+    practice : mapping of str to str, or sequence of str, optional
+        The same for practice.
+    answers : mapping of str to str, int, float or None, optional
+        Answer by ``questionnaire.question``, whatever it is about.
     """
 
     name: ClassVar[str] = "script"
     simulated: ClassVar[bool] = True
 
-    def __init__(self, grades: Mapping[str, str] | Sequence[str]) -> None:
+    def __init__(
+        self,
+        grades: Mapping[str, str] | Sequence[str],
+        *,
+        practice: Mapping[str, str] | Sequence[str] = (),
+        answers: Mapping[str, Answer] | None = None,
+    ) -> None:
         self._grades = grades
+        self._practice = practice
+        self._answers = answers or {}
 
     def make_ready(self, request: GradeRequest) -> None:
         """Return at once."""
@@ -154,7 +236,8 @@ class ScriptGrades:
         ParameterError
             If the script has none for it.
         """
-        presentation, grades = request.presentation, self._grades
+        presentation = request.presentation
+        grades = self._practice if request.practice else self._grades
         if isinstance(grades, Mapping):
             if presentation.code in grades:
                 return grades[presentation.code]
@@ -164,6 +247,20 @@ class ScriptGrades:
             f"script: needed a grade of position {presentation.position}, "
             f"code {presentation.code}"
         )
+
+    def instruct(self, request: GradeRequest, text: str) -> None:
+        """Return at once."""
+
+    def take_break(self, request: GradeRequest, minutes: float) -> None:
+        """Return at once."""
+
+    def answer(self, request: QuestionRequest) -> Answer:
+        """Return the answer of the script; None where it has none."""
+        return self._answers.get(f"{request.questionnaire.id}.{request.question.id}")
+
+    def begins_anew(self, request: GradeRequest, days: int) -> bool:  # noqa: ARG002 - the interface's
+        """Return False: a script goes on."""
+        return False
 
     def present_again(self, request: GradeRequest, fault: str) -> bool:  # noqa: ARG002 - the interface's
         """Return whether there were fewer faults in a row than `MAX_FAULTS`."""

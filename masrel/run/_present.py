@@ -280,6 +280,8 @@ def _keep(
     }
     if request.rehearsal:
         facts["rehearsal"] = True
+    if request.practice:
+        facts["practice"] = True
     checksum = write_recording(dataclasses.replace(recording, facts=facts), file)
     return _outcome(recording, protocol, request, checksum)
 

@@ -49,6 +49,7 @@ class Presenter:
         occasion: str,
         named_by: tuple[str, ...],
         known_by: tuple[str, ...] = (),
+        kind: Literal["presented", "practised"] = "presented",
     ) -> None:
         self._protocol = protocol
         self._grades = grades
@@ -56,7 +57,8 @@ class Presenter:
         self._log = log
         self._occasion = occasion  # what it is for, in messages
         self._named_by = named_by  # fields of a presentation in each of its events
-        self._known_by = known_by  # and those in ``presented`` alone
+        self._known_by = known_by  # and those in the event `kind` alone
+        self._kind = kind  # of event that says what was presented
         self.n_again = 0  # presentations beyond the first
         self.n_faults = 0
 
@@ -106,7 +108,7 @@ class Presenter:
         before = [
             event
             for event in self._log.events
-            if event.kind == "presented" and named <= event.fields.items()
+            if event.kind == self._kind and named <= event.fields.items()
         ]
         for event in before:  # a process may have died between the log and this
             file = self._log.path.parent / str(event.fields["recording"])
@@ -149,7 +151,7 @@ class Presenter:
         fields["attempt"] = request.attempt
         known = self._fields(request, self._known_by)
         presented = presented_fields(outcome, file, self._log.path.parent)
-        self._log.append("presented", {**fields, **known, **presented})
+        self._log.append(self._kind, {**fields, **known, **presented})
         if fault is not None:
             self._log.append("fault", {**fields, **fault_fields(fault, outcome)})
         spool_of(file).unlink(missing_ok=True)  # only now is it of no use

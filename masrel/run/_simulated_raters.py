@@ -8,22 +8,12 @@ import itertools
 import json
 import math
 import statistics
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 from masrel.errors import ParameterError, ProtocolError
 from masrel.protocol import Model, Protocol, scale_of
-from masrel.run._grade_sources import MAX_FAULTS, GradeRequest
-
-_Purpose = Literal[
-    "accuracy",
-    "neighbour",
-    "severity",
-    "retest",
-    "speed",
-    "sensor",
-    "stretches",
-    "hand",
-]
+from masrel.protocol._questions import Answer
+from masrel.run._grade_sources import MAX_FAULTS, GradeRequest, QuestionRequest
 
 _MOST_STRETCHES = 3  # of a simulated rater who may stretch as often as wanted
 
@@ -104,6 +94,41 @@ class SimulatedGrades:
     def present_again(self, request: GradeRequest, fault: str) -> bool:  # noqa: ARG002 - the interface's
         """Return whether there were fewer faults in a row than `MAX_FAULTS`."""
         return request.n_faults < MAX_FAULTS
+
+    def instruct(self, request: GradeRequest, text: str) -> None:
+        """Return at once."""
+
+    def take_break(self, request: GradeRequest, minutes: float) -> None:
+        """Return at once."""
+
+    def begins_anew(self, request: GradeRequest, days: int) -> bool:  # noqa: ARG002 - the interface's
+        """Return False: a simulated rater goes on."""
+        return False
+
+    def answer(self, request: QuestionRequest) -> Answer:
+        """Return an answer that is drawn, each that is possible equally likely.
+
+        Parameters
+        ----------
+        request : QuestionRequest
+            The question.
+
+        Returns
+        -------
+        str or int
+            An answer; to a question for text, that it is simulated.
+        """
+        question, shown = request.question, request.presentation
+        model, repeat = ("", 0) if shown is None else (shown.model, shown.repeat)
+        name = f"answer {request.questionnaire.id}.{question.id}"
+        key = (request.rater, request.session, model, repeat)
+        share = _uniform(self._settings.seed, name, *key)
+        if question.choices:
+            return question.choices[int(share * len(question.choices))]
+        if question.range is None:
+            return "simulated"
+        low, high = question.range
+        return low + int(share * (high - low + 1))
 
     def _fresh(self, rater: str, session: str, model: str, repeat: int) -> str:
         seed, key = self._settings.seed, (rater, session, model, repeat)
@@ -197,7 +222,7 @@ def _interpolated(height: float, anchors: list[tuple[float, float]]) -> float:
 
 def _uniform(
     seed: int,
-    purpose: _Purpose,
+    purpose: str,
     rater: str,
     session: str,
     model: str,

@@ -1,5 +1,6 @@
 """What a session log says, event after event: where the session stands."""
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,6 +20,25 @@ FELT: tuple[Felt, ...] = get_args(Felt)
 FROM_PERSONS = ("console",)
 """Sources of grades, by the names that logs have them by, that are a person's."""
 
+_PRESENTED = (
+    "code",
+    "position",
+    "attempt",
+    "recording",
+    "sha256",
+    "facts_sha256",
+    "mean_speed_deg_s",
+    "n_missed_ticks",
+    "fault",
+    "simulated",
+    "stretches",
+    "ended",
+    "n_stretches",
+    "felt",
+    "r1_deg",
+    "r2_deg",
+)
+
 EVENTS: dict[str, tuple[str, ...]] = {
     "session": (
         "format",
@@ -36,24 +56,7 @@ EVENTS: dict[str, tuple[str, ...]] = {
         "rehearsal",
     ),
     "resumed": ("protocol_sha256", "n_graded", "clock", "masrel_version"),
-    "presented": (
-        "code",
-        "position",
-        "attempt",
-        "recording",
-        "sha256",
-        "facts_sha256",
-        "mean_speed_deg_s",
-        "n_missed_ticks",
-        "fault",
-        "simulated",
-        "stretches",
-        "ended",
-        "n_stretches",
-        "felt",
-        "r1_deg",
-        "r2_deg",
-    ),
+    "presented": _PRESENTED,
     "fault": (
         "code",
         "position",
@@ -65,6 +68,23 @@ EVENTS: dict[str, tuple[str, ...]] = {
         "last_200_ms",
     ),
     "grade": ("code", "position", "grade", "stretch"),
+    "practised": (*_PRESENTED, "model"),  # no schedule says which it was
+    "practice-grade": ("code", "position", "grade", "stretch"),
+    "practice-skipped": ("code", "position", "who", "why"),
+    "interval": ("after", "days", "at_least_days", "at_most_days", "kept"),
+    "instructed": ("text",),
+    "break": ("after", "minutes", "lasted_s"),
+    "answered": ("questionnaire", "question", "code", "answer"),
+    "answer-correction": (
+        "questionnaire",
+        "question",
+        "code",
+        "answer",
+        "who",
+        "why",
+    ),
+    "aged": ("last_event_utc", "days", "resume", "restart"),
+    "restarted": ("protocol_sha256", "n_graded", "clock", "masrel_version"),
     "correction": ("code", "grade", "who", "why"),
     "skipped": ("code", "position", "who", "why"),
     "stopped": ("code", "position", "why"),
@@ -90,12 +110,23 @@ _LATER = {
 rehearsed, and only the columns of a recording were hashed."""
 
 
-@dataclass(slots=True, kw_only=True)
-class SessionState:
-    """Where a session stands."""
+# Of practice the same can follow as of the presentations that are rated.
+_OF_PRACTICE = {
+    "practised": "presented",
+    "practice-grade": "grade",
+    "practice-skipped": "skipped",
+}
 
-    # fields of the event ``session``; empty when there is none yet
-    header: "Mapping[str, _Facts]" = field(default_factory=dict)
+_AFTER_COMPLETE = ("correction", "answer-correction")
+
+AnswerKey = tuple[str, str, str | None]
+"""Questionnaire, question, and the code that it is about, if any."""
+
+
+@dataclass(slots=True, kw_only=True)
+class CodesState:
+    """Where the presentations of a session stand, or those for practice."""
+
     # presentations of each code, in order
     presented: dict[str, list[Event]] = field(default_factory=dict)
     # grade of each graded code as the rater gave it
@@ -110,7 +141,30 @@ class SessionState:
     settled: set[str] = field(default_factory=set)
     # the stretch each grade rests on, where the rater said so
     graded_stretches: dict[str, int] = field(default_factory=dict)
+
+
+@dataclass(slots=True, kw_only=True)
+class SessionState(CodesState):
+    """Where a session stands; what was before it began anew is set aside."""
+
+    # fields of the event ``session``; empty when there is none yet
+    header: "Mapping[str, _Facts]" = field(default_factory=dict)
     is_complete: bool = False  # whether the session came to its end
+    practice: CodesState = field(default_factory=CodesState)
+    is_instructed: bool = False  # whether the rater has read the instructions
+    # after how many presentations there were breaks
+    breaks: set[object] = field(default_factory=set)
+    answers: "dict[AnswerKey, _Facts]" = field(default_factory=dict)  # with corrections
+    # presentations, also for practice, and how many grades were set aside
+    set_aside: list[Event] = field(default_factory=list)
+    n_set_aside: int = 0
+
+    @property
+    def all_presented(self) -> list[Event]:
+        """Every presentation that left a recording."""
+        parts = (self.presented, self.practice.presented)
+        now = (event for part in parts for events in part.values() for event in events)
+        return [*self.set_aside, *now]
 
 
 def replay(path: Path, events: Sequence[Event]) -> SessionState:
@@ -141,15 +195,29 @@ def _contradiction(state: SessionState, event: Event) -> str | None:
         return None
     if (event.kind == "session") == bool(state.header):
         return "needed the event session once, before all others"
-    if state.is_complete and event.kind != "correction":
+    if state.is_complete and event.kind not in _AFTER_COMPLETE:
         return "needed no event but a correction after complete"
-    return _contradiction_of_code(state, event)
+    if "question" in event.fields:
+        return _contradiction_of_answer(state, event)
+    return _contradiction_of_code(*_part(state, event))
+
+
+def _part(state: SessionState, event: Event) -> tuple[CodesState, Event]:
+    # what an event is about, and the event as one of that part
+    if event.kind in _OF_PRACTICE:
+        return state.practice, dataclasses.replace(event, kind=_OF_PRACTICE[event.kind])
+    if event.kind == "fault" and event.fields["code"] in state.practice.presented:
+        return state.practice, event
+    return state, event
 
 
 def _of_another_type(event: Event) -> str | None:
     # the field that has no value of its type, or None
-    for name in ("code", "grade", "who", "why"):
+    for name in ("code", "grade", "who", "why", "questionnaire", "question"):
         if not isinstance(event.fields.get(name), str | None):
+            return name
+    for name in ("after", "answer"):
+        if isinstance(event.fields.get(name), list):
             return name
     speed = event.fields.get("mean_speed_deg_s")
     if not isinstance(speed, float | int | None):
@@ -166,7 +234,26 @@ def _of_another_type(event: Event) -> str | None:
     return None if are_stretches else "stretches"
 
 
-def _contradiction_of_code(state: SessionState, event: Event) -> str | None:
+def _answer_key(event: Event) -> AnswerKey:
+    code = event.fields["code"]
+    return (
+        str(event.fields["questionnaire"]),
+        str(event.fields["question"]),
+        None if code is None else str(code),
+    )
+
+
+def _contradiction_of_answer(state: SessionState, event: Event) -> str | None:
+    key = _answer_key(event)
+    name, code = f"{key[0]}.{key[1]}", key[2]
+    if code is not None and code not in state.presented:
+        return f"needed a code that was presented, got {code}"
+    if event.kind == "answered" and key in state.answers:
+        return f"needed one answer to {name}, got another"
+    return None
+
+
+def _contradiction_of_code(state: CodesState, event: Event) -> str | None:
     code = event.fields.get("code")
     before = state.presented.get(str(code), [])
     if event.kind in ("presented", "skipped") and code in state.settled:
@@ -188,12 +275,38 @@ def _contradiction_of_code(state: SessionState, event: Event) -> str | None:
 
 
 def _apply(state: SessionState, event: Event) -> None:
+    if event.kind == "session":
+        state.header = event.fields
+    elif event.kind == "complete":
+        state.is_complete = True
+    elif event.kind == "instructed":
+        state.is_instructed = True
+    elif event.kind == "break":
+        state.breaks.add(event.fields["after"])
+    elif event.kind == "restarted":
+        _set_aside(state)
+    elif "question" in event.fields:
+        state.answers[_answer_key(event)] = event.fields["answer"]
+    else:
+        _apply_to_code(*_part(state, event))
+
+
+def _set_aside(state: SessionState) -> None:
+    # what was before the session begins anew: it stays in the log, and counts no more
+    fresh = SessionState(
+        header=state.header,
+        set_aside=state.all_presented,
+        n_set_aside=state.n_set_aside + len(state.grades),
+    )
+    for each in dataclasses.fields(fresh):
+        setattr(state, each.name, getattr(fresh, each.name))
+
+
+def _apply_to_code(state: CodesState, event: Event) -> None:
     code, grade = str(event.fields.get("code")), event.fields.get("grade")
     if event.kind in ("grade", "skipped", "correction"):
         state.settled.add(code)
-    if event.kind == "session":
-        state.header = event.fields
-    elif event.kind == "presented":
+    if event.kind == "presented":
         state.presented.setdefault(code, []).append(event)
     elif event.kind == "grade":
         state.first_grades[code] = state.grades[code] = str(grade)
@@ -208,5 +321,3 @@ def _apply(state: SessionState, event: Event) -> None:
         state.graded_stretches.pop(code, None)  # what was felt was another grade's
     elif event.kind == "skipped":
         state.skipped[code] = event
-    elif event.kind == "complete":
-        state.is_complete = True

@@ -6,9 +6,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, ClassVar, TextIO
 
-from masrel.errors import SessionStoppedError
-from masrel.protocol import PresentationRules
-from masrel.run._grade_sources import GradeRequest, Skip, StretchGrade
+from masrel.errors import ParameterError, SessionStoppedError
+from masrel.protocol import PresentationRules, Question
+from masrel.protocol._questions import Answer, checked_answer
+from masrel.run._grade_sources import (
+    GradeRequest,
+    QuestionRequest,
+    Skip,
+    StretchGrade,
+)
 from masrel.scales import PublishedScale, Scale, published_scale
 
 if TYPE_CHECKING:
@@ -64,11 +70,19 @@ class ConsoleGrades:
         """
         again = "" if request.attempt == 1 else " again"
         presentation = request.presentation
-        rehearsal = "REHEARSAL, no rating of the study. " if request.rehearsal else ""
+        labels = [
+            label
+            for label, is_so in (
+                ("REHEARSAL", request.rehearsal),
+                ("PRACTICE", request.practice),
+            )
+            if is_so
+        ]
+        label = f"{', '.join(labels)}, no rating of the study. " if labels else ""
         instruction = _instruction(request.rules)
         answer = self._ask(
             request,
-            f"{rehearsal}Presentation {presentation.position} of "
+            f"{label}Presentation {presentation.position} of "
             f"{request.n_presentations}, code {presentation.code}{again}. {instruction}"
             "Enter to begin (then any other key is an emergency stop), stop to stop: ",
         )
@@ -164,7 +178,117 @@ class ConsoleGrades:
                     return Skip(who=request.rater, why=why.strip())
                 self._say("To skip it needs a reason: skip the motor is hot.\n")
 
-    def _ask(self, request: GradeRequest, question: str) -> str:
+    def instruct(self, request: GradeRequest, text: str) -> None:
+        """Show the instructions, and wait until the rater has read them.
+
+        Parameters
+        ----------
+        request : GradeRequest
+            What comes next.
+        text : str
+            The instructions.
+
+        Raises
+        ------
+        SessionStoppedError
+            If the person stops, or the input ends.
+        """
+        self._wait(request, f"{text.strip()}\nEnter to go on, stop to stop: ")
+
+    def take_break(self, request: GradeRequest, minutes: float) -> None:
+        """Say that there is a break, and wait until the rater goes on.
+
+        Parameters
+        ----------
+        request : GradeRequest
+            What comes next.
+        minutes : float
+            How long the break is meant to be, min.
+
+        Raises
+        ------
+        SessionStoppedError
+            If the person stops, or the input ends.
+        """
+        unit = "minute" if minutes == 1 else "minutes"
+        self._wait(
+            request,
+            f"A break of {minutes:g} {unit}. Enter after it to go on, stop to stop: ",
+        )
+
+    def _wait(self, request: GradeRequest, text: str) -> None:
+        while answer := self._ask(request, text):
+            if answer == "stop":
+                raise _stopped(request, "on request")
+
+    def begins_anew(self, request: GradeRequest, days: int) -> bool:
+        """Ask whether a session goes on or begins anew.
+
+        Parameters
+        ----------
+        request : GradeRequest
+            What comes next if it goes on.
+        days : int
+            How many days ago it was left.
+
+        Returns
+        -------
+        bool
+            Whether it begins anew.
+
+        Raises
+        ------
+        SessionStoppedError
+            If the person stops, or the input ends.
+        """
+        when = {0: "today", 1: "yesterday"}.get(days, f"{days} days ago")
+        while True:
+            answer = self._ask(
+                request,
+                f"This session was left {when}, before presentation "
+                f"{request.presentation.position} of {request.n_presentations}. Go on, "
+                "or begin anew, and what was graded counts no more? (go on; anew; "
+                "stop): ",
+            )
+            if answer in ("go on", "anew"):
+                return answer == "anew"
+            if answer == "stop":
+                raise _stopped(request, "on request")
+
+    def answer(self, request: QuestionRequest) -> Answer:
+        """Ask a question until it is answered.
+
+        Parameters
+        ----------
+        request : QuestionRequest
+            The question.
+
+        Returns
+        -------
+        str, int, float or None
+            The answer; None where the rater gives none and none is required.
+
+        Raises
+        ------
+        SessionStoppedError
+            If the person stops, or the input ends.
+        """
+        question, shown = request.question, request.presentation
+        if question == request.questionnaire.questions[0]:
+            of = "" if shown is None else f" ({shown.code})"
+            self._say(f"{request.questionnaire.title}{of}\n")
+        text = f"{question.text} ({_possible(question)}; stop): "
+        while True:
+            answer = self._ask(request, text)
+            if answer == "stop":
+                raise _stopped(request, "on request")
+            try:
+                return checked_answer(question, answer, where="answer")
+            except ParameterError as error:
+                if answer:  # else it was an Enter too many
+                    self._say(f"{error}.\n")
+
+    def _ask(self, request: GradeRequest | QuestionRequest, question: str) -> str:
         self._say(question)
         try:
             answer = self._answers.readline()
@@ -245,9 +369,25 @@ def _cues_in_words(rules: PresentationRules) -> list[str]:
     ]
 
 
-def _stopped(request: GradeRequest, why: str) -> SessionStoppedError:
+def _possible(question: Question) -> str:
+    # what can be answered, with what the ends of a range mean
+    if question.range is None:
+        words = question.needed
+    else:
+        labels = zip(
+            question.range, (question.low_label, question.high_label), strict=True
+        )
+        ends = [f"{end}: {label}" for end, label in labels if label]
+        words = "; ".join([question.needed, *ends])
+    return words if question.required else f"{words}; Enter for none"
+
+
+def _stopped(request: GradeRequest | QuestionRequest, why: str) -> SessionStoppedError:
+    where = "a question"
+    if isinstance(request, GradeRequest):
+        place, n_presentations = request.presentation.position, request.n_presentations
+        where = f"presentation {place} of {n_presentations}"
     return SessionStoppedError(
-        f"session {request.session} of {request.rater} was stopped {why} at "
-        f"presentation {request.presentation.position} of {request.n_presentations}; "
+        f"session {request.session} of {request.rater} was stopped {why} at {where}; "
         "the same command goes on there"
     )

@@ -5,13 +5,14 @@ what was presented but not graded is presented again and logged as another attem
 """
 
 import hashlib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Container, Iterable, Sequence
 from datetime import datetime
 from pathlib import Path
 
 from masrel._event_log import Event, SessionLog, utc_now
 from masrel._files import check_inside
-from masrel.conduct._study_log import stated
+from masrel.conduct._study_answers import study_answers
+from masrel.conduct._study_log import append_event, stated
 from masrel.conduct._withdrawal import refuse_withdrawn
 from masrel.errors import (
     ParameterError,
@@ -20,9 +21,14 @@ from masrel.errors import (
     SessionLogError,
 )
 from masrel.protocol import Protocol, StudyPaths
-from masrel.run._grade_sources import GradeSource
+from masrel.protocol._questions import checked_answer
+from masrel.recording import _Fact
+from masrel.run._days import is_complete
+from masrel.run._grade_sources import GradeSource, with_occasions
+from masrel.run._practice import practice_presentations
 from masrel.run._present import spool_of
 from masrel.run._presenter import CLOCKS, ClockName
+from masrel.run._questionnaires import ask_questions, question_named, questions_of
 from masrel.run._rehearsal import begin_rehearsal
 from masrel.run._runner import SessionRunner, SessionSummary
 from masrel.run._settings import (
@@ -84,13 +90,15 @@ def run_session(
         If the schedule is missing, damaged, foreign, or stale.
     SessionLogError
         If the log is damaged, of another schedule or protocol, was begun with
-        another source of grades or device, or is open elsewhere, or if there are
-        recordings of the session that it does not name.
+        another source of grades or device, was left on another day and may not be
+        gone on with, or is open elsewhere, or if there are recordings of the session
+        that it does not name.
     ProtocolError
         If a model asks for more torque than the device may send.
     ParameterError
         If the device or `clock` is unknown or they do not fit each other, the rater
-        was withdrawn, or the source gives a grade that is not of the scale.
+        was withdrawn, the session may not begin yet or any more, or the source lacks a
+        method that the protocol needs, or gives a grade or an answer that cannot be.
     DeviceError
         If the device cannot be used, or faults are not to be tried again.
     SessionStoppedError
@@ -103,6 +111,8 @@ def run_session(
     -----
     OverrunWarning
         If the control loop missed ticks.
+    MasrelWarning
+        If the session begins out of order, and the protocol lets it.
     """
     _check_device(clock, protocol)
     refuse_withdrawn(study, rater)
@@ -113,13 +123,44 @@ def run_session(
         schedule, checksum = _drawn_schedule(study, protocol, rater, session)
     log_file = study.log_file(rater, session)
     check_inside(log_file.parent, study.root)
+    both = (*schedule.presentations, *practice_presentations(protocol))
+    codes = {presentation.code for presentation in both}
     if not log_file.exists():
-        _check_recordings(schedule, log_file, ())  # before an empty log is made
+        _check_recordings(codes, log_file, ())  # before an empty log is made
     with SessionLog.open(log_file, now=now) as log:
-        _check_recordings(schedule, log_file, log.events)
-        runner = SessionRunner(study, protocol, schedule, grades, clock, log)
+        _check_recordings(codes, log_file, log.events)
+        runner = SessionRunner(study, protocol, schedule, grades, clock, log, now)
         runner.begin(checksum)
-        return runner.run(progress)
+        summary = runner.run(progress)
+        if not rehearsal:
+            _ask_about_study(study, protocol, rater, session, grades, now)
+        return summary
+
+
+def _ask_about_study(
+    study: StudyPaths,
+    protocol: Protocol,
+    rater: str,
+    session: str,
+    grades: GradeSource,
+    now: Callable[[], datetime],
+) -> None:
+    # once a rater has completed every session; the answers are the study's
+    sessions = [each.id for each in protocol.sessions if rater in each.raters]
+    if not questions_of(protocol, "study"):
+        return
+    if all(is_complete(study, rater, each) for each in sessions):
+        ask_questions(
+            protocol,
+            "study",
+            with_occasions(grades, protocol),
+            rater=rater,
+            session=session,
+            answered=study_answers(study).get(rater, {}),
+            log=lambda fields: append_event(
+                study, protocol, "answered", {"rater": rater, **fields}, now=now
+            ),
+        )
 
 
 def _drawn_schedule(
@@ -138,11 +179,10 @@ def _drawn_schedule(
 
 
 def _check_recordings(
-    schedule: Schedule, log_file: Path, events: Sequence[Event]
+    codes: Container[str], log_file: Path, events: Sequence[Event]
 ) -> None:
     # What the log does not name was graded, perhaps, in a log that is lost.
     named = {Path(str(event.fields.get("recording"))).name for event in events}
-    codes = {presentation.code for presentation in schedule.presentations}
     folder = log_file.with_suffix("")
     unnamed = sorted(
         file.name
@@ -231,6 +271,86 @@ def record_correction(
         what = "was presented" if grade is not None else "has a grade"
         _check_code(log.path, code, known, what)
         log.append("correction", {"code": code, "grade": grade, **reasons})
+
+
+def record_answer(
+    study: StudyPaths,
+    protocol: Protocol,
+    rater: str,
+    session: str,
+    *,
+    question: str,
+    answer: str | float | None,
+    who: str,
+    why: str,
+    code: str | None = None,
+    now: Callable[[], datetime] = utc_now,
+) -> None:
+    """Append a correction of an answer to the log it is in; the first one stays there.
+
+    A question that has no answer gets it so too: late.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is.
+    protocol : Protocol
+        The study's protocol.
+    rater, session : str
+        Whose session; about the study the session says nothing.
+    question : str
+        The question, as ``questionnaire.question``.
+    answer : str, float or None
+        What the answer should have been; None for a missing one.
+    who, why : str
+        Who corrects it, and for what reason.
+    code : str, optional
+        The blinded code of the presentation that the question is about.
+    now : callable, optional
+        Gives the time of day for the log, aware.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such question or rater, it cannot have this answer, it is about
+        presentations and no `code` says which or the other way round, or `who` or
+        `why` is blank.
+    SessionLogError
+        If there is no such log, it is damaged, or the code was not presented.
+    OSError
+        If the log cannot be written.
+    """
+    questionnaire, its_question = question_named(protocol, question)
+    if answer is not None:
+        answer = checked_answer(its_question, answer, where=f"answer to {question}")
+    if (code is not None) != (questionnaire.when == "presentation"):
+        needed = "the code of a presentation" if code is None else "no code"
+        raise ParameterError(
+            f"code: needed {needed}, as {question} is about each "
+            f"{questionnaire.when}, got {code or 'none'}"
+        )
+    fields: dict[str, _Fact] = {
+        "questionnaire": questionnaire.id,
+        "question": its_question.id,
+        "answer": answer,
+        **stated(who=who, why=why),
+    }
+    if questionnaire.when == "study":
+        of_study = {"rater": _known_rater(protocol, rater), **fields}
+        append_event(study, protocol, "answer-correction", of_study, now=now)
+        return
+    with _begun_log(study, rater, session, now) as log:
+        state = replay(log.path, log.events)
+        if code is not None:
+            _check_code(log.path, code, state.presented, "was presented")
+        log.append("answer-correction", {**fields, "code": code})
+
+
+def _known_rater(protocol: Protocol, rater: str) -> str:
+    known = [each.id for each in protocol.raters]
+    if rater not in known:
+        raise ParameterError(f"rater: needed one of {', '.join(known)}, got {rater!r}")
+    return rater
 
 
 def record_skip(

@@ -2,16 +2,18 @@
 
 import hashlib
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from masrel._event_log import Event, read_log
 from masrel._input import MAX_RECORDING, MAX_SMALL, parse_json, read_regular
-from masrel.errors import SessionLogError
+from masrel.errors import ParameterError, SessionLogError
 from masrel.protocol import Protocol, StudyPaths
+from masrel.protocol._questions import checked_answer
+from masrel.run._practice import practice_presentations
 from masrel.run._state import SessionState, replay
 from masrel.schedule import Presentation, Schedule
 from masrel.verification._finding import Finding, broken, doubt
@@ -77,14 +79,16 @@ def check_session(
             files=frozenset([log]),
         )
     state = replay(log, events)
-    presented = [event for of_code in state.presented.values() for event in of_code]
+    presented = state.all_presented
     recordings = [study.sessions / str(e.fields["recording"]) for e in presented]
     findings = [
         *_head_findings(study, protocol, schedule, state, log),
         *_event_findings(protocol, schedule, events, log),
+        *_answer_findings(protocol, events, log),
     ]
+    shown = _all_shown(protocol, schedule)
     for event, recording in zip(presented, recordings, strict=True):
-        findings += _recording_findings(study, schedule, log, event, recording)
+        findings += _recording_findings(study, schedule, shown, log, event, recording)
     record = SessionRecord(
         session=session,
         rater=rater,
@@ -143,10 +147,39 @@ def _head_findings(
         )
 
 
+def _all_shown(protocol: Protocol, schedule: Schedule) -> dict[str, Presentation]:
+    # every presentation by its code, also for practice
+    both = (*practice_presentations(protocol), *schedule.presentations)
+    return {shown.code: shown for shown in both}
+
+
+def _answer_findings(
+    protocol: Protocol, events: Sequence[Event], log: Path
+) -> Iterator[Finding]:
+    # of questions that the protocol has; one that it had once cannot be held against it
+    known = {
+        (questionnaire.id, question.id): question
+        for questionnaire in protocol.questionnaires
+        for question in questionnaire.questions
+    }
+    for event in events:
+        key = event.fields.get("questionnaire"), event.fields.get("question")
+        answer: Any = event.fields.get("answer")
+        if key not in known or answer is None:
+            continue
+        try:
+            checked_answer(
+                known[key], answer, where=f"line {event.line}: {event.kind}: answer"
+            )
+        except ParameterError as error:
+            yield broken(log, str(error))
+
+
 def _event_findings(
     protocol: Protocol, schedule: Schedule, events: Sequence[Event], log: Path
 ) -> Iterator[Finding]:
-    positions = {shown.code: shown.position for shown in schedule.presentations}
+    codes = _all_shown(protocol, schedule)
+    positions = {code: shown.position for code, shown in codes.items()}
     attempts = dict.fromkeys(positions, 0)
     before = None
     for event in events:
@@ -161,7 +194,7 @@ def _event_findings(
                 f"{where}: position of {code}: needed {positions[str(code)]}, "
                 f"got {fields['position']!r}",
             )
-        if event.kind == "presented":
+        if event.kind in ("presented", "practised"):
             attempts[str(code)] += 1
             if fields["attempt"] != attempts[str(code)]:
                 yield broken(
@@ -196,11 +229,16 @@ def _time(event: Event) -> datetime | None:
 
 
 def _recording_findings(
-    study: StudyPaths, schedule: Schedule, log: Path, event: Event, path: Path
+    study: StudyPaths,
+    schedule: Schedule,
+    all_shown: Mapping[str, Presentation],
+    log: Path,
+    event: Event,
+    path: Path,
 ) -> Iterator[Finding]:
     fields, where = event.fields, f"line {event.line} of {log}"
     code, attempt = str(fields["code"]), fields["attempt"]
-    shown = {shown.code: shown for shown in schedule.presentations}.get(code)
+    shown = all_shown.get(code)
     name = code if attempt == 1 else f"{code}-{attempt}"
     folder = study.recording_file(schedule.rater, schedule.session, code).parent
     if shown is None or path != folder / f"{name}.npz":

@@ -6,7 +6,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,11 +15,46 @@ import pytest
 from masrel.protocol import Protocol, StudyPaths
 from masrel.ratings import ratings_from_logs
 from masrel.recording import read_recording
-from masrel.run import SimulatedGrades, read_log, run_session
+from masrel.run import Event, SimulatedGrades, read_log, run_session
+from masrel.verification import verify_study
 
 Small = tuple[StudyPaths, Protocol]
 KILLER = Path(__file__).with_name("kill_at.py")
-N_LINES = 8  # session, 3 x (presented, grade), complete
+OCCASIONS = (
+    "[schedule]",
+    """
+[occasions]
+instructions = "Hold the wrist."
+practice = ["HM3"]
+break_after = 2
+
+[[questionnaires]]
+id = "each"
+title = "This one"
+when = "presentation"
+[[questionnaires.questions]]
+id = "sure"
+text = "How sure are you?"
+type = "visual-analogue"
+
+[[questionnaires]]
+id = "realism"
+title = "Realism"
+when = "session"
+[[questionnaires.questions]]
+id = "score"
+text = "How real did it feel?"
+type = "whole"
+low = 1
+high = 10
+
+[schedule]""",
+)
+KINDS = [
+    *("session", "instructed", "practised", "practice-grade"),
+    *("presented", "grade", "answered") * 2,
+    *("break", "presented", "grade", "answered", "answered", "complete"),
+]
 
 
 def whole_lines(log: Path) -> list[bytes]:
@@ -37,19 +72,20 @@ def killed_at(root: Path, line: int, n_bytes: int) -> None:
     assert died.returncode == -signal.SIGKILL, died.stderr
 
 
-@pytest.mark.parametrize("n_bytes", [0, 60])
+@pytest.mark.parametrize("n_bytes", [pytest.param(0, marks=pytest.mark.slow), 60])
 def test_killed_at_each_line_and_gone_on_with_it_is_as_if_never_killed(
-    small: Small, tmp_path: Path, n_bytes: int
+    new_study: Callable[..., Small], tmp_path: Path, n_bytes: int
 ) -> None:
-    study, protocol = small
+    study, protocol = new_study(OCCASIONS)
     # All runs go at once; each in a copy of the study.
     copies = {}
-    for line in range(1, N_LINES + 1):
+    for line in range(1, len(KINDS) + 1):
         copies[line] = StudyPaths(tmp_path / f"killed_{line}")
         shutil.copytree(study.root, copies[line].root)
-    go_on(small)
+    go_on((study, protocol))
     expected = ratings_from_logs(study, protocol)
-    assert len(whole_lines(study.log_file("R1", "test"))) == N_LINES
+    whole = read_log(study.log_file("R1", "test"))
+    assert [event.kind for event in whole] == KINDS
     for line, copy in copies.items():
         killed_at(copy.root, line, n_bytes)
         log = copy.log_file("R1", "test")
@@ -59,16 +95,28 @@ def test_killed_at_each_line_and_gone_on_with_it_is_as_if_never_killed(
         after = whole_lines(log)
         assert after[: len(before)] == before
         events = read_log(log)
-        graded = [e.fields["code"] for e in events if e.kind == "grade"]
-        assert len(graded) == len(set(graded)) == 3
+        for kind in ("grade", "practice-grade", "answered", "break", "instructed"):
+            assert facts(events, kind) == facts(whole, kind)
         assert ("recovered" in {e.kind for e in events}) is (n_bytes > 0)
         # every recording is in the log, also of a presentation that was not logged
-        named = {e.fields["recording"] for e in events if e.kind == "presented"}
+        named = {str(e.fields.get("recording")) for e in events} - {"None"}
         there = {f"test_R1/{f.name}" for f in copy.sessions.glob("*/*.npz")}
         assert there == named
         assert not list(copy.sessions.glob("*/*.partial"))
-        assert len(there) == 3 + (line in (2, 3, 4, 5, 6, 7))
+        is_cut = KINDS[line - 1] in (
+            "presented",
+            "practised",
+            "grade",
+            "practice-grade",
+        )
+        assert len(there) == 4 + is_cut
         assert ratings_from_logs(copy, protocol).table.equals(expected.table)
+        assert verify_study(copy).is_whole
+
+
+def facts(events: Sequence[Event], kind: str) -> list[object]:
+    # what events of a kind say, in order
+    return [dict(event.fields) for event in events if event.kind == kind]
 
 
 def test_the_command_killed_from_outside_goes_on(small: Small) -> None:
@@ -165,7 +213,7 @@ def n_kept(study: StudyPaths) -> dict[str, int]:
 def test_killed_at_any_moment_of_many_stretches_nothing_that_was_logged_is_lost(
     new_study: Callable[..., Small], tmp_path: Path, n_kills: int
 ) -> None:
-    study, protocol = new_study(FREE)
+    study, protocol = new_study(OCCASIONS, FREE)
     whole = StudyPaths(tmp_path / "whole")
     copies = [StudyPaths(tmp_path / f"killed_{n}") for n in range(n_kills)]
     for copy in (whole, *copies):
@@ -186,7 +234,7 @@ def test_killed_at_any_moment_of_many_stretches_nothing_that_was_logged_is_lost(
         events = read_log(log)
         graded = [e.fields["code"] for e in events if e.kind == "grade"]
         assert len(graded) == len(set(graded)) == 3
-        named = {e.fields["recording"] for e in events if e.kind == "presented"}
+        named = {str(e.fields.get("recording")) for e in events} - {"None"}
         assert named == {f"test_R1/{f.name}" for f in copy.sessions.glob("*/*.npz")}
         assert not list(copy.sessions.glob("*/*.partial"))
         for stem, n_samples in kept.items():

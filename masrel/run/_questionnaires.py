@@ -1,0 +1,76 @@
+"""Put the questions of a study to whoever grades; every answer is logged at once."""
+
+from collections.abc import Callable, Container
+from typing import Literal
+
+from masrel.errors import ParameterError
+from masrel.protocol import Protocol, Question, Questionnaire
+from masrel.protocol._questions import checked_answer
+from masrel.recording import _Fact
+from masrel.run._grade_sources import OccasionSource, QuestionRequest
+from masrel.schedule import Presentation
+
+When = Literal["presentation", "session", "study"]
+
+
+def ask_questions(
+    protocol: Protocol,
+    when: When,
+    source: OccasionSource,
+    *,
+    rater: str,
+    session: str,
+    presentation: Presentation | None = None,
+    answered: Container[tuple[str, str]] = (),
+    log: Callable[[dict[str, _Fact]], object],
+) -> None:
+    """Ask what has no answer yet, and log each answer before the next question."""
+    for questionnaire, question in questions_of(protocol, when):
+        if (questionnaire.id, question.id) in answered:
+            continue
+        request = QuestionRequest(
+            rater=rater,
+            session=session,
+            questionnaire=questionnaire,
+            question=question,
+            presentation=presentation,
+        )
+        answer = checked_answer(question, source.answer(request), where=_place(request))
+        names: dict[str, _Fact] = {
+            "questionnaire": questionnaire.id,
+            "question": question.id,
+        }
+        log({**names, "answer": answer})
+
+
+def _place(request: QuestionRequest) -> str:
+    # which answer, in a message
+    name = f"{request.questionnaire.id}.{request.question.id}"
+    of = "" if request.presentation is None else f" of {request.presentation.code}"
+    return f"answer to {name}{of} by {request.rater} in session {request.session}"
+
+
+def questions_of(
+    protocol: Protocol, when: When
+) -> list[tuple[Questionnaire, Question]]:
+    """Return the questions that are asked then, in order."""
+    return [
+        (questionnaire, question)
+        for questionnaire in protocol.questionnaires
+        if questionnaire.when == when
+        for question in questionnaire.questions
+    ]
+
+
+def question_named(protocol: Protocol, name: str) -> tuple[Questionnaire, Question]:
+    """Return the question that ``questionnaire.question`` names."""
+    known = {
+        f"{questionnaire.id}.{question.id}": (questionnaire, question)
+        for questionnaire in protocol.questionnaires
+        for question in questionnaire.questions
+    }
+    if name not in known:
+        raise ParameterError(
+            f"question: needed one of {', '.join(known) or 'none'}, got {name!r}"
+        )
+    return known[name]
