@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 from masrel.cli._options import OutputOptions, write_output
 from masrel.errors import ParameterError
-from masrel.report._tone_scenes import ToneScene, tardieu_document, tardieu_text
+from masrel.report._tone_scenes import tardieu_document, tardieu_text
 
 if TYPE_CHECKING:
-    from masrel.elbow import JointModel, Motion
+    from masrel.elbow import JointModel
 
 
 START_DEG, END_DEG = 30.0, 146.0
@@ -58,30 +58,6 @@ def end_within(joint: "JointModel", end_deg: float | None) -> float:
     return end_deg
 
 
-def tone_scene(
-    name: str,
-    joint: "JointModel",
-    kind: str,
-    speed: float | None,
-    ends_deg: tuple[float, float],
-    motion: "Motion",
-) -> ToneScene:
-    """Return the scene of a joint that is no spastic elbow; kind: of the motion."""
-    from masrel.elbow.tone import ToneModel
-
-    if not isinstance(joint, ToneModel):
-        raise ParameterError(f"--model: needs a law with exact events, got {name}")
-    return ToneScene(
-        model=name,
-        kind=kind,
-        speed_deg_s=speed,
-        start_deg=ends_deg[0],
-        end_deg=ends_deg[1],
-        joint=joint,
-        motion=motion,
-    )
-
-
 def write_tardieu(
     joints: "Mapping[str, JointModel]",
     start_deg: float,
@@ -93,7 +69,6 @@ def write_tardieu(
         raise ParameterError(
             f"--speed-deg-s: needs V1, V2 and V3 with --tardieu, got {len(speeds)}"
         )
-    output.check_files()
     documents = [
         tardieu_document(name, joint, start_deg, speeds)
         for name, joint in joints.items()

@@ -13,7 +13,7 @@ from masrel._cells import safe_cell
 from masrel._files import new_file
 from masrel.cli._options import check_folder
 from masrel.errors import ParameterError
-from masrel.report._traced_scenes import AnyScene, Scene
+from masrel.report._traced_scenes import Scene
 
 _COLUMNS = ("time_s", "angle_deg", "velocity_deg_s", "torque_nm", "phase")
 _MAX_SAMPLES = 5_000_000  # rows of a CSV file: at 1 kHz 83 minutes, and some 400 MB
@@ -35,7 +35,7 @@ def check_samples(csv_file: Path | None, rate_hz: float | None) -> None:
 def write_samples(
     csv_file: Path,
     rate_hz: float,
-    scenes: Sequence[AnyScene],
+    scenes: Sequence[Scene],
     documents: Sequence[dict[str, Any]],
     *,
     quiet: bool,
@@ -70,7 +70,7 @@ def _n_samples(documents: Sequence[dict[str, Any]], rate_hz: float) -> int:
 def _write_rows(
     writer: Any,  # csv.writer, whose type has no name
     names: tuple[object, ...],
-    scene: AnyScene,
+    scene: Scene,
     rate_hz: float,
     bar: "tqdm[Any]",
 ) -> None:
@@ -79,8 +79,7 @@ def _write_rows(
     from masrel import elbow
     from masrel.recording import PHASES
 
-    joint = scene.parameters if isinstance(scene, Scene) else scene.joint
-    samples = elbow.trace(joint, scene.motion, rate_hz=rate_hz)
+    samples = elbow.trace(scene.joint, scene.motion, rate_hz=rate_hz)
     columns = (
         samples.time,
         np.degrees(samples.angle),

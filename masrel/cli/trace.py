@@ -23,16 +23,14 @@ from masrel.cli._tone_traces import (
     START_DEG,
     end_within,
     joint_of_kind,
-    tone_scene,
     write_tardieu,
 )
 from masrel.cli._trace_samples import check_samples, write_samples
 from masrel.errors import ParameterError
-from masrel.report._tone_scenes import Quantities
 from masrel.report._traced_scenes import (
     SCENE_OUTPUTS,
     SCENE_VIEWS,
-    AnyScene,
+    Quantities,
     Scene,
     check_view,
     scene_document,
@@ -147,16 +145,21 @@ _quantity_options = grouped(
 class _LawOptions:
     """What the command line changes of every joint; None changes nothing."""
 
-    rest: float | None  # θ_rest, deg
-    post_catch: str | None  # reading of (5)
-    reading: str | None  # reading of Q
-    rise: float | None  # how long torque takes to its peak, s
-    inertia: float | None  # m of (1) and (5), kg·m²
+    rest: float | None = None  # θ_rest, deg
+    post_catch: str | None = None  # reading of (5)
+    reading: str | None = None  # reading of Q
+    rise: float | None = None  # how long torque takes to its peak, s
+    inertia: float | None = None  # m of (1) and (5), kg·m²
 
     def change(self, joint: "JointModel") -> "JointModel":
         """Return a joint with these changes, which only a spastic elbow can have."""
         from masrel.elbow import ElbowParameters
 
+        if not isinstance(joint, ElbowParameters):
+            raise ParameterError(
+                "--rest-deg, --post-catch, --q-reading, --catch-rise-s, "
+                f"--inertia-kg-m2: need a spastic elbow, got {joint.kind}"
+            )
         changes: dict[str, object] = {
             "rest_angle": None if self.rest is None else math.radians(self.rest),
             "post_catch": self.post_catch,
@@ -165,13 +168,6 @@ class _LawOptions:
             "inertia": self.inertia,
         }
         changes = {name: value for name, value in changes.items() if value is not None}
-        if not changes:
-            return joint
-        if not isinstance(joint, ElbowParameters):
-            raise ParameterError(
-                "--rest-deg, --post-catch, --q-reading, --catch-rise-s, "
-                f"--inertia-kg-m2: need a spastic elbow, got {joint.kind}"
-            )
         return replace(joint, **changes)  # type: ignore[arg-type]
 
 
@@ -293,7 +289,6 @@ def trace(
     if view is not None and output.figure is None:
         raise ParameterError("--view: goes with --figure, whose contents it chooses")
     scenes = _scenes(joints, stretch, speeds)
-    output.check_files()
     if output.figure is not None:
         check_view(scenes, view or SCENE_VIEWS[0])
     bar = tqdm(scenes, desc="scenes", delay=1.0, disable=output.hides_progress)
@@ -333,11 +328,11 @@ def _scenes(
     joints: "dict[str, JointModel]",
     stretch: _MotionOptions,
     speeds: Sequence[float],
-) -> list[AnyScene]:
+) -> list[Scene]:
     # one of each model and speed, however often an option repeats it
     from masrel.elbow import ElbowParameters
 
-    scenes: list[AnyScene] = []
+    scenes: list[Scene] = []
     motions: dict[tuple[float | None, float], Motion] = {}  # by speed and end
     start = START_DEG if stretch.start is None else stretch.start
     for name, joint in joints.items():
@@ -350,10 +345,6 @@ def _scenes(
             motion, ends = motions[speed, end], (start, end)
             if stretch.recording is not None:
                 ends = math.degrees(motion.start), math.degrees(motion.end)
-            if not isinstance(joint, ElbowParameters):
-                scene = tone_scene(name, joint, stretch.kind, speed, ends, motion)
-                scenes.append(scene)
-                continue
             scenes.append(
                 Scene(
                     model=name,
@@ -361,7 +352,7 @@ def _scenes(
                     speed_deg_s=speed,
                     start_deg=ends[0],
                     end_deg=ends[1],
-                    parameters=joint,
+                    joint=joint,
                     motion=motion,
                 )
             )
@@ -380,9 +371,11 @@ def _joints_of(names: _JointOptions, law: _LawOptions) -> dict[str, "JointModel"
             raise ParameterError(
                 f"--model: needs models whose names differ, got two called {name}"
             )
-        joints[name] = law.change(_joint_of(model, names.study))
+        joints[name] = _joint_of(model, names.study)
     for kind in dict.fromkeys(names.kinds):
-        joints[kind] = law.change(joint_of_kind(kind, names.parameters))
+        joints[kind] = joint_of_kind(kind, names.parameters)
+    if law != _LawOptions():
+        joints = {name: law.change(joint) for name, joint in joints.items()}
     return joints
 
 

@@ -93,15 +93,12 @@ def catch_bounds(p: Parameters, origin: Number) -> tuple[Number, Number]:
     return p.smallest_catch_angle - origin, largest
 
 
-def residual_share(p: Parameters) -> Number:
-    """Q as section II reads it, or 1 - Q, as section III.C does."""
-    decrease = 1.0 * (p.residual_reading == "decrease")
-    return decrease * (1.0 - p.residual_ratio) + (1.0 - decrease) * p.residual_ratio
-
-
 def catch(p: Parameters, pre_end: Number, rise: Number) -> tuple[TorqueLaw, TorqueLaw]:
     """(3), first and second line; pre_end is τ_pre_end and rise H·v_c."""
-    return TorqueLaw(pre_end + rise), TorqueLaw(pre_end + residual_share(p) * rise)
+    # What stays is Q as section II reads it, or 1 - Q, as section III.C does
+    decrease = 1.0 * (p.residual_reading == "decrease")
+    share = decrease * (1.0 - p.residual_ratio) + (1.0 - decrease) * p.residual_ratio
+    return TorqueLaw(pre_end + rise), TorqueLaw(pre_end + share * rise)
 
 
 def onset_share(y: Number) -> Number:

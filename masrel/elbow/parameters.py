@@ -161,7 +161,7 @@ class ElbowParameters:
     @property
     def residual_share(self) -> float:
         """Residual torque over peak torque, both above pre-catch."""
-        return float(_law.residual_share(self))
+        return float(_law.catch(self, 0.0, 1.0)[1].level)
 
     def catch_angle(self, mean_speed: float) -> float:
         """Return the catch angle for a mean pre-catch speed.

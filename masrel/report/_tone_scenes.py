@@ -6,7 +6,6 @@ the motion; of any joint the angles of the Tardieu scale.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import groupby
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -19,43 +18,14 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from masrel.elbow import JointModel, Motion
+    from masrel.elbow import JointModel
     from masrel.elbow.tone import ToneModel
+    from masrel.report._traced_scenes import Quantities, Scene
 
 _RATE_HZ = 1000  # of the samples that phases and lines are made of
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ToneScene:
-    """A joint of another kind than the spastic elbow, and a motion."""
-
-    model: str  # name of the model
-    kind: str  # kind of the motion
-    speed_deg_s: float | None  # its speed, if it is named after one
-    # start_deg, end_deg: where it starts and ends
-    start_deg: float
-    end_deg: float
-    joint: "ToneModel"
-    motion: "Motion"
-
-    @property
-    def title(self) -> str:
-        """Name of the scene."""
-        if self.speed_deg_s is None:
-            return f"{self.model}, {self.kind}"
-        return f"{self.model}, {self.kind} {significant(self.speed_deg_s)} deg/s"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Quantities:
-    """What is computed of every scene beside events and peak."""
-
-    outputs: tuple[str, ...] = ()  # of a spastic elbow
-    times: tuple[float, ...] = ()  # where torque is computed, s
-    angles: tuple[float, ...] = ()  # where it is computed, deg
-
-
-def tone_document(scene: ToneScene, quantities: Quantities) -> dict[str, object]:
+def tone_document(scene: "Scene", quantities: "Quantities") -> dict[str, object]:
     """Return the events of a scene, its peak torque, and torques at places."""
     if quantities.outputs:
         raise ParameterError(f"--output: needs spastic elbows, got {scene.joint.kind}")
@@ -63,7 +33,7 @@ def tone_document(scene: ToneScene, quantities: Quantities) -> dict[str, object]
 
     from masrel.elbow import times_at
 
-    joint, motion = scene.joint, scene.motion
+    joint, motion = _tone_of(scene), scene.motion
     events = joint.events(motion)
     caught = [event for event in events if event.name == joint.catch_event]
     line = tone_line(scene)
@@ -124,13 +94,23 @@ def torque_rows(
     ]
 
 
-def tone_line(scene: ToneScene) -> StretchLine:
+def _tone_of(scene: "Scene") -> "ToneModel":
+    from masrel.elbow.tone import ToneModel
+
+    if not isinstance(scene.joint, ToneModel):
+        raise ParameterError(
+            f"--model: needs a law with exact events, got {scene.model}"
+        )
+    return scene.joint
+
+
+def tone_line(scene: "Scene") -> StretchLine:
     """Return the exact torque of every millisecond, and the phases at these."""
     import numpy as np
 
     from masrel.elbow import trace
 
-    joint, motion = scene.joint, scene.motion
+    joint, motion = _tone_of(scene), scene.motion
     sampled = trace(joint, motion, rate_hz=_RATE_HZ)
     time = np.append(sampled.time, motion.duration)
     spans, first = [], 0

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Literal
 
 from masrel.errors import ParameterError
 from masrel.report._figure_data import (
@@ -17,16 +17,10 @@ from masrel.report._figure_data import (
     StretchPanel,
 )
 from masrel.report._tables import aligned, fixed_or_significant, significant
-from masrel.report._tone_scenes import (
-    Quantities,
-    ToneScene,
-    tone_document,
-    tone_line,
-    torque_rows,
-)
+from masrel.report._tone_scenes import tone_document, tone_line, torque_rows
 
 if TYPE_CHECKING:
-    from masrel.elbow import ElbowParameters, Motion
+    from masrel.elbow import ElbowParameters, JointModel, Motion
 
 SCENE_OUTPUTS = {
     "residual-torque": "residual_torque_nm",
@@ -50,7 +44,7 @@ _STAMP = "computed from the joint model, not measured"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scene:
-    """A model and a motion."""
+    """A joint and a motion."""
 
     model: str  # name of the model
     kind: str  # kind of the motion
@@ -58,7 +52,7 @@ class Scene:
     # start_deg, end_deg: where it starts and ends
     start_deg: float
     end_deg: float
-    parameters: "ElbowParameters"
+    joint: "JointModel"
     motion: "Motion"
 
     @property
@@ -69,17 +63,23 @@ class Scene:
         return f"{self.model}, {self.kind} {significant(self.speed_deg_s)} deg/s"
 
 
-AnyScene = Scene | ToneScene
-"""Of a spastic elbow, or of a joint of another kind."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Quantities:
+    """What is computed of every scene beside events and peak."""
+
+    outputs: tuple[str, ...] = ()  # of a spastic elbow
+    times: tuple[float, ...] = ()  # where torque is computed, s
+    angles: tuple[float, ...] = ()  # where it is computed, deg
 
 
-def scene_document(scene: AnyScene, quantities: Quantities) -> dict[str, object]:
+def scene_document(scene: Scene, quantities: Quantities) -> dict[str, object]:
     """Return the events of a scene, its peak torque, and what else was requested."""
-    if isinstance(scene, ToneScene):
-        return tone_document(scene, quantities)
     from masrel import elbow
 
-    events = elbow.events(scene.parameters, scene.motion)
+    joint, motion = scene.joint, scene.motion
+    if not isinstance(joint, elbow.ElbowParameters):
+        return tone_document(scene, quantities)
+    events = elbow.events(joint, motion)
     angle, speed = events.catch_angle, events.mean_speed
     document: dict[str, object] = {
         "model": scene.model,
@@ -89,7 +89,7 @@ def scene_document(scene: AnyScene, quantities: Quantities) -> dict[str, object]
         "to_deg": scene.end_deg,
         "catch_angle_deg": None if angle is None else math.degrees(angle),
         "mean_speed_deg_s": None if speed is None else math.degrees(speed),
-        "peak_torque_nm": elbow.peak_torque(scene.parameters, scene.motion),
+        "peak_torque_nm": elbow.peak_torque(joint, motion),
         "phases": [
             {
                 "name": span.name,
@@ -102,7 +102,7 @@ def scene_document(scene: AnyScene, quantities: Quantities) -> dict[str, object]
         ],
     }
     if quantities != Quantities():
-        document |= _requested(scene, quantities)
+        document |= _requested(joint, motion, quantities)
     for key, number in document.items():
         if isinstance(number, float) and not math.isfinite(number):
             raise ParameterError(
@@ -112,10 +112,11 @@ def scene_document(scene: AnyScene, quantities: Quantities) -> dict[str, object]
     return document
 
 
-def _requested(scene: Scene, quantities: Quantities) -> dict[str, object]:
+def _requested(
+    joint: "ElbowParameters", motion: "Motion", quantities: Quantities
+) -> dict[str, object]:
     from masrel import elbow
 
-    joint, motion = scene.parameters, scene.motion
     requested: dict[str, object] = {}
     functions = {
         "residual-torque": elbow.residual_torque,
@@ -210,7 +211,7 @@ def scenes_text(documents: Sequence[dict[str, Any]]) -> str:
     return "\n".join(aligned(rows, ["left", *numeric]))
 
 
-def check_view(scenes: Sequence[AnyScene], view: str) -> None:
+def check_view(scenes: Sequence[Scene], view: str) -> None:
     """Refuse a figure that cannot be drawn, before anything is computed for it."""
     models = _by_model(scenes)
     max_speeds = max(map(len, models.values()))
@@ -219,19 +220,18 @@ def check_view(scenes: Sequence[AnyScene], view: str) -> None:
             "--figure: shows 4 models at 5 speeds at most, or with --view catch 5 "
             f"models, got {len(models)} and {max_speeds}"
         )
-    elbows = [scene for scene in scenes if isinstance(scene, Scene)]
-    if view in ("catch", "schematic") and len(elbows) < len(scenes):
+    if view in ("catch", "schematic") and len(_elbows(scenes)) < len(scenes):
         raise ParameterError(
             f"--view {view}: shows the catch of a spastic elbow, got other kinds too"
         )
     if view == "catch":
-        _check_catches(_by_model(elbows))
+        _check_catches(models)
     if view == "schematic":
         if len(scenes) != 1:
             raise ParameterError(
                 f"--view schematic: shows one scene, got {len(scenes)}"
             )
-        if not _n_caught(elbows):
+        if not _n_caught(scenes):
             raise ParameterError("--view schematic: needs a stretch that catches")
 
 
@@ -248,17 +248,24 @@ def _check_catches(models: dict[str, list[Scene]]) -> None:
             )
 
 
+def _elbows(scenes: Sequence[Scene]) -> list["ElbowParameters"]:
+    from masrel.elbow import ElbowParameters
+
+    joints = [scene.joint for scene in scenes]
+    return [joint for joint in joints if isinstance(joint, ElbowParameters)]
+
+
 def _n_caught(scenes: Sequence[Scene]) -> int:
     import numpy as np
 
     from masrel.elbow import evaluate
 
-    joints = [scene.parameters for scene in scenes]
-    outputs = evaluate(joints, [scene.motion for scene in scenes], ["catch"])
+    motions = [scene.motion for scene in scenes]
+    outputs = evaluate(_elbows(scenes), motions, ["catch"])
     return int(np.isfinite(outputs.column("catch")).sum())
 
 
-def scenes_figure(scenes: Sequence[AnyScene], view: str, *, form: Form) -> bytes:
+def scenes_figure(scenes: Sequence[Scene], view: str, *, form: Form) -> bytes:
     """Return a figure of scenes as a file."""
     # Imported here: a text loads nothing that draws.
     from masrel.report.figures import draw
@@ -266,43 +273,36 @@ def scenes_figure(scenes: Sequence[AnyScene], view: str, *, form: Form) -> bytes
     return draw(_content(scenes, view), stamp=_STAMP, forms=(form,))[form]
 
 
-def _content(scenes: Sequence[AnyScene], view: str) -> Content:
-    elbows = [scene for scene in scenes if isinstance(scene, Scene)]
-    if view == "catch":
-        curves = (_curve(*of_model) for of_model in _by_model(elbows).items())
-        return CatchCurves(curves=tuple(curves))
-    if view == "schematic":
-        return _schematic(elbows[0])
+def _content(scenes: Sequence[Scene], view: str) -> Content:
     models = _by_model(scenes).items()
+    if view == "catch":
+        return CatchCurves(curves=tuple(_curve(*of_model) for of_model in models))
+    if view == "schematic":
+        return _schematic(scenes[0])
     against: Literal["angle", "time"] = "angle" if view == "angle" else "time"
     panels = tuple(_panel(*of_model) for of_model in models)
     return Stretches(panels=panels, against=against)
 
 
-_S = TypeVar("_S", bound=AnyScene)
-
-
-def _by_model(scenes: Sequence[_S]) -> dict[str, list[_S]]:
-    models: dict[str, list[_S]] = {}
+def _by_model(scenes: Sequence[Scene]) -> dict[str, list[Scene]]:
+    models: dict[str, list[Scene]] = {}
     for scene in scenes:
         models.setdefault(scene.model, []).append(scene)
     return models
 
 
-def _panel(name: str, scenes: Sequence[AnyScene]) -> StretchPanel:
-    lines = (
-        tone_line(scene) if isinstance(scene, ToneScene) else _elbow_line(scene)
-        for scene in scenes
-    )
-    return StretchPanel(title=name, lines=tuple(lines))
+def _panel(name: str, scenes: Sequence[Scene]) -> StretchPanel:
+    return StretchPanel(title=name, lines=tuple(map(_line, scenes)))
 
 
-def _elbow_line(scene: Scene) -> StretchLine:
+def _line(scene: Scene) -> StretchLine:
     import numpy as np
 
-    from masrel.elbow import outline
+    from masrel.elbow import ElbowParameters, outline
 
-    line = outline(scene.parameters, scene.motion, n_points=_N_PIXELS)
+    if not isinstance(scene.joint, ElbowParameters):
+        return tone_line(scene)
+    line = outline(scene.joint, scene.motion, n_points=_N_PIXELS)
     speed = scene.speed_deg_s
     return StretchLine(
         label=scene.kind if speed is None else f"{significant(speed)} deg/s",
@@ -316,13 +316,14 @@ def _elbow_line(scene: Scene) -> StretchLine:
 def _schematic(scene: Scene) -> CatchSchematic:
     from masrel.elbow import outline, residual_torque
 
-    line = outline(scene.parameters, scene.motion, n_points=_N_PIXELS)
+    (joint,) = _elbows([scene])
+    line = outline(joint, scene.motion, n_points=_N_PIXELS)
     events = line.events
     if events.catch is None or events.catch_speed is None or events.peak_end is None:
         raise ParameterError("--view schematic: needs a stretch that catches")
-    rise = scene.parameters.catch_torque_constant * events.catch_speed
-    residual = residual_torque(scene.parameters, scene.motion)
-    pre_end = residual - scene.parameters.residual_share * rise
+    rise = joint.catch_torque_constant * events.catch_speed
+    residual = residual_torque(joint, scene.motion)
+    pre_end = residual - joint.residual_share * rise
     return CatchSchematic(
         title=scene.title,
         time=line.time,
@@ -336,7 +337,7 @@ def _schematic(scene: Scene) -> CatchSchematic:
         residual=residual,
         residual_name=(
             r"$Q\,H\,v_c$"
-            if scene.parameters.residual_reading == "residual"
+            if joint.residual_reading == "residual"
             else r"$(1-Q)\,H\,v_c$"
         ),
     )
@@ -347,8 +348,7 @@ def _curve(name: str, scenes: Sequence[Scene]) -> CatchCurve:
 
     from masrel.elbow import evaluate
 
-    joint = scenes[0].parameters
-    joints = [scene.parameters for scene in scenes]
+    joints = _elbows(scenes)
     motions = [scene.motion for scene in scenes]
     outputs = evaluate(
         joints, motions, ("mean_speed", "catch_angle", "catch", "catch_end")
@@ -371,7 +371,7 @@ def _curve(name: str, scenes: Sequence[Scene]) -> CatchCurve:
         catch_speed=np.degrees(np.array(travel) / duration),
         duration=duration,
         clamps=(
-            math.degrees(joint.slowest_mean_speed),
-            math.degrees(joint.fastest_mean_speed),
+            math.degrees(joints[0].slowest_mean_speed),
+            math.degrees(joints[0].fastest_mean_speed),
         ),
     )
