@@ -108,7 +108,9 @@ class OutputOptions:
             raise ParameterError(
                 f"{' and '.join(printed)} want the same stdout: choose one"
             )
-        # Before anything is computed for them
+
+    def check_files(self) -> None:
+        """Refuse files that cannot be written, before anything is computed for them."""
         if self.json_file is not None:
             check_folder("--json", self.json_file)
         if self.figure is not None:

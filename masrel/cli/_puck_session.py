@@ -140,6 +140,7 @@ def puck_command(function: Callable[..., None]) -> Callable[..., None]:
         output: OutputOptions,
         **kwargs: Any,
     ) -> None:
+        output.check_files()
         options = PuckOptions(
             interface=interface,
             channel=channel,

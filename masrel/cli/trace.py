@@ -289,6 +289,7 @@ def trace(
     if view is not None and output.figure is None:
         raise ParameterError("--view: goes with --figure, whose contents it chooses")
     scenes = _scenes(joints, stretch, speeds)
+    output.check_files()
     if output.figure is not None:
         check_view(scenes, view or SCENE_VIEWS[0])
     bar = tqdm(scenes, desc="scenes", delay=1.0, disable=output.hides_progress)
