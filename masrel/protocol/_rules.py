@@ -12,6 +12,7 @@ from masrel.protocol._decode import got, needed, with_id
 from masrel.protocol._kinds import DEFAULT_KIND, kind_problem, value_problems
 from masrel.protocol._occasions import occasion_rules
 from masrel.protocol._questions import question_rules
+from masrel.protocol._rater_fields import rater_field_rules
 from masrel.protocol.definition import Model, PresentationRules
 
 Values = dict[str, Any]
@@ -38,6 +39,7 @@ def broken_rules(values: Values) -> Iterator[str]:
         _scale(values),
         _ids(values),
         _references(values),
+        rater_field_rules(values),
         _schedules(values),
         _device(values),
         _presentation(values),

@@ -196,8 +196,8 @@ _LATER: dict[str, dict[str, object]] = {
 do not enter, so that no schedule drawn before turns stale."""
 
 
-_LATER_ARRAYS = ("questionnaires",)
-"""Arrays of tables that protocols once had not: empty, they do not enter."""
+_LATER_ARRAYS = ("questionnaires", "rater_fields")
+"""Arrays and tables of tables that protocols once had not: empty, they do not enter."""
 
 _LATER_OF_SESSIONS: dict[str, object] = {
     "after": None,
@@ -217,6 +217,10 @@ _ABSENT: dict[str, object] = {
     "catch_travel_deg": None,
 }
 """Keys of models that do not enter where they are these."""
+
+
+_LATER_OF_RATERS: dict[str, object] = {"fields": {}}
+"""The same of every rater."""
 
 
 def protocol_hash(protocol: Protocol) -> str:
@@ -298,6 +302,8 @@ def _drop_later(plain: dict[str, Any]) -> None:
     # takes out what protocols once had not, where it says nothing
     for session in plain.get("sessions", ()):
         _drop(session, _LATER_OF_SESSIONS)
+    for rater in plain.get("raters", ()):
+        _drop(rater, _LATER_OF_RATERS)
     for array in _LATER_ARRAYS:
         if not plain.get(array, True):
             del plain[array]

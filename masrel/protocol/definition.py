@@ -4,6 +4,7 @@ Every field has its unit in its name, its range in its type, and its meaning in
 ``docs/protocol.md``.
 """
 
+import re
 import sys
 from typing import Annotated, Literal
 
@@ -100,6 +101,21 @@ class Rater(_Table, frozen=True, kw_only=True):
 
     id: _Identifier
     note: str = ""
+    fields: dict[str, object] = {}
+
+
+FIELD_NAME = re.compile(r"[a-z][a-z0-9_]{0,31}")
+"""What a field of raters may be called: a column of a table of raters."""
+
+
+class RaterField(_Table, frozen=True, kw_only=True):
+    """``[rater_fields.NAME]``: something that is known of each rater."""
+
+    type: Literal["text", "whole", "number", "choice", "date"]
+    title: str = ""
+    unit: str = ""
+    choices: tuple[_Text, ...] = ()
+    public: bool = False
 
 
 class Session(_Table, frozen=True, kw_only=True):
@@ -285,6 +301,7 @@ class Protocol(_Table, frozen=True, kw_only=True):
     elbow: ElbowConstants = ElbowConstants()
     models: Annotated[tuple[Model, ...], Meta(min_length=1)]
     raters: Annotated[tuple[Rater, ...], Meta(min_length=1)]
+    rater_fields: dict[str, RaterField] = {}
     sessions: Annotated[tuple[Session, ...], Meta(min_length=1)]
     schedule: ScheduleScheme
     stretch: Stretch = Stretch()

@@ -78,6 +78,7 @@ def test_what_a_rater_meets_enters_both(
     [
         (("study", "title"), "Another"),
         (("raters",), [{"id": "R1"}, {"id": "R2"}, {"id": "R3"}]),
+        (("rater_fields",), {"years": {"type": "whole"}}),
         (("sessions", 1, "note"), "later"),
         (("analysis", "level"), 0.9),
         (("training",), {"window": 40}),

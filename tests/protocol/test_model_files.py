@@ -168,6 +168,8 @@ def test_a_protocol_without_files_has_the_hash_it_had_before_there_were_any() ->
         assert set(model.pop("constants").values()) == {None}
         assert model.pop("kind") == "spastic-elbow"
         assert model.pop("parameters") == {}
+    assert all(rater.pop("fields") == {} for rater in content["raters"])
+    assert content.pop("rater_fields") == {}
     assert content["stretch"].pop("largest_speed_deg_s") == 131.0
     assert content.pop("presentation")["stretches"] == 1
     assert content.pop("occasions")["resume"] == "always"
