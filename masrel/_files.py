@@ -30,7 +30,7 @@ _LONGEST_S = 86_400.0
 
 # Where a study's primary records are, which no output replaces
 _PROTOCOL = "protocol.toml"
-_RECORD_FOLDERS = ("schedules", "sessions", ".key")
+_RECORD_FOLDERS = ("schedules", "sessions", "conduct", ".key")
 _SOURCES = (
     ("ratings", "published.csv"),
     ("ratings", "in_person.csv"),

@@ -24,6 +24,7 @@ MODULES = (
     "masrel.run",
     "masrel.training",
     "masrel.paper",
+    "masrel.progress",
     "masrel.ratings",
     "masrel.analysis",
     "masrel.verification",

@@ -29,7 +29,8 @@ def as_analysis_document(analysis: Analysis) -> dict[str, object]:
     Returns
     -------
     dict
-        Its fields in order; every part carries the hashes of its inputs.
+        Its fields in order, `excluded` only where somebody is; every part carries the
+        hashes of its inputs.
     """
     document: dict[str, object] = {}
     for field in dataclasses.fields(analysis):
@@ -38,7 +39,7 @@ def as_analysis_document(analysis: Analysis) -> dict[str, object]:
             document[field.name] = [_with_inputs(line, analysis) for line in value]
         elif dataclasses.is_dataclass(value):
             document[field.name] = _with_inputs(value, analysis)
-        else:
+        elif field.name != "excluded" or value:  # nobody could be, once
             document[field.name] = _plain(value)
     return document
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog
 from scipy.special import stdtrit
 
+from masrel.analysis._exclusions import analysed_ratings
 from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
 from masrel.protocol import Protocol, elbow_parameters
 from masrel.ratings import Ratings
@@ -117,6 +118,7 @@ def grade_regression(
     models: Literal["standard", "dummy", "all"] = "all",
     session: str | None = None,
     level: float = 0.95,
+    excluded: Sequence[str] = (),
 ) -> GradeRegression:
     """Regress grades on L, H, Q, D and the stretching speed.
 
@@ -136,6 +138,8 @@ def grade_regression(
         Which session; all unless given.
     level : float, optional
         Level of the intervals.
+    excluded : sequence of str, optional
+        Raters who are left out.
 
     Returns
     -------
@@ -170,6 +174,7 @@ def grade_regression(
        https://doi.org/10.1093/biomet/71.1.1
     """
     _check_options(protocol, predictors, session, level)
+    ratings = analysed_ratings(ratings, excluded)
     table, n_missing = _predictor_table(protocol, ratings, predictors, models, session)
     grades = tuple(g for g in ratings.scale.grades if (table["grade"] == g).any())
     data, dropped, scale = _standardized(table, grades, predictors)

@@ -3,6 +3,7 @@
 import hashlib
 import random
 import warnings
+from collections.abc import Sequence
 
 import masrel
 from masrel.agreement import coefficient, cohen_kappa
@@ -12,6 +13,7 @@ from masrel.analysis._descriptions import (
     presentations,
     stretching_speeds,
 )
+from masrel.analysis._exclusions import analysed_in_person, analysed_ratings
 from masrel.analysis._results import Analysis, PlannedEstimate, RaterEstimate
 from masrel.errors import (
     CountsError,
@@ -34,7 +36,11 @@ from masrel.ratings import (
 
 
 def analyze(
-    protocol: Protocol, ratings: Ratings, *, in_person: InPerson | None = None
+    protocol: Protocol,
+    ratings: Ratings,
+    *,
+    in_person: InPerson | None = None,
+    excluded: Sequence[str] = (),
 ) -> Analysis:
     """Compute what the protocol's plan and report ask for.
 
@@ -47,6 +53,9 @@ def analyze(
         The ratings.
     in_person : InPerson, optional
         Grades given to patients in person.
+    excluded : sequence of str, optional
+        Raters who are left out of every number
+        (`masrel.conduct.excluded_raters`). The hashes of the inputs are of all ratings.
 
     Returns
     -------
@@ -71,6 +80,9 @@ def analyze(
         If an interval rests on too little data.
     """
     _check_known(protocol, ratings)
+    inputs = _inputs(protocol, ratings, in_person)
+    ratings = analysed_ratings(ratings, excluded)
+    in_person = analysed_in_person(in_person, excluded)
     sections = set(protocol.report.sections)
     # descriptions of grades speak of the first session that has ratings
     present = set(ratings.table["session"])
@@ -98,7 +110,8 @@ def analyze(
         ),
         presentations=presentations(ratings),
         simulated=ratings.simulated,
-        inputs=_inputs(protocol, ratings, in_person),
+        excluded=tuple(excluded),
+        inputs=inputs,
         masrel_version=masrel.__version__,
     )
 

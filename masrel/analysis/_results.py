@@ -265,6 +265,8 @@ class Analysis:
         None when nothing is known of the stretches.
     simulated : bool
         Whether any rating is simulated.
+    excluded : tuple of str
+        Raters who are left out of every number.
     inputs : mapping of str to str
         SHA-256 of every input, by name.
     masrel_version : str
@@ -279,5 +281,6 @@ class Analysis:
     speeds: Speeds | None
     presentations: Presentations | None
     simulated: bool
+    excluded: tuple[str, ...] = ()
     inputs: Mapping[str, str]
     masrel_version: str

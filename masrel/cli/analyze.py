@@ -38,7 +38,10 @@ def analyze(study: Path, ratings_file: Path | None, output: OutputOptions) -> No
     data = read_study(study, ratings_file)
     with warnings_as_notes():
         analysis = library.analyze(
-            data.protocol, data.ratings, in_person=data.in_person
+            data.protocol,
+            data.ratings,
+            in_person=data.in_person,
+            excluded=data.excluded,
         )
     if output.json_file == STDOUT:
         write_json(library.as_analysis_document(analysis), STDOUT)

@@ -103,7 +103,7 @@ def _ratings_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
 
 
 def _has_record(study: StudyPaths) -> bool:
-    return study.sessions.is_dir() or study.conduct_file.exists()
+    return study.sessions.is_dir() or bool(study.conduct_logs())
 
 
 _CHECKERS: tuple[Callable[[Protocol, StudyPaths], Iterable[str]], ...] = (

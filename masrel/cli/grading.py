@@ -68,6 +68,7 @@ def grading(
             models=models,
             session=session,
             level=level,
+            excluded=data.excluded,
         )
     write_output(
         output,

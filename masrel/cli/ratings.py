@@ -4,9 +4,10 @@ from pathlib import Path
 
 import click
 
+from masrel._files import write_file
 from masrel.cli._options import echo_remarks
 from masrel.cli._paths import OutputFile, note_inputs
-from masrel.protocol import StudyPaths, read_protocol
+from masrel.protocol import Protocol, StudyPaths, read_protocol
 
 
 @click.command("ratings")
@@ -21,7 +22,8 @@ def ratings(study: Path, output: Path | None) -> None:
     """Collect the ratings of STUDY from its session logs.
 
     Every chain of hashes is verified, and every recording that is there is held
-    against its checksum. Corrections take the place of the grades they correct.
+    against its checksum. Corrections take the place of the grades they correct. The
+    table of raters, raters.csv, is written beside STUDY/ratings/ratings.csv.
     """
     from masrel.ratings import ratings_from_logs, study_remarks, write_ratings
 
@@ -32,6 +34,8 @@ def ratings(study: Path, output: Path | None) -> None:
     ratings = ratings_from_logs(paths, protocol)
     destination = output or paths.ratings_file
     write_ratings(ratings, destination, within=None if output else study)
+    if output is None:
+        _write_raters(paths, protocol)
     n_rows = len(ratings.table)
     n_missing = int(ratings.table["grade"].isna().sum())
     label = " (simulated)" if ratings.simulated else ""
@@ -43,3 +47,13 @@ def ratings(study: Path, output: Path | None) -> None:
     n_slow = int(ratings.table["felt"].isin(["below-threshold", "no-catch"]).sum())
     if n_slow:
         click.echo(f"{n_slow} after stretches too slow to feel the catch: column felt")
+
+
+def _write_raters(paths: StudyPaths, protocol: Protocol) -> None:
+    from masrel.progress import rater_progress, raters_csv, session_progress
+
+    sessions = session_progress(paths, protocol)
+    raters = rater_progress(paths, protocol, sessions)
+    simulated = any(session.simulated for session in sessions)
+    text = raters_csv(raters, protocol, simulated=simulated)
+    write_file(paths.raters_file, text, within=paths.root)

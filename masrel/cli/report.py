@@ -51,7 +51,12 @@ def report(
     refuse_record(destination / "report.html")  # before anything is computed
     data = read_study(study, ratings_file)
     with warnings_as_notes():
-        analysis = analyze(data.protocol, data.ratings, in_person=data.in_person)
+        analysis = analyze(
+            data.protocol,
+            data.ratings,
+            in_person=data.in_person,
+            excluded=data.excluded,
+        )
     with tqdm(desc="report", unit=" parts", disable=output.hides_progress) as bar:
 
         def progress(part: str) -> None:

@@ -5,10 +5,14 @@
 
 from collections.abc import Callable, Mapping
 from datetime import datetime
+from heapq import merge
+from itertools import accumulate
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import masrel
 from masrel._event_log import Event, SessionLog, read_log, utc_now
+from masrel._input import listed
 from masrel.errors import ParameterError, SessionLogError
 from masrel.protocol import Protocol, StudyPaths
 
@@ -30,40 +34,67 @@ _EVENTS = {
         "who",
         "why",
     ),
+    "excluded": ("rater", "who", "why"),
+    "included": ("rater", "who", "why"),
+    "rater-set": ("rater", "field", "value", "who"),
+    "noted": (
+        "kind",
+        "text",
+        "who",
+        "rater",
+        "session",
+        "severity",
+        "action",
+        "outcome",
+    ),
+    "merged": ("name", "log", "n_lines", "sha256", "protocol_sha256"),
     "recovered": ("line", "n_bytes", "sha256", "kept", "moved_to"),
 }
 """Every kind of event with the fields it has."""
 
-_SHOWN = ("withdrawn", "unblinded")
+_SHOWN = (
+    "withdrawn",
+    "unblinded",
+    "excluded",
+    "included",
+    "rater-set",
+    "noted",
+    "merged",
+)
 
 
 def read_conduct(study: StudyPaths) -> tuple[Event, ...]:
-    """Read what happened to a study beside its sessions, and verify its chain.
+    """Read what happened to a study beside its sessions, and verify its chains.
 
     Parameters
     ----------
     study : StudyPaths
-        Where the study is.
+        Where the study is. One that was merged from others has their logs too.
 
     Returns
     -------
     tuple of Event
-        In order of time: ``"withdrawn"`` with `rater`, `who` and `why`, and
-        ``"unblinded"`` with `rater`, `session`, `code`, `who` and `why`, where None
-        stands for all. Empty when nothing happened.
+        In order of time, with the fields that ``docs/conduct.md`` lists; None stands
+        for all, or for nothing. Empty when nothing happened.
 
     Raises
     ------
     SessionLogError
-        If the log is damaged or holds what is no such event.
+        If a log is damaged or holds what is no such event.
     """
     return tuple(event for event in all_events(study) if event.kind in _SHOWN)
 
 
 def all_events(study: StudyPaths) -> tuple[Event, ...]:
-    """Return every event of a study's log; none where there is no log."""
-    path = study.conduct_file
-    return _checked(study, read_log(path)) if path.exists() else ()
+    """Return every event of a study's logs, in order of time."""
+    logs = [_timed(_checked(path, read_log(path))) for path in study.conduct_logs()]
+    return tuple(event for _, event in merge(*logs, key=lambda timed: timed[0]))
+
+
+def _timed(events: tuple[Event, ...]) -> list[tuple[str, Event]]:
+    # a clock that is set back changes no order within a log
+    latest = accumulate((event.time_utc for event in events), max)
+    return list(zip(latest, events, strict=True))
 
 
 def append_event(
@@ -76,7 +107,7 @@ def append_event(
 ) -> None:
     """Append an event to the log of a study; the first one comes after a head."""
     with SessionLog.open(study.conduct_file, now=now) as log:
-        _checked(study, log.events)
+        _checked(log.path, log.events)
         if not any(event.kind == "conduct" for event in log.events):
             head: dict[str, _Fact] = {
                 "format": _FORMAT,
@@ -95,10 +126,17 @@ def stated(**texts: str) -> dict[str, str]:
     return {name: text.strip() for name, text in texts.items()}
 
 
-def _checked(study: StudyPaths, events: tuple[Event, ...]) -> tuple[Event, ...]:
+def check_rater(protocol: Protocol, rater: str) -> None:
+    """Refuse a rater that the protocol does not have."""
+    known = [each.id for each in protocol.raters]
+    if rater not in known:
+        raise ParameterError(f"rater: needed one of {listed(known)}, got {rater!r}")
+
+
+def _checked(path: Path, events: tuple[Event, ...]) -> tuple[Event, ...]:
     """Return the events of a log of conduct; refuse any other."""
     for event in events:
-        where = f"{study.conduct_file}: line {event.line}"
+        where = f"{path}: line {event.line}"
         if event.kind not in _EVENTS:
             raise SessionLogError(
                 f"{where}: needed an event of {', '.join(_EVENTS)}, got {event.kind!r}"

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from datetime import datetime
 
 from masrel._event_log import utc_now
-from masrel.conduct._study_log import append_event, read_conduct, stated
+from masrel.conduct._study_log import append_event, check_rater, read_conduct, stated
 from masrel.errors import ParameterError
 from masrel.protocol import Protocol, StudyPaths
 
@@ -43,9 +43,7 @@ def record_withdrawal(
     OSError
         If it cannot be written.
     """
-    known = [each.id for each in protocol.raters]
-    if rater not in known:
-        raise ParameterError(f"rater: needed one of {', '.join(known)}, got {rater!r}")
+    check_rater(protocol, rater)
     refuse_withdrawn(study, rater)
     reasons = stated(who=who, why=why)
     append_event(study, protocol, "withdrawn", {"rater": rater, **reasons}, now=now)

@@ -8,7 +8,7 @@ import msgspec
 
 from masrel._input import listed
 from masrel.protocol._decode import got, with_id
-from masrel.protocol.definition import FIELD_NAME, RaterField
+from masrel.protocol.definition import _FIELD_NAME, RaterField
 
 FieldValue = str | int | float
 """What a field holds; a date is text, ``YYYY-MM-DD``."""
@@ -84,7 +84,7 @@ def rater_field_rules(values: Mapping[str, Any]) -> Iterator[str]:
 
 def _declaration(name: str, field: Mapping[str, Any]) -> Iterator[str]:
     where = f"rater_fields.{name}"
-    if not FIELD_NAME.fullmatch(name) or name in RESERVED:
+    if not _FIELD_NAME.fullmatch(name) or name in RESERVED:
         yield (
             f"{where}: needed a name of 1 to 32 small letters, digits and '_', the "
             f"first a letter, other than {', '.join(RESERVED)}, got {got(name)}"

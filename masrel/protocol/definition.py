@@ -101,10 +101,10 @@ class Rater(_Table, frozen=True, kw_only=True):
 
     id: _Identifier
     note: str = ""
-    fields: dict[str, object] = {}
+    fields: dict[str, object] = {}  # noqa: RUF012 - msgspec makes each its own
 
 
-FIELD_NAME = re.compile(r"[a-z][a-z0-9_]{0,31}")
+_FIELD_NAME = re.compile(r"[a-z][a-z0-9_]{0,31}")
 """What a field of raters may be called: a column of a table of raters."""
 
 
@@ -301,7 +301,7 @@ class Protocol(_Table, frozen=True, kw_only=True):
     elbow: ElbowConstants = ElbowConstants()
     models: Annotated[tuple[Model, ...], Meta(min_length=1)]
     raters: Annotated[tuple[Rater, ...], Meta(min_length=1)]
-    rater_fields: dict[str, RaterField] = {}
+    rater_fields: dict[str, RaterField] = {}  # noqa: RUF012 - msgspec makes each its own
     sessions: Annotated[tuple[Session, ...], Meta(min_length=1)]
     schedule: ScheduleScheme
     stretch: Stretch = Stretch()

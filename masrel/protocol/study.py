@@ -72,6 +72,16 @@ class StudyPaths:
         return self.root / "conduct.jsonl"
 
     @property
+    def merged_conduct(self) -> Path:
+        """The folder of such logs of the studies that this one was merged from."""
+        return self.root / "conduct"
+
+    @property
+    def raters_file(self) -> Path:
+        """The table of raters that goes with that of ratings."""
+        return self.root / "ratings" / "raters.csv"
+
+    @property
     def secret_file(self) -> Path:
         """The secret that decides orders and codes; its folder is its owner's alone."""
         return self.root / ".key" / "secret.txt"
@@ -94,6 +104,11 @@ class StudyPaths:
     def logs(self) -> list[Path]:
         """Return the session logs that are there, whosever they are."""
         return sorted(path for path in self.sessions.glob("*.jsonl") if path.is_file())
+
+    def conduct_logs(self) -> list[Path]:
+        """Return the logs of conduct that are there: of the merged studies, its own."""
+        merged = sorted(self.merged_conduct.glob("*.jsonl"))
+        return [*merged, *(f for f in [self.conduct_file] if f.exists())]
 
     def schedule_file(self, rater: str, session: str) -> Path:
         """Return the file of one rater's schedule; it names the models."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from masrel._event_log import Event, read_log
-from masrel.conduct import read_conduct
+from masrel.conduct import excluded_raters, read_conduct
 from masrel.errors import MasrelError, SessionLogError
 from masrel.protocol import Protocol, StudyPaths
 from masrel.run._state import SessionState, replay
@@ -117,10 +117,10 @@ def study_remarks(
     Returns
     -------
     tuple of str
-        A sentence each for raters who were withdrawn, codes that were unblinded, logs
-        of no rater of the protocol, skipped presentations, sessions that were begun
-        anew, empty logs, recordings without a log, and ratings that are not from the
-        logs that there are. Empty when there is nothing to say.
+        A sentence each for raters who were withdrawn or are excluded, codes that were
+        unblinded, logs of no rater of the protocol, skipped presentations, sessions
+        that were begun anew, empty logs, recordings without a log, and ratings that are
+        not from the logs that there are. Empty when there is nothing to say.
 
     Raises
     ------
@@ -135,8 +135,7 @@ def study_remarks(
     >>> study_remarks(study, read_protocol(study.protocol))
     ()
     """
-    remarks = [_of_event(study, event) for event in read_conduct(study)]
-    remarks += _of_sessions(study, protocol)
+    remarks = [*_of_conduct(study), *_of_sessions(study, protocol)]
     if file not in (None, study.published_file) and any(study.sessions.glob("*.jsonl")):
         remarks.append(
             f"The ratings are from {file.name}, a file named by hand, and not from the "
@@ -145,15 +144,30 @@ def study_remarks(
     return tuple(remarks)
 
 
-def _of_event(study: StudyPaths, event: Event) -> str:
-    fields, day = event.fields, event.time_utc[:10]
-    if event.kind == "withdrawn":
-        n_graded = _n_graded(study, str(fields["rater"]))
-        return (
-            f"Rater {fields['rater']} was withdrawn on {day} by {fields['who']}: "
-            f"{fields['why']}. Grades given before, {n_graded} by the logs, are kept "
-            "and counted."
-        )
+def _of_conduct(study: StudyPaths) -> Iterator[str]:
+    events = read_conduct(study)
+    latest = {e.fields["rater"]: e for e in events if e.kind == "excluded"}
+    excluded = [latest[rater] for rater in excluded_raters(study)]
+    for event in events:
+        fields = event.fields
+        by = f"on {event.time_utc[:10]} by {fields.get('who')}: {fields.get('why')}."
+        if event.kind == "withdrawn":
+            n_graded = _n_graded(study, str(fields["rater"]))
+            yield (
+                f"Rater {fields['rater']} was withdrawn {by} Grades given before, "
+                f"{n_graded} by the logs, are kept and counted."
+            )
+        elif event.kind == "unblinded":
+            yield _of_unblinding(event, by)
+        elif event in excluded:
+            yield (
+                f"Rater {fields['rater']} was excluded {by} The grades are kept, and "
+                "enter no number."
+            )
+
+
+def _of_unblinding(event: Event, by: str) -> str:
+    fields = event.fields
     where = "".join(
         f" of {name} {fields[key]}"
         for key, name in (("rater", "rater"), ("session", "session"))
@@ -161,9 +175,7 @@ def _of_event(study: StudyPaths, event: Event) -> str:
     )
     what = "All codes" if fields["code"] is None else f"Code {fields['code']}"
     verb = "were" if fields["code"] is None else "was"
-    return (
-        f"{what}{where} {verb} unblinded on {day} by {fields['who']}: {fields['why']}."
-    )
+    return f"{what}{where} {verb} unblinded {by}"
 
 
 def _n_graded(study: StudyPaths, rater: str) -> int:

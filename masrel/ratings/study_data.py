@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from masrel.conduct import excluded_raters
 from masrel.errors import RatingsError
 from masrel.protocol import Protocol, StudyPaths, scale_of
 from masrel.ratings.in_person import InPerson, read_in_person
@@ -30,6 +31,8 @@ class StudyData:
         The ratings.
     in_person : InPerson or None
         Grades given in person; None for simulated ratings, to which they do not belong.
+    excluded : tuple of str
+        Raters who are left out of the analysis.
     read : str
         What was read, in words.
     """
@@ -38,6 +41,7 @@ class StudyData:
     protocol: Protocol
     ratings: Ratings
     in_person: InPerson | None
+    excluded: tuple[str, ...]
     read: str
 
 
@@ -84,6 +88,7 @@ def read_study_data(
         protocol=protocol,
         ratings=ratings,
         in_person=in_person_of(study, ratings),
+        excluded=excluded_raters(study),
         read=read,
     )
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from masrel._input import MAX_RECORDING, MAX_TABLE, parse_json, read_regular
+from masrel.conduct import excluded_raters
 from masrel.errors import MasrelError, MasrelWarning
 from masrel.protocol import Protocol, StudyPaths
 from masrel.verification._finding import Finding, broken, doubt
@@ -57,7 +58,12 @@ def _analysis_of(
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", MasrelWarning)  # of statistics
-        return analyze(protocol, ratings, in_person=in_person_of(study, ratings))
+        return analyze(
+            protocol,
+            ratings,
+            in_person=in_person_of(study, ratings),
+            excluded=excluded_raters(study),
+        )
 
 
 def _table_findings(path: Path, ratings: "Ratings") -> Iterator[Finding]:

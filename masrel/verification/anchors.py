@@ -71,8 +71,7 @@ def anchors_of(study: StudyPaths) -> tuple[Anchor, ...]:
 
 
 def _logs(study: StudyPaths) -> list[Path]:
-    is_there = study.conduct_file.is_file()
-    return [*([study.conduct_file] if is_there else []), *study.logs()]
+    return [*study.conduct_logs(), *study.logs()]
 
 
 def read_anchors(path: Path) -> tuple[Anchor, ...]:

@@ -1,0 +1,127 @@
+"""Where every session of a study stands, by its log: no recording is read."""
+
+from collections import Counter
+from dataclasses import dataclass
+from typing import Literal
+
+from masrel._event_log import read_log
+from masrel.errors import SessionLogError
+from masrel.protocol import Protocol, StudyPaths
+from masrel.run._state import SessionState, replay
+
+SessionStage = Literal["not drawn", "drawn", "begun", "complete", "unreadable"]
+"""How far a session came."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SessionProgress:
+    """Where one rater's session stands. No model is named.
+
+    Attributes
+    ----------
+    session, rater : str
+        Whose session.
+    stage : {"not drawn", "drawn", "begun", "complete", "unreadable"}
+        How far it came.
+    n_presentations : int
+        Presentations that the protocol has for a session.
+    n_graded, n_skipped, n_faults, n_corrections : int
+        Of them those with a grade and those left without one; presentations that a
+        fault stopped; corrections.
+    n_practised, n_breaks, n_answers : int
+        Practice presentations, breaks, and answers to questionnaires.
+    last_event, last_time_utc : str or None
+        What happened last in it, and when; None before it has begun.
+    grades_from : str or None
+        Where its grades come from; None before it has begun.
+    simulated : bool
+        Whether grades or device are simulated.
+    problem : str or None
+        Why its log cannot be read, or None.
+    """
+
+    session: str
+    rater: str
+    stage: SessionStage
+    n_presentations: int
+    n_graded: int = 0
+    n_skipped: int = 0
+    n_faults: int = 0
+    n_corrections: int = 0
+    n_practised: int = 0
+    n_breaks: int = 0
+    n_answers: int = 0
+    last_event: str | None = None
+    last_time_utc: str | None = None
+    grades_from: str | None = None
+    simulated: bool = False
+    problem: str | None = None
+
+
+def session_progress(
+    study: StudyPaths, protocol: Protocol
+) -> tuple[SessionProgress, ...]:
+    """Say where every session of a study stands.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is.
+    protocol : Protocol
+        The study's protocol.
+
+    Returns
+    -------
+    tuple of SessionProgress
+        Sessions and raters in the protocol's order. Of a log that is damaged the stage
+        is ``"unreadable"``.
+
+    Raises
+    ------
+    OSError
+        If a log that is there cannot be read.
+    """
+    return tuple(
+        _progress(study, protocol, rater, session.id)
+        for session in protocol.sessions
+        for rater in session.raters
+    )
+
+
+def _progress(
+    study: StudyPaths, protocol: Protocol, rater: str, session: str
+) -> SessionProgress:
+    n_presentations = len(protocol.models) * protocol.schedule.repeats
+    log = study.log_file(rater, session)
+    stage: SessionStage = "not drawn"
+    if study.schedule_file(rater, session).exists():
+        stage = "drawn"
+    problem = None
+    try:
+        events = read_log(log) if log.exists() else ()
+        state = replay(log, events)
+    except SessionLogError as error:
+        events, state, stage, problem = (), SessionState(), "unreadable", str(error)
+    if state.header:
+        stage = "complete" if state.is_complete else "begun"
+    counts = Counter(event.kind for event in events)
+    presented = [event for of_code in state.presented.values() for event in of_code]
+    return SessionProgress(
+        session=session,
+        rater=rater,
+        stage=stage,
+        n_presentations=n_presentations,
+        n_graded=len(state.grades),
+        n_skipped=len(state.skipped),
+        n_faults=sum(event.fields["fault"] is not None for event in presented),
+        n_corrections=counts["correction"],
+        n_practised=counts["practised"],
+        n_breaks=counts["break"],
+        n_answers=counts["answered"],
+        last_event=events[-1].kind if events else None,
+        last_time_utc=events[-1].time_utc if events else None,
+        grades_from=str(state.header["grades"]) if state.header else None,
+        simulated=bool(state.header.get("simulated"))
+        or any(event.fields["simulated"] for event in presented),
+        problem=problem,
+    )

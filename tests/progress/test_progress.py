@@ -1,0 +1,160 @@
+"""Where a study stands follows from its logs, and no model is named."""
+
+from collections.abc import Callable
+
+import pytest
+
+from masrel.conduct import record_exclusion, record_withdrawal
+from masrel.errors import ParameterError
+from masrel.progress import (
+    NextStep,
+    next_step,
+    rater_progress,
+    raters_csv,
+    session_progress,
+)
+from masrel.protocol import Protocol, StudyPaths, read_protocol
+from masrel.run import ScriptGrades, record_correction, run_session
+from masrel.schedule import read_schedule, write_schedules
+
+Small = tuple[StudyPaths, Protocol]
+BY = {"who": "MK", "why": "moved away"}
+
+
+def run(small: Small, rater: str, session: str = "test", *, n: int = 3) -> None:
+    grades = ScriptGrades(["1", "2", "3"][:n])
+    run_session(*small, rater, session, grades=grades, clock="simulated")
+
+
+def stop_after(small: Small, rater: str, n: int) -> None:
+    with pytest.raises(ParameterError):  # the script ends
+        run(small, rater, n=n)
+
+
+def step(small: Small) -> NextStep:
+    sessions = session_progress(*small)
+    return next_step(small[0], sessions, rater_progress(*small, sessions))
+
+
+def status(small: Small) -> dict[str, str]:
+    raters = rater_progress(*small, session_progress(*small))
+    return {rater.rater: rater.status for rater in raters}
+
+
+def test_a_session_is_drawn_begun_and_complete(small: Small) -> None:
+    study, protocol = small
+    study.schedule_file("R1", "retest").unlink()
+    stop_after(small, "R1", 2)
+    run(small, "R2")
+    code = read_schedule(study.schedule_file("R2", "test")).presentations[0].code
+    record_correction(study, protocol, "R2", "test", code=code, grade=None, **BY)
+    of_r1, of_r2, retest = session_progress(study, protocol)
+    assert (of_r1.stage, of_r1.n_graded, of_r1.n_presentations) == ("begun", 2, 3)
+    assert of_r1.last_event == "presented"
+    assert (of_r2.stage, of_r2.n_graded, of_r2.n_corrections) == ("complete", 2, 1)
+    assert of_r2.simulated
+    assert (retest.stage, retest.last_event) == ("not drawn", None)
+    assert not [m.id for m in protocol.models if m.id in repr((of_r1, of_r2, retest))]
+
+
+def test_a_damaged_log_is_said_and_hides_no_other_session(small: Small) -> None:
+    study, _ = small
+    run(small, "R1")
+    run(small, "R2")
+    log = study.log_file("R1", "test")
+    log.write_bytes(log.read_bytes().replace(b'"attempt": 1', b'"attempt": 2'))
+    of_r1, of_r2, _ = session_progress(*small)
+    assert of_r1.stage == "unreadable"
+    assert "needed previous" in str(of_r1.problem)
+    assert of_r2.stage == "complete"
+    assert step(small).command == f"masrel verify {study.root}"
+
+
+def test_raters_go_from_planned_to_excluded(small: Small) -> None:
+    study, protocol = small
+    assert status(small) == {"R1": "planned", "R2": "planned"}
+    run(small, "R1")
+    run(small, "R2")
+    assert status(small) == {"R1": "begun", "R2": "complete"}
+    record_withdrawal(study, protocol, "R1", **BY)
+    record_exclusion(study, protocol, "R2", **BY)
+    assert status(small) == {"R1": "withdrawn", "R2": "excluded"}
+
+
+def test_who_joins_later_is_late(small: Small) -> None:
+    study, _ = small
+    text = study.protocol.read_text(encoding="utf-8")
+    text = text.replace('["R1", "R2"]', '["R1", "R2", "R3"]')
+    text = text.replace("[schedule]", '[[raters]]\nid = "R3"\n\n[schedule]')
+    study.protocol.write_text(text, encoding="utf-8")
+    protocol = read_protocol(study.protocol)
+    write_schedules(protocol, study)
+    raters = rater_progress(study, protocol, session_progress(study, protocol))
+    assert [rater.is_late for rater in raters] == [False, False, True]
+
+
+def test_the_next_step_is_one_command(small: Small) -> None:
+    study, protocol = small
+    root = study.root
+    assert step(small).command == f"masrel run {root} --rater R1 --session test"
+    stop_after(small, "R2", 1)
+    assert step(small).command == f"masrel run {root} --rater R2 --session test"
+    assert step(small).why == "1 of 3 graded"
+    record_withdrawal(study, protocol, "R2", **BY)
+    run(small, "R1")
+    assert step(small).command == f"masrel run {root} --rater R1 --session retest"
+    study.schedule_file("R1", "retest").unlink()
+    assert step(small).command == f"masrel schedule {root}"
+    write_schedules(protocol, study)
+    run(small, "R1", "retest")
+    assert step(small).command == f"masrel ratings {root}"
+    study.ratings_file.parent.mkdir()
+    study.ratings_file.write_text("")
+    assert step(small).command == f"masrel report {root}"
+
+
+def test_the_table_of_raters_has_every_field(
+    new_study: Callable[..., Small],
+) -> None:
+    fields = '[rater_fields.clinic]\ntype = "text"\n\n[[raters]]\nid = "R1"\n'
+    values = '[raters.fields]\nclinic = "=A1"\n'
+    study, protocol = new_study(('[[raters]]\nid = "R1"\n', fields + values))
+    raters = rater_progress(study, protocol, session_progress(study, protocol))
+    text = raters_csv(raters, protocol, simulated=True)
+    assert text.splitlines()[0].startswith("# SIMULATED")
+    assert text.splitlines()[2:] == [
+        "rater,status,late,clinic",
+        "R1,planned,no,'=A1",  # no spreadsheet runs it
+        "R2,planned,no,NA",
+    ]
+
+
+@pytest.mark.parametrize("n_raters", [2, 6])
+def test_every_log_is_read_once(
+    new_study: Callable[..., Small], n_raters: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    names = [f"R{i}" for i in range(1, n_raters + 1)]
+    listed = ", ".join(f'"{name}"' for name in names)
+    more = "".join(f'[[raters]]\nid = "{name}"\n' for name in names[2:])
+    small = (
+        new_study(
+            ('raters = ["R1", "R2"]', f"raters = [{listed}]"),
+            ("[schedule]", more + "\n[schedule]"),
+        )
+        if n_raters > 2
+        else new_study()
+    )
+    for name in names:
+        run(small, name)
+    from masrel.progress import _session_stages
+
+    reads = []
+    original = _session_stages.read_log
+    monkeypatch.setattr(
+        _session_stages,
+        "read_log",
+        lambda path: (reads.append(path), original(path))[1],
+    )
+    sessions = session_progress(*small)
+    next_step(small[0], sessions, rater_progress(*small, sessions))
+    assert len(reads) == len(set(reads)) == n_raters
