@@ -138,15 +138,8 @@ def _place_between(sources: Sequence[_Source], n_models: int) -> list[_Between]:
         raise ParameterError(
             f"MODEL: needs models whose names differ, got two called {twice}"
         )
-    gaps = len(sources) - 1
-    if gaps < 1:
-        raise ParameterError(f"MODEL: needs two or more, got {sources[0].name} alone")
-    if n_models < gaps or n_models % gaps:
-        raise ParameterError(
-            f"--number: needs a multiple of {gaps}, one or more in each gap, "
-            f"got {n_models}"
-        )
-    each = n_models // gaps
+    made = intermediate_models(joints, n_models)
+    each = n_models // (len(sources) - 1)
     return [
         _model_between(
             name,
@@ -154,7 +147,7 @@ def _place_between(sources: Sequence[_Source], n_models: int) -> list[_Between]:
             sources[i // each : i // each + 2],
             f"{i % each + 1}/{each + 1}",
         )
-        for i, (name, joint) in enumerate(intermediate_models(joints, n_models).items())
+        for i, (name, joint) in enumerate(made.items())
     ]
 
 

@@ -48,6 +48,9 @@ class GradeRequest:
         Whether what the model has could be felt: no stretch was fast enough, or none
         came to the catch that the model has at that speed. None before, and after a
         fault.
+    ended : str or None
+        What ended the presentation, as in its recording: ``"time-limit"``, say. None
+        before.
     may_skip: bool
         Whether the presentation can be left without a grade after a fault.
     """
@@ -64,6 +67,7 @@ class GradeRequest:
     status: "PresentationStatus | None" = None
     n_stretches: int = 0
     felt: Felt | None = None
+    ended: str | None = None
     may_skip: bool = False
 
 

@@ -92,7 +92,8 @@ class ConsoleGrades:
     def grade(self, request: GradeRequest) -> str | StretchGrade | None:
         """Ask for the grade until it is one of the scale.
 
-        Before, the rater is told if the stretches were too slow to feel the catch.
+        Before, the rater is told if a limit of time ended the presentation, and if the
+        stretches were too slow to feel the catch.
 
         Parameters
         ----------
@@ -111,10 +112,7 @@ class ConsoleGrades:
             If the person stops, or the input ends.
         """
         grades, n_stretches = ", ".join(self._scale.grades), request.n_stretches
-        if request.felt not in ("felt", None):
-            self._say(
-                "That was too slow to feel the catch: once more? Then say again.\n"
-            )
+        self._say(_remarks(request))
         rests, meanings = (
             "",
             "" if self._published is None else "; ? for their meanings",
@@ -312,6 +310,20 @@ def _meanings_in_words(scale: Scale, published: PublishedScale) -> str:
         if grade in published.meanings
     ]
     return words + ("In short, in masrel's words:\n" if lines else "") + "".join(lines)
+
+
+def _remarks(request: GradeRequest) -> str:
+    # what the rater has to know of the presentation, a line each
+    limit_s = request.rules.time_limit_s
+    ended = {
+        "time-limit": "The time limit ended the presentation: no stretch begins later "
+        f"than {limit_s:g} s after the first movement.\n",
+        "max-duration": "The presentation was ended: it had gone on for too long.\n",
+    }
+    remarks = ended.get(request.ended or "", "")
+    if request.felt not in ("felt", None):
+        remarks += "That was too slow to feel the catch: once more? Then say again.\n"
+    return remarks
 
 
 def _instruction(rules: PresentationRules) -> str:

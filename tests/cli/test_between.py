@@ -131,11 +131,17 @@ def test_nothing_is_overwritten_unless_asked(masrel: Caller, tmp_path: Path) -> 
     ("arguments", "message"),
     [
         (("HM1", "HM9", "-n", "1"), "MODEL: needs HM1, HM2, HM3, HM4 or a model file"),
-        (("HM1", "-n", "1"), "MODEL: needs two or more, got HM1 alone"),
+        (("HM1", "-n", "1"), "models: need two or more, got 1"),
         (("HM1", "HM2", "HM1", "-n", "2"), "got two called HM1"),
-        (("HM1", "HM2", "-n", "0"), "--number: needs a multiple of 1, one or more"),
-        (("HM1", "HM2", "-n", "-3"), "--number: needs a multiple of 1, one or more"),
-        (("HM1", "HM2", "HM3", "-n", "3"), "--number: needs a multiple of 2"),
+        (
+            ("HM1", "HM2", "-n", "0"),
+            "number of models: needs a multiple of 1, one or more",
+        ),
+        (
+            ("HM1", "HM2", "-n", "-3"),
+            "number of models: needs a multiple of 1, one or more",
+        ),
+        (("HM1", "HM2", "HM3", "-n", "3"), "number of models: needs a multiple of 2"),
         (
             ("HM1", "none.toml", "-n", "1"),
             "needed a model file, got none.toml: No such",

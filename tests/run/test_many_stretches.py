@@ -160,6 +160,17 @@ def test_a_rater_is_told_what_was_too_slow_and_may_grade_it(new_study: New) -> N
     assert ratings_from_logs(*small).table["felt"].tolist() == ["below-threshold"] * 3
 
 
+def test_a_rater_is_told_that_the_time_limit_ended_a_presentation(
+    new_study: New,
+) -> None:
+    small = with_rules(new_study, 'stretches = "free"', "time_limit_s = 1.0")
+    source, said = console("\n1\n\n2\n\n3\n")
+    run(small, source)
+    ended = [event.fields["ended"] for event in shown(small)]
+    words = "no stretch begins later than 1 s after the first movement."
+    assert said.getvalue().count(words) == ended.count("time-limit") > 0
+
+
 def test_what_was_too_slow_is_counted(new_study: New) -> None:
     small = slowly(new_study)
     run(small, SimulatedGrades(small[1]))

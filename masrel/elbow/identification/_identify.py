@@ -440,7 +440,7 @@ def _check_models(movements: Sequence[Movement]) -> None:
 
 def _torque_remarks(movements: Sequence[Movement]) -> tuple[str, ...]:
     # which torque it is, of recordings of masrel's driver
-    said: dict[TorqueSource, str] = {
+    texts: dict[TorqueSource, str] = {
         "sensor": "measured by the device's sensor: what friction compensation leaves "
         "of the device is in it",
         "model": "what the joint model asked for, not measured",
@@ -448,7 +448,7 @@ def _torque_remarks(movements: Sequence[Movement]) -> tuple[str, ...]:
     n_from = Counter(movement.torque_source for movement in movements)
     return tuple(
         f"Torque of {n_from[source]} of {len(movements)} recordings: {text}"
-        for source, text in said.items()
+        for source, text in texts.items()
         if n_from[source]
     )
 

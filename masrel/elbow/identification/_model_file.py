@@ -261,7 +261,7 @@ def intermediate_models(
         raise ParameterError(f"models: need two or more, got {len(models)}")
     if n_models < gaps or n_models % gaps:
         raise ParameterError(
-            f"n_models: needs a multiple of {gaps}, one or more in each gap, "
+            f"number of models: needs a multiple of {gaps}, one or more in each gap, "
             f"got {n_models}"
         )
     each = n_models // gaps

@@ -37,7 +37,7 @@ def test_what_differs_is_interpolated_and_the_rest_is_kept() -> None:
 
 @pytest.mark.parametrize("n_models", [0, 2, 13])
 def test_gaps_that_would_be_unlike_are_refused(n_models: int) -> None:
-    with pytest.raises(ParameterError, match="n_models: needs a multiple of 3"):
+    with pytest.raises(ParameterError, match="number of models: needs a multiple of 3"):
         intermediate_models(STANDARD_MODELS, n_models)
 
 
