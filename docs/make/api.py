@@ -30,6 +30,7 @@ MODULES = (
     "masrel.verification",
     "masrel.report",
     "masrel.checklist",
+    "masrel.export",
     "masrel.scales",
     "masrel.estimates",
     "masrel.recording",

@@ -1,0 +1,250 @@
+"""What leaves a study: tables with described variables, recordings, files as they are.
+
+Every format is written from this one description.
+"""
+
+import csv
+import io
+import json
+import tomllib
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Literal
+
+from masrel._input import MAX_SMALL, read_regular
+from masrel.errors import ParameterError
+from masrel.protocol import Protocol, StudyPaths
+from masrel.ratings import Ratings, ratings_csv, read_study_data
+from masrel.run import read_log
+
+Kind = Literal["text", "whole", "number", "list"]
+"""What a cell holds; a list is numbers with semicolons between them."""
+
+MISSING = "NA"
+"""What stands for a missing value in tables of masrel."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Variable:
+    """One column of a table."""
+
+    name: str
+    title: str
+    kind: Kind = "text"
+    unit: str = ""
+    levels: tuple[str, ...] = ()  # the texts that it may have, in order
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DataTable:
+    """A table as texts, `MISSING` where there is nothing."""
+
+    name: str
+    title: str
+    variables: tuple[Variable, ...]
+    rows: tuple[tuple[str, ...], ...]
+    keys: tuple[str, ...]  # variables that together name a row
+
+    def column(self, name: str) -> tuple[str, ...]:
+        """Return the cells of a column."""
+        place = [variable.name for variable in self.variables].index(name)
+        return tuple(row[place] for row in self.rows)
+
+    def as_csv(self) -> bytes:
+        """Return the table as CSV, names of variables in its first line."""
+        return csv_bytes([[v.name for v in self.variables], *self.rows])
+
+
+def csv_bytes(rows: Iterable[Sequence[str]]) -> bytes:
+    """Return rows of texts as CSV."""
+    out = io.StringIO(newline="")
+    csv.writer(out, lineterminator="\n").writerows(rows)
+    return out.getvalue().encode()
+
+
+def json_bytes(document: object) -> bytes:
+    """Return a document as the bytes of a JSON file."""
+    return (json.dumps(document, indent=1, ensure_ascii=False) + "\n").encode()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecordingFile:
+    """The recording of one presentation, and what it is of."""
+
+    rater: str
+    session: str
+    name: str  # its code, with the attempt where there were several
+    path: Path
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Dataset:
+    """Everything of a study that is exported."""
+
+    paths: StudyPaths
+    protocol: Protocol
+    ratings: DataTable
+    raters: DataTable
+    recordings: tuple[RecordingFile, ...]
+    # files of the study by their place in it, as they leave it
+    files: dict[str, bytes]
+    description: str
+    left_out: tuple[str, ...]
+
+    @property
+    def tables(self) -> tuple[DataTable, ...]:
+        """The tables."""
+        return (self.ratings, self.raters)
+
+
+def gather_dataset(
+    paths: StudyPaths, protocol: Protocol, include: Collection[str]
+) -> Dataset:
+    """Read everything of a study that is exported; `include` names what is private."""
+    _check_names(include)
+    data = read_study_data(paths, protocol)
+    text, left_out = _protocol_text(paths, include)
+    files = {"protocol.toml": text}
+    if data.in_person is not None:
+        files["ratings/in_person.csv"] = _bytes(paths.in_person_file)
+    logs = [*([paths.conduct_file] if paths.conduct_file.is_file() else [])]
+    logs += paths.logs()
+    if "logs" in include:
+        files |= {log.relative_to(paths.root).as_posix(): _bytes(log) for log in logs}
+    elif logs:
+        left_out += (f"{len(logs)} logs, which name who did what and why (logs)",)
+    return Dataset(
+        paths=paths,
+        protocol=protocol,
+        ratings=_ratings_table(protocol, data.ratings),
+        raters=_raters_table(protocol),
+        recordings=tuple(_recordings(paths, protocol)),
+        files=files,
+        description=_description(protocol, data.ratings),
+        left_out=left_out,
+    )
+
+
+PRIVATE = ("notes", "logs")
+"""What `include` may name."""
+
+
+def _check_names(include: Collection[str]) -> None:
+    for name in include:
+        if name not in PRIVATE:
+            raise ParameterError(
+                f"include: needed one of {', '.join(PRIVATE)}, got {name!r}"
+            )
+
+
+def _bytes(path: Path) -> bytes:
+    return read_regular(path, most=MAX_SMALL)
+
+
+def _protocol_text(
+    paths: StudyPaths, include: Collection[str]
+) -> tuple[bytes, tuple[str, ...]]:
+    # the protocol without what is private, and what that was
+    text = _bytes(paths.protocol)
+    document: dict[str, Any] = tomllib.loads(text.decode())
+    notes = [rater for rater in document["raters"] if rater.get("note")]
+    if "notes" in include or not notes:
+        return text, ()
+    for rater in notes:
+        del rater["note"]
+    try:
+        tomli_w = import_module("tomli_w")
+    except ModuleNotFoundError as error:
+        raise ParameterError(
+            "export: leaving notes out of a protocol needs tomli-w; install it with: "
+            "pip install 'masrel[export]', or keep them with --include notes"
+        ) from error
+    left_out = f"notes on {len(notes)} raters in the protocol (notes)"
+    return tomli_w.dumps(document).encode(), (left_out,)
+
+
+_OF_RATINGS: dict[str, tuple[str, Kind, str]] = {
+    "session": ("Session", "text", ""),
+    "rater": ("Rater", "text", ""),
+    "model": ("Haptic model that was presented", "text", ""),
+    "repeat": ("Which presentation of the model in the session", "whole", ""),
+    "grade": ("Grade", "text", ""),
+    "mean_speed_deg_s": ("Mean speed before the catch", "number", "deg/s"),
+    "source": ("Where the rating comes from", "text", ""),
+    "n_stretches": ("Stretches before the grade", "whole", ""),
+    "min_speed_deg_s": ("Mean speed of the slowest stretch", "number", "deg/s"),
+    "max_speed_deg_s": ("Mean speed of the fastest stretch", "number", "deg/s"),
+    "speeds_deg_s": ("Mean speed of each stretch", "list", "deg/s"),
+    "graded_stretch": ("Stretch on which the grade rests", "whole", ""),
+    "felt": ("Whether what the model has could be felt", "text", ""),
+    "grades_from": ("Where the grade comes from", "text", ""),
+    "device": ("Device that presented the model", "text", ""),
+}
+
+
+def _ratings_table(protocol: Protocol, ratings: Ratings) -> DataTable:
+    lines = ratings_csv(ratings).splitlines(keepends=True)
+    text = "".join(line for line in lines if not line.startswith("#"))
+    names, *rows = csv.reader(io.StringIO(text))
+    levels = {
+        "grade": protocol.scale.grades,
+        "model": tuple(model.id for model in protocol.models),
+    }
+    return DataTable(
+        name="ratings",
+        title="Ratings, one row a rating",
+        variables=tuple(
+            Variable(
+                name=name,
+                title=_OF_RATINGS[name][0],
+                kind=_OF_RATINGS[name][1],
+                unit=_OF_RATINGS[name][2],
+                levels=levels.get(name, ()),
+            )
+            for name in names
+        ),
+        rows=tuple(map(tuple, rows)),
+        keys=("session", "rater", "model", "repeat"),
+    )
+
+
+def _raters_table(protocol: Protocol) -> DataTable:
+    return DataTable(
+        name="raters",
+        title="Raters",
+        variables=(Variable(name="rater", title="Rater"),),
+        rows=tuple((rater.id,) for rater in protocol.raters),
+        keys=("rater",),
+    )
+
+
+def _recordings(paths: StudyPaths, protocol: Protocol) -> Iterator[RecordingFile]:
+    # those that a log names, in its order
+    for session in protocol.sessions:
+        for rater in session.raters:
+            log = paths.log_file(rater, session.id)
+            if not log.is_file():
+                continue
+            for event in read_log(log):
+                if event.kind != "presented":
+                    continue
+                path = paths.sessions / str(event.fields["recording"])
+                if path.is_file():
+                    yield RecordingFile(
+                        rater=rater, session=session.id, name=path.stem, path=path
+                    )
+
+
+def _description(protocol: Protocol, ratings: Ratings) -> str:
+    sentences = [f"{protocol.study.title}."]
+    if protocol.study.source:
+        sentences.append(f"Source: {protocol.study.source}.")
+    grades = ", ".join(protocol.scale.grades)
+    sentences.append(f"Scale {protocol.scale.name}: {grades}.")
+    if ratings.simulated and ratings.n_from_persons:
+        sentences.append("SIMULATED DEVICE: not all grades were given on hardware.")
+    elif ratings.simulated:
+        sentences.append("SIMULATED DATA: no person gave these grades.")
+    return " ".join(sentences)
