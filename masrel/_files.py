@@ -8,6 +8,7 @@ new ones. No link is followed, and no output takes the place of a primary record
 import contextlib
 import errno
 import os
+import shutil
 import stat
 import sys
 import time
@@ -94,6 +95,22 @@ def new_file(path: Path) -> Iterator[BinaryIO]:
         part.unlink(missing_ok=True)
     _remove_left_over(path.parent)
     sync_folder(path.parent)
+
+
+@contextmanager
+def new_folder(folder: Path) -> Iterator[Path]:
+    """Give a folder to write into; at the end it gets its name, after a stop it goes."""
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise ParameterError(f"{folder}: needed a new or empty folder, got another")
+    make_folder(folder.parent)
+    part = folder.with_name(f"{_PART_BEGINS}{os.urandom(8).hex()}{_PART_ENDS}")
+    part.mkdir()
+    try:
+        yield part
+        os.replace(part, folder)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+    sync_folder(folder.parent)
 
 
 def _write_part(

@@ -9,6 +9,7 @@ import json
 import tomllib
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from datetime import date
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Literal
@@ -91,6 +92,7 @@ class Dataset:
     # files of the study by their place in it, as they leave it
     files: dict[str, bytes]
     description: str
+    day: date  # of the export
     left_out: tuple[str, ...]
 
     @property
@@ -100,7 +102,7 @@ class Dataset:
 
 
 def gather_dataset(
-    paths: StudyPaths, protocol: Protocol, include: Collection[str]
+    paths: StudyPaths, protocol: Protocol, include: Collection[str], day: date
 ) -> Dataset:
     """Read everything of a study that is exported; `include` names what is private."""
     _check_names(include)
@@ -123,6 +125,7 @@ def gather_dataset(
         recordings=tuple(_recordings(paths, protocol)),
         files=files,
         description=_description(protocol, data.ratings),
+        day=day,
         left_out=left_out,
     )
 
@@ -181,6 +184,11 @@ _OF_RATINGS: dict[str, tuple[str, Kind, str]] = {
     "felt": ("Whether what the model has could be felt", "text", ""),
     "grades_from": ("Where the grade comes from", "text", ""),
     "device": ("Device that presented the model", "text", ""),
+    "position": ("Place of the presentation in the session", "whole", ""),
+    "code": ("Blinded code by which the rater knew it", "text", ""),
+    "n_attempts": ("How often it was presented", "whole", ""),
+    "first_grade": ("Grade as the rater gave it, before corrections", "text", ""),
+    "graded_at": ("When the first grade was given, UTC", "text", ""),
 }
 
 

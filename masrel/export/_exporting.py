@@ -1,11 +1,10 @@
 """Write a study in a form that others read."""
 
-import shutil
-import tempfile
 from collections.abc import Callable, Collection, Iterator
+from datetime import date
 from pathlib import Path
 
-from masrel._files import make_folder, write_files
+from masrel._files import new_folder, write_files
 from masrel.errors import ParameterError
 from masrel.export._bids import bids_files
 from masrel.export._data_package import data_package_files
@@ -34,6 +33,7 @@ def export_study(
     folder: Path,
     *,
     include: Collection[str] = (),
+    day: date | None = None,
     progress: Callable[[str], object] | None = None,
 ) -> tuple[str, ...]:
     """Write a study in a form that archives and other programs read.
@@ -52,6 +52,8 @@ def export_study(
     include : collection of {"notes", "logs"}
         What else to export: notes on raters; logs, in which people and their reasons
         stand.
+    day : date, optional
+        The day of the export, today unless given; an RO-Crate has it.
     progress : callable, optional
         Called with the place of each file once it is written.
 
@@ -72,18 +74,10 @@ def export_study(
     """
     if form not in _FORMS:
         raise ParameterError(f"form: needed one of {', '.join(_FORMS)}, got {form!r}")
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise ParameterError(f"{folder}: needed a new or empty folder, got another")
-    dataset = gather_dataset(study, protocol, include)
-    make_folder(folder.parent)
-    part = Path(tempfile.mkdtemp(prefix=".masrel-", suffix=".part", dir=folder.parent))
-    try:
+    dataset = gather_dataset(study, protocol, include, day or date.today())
+    with new_folder(folder) as part:
         for place, content in _FORMS[form](dataset):
             write_files({part / place: content})
             if progress is not None:
                 progress(place)
-        part.chmod(0o755)
-        part.rename(folder)
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
     return dataset.left_out

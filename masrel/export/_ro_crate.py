@@ -74,7 +74,7 @@ def _metadata(dataset: Dataset, files: list[dict[str, object]]) -> dict[str, obj
         "name": dataset.protocol.study.title,
         "description": dataset.description,
         "license": "Not stated: to be added by the authors.",
-        "datePublished": "",
+        "datePublished": dataset.day.isoformat(),
         "hasPart": parts,
         "mentions": [{"@id": "#analysis"}],
     }
