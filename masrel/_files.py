@@ -99,7 +99,7 @@ def new_file(path: Path) -> Iterator[BinaryIO]:
 
 @contextmanager
 def new_folder(folder: Path) -> Iterator[Path]:
-    """Give a folder to write into; at the end it gets its name, after a stop it goes."""
+    """Give a folder to write into; at the end it gets its name, at a stop it goes."""
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise ParameterError(f"{folder}: needed a new or empty folder, got another")
     make_folder(folder.parent)
@@ -160,7 +160,10 @@ def _remove_left_over(folder: Path) -> None:
     with contextlib.suppress(OSError):  # of what another process took away
         for path in folder.iterdir():
             if is_part(path) and path.lstat().st_mtime < time.time() - _LONGEST_S:
-                path.unlink()
+                if path.is_dir() and not path.is_symlink():
+                    shutil.rmtree(path)
+                else:
+                    path.unlink()
 
 
 @contextmanager
