@@ -34,9 +34,10 @@ if TYPE_CHECKING:
 def verify(study: Path, anchor_file: Path | None, output: OutputOptions) -> None:
     """Verify the record of STUDY, every file against the one it was made from.
 
-    Protocol, schedules, logs, recordings, table of ratings and analysis.
-    Prints every session, what is wrong, and an anchor for each log: a hash
-    that, kept elsewhere, shows that its lines were not written anew.
+    Protocol, schedules, logs and recordings of sessions and trainings, table of
+    ratings, analysis and report. Prints every session and training, what is
+    wrong, and an anchor for each log: a hash that, kept elsewhere, shows that
+    its lines were not written anew.
     Exit code 2 when something is broken.
     """
     from masrel.verification import anchors_of, verify_study
@@ -87,6 +88,7 @@ def _document(
     return {
         "is_whole": is_whole,
         "sessions": [dataclasses.asdict(record) for record in verification.sessions],
+        "trainings": [dataclasses.asdict(record) for record in verification.trainings],
         "findings": [
             {**dataclasses.asdict(finding), "path": str(finding.path)}
             for finding in findings
@@ -115,6 +117,11 @@ def _show(
 ) -> None:
     for record in verification.sessions:
         click.echo(f"{record.session} {record.rater}: {_stage_of(record)}")
+    for training in verification.trainings:
+        click.echo(
+            f"training {training.rater}: {training.stage}, {training.n_graded} graded, "
+            f"{training.n_recordings} recordings"
+        )
     for anchor in anchors:
         click.echo(f"anchor: {anchor}")
     for finding in findings:

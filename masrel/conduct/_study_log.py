@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import masrel
 from masrel._event_log import Event, SessionLog, read_log, utc_now
-from masrel._input import listed
+from masrel._input import format_problem, listed
 from masrel.errors import ParameterError, SessionLogError
 from masrel.protocol import Protocol, StudyPaths
 
@@ -141,6 +141,10 @@ def _checked(path: Path, events: tuple[Event, ...]) -> tuple[Event, ...]:
             raise SessionLogError(
                 f"{where}: needed an event of {', '.join(_EVENTS)}, got {event.kind!r}"
             )
+        if event.kind == "conduct":  # first: another format has other fields
+            problem = format_problem(event.fields.get("format"), newest=_FORMAT)
+            if problem is not None:
+                raise SessionLogError(f"{where}: {problem}")
         if set(event.fields) != set(_EVENTS[event.kind]):
             raise SessionLogError(
                 f"{where}: {event.kind}: needed the fields "

@@ -11,7 +11,7 @@ from masrel._event_log import SessionLog
 from masrel.conduct._study_log import stated
 from masrel.errors import SessionLogError, SessionStoppedError
 from masrel.protocol import Protocol, StudyPaths, presented_hash, protocol_hash
-from masrel.recording import _Fact
+from masrel.recording import _Fact, _Facts
 from masrel.run._days import days_since, interval_fields, last_time
 from masrel.run._grade_sources import GradeRequest, GradeSource, Skip, with_occasions
 from masrel.run._practice import practice_presentations
@@ -19,11 +19,8 @@ from masrel.run._presenter import CLOCKS, ClockName, Presenter
 from masrel.run._questionnaires import ask_questions
 from masrel.run._rehearsal import RehearsalPaths
 from masrel.run._settings import moves_hardware
-from masrel.run._state import SessionState, replay
+from masrel.run._state import FORMAT, SessionState, replay
 from masrel.schedule import Presentation, Schedule
-
-_FORMAT = 2
-_FORMATS = (1, _FORMAT)  # a session begun with one of these is finished as it was begun
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -116,8 +113,8 @@ class SessionRunner:
     def begin(self, schedule_sha256: str) -> None:
         """Log which session this is; check that it is the same when it is resumed."""
         protocol, schedule = self._protocol, self._schedule
-        same: dict[str, _Fact] = {
-            "format": _FORMAT,
+        same: dict[str, _Facts] = {
+            "format": FORMAT,
             "study": protocol.study.id,
             "rater": schedule.rater,
             "session": schedule.session,
@@ -140,8 +137,7 @@ class SessionRunner:
             if interval is not None:
                 self._log.append("interval", interval)
             return
-        if header["format"] in _FORMATS:
-            same["format"] = header["format"]
+        same["format"] = header["format"]  # it is finished as it was begun
         for name, value in same.items():
             begun = header.get(name, False)  # there once were no rehearsals
             if begun != value:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
 
 from masrel._event_log import Event
+from masrel._input import format_problem
 from masrel.errors import SessionLogError
 
 if TYPE_CHECKING:
@@ -19,6 +20,9 @@ FELT: tuple[Felt, ...] = get_args(Felt)
 
 FROM_PERSONS = ("console",)
 """Sources of grades, by the names that logs have them by, that are a person's."""
+
+FORMAT = 2
+"""Version of session logs; those of version 1 are read, and finished, too."""
 
 _PRESENTED = (
     "code",
@@ -182,6 +186,10 @@ def _contradiction(state: SessionState, event: Event) -> str | None:
     # -> why the event cannot follow, or None
     if event.kind not in EVENTS:
         return f"needed an event of {', '.join(EVENTS)}"
+    if event.kind == "session":  # first: another format has other fields
+        problem = format_problem(event.fields.get("format"), newest=FORMAT)
+        if problem is not None:
+            return problem
     fields = set(EVENTS[event.kind])
     if set(event.fields) not in (fields, fields - _LATER.get(event.kind, set())):
         return (

@@ -13,12 +13,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from masrel._event_log import Event, read_log
+from masrel._input import format_problem
 from masrel.errors import SessionLogError
 from masrel.protocol import Protocol, StudyPaths, presented_hash
 from masrel.training._criterion import Criterion, training_criterion
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+FORMAT = 1
+"""Version of the log of a training."""
 
 SETTINGS = (
     "weights",
@@ -164,11 +168,9 @@ def check_events(path: Path, events: Sequence[Event]) -> None:
     graded = 0
     presented: Counter[object] = Counter()
     for event in events:
-        fields, problem = event.fields, None
-        if event.kind not in EVENTS:
-            problem = f"needed an event of {', '.join(EVENTS)}"
-        elif lacking := [name for name in EVENTS[event.kind] if name not in fields]:
-            problem = f"needed the field {lacking[0]}"
+        fields, problem = event.fields, _problem(event)
+        if problem is not None:
+            pass
         elif (event.kind == "training") != (event is events[0]):
             problem = "needed the event training once, before all others"
         elif event.kind == "presented" and fields["fault"] is None:
@@ -179,6 +181,23 @@ def check_events(path: Path, events: Sequence[Event]) -> None:
                 problem = f"needed the grade of presentation {graded}, after it"
         if problem is not None:
             raise SessionLogError(f"{path}: line {event.line}: {event.kind}: {problem}")
+
+
+def _problem(event: Event) -> str | None:
+    # why it is no event of any training, or None
+    if event.kind not in EVENTS:
+        return f"needed an event of {', '.join(EVENTS)}"
+    if event.kind == "training":  # first: another format has other fields
+        problem = format_problem(event.fields.get("format"), newest=FORMAT)
+        if problem is not None:
+            return problem
+    for name in EVENTS[event.kind]:
+        if name not in event.fields:
+            return f"needed the field {name}"
+    position = event.fields.get("position", 0)
+    if type(position) is not int:
+        return f"needed position as a number, got {position!r}"
+    return None
 
 
 def record_of(

@@ -20,6 +20,7 @@ from masrel.run.session import _check_device
 from masrel.schedule import Presentation
 from masrel.training._criterion import calibrate, training_criterion
 from masrel.training._lessons import (
+    FORMAT,
     SETTINGS,
     Lesson,
     TrainingRecord,
@@ -27,8 +28,6 @@ from masrel.training._lessons import (
     record_of,
 )
 from masrel.training._syllabus import next_model
-
-_FORMAT = 1
 
 _SESSION = "training"  # what recordings of a training have in place of a session
 
@@ -168,7 +167,7 @@ class _Trainer:
         }
         rules, device = self._protocol.training, self._protocol.device
         same: dict[str, _Fact] = {
-            "format": _FORMAT,
+            "format": FORMAT,
             "study": self._protocol.study.id,
             "rater": self._rater,
             "presented_sha256": presented_hash(self._protocol),

@@ -6,6 +6,7 @@ and every finding, each with its file.
 
 from masrel.verification._finding import Finding
 from masrel.verification._sessions import SessionRecord
+from masrel.verification._trainings import VerifiedTraining
 from masrel.verification.anchors import (
     Anchor,
     anchor_findings,
@@ -20,6 +21,7 @@ __all__ = [
     "Finding",
     "SessionRecord",
     "Verification",
+    "VerifiedTraining",
     "anchor_findings",
     "anchors_of",
     "read_anchors",

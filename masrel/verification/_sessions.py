@@ -1,28 +1,26 @@
 """Session logs, what they say happened, and the recordings they name."""
 
 import hashlib
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import datetime
 from pathlib import Path
 from typing import Any, Literal
 
-from masrel._event_log import Event, read_log
-from masrel._input import MAX_RECORDING, MAX_SMALL, parse_json, read_regular
-from masrel.errors import ParameterError, SessionLogError
+from masrel._event_log import Event
+from masrel.errors import ParameterError
 from masrel.protocol import Protocol, StudyPaths
 from masrel.protocol._questions import checked_answer
 from masrel.run._practice import practice_presentations
 from masrel.run._state import SessionState, replay
 from masrel.schedule import Presentation, Schedule
-from masrel.verification._finding import Finding, broken, doubt
+from masrel.verification._finding import Finding, broken
+from masrel.verification._log_findings import (
+    checked_log,
+    recording_findings,
+    time_findings,
+)
 
 Stage = Literal["not begun", "begun", "complete", "unreadable"]
-
-# Facts of a recording that the schedule has too, and those that the log has
-_FROM_SCHEDULE = ("code", "position", "model", "repeat")
-_FROM_LOG = ("attempt", "mean_speed_deg_s", "n_missed_ticks", "fault", "simulated")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,21 +68,21 @@ def check_session(
 ) -> CheckedSession:
     """Hold a log against its schedule, and its recordings against the log."""
     log = study.log_file(rater, session)
-    events, finding = _events(log)
-    if finding is not None or not events or schedule is None:
+    events, state, finding = checked_log(log, replay)
+    if state is None or schedule is None:
         stage: Stage = "not begun" if finding is None and not events else "unreadable"
         return CheckedSession(
             record=SessionRecord(session=session, rater=rater, stage=stage),
             findings=() if finding is None else (finding,),
             files=frozenset([log]),
         )
-    state = replay(log, events)
     presented = state.all_presented
     recordings = [study.sessions / str(e.fields["recording"]) for e in presented]
     findings = [
         *_head_findings(study, protocol, schedule, state, log),
         *_event_findings(protocol, schedule, events, log),
         *_answer_findings(protocol, events, log),
+        *time_findings(events, log),
     ]
     shown = _all_shown(protocol, schedule)
     for event, recording in zip(presented, recordings, strict=True):
@@ -102,20 +100,6 @@ def check_session(
     facts = (recording.with_suffix(".json") for recording in recordings)
     files = frozenset([log, *recordings, *facts])
     return CheckedSession(record=record, findings=tuple(findings), files=files)
-
-
-def _events(log: Path) -> tuple[tuple[Event, ...], Finding | None]:
-    # of a chain that holds and can have happened, and what is wrong where none does
-    if not log.exists():
-        return (), None
-    try:
-        events = read_log(log)
-        replay(log, events)
-    except (SessionLogError, OSError) as error:
-        return (), Finding(weight="broken", path=log, message=str(error))
-    if not events:
-        return (), broken(log, "needed a session log, got an empty file")
-    return events, None
 
 
 def _head_findings(
@@ -181,7 +165,6 @@ def _event_findings(
     codes = _all_shown(protocol, schedule)
     positions = {code: shown.position for code, shown in codes.items()}
     attempts = dict.fromkeys(positions, 0)
-    before = None
     for event in events:
         fields, where = event.fields, f"line {event.line}: {event.kind}"
         code, grade = fields.get("code"), fields.get("grade")
@@ -208,24 +191,6 @@ def _event_findings(
                 f"{where}: grade of {code}: needed one of "
                 f"{', '.join(protocol.scale.grades)}, got {grade!r}",
             )
-        time = _time(event)
-        if time is None:
-            yield broken(log, f"{where}: needed a time in UTC, got {event.time_utc!r}")
-        elif before is not None and time < before:
-            yield doubt(
-                log,
-                f"{where}: at {event.time_utc}, earlier than the line before: has the "
-                "clock been set back?",
-            )
-        before = time or before
-
-
-def _time(event: Event) -> datetime | None:
-    try:
-        time = datetime.fromisoformat(event.time_utc)
-    except ValueError:
-        return None
-    return time if time.tzinfo is not None else None
 
 
 def _recording_findings(
@@ -244,43 +209,9 @@ def _recording_findings(
     if shown is None or path != folder / f"{name}.npz":
         yield broken(log, f"line {event.line}: {path} is not where {name} is recorded")
         return
-    for file, sha256 in (
-        (path, fields["sha256"]),
-        (path.with_suffix(".json"), fields.get("facts_sha256")),
-    ):
-        if not file.is_file():
-            yield broken(file, f"needed a recording that {where} names, got no file")
-            return
-        data = read_regular(file, most=MAX_RECORDING)
-        if sha256 not in (None, hashlib.sha256(data).hexdigest()):
-            yield broken(file, f"is not the file whose SHA-256 {where} has")
-    yield from _fact_findings(path.with_suffix(".json"), shown, schedule, event, where)
-
-
-def _fact_findings(
-    path: Path, shown: Presentation, schedule: Schedule, event: Event, where: str
-) -> Iterator[Finding]:
-    # what a file says that was not hashed once must at least agree with what was
-    try:
-        facts = parse_json(read_regular(path, most=MAX_SMALL))
-    except ValueError:
-        facts = None
-    if not isinstance(facts, dict):
-        yield broken(path, "needed a JSON object, got none")
-        return
-    needed: dict[str, object] = {
+    of = {
         "study": schedule.study,
         "rater": schedule.rater,
         "session": schedule.session,
-        "sha256": event.fields["sha256"],
-        **{name: getattr(shown, name) for name in _FROM_SCHEDULE},
-        **{name: event.fields[name] for name in _FROM_LOG},
     }
-    for name, value in needed.items():
-        got = facts.get(name)
-        if got != value or type(got) is not type(value):
-            yield broken(
-                path,
-                f"{name}: needed {json.dumps(value)}, as {where} and the schedule "
-                f"have it, got {json.dumps(got)}",
-            )
+    yield from recording_findings(path, shown, of, event, where)

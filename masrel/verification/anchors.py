@@ -49,8 +49,8 @@ def anchors_of(study: StudyPaths) -> tuple[Anchor, ...]:
     Returns
     -------
     tuple of Anchor
-        Of the last line of each: of the study's conduct, then of every session. A log
-        whose chain does not hold has none.
+        Of the last line of each: of the study's conduct, then of every session, then of
+        every training. A log whose chain does not hold has none.
 
     Raises
     ------
@@ -71,7 +71,8 @@ def anchors_of(study: StudyPaths) -> tuple[Anchor, ...]:
 
 
 def _logs(study: StudyPaths) -> list[Path]:
-    return [*study.conduct_logs(), *study.logs()]
+    trainings = [log for log in sorted(study.training.glob("*.jsonl")) if log.is_file()]
+    return [*study.conduct_logs(), *study.logs(), *trainings]
 
 
 def read_anchors(path: Path) -> tuple[Anchor, ...]:

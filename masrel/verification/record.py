@@ -1,6 +1,6 @@
 """The record of a study, from protocol to analysis, each file held against the last."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,6 +11,11 @@ from masrel.schedule import read_schedule, schedule_problems
 from masrel.verification._finding import Finding, broken, doubt
 from masrel.verification._outputs import output_findings
 from masrel.verification._sessions import CheckedSession, SessionRecord, check_session
+from masrel.verification._trainings import (
+    CheckedTraining,
+    VerifiedTraining,
+    check_training,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,12 +26,15 @@ class Verification:
     ----------
     sessions : tuple of SessionRecord
         Every session of the protocol, one line a rater.
+    trainings : tuple of VerifiedTraining
+        Every training that has a log, by rater.
     findings : tuple of Finding
-        In the order of the record: protocol, schedules, logs and recordings, table,
-        analysis, report.
+        In the order of the record: protocol, schedules, logs and recordings of sessions
+        and of trainings, table, analysis, report.
     """
 
     sessions: tuple[SessionRecord, ...]
+    trainings: tuple[VerifiedTraining, ...] = ()
     findings: tuple[Finding, ...]
 
     @property
@@ -72,6 +80,7 @@ def verify_study(study: StudyPaths) -> Verification:
     record = verify_sessions(study, protocol)
     return Verification(
         sessions=record.sessions,
+        trainings=record.trainings,
         findings=(
             *_of_problems(study.schedules, schedule_problems(protocol, study)),
             *record.findings,
@@ -81,7 +90,7 @@ def verify_study(study: StudyPaths) -> Verification:
 
 
 def verify_sessions(study: StudyPaths, protocol: Protocol) -> Verification:
-    """Verify the session logs of a study and the recordings they name.
+    """Verify the logs of a study and the recordings they name.
 
     Parameters
     ----------
@@ -93,8 +102,8 @@ def verify_sessions(study: StudyPaths, protocol: Protocol) -> Verification:
     Returns
     -------
     Verification
-        Every session of the protocol, and what is wrong in ``sessions/`` and in the
-        log of what happened beside them.
+        Every session of the protocol, every training, and what is wrong in
+        ``sessions/``, in ``training/`` and in the log of what happened beside them.
 
     Raises
     ------
@@ -106,11 +115,18 @@ def verify_sessions(study: StudyPaths, protocol: Protocol) -> Verification:
         for session in protocol.sessions
         for rater in session.raters
     ]
+    training_logs = [study.training_log_file(rater.id) for rater in protocol.raters]
+    trained = [
+        check_training(study, protocol, log) for log in training_logs if log.is_file()
+    ]
     return Verification(
         sessions=tuple(of_session.record for of_session in checked),
+        trainings=tuple(of_rater.record for of_rater in trained),
         findings=(
             *(finding for of_session in checked for finding in of_session.findings),
-            *_unnamed(study, checked),
+            *_unnamed(study.sessions, checked, "rater in a session"),
+            *(finding for of_rater in trained for finding in of_rater.findings),
+            *_unnamed(study.training, trained, "rater"),
             *_conduct_findings(study),
         ),
     )
@@ -147,16 +163,19 @@ def _checked(
     return replace(checked, findings=(*findings, *checked.findings))
 
 
-def _unnamed(study: StudyPaths, checked: list[CheckedSession]) -> Iterator[Finding]:
-    # what lies in sessions/ and no log speaks for
-    named = {path for of_session in checked for path in of_session.files}
+def _unnamed(
+    folder: Path, checked: Sequence[CheckedSession | CheckedTraining], whose: str
+) -> Iterator[Finding]:
+    # what lies in a folder of logs and no log speaks for
+    named = {path for of_log in checked for path in of_log.files}
     # what a log that cannot be read names, nobody can say
     unknown = {
-        study.log_file(of_session.record.rater, of_session.record.session)
-        for of_session in checked
-        if of_session.record.stage == "unreadable"
+        path
+        for of_log in checked
+        if of_log.record.stage == "unreadable"
+        for path in of_log.files
     }
-    for path in sorted(study.sessions.rglob("*")):
+    for path in sorted(folder.rglob("*")):
         if path.parent.with_name(f"{path.parent.name}.jsonl") in unknown:
             continue
         if path in named or (path.is_dir() and any(path.iterdir())):
@@ -164,10 +183,10 @@ def _unnamed(study: StudyPaths, checked: list[CheckedSession]) -> Iterator[Findi
         if path.name.endswith(".jsonl.torn") and path.with_suffix("") in named:
             yield doubt(path, "bytes of a line that was not finished; the log says so")
         elif path.suffix == ".partial":
-            yield doubt(path, "a presentation that was cut off; masrel run recovers it")
+            yield doubt(path, "a presentation that was cut off; going on recovers it")
         elif path.suffix == ".jsonl":
-            yield broken(path, "is the log of no rater in a session of the protocol")
+            yield broken(path, f"is the log of no {whose} of the protocol")
         elif path.suffix in {".npz", ".json"}:
             yield broken(path, "is a recording that no log of the protocol names")
         else:
-            yield doubt(path, "is in sessions/, and no log names it")
+            yield doubt(path, f"is in {folder.name}/, and no log names it")
