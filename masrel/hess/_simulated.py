@@ -87,8 +87,6 @@ class SimulatedDevice(Device):
         parameters: PlantParameters | None = None,
         resolution: float = math.radians(0.005),
     ) -> None:
-        if not 0.0 < resolution < math.inf:
-            raise ParameterError(f"resolution: needs more than 0, got {resolution}")
         self._clock = clock
         self._resolution = resolution
         self._hand = hand

@@ -2,8 +2,6 @@
 
 import math
 
-from masrel.errors import ParameterError
-
 CUTOFF_RAD_S = 180.0
 """Of the low-pass, rad/s: that of the filter inside the source's motor amplifier."""
 
@@ -14,12 +12,9 @@ class VelocityEstimate:
     # At 1 kHz one encoder step of 0.005 deg is 5 deg/s from sample to sample. The
     # low-pass leaves 0.8 deg/s of it and delays the speed by 1/180 s = 5.6 ms.
 
-    __slots__ = ("_angle", "_cutoff", "_gain", "_interval", "_time", "_velocity")
+    __slots__ = ("_angle", "_gain", "_interval", "_time", "_velocity")
 
-    def __init__(self, cutoff: float = CUTOFF_RAD_S) -> None:
-        if not 0.0 < cutoff < math.inf:
-            raise ParameterError(f"cutoff: needs more than 0 rad/s, got {cutoff}")
-        self._cutoff = cutoff
+    def __init__(self) -> None:
         self._time: float | None = None
         self._angle = 0.0
         self._velocity = 0.0
@@ -36,7 +31,7 @@ class VelocityEstimate:
             return self._velocity
         if interval != self._interval:  # the gain is kept while ticks are regular
             self._interval = interval
-            self._gain = -math.expm1(-self._cutoff * interval)
+            self._gain = -math.expm1(-CUTOFF_RAD_S * interval)
         difference = (angle - self._angle) / interval
         self._velocity += self._gain * (difference - self._velocity)
         self._time, self._angle = time_s, angle

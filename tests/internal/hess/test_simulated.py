@@ -151,9 +151,6 @@ def test_a_torque_that_is_not_finite_is_refused() -> None:
     [
         ({"range_end": 0.9}, "range_end"),
         ({"range_end": 3.2}, "range_end"),
-        ({"arm_inertia": -0.1}, "arm_inertia"),
-        ({"delay": math.nan}, "delay"),
-        ({"step_ns": 0}, "step_ns"),
     ],
 )
 def test_an_impossible_plant_is_refused(change: dict[str, float], words: str) -> None:
@@ -162,12 +159,6 @@ def test_an_impossible_plant_is_refused(change: dict[str, float], words: str) ->
         SimulatedDevice(
             clock=SimulatedClock(), hand=hand, parameters=PlantParameters(**change)
         )
-
-
-def test_an_encoder_without_steps_is_refused() -> None:
-    hand = SimulatedHand(start=1.0, end=2.5, mean_speed=1.5)
-    with pytest.raises(ParameterError, match="resolution"):
-        SimulatedDevice(clock=SimulatedClock(), hand=hand, resolution=0.0)
 
 
 def test_the_hand_presses_as_hard_as_the_arm_resists() -> None:

@@ -4,14 +4,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from masrel.errors import ParameterError
 from masrel.hess._velocity import VelocityEstimate
 
 
 def test_a_step_of_speed_is_followed_as_a_first_order_system() -> None:
     # A ramp of angle is a step of speed; sampled every h, the exact first-order
     # response after n samples is v (1 - exp(-c n h)).
-    estimate = VelocityEstimate(cutoff=180.0)
+    estimate = VelocityEstimate()
     estimate.update(0.0, 0.0)
     for n in range(1, 40):
         velocity = estimate.update(n * 1e-3, 1.5 * n * 1e-3)
@@ -43,9 +42,3 @@ def test_missed_ticks_do_not_bias_a_constant_speed(intervals_ms: list[int]) -> N
         velocity = estimate.update(elapsed_ms * 1e-3, 2.0 * elapsed_ms * 1e-3)
     exact = 2.0 * (1.0 - math.exp(-180.0 * elapsed_ms * 1e-3))
     assert velocity == pytest.approx(exact, rel=1e-6)
-
-
-@pytest.mark.parametrize("cutoff", [0.0, -1.0, math.nan, math.inf])
-def test_a_cutoff_needs_to_be_positive(cutoff: float) -> None:
-    with pytest.raises(ParameterError, match="cutoff: needs more than 0"):
-        VelocityEstimate(cutoff)
