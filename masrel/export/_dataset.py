@@ -14,7 +14,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Literal
 
+from masrel._cells import safe_cell
 from masrel._input import MAX_SMALL, read_regular
+from masrel.conduct import rater_values
 from masrel.errors import ParameterError
 from masrel.protocol import Protocol, StudyPaths
 from masrel.ratings import Ratings, ratings_csv, read_study_data
@@ -105,9 +107,14 @@ def gather_dataset(
     paths: StudyPaths, protocol: Protocol, include: Collection[str], day: date
 ) -> Dataset:
     """Read everything of a study that is exported; `include` names what is private."""
-    _check_names(include)
+    _check_names(protocol, include)
     data = read_study_data(paths, protocol)
-    text, left_out = _protocol_text(paths, include)
+    fields = [
+        name
+        for name, field in protocol.rater_fields.items()
+        if field.public or name in include
+    ]
+    text, left_out = _protocol_text(paths, protocol, fields, "notes" in include)
     files = {"protocol.toml": text}
     if data.in_person is not None:
         files["ratings/in_person.csv"] = _bytes(paths.in_person_file)
@@ -121,7 +128,7 @@ def gather_dataset(
         paths=paths,
         protocol=protocol,
         ratings=_ratings_table(protocol, data.ratings),
-        raters=_raters_table(protocol),
+        raters=_raters_table(paths, protocol, fields),
         recordings=tuple(_recordings(paths, protocol)),
         files=files,
         description=_description(protocol, data.ratings),
@@ -130,15 +137,17 @@ def gather_dataset(
     )
 
 
-PRIVATE = ("notes", "logs")
-"""What `include` may name."""
+_PRIVATE = ("notes", "logs")
+"""What is private in every study."""
 
 
-def _check_names(include: Collection[str]) -> None:
+def _check_names(protocol: Protocol, include: Collection[str]) -> None:
+    fields = [name for name, field in protocol.rater_fields.items() if not field.public]
+    known = (*_PRIVATE, *fields)
     for name in include:
-        if name not in PRIVATE:
+        if name not in known:
             raise ParameterError(
-                f"include: needed one of {', '.join(PRIVATE)}, got {name!r}"
+                f"include: needed one of {', '.join(known)}, got {name!r}"
             )
 
 
@@ -147,25 +156,36 @@ def _bytes(path: Path) -> bytes:
 
 
 def _protocol_text(
-    paths: StudyPaths, include: Collection[str]
+    paths: StudyPaths, protocol: Protocol, fields: Sequence[str], has_notes: bool
 ) -> tuple[bytes, tuple[str, ...]]:
     # the protocol without what is private, and what that was
     text = _bytes(paths.protocol)
     document: dict[str, Any] = tomllib.loads(text.decode())
-    notes = [rater for rater in document["raters"] if rater.get("note")]
-    if "notes" in include or not notes:
-        return text, ()
-    for rater in notes:
-        del rater["note"]
+    hidden = [name for name in protocol.rater_fields if name not in fields]
+    n_notes = n_values = 0
+    for rater in document["raters"]:
+        if not has_notes and rater.pop("note", ""):
+            n_notes += 1
+        for name in hidden:
+            n_values += rater.get("fields", {}).pop(name, None) is not None
+    left_out = [f"the field {name} of raters ({name})" for name in hidden]
+    if n_notes:
+        left_out.append(f"notes on {n_notes} raters in the protocol (notes)")
+    if n_notes or n_values:
+        text = _toml(document).encode()
+    return text, tuple(left_out)
+
+
+def _toml(document: dict[str, Any]) -> str:
     try:
         tomli_w = import_module("tomli_w")
     except ModuleNotFoundError as error:
         raise ParameterError(
-            "export: leaving notes out of a protocol needs tomli-w; install it with: "
-            "pip install 'masrel[export]', or keep them with --include notes"
+            "export: leaving what is private out of a protocol needs tomli-w; install "
+            "it with: pip install 'masrel[export]', or keep it by --include"
         ) from error
-    left_out = f"notes on {len(notes)} raters in the protocol (notes)"
-    return tomli_w.dumps(document).encode(), (left_out,)
+    text: str = tomli_w.dumps(document)
+    return text
 
 
 _OF_RATINGS: dict[str, tuple[str, Kind, str]] = {
@@ -218,14 +238,38 @@ def _ratings_table(protocol: Protocol, ratings: Ratings) -> DataTable:
     )
 
 
-def _raters_table(protocol: Protocol) -> DataTable:
+_KINDS: dict[str, Kind] = {"whole": "whole", "number": "number"}
+
+
+def _raters_table(
+    paths: StudyPaths, protocol: Protocol, fields: Sequence[str]
+) -> DataTable:
+    values = rater_values(paths, protocol)
+    declared = {name: protocol.rater_fields[name] for name in fields}
+    described = [
+        Variable(
+            name=name,
+            title=field.title or name,
+            kind=_KINDS.get(field.type, "text"),
+            unit=field.unit,
+            levels=field.choices,
+        )
+        for name, field in declared.items()
+    ]
     return DataTable(
         name="raters",
         title="Raters",
-        variables=(Variable(name="rater", title="Rater"),),
-        rows=tuple((rater.id,) for rater in protocol.raters),
+        variables=(Variable(name="rater", title="Rater"), *described),
+        rows=tuple(
+            (rater, *(_cell(known[name]) for name in fields))
+            for rater, known in values.items()
+        ),
         keys=("rater",),
     )
+
+
+def _cell(value: object) -> str:
+    return MISSING if value is None else safe_cell(str(value))
 
 
 def _recordings(paths: StudyPaths, protocol: Protocol) -> Iterator[RecordingFile]:

@@ -49,9 +49,10 @@ def export_study(
     folder : Path
         The folder to make; it must not exist, or be empty. It has its name once it is
         whole.
-    include : collection of {"notes", "logs"}
-        What else to export: notes on raters; logs, in which people and their reasons
-        stand.
+    include : collection of str
+        What is private and exported all the same: ``"notes"`` on raters; ``"logs"``, in
+        which people and their reasons stand; fields of raters that are not public, by
+        their names.
     day : date, optional
         The day of the export, today unless given; an RO-Crate has it.
     progress : callable, optional

@@ -38,7 +38,23 @@ sessions = ["test"]
 target = "items"
 interval = "jackknife"
 """
-NOTE = ('[[raters]]\nid = "R2"', '[[raters]]\nid = "R2"\nnote = "very private"')
+ALL = ("notes", "logs", "illness")
+SECRETS = (b"very private", b"private, too", b"Somebody Private", b"a private reason")
+FIELDS = """
+[rater_fields.years]
+type = "whole"
+unit = "a"
+title = "Years of practice"
+public = true
+
+[rater_fields.illness]
+type = "text"
+"""
+NOTE = (
+    '[[raters]]\nid = "R2"',
+    '[[raters]]\nid = "R2"\nnote = "very private"\n'
+    'fields = { years = 7, illness = "private, too" }',
+)
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +62,7 @@ def rated(tmp_path_factory: pytest.TempPathFactory) -> Study:
     """Two sessions with grades, a note on a rater, and a correction; only read."""
     study = StudyPaths(tmp_path_factory.mktemp("export") / "study")
     study.root.mkdir()
-    text = f"{PROTOCOL.replace(*NOTE)}\n{PLAN}"
+    text = f"{PROTOCOL.replace(*NOTE)}\n{FIELDS}\n{PLAN}"
     study.protocol.write_text(text, encoding="utf-8")
     protocol = read_protocol(study.protocol)
     with_secret(study)
@@ -118,13 +134,21 @@ def test_what_is_private_stays_unless_it_is_named(
     rated: Study, form: str, tmp_path: Path
 ) -> None:
     left_out = export_study(*rated, form, tmp_path / "a")
-    assert len(left_out) == 2
+    assert len(left_out) == 3
     assert all("private" not in text.lower() for text in left_out)
     for name, data in files(tmp_path / "a"):
         assert b"rivate" not in data, name
-    assert export_study(*rated, form, tmp_path / "b", include=("notes", "logs")) == ()
+    assert (
+        export_study(*rated, form, tmp_path / "b", include=("notes", "logs", "illness"))
+        == ()
+    )
     everything = b"".join(data for _, data in files(tmp_path / "b"))
-    for text in (b"very private", b"Somebody Private", b"a private reason"):
+    for text in (
+        b"very private",
+        b"private, too",
+        b"Somebody Private",
+        b"a private reason",
+    ):
         assert text in everything
 
 
@@ -240,6 +264,18 @@ def test_psych_ds_describes_every_column_of_files_with_names_of_keywords(
         assert set(columns) <= described
         assert rows
         assert all(len(row) == len(columns) for row in rows)
+
+
+def test_public_fields_of_raters_go_along(rated: Study, tmp_path: Path) -> None:
+    folder = exported(rated, "bids", tmp_path / "out")
+    lines = (folder / "participants.tsv").read_text().splitlines()
+    assert [line.split("\t") for line in lines] == [
+        ["participant_id", "rater", "years"],
+        ["sub-R1", "R1", "n/a"],
+        ["sub-R2", "R2", "7"],
+    ]
+    described = json.loads((folder / "participants.json").read_text())
+    assert described["years"] == {"Description": "Years of practice", "Units": "a"}
 
 
 def test_every_column_of_ratings_is_described(rated: Study, tmp_path: Path) -> None:
