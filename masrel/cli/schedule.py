@@ -4,8 +4,8 @@ from pathlib import Path
 
 import click
 
-from masrel.protocol import StudyPaths, read_protocol
-from masrel.schedule import write_schedules
+from masrel.errors import ParameterError
+from masrel.protocol import Protocol, StudyPaths, read_protocol
 
 
 @click.command("schedule")
@@ -15,7 +15,17 @@ from masrel.schedule import write_schedules
     is_flag=True,
     help="Draw schedules anew that no longer fit the protocol.",
 )
-def schedule(study: Path, redraw: bool) -> None:
+@click.option("--site", help="Of the raters of this site alone.")
+@click.option(
+    "--copy-to",
+    "destination",
+    type=click.Path(path_type=Path),
+    help="With --site: draw nothing, but make this folder a copy of the study for the "
+    "site, with the site's secret alone.",
+)
+def schedule(
+    study: Path, redraw: bool, site: str | None, destination: Path | None
+) -> None:
     """Draw each rater's schedule and blinded sheet for every session of STUDY.
 
     Schedules are drawn once: those that are there stay as they are. When the
@@ -24,8 +34,36 @@ def schedule(study: Path, redraw: bool) -> None:
     """
     paths = StudyPaths(study)
     protocol = read_protocol(paths.protocol)
-    written = set(write_schedules(protocol, paths, redraw=redraw))
-    places = [(rater, s.id) for s in protocol.sessions for rater in s.raters]
+    if destination is not None:
+        _copy(paths, protocol, site, destination)
+    else:
+        _draw(paths, protocol, site, redraw=redraw)
+
+
+def _copy(
+    study: StudyPaths, protocol: Protocol, site: str | None, destination: Path
+) -> None:
+    from masrel.schedule import copy_for_site
+
+    if site is None:
+        raise ParameterError("--copy-to: needs --site, got it alone")
+    copy_for_site(protocol, study, site, destination)
+    click.echo(f"{destination}: a copy of the study with the secret of {site} alone.")
+
+
+def _draw(
+    paths: StudyPaths, protocol: Protocol, site: str | None, *, redraw: bool
+) -> None:
+    from masrel.conduct import allot_schedules
+    from masrel.schedule._sites import site_of
+
+    written = set(allot_schedules(paths, protocol, site=site, redraw=redraw))
+    places = [
+        (rater, session.id)
+        for session in protocol.sessions
+        for rater in session.raters
+        if site in (None, site_of(protocol, rater))
+    ]
     n_new = sum(paths.schedule_file(*place) in written for place in places)
     click.echo(
         f"{paths.schedules}: {n_new} drawn, {len(places) - n_new} kept. Give raters "

@@ -4,6 +4,7 @@ In: a protocol and drawn schedules. Out: ``conduct.jsonl``, an append-only log o
 study.
 """
 
+from masrel.conduct._allotment import allot_schedules
 from masrel.conduct._exclusion import (
     excluded_raters,
     record_exclusion,
@@ -16,6 +17,7 @@ from masrel.conduct._unblinding import record_unblinding
 from masrel.conduct._withdrawal import record_withdrawal
 
 __all__ = [
+    "allot_schedules",
     "excluded_raters",
     "rater_values",
     "read_conduct",

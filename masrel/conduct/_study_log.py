@@ -3,7 +3,8 @@
 ``conduct.jsonl`` is a chain of events as a session log is one.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from datetime import datetime
 from heapq import merge
 from itertools import accumulate
@@ -48,6 +49,7 @@ _EVENTS = {
         "outcome",
     ),
     "merged": ("name", "log", "n_lines", "sha256", "protocol_sha256"),
+    "allotted": ("rater", "session", "site", "scheme", "row"),
     "recovered": ("line", "n_bytes", "sha256", "kept", "moved_to"),
 }
 """Every kind of event with the fields it has."""
@@ -106,6 +108,15 @@ def append_event(
     now: Callable[[], datetime] = utc_now,
 ) -> None:
     """Append an event to the log of a study; the first one comes after a head."""
+    with open_conduct(study, protocol, now=now) as log:
+        log.append(kind, fields)
+
+
+@contextmanager
+def open_conduct(
+    study: StudyPaths, protocol: Protocol, *, now: Callable[[], datetime] = utc_now
+) -> Iterator[SessionLog]:
+    """Give the log of a study, verified and with its head, to append events to."""
     with SessionLog.open(study.conduct_file, now=now) as log:
         _checked(log.path, log.events)
         if not any(event.kind == "conduct" for event in log.events):
@@ -115,7 +126,7 @@ def append_event(
                 "masrel_version": masrel.__version__,
             }
             log.append("conduct", head)
-        log.append(kind, fields)
+        yield log
 
 
 def stated(**texts: str) -> dict[str, str]:

@@ -11,6 +11,7 @@ from masrel._input import listed
 from masrel.protocol._decode import got, needed, with_id
 from masrel.protocol._kinds import DEFAULT_KIND, kind_problem, value_problems
 from masrel.protocol._occasions import occasion_rules
+from masrel.protocol._order_rules import order_rules
 from masrel.protocol._questions import question_rules
 from masrel.protocol._rater_fields import rater_field_rules
 from masrel.protocol.definition import Model, PresentationRules
@@ -41,6 +42,7 @@ def broken_rules(values: Values) -> Iterator[str]:
         _references(values),
         rater_field_rules(values),
         _schedules(values),
+        order_rules(values),
         _device(values),
         _presentation(values),
         _training(values),

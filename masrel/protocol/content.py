@@ -148,6 +148,12 @@ _LATER: dict[str, dict[str, object]] = {
         "residual_reading": "residual",
         "rest_angle_deg": None,
     },
+    "schedule": {
+        "blocks_by": "repeat",
+        "standards_apart": False,
+        "max_same_grade": None,
+        "strata": "none",
+    },
     "stretch": {"largest_speed_deg_s": 131.0},
     "presentation": {
         "stretches": 1,
@@ -219,7 +225,7 @@ _ABSENT: dict[str, object] = {
 """Keys of models that do not enter where they are these."""
 
 
-_LATER_OF_RATERS: dict[str, object] = {"fields": {}}
+_LATER_OF_RATERS: dict[str, object] = {"fields": {}, "site": None}
 """The same of every rater."""
 
 

@@ -101,6 +101,7 @@ class Rater(_Table, frozen=True, kw_only=True):
 
     id: _Identifier
     note: str = ""
+    site: _Identifier | None = None
     fields: dict[str, object] = {}  # noqa: RUF012 - msgspec makes each its own
 
 
@@ -134,8 +135,19 @@ class ScheduleScheme(_Table, frozen=True, kw_only=True):
     """``[schedule]``: how the order of presentations is drawn."""
 
     seed: Annotated[int, Meta(ge=0, le=2**63 - 1)]
-    scheme: Literal["random-order"] = "random-order"
+    scheme: Literal[
+        "random-order",
+        "williams",
+        "latin-square",
+        "blocks",
+        "no-immediate-repeat",
+        "restricted",
+    ] = "random-order"
     repeats: Annotated[int, Meta(ge=1, le=20)] = 1
+    blocks_by: Literal["repeat", "role"] = "repeat"
+    standards_apart: bool = False
+    max_same_grade: Annotated[int, Meta(ge=1)] | None = None
+    strata: Literal["none", "site"] = "none"
 
 
 class Stretch(_Table, frozen=True, kw_only=True):

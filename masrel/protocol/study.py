@@ -183,17 +183,22 @@ def copy_template(name: str, destination: Path) -> None:
     if name not in template_names():
         known = ", ".join(template_names())
         raise ParameterError(f"study: needed one of {known}, got {name!r}")
-    if destination.exists() and not destination.is_dir():
-        raise ParameterError(f"{destination}: needed a new or empty folder, got a file")
     # Contents only: an installed file may be read-only, a study is edited.
     sources = {destination / part: _home() / name / part for part in _BUNDLED}
     contents = {to: of.read_bytes() for to, of in sources.items() if of.is_file()}
+    _check_new_folder(destination, contents)
+    write_files(contents, within=destination)
+
+
+def _check_new_folder(destination: Path, contents: Mapping[Path, bytes]) -> None:
+    """Refuse a folder that holds anything beside what a killed copy has left."""
+    if destination.exists() and not destination.is_dir():
+        raise ParameterError(f"{destination}: needed a new or empty folder, got a file")
     if held := _foreign_names(destination, contents):
         raise ParameterError(
             f"{destination}: needed a new or empty folder, got one that holds {held[0]}"
             + (f" and {len(held) - 1} more" if len(held) > 1 else "")
         )
-    write_files(contents, within=destination)
 
 
 def _foreign_names(folder: Path, contents: Mapping[Path, bytes]) -> list[str]:

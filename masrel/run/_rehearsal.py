@@ -8,8 +8,9 @@ from pathlib import Path
 import msgspec
 
 from masrel.protocol import Protocol, StudyPaths
-from masrel.schedule import Schedule, draw_schedule
-from masrel.schedule._secret import find_secret, new_secret
+from masrel.schedule import Schedule
+from masrel.schedule._secret import StudySecret, find_secret, new_secret
+from masrel.schedule.presentation import _draw_with_key
 
 _COMPLETE = b'{"event": "complete"'  # how the last line of a finished log begins
 
@@ -59,7 +60,7 @@ def _is_over(log: Path, checksum: str) -> bool:
 
 
 def _draw(
-    protocol: Protocol, rater: str, session: str, number: int, secret: bytes
+    protocol: Protocol, rater: str, session: str, number: int, secret: StudySecret
 ) -> Schedule:
     name = json.dumps([protocol.schedule.seed, "rehearsal", number])
     seed = int.from_bytes(hashlib.sha256(name.encode()).digest()[:8], "big") >> 1
@@ -67,4 +68,4 @@ def _draw(
         protocol.schedule, seed=seed, scheme="random-order"
     )
     of_rehearsal = msgspec.structs.replace(protocol, schedule=scheme)
-    return draw_schedule(of_rehearsal, rater, session, secret=secret)
+    return _draw_with_key(of_rehearsal, rater, session, key=secret, row=None)

@@ -1,27 +1,20 @@
 """The schedule of one rater in one session: what it is, drawing it, checking it."""
 
-import hashlib
-import hmac
-import json
 from collections import Counter
-from collections.abc import MutableSequence
 from dataclasses import dataclass
-from typing import TypeVar
-
-from numpy.random import PCG64
 
 import masrel
 from masrel.errors import ScheduleError
 from masrel.protocol import Protocol, presented_hash, protocol_hash
-from masrel.schedule._secret import check_secret, commitment_of
+from masrel.schedule._designs import WITH_ROWS
+from masrel.schedule._orders import draw_order
+from masrel.schedule._secret import StudySecret, check_secret
+from masrel.schedule._sites import site_of
+from masrel.schedule._stream import Stream
 
 # No letter that reads as a digit (I, O, Q, S, Z), that makes a number of the code
 # (E), or that says left or right (L, R).
 _CODE_LETTERS = "ABCDFGHJKMNPTUVWXY"
-
-_T = TypeVar("_T")
-
-_N_WORDS = 2**64
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,6 +63,10 @@ class Schedule:
     commitment : str or None
         Hash of the secret that decided order and codes: when the secret is published,
         it shows that no other was used. None when the seed alone decided.
+    site : str or None
+        The rater's site, where sites are strata.
+    row : int or None
+        Which row of a design the rater has, from 1; None where orders have no rows.
     """
 
     study: str
@@ -82,6 +79,8 @@ class Schedule:
     masrel_version: str
     presentations: tuple[Presentation, ...]
     commitment: str | None = None
+    site: str | None = None
+    row: int | None = None
 
 
 def draw_schedule(
@@ -104,48 +103,55 @@ def draw_schedule(
         16 random bytes that decide the draw together with the seed. Without them the
         seed alone does, and who knows it knows every order.
     row : int, optional
-        Row of a design whose orders have rows; ``random-order`` has none.
+        Row of a design, from 1; schemes ``williams`` and ``latin-square`` need one,
+        the others have none. :func:`masrel.conduct.allot_schedules` allots them.
 
     Returns
     -------
     Schedule
-        Every model as often as the protocol repeats it, in random order.
+        Every model as often as the protocol repeats it, in an order of its scheme.
 
     Raises
     ------
     ScheduleError
         If the session is not the protocol's or does not have the rater, the secret
-        has another length, or the scheme has no rows and one is named.
+        has another length, a row is missing or named where there are none, or no order
+        keeps the limits of the scheme.
 
     Notes
     -----
     Order and codes come from two streams for each session and rater alone, so
     adding a rater, a session or a repeat of another study moves nobody else's
-    schedule. With a secret nobody can tell one stream from the other without it: all
+    schedule; rows come from streams of the session, and of the site where sites are
+    strata. With a secret nobody can tell one stream from the other without it: all
     codes of a study say nothing about its orders.
     """
-    _require_place(protocol, rater, session)
     if secret is not None:
         check_secret(secret)
-    if row is not None:
-        raise ScheduleError(
-            f"row: needed none, scheme {protocol.schedule.scheme} has no rows, "
-            f"got {row}"
-        )
-    seed, repeats = protocol.schedule.seed, protocol.schedule.repeats
-    shown = [
-        (model.id, repeat)
-        for repeat in range(1, repeats + 1)
-        for model in protocol.models
-    ]
-    _Stream(seed, "schedule", session, rater, secret=secret).shuffle(shown)
-    stream = _Stream(seed, "codes", session, rater, secret=secret)
+    key = None if secret is None else StudySecret.of_study(secret)
+    return _draw_with_key(protocol, rater, session, key=key, row=row)
+
+
+def _draw_with_key(
+    protocol: Protocol,
+    rater: str,
+    session: str,
+    *,
+    key: StudySecret | None,
+    row: int | None,
+) -> Schedule:
+    """Draw the order and the codes of one rater from the secret of study or site."""
+    _require_place(protocol, rater, session)
+    site = site_of(protocol, rater)
+    secret = None if key is None else key.of(site)
+    shown = draw_order(protocol, rater, session, site=site, row=row, secret=secret)
+    stream = Stream(protocol.schedule.seed, "codes", session, rater, secret=secret)
     codes = _draw_codes(protocol, len(shown), stream)
     return Schedule(
         study=protocol.study.id,
         rater=rater,
         session=session,
-        seed=seed,
+        seed=protocol.schedule.seed,
         scheme=protocol.schedule.scheme,
         protocol_sha256=protocol_hash(protocol),
         presented_sha256=presented_hash(protocol),
@@ -156,11 +162,13 @@ def draw_schedule(
                 zip(codes, shown, strict=True), start=1
             )
         ),
-        commitment=None if secret is None else commitment_of(secret),
+        commitment=None if key is None else key.commitment,
+        site=site,
+        row=row,
     )
 
 
-def _draw_codes(protocol: Protocol, n_codes: int, stream: "_Stream") -> list[str]:
+def _draw_codes(protocol: Protocol, n_codes: int, stream: Stream) -> list[str]:
     # Two digits and a letter, such as 47K: 1800 codes, of which at most 500 are
     # needed and 500 are some model's id, so that the draw always ends.
     taken = {model.id.upper() for model in protocol.models}
@@ -190,8 +198,9 @@ def check_schedule(schedule: Schedule, protocol: Protocol) -> None:
     ------
     ScheduleError
         If study, rater or session are not the protocol's, what is presented has
-        changed since the draw, or the rows do not hold every model as often as the
-        protocol repeats it.
+        changed since the draw, the site is not that of the rater, a row is missing,
+        or the presentations do not have every model as often as the protocol
+        repeats it.
 
     Notes
     -----
@@ -209,6 +218,15 @@ def check_schedule(schedule: Schedule, protocol: Protocol) -> None:
         raise ScheduleError(
             f"{where}: needed one drawn from the protocol as it is, got one from "
             "before a change in what it presents; masrel check names the keys"
+        )
+    if schedule.site != (site := site_of(protocol, schedule.rater)):
+        raise ScheduleError(
+            f"{where}: needed one drawn for site {site}, got one for {schedule.site}"
+        )
+    if (schedule.row is None) == (schedule.scheme in WITH_ROWS):
+        raise ScheduleError(
+            f"{where}: needed {'a' if schedule.row is None else 'no'} row with scheme "
+            f"{schedule.scheme}, got {'none' if schedule.row is None else schedule.row}"
         )
     expected = Counter(
         (model.id, repeat)
@@ -237,54 +255,3 @@ def _require_place(protocol: Protocol, rater: str, session: str) -> None:
             f"rater: needed one of {', '.join(raters[session])} for session "
             f"{session}, got {rater!r}"
         )
-
-
-class _Stream:
-    """Random words for one purpose, whatever else is drawn from the same seed."""
-
-    # NumPy keeps the raw words of a bit generator the same for ever, but not what its
-    # Generator methods make of them: words are taken raw, and numbers made here.
-    #
-    # The SHA-256 of the JSON array ``["masrel", seed, *purpose]`` (UTF-8, no spaces,
-    # non-ASCII escaped) is the whole state of the generator: its first 16 bytes, big
-    # endian, are PCG64's state, the other 16 its increment, made odd. With a secret it
-    # is the HMAC-SHA256 of that array, whose key is the secret: who has the words of
-    # some streams learns neither the secret nor any other stream.
-
-    def __init__(self, seed: int, *purpose: str, secret: bytes | None = None) -> None:
-        name = json.dumps(["masrel", seed, *purpose], separators=(",", ":")).encode()
-        if secret is None:
-            digest = hashlib.sha256(name).digest()
-        else:
-            digest = hmac.digest(secret, name, "sha256")
-        self._generator = PCG64(0)
-        self._generator.state = {
-            "bit_generator": "PCG64",
-            "state": {
-                "state": int.from_bytes(digest[:16], "big"),
-                "inc": int.from_bytes(digest[16:], "big") | 1,
-            },
-            "has_uint32": 0,
-            "uinteger": 0,
-        }
-
-    def word(self) -> int:
-        """Return the next word, uniform on 0 to 2**64 - 1."""
-        return int(self._generator.random_raw())
-
-    def below(self, limit: int) -> int:
-        """Return a number uniform on 0 to `limit` - 1; `limit` from 1 to 2**64."""
-        # Words at and above the last multiple of `limit` are rejected, so that every
-        # number has exactly the same chance.
-        usable = _N_WORDS - _N_WORDS % limit
-        while (word := self.word()) >= usable:
-            pass
-        return word % limit
-
-    def shuffle(self, items: MutableSequence[_T]) -> None:
-        """Put `items` into a random order in place, each order equally likely."""
-        # Fisher and Yates, from the last place down: place i takes the item of a place
-        # drawn from 0 to i.
-        for i in range(len(items) - 1, 0, -1):
-            j = self.below(i + 1)
-            items[i], items[j] = items[j], items[i]

@@ -3,7 +3,7 @@
 import os
 import re
 import shlex
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,12 +17,14 @@ from masrel.protocol import (
     presented_hash,
 )
 from masrel.schedule._changes import content_file, stale_sentences
-from masrel.schedule._secret import commitment_of, find_secret, new_secret
+from masrel.schedule._designs import WITH_ROWS
+from masrel.schedule._secret import StudySecret, find_secret, new_secret
+from masrel.schedule._sites import checked_site, site_of
 from masrel.schedule.presentation import (
     Presentation,
     Schedule,
+    _draw_with_key,
     check_schedule,
-    draw_schedule,
 )
 
 _HEAD = {
@@ -35,11 +37,13 @@ _HEAD = {
     "presented_sha256": r"[0-9a-f]{64}",
     "masrel_version": r"\S+",
     "commitment": r"[0-9a-f]{64}",
+    "site": r"\S+",
+    "row": r"[1-9][0-9]{0,8}",
 }
 """Keys of the ``# key: value`` lines, in order, and what their values look like."""
 
-_OPTIONAL = ("commitment",)
-"""Those that a schedule drawn without a secret does not have."""
+_OPTIONAL = ("commitment", "site", "row")
+"""Those that a schedule without a secret, without strata, or without rows has not."""
 
 _COLUMNS = ["position", "code", "model", "repeat"]
 _SHEET_COLUMNS = ["position", "code", "grade"]
@@ -96,6 +100,8 @@ def read_schedule(path: Path) -> Schedule:
         presented_sha256=head["presented_sha256"],
         masrel_version=head["masrel_version"],
         commitment=head.get("commitment"),
+        site=head.get("site"),
+        row=int(head["row"]) if "row" in head else None,
         presentations=tuple(rows),
     )
 
@@ -176,8 +182,17 @@ def _row_problem(row: Sequence[str], place: int, seen: set[str]) -> str | None:
     return None
 
 
+_Places = Sequence[tuple[str, str]]
+"""Raters, each with a session."""
+
+
 def write_schedules(
-    protocol: Protocol, study: StudyPaths, *, redraw: bool = False
+    protocol: Protocol,
+    study: StudyPaths,
+    *,
+    redraw: bool = False,
+    site: str | None = None,
+    allot: Callable[[_Places], Mapping[tuple[str, str], int]] | None = None,
 ) -> tuple[Path, ...]:
     """Draw every schedule that is not there yet, with its blinded sheet.
 
@@ -195,6 +210,12 @@ def write_schedules(
     redraw : bool
         Draw stale or damaged schedules anew. Schedules that still fit stay as they
         are, byte for byte, with or without it.
+    site : str, optional
+        Of the raters of this site alone; sites must be strata.
+    allot : callable, optional
+        Takes the raters and sessions whose schedules are about to be drawn, and
+        returns their rows; for schemes with rows. It is called when nothing stands
+        against the draw. :func:`masrel.conduct.allot_schedules` allots by the log.
 
     Returns
     -------
@@ -206,12 +227,12 @@ def write_schedules(
     ScheduleError
         If a schedule is stale or damaged and `redraw` is false; or a schedule that
         has to be drawn belongs to a session that has begun (it has a log, or
-        grades on its sheet); or the file of the secret is damaged. Nothing is
-        written then.
+        grades on its sheet); or the file of the secret is damaged, or has the secret
+        of another site; or there is no such site. Nothing is written then.
     OSError
         If the system refuses a folder or file.
     """
-    every = _every_schedule(protocol, study)
+    every = _every_schedule(protocol, study, checked_site(protocol, site))
     problems: list[str] = []
     texts: dict[Path, str | bytes] = {}
     to_draw: list[_ScheduleFiles] = []
@@ -236,18 +257,40 @@ def write_schedules(
     if problems:
         raise ScheduleError("\n".join(problems))
     if to_draw:
-        drawn_from = content_file(study, presented_hash(protocol))
-        if not drawn_from.exists():
-            texts[drawn_from] = presented_content(protocol)
-        secret = find_secret(study) or new_secret(study)
-        for files in to_draw:
-            drawn = draw_schedule(protocol, files.rater, files.session, secret=secret)
-            # The sheet gets its name first: one without its schedule is drawn anew.
-            texts[files.sheet] = _sheet_text(drawn)
-            texts[files.schedule] = _schedule_text(drawn)
+        texts |= _drawn_texts(protocol, study, to_draw, allot)
     make_folder(study.schedules, mode=0o700)
     write_files(texts, within=study.root)
     return tuple(texts)
+
+
+def _drawn_texts(
+    protocol: Protocol,
+    study: StudyPaths,
+    to_draw: Sequence[_ScheduleFiles],
+    allot: Callable[[_Places], Mapping[tuple[str, str], int]] | None,
+) -> dict[Path, str | bytes]:
+    if protocol.schedule.scheme in WITH_ROWS and allot is None:
+        raise ScheduleError(
+            f"allot: needed with scheme {protocol.schedule.scheme}, whose rows are "
+            "allotted by the study's log (masrel.conduct.allot_schedules), got none"
+        )
+    key = find_secret(study)
+    if key is not None:
+        for files in to_draw:  # refused before a row is allotted
+            key.of(site_of(protocol, files.rater))
+    texts: dict[Path, str | bytes] = {}
+    drawn_from = content_file(study, presented_hash(protocol))
+    if not drawn_from.exists():
+        texts[drawn_from] = presented_content(protocol)
+    rows = {} if allot is None else allot([(f.rater, f.session) for f in to_draw])
+    key = key or new_secret(study)
+    for files in to_draw:
+        place = (files.rater, files.session)
+        drawn = _draw_with_key(protocol, *place, key=key, row=rows.get(place))
+        # The sheet gets its name first: one without its schedule is drawn anew.
+        texts[files.sheet] = _sheet_text(drawn)
+        texts[files.schedule] = _schedule_text(drawn)
+    return texts
 
 
 def schedule_problems(protocol: Protocol, study: StudyPaths) -> tuple[str, ...]:
@@ -318,14 +361,17 @@ def concealment_notes(protocol: Protocol, study: StudyPaths) -> tuple[str, ...]:
         schedules of another secret, and folders that others may read.
     """
     secret = find_secret(study)
-    commitments = [
-        read_schedule(files.schedule).commitment
+    schedules = [
+        read_schedule(files.schedule)
         for files in _every_schedule(protocol, study)
         if files.schedule.exists() and _fault(files, protocol) is None
     ]
-    from_seed = commitments.count(None)
-    same = None if secret is None else commitment_of(secret)
-    of_others = sum(c is not None and c != same for c in commitments)
+    from_seed = sum(each.commitment is None for each in schedules)
+    of_others = sum(
+        each.commitment is not None
+        and (secret is None or not secret.draws(each.site, each.commitment))
+        for each in schedules
+    )
     notes = []
     if study.published_secret_file.is_file():
         notes.append(
@@ -334,12 +380,12 @@ def concealment_notes(protocol: Protocol, study: StudyPaths) -> tuple[str, ...]:
         )
     if from_seed:
         notes.append(
-            f"{study.schedules}: {from_seed} of {len(commitments)} schedules were "
+            f"{study.schedules}: {from_seed} of {len(schedules)} schedules were "
             "drawn from the protocol's seed alone: a sheet gives their order away"
         )
     if of_others:
         notes.append(
-            f"{study.schedules}: {of_others} of {len(commitments)} schedules are of a "
+            f"{study.schedules}: {of_others} of {len(schedules)} schedules are of a "
             "secret that is not in the study: they stay good, and cannot be drawn "
             "again for comparison"
         )
@@ -357,7 +403,9 @@ def _open_folders(study: StudyPaths) -> Iterator[str]:
             )
 
 
-def _every_schedule(protocol: Protocol, study: StudyPaths) -> list[_ScheduleFiles]:
+def _every_schedule(
+    protocol: Protocol, study: StudyPaths, site: str | None = None
+) -> list[_ScheduleFiles]:
     return [
         _ScheduleFiles(
             rater=rater,
@@ -368,6 +416,7 @@ def _every_schedule(protocol: Protocol, study: StudyPaths) -> list[_ScheduleFile
         )
         for session in protocol.sessions
         for rater in session.raters
+        if site in (None, site_of(protocol, rater))
     ]
 
 
@@ -448,12 +497,17 @@ def _sheet_fault(files: _ScheduleFiles, schedule: Schedule) -> str | None:
 
 
 def _draw_fault(
-    files: _ScheduleFiles, schedule: Schedule, protocol: Protocol, secret: bytes | None
+    files: _ScheduleFiles,
+    schedule: Schedule,
+    protocol: Protocol,
+    secret: StudySecret | None,
 ) -> str | None:
     # Whether the study's secret draws another order or other codes than are there.
-    if secret is None or schedule.commitment != commitment_of(secret):
+    if secret is None or not secret.draws(schedule.site, schedule.commitment):
         return None
-    drawn = draw_schedule(protocol, files.rater, files.session, secret=secret)
+    drawn = _draw_with_key(
+        protocol, files.rater, files.session, key=secret, row=schedule.row
+    )
     if drawn.presentations == schedule.presentations:
         return None
     return (

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 from masrel.protocol import Protocol
 from masrel.run._grade_sources import MAX_FAULTS, GradeRequest
-from masrel.schedule.presentation import _Stream
+from masrel.schedule._stream import Stream
 from masrel.training._trainees import confusion
 
 # Noise of perception in grades: at first, in the end, and in how many presentations
@@ -61,7 +61,7 @@ class SimulatedTrainee:
         n_grades = len(self._grades)
         table = confusion("noise", noise, n_grades, tuple(self._intended.values()))
         purpose = "trainee", request.rater, str(shown.position)
-        share = _Stream(self._seed, *purpose).word() / _N_WORDS
+        share = Stream(self._seed, *purpose).word() / _N_WORDS
         row = table[self._intended[shown.model]].cumsum()
         return self._grades[min(int((share >= row).sum()), n_grades - 1)]
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from masrel.schedule.presentation import _Stream
+from masrel.schedule._stream import Stream
 from masrel.training._lessons import Lesson
 from masrel.training._trainees import BLOCK_SETS
 
@@ -21,17 +21,17 @@ def next_model(
     models = list(intended)
     if order == "blocked":
         block, place = divmod(len(lessons), BLOCK_SETS * len(models))
-        return _block(models, _Stream(seed, "training", rater, str(block)))[place]
+        return _block(models, Stream(seed, "training", rater, str(block)))[place]
     last = {one.model: one.grade for one in lessons}
     wrong = [
         model for model in models if last.get(model, intended[model]) != intended[model]
     ]
     tickets = [*models, *wrong]  # what was misgraded the last time, twice
-    stream = _Stream(seed, "training", rater, str(len(lessons)))
+    stream = Stream(seed, "training", rater, str(len(lessons)))
     return tickets[stream.below(len(tickets))]
 
 
-def _block(models: Sequence[str], stream: _Stream) -> list[str]:
+def _block(models: Sequence[str], stream: Stream) -> list[str]:
     # Only that each comes at all is certain: who counts knows next to nothing.
     while True:
         block = [

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from masrel.conduct import read_conduct
+from masrel.conduct._allotment import allotment_problems
 from masrel.errors import ProtocolError, ScheduleError, SessionLogError
 from masrel.protocol import Protocol, StudyPaths, read_protocol
 from masrel.schedule import read_schedule, schedule_problems
@@ -127,17 +127,17 @@ def verify_sessions(study: StudyPaths, protocol: Protocol) -> Verification:
             *_unnamed(study.sessions, checked, "rater in a session"),
             *(finding for of_rater in trained for finding in of_rater.findings),
             *_unnamed(study.training, trained, "rater"),
-            *_conduct_findings(study),
+            *_conduct_findings(study, protocol),
         ),
     )
 
 
-def _conduct_findings(study: StudyPaths) -> tuple[Finding, ...]:
+def _conduct_findings(study: StudyPaths, protocol: Protocol) -> tuple[Finding, ...]:
     try:
-        read_conduct(study)
+        problems = allotment_problems(study, protocol)
     except SessionLogError as error:
-        return _of_problems(study.conduct_file, (str(error),))
-    return ()
+        problems = (str(error),)
+    return _of_problems(study.conduct_file, problems)
 
 
 def _of_problems(path: Path, problems: Iterable[str]) -> tuple[Finding, ...]:

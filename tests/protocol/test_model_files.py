@@ -178,6 +178,12 @@ def test_a_protocol_without_files_has_the_hash_it_had_before_there_were_any() ->
         for key in ("after", "at_least_days", "at_most_days"):
             assert session.pop(key) is None
         assert session.pop("order_policy") == "refuse"
+    for rater in content["raters"]:
+        assert rater.pop("site") is None
+    assert content["schedule"].pop("blocks_by") == "repeat"
+    assert content["schedule"].pop("standards_apart") is False
+    assert content["schedule"].pop("max_same_grade") is None
+    assert content["schedule"].pop("strata") == "none"
     assert content.pop("training")["order"] == "blocked"
     assert content["simulated_raters"].pop("hold_s") == 0.0
     assert content["simulated_raters"].pop("hand") == "clamp"

@@ -1,5 +1,7 @@
 """Protocols to draw from, made without a file."""
 
+from typing import Any
+
 from masrel.protocol import (
     Model,
     Protocol,
@@ -31,15 +33,22 @@ def protocol_of(
     title: str = "A study",
     study: str = "tiny",
     sessions: tuple[str, ...] = ("test",),
+    dummies: tuple[str, ...] = (),
+    grades: dict[str, str] | None = None,
+    sites: dict[str, str] | None = None,
+    **rules: Any,
 ) -> Protocol:
     """A protocol in which every rater is in every session."""
+    # dummies: those of the models; grades, sites: by model and by rater; rules: further
+    # keys of [schedule]
     return Protocol(
         study=Study(id=study, title=title),
         scale=ScaleDefinition(name="MAS", grades=("1", "1+", "2", "3")),
         models=tuple(
             Model(
                 id=name,
-                intended_grade="1+",
+                role="dummy" if name in dummies else "standard",
+                intended_grade="1+" if grades is None else grades.get(name),
                 catch_angle_constant_deg=120.0,
                 catch_torque_nms_rad=2.0,
                 residual_ratio=0.3,
@@ -47,7 +56,7 @@ def protocol_of(
             )
             for name in models
         ),
-        raters=tuple(Rater(id=name) for name in raters),
+        raters=tuple(Rater(id=name, site=(sites or {}).get(name)) for name in raters),
         sessions=tuple(Session(id=name, raters=raters) for name in sessions),
-        schedule=ScheduleScheme(seed=seed, repeats=repeats),
+        schedule=ScheduleScheme(seed=seed, repeats=repeats, **rules),
     )

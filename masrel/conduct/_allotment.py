@@ -1,0 +1,167 @@
+"""Rows of designs, allotted to raters in the order in which the study's log has them.
+
+Nobody asks for a row: whoever comes next gets the next one that no event has, in the
+session and at the site; a row that was allotted once stays that rater's.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from masrel._event_log import Event, utc_now
+from masrel.conduct._study_log import all_events, open_conduct
+from masrel.errors import ScheduleError
+from masrel.protocol import Protocol, StudyPaths
+from masrel.schedule import Schedule, read_schedule, write_schedules
+from masrel.schedule._designs import WITH_ROWS
+from masrel.schedule._sites import site_of
+
+if TYPE_CHECKING:
+    from masrel.recording import _Fact  # loads numpy
+
+_Occasion = tuple[str, str]  # rater, session
+
+
+def allot_schedules(
+    study: StudyPaths,
+    protocol: Protocol,
+    *,
+    site: str | None = None,
+    redraw: bool = False,
+    now: Callable[[], datetime] = utc_now,
+) -> tuple[Path, ...]:
+    """Draw every schedule that is not there yet, its row allotted by the study's log.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is.
+    protocol : Protocol
+        The study's protocol. Where its scheme has no rows, nothing is logged.
+    site : str, optional
+        Of the raters of this site alone; sites must be strata.
+    redraw : bool
+        Draw stale or damaged schedules anew; a rater's row stays the same.
+    now : callable, optional
+        Gives the time of day, aware.
+
+    Returns
+    -------
+    tuple of Path
+        The files written; empty when all were there.
+
+    Raises
+    ------
+    ScheduleError
+        As :func:`masrel.schedule.write_schedules` does; no row is allotted then.
+    SessionLogError
+        If the log of the study's conduct is damaged.
+    OSError
+        If the system refuses a folder or file.
+    """
+
+    def allot(places: Sequence[_Occasion]) -> dict[_Occasion, int]:
+        return _allot(study, protocol, places, now)
+
+    has_rows = protocol.schedule.scheme in WITH_ROWS
+    return write_schedules(
+        protocol, study, redraw=redraw, site=site, allot=allot if has_rows else None
+    )
+
+
+def _allot(
+    study: StudyPaths,
+    protocol: Protocol,
+    places: Sequence[_Occasion],
+    now: Callable[[], datetime],
+) -> dict[_Occasion, int]:
+    """Return the rows of raters in sessions; those without one get the next."""
+    scheme = protocol.schedule.scheme
+    with open_conduct(study, protocol, now=now) as log:  # nobody else allots meanwhile
+        rows = _Rows(all_events(study))
+        allotted = {}
+        for rater, session in places:
+            design = (session, site_of(protocol, rater), scheme)
+            row = rows.of_rater.get((rater, *design))
+            if row is None:
+                row = rows.n_allotted(design) + 1
+                fields: dict[str, _Fact] = {
+                    "rater": rater,
+                    "session": session,
+                    "site": design[1],
+                    "scheme": scheme,
+                    "row": row,
+                }
+                rows.add(log.append("allotted", fields))
+            allotted[rater, session] = row
+    return allotted
+
+
+_Design = tuple[str, str | None, str]  # session, site, scheme
+
+
+class _Rows:
+    """The rows that events of a log allotted."""
+
+    def __init__(self, events: Sequence[Event]) -> None:
+        self.of_rater: dict[tuple[str, str, str | None, str], int] = {}
+        self._n: dict[_Design, int] = {}
+        self.problems: list[str] = []
+        for event in events:
+            if event.kind == "allotted":
+                self.add(event)
+
+    def n_allotted(self, design: _Design) -> int:
+        """Return how many rows of a design were allotted."""
+        return self._n.get(design, 0)
+
+    def add(self, event: Event) -> None:
+        """Take in an event, and note what is wrong with it."""
+        fields = event.fields
+        rater, site = str(fields["rater"]), fields["site"]
+        design = (
+            str(fields["session"]),
+            None if site is None else str(site),
+            str(fields["scheme"]),
+        )
+        row = self._n[design] = self.n_allotted(design) + 1
+        where = f"line {event.line}: allotted: rater {rater} in session {design[0]}"
+        if fields["row"] != row:
+            self.problems.append(
+                f"{where}: needed row {row}, the next one, got {fields['row']}"
+            )
+        if (rater, *design) in self.of_rater:
+            self.problems.append(
+                f"{where}: needed a rater without a row, got one with row "
+                f"{self.of_rater[rater, *design]}"
+            )
+            return
+        self.of_rater[rater, *design] = row
+
+
+def allotment_problems(study: StudyPaths, protocol: Protocol) -> tuple[str, ...]:
+    """Return where allotted rows, or rows of schedules, are not those of the log."""
+    rows = _Rows(all_events(study))
+    problems = [f"{study.conduct_file}: {problem}" for problem in rows.problems]
+    for schedule, path in _drawn(study, protocol):
+        design = (schedule.session, schedule.site, schedule.scheme)
+        row = rows.of_rater.get((schedule.rater, *design))
+        if schedule.row != row and schedule.scheme in WITH_ROWS:
+            needed = "a row that was allotted" if row is None else f"row {row}"
+            problems.append(
+                f"{path}: needed {needed}, by {study.conduct_file}, got row "
+                f"{schedule.row}"
+            )
+    return tuple(problems)
+
+
+def _drawn(study: StudyPaths, protocol: Protocol) -> Iterator[tuple[Schedule, Path]]:
+    for session in protocol.sessions:
+        for rater in session.raters:
+            path = study.schedule_file(rater, session.id)
+            if path.exists():
+                try:
+                    yield read_schedule(path), path
+                except ScheduleError:
+                    continue  # one of `schedule_problems`

@@ -1,0 +1,175 @@
+"""The order in which one rater meets the models, by the protocol's scheme."""
+
+from collections import Counter
+from collections.abc import Sequence
+from math import comb
+
+from masrel.errors import ScheduleError
+from masrel.protocol import Model, Protocol
+from masrel.schedule._admissible import (
+    FREE,
+    LimitedRuns,
+    arrangement,
+    n_arrangements,
+    subset,
+)
+from masrel.schedule._designs import WITH_ROWS, design_order
+from masrel.schedule._stream import Stream
+
+
+def draw_order(
+    protocol: Protocol,
+    rater: str,
+    session: str,
+    *,
+    site: str | None,
+    row: int | None,
+    secret: bytes | None,
+) -> list[tuple[str, int]]:
+    """Return model and repeat of each presentation of one rater, in order."""
+    rules = protocol.schedule
+    _check_row(rules.scheme, row)
+    models = [model.id for model in protocol.models]
+    stream = Stream(rules.seed, "schedule", session, rater, secret=secret)
+    if rules.scheme == "random-order":  # in which repeats come in any order, too
+        shown = [(m, repeat) for repeat in range(1, rules.repeats + 1) for m in models]
+        stream.shuffle(shown)
+        return shown
+    if row is not None:
+        return _numbered(design_order(protocol, session, site, row, secret))
+    if rules.scheme == "blocks":
+        return _numbered(_in_blocks(protocol, stream))
+    n_orders = count_orders(protocol)
+    if n_orders == 0:
+        raise ScheduleError(
+            "schedule.scheme: needed one that some order of the models keeps, got "
+            f'"{rules.scheme}", which none does'
+        )
+    return _numbered(order_at(protocol, stream.below(n_orders)))
+
+
+def _numbered(order: Sequence[str]) -> list[tuple[str, int]]:
+    # repeats are numbered as they come
+    n_before: Counter[str] = Counter()
+    shown = []
+    for model in order:
+        n_before[model] += 1
+        shown.append((model, n_before[model]))
+    return shown
+
+
+def _check_row(scheme: str, row: int | None) -> None:
+    if scheme not in WITH_ROWS and row is not None:
+        raise ScheduleError(f"row: needed none, scheme {scheme} has no rows, got {row}")
+    if scheme in WITH_ROWS and (row is None or row < 1):
+        raise ScheduleError(
+            f"row: needed a row of the design, from 1, with scheme {scheme}, got "
+            f"{'none' if row is None else row}"
+        )
+
+
+def _in_blocks(protocol: Protocol, stream: Stream) -> list[str]:
+    rules = protocol.schedule
+    models = [model.id for model in protocol.models]
+    blocks = [list(models) for _ in range(rules.repeats)]
+    if rules.blocks_by == "role":
+        blocks = [
+            [model.id for model in protocol.models if model.role == role]
+            * rules.repeats
+            for role in ("standard", "dummy")
+        ]
+        stream.shuffle(blocks)
+    for block in blocks:
+        stream.shuffle(block)
+    return [model for block in blocks for model in block]
+
+
+def count_orders(protocol: Protocol) -> int:
+    """Return how many orders keep the limits of the scheme, repeats not told apart."""
+    repeats = protocol.schedule.repeats
+    if _is_apart(protocol):
+        standards, dummies = _of_roles(protocol)
+        n_gaps = len(dummies) * repeats + 1
+        return (
+            comb(n_gaps, len(standards) * repeats)
+            * n_arrangements([repeats] * len(standards))
+            * n_arrangements([repeats] * len(dummies))
+        )
+    groups, free = _groups(protocol)
+    words = _words(protocol).count()
+    for group in (*groups, free):
+        words *= n_arrangements([repeats] * len(group))
+    return words
+
+
+def order_at(protocol: Protocol, number: int) -> list[str]:
+    """Return the order of a number below that of all orders, each number another."""
+    if _is_apart(protocol):
+        return _standards_parted(protocol, number)
+    groups, free = _groups(protocol)
+    sequences = {}
+    for index, group in ((FREE, free), *enumerate(groups)):
+        number, sequence = _arranged(protocol, group, number)
+        sequences[index] = iter(sequence)
+    return [next(sequences[group]) for group in _words(protocol).word(number)]
+
+
+def _standards_parted(protocol: Protocol, number: int) -> list[str]:
+    # at most one standard before each dummy, and one after the last
+    standards, dummies = _of_roles(protocol)
+    number, of_standards = _arranged(protocol, standards, number)
+    number, of_dummies = _arranged(protocol, dummies, number)
+    gaps = subset(number, range(len(of_dummies) + 1), len(of_standards))
+    order = list(of_dummies)
+    for gap, standard in reversed(list(zip(gaps, of_standards, strict=True))):
+        order.insert(gap, standard)
+    return order
+
+
+def _arranged(
+    protocol: Protocol, models: Sequence[str], number: int
+) -> tuple[int, list[str]]:
+    # what is left of the number, and all presentations of the models in its order
+    sizes = [protocol.schedule.repeats] * len(models)
+    number, index = divmod(number, n_arrangements(sizes))
+    return number, [models[place] for place in arrangement(index, sizes)]
+
+
+def _is_apart(protocol: Protocol) -> bool:
+    # Two standards that are apart are no two of a grade, and dummies have none then.
+    rules = protocol.schedule
+    return rules.scheme == "restricted" and rules.standards_apart
+
+
+def _of_roles(protocol: Protocol) -> tuple[list[str], list[str]]:
+    standards = [model.id for model in protocol.models if model.role == "standard"]
+    dummies = [model.id for model in protocol.models if model.role == "dummy"]
+    return standards, dummies
+
+
+def _groups(protocol: Protocol) -> tuple[list[list[str]], list[str]]:
+    # models that count as the same, and those that may come any number of times
+    groups: dict[str, list[str]] = {}
+    free = []
+    for model in protocol.models:
+        name = _group(protocol, model)
+        if name is None:
+            free.append(model.id)
+        else:
+            groups.setdefault(name, []).append(model.id)
+    return list(groups.values()), free
+
+
+def _group(protocol: Protocol, model: Model) -> str | None:
+    is_by_model = protocol.schedule.scheme == "no-immediate-repeat"
+    return model.id if is_by_model else model.intended_grade
+
+
+def _words(protocol: Protocol) -> LimitedRuns:
+    rules = protocol.schedule
+    groups, free = _groups(protocol)
+    return LimitedRuns(
+        sizes=tuple(len(group) * rules.repeats for group in groups),
+        n_free=len(free) * rules.repeats,
+        longest=rules.max_same_grade or 1,
+    )
