@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from masrel.conduct import allot_schedules, read_conduct, record_withdrawal
+from masrel.conduct import allot_schedules, record_withdrawal
 from masrel.errors import ParameterError, ScheduleError, SessionLogError
 from masrel.protocol import Protocol, StudyPaths
 from masrel.schedule import (
@@ -40,7 +40,9 @@ def study(tmp_path: Path) -> StudyPaths:
 
 
 def allotted(study: StudyPaths) -> list[tuple[object, ...]]:
-    return [tuple(event.fields.values()) for event in read_conduct(study)]
+    lines = study.conduct_file.read_text(encoding="utf-8").splitlines()
+    events = [json.loads(line) for line in lines]
+    return [tuple(e["fields"].values()) for e in events if e["event"] == "allotted"]
 
 
 def broken(study: StudyPaths, protocol: Protocol) -> list[str]:
