@@ -37,6 +37,7 @@ GROUPS = {
         "train": "Teach a rater on models of known grade, until a test is passed.",
         "run": "Present a schedule's models and record every grade.",
         "sheet": "Sheets to print for raters who grade on paper.",
+        "enter": "Bring in a sheet that was filled in on paper.",
         "status": "How far a study is, and what to do next.",
         "note": "Record a note, a deviation or an adverse event.",
         "rater": "What is known of raters, and who is left out of the analysis.",

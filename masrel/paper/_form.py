@@ -5,8 +5,10 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from masrel.protocol import Protocol, Question, Questionnaire
-from masrel.schedule import Schedule
+from masrel.errors import ScheduleError
+from masrel.protocol import Protocol, Question, StudyPaths
+from masrel.run._questionnaires import When, questions_of
+from masrel.schedule import Schedule, check_schedule, read_schedule
 
 FIRST_COLUMNS = ("sheet", "position", "code", "grade")
 """Columns of every sheet that is typed in; those of questions follow."""
@@ -53,25 +55,19 @@ def form_of(protocol: Protocol, schedule: Schedule) -> Form:
         rater=schedule.rater,
         session=schedule.session,
         codes=codes,
-        of_presentation=_columns_of(questionnaires_at(protocol, "presentation")),
-        of_session=_columns_of(questionnaires_at(protocol, "session")),
+        of_presentation=_columns_of(protocol, "presentation"),
+        of_session=_columns_of(protocol, "session"),
     )
 
 
-def questionnaires_at(protocol: Protocol, when: str) -> tuple[Questionnaire, ...]:
-    """Return the questionnaires that come after a presentation, or a session."""
-    return tuple(each for each in protocol.questionnaires if each.when == when)
-
-
-def _columns_of(questionnaires: Sequence[Questionnaire]) -> tuple[QuestionColumn, ...]:
+def _columns_of(protocol: Protocol, when: When) -> tuple[QuestionColumn, ...]:
     return tuple(
         QuestionColumn(
             column=f"{questionnaire.id}.{question.id}",
             questionnaire=questionnaire.id,
             question=question,
         )
-        for questionnaire in questionnaires
-        for question in questionnaire.questions
+        for questionnaire, question in questions_of(protocol, when)
     )
 
 
@@ -81,3 +77,18 @@ def _id_of(study: str, rater: str, session: str, codes: Sequence[str]) -> str:
     content = json.dumps([study, rater, session, *codes]).encode()
     digest = hashlib.sha256(content).hexdigest().upper()
     return f"S{digest[:4]}-{digest[4:8]}"
+
+
+def drawn_schedule(
+    study: StudyPaths, protocol: Protocol, rater: str, session: str
+) -> Schedule:
+    """Return the schedule of a rater in a session, checked against the protocol."""
+    path = study.schedule_file(rater, session)
+    schedule = read_schedule(path)
+    check_schedule(schedule, protocol)
+    if (schedule.rater, schedule.session) != (rater, session):
+        raise ScheduleError(
+            f"{path}: needed the schedule of rater {rater} in session {session}, got "
+            f"that of {schedule.rater} in {schedule.session}"
+        )
+    return schedule

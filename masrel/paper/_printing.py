@@ -13,12 +13,12 @@ from masrel.paper._form import (
     OF_SESSION,
     Form,
     QuestionColumn,
+    drawn_schedule,
     form_of,
 )
 from masrel.paper._typed import read_typed
 from masrel.protocol import Protocol, Question, StudyPaths, scale_of
 from masrel.scales import published_scale
-from masrel.schedule import Schedule, check_schedule, read_schedule
 
 _MOST_BOXES = 12
 """Answers of a question that are boxes; for more there is a blank."""
@@ -76,7 +76,7 @@ def write_sheets(
         If the system refuses a folder or file.
     """
     forms = [
-        form_of(protocol, _schedule(study, protocol, rater, session))
+        form_of(protocol, drawn_schedule(study, protocol, rater, session))
         for rater, session in _places(protocol, raters, sessions)
     ]
     html = study.sheets / "sheets.html"
@@ -116,14 +116,6 @@ def _places(
             f"{', '.join(raters)}"
         )
     return places
-
-
-def _schedule(
-    study: StudyPaths, protocol: Protocol, rater: str, session: str
-) -> Schedule:
-    schedule = read_schedule(study.schedule_file(rater, session))
-    check_schedule(schedule, protocol)
-    return schedule
 
 
 def _has_answers(path: Path) -> bool:

@@ -7,6 +7,7 @@ from pathlib import Path
 from masrel._event_log import Event, read_log
 from masrel.conduct import excluded_raters, read_conduct
 from masrel.errors import MasrelError, SessionLogError
+from masrel.paper._second_entry import sheet_differences
 from masrel.protocol import Protocol, StudyPaths
 from masrel.run._state import SessionState, replay
 from masrel.schedule import read_schedule
@@ -204,6 +205,7 @@ def _of_sessions(study: StudyPaths, protocol: Protocol) -> Iterator[str]:
             )
         elif log.stat().st_size:
             yield from _of_skips(study, log)
+            yield from _of_second_entries(study, log)
         else:
             yield (
                 f"{_name(study, log)} is empty: its grades, if there were any, are not "
@@ -232,6 +234,16 @@ def _of_skips(study: StudyPaths, log: Path) -> Iterator[str]:
                 f"{code}, was skipped after a fault by {event.fields['who']}: "
                 f"{event.fields['why']}. Its grade is missing."
             )
+
+
+def _of_second_entries(study: StudyPaths, log: Path) -> Iterator[str]:
+    for each in sheet_differences(_state_of(log)):
+        code = "session" if each.code is None else f"code {each.code}"
+        yield (
+            f"{_name(study, log)}: {code}, {each.column}: the first entry has "
+            f"{each.first}, the second {each.second} ({each.file}, row {each.row}, by "
+            f"{each.who}). The first counts until one is mended."
+        )
 
 
 def _state_of(log: Path) -> SessionState:

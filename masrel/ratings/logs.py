@@ -12,7 +12,7 @@ from masrel._input import MAX_RECORDING, MAX_SMALL, read_regular
 from masrel.errors import RatingsError
 from masrel.protocol import Protocol, StudyPaths, scale_of
 from masrel.ratings.table import _NEEDED_TIME, Ratings, _is_utc, ratings_from_rows
-from masrel.run._state import FROM_PERSONS, SessionState, replay
+from masrel.run._state import FROM_PAPER, FROM_PERSONS, SessionState, replay
 from masrel.schedule import Schedule, check_schedule, read_schedule
 
 
@@ -75,9 +75,9 @@ def _rows(
     schedule = _schedule(study, protocol, state, log)
     for code, events in state.presented.items():
         if code not in {shown.code for shown in schedule.presentations}:
+            line = f"line {events[0].line}: " if events else ""
             raise RatingsError(
-                f"{log}: line {events[0].line}: needed a code of the schedule, "
-                f"got {code!r}"
+                f"{log}: {line}needed a code of the schedule, got {code!r}"
             )
         for event in events:
             _check_recording(study, log, event)
@@ -100,11 +100,17 @@ def _rows(
             "graded_stretch": state.graded_stretches.get(shown.code),
             "position": shown.position,
             "code": shown.code,
-            "n_attempts": len(state.presented.get(shown.code, [])),
+            "n_attempts": _n_attempts(state, shown.code),
             "first_grade": state.first_grades.get(shown.code),
             "graded_at": _graded_at(state, shown.code, log),
             **_of_stretches(state.presented.get(shown.code, [])),
         }
+
+
+def _n_attempts(state: SessionState, code: str) -> int | None:
+    # how often a device presented it; of a sheet nobody knows
+    is_on_paper = state.header["grades"] == FROM_PAPER
+    return None if is_on_paper else len(state.presented.get(code, []))
 
 
 def _graded_at(state: SessionState, code: str, log: Path) -> str | None:

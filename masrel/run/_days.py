@@ -36,7 +36,10 @@ def _completed(study: StudyPaths, rater: str, session: str) -> str | None:
     # when a session came to its end
     log = study.log_file(rater, session)
     events = read_log(log) if log.exists() else ()
-    return next((e.time_utc for e in events if e.kind == "complete"), None)
+    completed = next((e.time_utc for e in events if e.kind == "complete"), None)
+    # one on paper was on another day than the one on which it was entered
+    held = next((str(e.fields["on"]) for e in events if e.kind == "held"), None)
+    return held if completed is not None and held is not None else completed
 
 
 def interval_fields(

@@ -18,11 +18,16 @@ Felt = Literal["felt", "below-threshold", "no-catch"]
 
 FELT: tuple[Felt, ...] = get_args(Felt)
 
-FROM_PERSONS = ("console",)
+FROM_PAPER = "paper"
+"""The source of grades that were written on a sheet."""
+
+FROM_PERSONS = ("console", FROM_PAPER)
 """Sources of grades, by the names that logs have them by, that are a person's."""
 
 FORMAT = 2
 """Version of session logs; those of version 1 are read, and finished, too."""
+
+_TYPED = ("file", "row", "file_sha256", "who")  # where it stood, and who typed it
 
 _PRESENTED = (
     "code",
@@ -89,6 +94,9 @@ EVENTS: dict[str, tuple[str, ...]] = {
     ),
     "aged": ("last_event_utc", "days", "resume", "restart"),
     "restarted": ("protocol_sha256", "n_graded", "clock", "masrel_version"),
+    "entered": ("code", "position", "grade", *_TYPED),
+    "reentered": ("code", "column", "value", *_TYPED),
+    "held": ("on",),
     "correction": ("code", "grade", "who", "why"),
     "skipped": ("code", "position", "who", "why"),
     "stopped": ("code", "position", "why"),
@@ -121,7 +129,7 @@ _OF_PRACTICE = {
     "practice-skipped": "skipped",
 }
 
-_AFTER_COMPLETE = ("correction", "answer-correction")
+_AFTER_COMPLETE = ("correction", "answer-correction", "reentered")
 
 AnswerKey = tuple[str, str, str | None]
 """Questionnaire, question, and the code that it is about, if any."""
@@ -131,7 +139,7 @@ AnswerKey = tuple[str, str, str | None]
 class CodesState:
     """Where the presentations of a session stand, or those for practice."""
 
-    # presentations of each code, in order
+    # presentations of each code, in order; none of one that was entered from paper
     presented: dict[str, list[Event]] = field(default_factory=dict)
     # grade of each graded code as the rater gave it
     first_grades: dict[str, str] = field(default_factory=dict)
@@ -153,12 +161,15 @@ class SessionState(CodesState):
 
     # fields of the event ``session``; empty when there is none yet
     header: "Mapping[str, _Facts]" = field(default_factory=dict)
+    held_on: str | None = None  # day of a session on paper, ISO 8601
     is_complete: bool = False  # whether the session came to its end
     practice: CodesState = field(default_factory=CodesState)
     is_instructed: bool = False  # whether the rater has read the instructions
     # after how many presentations there were breaks
     breaks: set[object] = field(default_factory=set)
     answers: "dict[AnswerKey, _Facts]" = field(default_factory=dict)  # with corrections
+    # the last second entry of each column of each code, or of the session
+    reentered: dict[tuple[str | None, str], Event] = field(default_factory=dict)
     # presentations, also for practice, and how many grades were set aside
     set_aside: list[Event] = field(default_factory=list)
     n_set_aside: int = 0
@@ -207,6 +218,8 @@ def _contradiction(state: SessionState, event: Event) -> str | None:
         return "needed no event but a correction after complete"
     if "question" in event.fields:
         return _contradiction_of_answer(state, event)
+    if "file_sha256" in event.fields:
+        return _contradiction_of_entry(state, event)
     return _contradiction_of_code(*_part(state, event))
 
 
@@ -261,6 +274,17 @@ def _contradiction_of_answer(state: SessionState, event: Event) -> str | None:
     return None
 
 
+def _contradiction_of_entry(state: SessionState, event: Event) -> str | None:
+    code = event.fields["code"]
+    if state.header["grades"] != FROM_PAPER:
+        return f"needed a session on paper, got one with {state.header['grades']}"
+    if event.kind == "entered" and code in (None, *state.settled):
+        return f"needed one entry of each code, got another of {code}"
+    if event.kind == "reentered" and code not in (None, *state.settled):
+        return f"needed a code that was entered, got {code}"
+    return None
+
+
 def _contradiction_of_code(state: CodesState, event: Event) -> str | None:
     code = event.fields.get("code")
     before = state.presented.get(str(code), [])
@@ -274,7 +298,7 @@ def _contradiction_of_code(state: CodesState, event: Event) -> str | None:
             return f"needed one grade of {code}, got another"
         if not before or before[-1].fields["fault"] is not None:
             return f"needed a presentation of {code} without fault before its grade"
-    if event.kind == "correction" and not before:
+    if event.kind == "correction" and code not in state.presented:
         return f"needed a code that was presented, got {code}"
     if event.kind == "correction" and event.fields["grade"] is None:
         if code not in state.grades:
@@ -287,6 +311,8 @@ def _apply(state: SessionState, event: Event) -> None:
         state.header = event.fields
     elif event.kind == "complete":
         state.is_complete = True
+    elif event.kind == "held":
+        state.held_on = str(event.fields["on"])
     elif event.kind == "instructed":
         state.is_instructed = True
     elif event.kind == "break":
@@ -295,6 +321,10 @@ def _apply(state: SessionState, event: Event) -> None:
         _set_aside(state)
     elif "question" in event.fields:
         state.answers[_answer_key(event)] = event.fields["answer"]
+    elif event.kind == "reentered":
+        code = event.fields["code"]
+        key = (None if code is None else str(code), str(event.fields["column"]))
+        state.reentered[key] = event
     else:
         _apply_to_code(*_part(state, event))
 
@@ -312,10 +342,14 @@ def _set_aside(state: SessionState) -> None:
 
 def _apply_to_code(state: CodesState, event: Event) -> None:
     code, grade = str(event.fields.get("code")), event.fields.get("grade")
-    if event.kind in ("grade", "skipped", "correction"):
+    if event.kind in ("grade", "skipped", "correction", "entered"):
         state.settled.add(code)
     if event.kind == "presented":
         state.presented.setdefault(code, []).append(event)
+    elif event.kind == "entered":
+        state.presented[code] = []  # by what or whom is not known here
+        if grade is not None:
+            state.first_grades[code] = state.grades[code] = str(grade)
     elif event.kind == "grade":
         state.first_grades[code] = state.grades[code] = str(grade)
         state.graded_at[code] = event.time_utc

@@ -1,0 +1,187 @@
+"""What was written on a sheet, held against what the sheet asks for."""
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+from masrel.errors import ParameterError, RatingsError
+from masrel.paper._form import FIRST_COLUMNS, NO_GRADE, OF_SESSION, Form, QuestionColumn
+from masrel.paper._typed import TypedRow, TypedSheet
+from masrel.protocol._questions import Answer, checked_answer
+
+_MAX_PROBLEMS = 20
+
+_DECIMAL_COMMA = re.compile(r"(\d{1,2}),(\d{1,2})")
+
+Answers = tuple[tuple[QuestionColumn, Answer], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FilledRow:
+    """A presentation as it is on a sheet, or what stands there of the session."""
+
+    number: int  # row of the file
+    position: int | None  # None: of the session
+    code: str | None
+    grade: str | None
+    answers: Answers
+
+
+def fill_form(
+    sheet: TypedSheet, form: Form, grades: Sequence[str], others: Iterable[Form]
+) -> tuple[FilledRow, ...]:
+    """Return the rows of a sheet by position; RatingsError says all that is wrong.
+
+    `others` are the sheets of the study's other raters and sessions.
+    """
+    _check_columns(sheet, form)
+    _refuse_other_sheet(sheet, form, others)
+    problems: list[str] = []
+    filled: dict[int | None, FilledRow] = {}
+    for row in sheet.rows:
+        where = f"{sheet.path}: row {row.number}"
+        try:
+            place = _position(row, form, where)
+            if place in filled:
+                raise ParameterError(
+                    f"{where}: needed each presentation once, got that of row "
+                    f"{filled[place].number} again"
+                )
+        except ParameterError as error:
+            problems.append(str(error))
+            continue
+        filled[place] = _filled_row(row, place, form, grades, where, problems)
+    problems += _absent(sheet, form, filled)
+    if problems:
+        more = len(problems) - _MAX_PROBLEMS
+        listed = problems[:_MAX_PROBLEMS] + ([f"and {more} more"] if more > 0 else [])
+        raise RatingsError("\n".join(listed))
+    return tuple(filled[place] for place in sorted(filled, key=lambda p: p or 10_000))
+
+
+def _check_columns(sheet: TypedSheet, form: Form) -> None:
+    for column in sheet.columns:
+        if column not in form.columns:
+            raise RatingsError(
+                f"{sheet.path}: needed the columns {', '.join(form.columns)}, got "
+                f"{column} too"
+            )
+    for column in form.columns[len(FIRST_COLUMNS) :]:
+        if column not in sheet.columns:
+            raise RatingsError(
+                f"{sheet.path}: needed the columns {', '.join(form.columns)}, got no "
+                f"{column}"
+            )
+
+
+def _refuse_other_sheet(sheet: TypedSheet, form: Form, others: Iterable[Form]) -> None:
+    needed = f"the sheet of rater {form.rater} in session {form.session}"
+    for row in sheet.rows:
+        if row["sheet"] not in ("", form.id):
+            owner = next((o for o in others if o.id == row["sheet"]), None)
+            raise RatingsError(
+                f"{sheet.path}: row {row.number}: needed {form.id}, {needed}, got "
+                f"{row['sheet']}, {_whose(owner)}"
+            )
+    codes = {row["code"].upper() for row in sheet.rows} - {""}
+    if codes and not codes & set(form.codes):
+        owner = next((o for o in others if codes <= set(o.codes)), None)
+        raise RatingsError(f"{sheet.path}: needed {needed}, got {_whose(owner)}")
+
+
+def _whose(form: Form | None) -> str:
+    if form is None:
+        return "a sheet of another study or of a schedule that was drawn anew"
+    return f"that of rater {form.rater} in session {form.session}"
+
+
+def _position(row: TypedRow, form: Form, where: str) -> int | None:
+    """Return the position that a row is of; None for what is asked of the session."""
+    code, position = row["code"].upper(), row["position"].casefold()
+    if position == OF_SESSION and form.of_session and not code:
+        return None
+    if code in form.codes:
+        place = form.codes.index(code) + 1
+        if position == str(place):
+            return place
+        raise ParameterError(
+            f"{where}: position: needed {place}, that of code {code}, got "
+            f"{row['position']!r}"
+        )
+    needed = "a code of the sheet"
+    if position.isdecimal() and 1 <= int(position) <= len(form.codes):
+        needed = f"{form.codes[int(position) - 1]} at position {int(position)}"
+    raise ParameterError(f"{where}: code: needed {needed}, got {row['code']!r}")
+
+
+def _filled_row(
+    row: TypedRow,
+    place: int | None,
+    form: Form,
+    grades: Sequence[str],
+    where: str,
+    problems: list[str],
+) -> FilledRow:
+    grade, has_grade = row["grade"], place is not None
+    if has_grade and grade not in (*grades, NO_GRADE):
+        problems.append(
+            f"{where}: grade: needed one of {', '.join(grades)}, or {NO_GRADE} where "
+            f"there is none, got {repr(grade) if grade else 'an empty cell'}"
+        )
+    columns, foreign = form.of_presentation, form.of_session
+    if not has_grade:
+        columns, foreign = foreign, columns
+        if grade:
+            problems.append(f"{where}: grade: needed of presentations, got {grade!r}")
+    for column in foreign:
+        if row[column.column]:
+            problems.append(
+                f"{where}: {column.column}: needed an empty cell in this row, got "
+                f"{row[column.column]!r}"
+            )
+    return FilledRow(
+        number=row.number,
+        position=place,
+        code=None if place is None else form.codes[place - 1],
+        grade=None if grade in ("", NO_GRADE) else grade,
+        answers=tuple(_answers(row, columns, where, problems)),
+    )
+
+
+def _answers(
+    row: TypedRow, columns: Sequence[QuestionColumn], where: str, problems: list[str]
+) -> Iterator[tuple[QuestionColumn, Answer]]:
+    for column in columns:
+        question, text = column.question, row[column.column]
+        if text == NO_GRADE and text not in question.choices:
+            yield column, None  # was left out on paper, and nobody can be asked again
+            continue
+        if question.type == "visual-analogue":
+            text = _DECIMAL_COMMA.sub(r"\1.\2", text)
+        try:
+            answer = checked_answer(question, text, where=f"{where}: {column.column}")
+        except ParameterError as error:
+            problems.append(f"{error} ({NO_GRADE}: was left out)")
+            continue
+        yield column, answer
+
+
+def _absent(
+    sheet: TypedSheet, form: Form, filled: dict[int | None, FilledRow]
+) -> Iterator[str]:
+    absent = [
+        f"position {position}, code {code}"
+        for position, code in enumerate(form.codes, start=1)
+        if position not in filled
+    ]
+    if absent:
+        yield (
+            f"{sheet.path}: needed a row for each of {len(form.codes)} presentations, "
+            f"got none of {'; '.join(absent)}: its grade is {NO_GRADE} where there is "
+            "none"
+        )
+    if form.of_session and None not in filled:
+        yield (
+            f"{sheet.path}: needed a row with {OF_SESSION!r} in the column position, "
+            "got none"
+        )
