@@ -3,6 +3,7 @@
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
 
@@ -129,6 +130,9 @@ _OF_PRACTICE = {
     "practice-skipped": "skipped",
 }
 
+_TEXTS = ("code", "grade", "who", "why", "questionnaire", "question", "column", "file")
+"""Fields that hold text or null, whatever the event."""
+
 _AFTER_COMPLETE = ("correction", "answer-correction", "reentered")
 
 AnswerKey = tuple[str, str, str | None]
@@ -193,8 +197,8 @@ def replay(path: Path, events: Sequence[Event]) -> SessionState:
     return state
 
 
-def _contradiction(state: SessionState, event: Event) -> str | None:
-    # -> why the event cannot follow, or None
+def _misshape(event: Event) -> str | None:
+    # -> why it is no event of a session, or None
     if event.kind not in EVENTS:
         return f"needed an event of {', '.join(EVENTS)}"
     if event.kind == "session":  # first: another format has other fields
@@ -210,8 +214,14 @@ def _contradiction(state: SessionState, event: Event) -> str | None:
     wrong = _of_another_type(event)
     if wrong is not None:
         return f"needed another value of {wrong}, got {event.fields[wrong]!r}"
-    if event.kind == "recovered":
-        return None
+    return None
+
+
+def _contradiction(state: SessionState, event: Event) -> str | None:
+    # -> why the event cannot follow, or None
+    problem = _misshape(event)
+    if problem is not None or event.kind == "recovered":
+        return problem
     if (event.kind == "session") == bool(state.header):
         return "needed the event session once, before all others"
     if state.is_complete and event.kind not in _AFTER_COMPLETE:
@@ -234,12 +244,16 @@ def _part(state: SessionState, event: Event) -> tuple[CodesState, Event]:
 
 def _of_another_type(event: Event) -> str | None:
     # the field that has no value of its type, or None
-    for name in ("code", "grade", "who", "why", "questionnaire", "question"):
+    for name in _TEXTS:
         if not isinstance(event.fields.get(name), str | None):
             return name
-    for name in ("after", "answer"):
+    for name in ("after", "answer", "value"):
         if isinstance(event.fields.get(name), list):
             return name
+    if event.kind == "held" and not _is_day(event.fields["on"]):
+        return "on"
+    if not isinstance(event.fields.get("row", 0), int):
+        return "row"
     speed = event.fields.get("mean_speed_deg_s")
     if not isinstance(speed, float | int | None):
         return "mean_speed_deg_s"
@@ -253,6 +267,13 @@ def _of_another_type(event: Event) -> str | None:
         )
     )
     return None if are_stretches else "stretches"
+
+
+def _is_day(value: object) -> bool:
+    try:
+        return date.fromisoformat(str(value)).isoformat() == value
+    except ValueError:
+        return False
 
 
 def _answer_key(event: Event) -> AnswerKey:
