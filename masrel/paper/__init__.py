@@ -4,9 +4,14 @@ In: a protocol and drawn schedules. Out: printable sheets without a model's name
 session logs whose grades are from paper.
 """
 
-from masrel.paper._entry import EnteredSheet, enter_sheet
-from masrel.paper._printing import PaperSheets, write_sheets
-from masrel.paper._second_entry import SheetDifference, compare_sheet
+import importlib
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from masrel.paper._differences import SheetDifference
+    from masrel.paper._entry import EnteredSheet, enter_sheet
+    from masrel.paper._printing import PaperSheets, write_sheets
+    from masrel.paper._second_entry import compare_sheet
 
 __all__ = [
     "EnteredSheet",
@@ -16,3 +21,17 @@ __all__ = [
     "enter_sheet",
     "write_sheets",
 ]
+
+_HOMES = {
+    "masrel.paper._differences": ("SheetDifference",),
+    "masrel.paper._entry": ("EnteredSheet", "enter_sheet"),
+    "masrel.paper._printing": ("PaperSheets", "write_sheets"),
+    "masrel.paper._second_entry": ("compare_sheet",),
+}
+
+
+def __getattr__(name: str) -> object:
+    for module, names in _HOMES.items():
+        if name in names:
+            return getattr(importlib.import_module(module), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

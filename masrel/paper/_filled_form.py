@@ -5,7 +5,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from masrel.errors import ParameterError, RatingsError
-from masrel.paper._form import FIRST_COLUMNS, NO_GRADE, OF_SESSION, Form, QuestionColumn
+from masrel.paper._differences import NO_GRADE
+from masrel.paper._form import FIRST_COLUMNS, OF_SESSION, Form, QuestionColumn
 from masrel.paper._typed import TypedRow, TypedSheet
 from masrel.protocol._questions import Answer, checked_answer
 

@@ -16,9 +16,6 @@ FIRST_COLUMNS = ("sheet", "position", "code", "grade")
 OF_SESSION = "session"
 """What stands for a position in the row of what is asked after the session."""
 
-NO_GRADE = "NA"
-"""What is typed where a presentation has no grade."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class QuestionColumn:

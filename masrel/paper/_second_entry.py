@@ -1,7 +1,6 @@
 """A sheet typed a second time by somebody else, compared with what was entered."""
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,46 +8,15 @@ from typing import TYPE_CHECKING
 from masrel._event_log import Event, SessionLog, utc_now
 from masrel.conduct._study_log import stated
 from masrel.errors import ParameterError, RatingsError, SessionLogError
+from masrel.paper._differences import GRADE, SheetDifference, sheet_differences
 from masrel.paper._entry import filled_sheet, typed_fields
 from masrel.paper._filled_form import FilledRow
-from masrel.paper._form import NO_GRADE
 from masrel.paper._typed import TypedSheet
 from masrel.protocol import Protocol, StudyPaths
 from masrel.run._state import FROM_PAPER, SessionState, replay
 
 if TYPE_CHECKING:
     from masrel.recording import _Fact  # loads numpy
-
-_GRADE = "grade"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SheetDifference:
-    """A cell in which the second entry of a sheet differs from the log.
-
-    Attributes
-    ----------
-    code : str or None
-        Of the presentation; None for a question about the session.
-    column : str
-        ``"grade"``, or the column of a question.
-    first, second : str
-        What the log has and what the second file has; "NA" where that is nothing.
-    file : str
-        Name of the second file.
-    row : int
-        Its row.
-    who : str
-        Who typed it.
-    """
-
-    code: str | None
-    column: str
-    first: str
-    second: str
-    file: str
-    row: int
-    who: str
 
 
 def compare_sheet(
@@ -143,7 +111,7 @@ def _reenter(
     state: SessionState,
     log: SessionLog,
 ) -> None:
-    values: dict[str, _Fact] = {_GRADE: row.grade} if row.code is not None else {}
+    values: dict[str, _Fact] = {GRADE: row.grade} if row.code is not None else {}
     values |= {column.column: answer for column, answer in row.answers}
     for column, value in values.items():
         cell = {
@@ -156,32 +124,3 @@ def _reenter(
         before = state.reentered.get((row.code, column))
         if before is None or dict(before.fields) != cell:
             log.append("reentered", cell)
-
-
-def sheet_differences(state: SessionState) -> tuple[SheetDifference, ...]:
-    """Return in what the last second entry of a sheet differs from the log."""
-    return tuple(sorted(_differences(state), key=lambda each: each.row))
-
-
-def _differences(state: SessionState) -> Iterator[SheetDifference]:
-    first: dict[tuple[str | None, str], object] = {
-        (code, _GRADE): grade for code, grade in state.grades.items()
-    }
-    for (questionnaire, question, code), answer in state.answers.items():
-        first[code, f"{questionnaire}.{question}"] = answer
-    for (code, column), event in state.reentered.items():
-        fields, before = event.fields, first.get((code, column))
-        if before != fields["value"]:
-            yield SheetDifference(
-                code=code,
-                column=column,
-                first=_shown(before),
-                second=_shown(fields["value"]),
-                file=str(fields["file"]),
-                row=int(str(fields["row"])),
-                who=str(fields["who"]),
-            )
-
-
-def _shown(value: object) -> str:
-    return NO_GRADE if value is None else str(value)

@@ -7,7 +7,7 @@ from pathlib import Path
 from masrel._event_log import Event, read_log
 from masrel.conduct import excluded_raters, read_conduct
 from masrel.errors import MasrelError, SessionLogError
-from masrel.paper._second_entry import sheet_differences
+from masrel.paper._differences import sheet_differences
 from masrel.protocol import Protocol, StudyPaths
 from masrel.run._state import SessionState, replay
 from masrel.schedule import read_schedule
