@@ -28,6 +28,7 @@ MODULES = (
     "masrel.ratings",
     "masrel.analysis",
     "masrel.verification",
+    "masrel.merging",
     "masrel.report",
     "masrel.checklist",
     "masrel.export",

@@ -41,6 +41,7 @@ GROUPS = {
         "status": "How far a study is, and what to do next.",
         "note": "Record a note, a deviation or an adverse event.",
         "rater": "What is known of raters, and who is left out of the analysis.",
+        "merge": "Put the sites of one study together in one folder.",
         "ratings": "Turn session logs into the table of ratings.",
         "analyze": "Compute the agreement tables a study asks for.",
         "grading": "Regress grades on the models' parameters and the speed.",

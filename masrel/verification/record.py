@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from masrel.conduct._allotment import allotment_problems
+from masrel.conduct._merged_logs import merged_log_problems
 from masrel.errors import ProtocolError, ScheduleError, SessionLogError
 from masrel.protocol import Protocol, StudyPaths, read_protocol
 from masrel.schedule import read_schedule, schedule_problems
@@ -134,7 +135,10 @@ def verify_sessions(study: StudyPaths, protocol: Protocol) -> Verification:
 
 def _conduct_findings(study: StudyPaths, protocol: Protocol) -> tuple[Finding, ...]:
     try:
-        problems = allotment_problems(study, protocol)
+        problems = (
+            *merged_log_problems(study),
+            *allotment_problems(study, protocol),
+        )
     except SessionLogError as error:
         problems = (str(error),)
     return _of_problems(study.conduct_file, problems)
