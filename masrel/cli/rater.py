@@ -108,6 +108,7 @@ def list_command(study: Path, output: OutputOptions) -> None:
 def _document(rater: "RaterProgress") -> dict[str, object]:
     return {
         "rater": rater.rater,
+        "site": rater.site,
         "status": rater.status,
         "is_late": rater.is_late,
         "fields": dict(rater.values),
@@ -120,6 +121,8 @@ def _table(
     from masrel.report._tables import Column, Table
 
     fields = protocol.rater_fields
+    sites = [rater.site for rater in raters]
+    of_site = [Column(key="site", heading="Site", align="left")] if any(sites) else []
     headings = {
         name: (field.title or name) + (f" ({field.unit})" if field.unit else "")
         for name, field in fields.items()
@@ -129,6 +132,7 @@ def _table(
         caption=f"Raters of study {protocol.study.id}",
         columns=(
             Column(key="rater", heading="Rater", align="left"),
+            *of_site,
             Column(key="status", heading="Status", align="left"),
             Column(key="late", heading="Late", align="left"),
             *(
@@ -143,6 +147,7 @@ def _table(
         rows=tuple(
             (
                 each.rater,
+                *([each.site] if any(sites) else []),
                 each.status,
                 "yes" if each.is_late else None,
                 *each.values.values(),

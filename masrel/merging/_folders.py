@@ -13,7 +13,7 @@ from masrel.errors import ParameterError, ScheduleError
 from masrel.merging._site_protocols import check_protocols, merged_protocol
 from masrel.protocol import Protocol, StudyPaths, protocol_hash, read_protocol
 from masrel.schedule import read_schedule
-from masrel.schedule._secret import commitment_of, find_secret
+from masrel.schedule._secret import find_secret
 from masrel.verification import verify_study
 
 
@@ -129,7 +129,7 @@ def _commitments(studies: Sequence[StudyPaths]) -> Iterator[tuple[Path, str | No
                 yield file, read_schedule(file).commitment
         secret = find_secret(study)
         if secret is not None:
-            yield study.secret_file, commitment_of(secret)
+            yield study.secret_file, secret.commitment
 
 
 def _owners(

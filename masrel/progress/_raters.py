@@ -27,17 +27,20 @@ class RaterProgress:
     ----------
     rater : str
         Who.
+    site : str or None
+        Where, if the protocol says so.
     status : {"planned", "begun", "complete", "withdrawn", "excluded"}
         Whether a session has begun, and all of them are complete; or whether the rater
         has left, or is left out of the analysis.
     is_late : bool
         Whether the rater joined later than most: the first schedule was drawn from
-        another protocol than most of the raters'.
+        another protocol than most of the site's.
     values : mapping of str to (str, int, float or None)
         What every field of the protocol holds; None where nothing is known.
     """
 
     rater: str
+    site: str | None
     status: RaterStatus
     is_late: bool
     values: Mapping[str, FieldValue | None] = field(hash=False)
@@ -74,12 +77,14 @@ def rater_progress(
         for event in read_conduct(study)
         if event.kind == "withdrawn"
     }
+    sites = {rater.id: rater.site for rater in protocol.raters}
     stages: dict[str, set[str]] = {rater.id: set() for rater in protocol.raters}
     for session in sessions:
         stages[session.rater].add(session.stage)
     return tuple(
         RaterProgress(
             rater=rater,
+            site=sites[rater],
             status=(
                 "excluded"
                 if rater in excluded
@@ -112,8 +117,15 @@ def _late_raters(study: StudyPaths, protocol: Protocol) -> set[str]:
                     drawn_from[rater] = read_schedule(file).protocol_sha256
                 except ScheduleError:
                     continue  # masrel check says so
-    usual = Counter(drawn_from.values()).most_common(1)
-    return {rater for rater, sha256 in drawn_from.items() if sha256 != usual[0][0]}
+    sites = {rater.id: rater.site for rater in protocol.raters}
+    counts: dict[str | None, Counter[str]] = {}
+    for rater, sha256 in drawn_from.items():
+        counts.setdefault(sites[rater], Counter())[sha256] += 1
+    return {
+        rater
+        for rater, sha256 in drawn_from.items()
+        if sha256 != counts[sites[rater]].most_common(1)[0][0]
+    }
 
 
 def raters_csv(
@@ -140,11 +152,12 @@ def raters_csv(
         head = f"# SIMULATED: not sessions of persons on hardware.\n{head}"
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["rater", "status", "late", *protocol.rater_fields])
+    writer.writerow(["rater", "site", "status", "late", *protocol.rater_fields])
     for each in raters:
         cells = [each.values[name] for name in protocol.rater_fields]
         late = "yes" if each.is_late else "no"
-        writer.writerow([each.rater, each.status, late, *map(_cell, cells)])
+        known = [each.rater, _cell(each.site), each.status, late]
+        writer.writerow([*known, *map(_cell, cells)])
     return head + text.getvalue()
 
 

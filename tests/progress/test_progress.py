@@ -123,9 +123,9 @@ def test_the_table_of_raters_has_every_field(
     text = raters_csv(raters, protocol, simulated=True)
     assert text.splitlines()[0].startswith("# SIMULATED")
     assert text.splitlines()[2:] == [
-        "rater,status,late,clinic",
-        "R1,planned,no,'=A1",  # no spreadsheet runs it
-        "R2,planned,no,NA",
+        "rater,site,status,late,clinic",
+        "R1,NA,planned,no,'=A1",  # no spreadsheet runs it
+        "R2,NA,planned,no,NA",
     ]
 
 
