@@ -4,6 +4,7 @@ from pathlib import Path
 
 import click
 
+from masrel.cli._options import OutputOptions, output_options, write_output
 from masrel.errors import ParameterError
 from masrel.protocol import Protocol, StudyPaths, read_protocol
 
@@ -23,8 +24,23 @@ from masrel.protocol import Protocol, StudyPaths, read_protocol
     help="With --site: draw nothing, but make this folder a copy of the study for the "
     "site, with the site's secret alone.",
 )
+@click.option(
+    "--show",
+    is_flag=True,
+    help="Draw nothing, but print how even the drawn orders are: places by model, what "
+    "follows what, runs. Not for raters.",
+)
+@output_options(
+    json="With --show: write every count as JSON here; - prints it, and nothing else.",
+    figure="With --show: heatmaps as .png, .svg or .pdf.",
+)
 def schedule(
-    study: Path, redraw: bool, site: str | None, destination: Path | None
+    study: Path,
+    redraw: bool,
+    site: str | None,
+    destination: Path | None,
+    show: bool,
+    output: OutputOptions,
 ) -> None:
     """Draw each rater's schedule and blinded sheet for every session of STUDY.
 
@@ -34,10 +50,46 @@ def schedule(
     """
     paths = StudyPaths(study)
     protocol = read_protocol(paths.protocol)
-    if destination is not None:
+    _check_options(redraw, destination, show=show, output=output)
+    if show:
+        _show(paths, protocol, site, output)
+    elif destination is not None:
         _copy(paths, protocol, site, destination)
     else:
         _draw(paths, protocol, site, redraw=redraw)
+
+
+def _check_options(
+    redraw: bool, destination: Path | None, *, show: bool, output: OutputOptions
+) -> None:
+    for option, file in (("--json", output.json_file), ("--figure", output.figure)):
+        if file is not None and not show:
+            raise ParameterError(f"{option}: needs --show, got it alone")
+    for option, is_chosen in (("--redraw", redraw), ("--copy-to", destination)):
+        if show and is_chosen:
+            raise ParameterError(f"--show: draws nothing, so needs no {option}")
+
+
+def _show(
+    study: StudyPaths, protocol: Protocol, site: str | None, output: OutputOptions
+) -> None:
+    from masrel.report._order_tables import (
+        count_tables,
+        order_document,
+        order_figure_content,
+        summary_table,
+    )
+    from masrel.schedule._balance import order_balance
+
+    balances = order_balance(protocol, study, site)
+    write_output(
+        output,
+        document=lambda: order_document(balances),
+        text=lambda: summary_table(balances),
+        figure=lambda: order_figure_content(balances),
+        stamp="not for raters",
+        more=[table for balance in balances for table in count_tables(balance)],
+    )
 
 
 def _copy(

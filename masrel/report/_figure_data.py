@@ -298,6 +298,24 @@ class LearningView:
     differences: tuple[int, ...]  # grades by which each grade is too high
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OrderPanel:
+    """Schedules of one session, counted."""
+
+    title: str
+    n_schedules: int
+    models: tuple[str, ...]  # names of the rows of both
+    places: tuple[tuple[int, ...], ...]  # by model and place
+    pairs: tuple[tuple[int, ...], ...]  # by model and the one right after it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OrderPanels:
+    """How even orders are, session below session."""
+
+    panels: tuple[OrderPanel, ...]
+
+
 Content = (
     GradeGrid
     | Forest
@@ -314,5 +332,6 @@ Content = (
     | PairMaps
     | Differences
     | LearningView
+    | OrderPanels
 )
 """Whatever can be drawn."""

@@ -134,7 +134,7 @@ def _figure(content: data.Content) -> Figure:
             from masrel.report.figures._forest import forest_figure
 
             return forest_figure(content)
-        case data.PairMaps() | data.LearningView():
+        case data.PairMaps() | data.LearningView() | data.OrderPanels():
             return _rater_figure(content)
         case data.Differences():
             from masrel.report.figures._limits_figure import limits_figure
@@ -152,7 +152,13 @@ def _figure(content: data.Content) -> Figure:
             return _joint_figure(content)
 
 
-def _rater_figure(content: data.PairMaps | data.LearningView) -> Figure:
+def _rater_figure(
+    content: data.PairMaps | data.LearningView | data.OrderPanels,
+) -> Figure:
+    if isinstance(content, data.OrderPanels):
+        from masrel.report.figures._order_figure import order_figure
+
+        return order_figure(content)
     if isinstance(content, data.LearningView):
         from masrel.report.figures._learning_figure import learning_figure
 
