@@ -271,7 +271,8 @@ class _Solved:
     mean: NDArray[Any]  # (m,)
     # (m, k + 1, k + 3): Z' W Z, where W is the inverse variance of items and residual
     z: NDArray[Any]
-    inverse: NDArray[Any]  # (m, k, k)
+    between: NDArray[Any]  # (m, k, k): I + ratio of raters times Z' W Z
+    inverse: NDArray[Any] | None  # of that, if there are slopes for sure
     left: NDArray[Any]  # (m, k + 1, 2): V⁻¹ (μ, y), by raters
 
     def slopes(self) -> NDArray[Any]:
@@ -280,9 +281,11 @@ class _Solved:
         sums, k = self.sums, len(self.sums.levels)
         of_items, of_raters = self.ratios.T[:, :, None]
         shrink = 1.0 + of_items * sums.sizes
+        inverse = _inverse(self.between) if self.inverse is None else self.inverse
         # of Z' W Z in the ratio of items
-        z_a = (-(shrink**-2) @ sums.products).reshape(self.z.shape)[..., : k + 1]
-        right = self.inverse @ self.z[:, :k, k + 1 :]
+        z_a = _weighted(-(shrink**-2), sums.products)
+        z_a = z_a.reshape(self.z.shape)[..., : k + 1]
+        right = inverse @ self.z[:, :k, k + 1 :]
         # of μ' V⁻¹ μ, and of y' P y, which is that of y less its mean
         left = self.left.copy()
         left[..., 1] -= self.mean[:, None] * left[..., 0]
@@ -293,7 +296,7 @@ class _Solved:
         slopes[:, 0] /= self.of_mean[:, None]
         slopes[:, 1] *= (sums.n_ratings - 1) / self.squares[:, None]
         slopes[:, 0, 0] += (sums.freq * sums.sizes / shrink).sum(axis=1)
-        transposed = self.inverse.mT
+        transposed = inverse.mT
         traces = (transposed * z_a[:, :k, :k]).sum(axis=(1, 2))
         slopes[:, 0, 0] += of_raters[:, 0] * traces
         slopes[:, 0, 1] += (transposed * self.z[:, :k, :k]).sum(axis=(1, 2))
@@ -305,15 +308,20 @@ def solved(sums: _Sums, ratios: NDArray[Any]) -> _Solved:
     m, k = len(ratios), len(sums.levels)
     of_items, of_raters = ratios.T[:, :, None]  # (m, 1) each
     shrink = 1.0 + of_items * sums.sizes
-    z = (1.0 / (sums.sizes * shrink) @ sums.products).reshape(m, k + 1, k + 3)
+    weights = 1.0 / (sums.sizes * shrink)
+    z = _weighted(weights, sums.products).reshape(m, k + 1, k + 3)
     z = z + sums.within
     between = np.eye(k) + of_raters[..., None] * z[:, :k, :k]
-    inverse = np.linalg.inv(between)
     # by Woodbury's formula: s = (μ, y)' V⁻¹ (μ, y)
     left = np.empty((m, k + 1, 2), dtype=z.dtype)
     left[:, :k] = sums.levels
     left[:, :k, 1] -= of_raters * z[:, :k, k]
-    left[:, :k] = inverse @ left[:, :k]
+    one, inverse = between, None
+    if np.iscomplexobj(between):
+        one, inverse = between[:1].real, _inverse(between)  # ways from one point
+        left[:, :k] = inverse @ left[:, :k]
+    else:
+        left[:, :k] = np.linalg.solve(between, left[:, :k])
     left[:, k] = 0.0, 1.0
     s = left.mT @ z[..., k + 1 :]
     of_mean, mean = s[:, 0, 0], s[:, 0, 1] / s[:, 0, 0]
@@ -321,7 +329,7 @@ def solved(sums: _Sums, ratios: NDArray[Any]) -> _Solved:
     df = sums.n_ratings - 1
     deviances = (
         np.log(shrink.real) @ sums.freq
-        + np.linalg.slogdet(between)[1]
+        + np.linalg.slogdet(one)[1]
         + np.log(of_mean.real)
         # not above 0 where raters are so far from the likeliest that all is rounding
         + df * np.log(np.where(squares.real > 0.0, squares.real, np.inf))
@@ -334,9 +342,25 @@ def solved(sums: _Sums, ratios: NDArray[Any]) -> _Solved:
         of_mean=of_mean,
         mean=mean,
         z=z,
+        between=between,
         inverse=inverse,
         left=left,
     )
+
+
+def _inverse(between: NDArray[Any]) -> NDArray[Any]:
+    # (m, k, k); imaginary parts are steps from one point, of which squares are nothing
+    if not np.iscomplexobj(between):
+        return np.linalg.inv(between)
+    real = np.linalg.inv(between[0].real)
+    return np.asarray(real - 1j * (real @ between.imag @ real))
+
+
+def _weighted(weights: NDArray[Any], products: _Floats) -> NDArray[Any]:
+    # weights @ products, of which no complex copy is made
+    if not np.iscomplexobj(weights):
+        return weights @ products
+    return weights.real @ products + 1j * (weights.imag @ products)
 
 
 def lowest(
