@@ -108,7 +108,7 @@ class DistinctItems:
         if counts.size > FEW and base ** counts.shape[1] <= _MAX_KEYS:
             freq = np.bincount(counts @ base ** np.arange(counts.shape[1]))
             keys = np.flatnonzero(freq)
-            return cls.of_arrays(_digits(keys, base, counts.shape[1]), freq[keys])
+            return cls.of_arrays(digits(keys, base, counts.shape[1]), freq[keys])
         return cls.of_arrays(counts)
 
     @classmethod
@@ -132,7 +132,7 @@ class DistinctItems:
         keys, freq = _count_keys(
             n_items, lambda at: _item_keys(codes[at], base, q), n_keys
         )
-        return cls.of_arrays(_digits(keys, base, q), freq)
+        return cls.of_arrays(digits(keys, base, q), freq)
 
     @classmethod
     def of_patterns(cls, coded: CodedRatings, often: Integers) -> "DistinctItems":
@@ -143,7 +143,7 @@ class DistinctItems:
             return cls.of_arrays(item_counts(coded), often)
         keys, at = np.unique(_item_keys(codes, base, q), return_inverse=True)
         freq = np.bincount(at, often).astype(np.int64)  # floats, exact to 2^53
-        return cls.of_arrays(_digits(keys, base, q), freq)
+        return cls.of_arrays(digits(keys, base, q), freq)
 
     def sums(self, v: Weights) -> SufficientStatistics:
         """Add the items up."""
@@ -314,7 +314,7 @@ def distinct_rows(codes: Codes, n_categories: int) -> tuple[Integers, Integers]:
         if small is not None:
             return small
     keys, freq = _count_keys(n_items, lambda at: _row_keys(codes[at], base), n_keys)
-    return _digits(keys, base, n_raters) - 1, freq
+    return digits(keys, base, n_raters) - 1, freq
 
 
 def _small_rows(
@@ -330,7 +330,7 @@ def _small_rows(
     keys, freq = _count_keys(
         len(codes), lambda at: _small_keys(codes[at], lowest, base), n_keys
     )
-    return _digits(keys, base, n_raters) + lowest, freq
+    return digits(keys, base, n_raters) + lowest, freq
 
 
 def _small_keys(codes: Codes, lowest: int, base: int) -> Integers:
@@ -366,8 +366,8 @@ def _max_keys(n_items: int) -> int:
     return min(_MAX_KEYS, 16 * n_items)
 
 
-def _digits(keys: Integers, base: int, n_digits: int) -> Integers:
-    # (n_keys,) -> (n_keys, n_digits), the last digit the most significant
+def digits(keys: Integers, base: int, n_digits: int) -> Integers:
+    """Return the digits of keys, (n_keys, n_digits), the last most significant."""
     return keys[:, None] // base ** np.arange(n_digits, dtype=np.int64) % base
 
 

@@ -40,7 +40,7 @@ _LARGE_TEXT = 256 << 20  # bytes of text from which a file is read as a stream
 _LARGE_TABLE = 20_000_000  # cells of a Parquet file from which it is
 _HEAD_ROWS = 10_000  # rows that show which column is what
 _HEAD_BYTES = 1 << 20
-_BATCH = 1 << 20  # cells of a batch
+_BATCH = 1 << 19  # cells of a batch, for which there is room near the processor
 _BUFFER = 1 << 20  # bytes of a column that are read at once
 _BLOCK = 1 << 24  # bytes of text in a batch
 
@@ -196,7 +196,8 @@ def _parquet_batches(
         texts = [column for column in columns[n_plain:] if types[column] in STRINGS]
         with _opened(path, read_dictionary=texts) as file:
             n_rows = file.metadata.num_rows
-            for batch in file.iter_batches(size, columns=columns):
+            # threads wait for each other more than they read
+            for batch in file.iter_batches(size, columns=columns, use_threads=False):
                 n_done += len(batch)
                 yield [batch.column(c) for c in columns], n_bytes * n_done // n_rows
 

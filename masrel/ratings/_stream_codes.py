@@ -6,7 +6,7 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement._counts import distinct_rows
+from masrel.agreement._counts import digits, distinct_rows
 from masrel.ratings._grade_texts import coded_texts
 from masrel.ratings._large_files import (
     NoStreamError,
@@ -18,32 +18,34 @@ from masrel.ratings._large_files import (
 StreamCodes = NDArray[np.signedinteger[Any]]
 
 _MAX_BYTE = 120  # texts whose numbers have a byte each
+_MAX_KEYS = 1 << 16  # rows that there can be, where they are counted in a table
 _MAX_PENDING = 1 << 18  # distinct rows before those alike are put together
 _MAX_KEPT = 100_000_000  # codes of distinct rows
 _SPAN = 1 << 16  # of whole numbers that are looked up in a table
 
 
 class TextCodes:
-    """Texts of cells as numbers in the order in which they are met."""
+    """Texts of cells as numbers in the order in which they are met.
 
-    def __init__(self, most: int, what: str) -> None:
+    `by_value` those that a column is the first to have are in their own order, in which
+    most grades differ from their numbers by the same.
+    """
+
+    def __init__(self, most: int, what: str, *, by_value: bool = False) -> None:
         self.texts: list[str] = []
         self.places: list[tuple[int, int]] = []
         self._code: dict[str, int] = {}
-        self._whole: set[str] = set()  # texts of whole numbers
+        self._whole: set[int] = set()  # whole numbers that are texts
         self._dtype = np.int8 if most <= _MAX_BYTE else np.int16
-        self._most, self._what = most, what
+        self._most, self._what, self._by_value = most, what, by_value
 
     def codes(self, column: Any, row: int, place: int) -> StreamCodes:
         """Return the number of every cell; the first is that of a row and a column."""
         if is_whole(column) and not column.null_count and len(column):
             values = numbers_of(column)
-            lowest, size = 0, 256
-            if values.itemsize > 1:
-                lowest = int(values.min())
-                size = int(values.max()) - lowest + 1
-            if size <= _SPAN:
-                return self._of_whole(values, lowest, size, (row, place))
+            span = range(int(values.min()), int(values.max()) + 1)
+            if len(span) <= _SPAN:
+                return self._of_whole(values, span, (row, place))
         if not hasattr(column, "dictionary"):
             column = column.dictionary_encode()
         n = len(column.dictionary)
@@ -57,27 +59,25 @@ class TextCodes:
         return self._looked_up(index, table, texts.__getitem__, (row, place))
 
     def _of_whole(
-        self, values: NDArray[Any], lowest: int, size: int, where: tuple[int, int]
+        self, values: NDArray[Any], span: range, where: tuple[int, int]
     ) -> StreamCodes:
-        # of whole numbers, by a table of those from the lowest on
-        unsigned = f"u{values.itemsize}"
-        numbers = np.arange(size, dtype=np.int64) + lowest
-        if values.itemsize == 1:  # all that a byte can be
-            index = values.view(unsigned)
-            numbers = np.arange(256, dtype=unsigned).view(values.dtype).astype(np.int64)
-        else:  # the difference fits without its sign
-            index = (values - values.dtype.type(lowest)).view(unsigned)
-        table = np.full(size, -1, dtype=self._dtype)
-        for text in self._whole:
-            place = int(text) - lowest if values.itemsize > 1 else int(text) % 256
-            if 0 <= place < size and int(text) == numbers[place]:
-                table[place] = self._code[text]
+        # of whole numbers, all in a span: the difference fits without its sign
+        above = values - values.dtype.type(span[0])
+        first = self._code.get(str(span[0]), len(self.texts))
+        if first + len(span) <= len(self.texts):
+            if self.texts[first : first + len(span)] == list(map(str, span)):
+                codes: StreamCodes = above.astype(self._dtype, copy=False)
+                return np.asarray(codes + self._dtype(first)) if first else codes
+        table = np.full(len(span), -1, dtype=self._dtype)
+        for number in self._whole:
+            if number in span:
+                table[number - span[0]] = self._code[str(number)]
 
         def named(k: int) -> str:
-            text = str(numbers[k])
-            self._whole.add(text)
-            return text
+            self._whole.add(span[k])
+            return str(span[k])
 
+        index = above.view(f"u{values.itemsize}")
         return self._looked_up(index, table, named, where)
 
     def _looked_up(
@@ -92,7 +92,8 @@ class TextCodes:
             return codes
         rows = np.flatnonzero(codes < 0)
         new, first = np.unique(index[rows], return_index=True)
-        for k in np.argsort(first).tolist():
+        order = np.arange(len(new)) if self._by_value else np.argsort(first)
+        for k in order.tolist():
             at = (where[0] + int(rows[first[k]]), where[1])
             table[new[k]] = self._number(text(int(new[k])), at)
         return _taken(table, index)
@@ -116,10 +117,9 @@ class TextCodes:
 
 def _taken(table: NDArray[Any], index: NDArray[Any]) -> StreamCodes:
     # table[index]; of bytes by bytes in a third of the time
-    if table.itemsize == 1 and index.itemsize == 1 and len(table) == 256:
-        return np.frombuffer(
-            index.tobytes().translate(table.tobytes()), dtype=table.dtype
-        )
+    if table.itemsize == 1 and index.itemsize == 1:
+        every = table.tobytes().ljust(256)
+        return np.frombuffer(index.tobytes().translate(every), dtype=table.dtype)
     codes: StreamCodes = table[index]
     return codes
 
@@ -131,11 +131,27 @@ class DistinctRows:
         self._rows: list[NDArray[np.int8]] = []
         self._freq: list[NDArray[np.int64]] = []
         self._n_pending = 0
+        self._shape = 1, 0  # codes, with that of no rating, and raters of the table
+        self._table = np.zeros(1, dtype=np.int64)
 
     def add(self, codes: StreamCodes, n_codes: int) -> None:
         """Count rows (n, n_raters) of codes from -1 to n_codes - 1."""
-        if len(codes):
-            self.add_counted(*distinct_rows(codes, n_codes))
+        shape = n_codes + 1, codes.shape[1]
+        n_keys = shape[0] ** shape[1]
+        if n_keys > _MAX_KEYS:
+            if len(codes):
+                self.add_counted(*distinct_rows(codes, n_codes))
+            return
+        if shape != self._shape:
+            self._empty_table()
+            self._shape, self._table = shape, np.zeros(n_keys, dtype=np.int64)
+        self._table += np.bincount(_row_keys(codes, shape[0]), minlength=n_keys)
+
+    def _empty_table(self) -> None:
+        (keys,) = self._table.nonzero()
+        freq, self._table = self._table[keys], np.zeros_like(self._table)
+        if len(keys):
+            self.add_counted(digits(keys, *self._shape) - 1, freq)
 
     def add_counted(self, rows: NDArray[Any], freq: NDArray[np.int64]) -> None:
         """Add rows that are counted."""
@@ -149,6 +165,7 @@ class DistinctRows:
 
     def merged(self) -> tuple[NDArray[np.int8], NDArray[np.int64]]:
         """Return every distinct row once, and how often it occurs."""
+        self._empty_table()
         width = max((part.shape[1] for part in self._rows), default=1)
         rows = np.concatenate(
             [np.empty((0, width), np.int8), *(widened(p, width) for p in self._rows)]
@@ -160,6 +177,15 @@ class DistinctRows:
                 f"{len(rows)} items that differ, more than a stream counts"
             )
         return rows, freq
+
+
+def _row_keys(codes: StreamCodes, base: int) -> NDArray[np.uint16]:
+    # (n, n_raters) codes from -1 on, column by column -> (n,): a digit of each rater
+    keys = (codes[:, -1] + 1).astype(np.uint16)
+    for column in codes.T[-2::-1]:
+        keys *= base
+        keys += (column + 1).view(np.uint8)
+    return keys
 
 
 def widened(rows: NDArray[np.int8], width: int) -> NDArray[np.int8]:

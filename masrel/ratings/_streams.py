@@ -104,7 +104,9 @@ class _Wide:
     large: LargeFile
     layout: Layout
     order: Ascending | Hashed
-    texts: TextCodes = field(default_factory=lambda: TextCodes(_MAX_GRADES, "grades"))
+    texts: TextCodes = field(
+        default_factory=lambda: TextCodes(_MAX_GRADES, "grades", by_value=True)
+    )
     rows: DistinctRows = field(default_factory=DistinctRows)
     first: StreamCodes | None = None  # (n_raters,): the first row
     n_rows: int = 0

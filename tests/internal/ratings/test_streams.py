@@ -13,7 +13,13 @@ import pytest
 
 from masrel.agreement import coefficient
 from masrel.errors import ParameterError, RatingsError
-from masrel.ratings import RatingsFile, _large_files, _streams, read_ratings
+from masrel.ratings import (
+    RatingsFile,
+    _large_files,
+    _stream_codes,
+    _streams,
+    read_ratings,
+)
 from masrel.ratings._stream_codes import merged_rows
 
 pyarrow = pytest.importorskip("pyarrow")
@@ -444,6 +450,42 @@ def test_ctrl_c_while_duckdb_is_started_is_no_other_error(
     path = written(tmp_path / "long.parquet", columns)
     with pytest.raises(KeyboardInterrupt):
         read_ratings(path, stream=True, progress=lambda *_: time.sleep(0.2))
+
+
+@pytest.mark.parametrize("lowest", [-2, 0, 1, 100])
+@pytest.mark.parametrize("kind", ["i1", "i8", "u1"])
+def test_grades_that_are_whole_numbers_are_looked_up_only_where_one_is_new(
+    tmp_path: Path, lowest: int, kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    grades = (made(5, 2000) + max(lowest, 0 if kind == "u1" else lowest)).astype(kind)
+    grades[1900:, 1] = grades.max() + 1  # met late
+    grades[1950:, 2] = grades.max() + 4  # and one behind a gap
+    columns = {"item": np.arange(2000), **{f"r{j}": grades[:, j] for j in range(4)}}
+    path = written(tmp_path / "wide.parquet", columns)
+    looked_up = []
+    counted = _stream_codes.TextCodes._looked_up
+
+    def counting(self: Any, index: Any, *rest: Any) -> Any:
+        looked_up.append(len(index))
+        return counted(self, index, *rest)
+
+    monkeypatch.setattr(_stream_codes.TextCodes, "_looked_up", counting)
+    assert_same(*both(path))
+    assert 3 <= len(looked_up) <= 10  # of 4 columns in 34 batches
+
+
+def test_rows_of_few_grades_are_counted_in_one_table(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> None:
+        raise AssertionError("counted batch by batch")
+
+    grades = made(6)
+    columns = {"item": np.arange(400), **{f"r{j}": grades[:, j] for j in range(4)}}
+    path = written(tmp_path / "wide.parquet", columns)
+    whole = read_ratings(path, stream=False)
+    monkeypatch.setattr(_stream_codes, "distinct_rows", refuse)
+    assert_same(read_ratings(path, stream=True), whole)
 
 
 def test_rows_that_are_merged_are_counted_once() -> None:
