@@ -12,6 +12,7 @@ if TYPE_CHECKING:
         to_frame,
         write_analysis,
     )
+    from masrel.analysis._gate_results import GateResult, check_gates
     from masrel.analysis._grading import Effect, GradeRegression, grade_regression
     from masrel.analysis._plan import analyze
     from masrel.analysis._results import (
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Analysis",
     "Effect",
+    "GateResult",
     "GradeRegression",
     "InPersonAgreement",
     "InPersonPair",
@@ -44,6 +46,7 @@ __all__ = [
     "Speeds",
     "analyze",
     "as_analysis_document",
+    "check_gates",
     "grade_regression",
     "to_frame",
     "write_analysis",
@@ -51,8 +54,10 @@ __all__ = [
 
 _HOMES = {
     "Effect": "_grading",
+    "GateResult": "_gate_results",
     "GradeRegression": "_grading",
     "analyze": "_plan",
+    "check_gates": "_gate_results",
     "as_analysis_document": "_analysis_json",
     "grade_regression": "_grading",
     "to_frame": "_analysis_json",

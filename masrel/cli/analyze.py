@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from masrel.cli._gating import GateOptions, conclude, gate_options
 from masrel.cli._options import (
     STDOUT,
     OutputOptions,
@@ -24,11 +25,17 @@ if TYPE_CHECKING:
 @click.command("analyze")
 @click.argument("study", type=click.Path(path_type=Path))
 @ratings_option
+@gate_options()
 @output_options(
     json="Write the analysis here; - prints it, and nothing else, on stdout.",
     csv="Print the tables as CSV.",
 )
-def analyze(study: Path, ratings_file: Path | None, output: OutputOptions) -> None:
+def analyze(
+    study: Path,
+    ratings_file: Path | None,
+    gating: GateOptions,
+    output: OutputOptions,
+) -> None:
     """Compute what the plan of STUDY asks for.
 
     Prints the tables and writes STUDY/analysis.json, or the file of --json.
@@ -36,6 +43,7 @@ def analyze(study: Path, ratings_file: Path | None, output: OutputOptions) -> No
     from masrel import analysis as library
 
     data = read_study(study, ratings_file)
+    gates = gating.gates(data.protocol)
     with warnings_as_notes():
         analysis = library.analyze(
             data.protocol,
@@ -45,6 +53,7 @@ def analyze(study: Path, ratings_file: Path | None, output: OutputOptions) -> No
         )
     if output.json_file == STDOUT:
         write_json(library.as_analysis_document(analysis), STDOUT)
+        conclude(analysis, gates, gating)
         return
     destination = output.json_file or data.paths.analysis_file
     library.write_analysis(
@@ -52,6 +61,7 @@ def analyze(study: Path, ratings_file: Path | None, output: OutputOptions) -> No
     )
     _show(data, analysis, csv=output.csv, raw=output.raw_csv)
     click.echo(f"read: {data.read}\nanalysis: {destination}", err=True)
+    conclude(analysis, gates, gating)
 
 
 def _show(data: "StudyData", analysis: "Analysis", *, csv: bool, raw: bool) -> None:

@@ -6,6 +6,7 @@ import click
 from tqdm import tqdm
 
 from masrel._files import check_inside, refuse_record
+from masrel.cli._gating import GateOptions, conclude, gate_options
 from masrel.cli._options import (
     OutputOptions,
     output_options,
@@ -25,6 +26,7 @@ from masrel.cli._options import (
     help="Folder to write into; default: STUDY/report.",
 )
 @ratings_option
+@gate_options()
 @output_options(
     raw_csv="No apostrophe before a text that a spreadsheet would run.",
     quiet="No progress bar.",
@@ -33,6 +35,7 @@ def report(
     study: Path,
     destination: Path | None,
     ratings_file: Path | None,
+    gating: GateOptions,
     output: OutputOptions,
 ) -> None:
     """Write the report of STUDY: HTML, Markdown, tables and figures.
@@ -50,6 +53,7 @@ def report(
         check_inside(destination, study)
     refuse_record(destination / "report.html")  # before anything is computed
     data = read_study(study, ratings_file)
+    gates = gating.gates(data.protocol)
     with warnings_as_notes():
         analysis = analyze(
             data.protocol,
@@ -82,3 +86,4 @@ def report(
         )
     click.echo(f"read: {data.read}", err=True)
     click.echo(files.html)
+    conclude(analysis, gates, gating)

@@ -4,6 +4,7 @@ Goes in: ``protocol.toml``. Comes out: a :class:`Protocol`, and from it the scal
 the joint parameters of each model in SI units, and two hashes.
 """
 
+from masrel.protocol._gates import Gate, GateKeys, gates_of, parse_gate
 from masrel.protocol._occasions import Occasions
 from masrel.protocol._questions import Question, Questionnaire
 from masrel.protocol.content import (
@@ -42,6 +43,8 @@ __all__ = [
     "DeviceSettings",
     "ElbowConstants",
     "EstimatePlan",
+    "Gate",
+    "GateKeys",
     "Model",
     "ModelConstants",
     "Occasions",
@@ -62,7 +65,9 @@ __all__ = [
     "Training",
     "copy_template",
     "elbow_parameters",
+    "gates_of",
     "joint_model",
+    "parse_gate",
     "presented_content",
     "presented_hash",
     "protocol_hash",

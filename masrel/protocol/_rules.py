@@ -9,6 +9,7 @@ import msgspec
 
 from masrel._input import listed
 from masrel.protocol._decode import got, needed, with_id
+from masrel.protocol._gates import gate_rules
 from masrel.protocol._kinds import DEFAULT_KIND, kind_problem, value_problems
 from masrel.protocol._occasions import occasion_rules
 from masrel.protocol._order_rules import order_rules
@@ -51,6 +52,7 @@ def broken_rules(values: Values) -> Iterator[str]:
         kind_rules(values),
         joint_rules(values),
         _plan(values),
+        gate_rules(values),
     )
 
 

@@ -186,6 +186,7 @@ _LATER: dict[str, dict[str, object]] = {
         "torque_sensor": False,
     },
     "simulated_raters": {"hold_s": 0.0, "hand": "clamp"},
+    "report": {"gates": ()},
     "training": {
         "kappa_insufficient": 0.6,
         "kappa_sufficient": 0.8,

@@ -12,6 +12,7 @@ from msgspec import Meta
 
 from masrel.elbow.parameters import PostCatch, ResidualReading
 from masrel.estimates import Target
+from masrel.protocol._gates import GateKeys
 from masrel.protocol._keys import _Identifier, _Table, _Text
 from masrel.protocol._occasions import Occasions
 from masrel.protocol._questions import Questionnaire
@@ -303,6 +304,7 @@ class Report(_Table, frozen=True, kw_only=True):
         ],
         ...,
     ] = ("design", "grades", "agreement", "intended", "test-retest", "speeds", "traces")
+    gates: tuple[GateKeys, ...] = ()
 
 
 class Protocol(_Table, frozen=True, kw_only=True):

@@ -12,7 +12,15 @@ import msgspec
 import pytest
 
 from docs.make.pages import ROOT, Block, PageError, pages, read, renewed
-from masrel.protocol import DeviceSettings, Model, ScaleDefinition
+from masrel.protocol import (
+    DeviceSettings,
+    Model,
+    Questionnaire,
+    Rater,
+    RaterField,
+    Report,
+    ScaleDefinition,
+)
 from tests.architecture.test_names import DIALECT, PREFIXES, bound
 from tests.protocol.documents import VALID
 
@@ -44,6 +52,10 @@ NOT_RUN = [
 PIECES = {
     "device": (DeviceSettings, {}),
     "models": (Model, VALID["models"][0]),
+    "questionnaires": (Questionnaire, {}),
+    "rater_fields": (dict[str, RaterField], {}),
+    "raters": (Rater, {}),
+    "report": (Report, {}),
     "scale": (ScaleDefinition, {}),
 }
 

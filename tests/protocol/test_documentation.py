@@ -33,6 +33,7 @@ TABLES = {
     "[analysis]": definition.Analysis,
     "[[analysis.estimates]]": definition.EstimatePlan,
     "[report]": definition.Report,
+    "[[report.gates]]": definition.GateKeys,
 }
 
 
@@ -69,7 +70,12 @@ def test_every_key_is_there_with_its_default(heading: str) -> None:
 def test_every_table_of_a_protocol_is_there() -> None:
     names = {heading.strip("[]").removesuffix(".NAME") for heading in TABLES}
     fields = {field.name for field in msgspec.structs.fields(Protocol)}
-    inner = {"analysis.estimates", "models.constants", "questionnaires.questions"}
+    inner = {
+        "analysis.estimates",
+        "models.constants",
+        "questionnaires.questions",
+        "report.gates",
+    }
     assert names == fields | inner
 
 
