@@ -59,6 +59,13 @@ def regular(descriptor: int, path: Path) -> int:
     raise OSError(errno.EINVAL, "not a regular file", str(path))
 
 
+def not_utf8(error: UnicodeDecodeError) -> str:
+    """Return where a text is not UTF-8, for a message that begins with its file."""
+    line = error.object.count(b"\n", 0, error.start) + 1
+    byte = error.object[error.start]
+    return f"line {line}: needed UTF-8 text, got the byte {byte:#04x}; save it as UTF-8"
+
+
 def listed(names: Iterable[str]) -> str:
     """Return names as a message has them: the first of them where they are many."""
     names = list(names)

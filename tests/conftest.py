@@ -1,7 +1,24 @@
 """Settings of property tests: the same examples in every run, no time limit."""
 
+from collections.abc import Callable, Iterator
+
+import pytest
 from hypothesis import settings
+
+from tests.faults import Faults
 
 # derandomize: a failure repeats; 50 examples a property; a slow machine is no failure.
 settings.register_profile("masrel", derandomize=True, deadline=None, max_examples=50)
 settings.load_profile("masrel")
+
+
+@pytest.fixture
+def faults(
+    request: pytest.FixtureRequest, record_property: Callable[[str, object], None]
+) -> Iterator[Faults]:
+    """Counts of injected faults; whole ones go into the table of docs/record.md."""
+    counts = Faults()
+    yield counts
+    if request.node.get_closest_marker("faults"):
+        for row in counts.rows():
+            record_property("faults", row)

@@ -8,7 +8,7 @@ from typing import Any
 
 import msgspec
 
-from masrel._input import MAX_SMALL, parse_toml, read_regular
+from masrel._input import MAX_SMALL, not_utf8, parse_toml, read_regular
 from masrel.elbow.identification._model_file import (
     CONSTANT_KEYS,
     FORMAT,
@@ -92,14 +92,15 @@ def read_protocol(path: Path) -> Protocol:
 def _read_toml(path: Path) -> dict[str, object]:
     try:
         return parse_toml(read_regular(path, most=MAX_SMALL))
+    except NotADirectoryError as error:
+        raise ProtocolError(
+            f"{path.parent}: needed the folder of a study, got a file"
+        ) from error
     except OSError as error:
         reason = error.strerror or str(error)
         raise ProtocolError(f"{path}: needed a protocol file, got: {reason}") from error
     except UnicodeDecodeError as error:
-        raise ProtocolError(
-            f"{path}: needed UTF-8 text, got byte {error.object[error.start]:#04x} "
-            f"at offset {error.start}"
-        ) from error
+        raise ProtocolError(f"{path}: {not_utf8(error)}") from error
     except ValueError as error:  # TOMLDecodeError says line and column
         raise ProtocolError(f"{path}: needed valid TOML, got: {error}") from error
 

@@ -169,6 +169,13 @@ def _json_files(name: str, suffix: str, data: bytes) -> list[tuple[str, list[Any
         return files
 
 
+def _csv_values(name: str, text: str) -> list[Any]:
+    try:
+        return list(csv.DictReader(io.StringIO(text, newline="")))
+    except csv.Error as error:
+        raise RatingsError(f"{name}: needed cells of a table ({error})") from error
+
+
 def _json_values(name: str, suffix: str, data: bytes) -> list[Any]:
     # values of JSON, of JSON lines whatever the name ends with, or rows of a CSV file
     try:
@@ -176,7 +183,7 @@ def _json_values(name: str, suffix: str, data: bytes) -> list[Any]:
     except UnicodeDecodeError as error:
         raise RatingsError(f"{name}: needed text in UTF-8 ({error})") from error
     if suffix == ".csv":
-        return list(csv.DictReader(io.StringIO(text, newline="")))
+        return _csv_values(name, text)
     if suffix != ".jsonl":
         try:
             values = _parsed(name, text)

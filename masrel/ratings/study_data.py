@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from masrel._input import MAX_TABLE, read_regular
 from masrel.conduct import excluded_raters
 from masrel.errors import RatingsError
 from masrel.protocol import Protocol, StudyPaths, scale_of
@@ -156,12 +157,16 @@ def table_differences(path: Path, ratings: Ratings) -> Iterator[str]:
     """
     if not path.is_file():
         return
-    text = path.read_bytes().decode("utf-8", errors="replace")
+    text = read_regular(path, most=MAX_TABLE).decode("utf-8", errors="replace")
     texts = _texts(ratings)
     if text in texts:
         return
     logged = next((t for t in texts if _names(t) == _names(text)), texts[0])
-    rows, needed = _rows(text), _rows(logged)
+    try:
+        rows, needed = _rows(text), _rows(logged)
+    except csv.Error as error:
+        yield f"it is no table ({error})"
+        return
     if rows == needed:
         yield "the ratings are the same, but not what stands around them"
     yield from _differences(rows, needed)

@@ -14,6 +14,7 @@ from masrel._input import (
     csv_format,
     format_problem,
     listed,
+    not_utf8,
     read_regular,
 )
 from masrel.errors import RatingsError
@@ -300,11 +301,7 @@ def _read_rows(path: Path) -> _CsvRows:
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
-        raise RatingsError(
-            f"{path}: line {line}: needed UTF-8 text, got the byte "
-            f"0x{data[error.start]:02x}; save the file as UTF-8"
-        ) from error
+        raise RatingsError(f"{path}: {not_utf8(error)}") from error
     if "\0" in text:
         line = text.count("\n", 0, text.index("\0")) + 1
         raise RatingsError(f"{path}: line {line}: needed text, got a zero byte")

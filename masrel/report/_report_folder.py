@@ -2,8 +2,8 @@
 
 Tables and figures have the start of their hash in their names, so that those of a new
 report never take the place of those that a page still shows. They are on disk before
-the first page is replaced; the manifest names them all; then those go that only the
-manifest before names. What else is in the folder stays.
+the first page is replaced; the manifest names them all; then those go that it does not
+name, also of a report that was never finished. What else is in the folder stays.
 """
 
 import hashlib
@@ -14,12 +14,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from masrel._files import refuse_record, sync_folder, write_files
-from masrel._input import MAX_RECORDING, MAX_SMALL, parse_json, read_regular
+from masrel._input import MAX_RECORDING, read_regular
 
 MANIFEST = "manifest.json"
 _FORMAT = "masrel report 1"
 
 _N_HEX = 16  # of a hash in a name
+_ASSET_FOLDERS = ("tables", "figures")
 _ASSET = re.compile(r"(?:tables|figures)/[\w.-]+-([0-9a-f]{16})\.(?:csv|png|svg)")
 
 
@@ -45,7 +46,6 @@ def replace_report(
     """Put a report into a folder, in the place of the one that is there."""
     for name in (*pages, MANIFEST):
         refuse_record(folder / name)
-    before = _named_before(folder)
     new = {
         folder / place: data
         for place, data in assets.contents.items()
@@ -62,7 +62,8 @@ def replace_report(
     }
     manifest = json.dumps(document, indent=1, ensure_ascii=False) + "\n"
     write_files({folder / MANIFEST: manifest}, within=folder)
-    _remove(folder, [place for place in before if place not in assets.contents])
+    for name in _ASSET_FOLDERS:
+        _remove_others(folder, name, assets.contents)
 
 
 def _hash(data: bytes) -> str:
@@ -78,30 +79,20 @@ def _is_there(path: Path, data: bytes) -> bool:
         return False
 
 
-def _named_before(folder: Path) -> list[str]:
-    # The assets that the manifest in the folder names, if there is a good one
-    try:
-        document = parse_json(read_regular(folder / MANIFEST, most=MAX_SMALL))
-    except (OSError, ValueError):
-        return []
-    files = document.get("files") if isinstance(document, dict) else None
-    if not isinstance(files, dict):
-        return []
-    return [place for place in files if _ASSET.fullmatch(place)]
-
-
-def _remove(folder: Path, places: list[str]) -> None:
-    # A file goes only if it is what was written: its name holds its hash.
-    for place in places:
-        path, asset = folder / place, _ASSET.fullmatch(place)
-        if asset is None or path.is_symlink() or path.parent.is_symlink():
+def _remove_others(folder: Path, name: str, kept: Mapping[str, bytes]) -> None:
+    # A file goes only if it is what a report wrote: its name holds its hash.
+    inside = folder / name
+    if inside.is_symlink() or not inside.is_dir():
+        return
+    for path in sorted(inside.iterdir()):
+        place = f"{name}/{path.name}"
+        asset = _ASSET.fullmatch(place)
+        if asset is None or place in kept or path.is_symlink():
             continue
         try:
             data = read_regular(path, most=MAX_RECORDING)
-        except OSError:  # gone, or no such file any more
+        except OSError:  # gone, or no file
             continue
         if _hash(data).startswith(asset[1]):
             path.unlink()
-    for name in {Path(place).parent for place in places}:
-        if (folder / name).is_dir():
-            sync_folder(folder / name)
+    sync_folder(inside)

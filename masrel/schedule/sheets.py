@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from masrel._files import make_folder, write_files
-from masrel._input import MAX_SMALL, read_regular
+from masrel._input import MAX_SMALL, not_utf8, read_regular
 from masrel.errors import ScheduleError
 from masrel.protocol import (
     Protocol,
@@ -113,7 +113,7 @@ def _read_lines(path: Path) -> list[str]:
         reason = error.strerror or str(error)
         raise ScheduleError(f"{path}: needed a schedule file, got: {reason}") from error
     except UnicodeDecodeError as error:
-        raise ScheduleError(f"{path}: needed UTF-8 text, got other bytes") from error
+        raise ScheduleError(f"{path}: {not_utf8(error)}") from error
 
 
 def _read_head(lines: list[str], path: Path, problems: list[str]) -> dict[str, str]:

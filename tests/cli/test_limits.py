@@ -159,6 +159,22 @@ def test_long_numbers_and_cells_of_other_files(study: Path, masrel: Caller) -> N
         refused(masrel("check", study), str(ratings))
 
 
+@pytest.mark.parametrize("size", [200_000, 65_000_000])
+def test_a_table_beside_its_logs_that_is_one_long_cell(
+    size: int, study: Path, masrel: Caller
+) -> None:
+    assert masrel("schedule", study).code == 0
+    names = ("--rater", "R1", "--session", "test", "--grades", "simulated")
+    assert masrel("run", study, *names, "--clock", "simulated", "--quiet").code == 0
+    ratings = study / "ratings" / "ratings.csv"
+    ratings.parent.mkdir()
+    ratings.write_bytes(b"[" * size)
+    for verb in ("verify", "analyze"):
+        done = masrel(verb, study)
+        assert done.code == 2
+        assert str(ratings) in done.err.splitlines()[-1] or "broken" in done.err
+
+
 @pytest.mark.slow
 def test_wide_headers_take_linear_time(study: Path, masrel: Caller) -> None:
     ratings = study / "ratings" / "ratings.csv"

@@ -11,6 +11,7 @@ import re
 import signal
 import subprocess
 import sys
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -20,7 +21,16 @@ from typing import Any
 import pytest
 
 CHANGING = ("open", "write", "fsync", "replace", "unlink", "mkdir", "chmod")
-SYSCALLS = ("openat", "write", "fsync", "rename", "unlink", "mkdir", "chmod", "close")
+
+# Calls of the system that change a file or a folder, and those that need space
+SYSCALLS = (
+    *("open", "openat", "creat", "write", "writev", "pwrite64", "ftruncate"),
+    *("fsync", "fdatasync", "rename", "renameat", "renameat2", "link", "symlink"),
+    *("unlink", "unlinkat", "mkdir", "mkdirat", "rmdir", "chmod", "fchmod", "fchmodat"),
+)
+_TAKE_NONE = ("unlink", "unlinkat", "rmdir", "chmod", "fchmod", "fchmodat")
+_OPENS = ("open", "openat")
+_WRITES_TEXT = ("write", "writev", "pwrite64")  # which may name a folder
 
 Contents = dict[str, str]
 
@@ -114,23 +124,47 @@ def masrel_command(*arguments: object) -> list[str]:
     return [sys.executable, "-B", "-c", code, *map(str, arguments)]
 
 
-def syscalls_on(root: Path, log: Path, *arguments: object) -> list[tuple[str, int]]:
-    """The calls of a verb that touch a folder: name, and count of that name so far."""
-    command = ["strace", "-y", "-o", str(log), "-e", f"trace={','.join(SYSCALLS)}"]
-    subprocess.run([*command, *masrel_command(*arguments)], check=True)
-    counts = dict.fromkeys(SYSCALLS, 0)
-    found = []
-    for line in log.read_text(errors="replace").splitlines():
-        name = line.partition("(")[0]
-        if name in counts:
-            counts[name] += 1
-            if str(root) in line:
-                found.append((name, counts[name]))
+@dataclass(frozen=True, slots=True)
+class Syscall:
+    """A call of the system: its name, and which of that name in the process."""
+
+    name: str
+    place: int
+
+    @property
+    def needs_space(self) -> bool:
+        return self.name not in _TAKE_NONE
+
+    def inject(self, what: str, command: list[str]) -> subprocess.CompletedProcess[str]:
+        """Run a command in which this call meets a signal or an error instead."""
+        # The faster way, by which strace 6.1 injects errors, but no signals
+        fast = [] if what.startswith("signal") else ["-f", "--seccomp-bpf"]
+        traced = ["strace", *fast, "-o", os.devnull, "-e", f"trace={self.name}"]
+        traced += ["-e", f"inject={self.name}:{what}:when={self.place}"]
+        return subprocess.run([*traced, *command], capture_output=True, text=True)
+
+
+def syscalls_on(root: Path, log: Path, command: list[str]) -> list[Syscall]:
+    """Return the calls of a command that change anything in a folder, in order."""
+    traced = ["strace", "-f", "--seccomp-bpf", "-y", "-s", "4096", "-o", str(log)]
+    traced += ["-e", f"trace={','.join(SYSCALLS)}"]
+    subprocess.run([*traced, *command], check=True, capture_output=True)
+    counts: dict[str, int] = defaultdict(int)
+    found, threads = [], set()
+    lines = log.read_text(errors="replace").splitlines()
+    main = lines[0].split()[0]
+    for line in lines:
+        thread, name = re.match(r"(\d+) +(\w*)", line).groups()
+        counts[name] += thread == main
+        reads = name in _OPENS and not re.search("O_WRONLY|O_RDWR|O_CREAT", line)
+        target = line.partition(">")[0] if name in _WRITES_TEXT else line
+        if name in SYSCALLS and str(root) in target and not reads:
+            found.append(Syscall(name, counts[name]))
+            threads.add(thread)
+    assert threads == {main}  # the one whose calls strace counts
     return found
 
 
-def killed_by_strace(name: str, place: int, *arguments: object) -> None:
-    inject = f"inject={name}:signal=SIGKILL:when={place}"
-    command = ["strace", "-o", os.devnull, "-e", f"trace={name}", "-e", inject]
-    done = subprocess.run([*command, *masrel_command(*arguments)], capture_output=True)
-    assert done.returncode == -signal.SIGKILL, (name, place)
+def killed_by_strace(syscall: Syscall, command: list[str]) -> None:
+    done = syscall.inject("signal=SIGKILL", command)
+    assert done.returncode == -signal.SIGKILL, (syscall, done.stderr)

@@ -1,7 +1,9 @@
 """Verbs that are killed, or whose disk is full, at each call that changes a file."""
 
+import math
 import shutil
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from pathlib import Path
 from random import Random
 
@@ -10,15 +12,19 @@ from click.testing import CliRunner
 
 from masrel.cli import cli
 from tests.cli.process import Caller
+from tests.faults import Faults
 from tests.flow.conftest import run
 from tests.flow.cuts import (
+    Contents,
     Cuts,
+    Syscall,
     called_before,
     check_links,
     check_old_or_new,
     contents,
     full_disk_at,
     killed_by_strace,
+    masrel_command,
     syscalls_on,
 )
 
@@ -150,47 +156,94 @@ def test_a_full_disk_at_any_call_of_what_computes(
     full_at_each_call(verb, 8, prepared, masrel, tmp_path)
 
 
-def is_done(verb: str, root: Path) -> bool:
-    # a study that is there is not made again
-    return verb == "init" and (root / "protocol.toml").exists()
+@dataclass
+class Traced:
+    """A verb whose calls of the system are known, and the study that it is for."""
+
+    verb: str
+    root: Path
+    kept: Path
+    call: list[str]
+    syscalls: list[Syscall] = field(default_factory=list)
+    before: Contents = field(default_factory=dict)
+    after: Contents = field(default_factory=dict)
+
+    def restore(self) -> None:
+        shutil.rmtree(self.root)
+        shutil.copytree(self.kept, self.root)
+
+    def check(self) -> None:
+        """All files are old or new, and the same call again makes all of them new."""
+        check_old_or_new(self.before, [contents(self.root)], self.after)
+        check_links(self.root)
+        is_made = (self.root / "protocol.toml").exists()
+        if not (self.verb == "init" and is_made):  # which is not made again
+            assert CliRunner().invoke(cli, self.call).exit_code == 0
+        assert contents(self.root) == self.after
 
 
-def each_syscall(verb: str, share: float, prepared: Prepared, tmp_path: Path) -> None:
-    # Kills the process before every call, or a seeded share of the calls.
+@pytest.fixture
+def traced(prepared: Prepared, tmp_path: Path) -> Callable[[str], Traced]:
+    """Makes a study for a verb, and follows the verb."""
     if shutil.which("strace") is None:
         pytest.skip("needs strace: it kills the process at a call of the system")
-    root, call = prepared(verb)
-    kept = tmp_path / "kept"
-    shutil.copytree(root, kept)
-    syscalls = syscalls_on(root, tmp_path / "log", *call)
-    after = contents(root)
-    random = Random(11)
-    for name, place in syscalls:
-        if random.random() >= share:
-            continue
-        shutil.rmtree(root)
-        shutil.copytree(kept, root)
-        before = contents(root)
-        killed_by_strace(name, place, *call)
-        check_old_or_new(before, [contents(root)], after)
-        check_links(root)
-        # and the same call again does it all, whatever the kill left
-        if not is_done(verb, root):
-            assert CliRunner().invoke(cli, call).exit_code == 0
-        assert contents(root) == after
+
+    def make(verb: str) -> Traced:
+        root, call = prepared(verb)
+        traced = Traced(verb, root, tmp_path / "kept", call)
+        traced.before = contents(root)
+        shutil.copytree(root, traced.kept)
+        command = masrel_command(*call)
+        traced.syscalls = syscalls_on(root, tmp_path / "log", command)
+        traced.after = contents(root)
+        assert traced.after != traced.before
+        return traced
+
+    return make
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("verb", VERBS)
-def test_a_kill_at_some_system_calls(
-    verb: str, prepared: Prepared, tmp_path: Path
-) -> None:
-    each_syscall(verb, 0.02 if verb == "report" else 0.1, prepared, tmp_path)
+def some(syscalls: list[Syscall], share: float) -> list[Syscall]:
+    """Return a seeded share of them, or all."""
+    return Random(11).sample(syscalls, math.ceil(share * len(syscalls)))
 
 
-@pytest.mark.long
+EVERY = pytest.mark.parametrize(
+    "share",
+    [
+        pytest.param(0.1, marks=pytest.mark.slow),
+        pytest.param(1.0, marks=[pytest.mark.long, pytest.mark.faults]),
+    ],
+)
+
+
+@EVERY
 @pytest.mark.parametrize("verb", VERBS)
 def test_a_kill_at_every_system_call(
-    verb: str, prepared: Prepared, tmp_path: Path
+    verb: str, share: float, traced: Callable[[str], Traced], faults: Faults
 ) -> None:
-    each_syscall(verb, 1.0, prepared, tmp_path)
+    made = traced(verb)
+    for syscall in some(made.syscalls, share):
+        made.restore()
+        with faults(f"`{verb}` killed at a system call that changes a file"):
+            killed_by_strace(syscall, masrel_command(*made.call))
+            made.check()
+
+
+@EVERY
+@pytest.mark.parametrize("verb", VERBS)
+def test_a_full_disk_at_every_system_call(
+    verb: str, share: float, traced: Callable[[str], Traced], faults: Faults
+) -> None:
+    made = traced(verb)
+    needs_space = [syscall for syscall in made.syscalls if syscall.needs_space]
+    for syscall in some(needs_space, share):
+        made.restore()
+        with faults(f"`{verb}` with a full disk at a system call that needs space"):
+            done = syscall.inject("error=ENOSPC", masrel_command(*made.call))
+            assert done.returncode == 2, done.stderr
+            assert not list(made.root.rglob(".masrel-*"))
+            said = done.stderr.splitlines()[-1]
+            assert "No space left on device" in said
+            assert str(made.root) in said
+            assert ".masrel-" not in said
+            made.check()

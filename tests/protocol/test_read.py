@@ -470,7 +470,7 @@ def test_a_rater_without_any_usable_key_hides_no_other_problem(tmp_path: Path) -
     [
         (b"[study\n", "needed valid TOML, got: .*line 1"),
         (b'a = 1\nb = "\n', "needed valid TOML, got: .*line 2"),
-        (b'a = "\xff"', "needed UTF-8 text, got byte 0xff at offset 5"),
+        (b'a = "\xff"', "line 1: needed UTF-8 text, got the byte 0xff"),
         (None, "needed a protocol file, got: No such file"),
     ],
 )

@@ -17,6 +17,7 @@ from masrel.ratings import ratings_from_logs
 from masrel.recording import read_recording
 from masrel.run import Event, SimulatedGrades, read_log, run_session
 from masrel.verification import verify_study
+from tests.faults import Faults
 
 Small = tuple[StudyPaths, Protocol]
 KILLER = Path(__file__).with_name("kill_at.py")
@@ -72,9 +73,10 @@ def killed_at(root: Path, line: int, n_bytes: int) -> None:
     assert died.returncode == -signal.SIGKILL, died.stderr
 
 
+@pytest.mark.faults
 @pytest.mark.parametrize("n_bytes", [pytest.param(0, marks=pytest.mark.slow), 60])
 def test_killed_at_each_line_and_gone_on_with_it_is_as_if_never_killed(
-    new_study: Callable[..., Small], tmp_path: Path, n_bytes: int
+    new_study: Callable[..., Small], tmp_path: Path, n_bytes: int, faults: Faults
 ) -> None:
     study, protocol = new_study(OCCASIONS)
     # All runs go at once; each in a copy of the study.
@@ -87,31 +89,32 @@ def test_killed_at_each_line_and_gone_on_with_it_is_as_if_never_killed(
     whole = read_log(study.log_file("R1", "test"))
     assert [event.kind for event in whole] == KINDS
     for line, copy in copies.items():
-        killed_at(copy.root, line, n_bytes)
-        log = copy.log_file("R1", "test")
-        before = whole_lines(log)
-        assert len(before) == line - 1
-        go_on((copy, protocol))
-        after = whole_lines(log)
-        assert after[: len(before)] == before
-        events = read_log(log)
-        for kind in ("grade", "practice-grade", "answered", "break", "instructed"):
-            assert facts(events, kind) == facts(whole, kind)
-        assert ("recovered" in {e.kind for e in events}) is (n_bytes > 0)
-        # every recording is in the log, also of a presentation that was not logged
-        named = {str(e.fields.get("recording")) for e in events} - {"None"}
-        there = {f"test_R1/{f.name}" for f in copy.sessions.glob("*/*.npz")}
-        assert there == named
-        assert not list(copy.sessions.glob("*/*.partial"))
-        is_cut = KINDS[line - 1] in (
-            "presented",
-            "practised",
-            "grade",
-            "practice-grade",
-        )
-        assert len(there) == 4 + is_cut
-        assert ratings_from_logs(copy, protocol).table.equals(expected.table)
-        assert verify_study(copy).is_whole
+        with faults("a session killed at each line of its log, and gone on with"):
+            killed_at(copy.root, line, n_bytes)
+            log = copy.log_file("R1", "test")
+            before = whole_lines(log)
+            assert len(before) == line - 1
+            go_on((copy, protocol))
+            after = whole_lines(log)
+            assert after[: len(before)] == before
+            events = read_log(log)
+            for kind in ("grade", "practice-grade", "answered", "break", "instructed"):
+                assert facts(events, kind) == facts(whole, kind)
+            assert ("recovered" in {e.kind for e in events}) is (n_bytes > 0)
+            # every recording is in the log, also of a presentation that was not logged
+            named = {str(e.fields.get("recording")) for e in events} - {"None"}
+            there = {f"test_R1/{f.name}" for f in copy.sessions.glob("*/*.npz")}
+            assert there == named
+            assert not list(copy.sessions.glob("*/*.partial"))
+            is_cut = KINDS[line - 1] in (
+                "presented",
+                "practised",
+                "grade",
+                "practice-grade",
+            )
+            assert len(there) == 4 + is_cut
+            assert ratings_from_logs(copy, protocol).table.equals(expected.table)
+            assert verify_study(copy).is_whole
 
 
 def facts(events: Sequence[Event], kind: str) -> list[object]:
@@ -207,11 +210,11 @@ def n_kept(study: StudyPaths) -> dict[str, int]:
     "n_kills",
     [
         pytest.param(20, marks=pytest.mark.slow),
-        pytest.param(200, marks=pytest.mark.long),
+        pytest.param(300, marks=[pytest.mark.long, pytest.mark.faults]),
     ],
 )
 def test_killed_at_any_moment_of_many_stretches_nothing_that_was_logged_is_lost(
-    new_study: Callable[..., Small], tmp_path: Path, n_kills: int
+    new_study: Callable[..., Small], tmp_path: Path, n_kills: int, faults: Faults
 ) -> None:
     study, protocol = new_study(OCCASIONS, FREE)
     whole = StudyPaths(tmp_path / "whole")
@@ -226,21 +229,22 @@ def test_killed_at_any_moment_of_many_stretches_nothing_that_was_logged_is_lost(
     assert expected["n_stretches"].max() > 1
     n_cut = 0
     for copy in copies:
-        log = copy.log_file("R1", "test")
-        before, kept = whole_lines(log), n_kept(copy)
-        go_on((copy, protocol))
-        after = whole_lines(log)
-        assert after[: len(before)] == before
-        events = read_log(log)
-        graded = [e.fields["code"] for e in events if e.kind == "grade"]
-        assert len(graded) == len(set(graded)) == 3
-        named = {str(e.fields.get("recording")) for e in events} - {"None"}
-        assert named == {f"test_R1/{f.name}" for f in copy.sessions.glob("*/*.npz")}
-        assert not list(copy.sessions.glob("*/*.partial"))
-        for stem, n_samples in kept.items():
-            if n_samples > 0:  # else it had not begun
-                file = copy.sessions / "test_R1" / f"{stem}.npz"
-                assert read_recording(file).n_samples == n_samples
-                n_cut += 1
-        assert ratings_from_logs(copy, protocol).table.equals(expected)
+        with faults("a session killed at a random moment, and gone on with"):
+            log = copy.log_file("R1", "test")
+            before, kept = whole_lines(log), n_kept(copy)
+            go_on((copy, protocol))
+            after = whole_lines(log)
+            assert after[: len(before)] == before
+            events = read_log(log)
+            graded = [e.fields["code"] for e in events if e.kind == "grade"]
+            assert len(graded) == len(set(graded)) == 3
+            named = {str(e.fields.get("recording")) for e in events} - {"None"}
+            assert named == {f"test_R1/{f.name}" for f in copy.sessions.glob("*/*.npz")}
+            assert not list(copy.sessions.glob("*/*.partial"))
+            for stem, n_samples in kept.items():
+                if n_samples > 0:  # else it had not begun
+                    file = copy.sessions / "test_R1" / f"{stem}.npz"
+                    assert read_recording(file).n_samples == n_samples
+                    n_cut += 1
+            assert ratings_from_logs(copy, protocol).table.equals(expected)
     assert n_cut > n_kills / 2

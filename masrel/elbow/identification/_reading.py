@@ -17,7 +17,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel._input import MAX_RECORDING, read_regular
+from masrel._input import MAX_RECORDING, not_utf8, read_regular
 from masrel.errors import ParameterError, RecordingError, RecordingWarning
 from masrel.recording import (
     _FIRST_COLUMNS,
@@ -365,10 +365,7 @@ def _read_text(path: Path, content: bytes) -> _Text:
     try:
         lines = content.decode("utf-8-sig").splitlines()
     except UnicodeDecodeError as error:
-        raise RecordingError(
-            f"{path}: needs UTF-8 text, got byte {content[error.start]:#04x} at offset "
-            f"{error.start}"
-        ) from error
+        raise RecordingError(f"{path}: {not_utf8(error)}") from error
     remarks = 0
     while remarks < len(lines) and (
         lines[remarks].startswith("#") or not lines[remarks].strip()
@@ -377,7 +374,10 @@ def _read_text(path: Path, content: bytes) -> _Text:
     if remarks == len(lines):
         raise RecordingError(f"{path}: needs a line of column names, got none")
     separator = max(",;\t", key=lines[remarks].count)
-    rows = list(csv.reader(lines[remarks:], delimiter=separator))
+    try:
+        rows = list(csv.reader(lines[remarks:], delimiter=separator))
+    except csv.Error as error:
+        raise RecordingError(f"{path}: needs cells of numbers ({error})") from error
     names = [name.strip() for name in rows[0]]
     if len(set(names)) != len(names):
         twice = next(name for name in names if names.count(name) > 1)

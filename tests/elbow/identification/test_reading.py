@@ -161,8 +161,11 @@ def test_files_that_are_none_are_refused(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="no such file"):
         read_movement(tmp_path / "absent.csv")
     (tmp_path / "latin.csv").write_bytes(b"time_s,\xe9\n")
-    with pytest.raises(RecordingError, match="needs UTF-8 text, got byte 0xe9"):
+    with pytest.raises(RecordingError, match="needed UTF-8 text, got the byte 0xe9"):
         read_movement(tmp_path / "latin.csv")
+    (tmp_path / "long.csv").write_text(f"time_s,angle_deg\n0,{'1' * 200_000}\n")
+    with pytest.raises(RecordingError, match="field larger than field limit"):
+        read_movement(tmp_path / "long.csv")
     (tmp_path / "broken.npz").write_bytes(b"PK no archive")
     with pytest.raises(RecordingError, match="not an archive of columns"):
         read_movement(tmp_path / "broken.npz")
