@@ -79,7 +79,7 @@ def _is_there(path: Path, data: bytes) -> bool:
         return False
 
 
-def _remove_others(folder: Path, name: str, kept: Mapping[str, bytes]) -> None:
+def _remove_others(folder: Path, name: str, named: Mapping[str, bytes]) -> None:
     # A file goes only if it is what a report wrote: its name holds its hash.
     inside = folder / name
     if inside.is_symlink() or not inside.is_dir():
@@ -87,7 +87,7 @@ def _remove_others(folder: Path, name: str, kept: Mapping[str, bytes]) -> None:
     for path in sorted(inside.iterdir()):
         place = f"{name}/{path.name}"
         asset = _ASSET.fullmatch(place)
-        if asset is None or place in kept or path.is_symlink():
+        if asset is None or place in named or path.is_symlink():
             continue
         try:
             data = read_regular(path, most=MAX_RECORDING)
