@@ -164,8 +164,8 @@ _TARDIEU_MEANINGS = MappingProxyType(
     }
 )
 
-_R1 = ("R1", "angle of catch or clonus, stretched fast")
-_R2 = ("R2", "end of the range, stretched slowly")
+_R1 = ("R1", "catch or clonus, stretched fast")
+_R2 = ("R2", "end of range, stretched slowly")
 
 _OF_THE_LITERATURE = (
     PublishedScale(

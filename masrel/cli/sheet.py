@@ -13,7 +13,13 @@ from masrel.protocol import StudyPaths, read_protocol
 @click.option(
     "--session", "sessions", multiple=True, help="Id of a session; default: all."
 )
-def sheet(study: Path, raters: tuple[str, ...], sessions: tuple[str, ...]) -> None:
+@click.option("--site", "sites", multiple=True, help="Id of a site; default: all.")
+def sheet(
+    study: Path,
+    raters: tuple[str, ...],
+    sessions: tuple[str, ...],
+    sites: tuple[str, ...],
+) -> None:
     """Make sheets of drawn schedules to print, and files to type them into.
 
     The sheets are a page to open in a browser and print. They have codes and no models.
@@ -24,7 +30,7 @@ def sheet(study: Path, raters: tuple[str, ...], sessions: tuple[str, ...]) -> No
 
     paths = StudyPaths(study)
     protocol = read_protocol(paths.protocol)
-    made = write_sheets(paths, protocol, raters=raters, sessions=sessions)
+    made = write_sheets(paths, protocol, raters=raters, sessions=sessions, sites=sites)
     n_typed, n_kept = len(made.typed), len(made.unchanged)
     note = f", {n_kept} of them filled in and kept" if n_kept else ""
     click.echo(

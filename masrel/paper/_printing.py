@@ -49,6 +49,7 @@ def write_sheets(
     *,
     raters: Sequence[str] = (),
     sessions: Sequence[str] = (),
+    sites: Sequence[str] = (),
 ) -> PaperSheets:
     """Write sheets of drawn schedules to print, and files to type them into.
 
@@ -58,8 +59,8 @@ def write_sheets(
         Where the study is; its schedules are drawn.
     protocol : Protocol
         The study's protocol.
-    raters, sessions : sequence of str, optional
-        Whose sheets; of all unless given.
+    raters, sessions, sites : sequence of str, optional
+        Whose sheets; all that are drawn unless given.
 
     Returns
     -------
@@ -69,15 +70,16 @@ def write_sheets(
     Raises
     ------
     ParameterError
-        If the protocol has no such rater or session, or not the two together.
+        If the protocol has no such rater, session or site, or not these together.
     ScheduleError
-        If a schedule is missing, damaged, or stale.
+        If no schedule is drawn, or that of a rater who is named is not, or one is
+        damaged or stale.
     OSError
         If the system refuses a folder or file.
     """
     forms = [
         form_of(protocol, drawn_schedule(study, protocol, rater, session))
-        for rater, session in _places(protocol, raters, sessions)
+        for rater, session in _places(study, protocol, raters, sessions, sites)
     ]
     html = study.sheets / "sheets.html"
     typed = tuple(study.typed_file(form.rater, form.session) for form in forms)
@@ -92,30 +94,40 @@ def write_sheets(
 
 
 def _places(
-    protocol: Protocol, raters: Sequence[str], sessions: Sequence[str]
+    study: StudyPaths,
+    protocol: Protocol,
+    raters: Sequence[str],
+    sessions: Sequence[str],
+    sites: Sequence[str],
 ) -> list[tuple[str, str]]:
-    ids = {
-        "rater": [rater.id for rater in protocol.raters],
-        "session": [session.id for session in protocol.sessions],
+    # rater and session of each sheet
+    site_of = {rater.id: rater.site for rater in protocol.raters}
+    known = {
+        "rater": (raters, list(site_of)),
+        "session": (sessions, [session.id for session in protocol.sessions]),
+        "site": (sites, sorted({site for site in site_of.values() if site})),
     }
-    for name, chosen in (("rater", raters), ("session", sessions)):
+    for name, (chosen, ids) in known.items():
         for each in chosen:
-            if each not in ids[name]:
+            if each not in ids:
                 raise ParameterError(
-                    f"{name}: needed one of {', '.join(ids[name])}, got {each!r}"
+                    f"{name}: needed one of {', '.join(ids) or 'none'}, got {each!r}"
                 )
     places = [
         (rater, session.id)
         for session in protocol.sessions
         for rater in session.raters
-        if (not sessions or session.id in sessions) and (not raters or rater in raters)
+        if (not sessions or session.id in sessions)
+        and (not raters or rater in raters)
+        and (not sites or site_of[rater] in sites)
     ]
     if not places:
         raise ParameterError(
-            f"rater: needed one of session {', '.join(sessions)}, got "
-            f"{', '.join(raters)}"
+            "rater: needed a rater of the session and the site, got none in both"
         )
-    return places
+    # those that were not named may be drawn later, or elsewhere
+    drawn = [place for place in places if study.schedule_file(*place).exists()]
+    return places if raters or not drawn else drawn
 
 
 def _has_answers(path: Path) -> bool:

@@ -239,10 +239,13 @@ def _of_skips(study: StudyPaths, log: Path) -> Iterator[str]:
 def _of_second_entries(study: StudyPaths, log: Path) -> Iterator[str]:
     for each in sheet_differences(_state_of(log)):
         code = "session" if each.code is None else f"code {each.code}"
+        values = ""
+        if each.column == "grade":  # an answer is its rater's
+            values = f": the first has {each.first}, the second {each.second}"
         yield (
-            f"{_name(study, log)}: {code}, {each.column}: the first entry has "
-            f"{each.first}, the second {each.second} ({each.file}, row {each.row}, by "
-            f"{each.who}). The first counts until one is mended."
+            f"{_name(study, log)}: the two entries of its sheet differ, {code}, "
+            f"{each.column}{values} ({each.file}, row {each.row}). The first counts "
+            "until one is mended."
         )
 
 

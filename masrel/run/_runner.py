@@ -138,7 +138,8 @@ class SessionRunner:
                 self._log.append("interval", interval)
             return
         same["format"] = header["format"]  # it is finished as it was begun
-        for name, value in same.items():
+        for name in ("grades", *same):  # which says most comes first
+            value = same[name]
             begun = header.get(name, False)  # there once were no rehearsals
             if begun != value:
                 raise SessionLogError(

@@ -60,6 +60,7 @@ class _ScheduleFiles:
     session: str
     schedule: Path
     sheet: Path
+    typed: Path  # there once the sheet has been printed
     log: Path
 
 
@@ -412,6 +413,7 @@ def _every_schedule(
             session=session.id,
             schedule=study.schedule_file(rater, session.id),
             sheet=study.sheet_file(rater, session.id),
+            typed=study.typed_file(rater, session.id),
             log=study.log_file(rater, session.id),
         )
         for session in protocol.sessions
@@ -465,6 +467,12 @@ def _refusal(files: _ScheduleFiles, fault: str, *, redraw: bool) -> str | None:
         return (
             f"{fault}. It was not drawn, because {files.sheet} has grades on it. Move "
             "the sheet out of the study first"
+        )
+    if files.typed.exists():
+        return (
+            f"{fault}. It was not drawn, because its sheet was printed, and what is on "
+            f"paper could not be entered any more. Move {files.typed} out of the study "
+            "first"
         )
     if files.schedule.exists() and not redraw:
         return f"{fault}. It was kept; --redraw draws it anew"

@@ -55,8 +55,9 @@ def test_a_difference_is_named_and_stays_a_remark_until_it_is_settled(
     assert (difference.first, difference.second) == ("1+", "1")
     (remark,) = study_remarks(study, protocol)
     assert remark == (
-        f"sessions/test_R1.jsonl: code {code}, grade: the first entry has 1+, the "
-        "second 1 (second.csv, row 2, by JL). The first counts until one is mended."
+        f"sessions/test_R1.jsonl: the two entries of its sheet differ, code {code}, "
+        "grade: the first has 1+, the second 1 (second.csv, row 2). The first counts "
+        "until one is mended."
     )
     # the first was wrong
     reasons = {"who": "MK", "why": "typed wrongly"}
@@ -91,6 +92,9 @@ def test_answers_are_compared_too(new_study: New) -> None:
         (None, "end.tired", "50", "50.5"),
     ]
     assert verify_study(small[0]).is_whole
+    remarks = " ".join(study_remarks(*small))  # an answer is private
+    assert "arm.realism (b.csv, row 3)" in remarks
+    assert "50" not in remarks
 
 
 def test_the_second_entry_is_of_another_file_and_another_person(small: Small) -> None:

@@ -15,7 +15,7 @@ from masrel.cli import cli
 from masrel.errors import ParameterError, ScheduleError
 from masrel.paper import write_sheets
 from masrel.protocol import Protocol, StudyPaths, read_protocol
-from masrel.schedule import read_schedule
+from masrel.schedule import read_schedule, write_schedules
 from tests.paper.conftest import QUESTIONS
 
 Small = tuple[StudyPaths, Protocol]
@@ -93,6 +93,20 @@ def test_what_has_been_typed_stays_and_a_blank_file_is_made_anew(
     assert codes(study, "R2")[0] in blank.read_text(encoding="utf-8")
 
 
+def test_a_schedule_whose_sheet_was_printed_is_not_drawn_anew(small: Small) -> None:
+    study, protocol = small
+    write_sheets(study, protocol, raters=["R1"], sessions=["test"])
+    text = study.protocol.read_text("utf-8").replace("= 0.60", "= 0.55")
+    study.protocol.write_text(text, encoding="utf-8")
+    changed = read_protocol(study.protocol)
+    with pytest.raises(ScheduleError) as caught:
+        write_schedules(changed, study, redraw=True)
+    assert "because its sheet was printed" in str(caught.value)
+    assert f"Move {study.typed_file('R1', 'test')} out of the study" in str(
+        caught.value
+    )
+
+
 def test_breaks_instructions_and_the_meanings_of_grades_are_printed(
     new_study: New,
 ) -> None:
@@ -116,12 +130,25 @@ def test_whose_sheets_there_are_not_is_said(small: Small) -> None:
         write_sheets(study, protocol, raters=["R9"])
     with pytest.raises(ParameterError, match=r"^session: needed one of test, retest"):
         write_sheets(study, protocol, sessions=["later"])
-    with pytest.raises(ParameterError, match="needed one of session retest, got R2"):
+    with pytest.raises(
+        ParameterError, match="needed a rater of the session and the site"
+    ):
         write_sheets(study, protocol, raters=["R2"], sessions=["retest"])
-    study.schedule_file("R2", "test").unlink()
-    with pytest.raises(ScheduleError, match="needed a schedule file"):
-        write_sheets(study, protocol)
+    with pytest.raises(ParameterError, match=r"^site: needed one of none, got 'north'"):
+        write_sheets(study, protocol, sites=["north"])
     assert not study.sheets.exists()
+
+
+def test_sheets_are_of_the_schedules_that_are_drawn(new_study: New) -> None:
+    study, protocol = new_study(
+        ('[[raters]]\nid = "R2"', '[[raters]]\nid = "R2"\nsite = "north"')
+    )
+    made = write_sheets(study, protocol, sites=["north"])
+    assert made.typed == (study.typed_file("R2", "test"),)
+    study.schedule_file("R2", "test").unlink()
+    assert len(write_sheets(study, protocol).typed) == 2
+    with pytest.raises(ScheduleError, match="needed a schedule file"):
+        write_sheets(study, protocol, raters=["R2"])
 
 
 def test_the_command_says_what_to_do_next(small: Small) -> None:
@@ -203,5 +230,5 @@ def test_in_chromiums_pdf_no_row_is_split_and_no_code_is_missing(
     assert {code: words[code] for code in expected} == expected
     for page in pages:  # a row begins with its code, and ends with its question
         n_rows = sum(word in expected for word in page)
-        assert page.count("none") == n_rows
+        assert page.count("NA") == n_rows
         assert page.count("ends-here") == (4 * n_rows if repeats > 1 else 0)
