@@ -1,7 +1,7 @@
 """What docs/tone.md says of tone in people's hands: its table and its figure.
 
-``python -m docs.make.tone_hands [HANDS]`` draws the figure and prints the table; 250
-hands of each kind take some 20 minutes.
+``python -m docs.make.tone_hands [HANDS]`` draws the figure and prints the table; a
+hundred hands of each kind take some ten minutes.
 """
 
 import sys

@@ -335,8 +335,12 @@ def _instruction(rules: PresentationRules) -> str:
     if stretches == "free":
         return f"Stretch the arm as often as you want, then {done}. "
     if isinstance(stretches, int):
-        return f"Stretch the arm {stretches} times; {done} before. "
-    return "".join(f"{cue}. " for cue in _cues_in_words(rules))
+        return (
+            f"Stretch the arm {stretches} times and bring it back each time; {done} "
+            "before. "
+        )
+    cues = [f"{cue}. " for cue in _cues_in_words(rules)]
+    return "".join([*cues, *(["Bring the arm back each time. "] if cues[1:] else [])])
 
 
 @contextmanager

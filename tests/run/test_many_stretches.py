@@ -189,6 +189,7 @@ def test_a_grade_may_name_the_stretch_it_rests_on(new_study: New) -> None:
     small = with_rules(new_study, "stretches = 2")
     source, said = console("\n1+ 2\n\n1 3\n2\n\n\n3\n")
     run(small, source)
+    assert "Stretch the arm 2 times and bring it back each time" in said.getvalue()
     assert "and the stretch it rests on, 1 to 2" in said.getvalue()
     assert "'1 3' is not a grade" in said.getvalue()
     assert "'' is not a grade" not in said.getvalue()  # an Enter too many
