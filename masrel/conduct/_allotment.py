@@ -125,6 +125,8 @@ class _Rows:
             None if site is None else str(site),
             str(fields["scheme"]),
         )
+        if self.of_rater.get((rater, *design)) == fields["row"]:
+            return  # the log of another copy of the study has it, too
         row = self._n[design] = self.n_allotted(design) + 1
         where = f"line {event.line}: allotted: rater {rater} in session {design[0]}"
         if fields["row"] != row:

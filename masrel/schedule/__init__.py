@@ -4,7 +4,7 @@ Goes in: a protocol. Comes out: for each rater and session a schedule file that
 names the models, and a blinded sheet that does not.
 """
 
-from masrel.schedule._copies import check_commitments, copy_for_site
+from masrel.schedule._copies import copy_for_site
 from masrel.schedule.presentation import (
     Presentation,
     Schedule,
@@ -21,7 +21,6 @@ from masrel.schedule.sheets import (
 __all__ = [
     "Presentation",
     "Schedule",
-    "check_commitments",
     "check_schedule",
     "concealment_notes",
     "copy_for_site",

@@ -1,4 +1,4 @@
-"""Copies of a study for its sites, and whether studies have one secret."""
+"""Copies of a study for its sites."""
 
 from pathlib import Path
 
@@ -9,7 +9,6 @@ from masrel.protocol import Protocol, StudyPaths
 from masrel.protocol.study import _check_new_folder
 from masrel.schedule._secret import find_secret, new_secret, site_secret_text
 from masrel.schedule._sites import checked_site
-from masrel.schedule.sheets import read_schedule
 
 
 def copy_for_site(
@@ -58,39 +57,3 @@ def copy_for_site(
     make_folder(copy.secret_file.parent, mode=0o700)
     write_files(secret, within=destination, mode=0o600)
     write_files(contents, within=destination)
-
-
-def check_commitments(*studies: StudyPaths) -> None:
-    """Refuse studies whose schedules were not drawn from one secret.
-
-    Parameters
-    ----------
-    *studies : StudyPaths
-        Where they are. Sites of one study have one commitment, whatever secret each
-        of them has.
-
-    Raises
-    ------
-    ScheduleError
-        If two schedules, or a schedule and a secret, have different commitments, or
-        one was drawn without a secret and another with one; the message names both
-        files. Or if one of them is damaged.
-    """
-    first: tuple[Path, str | None] | None = None
-    for study in studies:
-        commitments = {
-            path: read_schedule(path).commitment
-            for path in sorted(study.schedules.glob("*.csv"))
-            if not path.stem.endswith("_sheet")
-        }
-        key = find_secret(study)
-        if key is not None and None not in commitments.values():
-            commitments[study.secret_file] = key.commitment
-        for path, commitment in commitments.items():
-            if first is None:
-                first = (path, commitment)
-            elif commitment != first[1]:
-                raise ScheduleError(
-                    f"{path}: needed commitment {first[1] or 'none'}, as {first[0]} "
-                    f"has it, got {commitment or 'none'}"
-                )

@@ -162,3 +162,34 @@ def test_a_row_that_was_forged_is_broken(masrel: Caller, study: StudyPaths) -> N
     assert f"broken: {file}: needed row 1, by {study.conduct_file}, got row 4" in (
         verified.err
     )
+
+
+def test_sites_that_drew_by_themselves_are_merged(
+    masrel: Caller, study: StudyPaths, tmp_path: Path
+) -> None:
+    south, both = tmp_path / "south", tmp_path / "both"
+    masrel("schedule", study.root, "--site", "south", "--copy-to", south)
+    masrel("schedule", study.root, "--site", "north")
+    masrel("schedule", south, "--site", "south")
+    merged = masrel("merge", study.root, south, "-o", both)
+    assert merged.code == 0, merged.err
+    assert masrel("verify", both).code == 0
+    assert "0 drawn, 6 kept" in masrel("schedule", both).out
+    # what the whole study would have drawn, and nothing else
+    masrel("schedule", study.root)
+    for file in sorted(study.schedules.glob("test_*.csv")):
+        assert (both / "schedules" / file.name).read_bytes() == file.read_bytes()
+
+
+def test_a_copy_without_the_secret_is_not_merged(
+    masrel: Caller, study: StudyPaths, tmp_path: Path
+) -> None:
+    other = tmp_path / "south"
+    other.mkdir()
+    (other / "protocol.toml").write_bytes(study.protocol.read_bytes())
+    masrel("schedule", study.root, "--site", "north")
+    masrel("schedule", other, "--site", "south")
+    refused = masrel("merge", study.root, other, "-o", tmp_path / "both")
+    assert refused.code == 2
+    assert "commitment" in refused.err
+    assert not (tmp_path / "both").exists()

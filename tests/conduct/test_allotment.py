@@ -11,7 +11,6 @@ from masrel.conduct import allot_schedules, record_withdrawal
 from masrel.errors import ParameterError, ScheduleError, SessionLogError
 from masrel.protocol import Protocol, StudyPaths
 from masrel.schedule import (
-    check_commitments,
     concealment_notes,
     copy_for_site,
     draw_schedule,
@@ -308,24 +307,6 @@ def test_events_name_no_model(study: StudyPaths) -> None:
     assert not [model.id for model in protocol.models if f'"{model.id}"' in str(lines)]
 
 
-def test_studies_of_one_secret_agree_and_others_are_named(
-    study: StudyPaths, tmp_path: Path
-) -> None:
-    protocol, copy = at_sites(), StudyPaths(tmp_path / "south")
-    study.protocol.write_text("# ...", encoding="utf-8")
-    copy_for_site(protocol, study, "south", copy.root)
-    allot_schedules(copy, protocol, site="south")
-    allot_schedules(study, protocol, site="north")
-    check_commitments(study, copy)
-    other = StudyPaths(tmp_path / "other")
-    allot_schedules(other, protocol, site="south")  # of a secret of its own
-    with pytest.raises(ScheduleError, match=r"test_R2.csv: needed commitment .*R1.csv"):
-        check_commitments(study, other)
-    allot_schedules(other, protocol_of(raters=("R9",)))
-    with pytest.raises(ScheduleError, match="needed commitment"):
-        check_commitments(other, copy)
-
-
 def test_a_copy_is_made_into_a_new_folder_for_a_site_that_there_is(
     study: StudyPaths, tmp_path: Path
 ) -> None:
@@ -337,3 +318,27 @@ def test_a_copy_is_made_into_a_new_folder_for_a_site_that_there_is(
     with pytest.raises(ScheduleError, match=r"needed schedule.strata"):
         copy_for_site(williams(), study, "south", tmp_path / "east")
     assert not (tmp_path / "east").exists()
+
+
+def test_an_event_that_two_logs_have_allots_once(study: StudyPaths) -> None:
+    # a study that was copied after the draw, and merged with its copy
+    protocol = williams()
+    allot_schedules(study, protocol)
+    study.merged_conduct.mkdir()
+    (study.merged_conduct / "a.jsonl").write_bytes(study.conduct_file.read_bytes())
+    later = williams(raters=("R1", "R2", "R3"))
+    allot_schedules(study, later)
+    assert allotted(study)[-1] == ("R3", "test", None, "williams", 3)
+    assert not [problem for problem in broken(study, later) if "row" in problem]
+
+
+def test_two_copies_that_dealt_one_row_are_found(
+    study: StudyPaths, tmp_path: Path
+) -> None:
+    copy = with_secret(StudyPaths(tmp_path / "copy"))
+    for each, raters in ((study, ("R1", "R2")), (copy, ("R3", "R4"))):
+        allot_schedules(each, williams(raters=raters))
+    study.merged_conduct.mkdir()
+    (study.merged_conduct / "a.jsonl").write_bytes(copy.conduct_file.read_bytes())
+    problems = broken(study, williams())
+    assert any("needed row 3, the next one, got 1" in problem for problem in problems)

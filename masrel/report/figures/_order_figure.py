@@ -31,7 +31,7 @@ def order_figure(content: OrderPanels) -> Figure:
         len(content.panels),
         2,
         squeeze=False,
-        width_ratios=(max(n_places, n_models), n_models),
+        width_ratios=(min(max(n_places, n_models), 2 * n_models), n_models),
     )
     for (left, right), panel in zip(rows, content.panels, strict=True):
         _draw(figure, left, panel, panel.places, None)
