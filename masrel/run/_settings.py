@@ -133,11 +133,16 @@ def _speed_of_torque(protocol: Protocol, model: Model, torque: float) -> float:
 
 
 def _largest_torque(protocol: Protocol, model: Model, speed_deg_s: float) -> float:
-    # in every phase of every motion up to a speed, N·m
-    return joint_model(protocol, model.id).largest_torque(
-        start_angle=math.radians(protocol.stretch.start_deg),
-        speed=math.radians(speed_deg_s),
-    )
+    # of which a limit is held, in every phase of every motion up to a speed, N·m
+    settings, joint = protocol.device, joint_model(protocol, model.id)
+    start, speed = math.radians(protocol.stretch.start_deg), math.radians(speed_deg_s)
+    largest = joint.largest_torque(start_angle=start, speed=speed)
+    if speed == 0.0 or _torque_limit(protocol, model)[0] != "torque_limit_nm":
+        return largest
+    # On the way back the device's friction is compensated the way the spring pushes.
+    friction = settings.friction_viscous_nms_rad * speed + settings.friction_coulomb_nm
+    held = joint.largest_torque(start_angle=start, speed=0.0)
+    return max(largest, held + settings.friction_compensation * friction)
 
 
 def _torque_limit(protocol: Protocol, model: Model) -> tuple[str, float]:

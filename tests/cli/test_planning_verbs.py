@@ -113,6 +113,24 @@ def test_a_guarded_model_is_checked_against_the_torque_of_the_guard(
     assert err.count("needed") == 1
 
 
+def test_the_way_back_counts_with_the_friction_that_is_compensated(
+    tmp_path: Path,
+) -> None:
+    # By hand: the contracture holds 11.475 N·m at its end, and with 3 N·m of friction
+    # comes 0.9 · (0.168 · 2.286 + 3) N·m on the way back.
+    masrel("init", tmp_path / "new", "--study", "tone")
+    protocol = tmp_path / "new" / "protocol.toml"
+    text = protocol.read_text(encoding="utf-8")
+    assert "torque_limit_nm = 20.0" in text
+    rough = text.replace("torque_limit_nm = 20.0", "torque_limit_nm = 14.5")
+    rough = rough.replace("[device]\n", "[device]\nfriction_coulomb_nm = 3.0\n")
+    protocol.write_text(rough, encoding="utf-8")
+    _, err = masrel("check", tmp_path / "new", code=2)
+    (line,) = (line for line in err.splitlines() if '"F3"' in line)
+    assert "needed at most device.torque_limit_nm (14.5 N·m)" in line
+    assert "got 14.517 N·m" in line
+
+
 def test_a_model_too_stiff_for_the_device_is_a_problem(tmp_path: Path) -> None:
     # By hand: 2002 N·m/rad · 1 ms / 2 = 1.001 N·m·s/rad, and 0.3 · 0.0898 of damping.
     masrel("init", tmp_path / "new", "--study", "tone")
