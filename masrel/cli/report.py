@@ -27,6 +27,13 @@ from masrel.cli._options import (
 )
 @ratings_option
 @gate_options()
+@click.option(
+    "--include",
+    multiple=True,
+    metavar="NAME",
+    help="Show what is private, too: who (recorded events), notes (their texts), or a "
+    "field of raters that is not public. Repeatable.",
+)
 @output_options(
     raw_csv="No apostrophe before a text that a spreadsheet would run.",
     quiet="No progress bar.",
@@ -36,6 +43,7 @@ def report(
     destination: Path | None,
     ratings_file: Path | None,
     gating: GateOptions,
+    include: tuple[str, ...],
     output: OutputOptions,
 ) -> None:
     """Write the report of STUDY: HTML, Markdown, tables and figures.
@@ -44,8 +52,7 @@ def report(
     same bytes.
     """
     from masrel.analysis import analyze
-    from masrel.ratings import corrections_of, study_remarks
-    from masrel.report import write_report
+    from masrel.report import study_conduct, write_report
     from masrel.verification import anchors_of
 
     if destination is None:
@@ -54,6 +61,9 @@ def report(
     refuse_record(destination / "report.html")  # before anything is computed
     data = read_study(study, ratings_file)
     gates = gating.gates(data.protocol)
+    conduct = study_conduct(
+        data.paths, data.protocol, file=ratings_file, include=include
+    )
     with warnings_as_notes():
         analysis = analyze(
             data.protocol,
@@ -76,11 +86,7 @@ def report(
             recordings=data.paths.sessions,
             # of what is simulated none, so that it repeats byte for byte
             anchors=() if data.ratings.simulated else anchors_of(data.paths),
-            remarks=study_remarks(data.paths, data.protocol, file=ratings_file),
-            # a table named by hand is not the logs'
-            corrections=corrections_of(data.paths, data.protocol)
-            if ratings_file is None
-            else (),
+            conduct=conduct,
             progress=progress,
             raw_csv=output.raw_csv,
         )

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from masrel.ratings.completeness import (
         Correction,
         corrections_of,
+        session_remarks,
         study_remarks,
     )
     from masrel.ratings.in_person import InPerson, InPersonRow, read_in_person
@@ -63,13 +64,19 @@ __all__ = [
     "read_study_data",
     "read_study_ratings",
     "retest_pairs",
+    "session_remarks",
     "study_remarks",
     "table_differences",
     "write_ratings",
 ]
 
 _HOMES = {
-    "completeness": ("Correction", "corrections_of", "study_remarks"),
+    "completeness": (
+        "Correction",
+        "corrections_of",
+        "session_remarks",
+        "study_remarks",
+    ),
     "in_person": ("InPerson", "InPersonRow", "read_in_person"),
     "logs": ("ratings_from_logs",),
     "_parts": ("RatingsPart", "Repeated"),

@@ -136,7 +136,35 @@ def study_remarks(
     >>> study_remarks(study, read_protocol(study.protocol))
     ()
     """
-    remarks = [*_of_conduct(study), *_of_sessions(study, protocol)]
+    return (*_of_conduct(study), *session_remarks(study, protocol, file=file))
+
+
+def session_remarks(
+    study: StudyPaths,
+    protocol: Protocol,
+    *,
+    file: Path | None = None,
+    names: bool = True,
+) -> tuple[str, ...]:
+    """Say of the sessions what a reader of a study's ratings must know beside them.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is.
+    protocol : Protocol
+        The study's protocol.
+    file : Path, optional
+        A table that is used whatever the session logs say.
+    names : bool, optional
+        Whether to say who recorded each.
+
+    Returns
+    -------
+    tuple of str
+        What `study_remarks` returns, but for events beside the sessions.
+    """
+    remarks = [*_of_sessions(study, protocol, names=names)]
     if file not in (None, study.published_file) and any(study.sessions.glob("*.jsonl")):
         remarks.append(
             f"The ratings are from {file.name}, a file named by hand, and not from the "
@@ -147,20 +175,25 @@ def study_remarks(
 
 def _of_conduct(study: StudyPaths) -> Iterator[str]:
     events = read_conduct(study)
-    latest = {e.fields["rater"]: e for e in events if e.kind == "excluded"}
-    excluded = [latest[rater] for rater in excluded_raters(study)]
+    raters = excluded_raters(study)
+    latest = {
+        event.fields["rater"]: event
+        for event in events
+        if event.kind == "excluded" and event.fields["rater"] in raters
+    }
     for event in events:
         fields = event.fields
         by = f"on {event.time_utc[:10]} by {fields.get('who')}: {fields.get('why')}."
         if event.kind == "withdrawn":
             n_graded = _n_graded(study, str(fields["rater"]))
+            counted = "" if fields["rater"] in latest else " and counted"
             yield (
                 f"Rater {fields['rater']} was withdrawn {by} Grades given before, "
-                f"{n_graded} by the logs, are kept and counted."
+                f"{n_graded} by the logs, are kept{counted}."
             )
         elif event.kind == "unblinded":
             yield _of_unblinding(event, by)
-        elif event in excluded:
+        elif event in latest.values():
             yield (
                 f"Rater {fields['rater']} was excluded {by} The grades are kept, and "
                 "enter no number."
@@ -188,7 +221,9 @@ def _n_graded(study: StudyPaths, rater: str) -> int:
     return count
 
 
-def _of_sessions(study: StudyPaths, protocol: Protocol) -> Iterator[str]:
+def _of_sessions(
+    study: StudyPaths, protocol: Protocol, *, names: bool
+) -> Iterator[str]:
     expected = {
         study.log_file(rater, session.id)
         for session in protocol.sessions
@@ -204,7 +239,7 @@ def _of_sessions(study: StudyPaths, protocol: Protocol) -> Iterator[str]:
                 "move the log out of the study."
             )
         elif log.stat().st_size:
-            yield from _of_skips(study, log)
+            yield from _of_skips(study, log, names=names)
             yield from _of_second_entries(study, log)
         else:
             yield (
@@ -219,7 +254,7 @@ def _of_sessions(study: StudyPaths, protocol: Protocol) -> Iterator[str]:
             )
 
 
-def _of_skips(study: StudyPaths, log: Path) -> Iterator[str]:
+def _of_skips(study: StudyPaths, log: Path, *, names: bool) -> Iterator[str]:
     # those that did not get their grade later, and grades that count no more
     state = _state_of(log)
     if state.n_set_aside:
@@ -229,10 +264,11 @@ def _of_skips(study: StudyPaths, log: Path) -> Iterator[str]:
         )
     for code, event in state.skipped.items():
         if code not in state.grades:
+            by = f" by {event.fields['who']}" if names else ""
             yield (
                 f"{_name(study, log)}: presentation {event.fields['position']}, code "
-                f"{code}, was skipped after a fault by {event.fields['who']}: "
-                f"{event.fields['why']}. Its grade is missing."
+                f"{code}, was skipped after a fault{by}: {event.fields['why']}. Its "
+                "grade is missing."
             )
 
 

@@ -7,14 +7,15 @@ same as Markdown, tables as CSV, figures as PNG and SVG.
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from masrel.report._conduct import StudyConduct, study_conduct
     from masrel.report._document import ReportFiles, write_report
 
-__all__ = ["ReportFiles", "write_report"]
+__all__ = ["ReportFiles", "StudyConduct", "study_conduct", "write_report"]
 
 
 def __getattr__(name: str) -> object:
     if name in __all__:
-        from masrel.report import _document
+        from masrel.report import _conduct, _document
 
-        return getattr(_document, name)
+        return getattr(_conduct if "onduct" in name else _document, name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

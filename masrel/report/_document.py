@@ -17,14 +17,15 @@ from pathlib import Path
 
 from masrel.analysis import Analysis
 from masrel.protocol import Protocol
-from masrel.ratings import Correction, InPerson, Ratings
+from masrel.ratings import InPerson, Ratings
 from masrel.report._agreement import estimates_section
+from masrel.report._conduct import StudyConduct, conduct_section
 from masrel.report._design import design_section
 from masrel.report._grades import grades_section, in_person_section, intended_section
 from masrel.report._material import Drawing, Material, Paragraph, Section, gather
 from masrel.report._report_folder import MANIFEST, Assets, replace_report
 from masrel.report._stretches import speeds_section, traces_section
-from masrel.report._tables import Column, Table, as_csv, page_cells, tag_of
+from masrel.report._tables import Table, as_csv, page_cells, tag_of
 from masrel.verification import Anchor
 
 Progress = Callable[[str], object]
@@ -49,17 +50,6 @@ _INPUTS = {
 }
 
 _KINDS = {Paragraph: "paragraph", Table: "table", Drawing: "figure"}
-
-_CORRECTION_COLUMNS = (  # each is of `Correction`
-    Column(key="rater", heading="Rater", align="left"),
-    Column(key="session", heading="Session", align="left"),
-    Column(key="model", heading="Model", align="left"),
-    Column(key="repeat", heading="Repeat"),
-    Column(key="first_grade", heading="First", align="center"),
-    Column(key="grade", heading="Corrected", align="center"),
-    Column(key="who", heading="By", align="left"),
-    Column(key="why", heading="Reason", align="left"),
-)
 
 # Symbols of the model as they are written in plain text: an index after "_".
 _SYMBOL = re.compile(r"(?<!\w)(ΔT|k|ν|θ|p)_(peak|post|th|L|start|end|o|e)(?!\w)")
@@ -96,8 +86,7 @@ def write_report(
     *,
     in_person: InPerson | None = None,
     recordings: Path | None = None,
-    remarks: Sequence[str] = (),
-    corrections: Sequence[Correction] = (),
+    conduct: StudyConduct | None = None,
     anchors: Sequence[Anchor] = (),
     progress: Progress | None = None,
     raw_csv: bool = False,
@@ -121,12 +110,9 @@ def write_report(
         Grades given in person, whose notes are shown below their table.
     recordings : Path, optional
         The folder of the sessions' recordings, of which measured torque is drawn.
-    remarks : sequence of str
-        What a reader must know beside the ratings (`masrel.ratings.study_remarks`);
-        where there is any, the report begins with it.
-    corrections : sequence of Correction, optional
-        Grades that were corrected (`masrel.ratings.corrections_of`), listed after the
-        remarks.
+    conduct : StudyConduct, optional
+        How the study was run (`study_conduct`); where there is anything to say, the
+        report begins with it.
     anchors : sequence of Anchor, optional
         Hashes of the session logs (`masrel.verification.anchors_of`), printed at the
         end: a report kept elsewhere shows whether the logs were written anew.
@@ -150,14 +136,8 @@ def write_report(
     """
     material = gather(protocol, ratings, analysis, in_person, recordings)
     sections = [SECTIONS[name](material) for name in protocol.report.sections]
-    conduct: list[Paragraph | Table | Drawing] = [
-        Paragraph(text=text) for text in remarks
-    ]
-    if corrections:
-        conduct.append(_corrections_table(corrections, material.data))
-    if conduct:
-        title, blocks = "Conduct of the study", tuple(conduct)
-        sections.insert(0, Section(name="conduct", title=title, blocks=blocks))
+    if conduct is not None and (first := conduct_section(material, conduct)):
+        sections.insert(0, first)
     assets = Assets()
     shown = _make_blocks(sections, assets, progress, raw_csv=raw_csv)
     pages = _pages(material, shown, anchors)
@@ -172,23 +152,6 @@ def write_report(
         figures=tuple(
             destination / p for p in assets.contents if not p.endswith(".csv")
         ),
-    )
-
-
-def _corrections_table(corrections: Sequence[Correction], data: str) -> Table:
-    return Table(
-        name="corrections",
-        caption="Corrected grades",
-        columns=_CORRECTION_COLUMNS,
-        rows=tuple(
-            tuple(getattr(each, column.key) for column in _CORRECTION_COLUMNS)
-            for each in corrections
-        ),
-        notes=(
-            "Each correction in order of time, the last one of a presentation counts; "
-            "First: as the rater gave it; –: no grade.",
-        ),
-        data=data,
     )
 
 

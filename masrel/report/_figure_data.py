@@ -316,8 +316,25 @@ class OrderPanels:
     panels: tuple[OrderPanel, ...]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlowStep:
+    """How many raters came so far, and what became of the others."""
+
+    label: str
+    n: int
+    others: tuple[str, ...] = ()  # a line each
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RaterFlow:
+    """The way of the raters through a study."""
+
+    steps: tuple[FlowStep, ...]  # first on top
+
+
 Content = (
     GradeGrid
+    | RaterFlow
     | Forest
     | SpeedDots
     | TraceColumns

@@ -86,7 +86,12 @@ def _grid_blocks(
         text = ", ".join(f"{n} of grade {grade}" for grade, n in counts.items())
         aim = "" if intended is None else f" (intended {intended})"
         listed.append(f"{model}{aim}: {text or 'no grades'}")
-    notes = (f"{counted(n_missing, 'rating')} missing, shown as –.",)
+    notes = [f"{counted(n_missing, 'rating')} missing, shown as –."] * bool(n_missing)
+    excluded = [r for r in grid.raters if r in material.analysis.excluded]
+    if excluded:
+        notes.append(
+            f"Excluded from every number of this report: {', '.join(excluded)}."
+        )
     table = Table(
         name=f"grades_{session}",
         caption=f"Grades of session {session}: models by raters",
@@ -96,7 +101,7 @@ def _grid_blocks(
             *(Column(key=name, heading=name, align="center") for name in grid.raters),
         ),
         rows=tuple(table_rows),
-        notes=notes if n_missing else (),
+        notes=tuple(notes),
         data=material.data,
     )
     caption = f"Grades of session {session}. Darker is a higher grade"

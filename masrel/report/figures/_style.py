@@ -134,7 +134,12 @@ def _figure(content: data.Content) -> Figure:
             from masrel.report.figures._forest import forest_figure
 
             return forest_figure(content)
-        case data.PairMaps() | data.LearningView() | data.OrderPanels():
+        case (
+            data.PairMaps()
+            | data.LearningView()
+            | data.OrderPanels()
+            | data.RaterFlow()
+        ):
             return _rater_figure(content)
         case data.Differences():
             from masrel.report.figures._limits_figure import limits_figure
@@ -153,12 +158,16 @@ def _figure(content: data.Content) -> Figure:
 
 
 def _rater_figure(
-    content: data.PairMaps | data.LearningView | data.OrderPanels,
+    content: data.PairMaps | data.LearningView | data.OrderPanels | data.RaterFlow,
 ) -> Figure:
     if isinstance(content, data.OrderPanels):
         from masrel.report.figures._order_figure import order_figure
 
         return order_figure(content)
+    if isinstance(content, data.RaterFlow):
+        from masrel.report.figures._rater_flow import flow_figure
+
+        return flow_figure(content)
     if isinstance(content, data.LearningView):
         from masrel.report.figures._learning_figure import learning_figure
 
