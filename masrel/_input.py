@@ -32,7 +32,7 @@ _LONG_KEY = re.compile(
     rf"""(?<![\w"'.-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{_MAX_DEPTH}}}"""
 )
 # A spreadsheet fills a line up with separators
-_CSV_FORMAT = re.compile(r"# ?format: *([^\s,;]{1,18})")
+_CSV_FORMAT = re.compile(r"# *format: *([^\s,;]{1,18})")
 _MAX_LISTED = 40
 _MAX_BITS = 1024  # of a whole number: what is longer cannot always be shown
 

@@ -19,7 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel._files import write_files
-from masrel._input import MAX_RECORDING, MAX_SMALL, parse_json, read_regular
+from masrel._input import (
+    MAX_RECORDING,
+    MAX_SMALL,
+    format_problem,
+    parse_json,
+    read_regular,
+)
 from masrel.errors import ParameterError, RecordingError
 
 __all__ = [
@@ -57,6 +63,9 @@ RECORDING_COLUMNS = (
     "ramp",  # position in RAMPS
     "stretch",  # which one goes on: 1, 2, ...; 0 before, between and after
 )
+_FORMAT = 1
+"""Version of the files of a recording; facts without one are of version 1."""
+
 _FIRST_COLUMNS = frozenset(RECORDING_COLUMNS[:6])  # those of every recording
 
 _CATCH = PHASES.index("catch")
@@ -396,7 +405,11 @@ def write_recording(recording: Recording, path: Path) -> str:
     # Floats are never pickled; numpy 2.0 takes `allow_pickle` for a column.
     np.savez_compressed(archive, **ordered)  # type: ignore[arg-type]
     checksum = hashlib.sha256(archive.getbuffer()).hexdigest()
-    document: dict[str, object] = {"sha256": checksum, **recording.facts}
+    document: dict[str, object] = {
+        **recording.facts,
+        "format": _FORMAT,
+        "sha256": checksum,
+    }
     if channels:
         document["channels"] = [asdict(channel) for channel in recording.channels]
     facts = json.dumps(document, indent=1, sort_keys=True, allow_nan=False) + "\n"
@@ -433,6 +446,9 @@ def read_recording(path: Path) -> Recording:
         raise RecordingError(f"{facts_path}: not JSON ({error})") from error
     if not isinstance(facts, dict) or "sha256" not in facts:
         raise RecordingError(f"{facts_path}: needs an object with the key sha256")
+    problem = format_problem(facts.pop("format", 1), newest=_FORMAT)
+    if problem is not None:
+        raise RecordingError(f"{facts_path}: {problem}")
     data = read_regular(path, most=MAX_RECORDING)
     checksum = hashlib.sha256(data).hexdigest()
     if facts.pop("sha256") != checksum:

@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 
+ANALYSIS_FORMAT = 1
+"""Version of the file of an analysis; one that names none is of version 1."""
+
+
 def as_analysis_document(analysis: Analysis) -> dict[str, object]:
     """Turn an analysis into plain values for JSON, ``nan`` as None.
 
@@ -29,10 +33,10 @@ def as_analysis_document(analysis: Analysis) -> dict[str, object]:
     Returns
     -------
     dict
-        Its fields in order, `excluded` only where somebody is; every part carries the
-        hashes of its inputs.
+        The version of its format, and its fields in order, `excluded` only where
+        somebody is; every part carries the hashes of its inputs.
     """
-    document: dict[str, object] = {}
+    document: dict[str, object] = {"format": ANALYSIS_FORMAT}
     for field in dataclasses.fields(analysis):
         value = getattr(analysis, field.name)
         if field.name == "estimates":

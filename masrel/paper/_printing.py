@@ -152,7 +152,7 @@ def _typed_text(form: Form) -> str:
         writer.writerow([form.id, position, code, *blank])
     if form.of_session:
         writer.writerow([form.id, OF_SESSION, "", *blank])
-    return text.getvalue()
+    return f"# format: 1\n{text.getvalue()}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -158,7 +158,7 @@ def raters_csv(
         late = "yes" if each.is_late else "no"
         known = [each.rater, _cell(each.site), each.status, late]
         writer.writerow([*known, *map(_cell, cells)])
-    return head + text.getvalue()
+    return f"{head}# format: 1\n{text.getvalue()}"
 
 
 def _cell(value: FieldValue | None) -> str:

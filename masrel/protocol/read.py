@@ -8,7 +8,7 @@ from typing import Any
 
 import msgspec
 
-from masrel._input import MAX_SMALL, not_utf8, parse_toml, read_regular
+from masrel._input import MAX_SMALL, format_problem, not_utf8, parse_toml, read_regular
 from masrel.elbow.identification._model_file import (
     CONSTANT_KEYS,
     FORMAT,
@@ -67,7 +67,11 @@ def read_protocol(path: Path) -> Protocol:
     Rules across keys are applied to what could be decoded, so that one wrong key
     hides no other problem.
     """
-    resolved = _resolve_model_files(_read_toml(path), path.parent)
+    content = _read_toml(path)
+    problem = format_problem(content.pop("format", 1), newest=1)
+    if problem is not None:
+        raise ProtocolError(f"{path}: {problem}")
+    resolved = _resolve_model_files(content, path.parent)
     raw = resolved.raw
     # A model whose file could not be used lacks its keys for that reason alone; so
     # does a protocol its scale.

@@ -6,14 +6,14 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from masrel._input import MAX_TABLE, read_regular
+from masrel._input import MAX_TABLE, csv_format, format_problem, read_regular
 from masrel.conduct import excluded_raters
 from masrel.errors import RatingsError
 from masrel.protocol import Protocol, StudyPaths, scale_of
 from masrel.ratings.in_person import InPerson, read_in_person
 from masrel.ratings.logs import ratings_from_logs
 from masrel.ratings.study_file import read_study_ratings
-from masrel.ratings.table import Ratings, _texts
+from masrel.ratings.table import _FORMAT, Ratings, _texts
 
 _KEY = ("session", "rater", "model", "repeat")
 
@@ -160,6 +160,10 @@ def table_differences(path: Path, ratings: Ratings) -> Iterator[str]:
     text = read_regular(path, most=MAX_TABLE).decode("utf-8", errors="replace")
     texts = _texts(ratings)
     if text in texts:
+        return
+    problem = format_problem(csv_format(text), newest=_FORMAT)
+    if problem is not None:
+        yield problem
         return
     logged = next((t for t in texts if _names(t) == _names(text)), texts[0])
     try:

@@ -15,9 +15,9 @@ from pathlib import Path
 
 from masrel._files import refuse_record, sync_folder, write_files
 from masrel._input import MAX_RECORDING, read_regular
+from masrel.verification._outputs import REPORT_FORMAT
 
 MANIFEST = "manifest.json"
-_FORMAT = "masrel report 1"
 
 _N_HEX = 16  # of a hash in a name
 _ASSET_FOLDERS = ("tables", "figures")
@@ -56,7 +56,7 @@ def replace_report(
         write_files({folder / page: text}, within=folder)
     written = assets.contents | {page: text.encode() for page, text in pages.items()}
     document = {
-        "format": _FORMAT,
+        "format": REPORT_FORMAT,
         "inputs": dict(inputs),
         "files": {place: _hash(data) for place, data in written.items()},
     }

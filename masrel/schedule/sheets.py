@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from masrel._files import make_folder, write_files
-from masrel._input import MAX_SMALL, not_utf8, read_regular
+from masrel._input import MAX_SMALL, csv_format, format_problem, not_utf8, read_regular
 from masrel.errors import ScheduleError
 from masrel.protocol import (
     Protocol,
@@ -26,6 +26,9 @@ from masrel.schedule.presentation import (
     _draw_with_key,
     check_schedule,
 )
+
+_FORMAT = 1
+"""Version of the files of schedules and sheets; a file without one is of version 1."""
 
 _HEAD = {
     "study": r"\S+",
@@ -86,6 +89,9 @@ def read_schedule(path: Path) -> Schedule:
     """
     lines = _read_lines(path)
     n_head = next((i for i, s in enumerate(lines) if not s.startswith("#")), len(lines))
+    problem = _format_problem(lines)
+    if problem is not None:
+        raise ScheduleError(f"{path}: {problem}")
     problems: list[str] = []
     head = _read_head(lines[:n_head], path, problems)
     rows = _read_rows(lines, n_head, path, problems)
@@ -117,11 +123,17 @@ def _read_lines(path: Path) -> list[str]:
         raise ScheduleError(f"{path}: {not_utf8(error)}") from error
 
 
+def _format_problem(lines: Sequence[str]) -> str | None:
+    return format_problem(csv_format("\n".join(lines)), newest=_FORMAT)
+
+
 def _read_head(lines: list[str], path: Path, problems: list[str]) -> dict[str, str]:
     head: dict[str, str] = {}
     for number, line in enumerate(lines, start=1):
         key, _, value = line.removeprefix("#").partition(":")
         key, value = key.strip(), value.strip()
+        if key == "format":
+            continue  # it is known
         if key not in _HEAD or key in head:
             problems.append(
                 f"{path}: line {number}: needed '# key: value' with each of "
@@ -481,7 +493,7 @@ def _refusal(files: _ScheduleFiles, fault: str, *, redraw: bool) -> str | None:
 
 def _is_filled_in(sheet: Path) -> bool:
     # A blank sheet's rows, and none but they, end at the comma before the grade.
-    rows = _sheet_lines(sheet)[1:]
+    rows = [row for row in _sheet_lines(sheet) if not row.startswith("#")][1:]
     return any(not row.endswith(",") for row in rows if row)
 
 
@@ -494,7 +506,12 @@ def _sheet_fault(files: _ScheduleFiles, schedule: Schedule) -> str | None:
     # The sheet may be missing or have grades, but its codes are the schedule's.
     if not files.sheet.exists():
         return None
-    rows = [tuple(row.split(",")[:2]) for row in _sheet_lines(files.sheet)[1:] if row]
+    lines = _sheet_lines(files.sheet)
+    problem = _format_problem(lines)
+    if problem is not None:
+        return f"{files.sheet}: {problem}"
+    below = [line for line in lines if line and not line.startswith("#")][1:]
+    rows = [tuple(row.split(",")[:2]) for row in below]
     expected = [(str(s.position), s.code) for s in schedule.presentations]
     if rows == expected:
         return None
@@ -527,7 +544,8 @@ def _draw_fault(
 def _schedule_text(schedule: Schedule) -> str:
     """Write a schedule as the text of its file."""
     values = {key: getattr(schedule, key) for key in _HEAD}
-    head = [f"# {key}: {value}" for key, value in values.items() if value is not None]
+    head = [f"# format: {_FORMAT}"]
+    head += [f"# {key}: {value}" for key, value in values.items() if value is not None]
     rows = [
         f"{shown.position},{shown.code},{shown.model},{shown.repeat}"
         for shown in schedule.presentations
@@ -538,4 +556,5 @@ def _schedule_text(schedule: Schedule) -> str:
 def _sheet_text(schedule: Schedule) -> str:
     """Write the blinded sheet on which a rater's grades are noted."""
     rows = [f"{shown.position},{shown.code}," for shown in schedule.presentations]
-    return "\n".join([",".join(_SHEET_COLUMNS), *rows]) + "\n"
+    head = f"# format: {_FORMAT}"
+    return "\n".join([head, ",".join(_SHEET_COLUMNS), *rows]) + "\n"

@@ -8,8 +8,15 @@ from pathlib import Path
 from typing import TypeVar
 
 from masrel._event_log import Event, read_log
-from masrel._input import MAX_RECORDING, MAX_SMALL, parse_json, read_regular
+from masrel._input import (
+    MAX_RECORDING,
+    MAX_SMALL,
+    format_problem,
+    parse_json,
+    read_regular,
+)
 from masrel.errors import SessionLogError
+from masrel.recording import _FORMAT
 from masrel.schedule import Presentation
 from masrel.verification._finding import Finding, broken, doubt
 
@@ -89,6 +96,9 @@ def _fact_findings(
     if not isinstance(facts, dict):
         yield broken(path, "needed a JSON object, got none")
         return
+    problem = format_problem(facts.get("format", 1), newest=_FORMAT)
+    if problem is not None:
+        yield broken(path, problem)
     needed: dict[str, object] = {
         **of,
         "sha256": event.fields["sha256"],

@@ -8,7 +8,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from masrel._input import MAX_RECORDING, MAX_TABLE, parse_json, read_regular
+from masrel._input import (
+    MAX_RECORDING,
+    MAX_TABLE,
+    format_problem,
+    parse_json,
+    read_regular,
+)
 from masrel.conduct import excluded_raters
 from masrel.errors import MasrelError, MasrelWarning
 from masrel.protocol import Protocol, StudyPaths
@@ -17,6 +23,9 @@ from masrel.verification._finding import Finding, broken, doubt
 if TYPE_CHECKING:
     from masrel.analysis import Analysis
     from masrel.ratings import Ratings
+
+REPORT_FORMAT = "masrel report 1"
+"""What the manifest of a report says its format is."""
 
 _SHOWN = 20  # differences of the table that are listed
 
@@ -92,10 +101,16 @@ def _analysis_findings(
     path: Path, analysis: "Analysis", texts: Sequence[str]
 ) -> Iterator[Finding]:
     from masrel.analysis import as_analysis_document
+    from masrel.analysis._analysis_json import ANALYSIS_FORMAT
 
     document = _document(path)
     if document is None:
         yield broken(path, "needed a JSON object, got none")
+        return
+    document = {"format": 1, **document}  # which was not said once
+    problem = format_problem(document["format"], newest=ANALYSIS_FORMAT)
+    if problem is not None:
+        yield broken(path, problem)
         return
     analysis = _of_same_table(analysis, document.get("inputs"), texts)
     needed = json.loads(json.dumps(as_analysis_document(analysis)))
@@ -136,6 +151,12 @@ def _report_findings(
     files = None if document is None else document.get("files")
     if document is None or not isinstance(files, dict):
         yield broken(manifest, "needed the manifest of a report, got none")
+        return
+    if document.get("format") != REPORT_FORMAT:
+        yield broken(
+            manifest,
+            f"needed format {REPORT_FORMAT!r}, got {document.get('format')!r}",
+        )
         return
     analysis = _of_same_table(analysis, document.get("inputs"), texts)
     if document.get("inputs") != analysis.inputs:

@@ -7,13 +7,17 @@ from pathlib import Path
 
 from masrel._event_log import line_hashes, read_log
 from masrel._files import write_file
-from masrel._input import MAX_TABLE, read_regular
+from masrel._input import MAX_TABLE, csv_format, format_problem, read_regular
 from masrel.errors import ParameterError, SessionLogError
 from masrel.protocol import StudyPaths
 from masrel.verification._finding import Finding, broken
 
+_FORMAT = 1
 _LINE = re.compile(r"([0-9a-f]{64})  (\d{1,9})  (\S.*)")
-_HEAD = "# SHA-256 of a line of a session log, the line's number, and the log.\n"
+_HEAD = (
+    f"# format: {_FORMAT}\n"
+    "# SHA-256 of a line of a log, the line's number, and the log.\n"
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,6 +102,9 @@ def read_anchors(path: Path) -> tuple[Anchor, ...]:
     anchors = []
     text = read_regular(path, most=MAX_TABLE).decode("utf-8", errors="replace")
     for number, line in enumerate(text.splitlines(), start=1):
+        problem = format_problem(csv_format(line), newest=_FORMAT)
+        if problem is not None:
+            raise ParameterError(f"{path}: line {number}: {problem}")
         if line.startswith("#") or not line.strip():
             continue
         match = _LINE.fullmatch(line.strip())

@@ -60,7 +60,7 @@ def test_a_sheet_is_typed_into_a_file_with_a_column_a_question(new_study: New) -
     study, protocol = new_study(("[schedule]", QUESTIONS))
     write_sheets(study, protocol, raters=["R1"], sessions=["test"])
     text = study.typed_file("R1", "test").read_text(encoding="utf-8")
-    head, *rows, last = text.splitlines()
+    _, head, *rows, last = text.splitlines()
     assert head == "sheet,position,code,grade,arm.realism,end.tired,end.words"
     (sheet,) = {row.split(",")[0] for row in (*rows, last)}
     assert re.fullmatch(r"S[0-9A-F]{4}-[0-9A-F]{4}", sheet)

@@ -122,7 +122,7 @@ def test_the_table_of_raters_has_every_field(
     raters = rater_progress(study, protocol, session_progress(study, protocol))
     text = raters_csv(raters, protocol, simulated=True)
     assert text.splitlines()[0].startswith("# SIMULATED")
-    assert text.splitlines()[2:] == [
+    assert text.splitlines()[3:] == [
         "rater,site,status,late,clinic",
         "R1,NA,planned,no,'=A1",  # no spreadsheet runs it
         "R2,NA,planned,no,NA",

@@ -64,7 +64,7 @@ def test_a_sheet_reveals_neither_model_nor_grade_nor_seed(study: StudyPaths) -> 
     shown = read_schedule(study.schedule_file("R1", "test")).presentations
     text = study.sheet_file("R1", "test").read_text(encoding="utf-8")
     expected = [f"{place},{each.code}," for place, each in enumerate(shown, start=1)]
-    assert text.splitlines() == ["position,code,grade", *expected]
+    assert text.splitlines() == ["# format: 1", "position,code,grade", *expected]
     for secret in (*names, "1+", "987654321", "standard"):
         assert secret not in text
 

@@ -28,6 +28,7 @@ LINES = written()
 def test_the_file_is_provenance_then_rows() -> None:
     first, second = SCHEDULE.presentations
     assert LINES == [
+        "# format: 1",
         "# study: tiny",
         "# rater: R1",
         "# session: test",
@@ -53,19 +54,20 @@ def test_what_was_written_is_read_back(tmp_path: Path, ending: str) -> None:
 @pytest.mark.parametrize(
     ("number", "line", "message"),
     [
-        (1, None, "needed a line '# study: ...', got none"),
-        (1, "# studio: tiny", "line 1: needed '# key: value'"),
-        (2, "# study: tiny", "line 2: needed '# key: value'"),
-        (4, "# seed: -1", "line 4: needed seed"),
-        (6, "# protocol_sha256: 12", "line 6: needed protocol_sha256"),
-        (10, "code,position,model,repeat", "line 10: needed columns position,code"),
-        (9, "# commitment: no", "line 9: needed commitment"),
-        (11, "2,47K,A,1", "line 11: needed position 1, got '2'"),
-        (11, "1,../x,A,1", "line 11: needed a code of letters and digits, got '../x'"),
-        (11, "1,47K,,1", "line 11: needed the id of a model"),
-        (11, "1,47K,A,0", "line 11: needed repeat"),
-        (11, "1,47K,A", "line 11: needed 4 cells, got 3"),
-        (12, f"2,{SCHEDULE.presentations[0].code},B,1", "line 12: needed codes that"),
+        (1, "# format: 2", "needed format 1, got 2"),
+        (2, None, "needed a line '# study: ...', got none"),
+        (2, "# studio: tiny", "line 2: needed '# key: value'"),
+        (3, "# study: tiny", "line 3: needed '# key: value'"),
+        (5, "# seed: -1", "line 5: needed seed"),
+        (7, "# protocol_sha256: 12", "line 7: needed protocol_sha256"),
+        (11, "code,position,model,repeat", "line 11: needed columns position,code"),
+        (10, "# commitment: no", "line 10: needed commitment"),
+        (12, "2,47K,A,1", "line 12: needed position 1, got '2'"),
+        (12, "1,../x,A,1", "line 12: needed a code of letters and digits, got '../x'"),
+        (12, "1,47K,,1", "line 12: needed the id of a model"),
+        (12, "1,47K,A,0", "line 12: needed repeat"),
+        (12, "1,47K,A", "line 12: needed 4 cells, got 3"),
+        (13, f"2,{SCHEDULE.presentations[0].code},B,1", "line 13: needed codes that"),
     ],
 )
 def test_a_wrong_line_is_named(
@@ -80,15 +82,21 @@ def test_a_wrong_line_is_named(
     assert f"{path}: {message}" in str(caught.value)
 
 
+def test_a_schedule_of_before_formats_had_numbers_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "test_R1.csv"
+    path.write_text("\n".join(LINES[1:]) + "\n", encoding="utf-8")
+    assert read_schedule(path) == SCHEDULE
+
+
 def test_every_wrong_line_is_named_at_once(tmp_path: Path) -> None:
     lines = list(LINES)
-    lines[3], lines[10], lines[11] = "# seed: x", "1,47K", "3,48K,B,1"
+    lines[4], lines[11], lines[12] = "# seed: x", "1,47K", "3,48K,B,1"
     path = tmp_path / "test_R1.csv"
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     with pytest.raises(ScheduleError) as caught:
         read_schedule(path)
     found = [text.split(": ")[1] for text in str(caught.value).splitlines()]
-    assert found == ["line 4", "line 11", "line 12"]
+    assert found == ["line 5", "line 12", "line 13"]
 
 
 @pytest.mark.parametrize(
@@ -97,7 +105,7 @@ def test_every_wrong_line_is_named_at_once(tmp_path: Path) -> None:
         (None, "needed a schedule file, got: No such file"),
         (b"", "needed columns position,code,model,repeat, got nothing"),
         (b"\xff\xfe", "needed UTF-8 text"),
-        ("\n".join(LINES[:10]).encode(), "needed at least one presentation, got none"),
+        ("\n".join(LINES[:11]).encode(), "needed at least one presentation, got none"),
     ],
 )
 def test_a_file_that_is_no_schedule_is_refused(

@@ -28,8 +28,12 @@ def drawn_then(paths: StudyPaths, name: str) -> Protocol:
     for session in protocol.sessions:
         for rater in session.raters:
             drawn = draw_schedule(protocol, rater, session.id)
-            paths.schedule_file(rater, session.id).write_text(schedule_text(drawn))
-            paths.sheet_file(rater, session.id).write_text(sheet_text(drawn))
+            texts = {
+                paths.schedule_file(rater, session.id): schedule_text(drawn),
+                paths.sheet_file(rater, session.id): sheet_text(drawn),
+            }
+            for path, text in texts.items():  # no file named its format then
+                path.write_text(text.removeprefix("# format: 1\n"))
     return protocol
 
 
