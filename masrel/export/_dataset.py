@@ -14,10 +14,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Literal
 
-from masrel._cells import safe_cell
-from masrel._input import MAX_SMALL, read_regular
-from masrel.conduct import rater_values
+from masrel._input import MAX_SMALL, listed, read_regular
 from masrel.errors import ParameterError
+from masrel.progress import rater_progress, raters_csv, session_progress
 from masrel.protocol import Protocol, StudyPaths
 from masrel.ratings import Ratings, ratings_csv, read_study_data
 from masrel.run import read_log
@@ -118,18 +117,25 @@ def gather_dataset(
     files = {"protocol.toml": text}
     if data.in_person is not None:
         files["ratings/in_person.csv"] = _bytes(paths.in_person_file)
-    logs = [*([paths.conduct_file] if paths.conduct_file.is_file() else [])]
-    logs += paths.logs()
+    logs = [*paths.conduct_logs(), *paths.logs()]
+    # who is excluded is not known without the logs
+    excluded = () if "logs" in include else data.excluded
     if "logs" in include:
         files |= {log.relative_to(paths.root).as_posix(): _bytes(log) for log in logs}
     elif logs:
         left_out += (f"{len(logs)} logs, which name who did what and why (logs)",)
+    if excluded:
+        left_out += (f"ratings of {listed(excluded)}, who are excluded (logs)",)
     return Dataset(
         paths=paths,
         protocol=protocol,
-        ratings=_ratings_table(protocol, data.ratings),
+        ratings=_ratings_table(protocol, data.ratings, excluded),
         raters=_raters_table(paths, protocol, fields),
-        recordings=tuple(_recordings(paths, protocol)),
+        recordings=tuple(
+            recording
+            for recording in _recordings(paths, protocol)
+            if recording.rater not in excluded
+        ),
         files=files,
         description=_description(protocol, data.ratings),
         day=day,
@@ -212,10 +218,11 @@ _OF_RATINGS: dict[str, tuple[str, Kind, str]] = {
 }
 
 
-def _ratings_table(protocol: Protocol, ratings: Ratings) -> DataTable:
-    lines = ratings_csv(ratings).splitlines(keepends=True)
-    text = "".join(line for line in lines if not line.startswith("#"))
-    names, *rows = csv.reader(io.StringIO(text))
+def _ratings_table(
+    protocol: Protocol, ratings: Ratings, excluded: Collection[str]
+) -> DataTable:
+    names, *rows = _records(ratings_csv(ratings))
+    rater = names.index("rater")
     levels = {
         "grade": protocol.scale.grades,
         "model": tuple(model.id for model in protocol.models),
@@ -233,43 +240,59 @@ def _ratings_table(protocol: Protocol, ratings: Ratings) -> DataTable:
             )
             for name in names
         ),
-        rows=tuple(map(tuple, rows)),
+        rows=tuple(tuple(row) for row in rows if row[rater] not in excluded),
         keys=("session", "rater", "model", "repeat"),
     )
+
+
+def _records(text: str) -> list[list[str]]:
+    # those of a table of masrel, without the comments above it
+    lines = text.splitlines(keepends=True)
+    body = "".join(line for line in lines if not line.startswith("#"))
+    return list(csv.reader(io.StringIO(body)))
 
 
 _KINDS: dict[str, Kind] = {"whole": "whole", "number": "number"}
 
 
+_OF_RATERS = {
+    "rater": Variable(name="rater", title="Rater"),
+    "site": Variable(name="site", title="Site"),
+    "status": Variable(name="status", title="What became of the rater in the study"),
+    "late": Variable(name="late", title="Joined later than most", levels=("yes", "no")),
+}
+
+
 def _raters_table(
     paths: StudyPaths, protocol: Protocol, fields: Sequence[str]
 ) -> DataTable:
-    values = rater_values(paths, protocol)
-    declared = {name: protocol.rater_fields[name] for name in fields}
-    described = [
-        Variable(
-            name=name,
-            title=field.title or name,
-            kind=_KINDS.get(field.type, "text"),
-            unit=field.unit,
-            levels=field.choices,
-        )
-        for name, field in declared.items()
-    ]
+    sessions = session_progress(paths, protocol)
+    raters = rater_progress(paths, protocol, sessions)
+    names, *rows = _records(raters_csv(raters, protocol, simulated=False))
+    # of ratings that were published nobody knows how they came about
+    known = [*_OF_RATERS] if paths.logs() else ["rater", "site"]
+    places = [i for i, name in enumerate(names) if name in (*known, *fields)]
     return DataTable(
         name="raters",
         title="Raters",
-        variables=(Variable(name="rater", title="Rater"), *described),
-        rows=tuple(
-            (rater, *(_cell(known[name]) for name in fields))
-            for rater, known in values.items()
+        variables=tuple(
+            _OF_RATERS.get(names[i]) or _field_variable(protocol, names[i])
+            for i in places
         ),
+        rows=tuple(tuple(row[i] for i in places) for row in rows),
         keys=("rater",),
     )
 
 
-def _cell(value: object) -> str:
-    return MISSING if value is None else safe_cell(str(value))
+def _field_variable(protocol: Protocol, name: str) -> Variable:
+    field = protocol.rater_fields[name]
+    return Variable(
+        name=name,
+        title=field.title or name,
+        kind=_KINDS.get(field.type, "text"),
+        unit=field.unit,
+        levels=field.choices,
+    )
 
 
 def _recordings(paths: StudyPaths, protocol: Protocol) -> Iterator[RecordingFile]:

@@ -14,8 +14,6 @@ from masrel.paper._form import FIRST_COLUMNS
 
 _SEPARATORS = (",", ";", "\t")
 
-_LONGEST_CELL = 10_000  # letters of an answer
-
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 """Byte order marks of what spreadsheets call Unicode text."""
 
@@ -102,13 +100,7 @@ def _records(path: Path, text: str) -> Iterator[list[str]]:
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator)
     try:
         for record in reader:
-            cells = [cell.strip() for cell in record]
-            if any(len(cell) > _LONGEST_CELL for cell in cells):
-                raise RatingsError(
-                    f"{path}: line {reader.line_num}: needed cells of at most "
-                    f"{_LONGEST_CELL} letters, got a longer one"
-                )
-            yield cells or [""]
+            yield [cell.strip() for cell in record] or [""]
     except csv.Error as error:
         raise RatingsError(
             f"{path}: line {reader.line_num}: needed cells of a CSV file, got: {error}"
@@ -121,14 +113,12 @@ def _columns(path: Path, number: int, record: list[str]) -> list[str]:
         if name not in names:
             raise RatingsError(
                 f"{path}: row {number}: needed the columns "
-                f"{', '.join(FIRST_COLUMNS[1:])}, got "
-                f"{shortened(', '.join(filter(None, names)))}"
+                f"{', '.join(FIRST_COLUMNS[1:])}, got {', '.join(filter(None, names))}"
             )
     for name in filter(None, names):
         if names.count(name) > 1:
             raise RatingsError(
-                f"{path}: row {number}: needed each column once, got {shortened(name)} "
-                "twice"
+                f"{path}: row {number}: needed each column once, got {name} twice"
             )
     return names
 
@@ -149,13 +139,8 @@ def _rows(
             if cell and not column:
                 raise RatingsError(
                     f"{path}: row {number}: needed cells below the name of a column, "
-                    f"got {shortened(cell)!r} below none"
+                    f"got {cell!r} below none"
                 )
         yield TypedRow(
             number=number, cells={name: cell for name, cell in named if name}
         )
-
-
-def shortened(text: str, most: int = 100) -> str:
-    """Return a text as a message has it."""
-    return text if len(text) <= most else f"{text[:most]}…"

@@ -5,6 +5,7 @@ import gzip
 import hashlib
 import json
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -16,6 +17,7 @@ import pytest
 from rocrate.rocrate import ROCrate
 
 from masrel.analysis import analyze, as_analysis_document
+from masrel.conduct import record_exclusion
 from masrel.errors import ParameterError
 from masrel.export import EXPORT_FORMS, export_study
 from masrel.protocol import Protocol, StudyPaths, read_protocol
@@ -270,12 +272,27 @@ def test_public_fields_of_raters_go_along(rated: Study, tmp_path: Path) -> None:
     folder = exported(rated, "bids", tmp_path / "out")
     lines = (folder / "participants.tsv").read_text().splitlines()
     assert [line.split("\t") for line in lines] == [
-        ["participant_id", "rater", "years"],
-        ["sub-R1", "R1", "n/a"],
-        ["sub-R2", "R2", "7"],
+        ["participant_id", "rater", "site", "status", "late", "years"],
+        ["sub-R1", "R1", "n/a", "begun", "no", "n/a"],
+        ["sub-R2", "R2", "n/a", "complete", "no", "7"],
     ]
     described = json.loads((folder / "participants.json").read_text())
     assert described["years"] == {"Description": "Years of practice", "Units": "a"}
+
+
+def test_who_is_excluded_is_left_out_and_said(rated: Study, tmp_path: Path) -> None:
+    copy = StudyPaths(tmp_path / "study")
+    shutil.copytree(rated[0].root, copy.root)
+    record_exclusion(copy, rated[1], "R2", who="Somebody Private", why="rivate")
+    study = (copy, rated[1])
+    left_out = export_study(*study, "datapackage", tmp_path / "a")
+    assert "ratings of R2, who are excluded (logs)" in left_out
+    named = {path.name.split("_")[1] for path in (tmp_path / "a/recordings").iterdir()}
+    assert named == {"R1"}
+    ratings = (tmp_path / "a" / "ratings" / "ratings.csv").read_text().splitlines()
+    assert [line.split(",")[1] for line in ratings] == ["rater", *["R1"] * 3]
+    export_study(*study, "datapackage", tmp_path / "b", include=("logs", "notes"))
+    assert "R2" in (tmp_path / "b/ratings/ratings.csv").read_text()
 
 
 def test_every_column_of_ratings_is_described(rated: Study, tmp_path: Path) -> None:

@@ -3,7 +3,6 @@
 import csv
 import io
 import json
-import random
 from collections.abc import Callable, Sequence
 from datetime import UTC, date, datetime
 from pathlib import Path
@@ -14,7 +13,6 @@ from click.testing import CliRunner
 from masrel.analysis import analyze
 from masrel.cli import cli
 from masrel.errors import (
-    MasrelError,
     MasrelWarning,
     ParameterError,
     RatingsError,
@@ -379,26 +377,3 @@ def test_the_command_enters_and_says_so(small: Small) -> None:
     )
     header = json.loads(study.log_file("R1", "test").read_text("utf-8").splitlines()[0])
     assert header["fields"]["grades"] == "paper"
-
-
-def test_whatever_a_file_holds_it_is_refused_in_words(new_study: New) -> None:
-    small = study, _ = new_study(("[schedule]", QUESTIONS))
-    rows = filled(small, "1", "2", "3")
-    for row in rows[1:4]:
-        row[4] = "7"
-    rows[4][5] = "50"
-    enter(small, typed(small, rows))
-    before = study.log_file("R1", "test").read_bytes()
-    whole, rng = typed(small, rows).read_bytes(), random.Random(7)
-    file = study.root / "changed.csv"
-    for _ in range(150):  # also those that are right were entered before
-        data = bytearray(whole)
-        for _ in range(rng.randint(1, 4)):
-            start = rng.randrange(len(data) + 1)
-            new = rng.choice([b",", b";", b'"', b"\n", b"\0", b"\xe4", b"NA", b""])
-            data[start : start + rng.randint(0, 9)] = new
-        file.write_bytes(data)
-        with pytest.raises(MasrelError) as caught:
-            enter(small, file)
-        assert len(str(caught.value)) < 5000
-    assert study.log_file("R1", "test").read_bytes() == before
