@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     type=click.DateTime(["%Y-%m-%d"]),
     help="Day of the session, as on the sheet.",
 )
+@click.option("--device", help="What presented the models; default: none.")
 @click.option(
     "--second",
     is_flag=True,
@@ -39,6 +40,7 @@ def enter(
     session: str,
     who: str,
     on: datetime | None,
+    device: str | None,
     second: bool,
 ) -> None:
     """Enter a sheet of STUDY that was filled in on paper and typed into FILE.
@@ -47,16 +49,25 @@ def enter(
     nothing is entered: where the two entries differ is listed, and the exit code is 1.
     """
     from masrel.paper import enter_sheet
+    from masrel.paper._entry import NO_DEVICE
 
     paths = StudyPaths(study)
     protocol = read_protocol(paths.protocol)
     if second:
-        if on is not None:
-            raise click.UsageError("--on is said with the first entry, not --second")
+        if on is not None or device is not None:
+            raise click.UsageError("--on and --device are said with the first entry")
         context.exit(_compare(paths, protocol, file, rater, session, who))
-    day = None if on is None else on.date()
     with warnings_as_notes():
-        entered = enter_sheet(paths, protocol, file, rater, session, who=who, on=day)
+        entered = enter_sheet(
+            paths,
+            protocol,
+            file,
+            rater,
+            session,
+            who=who,
+            on=None if on is None else on.date(),
+            device=device or NO_DEVICE,
+        )
     n_missing = entered.n_presentations - entered.n_graded
     without = f", {n_missing} missing," if n_missing else ""
     click.echo(

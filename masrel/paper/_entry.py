@@ -1,6 +1,7 @@
 """Sheets that were filled in, brought into session logs."""
 
 import hashlib
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from datetime import date, datetime, time
@@ -24,7 +25,10 @@ from masrel.run._state import FORMAT, FROM_PAPER, SessionState, replay
 if TYPE_CHECKING:
     from masrel.recording import _Fact  # loads numpy
 
-_NO_DEVICE = "none"
+NO_DEVICE = "none"
+"""What logs call the device where nobody says what presented the models."""
+
+_DEVICE = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,31}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,6 +63,7 @@ def enter_sheet(
     *,
     who: str,
     on: date | None = None,
+    device: str = NO_DEVICE,
     now: Callable[[], datetime] = utc_now,
 ) -> EnteredSheet:
     """Bring a sheet that was filled in on paper into a session log.
@@ -81,6 +86,8 @@ def enter_sheet(
     on : date, optional
         Day of the session, as on the sheet: from it the days between sessions are
         counted.
+    device : str, optional
+        What presented the models, where another program ran it; "none" unless given.
     now : callable, optional
         Gives the time of day for the log, aware.
 
@@ -101,7 +108,7 @@ def enter_sheet(
         If the session was begun with a device, or entered before, or its log is
         damaged.
     ParameterError
-        If `who` is blank, or `on` is a day to come.
+        If `who` is blank, `on` is a day to come, or `device` is no name or simulated.
     OSError
         If the log cannot be written.
 
@@ -112,12 +119,13 @@ def enter_sheet(
     """
     reasons = stated(who=who)
     _check_day(on, now)
+    _check_device(device)
     sheet, rows, form = filled_sheet(study, protocol, file, rater, session)
     log_file = study.log_file(rater, session)
     check_inside(log_file.parent, study.root)
     with SessionLog.open(log_file, now=now) as log:
         state = replay(log.path, log.events)
-        _begin(study, protocol, form, state, log)
+        _begin(study, protocol, form, device, state, log)
         if on is not None and state.held_on is None:
             _log_day(study, protocol, form, on, log)
         _refuse_entered(sheet, log)
@@ -159,6 +167,7 @@ def _begin(
     study: StudyPaths,
     protocol: Protocol,
     form: Form,
+    device: str,
     state: SessionState,
     log: SessionLog,
 ) -> None:
@@ -172,13 +181,13 @@ def _begin(
         "schedule_sha256": hashlib.sha256(schedule_file.read_bytes()).hexdigest(),
         "simulated": False,
         "grades": FROM_PAPER,
-        "device": _NO_DEVICE,
+        "device": device,
         "rehearsal": False,
     }
     if not state.header:
         provenance: dict[str, _Fact] = {
             "protocol_sha256": protocol_hash(protocol),
-            "clock": _NO_DEVICE,
+            "clock": NO_DEVICE,
             "masrel_version": masrel.__version__,
         }
         log.append("session", {**same, **provenance})
@@ -194,6 +203,15 @@ def _check_day(on: date | None, now: Callable[[], datetime]) -> None:
     today = now().astimezone().date()
     if on is not None and on > today:
         raise ParameterError(f"on: needed a day up to {today}, got {on}")
+
+
+def _check_device(device: str) -> None:
+    # what is simulated is run by masrel, and says so in the log
+    if not _DEVICE.fullmatch(device) or "simulated" in device.casefold():
+        raise ParameterError(
+            "device: needed a name of 1 to 32 letters, digits, '.', '_' or '-' of "
+            f"a device that is not simulated, got {device!r}"
+        )
 
 
 def _log_day(

@@ -358,6 +358,15 @@ def test_days_between_sessions_are_counted_from_the_days_on_the_sheets(
     assert verify_study(study).is_whole
 
 
+def test_what_presented_the_models_is_named_and_never_simulated(small: Small) -> None:
+    file = typed(small, filled(small, "1", "2", "3"))
+    for name in ("simulated", "Simulated-arm", "", "two words"):
+        with pytest.raises(ParameterError, match=r"^device: needed a name of "):
+            enter(small, file, device=name)
+    enter(small, file, device="wam-arm")
+    assert set(ratings_from_logs(*small).table["device"]) == {"wam-arm"}
+
+
 def test_a_session_on_a_day_to_come_is_refused(small: Small) -> None:
     file = typed(small, filled(small, "1", "2", "3"))
     with pytest.raises(ParameterError, match=r"^on: needed a day up to "):
