@@ -14,6 +14,7 @@ from masrel.report._tables import (
     as_entered,
     counted,
 )
+from masrel.schedule._orders import orders_in_words
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -83,6 +84,11 @@ def design_section(material: Material) -> Section:
     stretches = stretches_asked_for(protocol.presentation)
     if stretches:
         texts[0] += f" {stretches}"
+    if protocol.schedule.scheme != "random-order":
+        texts[0] += (
+            " In each session a rater meets the models in "
+            f"{orders_in_words(protocol.schedule)}."
+        )
     if study.notes:
         texts.append(study.notes)
     if study.source and material.data != "published":  # else it is in the head

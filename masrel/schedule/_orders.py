@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from math import comb
 
 from masrel.errors import ScheduleError
-from masrel.protocol import Model, Protocol
+from masrel.protocol import Model, Protocol, ScheduleScheme
 from masrel.schedule._admissible import (
     FREE,
     LimitedRuns,
@@ -56,6 +56,28 @@ def _numbered(order: Sequence[str]) -> list[tuple[str, int]]:
         n_before[model] += 1
         shown.append((model, n_before[model]))
     return shown
+
+
+def orders_in_words(rules: ScheduleScheme) -> str:
+    """Say which orders a scheme draws, to follow "meets the models in"."""
+    limits = []
+    if rules.scheme == "no-immediate-repeat":
+        limits.append("no model comes twice in a row")
+    if rules.standards_apart:
+        limits.append("no two standards come in a row")
+    if rules.max_same_grade is not None:
+        limits.append(f"at most {rules.max_same_grade} of one grade come in a row")
+    if limits:
+        return f"an order drawn from all in which {' and '.join(limits)}"
+    if rules.scheme == "williams":
+        return "an order of a Williams design, which balances places and what follows"
+    if rules.scheme == "latin-square":
+        return "an order of a Latin square, which balances places"
+    if rules.scheme == "blocks" and rules.blocks_by == "role":
+        return "a random order with standards and dummies in a block each"
+    if rules.scheme == "blocks":
+        return "a random order in which each comes once before any comes again"
+    return "a random order"
 
 
 def _check_row(scheme: str, row: int | None) -> None:

@@ -63,3 +63,28 @@ def test_the_parameters_are_shown_as_they_were_given(tmp_path: Path) -> None:
     files = write_report(protocol, rows, analyze(protocol, rows), tmp_path)
     text = files.markdown.read_text(encoding="utf-8")
     assert re.search(r"\| HM1 \| standard \| 1 \| 130 \| 1.40 \| 0.1255 \| 60 \|", text)
+
+
+@pytest.mark.parametrize(
+    ("rules", "sentence"),
+    [
+        ({}, None),
+        ({"scheme": "williams"}, "meets the models in an order of a Williams design"),
+        (
+            {"scheme": "restricted", "standards_apart": True, "max_same_grade": 2},
+            "meets the models in an order drawn from all in which no two standards "
+            "come in a row and at most 2 of one grade come in a row.",
+        ),
+    ],
+)
+def test_the_design_says_how_orders_were_drawn(
+    tmp_path: Path, rules: dict[str, object], sentence: str | None
+) -> None:
+    protocol = protocol_with(sections=("design",))
+    scheme = msgspec.structs.replace(protocol.schedule, **rules)
+    protocol = msgspec.structs.replace(protocol, schedule=scheme)
+    rows = table_v()
+    files = write_report(protocol, rows, analyze(protocol, rows), tmp_path)
+    text = files.markdown.read_text(encoding="utf-8")
+    assert (sentence or "scale MAS") in text
+    assert ("meets the models" in text) == (sentence is not None)
