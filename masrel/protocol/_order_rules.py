@@ -95,13 +95,6 @@ def _too_strict(
     graded = [model for model in models if model.get("intended_grade") is not None]
     if limit is None:
         return
-    if is_apart and any(model["role"] == "dummy" for model in graded):
-        yield (
-            "schedule.max_same_grade: needed dummies without intended_grade beside "
-            "standards_apart = true, for orders under both are counted for these "
-            f"alone, got {sum(m['role'] == 'dummy' for m in graded)} with one"
-        )
-        return
     of_grade = Counter(model["intended_grade"] for model in graded)
     for grade, n_models in of_grade.items():
         n_same, n_other = n_models * repeats, (len(models) - n_models) * repeats

@@ -5,13 +5,14 @@ of each number below that, so that an order drawn by a number drawn uniformly is
 all that keep the limits, each equally likely.
 """
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import pairwise
 from math import comb, prod
 from operator import mul
-from typing import TypeVar
+from typing import Self, TypeVar
 
 _T = TypeVar("_T")
 
@@ -68,6 +69,104 @@ class LimitedRuns:
         for n_runs in range(-(-size // self.longest), size + 1):
             words = sum(map(mul, _signed(n_runs), by_blocks))
             yield n_runs, words * _n_compositions(size, n_runs, self.longest)
+
+
+Cell = tuple[int | None, bool]
+"""What a presentation counts as: the number of its grade, and if it is a standard."""
+
+_Sizes = tuple[int, int]  # dummies, standards
+
+MAX_REMAINDERS = 100_000
+"""What may be left of a word, at most, for it to be counted; some seconds."""
+
+
+@dataclass(frozen=True, slots=True)
+class PartedRuns:
+    """Words without two standards in a row, nor more than `longest` of a grade."""
+
+    grades: tuple[_Sizes, ...]  # presentations of each grade
+    free: _Sizes  # of no grade
+    longest: int
+    _counts: dict[object, int] = field(default_factory=dict, compare=False, repr=False)
+
+    @property
+    def n_remainders(self) -> int:
+        """An upper limit to the number of different remainders of a word."""
+        # Grades with as many presentations are alike: only how many of them have so
+        # much left counts, and what the last presentation was.
+        left = prod(
+            comb((dummies + 1) * (standards + 1) + n - 1, n)
+            for (dummies, standards), n in Counter(self.grades).items()
+        )
+        of_free = (self.free[0] + 1) * (self.free[1] + 1)
+        longest = min(self.longest, max(map(sum, self.grades), default=1))
+        return left * of_free * (len(self.grades) + 1) * 2 * longest
+
+    def count(self) -> int:
+        """Return how many such words there are."""
+        return self._completions(_Remainder(self.grades, self.free))
+
+    def word(self, number: int) -> list[Cell]:
+        """Return the word of a number below `count`."""
+        left = _Remainder(self.grades, self.free)
+        word = []
+        while left.n_letters:
+            options = ((each, self._completions(each)) for each in self._after(left))
+            left, number = _pick(number, options)
+            word.append((left.grade, left.is_standard))
+        return word
+
+    def _completions(self, left: "_Remainder") -> int:
+        if not left.n_letters:
+            return 1
+        key = left.without_names()
+        if key not in self._counts:
+            total = 0
+            for each in self._after(left):
+                total += self._completions(each)
+            self._counts[key] = total
+        return self._counts[key]
+
+    def _after(self, left: "_Remainder") -> "Iterator[_Remainder]":
+        # by grade, then without one; of each a dummy, then a standard
+        for grade in (*range(len(left.grades)), None):
+            sizes = left.free if grade is None else left.grades[grade]
+            run = 1 if grade != left.grade or grade is None else left.run + 1
+            for is_standard in (False, True):
+                is_apart = not (is_standard and left.is_standard)
+                if sizes[is_standard] and run <= self.longest and is_apart:
+                    yield left.less(grade, is_standard=is_standard, run=run)
+
+
+@dataclass(frozen=True, slots=True)
+class _Remainder:
+    """What is left of a word, and how the part before it ends."""
+
+    grades: tuple[_Sizes, ...]
+    free: _Sizes
+    grade: int | None = None  # of the last presentation
+    is_standard: bool = False
+    run: int = 0
+
+    @property
+    def n_letters(self) -> int:
+        return sum(map(sum, self.grades)) + sum(self.free)
+
+    def less(self, grade: int | None, *, is_standard: bool, run: int) -> Self:
+        """Return what is left after another presentation."""
+        taken = (not is_standard, is_standard)
+        sizes = self.free if grade is None else self.grades[grade]
+        rest = (sizes[0] - taken[0], sizes[1] - taken[1])
+        if grade is None:
+            return type(self)(self.grades, rest, None, is_standard, run)
+        grades = (*self.grades[:grade], rest, *self.grades[grade + 1 :])
+        return type(self)(grades, self.free, grade, is_standard, run)
+
+    def without_names(self) -> tuple[object, ...]:
+        """Return what decides how many words go on from here."""
+        others = sorted(s for i, s in enumerate(self.grades) if i != self.grade)
+        last = None if self.grade is None else self.grades[self.grade]
+        return (*others, last, self.free, self.is_standard, self.run)
 
 
 @lru_cache(maxsize=64)

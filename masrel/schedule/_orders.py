@@ -2,13 +2,17 @@
 
 from collections import Counter
 from collections.abc import Sequence
-from math import comb
+from functools import lru_cache
+from math import comb, prod
 
 from masrel.errors import ScheduleError
 from masrel.protocol import Model, Protocol, ScheduleScheme
 from masrel.schedule._admissible import (
     FREE,
+    MAX_REMAINDERS,
+    Cell,
     LimitedRuns,
+    PartedRuns,
     arrangement,
     n_arrangements,
     subset,
@@ -39,13 +43,28 @@ def draw_order(
         return _numbered(design_order(protocol, session, site, row, secret))
     if rules.scheme == "blocks":
         return _numbered(_in_blocks(protocol, stream))
-    n_orders = count_orders(protocol)
-    if n_orders == 0:
-        raise ScheduleError(
-            "schedule.scheme: needed one that some order of the models keeps, got "
-            f'"{rules.scheme}", which none does'
+    if (problem := order_problem(protocol)) is not None:
+        raise ScheduleError(problem)
+    return _numbered(order_at(protocol, stream.below(count_orders(protocol))))
+
+
+def order_problem(protocol: Protocol) -> str | None:
+    """Say why no order can be drawn by the protocol's scheme; None if one can."""
+    scheme = protocol.schedule.scheme
+    if scheme not in ("no-immediate-repeat", "restricted"):
+        return None
+    if _is_parted(protocol) and (n := _parted(protocol).n_remainders) > MAX_REMAINDERS:
+        return (
+            "schedule.max_same_grade: needed orders that can be counted beside "
+            f"standards_apart = true (at most {MAX_REMAINDERS} remainders), got {n}: "
+            "take intended_grade from dummies, or repeat less"
         )
-    return _numbered(order_at(protocol, stream.below(n_orders)))
+    if count_orders(protocol) == 0:
+        return (
+            "schedule.scheme: needed one that some order of the models keeps, got "
+            f'"{scheme}", which none does'
+        )
+    return None
 
 
 def _numbered(order: Sequence[str]) -> list[tuple[str, int]]:
@@ -109,7 +128,12 @@ def _in_blocks(protocol: Protocol, stream: Stream) -> list[str]:
 def count_orders(protocol: Protocol) -> int:
     """Return how many orders keep the limits of the scheme, repeats not told apart."""
     repeats = protocol.schedule.repeats
-    if _is_apart(protocol):
+    if _is_parted(protocol):
+        of_cells = (
+            n_arrangements([repeats] * len(m)) for m in _cells(protocol).values()
+        )
+        return _parted(protocol).count() * prod(of_cells)
+    if protocol.schedule.standards_apart:
         standards, dummies = _of_roles(protocol)
         n_gaps = len(dummies) * repeats + 1
         return (
@@ -126,7 +150,13 @@ def count_orders(protocol: Protocol) -> int:
 
 def order_at(protocol: Protocol, number: int) -> list[str]:
     """Return the order of a number below that of all orders, each number another."""
-    if _is_apart(protocol):
+    if _is_parted(protocol):
+        cells = {}
+        for cell, models in _cells(protocol).items():
+            number, sequence = _arranged(protocol, models, number)
+            cells[cell] = iter(sequence)
+        return [next(cells[cell]) for cell in _parted(protocol).word(number)]
+    if protocol.schedule.standards_apart:
         return _standards_parted(protocol, number)
     groups, free = _groups(protocol)
     sequences = {}
@@ -157,10 +187,48 @@ def _arranged(
     return number, [models[place] for place in arrangement(index, sizes)]
 
 
-def _is_apart(protocol: Protocol) -> bool:
-    # Two standards that are apart are no two of a grade, and dummies have none then.
+def _is_parted(protocol: Protocol) -> bool:
+    """Return whether one limit does not hold by the other: a dummy has a grade."""
+    # Two standards that are apart are no two of a grade in a row.
     rules = protocol.schedule
-    return rules.scheme == "restricted" and rules.standards_apart
+    return (
+        rules.standards_apart
+        and rules.max_same_grade is not None
+        and any(m.role == "dummy" and m.intended_grade for m in protocol.models)
+    )
+
+
+def _cells(protocol: Protocol) -> dict[Cell, list[str]]:
+    # models by grade, in the order in which grades first come, and those without last;
+    # of each the dummies, then the standards
+    grades = dict.fromkeys(m.intended_grade for m in protocol.models)
+    names = [*(grade for grade in grades if grade is not None), None]
+    return {
+        (None if grade is None else index, role == "standard"): [
+            m.id for m in protocol.models if (m.intended_grade, m.role) == (grade, role)
+        ]
+        for index, grade in enumerate(names)
+        for role in ("dummy", "standard")
+    }
+
+
+def _parted(protocol: Protocol) -> PartedRuns:
+    repeats = protocol.schedule.repeats
+    n = {cell: len(models) * repeats for cell, models in _cells(protocol).items()}
+    n_grades = len(n) // 2 - 1
+    return _counted(
+        tuple((n[grade, False], n[grade, True]) for grade in range(n_grades)),
+        (n[None, False], n[None, True]),
+        protocol.schedule.max_same_grade or 1,
+    )
+
+
+@lru_cache(maxsize=8)
+def _counted(
+    grades: tuple[tuple[int, int], ...], free: tuple[int, int], longest: int
+) -> PartedRuns:
+    # one for all raters: what was counted stays with it
+    return PartedRuns(grades, free, longest)
 
 
 def _of_roles(protocol: Protocol) -> tuple[list[str], list[str]]:

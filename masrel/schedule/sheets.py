@@ -18,6 +18,7 @@ from masrel.protocol import (
 )
 from masrel.schedule._changes import content_file, stale_sentences
 from masrel.schedule._designs import WITH_ROWS
+from masrel.schedule._orders import order_problem
 from masrel.schedule._secret import StudySecret, find_secret, new_secret
 from masrel.schedule._sites import checked_site, site_of
 from masrel.schedule.presentation import (
@@ -287,6 +288,8 @@ def _drawn_texts(
             f"allot: needed with scheme {protocol.schedule.scheme}, whose rows are "
             "allotted by the study's log (masrel.conduct.allot_schedules), got none"
         )
+    if (problem := order_problem(protocol)) is not None:
+        raise ScheduleError(f"{study.protocol}: {problem}")
     key = find_secret(study)
     if key is not None:
         for files in to_draw:  # refused before a row is allotted
@@ -327,6 +330,8 @@ def schedule_problems(protocol: Protocol, study: StudyPaths) -> tuple[str, ...]:
         secret = find_secret(study)
     except ScheduleError as error:
         return (str(error),)
+    if (problem := order_problem(protocol)) is not None:
+        return (f"{study.protocol}: {problem}",)
     every = _every_schedule(protocol, study)
     problems: list[str] = []
     stale: list[str] = []

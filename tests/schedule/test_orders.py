@@ -8,8 +8,19 @@ from pathlib import Path
 import pytest
 
 from masrel.errors import ProtocolError, ScheduleError
-from masrel.protocol import Protocol, presented_hash, protocol_hash, read_protocol
-from masrel.schedule import check_schedule, draw_schedule
+from masrel.protocol import (
+    Protocol,
+    StudyPaths,
+    presented_hash,
+    protocol_hash,
+    read_protocol,
+)
+from masrel.schedule import (
+    check_schedule,
+    draw_schedule,
+    schedule_problems,
+    write_schedules,
+)
 from tests.protocol.documents import VALID, changed, write
 from tests.schedule.studies import SECRET, protocol_of
 
@@ -199,6 +210,7 @@ def test_limits_are_kept_by_every_order(
     assert not all(is_kept(order(at_random, rater)) for rater in raters(40))
 
 
+@pytest.mark.slow  # that numbers are one to one with orders is tested for each
 @pytest.mark.parametrize(
     ("rules", "n_orders", "limit"),
     [
@@ -398,3 +410,47 @@ def test_keys_at_their_defaults_are_what_protocols_always_had() -> None:
     sited = protocol_of(sites={"R1": "north"})
     assert presented_hash(sited) == presented_hash(plain)
     assert protocol_hash(sited) != protocol_hash(plain)
+
+
+def many_graded(repeats: int) -> Protocol:
+    """Standards and dummies of four grades, under both limits."""
+    return protocol_of(
+        models=tuple("ABCDEFGHIJKL"),
+        dummies=tuple("EFGHIJKL"),
+        grades={model: str(i % 4) for i, model in enumerate("ABCDEFGHIJKL")},
+        repeats=repeats,
+        scheme="restricted",
+        standards_apart=True,
+        max_same_grade=1,
+    )
+
+
+def test_both_limits_hold_where_dummies_have_grades_too() -> None:
+    protocol = many_graded(repeats=2)
+    drawn = order(protocol, "R1")
+    assert no_pair(lambda m: "standard" if m in "ABCD" else None)(drawn)
+    assert no_pair(lambda m: "ABCDEFGHIJKL".index(m) % 4)(drawn)
+
+
+def test_orders_that_cannot_be_counted_or_are_not_there_are_named(
+    tmp_path: Path,
+) -> None:
+    study = StudyPaths(tmp_path)
+    none = protocol_of(
+        models=("A", "B"),
+        dummies=("B",),
+        grades={"A": "1", "B": "1"},
+        scheme="restricted",
+        standards_apart=True,
+        max_same_grade=1,
+    )
+    for protocol, sentence in (
+        (many_graded(repeats=5), "schedule.max_same_grade: needed orders that can be"),
+        (none, "schedule.scheme: needed one that some order of the models keeps"),
+    ):
+        with pytest.raises(ScheduleError) as caught:
+            write_schedules(protocol, study)
+        (problem,) = schedule_problems(protocol, study)
+        assert problem == str(caught.value)
+        assert problem.startswith(f"{study.protocol}: {sentence}")
+    assert list(tmp_path.iterdir()) == []

@@ -13,6 +13,7 @@ from masrel.protocol import Protocol
 from masrel.schedule._admissible import (
     FREE,
     LimitedRuns,
+    PartedRuns,
     _apart_word,
     _completions,
     arrangement,
@@ -152,6 +153,23 @@ def keeps(order: Sequence[str], protocol: Protocol) -> bool:
             scheme="restricted",
             max_same_grade=2,
         ),
+        protocol_of(
+            models=(*STANDARDS, "D1", "D2", "D3"),
+            dummies=("D1", "D2", "D3"),
+            grades={"S1": "1", "S2": "2", "D1": "1", "D2": "1"},
+            scheme="restricted",
+            standards_apart=True,
+            max_same_grade=2,
+        ),
+        protocol_of(
+            models=("S1", "D1", "D2"),
+            dummies=DUMMIES,
+            grades={"S1": "1", "D1": "2", "D2": "1"},
+            repeats=2,
+            scheme="restricted",
+            standards_apart=True,
+            max_same_grade=1,
+        ),
     ],
 )
 def test_numbers_are_one_to_one_with_the_orders_of_a_protocol(
@@ -172,3 +190,39 @@ def test_orders_of_pairs_without_two_in_a_row_are_as_many_as_in_the_literature()
     # n models twice each, none twice in a row: https://oeis.org/A114938
     counts = [LimitedRuns((2,) * n, 0, 1).count() for n in range(1, 7)]
     assert counts == [0, 2, 30, 864, 39480, 2631600]
+
+
+PARTED = [
+    (((2, 1), (1, 1)), (1, 0), 1),
+    (((2, 1), (2, 1)), (0, 1), 2),
+    (((1, 1), (1, 1), (1, 1)), (0, 0), 1),
+    (((3, 0), (0, 2)), (1, 0), 2),
+    (((0, 3),), (1, 0), 1),  # none
+]
+
+
+@pytest.mark.parametrize(("grades", "free", "longest"), PARTED)
+def test_numbers_are_one_to_one_with_words_under_both_limits(
+    grades: tuple[tuple[int, int], ...], free: tuple[int, int], longest: int
+) -> None:
+    cells = [*enumerate(grades), (None, free)]
+    letters = [
+        (grade, is_standard)
+        for grade, sizes in cells
+        for is_standard in (False, True)
+        for _ in range(sizes[is_standard])
+    ]
+    admissible = {
+        word
+        for word in distinct_orders(letters)
+        if not any(a[1] and b[1] for a, b in itertools.pairwise(word))
+        and all(
+            grade is None or len(list(run)) <= longest
+            for grade, run in itertools.groupby(cell[0] for cell in word)
+        )
+    }
+    words = PartedRuns(grades, free, longest)
+    numbered = [tuple(words.word(number)) for number in range(words.count())]
+    assert len(numbered) == len(admissible)
+    assert set(numbered) == admissible
+    assert len(words._counts) <= words.n_remainders
