@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from masrel.errors import ParameterError, RatingsError
 from masrel.paper._differences import NO_GRADE
 from masrel.paper._form import FIRST_COLUMNS, OF_SESSION, Form, QuestionColumn
-from masrel.paper._typed import TypedRow, TypedSheet
+from masrel.paper._typed import TypedRow, TypedSheet, shortened
 from masrel.protocol._questions import Answer, checked_answer
 
 _MAX_PROBLEMS = 20
@@ -65,7 +65,7 @@ def _check_columns(sheet: TypedSheet, form: Form) -> None:
         if column not in form.columns:
             raise RatingsError(
                 f"{sheet.path}: needed the columns {', '.join(form.columns)}, got "
-                f"{column} too"
+                f"{shortened(column)} too"
             )
     for column in form.columns[len(FIRST_COLUMNS) :]:
         if column not in sheet.columns:
@@ -82,7 +82,7 @@ def _refuse_other_sheet(sheet: TypedSheet, form: Form, others: Iterable[Form]) -
             owner = next((o for o in others if o.id == row["sheet"]), None)
             raise RatingsError(
                 f"{sheet.path}: row {row.number}: needed {form.id}, {needed}, got "
-                f"{row['sheet']}, {_whose(owner)}"
+                f"{shortened(row['sheet'])}, {_whose(owner)}"
             )
     codes = {row["code"].upper() for row in sheet.rows} - {""}
     if codes and not codes & set(form.codes):
@@ -107,12 +107,14 @@ def _position(row: TypedRow, form: Form, where: str) -> int | None:
             return place
         raise ParameterError(
             f"{where}: position: needed {place}, that of code {code}, got "
-            f"{row['position']!r}"
+            f"{shortened(row['position'])!r}"
         )
     needed = "a code of the sheet"
     if position.isdecimal() and 1 <= int(position) <= len(form.codes):
         needed = f"{form.codes[int(position) - 1]} at position {int(position)}"
-    raise ParameterError(f"{where}: code: needed {needed}, got {row['code']!r}")
+    raise ParameterError(
+        f"{where}: code: needed {needed}, got {shortened(row['code'])!r}"
+    )
 
 
 def _filled_row(
@@ -127,18 +129,21 @@ def _filled_row(
     if has_grade and grade not in (*grades, NO_GRADE):
         problems.append(
             f"{where}: grade: needed one of {', '.join(grades)}, or {NO_GRADE} where "
-            f"there is none, got {repr(grade) if grade else 'an empty cell'}"
+            f"there is none, got "
+            f"{repr(shortened(grade)) if grade else 'an empty cell'}"
         )
     columns, foreign = form.of_presentation, form.of_session
     if not has_grade:
         columns, foreign = foreign, columns
         if grade:
-            problems.append(f"{where}: grade: needed of presentations, got {grade!r}")
+            problems.append(
+                f"{where}: grade: needed of presentations, got {shortened(grade)!r}"
+            )
     for column in foreign:
         if row[column.column]:
             problems.append(
                 f"{where}: {column.column}: needed an empty cell in this row, got "
-                f"{row[column.column]!r}"
+                f"{shortened(row[column.column])!r}"
             )
     return FilledRow(
         number=row.number,
@@ -162,7 +167,7 @@ def _answers(
         try:
             answer = checked_answer(question, text, where=f"{where}: {column.column}")
         except ParameterError as error:
-            problems.append(f"{error} ({NO_GRADE}: was left out)")
+            problems.append(f"{shortened(str(error), 400)} ({NO_GRADE}: was left out)")
             continue
         yield column, answer
 

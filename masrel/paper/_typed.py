@@ -5,14 +5,15 @@ import hashlib
 import io
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import takewhile
 from pathlib import Path
 
-from masrel._input import MAX_SMALL, csv_format, format_problem, read_regular
+from masrel._input import MAX_SMALL, read_regular
 from masrel.errors import RatingsError
 from masrel.paper._form import FIRST_COLUMNS
 
 _SEPARATORS = (",", ";", "\t")
+
+_LONGEST_CELL = 10_000  # letters of an answer
 
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 """Byte order marks of what spreadsheets call Unicode text."""
@@ -46,13 +47,8 @@ def read_typed(path: Path) -> TypedSheet:
     """Return what was typed into a sheet; RatingsError if it is no such file."""
     data = _bytes(path)
     records = list(_records(path, _text(path, data)))
-    # Below the version, and "sep=;", which some spreadsheets write and want first
-    head = list(takewhile(_is_head, (record[0] for record in records)))
-    start = len(head)
-    for line in head:
-        problem = format_problem(csv_format(line), newest=1)
-        if problem is not None:
-            raise RatingsError(f"{path}: {problem}")
+    # Below "sep=;", which some spreadsheets write and want first
+    start = 1 if records and records[0][0].casefold().startswith("sep=") else 0
     if len(records) <= start:
         raise RatingsError(
             f"{path}: needed the columns {', '.join(FIRST_COLUMNS[1:])}, got nothing"
@@ -64,10 +60,6 @@ def read_typed(path: Path) -> TypedSheet:
         columns=tuple(name for name in columns if name),
         rows=tuple(_rows(path, start, columns, records)),
     )
-
-
-def _is_head(cell: str) -> bool:
-    return cell.startswith("#") or cell.casefold().startswith("sep=")
 
 
 def _bytes(path: Path) -> bytes:
@@ -100,7 +92,13 @@ def _records(path: Path, text: str) -> Iterator[list[str]]:
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator)
     try:
         for record in reader:
-            yield [cell.strip() for cell in record] or [""]
+            cells = [cell.strip() for cell in record]
+            if any(len(cell) > _LONGEST_CELL for cell in cells):
+                raise RatingsError(
+                    f"{path}: line {reader.line_num}: needed cells of at most "
+                    f"{_LONGEST_CELL} letters, got a longer one"
+                )
+            yield cells or [""]
     except csv.Error as error:
         raise RatingsError(
             f"{path}: line {reader.line_num}: needed cells of a CSV file, got: {error}"
@@ -113,12 +111,14 @@ def _columns(path: Path, number: int, record: list[str]) -> list[str]:
         if name not in names:
             raise RatingsError(
                 f"{path}: row {number}: needed the columns "
-                f"{', '.join(FIRST_COLUMNS[1:])}, got {', '.join(filter(None, names))}"
+                f"{', '.join(FIRST_COLUMNS[1:])}, got "
+                f"{shortened(', '.join(filter(None, names)))}"
             )
     for name in filter(None, names):
         if names.count(name) > 1:
             raise RatingsError(
-                f"{path}: row {number}: needed each column once, got {name} twice"
+                f"{path}: row {number}: needed each column once, got {shortened(name)} "
+                "twice"
             )
     return names
 
@@ -139,8 +139,13 @@ def _rows(
             if cell and not column:
                 raise RatingsError(
                     f"{path}: row {number}: needed cells below the name of a column, "
-                    f"got {cell!r} below none"
+                    f"got {shortened(cell)!r} below none"
                 )
         yield TypedRow(
             number=number, cells={name: cell for name, cell in named if name}
         )
+
+
+def shortened(text: str, most: int = 100) -> str:
+    """Return a text as a message has it."""
+    return text if len(text) <= most else f"{text[:most]}…"

@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import random
 from collections.abc import Callable, Sequence
 from datetime import UTC, date, datetime
 from pathlib import Path
@@ -13,6 +14,7 @@ from click.testing import CliRunner
 from masrel.analysis import analyze
 from masrel.cli import cli
 from masrel.errors import (
+    MasrelError,
     MasrelWarning,
     ParameterError,
     RatingsError,
@@ -36,7 +38,7 @@ def blank(small: Small, rater: str = "R1", session: str = "test") -> Rows:
     """The rows of the file that a sheet is typed into."""
     write_sheets(*small)
     text = small[0].typed_file(rater, session).read_text(encoding="utf-8")
-    return list(csv.reader(io.StringIO(text)))[1:]  # below the version
+    return list(csv.reader(io.StringIO(text)))
 
 
 def filled(
@@ -386,3 +388,26 @@ def test_the_command_enters_and_says_so(small: Small) -> None:
     )
     header = json.loads(study.log_file("R1", "test").read_text("utf-8").splitlines()[0])
     assert header["fields"]["grades"] == "paper"
+
+
+def test_whatever_a_file_holds_it_is_refused_in_words(new_study: New) -> None:
+    small = study, _ = new_study(("[schedule]", QUESTIONS))
+    rows = filled(small, "1", "2", "3")
+    for row in rows[1:4]:
+        row[4] = "7"
+    rows[4][5] = "50"
+    enter(small, typed(small, rows))
+    before = study.log_file("R1", "test").read_bytes()
+    whole, rng = typed(small, rows).read_bytes(), random.Random(7)
+    file = study.root / "changed.csv"
+    for _ in range(150):  # also those that are right were entered before
+        data = bytearray(whole)
+        for _ in range(rng.randint(1, 4)):
+            start = rng.randrange(len(data) + 1)
+            new = rng.choice([b",", b";", b'"', b"\n", b"\0", b"\xe4", b"NA", b""])
+            data[start : start + rng.randint(0, 9)] = new
+        file.write_bytes(data)
+        with pytest.raises(MasrelError) as caught:
+            enter(small, file)
+        assert len(str(caught.value)) < 5000
+    assert study.log_file("R1", "test").read_bytes() == before
