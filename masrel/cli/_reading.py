@@ -190,7 +190,10 @@ def what_was_read(file: "RatingsFile") -> list[str]:
     raters = ", ".join(names[:_SHOWN])
     if len(names) > _SHOWN:
         raters += f" and {len(names) - _SHOWN} more"
-    items = f" named by {' and '.join(map(repr, read['item']))}" if read["item"] else ""
+    items = ""
+    if read["item"] and read["layout"] != "table":
+        columns = [repr(name) if name else "the first column" for name in read["item"]]
+        items = f" named by {' and '.join(columns)}"
     if read.get("clusters"):
         items += f" in {counted(read['n_clusters'], 'cluster')} by {read['clusters']!r}"
     counts = f"{counted(read['n_items'], 'item')}{items}, "

@@ -44,6 +44,14 @@ def _plain_weights(name: str) -> str:
     return plain_name(name)
 
 
+def _level(_: click.Context, __: click.Parameter, value: float) -> float:
+    # checked here, since nothing else looks at it where there is no interval
+    from masrel.agreement._kernel import check_level
+
+    check_level(value)
+    return value
+
+
 _estimate_options = grouped(
     "options",
     EstimateOptions,
@@ -88,7 +96,11 @@ _estimate_options = grouped(
         help="Kind of interval; auto chooses by target and size.",
     ),
     click.option(
-        "--level", default=0.95, show_default=True, help="Level of intervals."
+        "--level",
+        default=0.95,
+        show_default=True,
+        callback=_level,
+        help="Level of intervals.",
     ),
     click.option("--resamples", "n_resamples", default=10_000, show_default=True),
     click.option("--seed", default=0, show_default=True, help="Seed of resampling."),

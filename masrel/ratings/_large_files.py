@@ -88,6 +88,8 @@ def large_file(
             if (large := _text(path, options)) is not None:
                 return large
     if stream:
+        if str(path) != "-" and not path.exists():
+            raise RatingsError(f"{path}: no such file")
         raise RatingsError(
             f"{path}: --stream: needed a Parquet file, or text in UTF-8 with a "
             "separator that is no blank, as it stands and not packed, without "

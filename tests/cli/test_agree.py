@@ -113,6 +113,7 @@ def test_seeded_intervals_repeat(tmp_path: Path) -> None:
         (["--coefficients", "stratified_kappa"], "two sessions"),
         (["--categories", "1,2,3"], "line 2, column 'Lee'"),
         (["--level", "1", "--target", "items"], "level: needs (0, 1), got 1"),
+        (["--level", "2"], "level: needs (0, 1), got 2"),
         (["--target", "raters", "--interval", "analytic"], "target"),
         (["--json", "no/such/folder.json"], "no/such/folder.json"),
         (["--item", "animal"], "animal"),

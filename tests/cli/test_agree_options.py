@@ -556,3 +556,13 @@ def test_grades_of_several_labels_are_sets(masrel: Caller, tmp_path: Path) -> No
         )
         alpha = krippendorff_alpha(sets, metric=metric)
         assert of_alpha["value"] == alpha.value
+
+
+def test_rows_of_a_contingency_table_name_no_items(
+    tmp_path: Path, masrel: Caller
+) -> None:
+    path = tmp_path / "table.csv"
+    path.write_text(",yes,no\nyes,20,5\nno,4,30\n")
+    assert "59 items, 2 raters." in masrel("agree", path, "--table").out
+    path.write_text(",A,B\np1,1,2\np2,2,2\n")
+    assert "2 items named by the first column, " in masrel("agree", path).out

@@ -351,6 +351,8 @@ def test_a_packed_file_is_no_stream(tmp_path: Path) -> None:
     path.write_bytes(gzip.compress(b"id,A,B\np1,1,2\n"))
     with pytest.raises(RatingsError, match="--stream: needed a Parquet file"):
         read_ratings(path, stream=True)
+    with pytest.raises(RatingsError, match="no such file"):
+        read_ratings(tmp_path / "none.csv", stream=True)
     assert len(read_ratings(path).parts) == 1
 
 
