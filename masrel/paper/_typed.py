@@ -5,9 +5,10 @@ import hashlib
 import io
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import takewhile
 from pathlib import Path
 
-from masrel._input import MAX_SMALL, read_regular
+from masrel._input import MAX_SMALL, csv_format, format_problem, read_regular
 from masrel.errors import RatingsError
 from masrel.paper._form import FIRST_COLUMNS
 
@@ -47,8 +48,13 @@ def read_typed(path: Path) -> TypedSheet:
     """Return what was typed into a sheet; RatingsError if it is no such file."""
     data = _bytes(path)
     records = list(_records(path, _text(path, data)))
-    # Below "sep=;", which some spreadsheets write and want first
-    start = 1 if records and records[0][0].casefold().startswith("sep=") else 0
+    # Below the version, and "sep=;", which some spreadsheets write and want first
+    head = list(takewhile(_is_head, (record[0] for record in records)))
+    start = len(head)
+    for line in head:
+        problem = format_problem(csv_format(line), newest=1)
+        if problem is not None:
+            raise RatingsError(f"{path}: {problem}")
     if len(records) <= start:
         raise RatingsError(
             f"{path}: needed the columns {', '.join(FIRST_COLUMNS[1:])}, got nothing"
@@ -60,6 +66,10 @@ def read_typed(path: Path) -> TypedSheet:
         columns=tuple(name for name in columns if name),
         rows=tuple(_rows(path, start, columns, records)),
     )
+
+
+def _is_head(cell: str) -> bool:
+    return cell.startswith("#") or cell.casefold().startswith("sep=")
 
 
 def _bytes(path: Path) -> bytes:

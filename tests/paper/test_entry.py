@@ -38,7 +38,7 @@ def blank(small: Small, rater: str = "R1", session: str = "test") -> Rows:
     """The rows of the file that a sheet is typed into."""
     write_sheets(*small)
     text = small[0].typed_file(rater, session).read_text(encoding="utf-8")
-    return list(csv.reader(io.StringIO(text)))
+    return list(csv.reader(io.StringIO(text)))[1:]  # below the version
 
 
 def filled(
