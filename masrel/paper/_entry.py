@@ -13,7 +13,8 @@ import msgspec
 import masrel
 from masrel._event_log import SessionLog, utc_now
 from masrel._files import check_inside
-from masrel.conduct._study_log import stated
+from masrel.conduct._study_answers import study_answers
+from masrel.conduct._study_log import append_event, stated
 from masrel.errors import ParameterError, SessionLogError
 from masrel.paper._filled_form import FilledRow, fill_form
 from masrel.paper._form import Form, drawn_schedule, form_of
@@ -130,7 +131,10 @@ def enter_sheet(
             _log_day(study, protocol, form, on, log)
         _refuse_entered(sheet, log)
         for row in rows:
-            _enter(row, sheet, reasons, state, log)
+            if row.place == "study":
+                _answer_about_study(study, protocol, row, form.rater, now)
+            else:
+                _enter(row, sheet, reasons, state, log)
         n_presentations = len(form.codes)
         log.append("complete", {"n_presentations": n_presentations})
         n_graded = len(replay(log.path, log.events).grades)
@@ -257,13 +261,29 @@ def _enter(
 ) -> None:
     # state: before, when a process may have died in the middle of it
     if row.code not in (None, *state.settled):
-        fields = {"code": row.code, "position": row.position, "grade": row.grade}
+        fields = {"code": row.code, "position": row.place, "grade": row.grade}
         log.append("entered", {**fields, **typed_fields(row, sheet), **reasons})
     for column, answer in row.answers:
         key = (column.questionnaire, column.question.id, row.code)
         if key not in state.answers:
             names = dict(zip(("questionnaire", "question", "code"), key, strict=True))
             log.append("answered", {**names, "answer": answer})
+
+
+def _answer_about_study(
+    study: StudyPaths,
+    protocol: Protocol,
+    row: FilledRow,
+    rater: str,
+    now: Callable[[], datetime],
+) -> None:
+    # in the log of the study, once
+    answered = study_answers(study).get(rater, {})
+    for column, answer in row.answers:
+        names = {"questionnaire": column.questionnaire, "question": column.question.id}
+        if tuple(names.values()) not in answered:
+            fields: dict[str, _Fact] = {"rater": rater, **names, "answer": answer}
+            append_event(study, protocol, "answered", fields, now=now)
 
 
 def typed_fields(row: FilledRow, sheet: TypedSheet) -> "dict[str, _Fact]":

@@ -6,23 +6,27 @@ from dataclasses import dataclass
 
 from masrel.errors import ParameterError, RatingsError
 from masrel.paper._differences import NO_GRADE
-from masrel.paper._form import FIRST_COLUMNS, OF_SESSION, Form, QuestionColumn
+from masrel.paper._form import FIRST_COLUMNS, Form, QuestionColumn
 from masrel.paper._typed import TypedRow, TypedSheet, shortened
 from masrel.protocol._questions import Answer, checked_answer
+from masrel.run._questionnaires import When
 
 _MAX_PROBLEMS = 20
 
 _DECIMAL_COMMA = re.compile(r"(\d{1,2}),(\d{1,2})")
+
+Place = int | When
+"""The position of a presentation, or what else a row is about."""
 
 Answers = tuple[tuple[QuestionColumn, Answer], ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FilledRow:
-    """A presentation as it is on a sheet, or what stands there of the session."""
+    """A presentation as it is on a sheet, or what stands there about the session."""
 
     number: int  # row of the file
-    position: int | None  # None: of the session
+    place: Place
     code: str | None
     grade: str | None
     answers: Answers
@@ -38,11 +42,11 @@ def fill_form(
     _check_columns(sheet, form)
     _refuse_other_sheet(sheet, form, others)
     problems: list[str] = []
-    filled: dict[int | None, FilledRow] = {}
+    filled: dict[Place, FilledRow] = {}
     for row in sheet.rows:
         where = f"{sheet.path}: row {row.number}"
         try:
-            place = _position(row, form, where)
+            place = _place(row, form, where)
             if place in filled:
                 raise ParameterError(
                     f"{where}: needed each presentation once, got that of row "
@@ -57,7 +61,8 @@ def fill_form(
         more = len(problems) - _MAX_PROBLEMS
         listed = problems[:_MAX_PROBLEMS] + ([f"and {more} more"] if more > 0 else [])
         raise RatingsError("\n".join(listed))
-    return tuple(filled[place] for place in sorted(filled, key=lambda p: p or 10_000))
+    order: list[Place] = [*range(1, len(form.codes) + 1), *form.afterwards]
+    return tuple(filled[place] for place in order)
 
 
 def _check_columns(sheet: TypedSheet, form: Form) -> None:
@@ -96,11 +101,12 @@ def _whose(form: Form | None) -> str:
     return f"that of rater {form.rater} in session {form.session}"
 
 
-def _position(row: TypedRow, form: Form, where: str) -> int | None:
-    """Return the position that a row is of; None for what is asked of the session."""
+def _place(row: TypedRow, form: Form, where: str) -> Place:
+    """Return the position that a row is of, or what else it is about."""
     code, position = row["code"].upper(), row["position"].casefold()
-    if position == OF_SESSION and form.of_session and not code:
-        return None
+    for when in form.afterwards:
+        if position == when and not code:
+            return when
     if code in form.codes:
         place = form.codes.index(code) + 1
         if position == str(place):
@@ -119,38 +125,37 @@ def _position(row: TypedRow, form: Form, where: str) -> int | None:
 
 def _filled_row(
     row: TypedRow,
-    place: int | None,
+    place: Place,
     form: Form,
     grades: Sequence[str],
     where: str,
     problems: list[str],
 ) -> FilledRow:
-    grade, has_grade = row["grade"], place is not None
-    if has_grade and grade not in (*grades, NO_GRADE):
+    grade, is_graded = row["grade"], isinstance(place, int)
+    if is_graded and grade not in (*grades, NO_GRADE):
         problems.append(
             f"{where}: grade: needed one of {', '.join(grades)}, or {NO_GRADE} where "
             f"there is none, got "
             f"{repr(shortened(grade)) if grade else 'an empty cell'}"
         )
-    columns, foreign = form.of_presentation, form.of_session
-    if not has_grade:
-        columns, foreign = foreign, columns
-        if grade:
-            problems.append(
-                f"{where}: grade: needed of presentations, got {shortened(grade)!r}"
-            )
-    for column in foreign:
-        if row[column.column]:
-            problems.append(
-                f"{where}: {column.column}: needed an empty cell in this row, got "
-                f"{shortened(row[column.column])!r}"
-            )
+    if not is_graded and grade:
+        problems.append(
+            f"{where}: grade: needed of presentations, got {shortened(grade)!r}"
+        )
+    about: When = "presentation" if isinstance(place, int) else place
+    for when, columns in form.questions.items():
+        for column in columns if when != about else ():
+            if row[column.column]:
+                problems.append(
+                    f"{where}: {column.column}: needed an empty cell in this row, got "
+                    f"{shortened(row[column.column])!r}"
+                )
     return FilledRow(
         number=row.number,
-        position=place,
-        code=None if place is None else form.codes[place - 1],
+        place=place,
+        code=form.codes[place - 1] if isinstance(place, int) else None,
         grade=None if grade in ("", NO_GRADE) else grade,
-        answers=tuple(_answers(row, columns, where, problems)),
+        answers=tuple(_answers(row, form.questions[about], where, problems)),
     )
 
 
@@ -173,7 +178,7 @@ def _answers(
 
 
 def _absent(
-    sheet: TypedSheet, form: Form, filled: dict[int | None, FilledRow]
+    sheet: TypedSheet, form: Form, filled: dict[Place, FilledRow]
 ) -> Iterator[str]:
     absent = [
         f"position {position}, code {code}"
@@ -186,8 +191,9 @@ def _absent(
             f"got none of {'; '.join(absent)}: its grade is {NO_GRADE} where there is "
             "none"
         )
-    if form.of_session and None not in filled:
-        yield (
-            f"{sheet.path}: needed a row with {OF_SESSION!r} in the column position, "
-            "got none"
-        )
+    for when in form.afterwards:
+        if when not in filled:
+            yield (
+                f"{sheet.path}: needed a row with {when!r} in the column position, got "
+                "none"
+            )

@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from masrel.errors import ScheduleError
@@ -13,8 +13,8 @@ from masrel.schedule import Schedule, check_schedule, read_schedule
 FIRST_COLUMNS = ("sheet", "position", "code", "grade")
 """Columns of every sheet that is typed in; those of questions follow."""
 
-OF_SESSION = "session"
-"""What stands for a position in the row of what is asked after the session."""
+AFTERWARDS: tuple[When, ...] = ("session", "study")
+"""What stands for a position in the rows of what is asked about these."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,26 +34,42 @@ class Form:
     rater: str
     session: str
     codes: tuple[str, ...]  # by position, from 1
-    of_presentation: tuple[QuestionColumn, ...]
-    of_session: tuple[QuestionColumn, ...]
+    questions: Mapping[When, tuple[QuestionColumn, ...]]  # by what they are about
 
     @property
     def columns(self) -> tuple[str, ...]:
         """The columns of the sheet that is typed in."""
-        questions = (*self.of_presentation, *self.of_session)
-        return (*FIRST_COLUMNS, *(each.column for each in questions))
+        asked_for = (each.column for part in self.questions.values() for each in part)
+        return (*FIRST_COLUMNS, *asked_for)
+
+    @property
+    def afterwards(self) -> tuple[When, ...]:
+        """What there are questions about besides presentations."""
+        return tuple(when for when in AFTERWARDS if self.questions[when])
 
 
 def form_of(protocol: Protocol, schedule: Schedule) -> Form:
     """Return the sheet of a schedule; it names no model."""
     codes = tuple(shown.code for shown in schedule.presentations)
+    # a rater is asked about the study on the sheet of the last session
+    is_last = (
+        schedule.session
+        == [
+            session.id
+            for session in protocol.sessions
+            if schedule.rater in session.raters
+        ][-1]
+    )
     return Form(
         id=_id_of(schedule.study, schedule.rater, schedule.session, codes),
         rater=schedule.rater,
         session=schedule.session,
         codes=codes,
-        of_presentation=_columns_of(protocol, "presentation"),
-        of_session=_columns_of(protocol, "session"),
+        questions={
+            "presentation": _columns_of(protocol, "presentation"),
+            "session": _columns_of(protocol, "session"),
+            "study": _columns_of(protocol, "study") if is_last else (),
+        },
     )
 
 

@@ -10,7 +10,6 @@ import masrel
 from masrel._files import write_files
 from masrel.errors import ParameterError, RatingsError
 from masrel.paper._form import (
-    OF_SESSION,
     Form,
     QuestionColumn,
     drawn_schedule,
@@ -150,8 +149,8 @@ def _typed_text(form: Form) -> str:
     blank = [""] * (len(form.columns) - 3)
     for position, code in enumerate(form.codes, start=1):
         writer.writerow([form.id, position, code, *blank])
-    if form.of_session:
-        writer.writerow([form.id, OF_SESSION, "", *blank])
+    for when in form.afterwards:
+        writer.writerow([form.id, when, "", *blank])
     return f"# format: 1\n{text.getvalue()}"
 
 
@@ -207,9 +206,18 @@ def _page(protocol: Protocol, forms: Sequence[Form]) -> str:
             if scale is not None and grade in scale.meanings
         ],
         grades=grades,
-        of_presentation=_shown(forms[0].of_presentation),
-        of_session=_shown(forms[0].of_session),
-        sheets=[{"form": form, "rows": _rows(protocol, form)} for form in forms],
+        of_presentation=_shown(forms[0].questions["presentation"]),
+        sheets=[
+            {
+                "form": form,
+                "rows": _rows(protocol, form),
+                "afterwards": [
+                    (f"After the {when}", _shown(form.questions[when]))
+                    for when in form.afterwards
+                ],
+            }
+            for form in forms
+        ],
     )
 
 

@@ -13,6 +13,7 @@ from click.testing import CliRunner
 
 from masrel.analysis import analyze
 from masrel.cli import cli
+from masrel.conduct._study_answers import study_answers
 from masrel.errors import (
     MasrelError,
     MasrelWarning,
@@ -20,7 +21,7 @@ from masrel.errors import (
     RatingsError,
     SessionLogError,
 )
-from masrel.paper import enter_sheet, write_sheets
+from masrel.paper import compare_sheet, enter_sheet, write_sheets
 from masrel.protocol import Protocol, StudyPaths
 from masrel.ratings import corrections_of, ratings_from_logs, read_study_data
 from masrel.run import read_log, record_correction
@@ -182,6 +183,40 @@ def test_answers_come_with_the_grades(new_study: New) -> None:
         ("words", None): "größer; schneller",
     }
     assert verify_study(small[0]).is_whole
+
+
+ABOUT_THE_STUDY = """
+[[questionnaires]]
+id = "all"
+title = "The study"
+when = "study"
+
+[[questionnaires.questions]]
+id = "again"
+text = "Would you take part again?"
+type = "choice"
+choices = ["yes", "no"]
+
+[schedule]
+"""
+
+
+def test_a_rater_is_asked_about_the_study_on_the_sheet_of_the_last_session(
+    new_study: New,
+) -> None:
+    small = study, protocol = new_study(("[schedule]", ABOUT_THE_STUDY))
+    assert blank(small)[-1][1] == "3"  # R1 has a retest to come
+    assert "After the study" in (study.sheets / "sheets.html").read_text("utf-8")
+    enter(small, typed(small, filled(small, "1", "2", "3")))
+    rows = filled(small, "1", "2", "3", session="retest")
+    assert rows[-1][1] == "study"
+    rows[-1][4] = "yes"
+    file = typed(small, rows, name="b.csv")
+    enter_sheet(study, protocol, file, "R1", "retest", who="MK")
+    assert study_answers(study) == {"R1": {("all", "again"): "yes"}}
+    assert verify_study(study).is_whole
+    again = typed(small, [*rows, [""]], name="c.csv")
+    assert compare_sheet(study, protocol, again, "R1", "retest", who="JL") == ()
 
 
 @pytest.mark.parametrize(
