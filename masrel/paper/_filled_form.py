@@ -15,7 +15,7 @@ _MAX_PROBLEMS = 20
 
 _DECIMAL_COMMA = re.compile(r"(\d{1,2}),(\d{1,2})")
 
-Place = int | When
+Position = int | When
 """The position of a presentation, or what else a row is about."""
 
 Answers = tuple[tuple[QuestionColumn, Answer], ...]
@@ -26,7 +26,7 @@ class FilledRow:
     """A presentation as it is on a sheet, or what stands there about the session."""
 
     number: int  # row of the file
-    place: Place
+    place: Position
     code: str | None
     grade: str | None
     answers: Answers
@@ -42,7 +42,7 @@ def fill_form(
     _check_columns(sheet, form)
     _refuse_other_sheet(sheet, form, others)
     problems: list[str] = []
-    filled: dict[Place, FilledRow] = {}
+    filled: dict[Position, FilledRow] = {}
     for row in sheet.rows:
         where = f"{sheet.path}: row {row.number}"
         try:
@@ -61,7 +61,7 @@ def fill_form(
         more = len(problems) - _MAX_PROBLEMS
         listed = problems[:_MAX_PROBLEMS] + ([f"and {more} more"] if more > 0 else [])
         raise RatingsError("\n".join(listed))
-    order: list[Place] = [*range(1, len(form.codes) + 1), *form.afterwards]
+    order: list[Position] = [*range(1, len(form.codes) + 1), *form.afterwards]
     return tuple(filled[place] for place in order)
 
 
@@ -101,7 +101,7 @@ def _whose(form: Form | None) -> str:
     return f"that of rater {form.rater} in session {form.session}"
 
 
-def _place(row: TypedRow, form: Form, where: str) -> Place:
+def _place(row: TypedRow, form: Form, where: str) -> Position:
     """Return the position that a row is of, or what else it is about."""
     code, position = row["code"].upper(), row["position"].casefold()
     for when in form.afterwards:
@@ -125,7 +125,7 @@ def _place(row: TypedRow, form: Form, where: str) -> Place:
 
 def _filled_row(
     row: TypedRow,
-    place: Place,
+    place: Position,
     form: Form,
     grades: Sequence[str],
     where: str,
@@ -178,7 +178,7 @@ def _answers(
 
 
 def _absent(
-    sheet: TypedSheet, form: Form, filled: dict[Place, FilledRow]
+    sheet: TypedSheet, form: Form, filled: dict[Position, FilledRow]
 ) -> Iterator[str]:
     absent = [
         f"position {position}, code {code}"
