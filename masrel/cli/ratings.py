@@ -8,6 +8,7 @@ from masrel._files import write_file
 from masrel.cli._options import echo_remarks
 from masrel.cli._paths import OutputFile, note_inputs
 from masrel.protocol import Protocol, StudyPaths, read_protocol
+from masrel.run._session_logs import logs_read_once
 
 
 @click.command("ratings")
@@ -18,6 +19,7 @@ from masrel.protocol import Protocol, StudyPaths, read_protocol
     type=OutputFile(path_type=Path),
     help="File to write; default: STUDY/ratings/ratings.csv.",
 )
+@logs_read_once()
 def ratings(study: Path, output: Path | None) -> None:
     """Collect the ratings of STUDY from its session logs.
 

@@ -14,6 +14,7 @@ from masrel.cli._options import (
     read_study,
     warnings_as_notes,
 )
+from masrel.run._session_logs import logs_read_once
 
 
 @click.command("report")
@@ -38,6 +39,7 @@ from masrel.cli._options import (
     raw_csv="No apostrophe before a text that a spreadsheet would run.",
     quiet="No progress bar.",
 )
+@logs_read_once()
 def report(
     study: Path,
     destination: Path | None,

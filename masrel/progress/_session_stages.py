@@ -4,10 +4,10 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import Literal
 
-from masrel._event_log import read_log
 from masrel.errors import SessionLogError
 from masrel.protocol import Protocol, StudyPaths
-from masrel.run._state import SessionState, replay
+from masrel.run._session_logs import read_session
+from masrel.run._state import SessionState
 
 SessionStage = Literal["not drawn", "drawn", "begun", "complete", "unreadable"]
 """How far a session came."""
@@ -98,8 +98,7 @@ def _progress(
         stage = "drawn"
     problem = None
     try:
-        events = read_log(log) if log.exists() else ()
-        state = replay(log, events)
+        events, state = read_session(log) if log.exists() else ((), SessionState())
     except SessionLogError as error:
         events, state, stage, problem = (), SessionState(), "unreadable", str(error)
     if state.header:

@@ -4,12 +4,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from masrel._event_log import Event, read_log
+from masrel._event_log import Event
 from masrel.conduct import excluded_raters, read_conduct
 from masrel.errors import MasrelError, SessionLogError
 from masrel.paper._differences import sheet_differences
 from masrel.protocol import Protocol, StudyPaths
-from masrel.run._state import SessionState, replay
+from masrel.run._session_logs import read_session
+from masrel.run._state import SessionState
 from masrel.schedule import read_schedule
 
 
@@ -76,13 +77,12 @@ def corrections_of(study: StudyPaths, protocol: Protocol) -> tuple[Correction, .
 
 def _corrections(study: StudyPaths, rater: str, session: str) -> Iterator[Correction]:
     log = study.log_file(rater, session)
-    events = read_log(log)
+    events, state = read_session(log)
     # those before a session began anew are set aside with what they corrected
     anew = max((e.line for e in events if e.kind == "restarted"), default=0)
     corrected = [e.fields for e in events if e.kind == "correction" and e.line > anew]
     if not corrected:
         return
-    state = replay(log, events)
     schedule = read_schedule(study.schedule_file(rater, session))
     shown = {each.code: each for each in schedule.presentations}
     for fields in corrected:
@@ -288,7 +288,7 @@ def _of_second_entries(study: StudyPaths, log: Path) -> Iterator[str]:
 def _state_of(log: Path) -> SessionState:
     # of a log that cannot be read none; it is said to be damaged where it is read
     try:
-        return replay(log, read_log(log))
+        return read_session(log)[1]
     except MasrelError:
         return SessionState()
 

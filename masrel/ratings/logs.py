@@ -7,12 +7,13 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from masrel._event_log import Event, read_log
+from masrel._event_log import Event
 from masrel._input import MAX_RECORDING, MAX_SMALL, read_regular
 from masrel.errors import RatingsError
 from masrel.protocol import Protocol, StudyPaths, scale_of
 from masrel.ratings.table import _NEEDED_TIME, Ratings, _is_utc, ratings_from_rows
-from masrel.run._state import FROM_PAPER, FROM_PERSONS, SessionState, replay
+from masrel.run._session_logs import read_session
+from masrel.run._state import FROM_PAPER, FROM_PERSONS, SessionState
 from masrel.schedule import Schedule, check_schedule, read_schedule
 
 
@@ -64,7 +65,7 @@ def _rows(
     study: StudyPaths, protocol: Protocol, rater: str, session: str
 ) -> Iterator[dict[str, object]]:
     log = study.log_file(rater, session)
-    state = replay(log, read_log(log))
+    _, state = read_session(log)
     if not state.header:
         return
     if state.header.get("rehearsal"):
@@ -73,14 +74,22 @@ def _rows(
             "grades are no ratings of the study: move it away"
         )
     schedule = _schedule(study, protocol, state, log)
+    codes = {shown.code for shown in schedule.presentations}
     for code, events in state.presented.items():
-        if code not in {shown.code for shown in schedule.presentations}:
+        if code not in codes:
             line = f"line {events[0].line}: " if events else ""
             raise RatingsError(
                 f"{log}: {line}needed a code of the schedule, got {code!r}"
             )
         for event in events:
             _check_recording(study, log, event)
+    of_session = {
+        "session": session,
+        "rater": rater,
+        "source": "simulated" if _is_simulated(state) else "recorded",
+        "grades_from": str(state.header["grades"]),
+        "device": _device(state),
+    }
     for shown in schedule.presentations:
         grade = state.grades.get(shown.code)
         if grade is not None and grade not in protocol.scale.grades:
@@ -89,14 +98,10 @@ def _rows(
                 f"{', '.join(protocol.scale.grades)}, got {grade!r}"
             )
         yield {
-            "session": session,
-            "rater": rater,
+            **of_session,
             "model": shown.model,
             "repeat": shown.repeat,
             "grade": grade,
-            "source": "simulated" if _is_simulated(state) else "recorded",
-            "grades_from": str(state.header["grades"]),
-            "device": _device(state),
             "graded_stretch": state.graded_stretches.get(shown.code),
             "position": shown.position,
             "code": shown.code,

@@ -1,9 +1,13 @@
 """Where a study stands follows from its logs, and no model is named."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
+from masrel._event_log import Event
+from masrel.cli import cli
 from masrel.conduct import record_exclusion, record_withdrawal
 from masrel.errors import ParameterError
 from masrel.progress import (
@@ -14,7 +18,7 @@ from masrel.progress import (
     session_progress,
 )
 from masrel.protocol import Protocol, StudyPaths, read_protocol
-from masrel.run import ScriptGrades, record_correction, run_session
+from masrel.run import ScriptGrades, _session_logs, record_correction, run_session
 from masrel.schedule import read_schedule, write_schedules
 
 Small = tuple[StudyPaths, Protocol]
@@ -146,15 +150,22 @@ def test_every_log_is_read_once(
     )
     for name in names:
         run(small, name)
-    from masrel.progress import _session_stages
+    reads: list[Path] = []
+    original = _session_logs.read_log
 
-    reads = []
-    original = _session_stages.read_log
-    monkeypatch.setattr(
-        _session_stages,
-        "read_log",
-        lambda path: (reads.append(path), original(path))[1],
-    )
-    sessions = session_progress(*small)
-    next_step(small[0], sessions, rater_progress(*small, sessions))
+    def counted(path: Path) -> tuple[Event, ...]:
+        reads.append(path)
+        return original(path)
+
+    monkeypatch.setattr(_session_logs, "read_log", counted)
+    call("status", small[0].root)
     assert len(reads) == len(set(reads)) == n_raters
+    reads.clear()
+    call("ratings", small[0].root)
+    assert len(reads) == len(set(reads)) == n_raters
+
+
+def call(*words: object) -> str:
+    result = CliRunner().invoke(cli, [str(word) for word in words])
+    assert result.exit_code == 0, result.output
+    return result.output
