@@ -44,7 +44,8 @@ class StudySecret:
         if self.site is not None:
             raise ScheduleError(
                 f"secret: needed that of {'the study' if site is None else site}, got "
-                f"that of site {self.site} alone"
+                f"that of site {self.site} alone, whose raters masrel schedule draws "
+                f"with --site {self.site}"
             )
         return site_secret(self.secret, str(site))
 
