@@ -195,11 +195,11 @@ def _begin(
             "masrel_version": masrel.__version__,
         }
         log.append("session", {**same, **provenance})
-    for name, value in same.items() if state.header else ():
-        if state.header.get(name) != value:
+    for name in ("grades", *same) if state.header else ():  # which says most is first
+        if state.header.get(name) != same[name]:
             raise SessionLogError(
                 f"{log.path}: begun with {name} = {state.header.get(name)}: needed "
-                f"{value} to enter a sheet into it"
+                f"{same[name]} to enter a sheet into it"
             )
 
 

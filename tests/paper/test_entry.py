@@ -319,7 +319,7 @@ def test_a_sheet_is_entered_once(small: Small) -> None:
 
 def test_a_session_of_the_console_takes_no_sheet(small: Small) -> None:
     run(small, console("\n1\n\n2\n\n3\n")[0])
-    with pytest.raises(SessionLogError, match="begun with "):
+    with pytest.raises(SessionLogError, match="begun with grades = console: needed"):
         enter(small, typed(small, filled(small, "1", "2", "3")))
 
 
