@@ -46,7 +46,8 @@ def schedule(
 
     Schedules are drawn once: those that are there stay as they are. When the
     protocol has changed in what it presents, they are refused; --redraw draws them
-    anew, but never those of a session that has begun.
+    anew, but never those of a session that has begun. In a copy that --copy-to made
+    for a site, they are those of its raters.
     """
     paths = StudyPaths(study)
     protocol = read_protocol(paths.protocol)
@@ -107,8 +108,10 @@ def _draw(
     paths: StudyPaths, protocol: Protocol, site: str | None, *, redraw: bool
 ) -> None:
     from masrel.conduct import allot_schedules
+    from masrel.schedule import site_of_copy
     from masrel.schedule._sites import site_of
 
+    site = site or site_of_copy(paths)
     written = set(allot_schedules(paths, protocol, site=site, redraw=redraw))
     places = [
         (rater, session.id)

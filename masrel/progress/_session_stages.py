@@ -8,6 +8,8 @@ from masrel.errors import SessionLogError
 from masrel.protocol import Protocol, StudyPaths
 from masrel.run._session_logs import read_session
 from masrel.run._state import SessionState
+from masrel.schedule import site_of_copy
+from masrel.schedule._sites import site_of
 
 SessionStage = Literal["not drawn", "drawn", "begun", "complete", "unreadable"]
 """How far a session came."""
@@ -73,18 +75,22 @@ def session_progress(
     Returns
     -------
     tuple of SessionProgress
-        Sessions and raters in the protocol's order. Of a log that is damaged the stage
-        is ``"unreadable"``.
+        Sessions and raters in the protocol's order; in the copy of a site, those of its
+        raters. Of a log that is damaged the stage is ``"unreadable"``.
 
     Raises
     ------
+    ScheduleError
+        If the file of the study's secret is damaged.
     OSError
         If a log that is there cannot be read.
     """
+    site = site_of_copy(study)
     return tuple(
         _progress(study, protocol, rater, session.id)
         for session in protocol.sessions
         for rater in session.raters
+        if site in (None, site_of(protocol, rater))
     )
 
 

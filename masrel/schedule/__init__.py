@@ -4,7 +4,7 @@ Goes in: a protocol. Comes out: for each rater and session a schedule file that
 names the models, and a blinded sheet that does not.
 """
 
-from masrel.schedule._copies import copy_for_site
+from masrel.schedule._copies import copy_for_site, site_of_copy
 from masrel.schedule.presentation import (
     Presentation,
     Schedule,
@@ -27,5 +27,6 @@ __all__ = [
     "draw_schedule",
     "read_schedule",
     "schedule_problems",
+    "site_of_copy",
     "write_schedules",
 ]

@@ -11,6 +11,28 @@ from masrel.schedule._secret import find_secret, new_secret, site_secret_text
 from masrel.schedule._sites import checked_site
 
 
+def site_of_copy(study: StudyPaths) -> str | None:
+    """Return the site that a study is the copy of.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is.
+
+    Returns
+    -------
+    str or None
+        The site whose secret alone the study has; None of a whole study.
+
+    Raises
+    ------
+    ScheduleError
+        If the file of the secret is damaged.
+    """
+    key = find_secret(study)
+    return None if key is None else key.site
+
+
 def copy_for_site(
     protocol: Protocol, study: StudyPaths, site: str, destination: Path
 ) -> None:

@@ -193,3 +193,18 @@ def test_a_copy_without_the_secret_is_not_merged(
     assert refused.code == 2
     assert "commitment" in refused.err
     assert not (tmp_path / "both").exists()
+
+
+def test_the_copy_of_a_site_is_about_that_site_alone(
+    masrel: Caller, study: StudyPaths, tmp_path: Path
+) -> None:
+    copy = tmp_path / "south"
+    masrel("schedule", study.root, "--site", "south", "--copy-to", copy)
+    before = json.loads(masrel("status", copy, "--json", "-").out)
+    assert [session["rater"] for session in before["sessions"]] == ["R5", "R6"]
+    assert before["next"]["command"] == f"masrel schedule {copy}"
+    done = masrel("schedule", copy)
+    assert done.code == 0
+    assert "2 drawn, 0 kept" in done.out
+    after = json.loads(masrel("status", copy, "--json", "-").out)
+    assert after["next"]["command"].startswith(f"masrel run {copy} --rater ")
