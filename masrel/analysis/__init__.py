@@ -17,12 +17,14 @@ if TYPE_CHECKING:
     from masrel.analysis._plan import analyze
     from masrel.analysis._results import (
         Analysis,
+        AnswerCount,
         InPersonAgreement,
         InPersonPair,
         IntendedAgreement,
         ModelAgreement,
         PlannedEstimate,
         Presentations,
+        QuestionSummary,
         RaterEstimate,
         Speed,
         Speeds,
@@ -31,6 +33,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Analysis",
+    "AnswerCount",
     "Effect",
     "GateResult",
     "GradeRegression",
@@ -40,6 +43,7 @@ __all__ = [
     "ModelAgreement",
     "PlannedEstimate",
     "Presentations",
+    "QuestionSummary",
     "RaterEstimate",
     "Speed",
     "SpeedSummary",

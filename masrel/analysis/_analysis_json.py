@@ -22,6 +22,14 @@ ANALYSIS_FORMAT = 1
 """Version of the file of an analysis; one that names none is of version 1."""
 
 
+_LATER = ("excluded", "questionnaires")
+"""Fields that analyses once had not, and have not in a file where they are empty."""
+
+
+_LATER = ("excluded", "questionnaires")
+"""Fields that analyses once had not, and have not in a file where they are empty."""
+
+
 def as_analysis_document(analysis: Analysis) -> dict[str, object]:
     """Turn an analysis into plain values for JSON, ``nan`` as None.
 
@@ -33,8 +41,9 @@ def as_analysis_document(analysis: Analysis) -> dict[str, object]:
     Returns
     -------
     dict
-        The version of its format, and its fields in order, `excluded` only where
-        somebody is; every part carries the hashes of its inputs.
+        The version of its format, and its fields in order, `excluded` and
+        `questionnaires` only where there are some; every part carries the hashes of its
+        inputs.
     """
     document: dict[str, object] = {"format": ANALYSIS_FORMAT}
     for field in dataclasses.fields(analysis):
@@ -43,7 +52,7 @@ def as_analysis_document(analysis: Analysis) -> dict[str, object]:
             document[field.name] = [_with_inputs(line, analysis) for line in value]
         elif dataclasses.is_dataclass(value):
             document[field.name] = _with_inputs(value, analysis)
-        elif field.name != "excluded" or value:  # nobody could be, once
+        elif value or field.name not in _LATER:
             document[field.name] = _plain(value)
     return document
 

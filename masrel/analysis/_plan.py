@@ -14,6 +14,7 @@ from masrel.analysis._descriptions import (
     stretching_speeds,
 )
 from masrel.analysis._exclusions import analysed_in_person, analysed_ratings
+from masrel.analysis._question_summaries import question_summaries
 from masrel.analysis._results import Analysis, PlannedEstimate, RaterEstimate
 from masrel.errors import (
     CountsError,
@@ -25,9 +26,11 @@ from masrel.errors import (
 from masrel.estimates import Estimate
 from masrel.protocol import EstimatePlan, Protocol, protocol_hash, scale_of
 from masrel.ratings import (
+    GivenAnswer,
     InPerson,
     Ratings,
     RetestPairs,
+    answers_csv,
     rating_matrix,
     ratings_csv,
     ratings_from_rows,
@@ -40,6 +43,7 @@ def analyze(
     ratings: Ratings,
     *,
     in_person: InPerson | None = None,
+    answers: Sequence[GivenAnswer] = (),
     excluded: Sequence[str] = (),
 ) -> Analysis:
     """Compute what the protocol's plan and report ask for.
@@ -53,6 +57,8 @@ def analyze(
         The ratings.
     in_person : InPerson, optional
         Grades given to patients in person.
+    answers : sequence of GivenAnswer, optional
+        Answers to the study's questionnaires.
     excluded : sequence of str, optional
         Raters who are left out of every number
         (`masrel.conduct.excluded_raters`). The hashes of the inputs are of all ratings.
@@ -80,9 +86,10 @@ def analyze(
         If an interval rests on too little data.
     """
     _check_known(protocol, ratings)
-    inputs = _inputs(protocol, ratings, in_person)
+    inputs = _inputs(protocol, ratings, in_person, answers)
     ratings = analysed_ratings(ratings, excluded)
     in_person = analysed_in_person(in_person, excluded)
+    answers = [each for each in answers if each.rater not in excluded]
     sections = set(protocol.report.sections)
     # descriptions of grades speak of the first session that has ratings
     present = set(ratings.table["session"])
@@ -109,6 +116,7 @@ def analyze(
             else None
         ),
         presentations=presentations(ratings),
+        questionnaires=question_summaries(protocol, answers),
         simulated=ratings.simulated,
         excluded=tuple(excluded),
         inputs=inputs,
@@ -137,7 +145,10 @@ def _check_known(protocol: Protocol, ratings: Ratings) -> None:
 
 
 def _inputs(
-    protocol: Protocol, ratings: Ratings, in_person: InPerson | None
+    protocol: Protocol,
+    ratings: Ratings,
+    in_person: InPerson | None,
+    answers: Sequence[GivenAnswer],
 ) -> dict[str, str]:
     # SHA-256 by name; of the file that is there, or that `masrel ratings` writes
     path = ratings.source_path
@@ -149,6 +160,9 @@ def _inputs(
     if in_person is not None:
         data = in_person.source_path.read_bytes()
         inputs["in_person_sha256"] = hashlib.sha256(data).hexdigest()
+    if answers:
+        data = answers_csv(tuple(answers)).encode()
+        inputs["answers_sha256"] = hashlib.sha256(data).hexdigest()
     return inputs
 
 

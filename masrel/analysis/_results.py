@@ -244,6 +244,61 @@ class Presentations:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class AnswerCount:
+    """How often one answer, or one of a range, was given.
+
+    Attributes
+    ----------
+    label : str
+        The answer, or the range.
+    n : int
+        How often it was given.
+    """
+
+    label: str
+    n: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class QuestionSummary:
+    """How one question was answered in one session.
+
+    Attributes
+    ----------
+    questionnaire, question : str
+        Their ids.
+    session : str or None
+        The session; None for a question about the study.
+    model : str or None
+        The model, for a question about presentations.
+    n, n_missing : int
+        Answers there are, and those there are not.
+    mean, sd, median, least, most : float
+        Of answers that are numbers, with the standard deviation of n − 1; ``nan`` where
+        undefined.
+    counts : tuple of AnswerCount
+        Of each choice or whole number, or of each tenth of a wide range; empty for
+        texts.
+    is_reconstructed : bool
+        Whether the answers were never given, and only fit what is printed of them.
+    """
+
+    questionnaire: str
+    question: str
+    session: str | None
+    model: str | None
+    n: int
+    n_missing: int
+    mean: float
+    sd: float
+    median: float
+    least: float
+    most: float
+    counts: tuple[AnswerCount, ...]
+    is_reconstructed: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Analysis:
     """Everything a study's plan asks for.
 
@@ -263,6 +318,8 @@ class Analysis:
         None when no section asks for them.
     presentations : Presentations or None
         None when nothing is known of the stretches.
+    questionnaires : tuple of QuestionSummary
+        One per question, session and model that it is about.
     simulated : bool
         Whether any rating is simulated.
     excluded : tuple of str
@@ -280,6 +337,7 @@ class Analysis:
     in_person: InPersonAgreement | None
     speeds: Speeds | None
     presentations: Presentations | None
+    questionnaires: tuple[QuestionSummary, ...]
     simulated: bool
     excluded: tuple[str, ...] = ()
     inputs: Mapping[str, str]

@@ -49,6 +49,7 @@ def analyze(
             data.protocol,
             data.ratings,
             in_person=data.in_person,
+            answers=data.answers,
             excluded=data.excluded,
         )
     if output.json_file == STDOUT:
@@ -93,5 +94,6 @@ def _computed(analysis: "Analysis") -> list[str]:
         "intended": analysis.intended is not None,
         "in-person": analysis.in_person is not None,
         "speeds": analysis.speeds is not None,
+        "questionnaires": bool(analysis.questionnaires),
     }
     return [name for name, computed in is_computed.items() if computed]

@@ -64,7 +64,12 @@ def _publish_secret(study: StudyPaths) -> None:
 
 def _simulate(study: StudyPaths, output: OutputOptions) -> None:
     # every rater of every session, on the simulated device and clock
-    from masrel.ratings import ratings_from_logs, write_ratings
+    from masrel.ratings import (
+        answers_from_logs,
+        ratings_from_logs,
+        write_answers,
+        write_ratings,
+    )
     from masrel.run import SimulatedGrades, run_session
     from masrel.schedule import write_schedules
 
@@ -89,6 +94,8 @@ def _simulate(study: StudyPaths, output: OutputOptions) -> None:
                 progress=lambda _: bar.update(),
             )
     write_ratings(ratings_from_logs(study, protocol), study.ratings_file)
+    if protocol.questionnaires:
+        write_answers(answers_from_logs(study, protocol), study.answers_file)
 
 
 def _report(
@@ -101,7 +108,9 @@ def _report(
     destination = study.root.parent / f"report-{name}"
     is_simulated = ratings_file == study.ratings_file
     data = read_study(study.root, None if is_simulated else ratings_file)
-    analysis = analyze(data.protocol, data.ratings, in_person=data.in_person)
+    analysis = analyze(
+        data.protocol, data.ratings, in_person=data.in_person, answers=data.answers
+    )
     write_analysis(
         analysis,
         study.analysis_file if is_simulated else study.root / "analysis-published.json",

@@ -27,7 +27,13 @@ def ratings(study: Path, output: Path | None) -> None:
     against its checksum. Corrections take the place of the grades they correct. The
     table of raters, raters.csv, is written beside STUDY/ratings/ratings.csv.
     """
-    from masrel.ratings import ratings_from_logs, study_remarks, write_ratings
+    from masrel.ratings import (
+        answers_from_logs,
+        ratings_from_logs,
+        study_remarks,
+        write_answers,
+        write_ratings,
+    )
 
     paths = StudyPaths(study)
     protocol = read_protocol(paths.protocol)
@@ -46,6 +52,14 @@ def ratings(study: Path, output: Path | None) -> None:
     click.echo(
         f"{n_rows - n_missing} ratings{label}, {n_missing} missing: {destination}"
     )
+    if protocol.questionnaires:
+        answers = answers_from_logs(paths, protocol)
+        beside = paths.answers_file
+        if output is not None:
+            beside = output.with_name(f"{output.stem}_answers.csv")
+        write_answers(answers, beside, within=None if output else study)
+        n_open = sum(each.answer is None for each in answers)
+        click.echo(f"{len(answers) - n_open} answers, {n_open} missing: {beside}")
     n_slow = int(ratings.table["felt"].isin(["below-threshold", "no-catch"]).sum())
     if n_slow:
         click.echo(f"{n_slow} after stretches too slow to feel the catch: column felt")

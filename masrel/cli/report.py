@@ -71,6 +71,7 @@ def report(
             data.protocol,
             data.ratings,
             in_person=data.in_person,
+            answers=data.answers,
             excluded=data.excluded,
         )
     with tqdm(desc="report", unit=" parts", disable=output.hides_progress) as bar:

@@ -1,7 +1,7 @@
 """``masrel run``: present a schedule's models and record every grade."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, TypedDict
 
 import click
 from tqdm import tqdm
@@ -42,8 +42,18 @@ if TYPE_CHECKING:
 @click.option(
     "--skip", metavar="CODE", help="Leave this code, after a fault, without a grade."
 )
-@click.option("--who", help="With --correct and --skip: who says so.")
-@click.option("--why", help="With --correct and --skip: for what reason.")
+@click.option(
+    "--question",
+    metavar="QUESTION",
+    help="Correct the answer to this question, named as QUESTIONNAIRE.QUESTION.",
+)
+@click.option(
+    "--answer",
+    help="With --question: what the answer should have been, NA for missing.",
+)
+@click.option("--code", help="With --question: which presentation it is about.")
+@click.option("--who", help="With --correct, --skip and --question: who says so.")
+@click.option("--why", help="With --correct, --skip and --question: why.")
 def run(
     study: Path,
     rater: str,
@@ -55,36 +65,72 @@ def run(
     correct: str | None,
     grade: str | None,
     skip: str | None,
+    question: str | None,
+    answer: str | None,
+    code: str | None,
     who: str | None,
     why: str | None,
 ) -> None:
     """Run one rater's session of STUDY, or go on with it where it stopped.
 
     The rater is shown blinded codes only. With --rehearse the order and the codes are
-    other ones, and log and recordings are kept in STUDY/rehearsals. With --correct or
-    --skip no model is presented: what is said is added to the session's log, where the
-    first grade stays.
+    other ones, and log and recordings are kept in STUDY/rehearsals. With --correct,
+    --skip or --question no model is presented: what is said is added to the session's
+    log, where the first grade and answer stay.
     """
     paths = StudyPaths(study)
     protocol = read_protocol(paths.protocol)
-    options = {"--grade": grade, "--who": who, "--why": why}
-    if correct is None and skip is None:
-        _refuse_strays(options)
+    acts = {"--correct": correct, "--skip": skip, "--question": question}
+    chosen = [act for act, value in acts.items() if value is not None]
+    options = {"--grade": grade, "--answer": answer, "--code": code}
+    if len(chosen) > 1:
+        raise click.UsageError(f"{' and '.join(chosen)} are said one at a time")
+    if rehearse and chosen:
+        raise click.UsageError(f"--rehearse presents models, and {chosen[0]} none")
+    _check_options({**options, "--who": who, "--why": why}, *chosen)
+    if not chosen:
         flags = {"rehearse": rehearse, "quiet": output.quiet}
         _run(paths, protocol, rater, session, grades, clock, **flags)
         return
-    if rehearse:
-        verb = "--skip" if correct is None else "--correct"
-        raise click.UsageError(f"--rehearse presents models, and {verb} none")
-    if correct is not None and skip is not None:
-        raise click.UsageError("--correct and --skip are said one at a time")
-    message = (
-        _correct(paths, protocol, rater, session, correct, grade, who, why)
-        if correct is not None
-        else _skip(paths, rater, session, str(skip), grade, who, why)
-    )
+    reasons = _Reasons(who=str(who), why=str(why))
+    if correct is not None:
+        message = _correct(
+            paths, protocol, rater, session, correct, str(grade), reasons
+        )
+    elif skip is not None:
+        message = _skip(paths, rater, session, skip, reasons)
+    else:
+        message = _correct_answer(
+            paths, protocol, rater, session, str(question), str(answer), code, reasons
+        )
     if not output.quiet:
-        click.echo(f"{message} {paths.log_file(rater, session)}. Then: masrel ratings")
+        click.echo(f"{message}. Then: masrel ratings")
+
+
+class _Reasons(TypedDict):
+    who: str
+    why: str
+
+
+# What corrects or skips, with the options that it needs and those that it may have.
+_ACTS = {
+    "--correct": (("--grade", "--who", "--why"), ()),
+    "--skip": (("--who", "--why"), ()),
+    "--question": (("--answer", "--who", "--why"), ("--code",)),
+}
+
+
+def _check_options(options: dict[str, str | None], chosen: str = "") -> None:
+    needed, possible = _ACTS.get(chosen, ((), ()))
+    for name, value in options.items():
+        if value is not None and name not in (*needed, *possible):
+            act = next(act for act, names in _ACTS.items() if name in sum(names, ()))
+            of = "QUESTION" if act == "--question" else "CODE"
+            but = f", not {chosen}" if chosen else " too"
+            raise click.UsageError(f"{name} needs {act} {of}{but}")
+    if any(options[name] is None for name in needed):
+        *first, last = needed
+        raise click.UsageError(f"{chosen} needs {', '.join(first)} and {last} too")
 
 
 def _correct(
@@ -93,46 +139,56 @@ def _correct(
     rater: str,
     session: str,
     code: str,
-    grade: str | None,
-    who: str | None,
-    why: str | None,
+    grade: str,
+    reasons: _Reasons,
 ) -> str:
     from masrel.run import record_correction
 
-    if grade is None or who is None or why is None:
-        raise click.UsageError("--correct needs --grade, --who and --why too")
     corrected = None if grade == "NA" else grade  # no scale has such a grade
     record_correction(
-        paths, protocol, rater, session, code=code, grade=corrected, who=who, why=why
+        paths, protocol, rater, session, code=code, grade=corrected, **reasons
     )
     what = "missing" if corrected is None else grade
     now = f"{code} of {rater}, session {session}, is now {what}"
-    return f"{now}; what it was before stays in"
+    return f"{now}; what it was before stays in {paths.log_file(rater, session)}"
 
 
 def _skip(
-    paths: StudyPaths,
-    rater: str,
-    session: str,
-    code: str,
-    grade: str | None,
-    who: str | None,
-    why: str | None,
+    paths: StudyPaths, rater: str, session: str, code: str, reasons: _Reasons
 ) -> str:
     from masrel.run import record_skip
 
-    if grade is not None:
-        raise click.UsageError("--grade needs --correct CODE, not --skip")
-    if who is None or why is None:
-        raise click.UsageError("--skip needs --who and --why too")
-    record_skip(paths, rater, session, code=code, who=who, why=why)
-    return f"{code} of {rater}, session {session}, is skipped, as is said in"
+    record_skip(paths, rater, session, code=code, **reasons)
+    log = paths.log_file(rater, session)
+    return f"{code} of {rater}, session {session}, is skipped, as is said in {log}"
 
 
-def _refuse_strays(options: dict[str, str | None]) -> None:
-    strays = [name for name, value in options.items() if value is not None]
-    if strays:
-        raise click.UsageError(f"{', '.join(strays)} needs --correct CODE too")
+def _correct_answer(
+    paths: StudyPaths,
+    protocol: Protocol,
+    rater: str,
+    session: str,
+    question: str,
+    answer: str,
+    code: str | None,
+    reasons: _Reasons,
+) -> str:
+    from masrel.run import record_answer
+
+    log = record_answer(
+        paths,
+        protocol,
+        rater,
+        session,
+        question=question,
+        answer=None if answer == "NA" else answer,
+        code=code,
+        **reasons,
+    )
+    what = "missing" if answer == "NA" else answer
+    of = f"{question} of {code}" if code is not None else question
+    now = f"the answer of {rater} to {of} is now {what}"
+    return f"{now}; what it was before stays in {log}"
 
 
 def _run(

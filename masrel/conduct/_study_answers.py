@@ -1,20 +1,22 @@
 """What raters answered about the study as a whole."""
 
-from typing import TYPE_CHECKING
-
 from masrel.conduct._study_log import all_events
+from masrel.errors import SessionLogError
 from masrel.protocol import StudyPaths
-
-if TYPE_CHECKING:
-    from masrel.recording import _Facts  # loads numpy
+from masrel.protocol._questions import Answer
 
 
-def study_answers(study: StudyPaths) -> "dict[str, dict[tuple[str, str], _Facts]]":
+def study_answers(study: StudyPaths) -> dict[str, dict[tuple[str, str], Answer]]:
     """Return the last answer of each rater by questionnaire and question."""
-    answers: dict[str, dict[tuple[str, str], _Facts]] = {}
+    answers: dict[str, dict[tuple[str, str], Answer]] = {}
     for event in all_events(study):
         if event.kind in ("answered", "answer-correction"):
-            fields = event.fields
+            fields, answer = event.fields, event.fields["answer"]
+            if not isinstance(answer, str | int | float | None):
+                raise SessionLogError(
+                    f"{study.conduct_file}: line {event.line}: {event.kind}: needed "
+                    f"one answer, got {answer!r}"
+                )
             key = str(fields["questionnaire"]), str(fields["question"])
-            answers.setdefault(str(fields["rater"]), {})[key] = fields["answer"]
+            answers.setdefault(str(fields["rater"]), {})[key] = answer
     return answers

@@ -8,8 +8,7 @@ from masrel.errors import ParameterError, RatingsError
 from masrel.paper._differences import NO_GRADE
 from masrel.paper._form import FIRST_COLUMNS, Form, QuestionColumn
 from masrel.paper._typed import TypedRow, TypedSheet, shortened
-from masrel.protocol._questions import Answer, checked_answer
-from masrel.run._questionnaires import When
+from masrel.protocol._questions import Answer, When, checked_answer
 
 _MAX_PROBLEMS = 20
 

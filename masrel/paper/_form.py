@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from masrel.errors import ScheduleError
 from masrel.protocol import Protocol, Question, StudyPaths
-from masrel.run._questionnaires import When, questions_of
+from masrel.protocol._questions import When, questions_of
 from masrel.schedule import Schedule, check_schedule, read_schedule
 
 FIRST_COLUMNS = ("sheet", "position", "code", "grade")

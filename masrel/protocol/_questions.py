@@ -2,13 +2,19 @@
 
 import math
 from collections.abc import Iterator
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from msgspec import Meta
 
 from masrel.errors import ParameterError
 from masrel.protocol._decode import got, with_id
 from masrel.protocol._keys import _Identifier, _Table, _Text
+
+if TYPE_CHECKING:
+    from masrel.protocol.definition import Protocol
+
+When = Literal["presentation", "session", "study"]
+"""What questions are about, and so when they are asked."""
 
 _Whole = Annotated[int, Meta(ge=-1_000_000, le=1_000_000)]
 
@@ -61,8 +67,20 @@ class Questionnaire(_Table, frozen=True, kw_only=True):
 
     id: _Identifier
     title: _Text
-    when: Literal["presentation", "session", "study"]
+    when: When
     questions: Annotated[tuple[Question, ...], Meta(min_length=1)]
+
+
+def questions_of(
+    protocol: "Protocol", when: When
+) -> list[tuple[Questionnaire, Question]]:
+    """Return the questions that are asked then, in order."""
+    return [
+        (questionnaire, question)
+        for questionnaire in protocol.questionnaires
+        if questionnaire.when == when
+        for question in questionnaire.questions
+    ]
 
 
 def checked_answer(question: Question, answer: Answer, *, where: str) -> Answer:

@@ -301,6 +301,7 @@ class Report(_Table, frozen=True, kw_only=True):
             "test-retest",
             "speeds",
             "traces",
+            "questionnaires",
         ],
         ...,
     ] = ("design", "grades", "agreement", "intended", "test-retest", "speeds", "traces")

@@ -47,6 +47,16 @@ class StudyPaths:
         return self.root / "ratings" / "ratings.csv"
 
     @property
+    def answers_file(self) -> Path:
+        """The table of answers to questionnaires made from the logs."""
+        return self.root / "ratings" / "answers.csv"
+
+    @property
+    def published_answers_file(self) -> Path:
+        """Answers published elsewhere, or that fit what is."""
+        return self.root / "ratings" / "published_answers.csv"
+
+    @property
     def published_file(self) -> Path:
         """Ratings published elsewhere, when the study has some."""
         return self.root / "ratings" / "published.csv"
@@ -138,6 +148,7 @@ class StudyPaths:
 _BUNDLED = (
     "README.md",
     "ratings/published.csv",
+    "ratings/published_answers.csv",
     "ratings/in_person.csv",
     "published_secret.txt",
     "protocol.toml",  # last: a folder that has one is a study

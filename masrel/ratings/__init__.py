@@ -9,6 +9,15 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from masrel.ratings._parts import RatingsPart, Repeated
+    from masrel.ratings.answers import (
+        RECONSTRUCTED,
+        GivenAnswer,
+        answers_csv,
+        answers_from_logs,
+        answers_of,
+        read_answers,
+        write_answers,
+    )
     from masrel.ratings.completeness import (
         Correction,
         corrections_of,
@@ -42,8 +51,10 @@ if TYPE_CHECKING:
 __all__ = [
     "DEFAULT_SESSION",
     "RATING_COLUMNS",
+    "RECONSTRUCTED",
     "SOURCES",
     "Correction",
+    "GivenAnswer",
     "InPerson",
     "InPersonRow",
     "RatingMatrix",
@@ -53,12 +64,16 @@ __all__ = [
     "Repeated",
     "RetestPairs",
     "StudyData",
+    "answers_csv",
+    "answers_from_logs",
+    "answers_of",
     "corrections_of",
     "in_person_of",
     "rating_matrix",
     "ratings_csv",
     "ratings_from_logs",
     "ratings_from_rows",
+    "read_answers",
     "read_in_person",
     "read_ratings",
     "read_study_data",
@@ -67,10 +82,20 @@ __all__ = [
     "session_remarks",
     "study_remarks",
     "table_differences",
+    "write_answers",
     "write_ratings",
 ]
 
 _HOMES = {
+    "answers": (
+        "RECONSTRUCTED",
+        "GivenAnswer",
+        "answers_csv",
+        "answers_from_logs",
+        "answers_of",
+        "read_answers",
+        "write_answers",
+    ),
     "completeness": (
         "Correction",
         "corrections_of",

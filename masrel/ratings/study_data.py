@@ -10,6 +10,7 @@ from masrel._input import MAX_TABLE, csv_format, format_problem, read_regular
 from masrel.conduct import excluded_raters
 from masrel.errors import RatingsError
 from masrel.protocol import Protocol, StudyPaths, scale_of
+from masrel.ratings.answers import GivenAnswer, answers_of
 from masrel.ratings.in_person import InPerson, read_in_person
 from masrel.ratings.logs import ratings_from_logs
 from masrel.ratings.study_file import read_study_ratings
@@ -34,6 +35,8 @@ class StudyData:
         Grades given in person; None for simulated ratings, to which they do not belong.
     excluded : tuple of str
         Raters who are left out of the analysis.
+    answers : tuple of GivenAnswer
+        Answers to questionnaires.
     read : str
         What was read, in words.
     """
@@ -43,6 +46,7 @@ class StudyData:
     ratings: Ratings
     in_person: InPerson | None
     excluded: tuple[str, ...]
+    answers: tuple[GivenAnswer, ...]
     read: str
 
 
@@ -90,6 +94,7 @@ def read_study_data(
         ratings=ratings,
         in_person=in_person_of(study, ratings),
         excluded=excluded_raters(study),
+        answers=answers_of(study, protocol, file=file),
         read=read,
     )
 

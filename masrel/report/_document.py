@@ -16,13 +16,14 @@ from functools import partial
 from pathlib import Path
 
 from masrel.analysis import Analysis
-from masrel.protocol import Protocol
+from masrel.protocol import Protocol, Report
 from masrel.ratings import InPerson, Ratings
 from masrel.report._agreement import estimates_section
 from masrel.report._conduct import StudyConduct, conduct_section
 from masrel.report._design import design_section
 from masrel.report._grades import grades_section, in_person_section, intended_section
 from masrel.report._material import Drawing, Material, Paragraph, Section, gather
+from masrel.report._question_tables import questionnaires_section
 from masrel.report._report_folder import MANIFEST, Assets, replace_report
 from masrel.report._stretches import speeds_section, traces_section
 from masrel.report._tables import Table, as_csv, page_cells, tag_of
@@ -40,6 +41,7 @@ SECTIONS: dict[str, Callable[[Material], Section]] = {
     "test-retest": partial(estimates_section, kind="test-retest"),
     "speeds": speeds_section,
     "traces": traces_section,
+    "questionnaires": questionnaires_section,
 }
 """Name in ``report.sections`` to what makes it: only what a protocol names is made."""
 
@@ -47,6 +49,7 @@ _INPUTS = {
     "protocol_sha256": "protocol",
     "ratings_sha256": "ratings",
     "in_person_sha256": "grades given in person",
+    "answers_sha256": "answers to questionnaires",
 }
 
 _KINDS = {Paragraph: "paragraph", Table: "table", Drawing: "figure"}
@@ -135,7 +138,7 @@ def write_report(
         If a file cannot be written; the pages that were there are then there still.
     """
     material = gather(protocol, ratings, analysis, in_person, recordings)
-    sections = [SECTIONS[name](material) for name in protocol.report.sections]
+    sections = [SECTIONS[name](material) for name in _section_names(protocol)]
     if conduct is not None and (first := conduct_section(material, conduct)):
         sections.insert(0, first)
     assets = Assets()
@@ -153,6 +156,14 @@ def write_report(
             destination / p for p in assets.contents if not p.endswith(".csv")
         ),
     )
+
+
+def _section_names(protocol: Protocol) -> tuple[str, ...]:
+    # who leaves the choice to masrel sees the questionnaires where there are some
+    names: tuple[str, ...] = protocol.report.sections
+    if names == Report().sections and protocol.questionnaires:
+        return (*names, "questionnaires")
+    return names
 
 
 def _make_blocks(

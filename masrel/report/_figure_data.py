@@ -332,6 +332,22 @@ class RaterFlow:
     steps: tuple[FlowStep, ...]  # first on top
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AnswerPanel:
+    """How often each answer to one question was given."""
+
+    title: str  # the question, and the session
+    labels: tuple[str, ...]  # the answers, or ranges of them
+    counts: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AnswerBars:
+    """Answers to questionnaires, a panel a question and session."""
+
+    panels: tuple[AnswerPanel, ...]
+
+
 Content = (
     GradeGrid
     | RaterFlow
@@ -350,5 +366,6 @@ Content = (
     | Differences
     | LearningView
     | OrderPanels
+    | AnswerBars
 )
 """Whatever can be drawn."""

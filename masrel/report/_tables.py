@@ -12,7 +12,7 @@ import textwrap
 import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass
-from decimal import Decimal
+from decimal import ROUND_HALF_UP, Decimal
 from typing import Literal
 
 from masrel._cells import safe_cell
@@ -72,7 +72,7 @@ class Table:
     notes: tuple[str, ...] = ()  # what the reader must know, below the table
     read: tuple[str, ...] = ()  # what was read for it, above the table
     # where the data come from: "simulated", "simulated device" where persons gave the
-    # grades, "published", "recorded" or "foreign"
+    # grades, "published", "reconstructed", "recorded" or "foreign"
     data: str
 
     @property
@@ -103,6 +103,16 @@ def number(value: Value, digits: int | None, *, in_units: bool = False) -> str:
     text = fixed_or_significant(value, digits) if in_units else f"{value:.{digits}f}"
     if float(text) == 0.0:
         text = text.removeprefix("-")  # no "-0.000"
+    return text.replace("-", "−")
+
+
+def half_up(value: float, decimals: int) -> str:
+    """Return a number rounded as on paper: what lies in the middle goes up."""
+    # Means of a few whole numbers often lie there; a float's own format goes to even.
+    if math.isnan(value):
+        return UNDEFINED
+    unit = Decimal(1).scaleb(-decimals)
+    text = str(Decimal(repr(value)).quantize(unit, ROUND_HALF_UP))
     return text.replace("-", "−")
 
 

@@ -1,16 +1,13 @@
 """Put the questions of a study to whoever grades; every answer is logged at once."""
 
 from collections.abc import Callable, Container
-from typing import Literal
 
 from masrel.errors import ParameterError
 from masrel.protocol import Protocol, Question, Questionnaire
-from masrel.protocol._questions import checked_answer
+from masrel.protocol._questions import When, checked_answer, questions_of
 from masrel.recording import _Fact
 from masrel.run._grade_sources import OccasionSource, QuestionRequest
 from masrel.schedule import Presentation
-
-When = Literal["presentation", "session", "study"]
 
 
 def ask_questions(
@@ -48,18 +45,6 @@ def _place(request: QuestionRequest) -> str:
     name = f"{request.questionnaire.id}.{request.question.id}"
     of = "" if request.presentation is None else f" of {request.presentation.code}"
     return f"answer to {name}{of} by {request.rater} in session {request.session}"
-
-
-def questions_of(
-    protocol: Protocol, when: When
-) -> list[tuple[Questionnaire, Question]]:
-    """Return the questions that are asked then, in order."""
-    return [
-        (questionnaire, question)
-        for questionnaire in protocol.questionnaires
-        if questionnaire.when == when
-        for question in questionnaire.questions
-    ]
 
 
 def question_named(protocol: Protocol, name: str) -> tuple[Questionnaire, Question]:

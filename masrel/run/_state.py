@@ -5,13 +5,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import date
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, Literal, cast, get_args
 
 from masrel._event_log import Event
 from masrel._input import format_problem
 from masrel.errors import SessionLogError
 
 if TYPE_CHECKING:
+    from masrel.protocol._questions import Answer
     from masrel.recording import _Facts  # loads numpy
 
 Felt = Literal["felt", "below-threshold", "no-catch"]
@@ -171,7 +172,7 @@ class SessionState(CodesState):
     is_instructed: bool = False  # whether the rater has read the instructions
     # after how many presentations there were breaks
     breaks: set[object] = field(default_factory=set)
-    answers: "dict[AnswerKey, _Facts]" = field(default_factory=dict)  # with corrections
+    answers: "dict[AnswerKey, Answer]" = field(default_factory=dict)  # with corrections
     # the last second entry of each column of each code, or of the session
     reentered: dict[tuple[str | None, str], Event] = field(default_factory=dict)
     # presentations, also for practice, and how many grades were set aside
@@ -341,7 +342,8 @@ def _apply(state: SessionState, event: Event) -> None:
     elif event.kind == "restarted":
         _set_aside(state)
     elif "question" in event.fields:
-        state.answers[_answer_key(event)] = event.fields["answer"]
+        # no list, or the event would have been refused
+        state.answers[_answer_key(event)] = cast("Answer", event.fields["answer"])
     elif event.kind == "reentered":
         code = event.fields["code"]
         key = (None if code is None else str(code), str(event.fields["column"]))

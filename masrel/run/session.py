@@ -21,14 +21,14 @@ from masrel.errors import (
     SessionLogError,
 )
 from masrel.protocol import Protocol, StudyPaths
-from masrel.protocol._questions import checked_answer
+from masrel.protocol._questions import checked_answer, questions_of
 from masrel.recording import _Fact
 from masrel.run._days import is_complete
 from masrel.run._grade_sources import GradeSource, with_occasions
 from masrel.run._practice import practice_presentations
 from masrel.run._present import spool_of
 from masrel.run._presenter import CLOCKS, ClockName
-from masrel.run._questionnaires import ask_questions, question_named, questions_of
+from masrel.run._questionnaires import ask_questions, question_named
 from masrel.run._rehearsal import begin_rehearsal
 from masrel.run._runner import SessionRunner, SessionSummary
 from masrel.run._settings import (
@@ -285,7 +285,7 @@ def record_answer(
     why: str,
     code: str | None = None,
     now: Callable[[], datetime] = utc_now,
-) -> None:
+) -> Path:
     """Append a correction of an answer to the log it is in; the first one stays there.
 
     A question that has no answer gets it so too: late.
@@ -308,6 +308,11 @@ def record_answer(
         The blinded code of the presentation that the question is about.
     now : callable, optional
         Gives the time of day for the log, aware.
+
+    Returns
+    -------
+    Path
+        The log.
 
     Raises
     ------
@@ -338,12 +343,13 @@ def record_answer(
     if questionnaire.when == "study":
         of_study = {"rater": _known_rater(protocol, rater), **fields}
         append_event(study, protocol, "answer-correction", of_study, now=now)
-        return
+        return study.conduct_file
     with _begun_log(study, rater, session, now) as log:
         state = replay(log.path, log.events)
         if code is not None:
             _check_code(log.path, code, state.presented, "was presented")
         log.append("answer-correction", {**fields, "code": code})
+    return log.path
 
 
 def _known_rater(protocol: Protocol, rater: str) -> str:

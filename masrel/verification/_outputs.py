@@ -33,7 +33,8 @@ _SHOWN = 20  # differences of the table that are listed
 def output_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]:
     """Yield what is wrong with everything that was made from the logs."""
     table, manifest = study.ratings_file, study.report / "manifest.json"
-    files = [f for f in (table, study.analysis_file, manifest) if f.is_file()]
+    outputs = (table, study.answers_file, study.analysis_file, manifest)
+    files = [file for file in outputs if file.is_file()]
     if not files:
         return  # nothing is loaded for it
     from masrel.ratings import ratings_from_logs, read_study_data
@@ -43,6 +44,7 @@ def output_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]:
         if study.logs():
             ratings = ratings_from_logs(study, protocol)
             yield from _table_findings(table, ratings)
+            yield from _answers_findings(study, protocol)
         else:
             ratings = read_study_data(study, protocol).ratings
             if table.is_file():
@@ -63,7 +65,7 @@ def _analysis_of(
     study: StudyPaths, protocol: Protocol, ratings: "Ratings"
 ) -> "Analysis":
     from masrel.analysis import analyze
-    from masrel.ratings import in_person_of
+    from masrel.ratings import answers_of, in_person_of
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", MasrelWarning)  # of statistics
@@ -71,8 +73,21 @@ def _analysis_of(
             protocol,
             ratings,
             in_person=in_person_of(study, ratings),
+            answers=answers_of(study, protocol),
             excluded=excluded_raters(study),
         )
+
+
+def _answers_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]:
+    from masrel.ratings import answers_csv, answers_from_logs
+
+    path = study.answers_file
+    if path.is_file():
+        text = read_regular(path, most=MAX_TABLE).decode("utf-8", errors="replace")
+        if text != answers_csv(answers_from_logs(study, protocol)):
+            yield broken(
+                path, "is not what the logs say; masrel ratings writes it anew"
+            )
 
 
 def _table_findings(path: Path, ratings: "Ratings") -> Iterator[Finding]:

@@ -55,7 +55,7 @@ def said(field: msgspec.structs.FieldInfo) -> str:
     if field.default is None:
         return "none"
     if field.name == "sections":
-        return 'all but `"in-person"`'
+        return 'all but `"in-person"` and `"questionnaires"`'
     if isinstance(field.default, msgspec.Struct) or field.default_factory is dict:
         return "`{}`"
     return f"`{json.dumps(field.default)}`"
@@ -79,11 +79,11 @@ def test_every_table_of_a_protocol_is_there() -> None:
     assert names == fields | inner
 
 
-def test_the_default_sections_are_all_but_in_person() -> None:
+def test_the_default_sections_are_all_that_every_study_has() -> None:
     (field,) = (
         f for f in msgspec.structs.fields(definition.Report) if f.name == "sections"
     )
     info = msgspec.inspect.type_info(field.type)
     assert isinstance(info, msgspec.inspect.VarTupleType)
     assert isinstance(info.item_type, msgspec.inspect.LiteralType)
-    assert {*field.default, "in-person"} == set(info.item_type.values)
+    assert {*field.default, "in-person", "questionnaires"} == set(info.item_type.values)

@@ -35,6 +35,7 @@ def test_the_published_study_brings_its_ratings(tmp_path: Path) -> None:
         "published_secret.txt",
         "ratings/in_person.csv",
         "ratings/published.csv",
+        "ratings/published_answers.csv",
     ]
     assert all(
         found[name] == (STUDIES / "hess2012" / name).read_bytes() for name in found

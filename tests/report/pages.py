@@ -23,6 +23,7 @@ ALL = (
     "test-retest",
     "speeds",
     "traces",
+    "questionnaires",
 )
 
 AGAIN = plan(

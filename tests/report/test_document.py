@@ -27,6 +27,7 @@ TITLES = {
     "test-retest": "Test-retest agreement",
     "speeds": "Stretching speeds",
     "traces": "Torque traces",
+    "questionnaires": "Questionnaires",
 }
 
 

@@ -191,6 +191,9 @@ def test_a_graded_presentation_is_not_skipped(small: Small) -> None:
         (["--skip", "X", "--grade", "1"], "--grade needs --correct CODE, not --skip"),
         (["--skip", "X", "--correct", "X"], "are said one at a time"),
         (["--skip", "X", "--rehearse"], "presents models, and --skip none"),
+        (["--question", "a.b"], "--question needs --answer, --who and --why too"),
+        (["--answer", "7"], "--answer needs --question QUESTION too"),
+        (["--code", "X", "--skip", "X"], "--code needs --question QUESTION, not"),
     ],
 )
 def test_a_skip_that_makes_no_sense_is_refused(

@@ -14,7 +14,12 @@ from masrel.errors import (
     SessionStoppedError,
 )
 from masrel.protocol import Protocol, StudyPaths, scale_of
-from masrel.ratings import ratings_from_logs, study_remarks
+from masrel.ratings import (
+    answers_from_logs,
+    ratings_from_logs,
+    read_answers,
+    study_remarks,
+)
 from masrel.recording import read_recording
 from masrel.run import (
     ConsoleGrades,
@@ -27,7 +32,9 @@ from masrel.run import (
     record_answer,
     run_session,
 )
+from masrel.schedule import read_schedule
 from masrel.verification import verify_study
+from tests.run.test_command import typed
 
 New = Callable[..., tuple[StudyPaths, Protocol]]
 
@@ -392,6 +399,40 @@ def test_an_answer_is_corrected_and_the_first_one_stays(new_study: New) -> None:
                 code=code,
                 **reasons,
             )
+
+
+def test_an_answer_is_corrected_by_the_command(new_study: New) -> None:
+    study, protocol = new_study(("[schedule]", QUESTIONS))
+    run(study, protocol)
+    first = read_schedule(study.schedule_file("R1", "test")).presentations[0].code
+    command = ("run", study.root, "--rater", "R1", "--session", "test")
+    command += ("--who", "AB", "--why", "slip")
+    for options, said in (
+        (["--question", "realism.score", "--answer", "9"], "realism.score is now 9;"),
+        (
+            ["--question", "each.sure", "--code", first, "--answer", "NA"],
+            f"each.sure of {first} is now missing;",
+        ),
+        (["--question", "end.again", "--answer", "no"], "end.again is now no;"),
+    ):
+        out, _ = typed(*command, *options)
+        assert said in out
+    assert study_answers(study) == {"R1": {("end", "again"): "no"}}
+    out, _ = typed("ratings", study.root)
+    assert "answers.csv" in out
+    rows = study.answers_file.read_text(encoding="utf-8").splitlines()
+    assert "test,R1,realism,score,,,9,script" in rows
+    assert ",R1,end,again,,,no,script" in rows
+    assert sum(row.endswith(",,script") for row in rows) == 2  # the note; made missing
+    assert read_answers(study.answers_file, protocol) == answers_from_logs(
+        study, protocol
+    )
+    assert verify_study(study).findings == ()
+    text = study.answers_file.read_text(encoding="utf-8")
+    study.answers_file.write_text(text.replace(",9,", ",8,"), encoding="utf-8")
+    (finding,) = verify_study(study).findings
+    assert "answers.csv" in str(finding.path)
+    assert finding.message.endswith("masrel ratings writes it anew")
 
 
 def test_a_source_without_the_method_is_refused_before_anything_happens(

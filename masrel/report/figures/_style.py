@@ -139,6 +139,7 @@ def _figure(content: data.Content) -> Figure:
             | data.LearningView()
             | data.OrderPanels()
             | data.RaterFlow()
+            | data.AnswerBars()
         ):
             return _rater_figure(content)
         case data.Differences():
@@ -158,7 +159,13 @@ def _figure(content: data.Content) -> Figure:
 
 
 def _rater_figure(
-    content: data.PairMaps | data.LearningView | data.OrderPanels | data.RaterFlow,
+    content: (
+        data.PairMaps
+        | data.LearningView
+        | data.OrderPanels
+        | data.RaterFlow
+        | data.AnswerBars
+    ),
 ) -> Figure:
     if isinstance(content, data.OrderPanels):
         from masrel.report.figures._order_figure import order_figure
@@ -168,6 +175,10 @@ def _rater_figure(
         from masrel.report.figures._rater_flow import flow_figure
 
         return flow_figure(content)
+    if isinstance(content, data.AnswerBars):
+        from masrel.report.figures._answer_bars import answer_figure
+
+        return answer_figure(content)
     if isinstance(content, data.LearningView):
         from masrel.report.figures._learning_figure import learning_figure
 
