@@ -47,12 +47,20 @@ def ratings_from_logs(study: StudyPaths, protocol: Protocol) -> Ratings:
     ScheduleError
         If a schedule is missing, damaged or stale.
     """
+    return _of_logs(study, protocol, check_recordings=True)
+
+
+def _of_logs(
+    study: StudyPaths, protocol: Protocol, *, check_recordings: bool
+) -> Ratings:
     rows = [
         row
         for session in protocol.sessions
         for rater in session.raters
         if study.log_file(rater, session.id).exists()
-        for row in _rows(study, protocol, rater, session.id)
+        for row in _rows(
+            study, protocol, rater, session.id, check_recordings=check_recordings
+        )
     ]
     if not rows:
         raise RatingsError(
@@ -62,7 +70,12 @@ def ratings_from_logs(study: StudyPaths, protocol: Protocol) -> Ratings:
 
 
 def _rows(
-    study: StudyPaths, protocol: Protocol, rater: str, session: str
+    study: StudyPaths,
+    protocol: Protocol,
+    rater: str,
+    session: str,
+    *,
+    check_recordings: bool,
 ) -> Iterator[dict[str, object]]:
     log = study.log_file(rater, session)
     _, state = read_session(log)
@@ -81,7 +94,7 @@ def _rows(
             raise RatingsError(
                 f"{log}: {line}needed a code of the schedule, got {code!r}"
             )
-        for event in events:
+        for event in events if check_recordings else ():
             _check_recording(study, log, event)
     of_session = {
         "session": session,

@@ -163,13 +163,13 @@ def table_differences(path: Path, ratings: Ratings) -> Iterator[str]:
     if not path.is_file():
         return
     text = read_regular(path, most=MAX_TABLE).decode("utf-8", errors="replace")
-    texts = _texts(ratings)
-    if text in texts:
+    if text in _texts(ratings):
         return
     problem = format_problem(csv_format(text), newest=_FORMAT)
     if problem is not None:
         yield problem
         return
+    texts = list(_texts(ratings))
     logged = next((t for t in texts if _names(t) == _names(text)), texts[0])
     try:
         rows, needed = _rows(text), _rows(logged)

@@ -3,7 +3,7 @@
 import csv
 import io
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -503,14 +503,13 @@ def ratings_csv(ratings: Ratings) -> str:
     return f"{_head(ratings)}# format: {_FORMAT}\n{_body(ratings, names)}"
 
 
-def _texts(ratings: Ratings) -> list[str]:
-    """Return every text that a table of these ratings of logs has ever had."""
-    texts = [ratings_csv(ratings)]
+def _texts(ratings: Ratings) -> Iterator[str]:
+    """Yield every text that a table of these ratings of logs has ever had."""
+    yield ratings_csv(ratings)
     head = _head(ratings)
-    texts.append(head + _body(ratings, RATING_COLUMNS[:_N_FORMERLY]))
+    yield head + _body(ratings, RATING_COLUMNS[:_N_FORMERLY])
     if ratings.table["felt"].isna().all():  # of logs that say nothing of stretches
-        texts.append(head + _body(ratings, RATING_COLUMNS[:_N_ALWAYS]))
-    return texts
+        yield head + _body(ratings, RATING_COLUMNS[:_N_ALWAYS])
 
 
 def _head(ratings: Ratings) -> str:

@@ -3,7 +3,7 @@
 import hashlib
 import json
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -37,28 +37,30 @@ def output_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]:
     files = [file for file in outputs if file.is_file()]
     if not files:
         return  # nothing is loaded for it
-    from masrel.ratings import ratings_from_logs, read_study_data
-    from masrel.ratings.table import _texts
+    from masrel.ratings import read_study_data
+    from masrel.ratings.logs import _of_logs
 
     try:
         if study.logs():
-            ratings = ratings_from_logs(study, protocol)
+            # recordings have been held against the logs before
+            ratings = _of_logs(study, protocol, check_recordings=False)
             yield from _table_findings(table, ratings)
             yield from _answers_findings(study, protocol)
         else:
             ratings = read_study_data(study, protocol).ratings
             if table.is_file():
                 yield doubt(table, "no session log stands behind this table")
+        if files == [table]:
+            return
         analysis = _analysis_of(study, protocol, ratings)
     except MasrelError as error:
         for path in files:
             yield broken(path, f"cannot be held against what it is made from: {error}")
         return
-    texts = _texts(ratings) if ratings.source_path is None else []
     if study.analysis_file.is_file():
-        yield from _analysis_findings(study.analysis_file, analysis, texts)
+        yield from _analysis_findings(study.analysis_file, analysis, ratings)
     if manifest.is_file():
-        yield from _report_findings(manifest, analysis, texts)
+        yield from _report_findings(manifest, analysis, ratings)
 
 
 def _analysis_of(
@@ -101,19 +103,24 @@ def _table_findings(path: Path, ratings: "Ratings") -> Iterator[Finding]:
 
 
 def _of_same_table(
-    analysis: "Analysis", inputs: object, texts: Sequence[str]
+    analysis: "Analysis", inputs: object, ratings: "Ratings"
 ) -> "Analysis":
     # with the hash that was written if it is of the same table in an earlier format
-    if not isinstance(inputs, dict):
+    from masrel.ratings.table import _texts
+
+    sha256 = inputs.get("ratings_sha256") if isinstance(inputs, dict) else None
+    if sha256 == analysis.inputs["ratings_sha256"] or ratings.source_path is not None:
         return analysis
-    sha256 = inputs.get("ratings_sha256")
-    if sha256 not in [hashlib.sha256(text.encode()).hexdigest() for text in texts]:
-        return analysis
-    return replace(analysis, inputs={**analysis.inputs, "ratings_sha256": sha256})
+    for text in _texts(ratings):
+        if sha256 == hashlib.sha256(text.encode()).hexdigest():
+            return replace(
+                analysis, inputs={**analysis.inputs, "ratings_sha256": sha256}
+            )
+    return analysis
 
 
 def _analysis_findings(
-    path: Path, analysis: "Analysis", texts: Sequence[str]
+    path: Path, analysis: "Analysis", ratings: "Ratings"
 ) -> Iterator[Finding]:
     from masrel.analysis import as_analysis_document
     from masrel.analysis._analysis_json import ANALYSIS_FORMAT
@@ -127,7 +134,7 @@ def _analysis_findings(
     if problem is not None:
         yield broken(path, problem)
         return
-    analysis = _of_same_table(analysis, document.get("inputs"), texts)
+    analysis = _of_same_table(analysis, document.get("inputs"), ratings)
     needed = json.loads(json.dumps(as_analysis_document(analysis)))
     version = document.get("masrel_version")
     if version != analysis.masrel_version:
@@ -159,7 +166,7 @@ def _first_difference(got: object, needed: object, place: str = "") -> str | Non
 
 
 def _report_findings(
-    manifest: Path, analysis: "Analysis", texts: Sequence[str]
+    manifest: Path, analysis: "Analysis", ratings: "Ratings"
 ) -> Iterator[Finding]:
     # of the pages and assets that a report consists of, and what it was made from
     document = _document(manifest)
@@ -173,7 +180,7 @@ def _report_findings(
             f"needed format {REPORT_FORMAT!r}, got {document.get('format')!r}",
         )
         return
-    analysis = _of_same_table(analysis, document.get("inputs"), texts)
+    analysis = _of_same_table(analysis, document.get("inputs"), ratings)
     if document.get("inputs") != analysis.inputs:
         yield broken(
             manifest, "the report is of another protocol or of other ratings: make anew"
