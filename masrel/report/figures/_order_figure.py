@@ -53,13 +53,13 @@ def _draw(
     columns: Sequence[str] | None,
 ) -> None:
     # columns: names of the columns; None for places, from 1
-    shown = np.array(counts, dtype=float)
+    shown = np.array(counts, dtype=np.int64)
     n_rows, n_columns = shown.shape
     image = axes.imshow(
         shown,
         cmap=_COLOURS,
         vmin=0.0,
-        vmax=max(1.0, shown.max()),
+        vmax=max(1, int(shown.max())),
         aspect="auto",
         extent=(0.5, n_columns + 0.5, n_rows + 0.5, 0.5),
         interpolation="none",
@@ -80,14 +80,14 @@ def _draw(
     bar.outline.set_visible(False)
 
 
-def _write_numbers(axes: Axes, counts: NDArray[np.float64]) -> None:
+def _write_numbers(axes: Axes, counts: NDArray[np.int64]) -> None:
     """Write each count into its cell; they are of shape (n_rows, n_columns)."""
     dark = 0.55 * counts.max()
     for (row, column), freq in np.ndenumerate(counts):
         axes.text(
             column + 1,
             row + 1,
-            f"{freq:.0f}",
+            str(freq),
             ha="center",
             va="center",
             fontsize=6,
