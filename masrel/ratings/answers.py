@@ -7,7 +7,6 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 from masrel._cells import from_safe_cell, safe_cell
-from masrel._event_log import read_log
 from masrel._files import write_file
 from masrel._input import listed
 from masrel.conduct._study_answers import study_answers
@@ -15,7 +14,8 @@ from masrel.errors import ParameterError
 from masrel.protocol import Protocol, Question, StudyPaths
 from masrel.protocol._questions import Answer, checked_answer, questions_of
 from masrel.ratings.study_file import _Problem, _read_rows, _refusal
-from masrel.run._state import FROM_PERSONS, SessionState, replay
+from masrel.run._session_logs import read_session
+from masrel.run._state import FROM_PERSONS, SessionState
 from masrel.schedule import read_schedule
 
 RECONSTRUCTED = "reconstructed"
@@ -54,6 +54,9 @@ class GivenAnswer:
     answer: Answer
     grades_from: str
 
+
+_FORMAT = 1
+"""Version of a table of answers."""
 
 _COLUMNS = tuple(field.name for field in fields(GivenAnswer))
 
@@ -143,7 +146,7 @@ def answers_of(
 
 def _state_of(study: StudyPaths, rater: str, session: str) -> SessionState:
     log = study.log_file(rater, session)
-    return replay(log, read_log(log)) if log.exists() else SessionState()
+    return read_session(log)[1] if log.exists() else SessionState()
 
 
 def _of_session(
@@ -210,6 +213,7 @@ def answers_csv(answers: tuple[GivenAnswer, ...]) -> str:
     if any(each.grades_from not in (*FROM_PERSONS, RECONSTRUCTED) for each in answers):
         text.write("# SIMULATED: not answers of persons.\n")
     text.write("# Answers to questionnaires, one row a question; empty is missing.\n")
+    text.write(f"# format: {_FORMAT}\n")
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(_COLUMNS)
     for each in answers:
@@ -221,7 +225,7 @@ def answers_csv(answers: tuple[GivenAnswer, ...]) -> str:
 def write_answers(
     answers: tuple[GivenAnswer, ...], path: Path, *, within: Path | None = None
 ) -> None:
-    """Write answers as CSV; the same answers give the same bytes.
+    """Write answers as CSV, for their owner alone; the same answers, the same bytes.
 
     Parameters
     ----------
@@ -239,7 +243,7 @@ def write_answers(
     OSError
         If the file cannot be written; what was there is then there still.
     """
-    write_file(path, answers_csv(answers), within=within)
+    write_file(path, answers_csv(answers), within=within, mode=0o600)
 
 
 def read_answers(path: Path, protocol: Protocol) -> tuple[GivenAnswer, ...]:

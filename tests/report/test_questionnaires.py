@@ -148,5 +148,5 @@ def test_simulated_answers_are_labelled() -> None:
 def test_a_wrong_row_is_named(tmp_path: Path, row: str, problem: str) -> None:
     file = tmp_path / "answers.csv"
     file.write_text(answers_csv(()) + row + "\n", encoding="utf-8")
-    with pytest.raises(RatingsError, match=f"answers.csv: line 3: {problem}"):
+    with pytest.raises(RatingsError, match=f"answers.csv: line 4: {problem}"):
         read_answers(file, read_protocol(HESS.protocol))
