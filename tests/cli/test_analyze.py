@@ -93,7 +93,7 @@ def test_csv_on_stdout_is_tables_alone(masrel: Caller, study: Path) -> None:
     assert done.code == 0
     tables = [part for part in done.out.split("\n\n") if part]
     heads = [next(csv.reader(table.splitlines())) for table in tables]
-    assert [head[0] for head in heads] == ["id", "model", "model"]
+    assert [head[0] for head in heads] == ["id", "model", "model", "question"]
     assert {head[-1] for head in heads} == {"data"}
     assert "again" in done.err
 
