@@ -16,7 +16,7 @@ from masrel.protocol import copy_template
     show_default=True,
     metavar="NAME",
     help="Bundled study to copy: small, a template to edit; tone, one of several "
-    "kinds of models; or hess2012.",
+    "kinds of models; two-sites, with all that a coordinator needs; or hess2012.",
 )
 def init(folder: Path, template: str) -> None:
     """Make a new study in DIR, which must not exist or be empty."""

@@ -29,7 +29,7 @@ TEXTS = {name: page.read_text(encoding="utf-8") for name, page in PAGES.items()}
 BLOCKS = [block for name, text in TEXTS.items() for block in read(text, name)]
 
 # The latent-trait model takes half a minute.
-SLOW = {"docs/latent_trait.md"}
+SLOW = {"docs/coordinating.md", "docs/latent_trait.md"}
 
 # Every block that is not run, and why. A new one has to be entered here.
 NOT_RUN = [
