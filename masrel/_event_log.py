@@ -82,6 +82,12 @@ def read_log(path: Path) -> tuple[Event, ...]:
     return _verify(path, lines)
 
 
+def events_before_torn(path: Path) -> tuple[Event, ...] | None:
+    """Return the events of a log's whole lines; None unless a torn line follows."""
+    lines, torn = _split_lines(_read(path))
+    return _verify(path, lines) if torn else None
+
+
 def _read(path: Path) -> bytes:
     try:
         return read_regular(path, most=MAX_TABLE)

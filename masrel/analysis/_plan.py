@@ -87,9 +87,10 @@ def analyze(
     """
     _check_known(protocol, ratings)
     inputs = _inputs(protocol, ratings, in_person, answers)
-    ratings = analysed_ratings(ratings, excluded)
-    in_person = analysed_in_person(in_person, excluded)
-    answers = [each for each in answers if each.rater not in excluded]
+    if excluded:
+        ratings = analysed_ratings(ratings, excluded)
+        in_person = analysed_in_person(in_person, excluded)
+        answers = [each for each in answers if each.rater not in excluded]
     sections = set(protocol.report.sections)
     # descriptions of grades speak of the first session that has ratings
     present = set(ratings.table["session"])

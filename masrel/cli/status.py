@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from masrel.cli._options import STDOUT, OutputOptions, output_options, write_json
-from masrel.errors import ParameterError
+from masrel.errors import ParameterError, SessionLogError
 from masrel.protocol import StudyPaths, read_protocol
 
 if TYPE_CHECKING:
@@ -52,6 +52,7 @@ class _Overview:
     sessions: "tuple[SessionProgress, ...]"
     raters: "tuple[RaterProgress, ...]"
     events: "tuple[Event, ...]"
+    problem: str | None  # why what happened beside the sessions cannot be read
     next: "NextStep"
 
     @classmethod
@@ -61,12 +62,20 @@ class _Overview:
 
         protocol = read_protocol(paths.protocol)
         sessions = session_progress(paths, protocol)
-        raters = rater_progress(paths, protocol, sessions)
+        raters: tuple[RaterProgress, ...] = ()
+        events: tuple[Event, ...] = ()
+        problem = None
+        try:
+            raters = rater_progress(paths, protocol, sessions)
+            events = read_conduct(paths)
+        except SessionLogError as error:  # hides no session
+            problem = str(error)
         return cls(
             study=protocol.study.id,
             sessions=sessions,
             raters=raters,
-            events=read_conduct(paths),
+            events=events,
+            problem=problem,
             next=next_step(paths, sessions, raters),
         )
 
@@ -82,6 +91,7 @@ class _Overview:
                 {"event": e.kind, "time_utc": e.time_utc, **e.fields}
                 for e in self.events
             ],
+            "problem": self.problem,
             "next": dataclasses.asdict(self.next),
         }
 
@@ -89,7 +99,8 @@ class _Overview:
         from masrel.report._tables import as_text
 
         parts = [as_text(_sessions_table(self))]
-        parts += [f"{s.problem}" for s in self.sessions if s.problem is not None]
+        problems = (self.problem, *(session.problem for session in self.sessions))
+        parts += [problem for problem in problems if problem is not None]
         if self.events:
             parts.append("\n".join(map(_event_line, self.events)))
         parts.append(f"next: {self.next.command}  ({self.next.why})")
@@ -134,7 +145,7 @@ def _sessions_table(overview: _Overview) -> "Table":
             (
                 session.session,
                 session.rater,
-                _stage(session, status[session.rater]),
+                _stage(session, status.get(session.rater)),
                 f"{session.n_graded} of {session.n_presentations}",
                 *(getattr(session, key) for key in counts.values()),
                 _last_event(session),
@@ -145,7 +156,7 @@ def _sessions_table(overview: _Overview) -> "Table":
     )
 
 
-def _stage(session: "SessionProgress", status: str) -> str:
+def _stage(session: "SessionProgress", status: str | None) -> str:
     is_out = status in ("withdrawn", "excluded")
     return f"{session.stage}, {status}" if is_out else session.stage
 

@@ -2,12 +2,14 @@
 
 from collections import Counter
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
+from masrel._event_log import Event, events_before_torn
 from masrel.errors import SessionLogError
 from masrel.protocol import Protocol, StudyPaths
 from masrel.run._session_logs import read_session
-from masrel.run._state import SessionState
+from masrel.run._state import SessionState, replay
 from masrel.schedule import site_of_copy
 from masrel.schedule._sites import site_of
 
@@ -102,11 +104,9 @@ def _progress(
     stage: SessionStage = "not drawn"
     if study.schedule_file(rater, session).exists():
         stage = "drawn"
-    problem = None
-    try:
-        events, state = read_session(log) if log.exists() else ((), SessionState())
-    except SessionLogError as error:
-        events, state, stage, problem = (), SessionState(), "unreadable", str(error)
+    events, state, problem = _events(log)
+    if problem is not None and not events:
+        stage = "unreadable"
     if state.header:
         stage = "complete" if state.is_complete else "begun"
     counts = Counter(event.kind for event in events)
@@ -130,3 +130,19 @@ def _progress(
         or any(event.fields["simulated"] for event in presented),
         problem=problem,
     )
+
+
+def _events(log: Path) -> tuple[tuple[Event, ...], SessionState, str | None]:
+    # what a log says, or why it cannot be read; of one whose last line a kill cut off,
+    # which masrel run takes out again, both
+    if not log.exists():
+        return (), SessionState(), None
+    try:
+        return *read_session(log), None
+    except SessionLogError as error:
+        problem = str(error)
+    try:
+        events = events_before_torn(log) or ()
+        return events, replay(log, events), problem
+    except SessionLogError:
+        return (), SessionState(), problem

@@ -62,7 +62,7 @@ def study_conduct(
     *,
     file: Path | None = None,
     include: Collection[str] = (),
-) -> StudyConduct:
+) -> StudyConduct | None:
     """Gather what a report says of how a study was run.
 
     Parameters
@@ -79,8 +79,8 @@ def study_conduct(
 
     Returns
     -------
-    StudyConduct
-        For `write_report`.
+    StudyConduct or None
+        For `write_report`; None of a study that was not run.
 
     Raises
     ------
@@ -95,6 +95,8 @@ def study_conduct(
             raise ParameterError(
                 f"include: needed one of {', '.join(known)}, got {name!r}"
             )
+    if not (study.sessions.is_dir() or study.conduct_logs()):
+        return None
     sessions = session_progress(study, protocol)
     return StudyConduct(
         sessions=sessions,

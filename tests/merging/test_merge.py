@@ -177,6 +177,7 @@ def refusal(sites: Sites, out: Path, kind: type[MasrelError]) -> str:
     return str(caught.value)
 
 
+@pytest.mark.slow
 def test_a_rater_with_sessions_in_both_is_refused(sites: Sites, tmp_path: Path) -> None:
     run(sites[1], "R2")
     message = refusal(sites, tmp_path / "both", ParameterError)
@@ -220,6 +221,7 @@ def test_another_secret_is_refused(
     assert "test_R5.csv: commitment: needed that of " in message
 
 
+@pytest.mark.slow
 def test_a_record_that_is_broken_is_refused(sites: Sites, tmp_path: Path) -> None:
     log = sites[1].log_file("R3", "test")
     log.write_bytes(log.read_bytes().replace(b'"attempt": 1', b'"attempt": 2'))
@@ -227,6 +229,7 @@ def test_a_record_that_is_broken_is_refused(sites: Sites, tmp_path: Path) -> Non
     assert message.startswith(f"{sites[1].root}: needed a record that is whole")
 
 
+@pytest.mark.slow
 def test_a_folder_that_holds_anything_is_refused(sites: Sites, tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="needed a new or empty folder"):
         merge_studies(sites, sites[0].root)

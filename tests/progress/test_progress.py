@@ -8,7 +8,7 @@ from click.testing import CliRunner
 
 from masrel._event_log import Event
 from masrel.cli import cli
-from masrel.conduct import record_exclusion, record_withdrawal
+from masrel.conduct import record_exclusion, record_note, record_withdrawal
 from masrel.errors import ParameterError
 from masrel.progress import (
     NextStep,
@@ -74,6 +74,24 @@ def test_a_damaged_log_is_said_and_hides_no_other_session(small: Small) -> None:
     assert step(small).command == f"masrel verify {study.root}"
 
 
+def test_a_line_that_a_kill_cut_off_hides_nothing(small: Small) -> None:
+    study, protocol = small
+    stop_after(small, "R1", 2)
+    record_withdrawal(study, protocol, "R2", **BY)
+    for log in (study.log_file("R1", "test"), study.conduct_file):
+        log.write_bytes(log.read_bytes() + b'{"event": "gra')
+    (of_r1, _, _) = session_progress(*small)
+    assert (of_r1.stage, of_r1.n_graded) == ("begun", 2)
+    assert "ends without a newline" in str(of_r1.problem)
+    shown = call("status", study.root)
+    assert "2 of 3" in shown
+    assert shown.count("ends without a newline") == 2
+    assert f"next: masrel run {study.root} --rater R1 --session test" in shown
+    record_note(study, protocol, "power cut", who="MK")  # takes the torn line out
+    assert status(small)["R2"] == "withdrawn"
+    assert "note: text power cut" in call("status", study.root)
+
+
 def test_raters_go_from_planned_to_excluded(small: Small) -> None:
     study, protocol = small
     assert status(small) == {"R1": "planned", "R2": "planned"}
@@ -133,7 +151,7 @@ def test_the_table_of_raters_has_every_field(
     ]
 
 
-@pytest.mark.parametrize("n_raters", [2, 6])
+@pytest.mark.parametrize("n_raters", [2, pytest.param(6, marks=pytest.mark.slow)])
 def test_every_log_is_read_once(
     new_study: Callable[..., Small], n_raters: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:

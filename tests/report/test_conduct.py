@@ -91,6 +91,7 @@ def test_an_excluded_rater_is_in_the_data_and_in_no_number(
     assert agreement()[0] == before
 
 
+@pytest.mark.slow
 def test_what_is_private_is_shown_when_it_is_asked_for(
     run_study: tuple[StudyPaths, Protocol],
 ) -> None:
