@@ -233,6 +233,11 @@ def _run(
             f"{what} {done.session} of {done.rater} is complete: "
             f"{done.n_graded} grades{label}{without} in {done.log_file}"
             + ("; none is a rating of the study" if done.rehearsal else "")
+            + (
+                f"; {done.n_set_aside} from before count no more"
+                if done.n_set_aside
+                else ""
+            )
         )
 
 

@@ -66,7 +66,7 @@ def to_report(root: Path, study: Path) -> None:
     protocol.write_text(f'{text}[report]\nsections = ["grades", "intended"]\n')
     run("report", str(root), "--quiet")
     sheet = root / "schedules" / "test_R2_sheet.csv"
-    code = sheet.read_text().splitlines()[1].split(",")[1]
+    code = sheet.read_text().splitlines()[-1].split(",")[1]
     where = (str(root), "--rater", "R2", "--session", "test")
     run("run", *where, "--correct", code, "--grade", "4", "--who", "A", "--why", "b")
     run("ratings", str(root))

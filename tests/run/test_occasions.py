@@ -173,7 +173,7 @@ def test_the_console_says_what_is_practice_and_what_a_break(new_study: New) -> N
     assert "HM" not in text
 
 
-@pytest.mark.parametrize("n_lines", [0, 1, 3, 5, 9])
+@pytest.mark.parametrize("n_lines", [0, 1, 3, 5, 9, 10])
 def test_a_stopped_session_goes_on_before_what_was_not_over(
     new_study: New, n_lines: int
 ) -> None:
