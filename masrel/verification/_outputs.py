@@ -50,7 +50,7 @@ def output_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]:
             ratings = read_study_data(study, protocol).ratings
             if table.is_file():
                 yield doubt(table, "no session log stands behind this table")
-        if files == [table]:
+        if not {study.analysis_file, manifest} & {*files}:
             return
         analysis = _analysis_of(study, protocol, ratings)
     except MasrelError as error:
