@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from masrel.protocol import PresentationRules
+from masrel.protocol import Occasions, PresentationRules
 from masrel.protocol._kinds import DEFAULT_KIND, all_values
 from masrel.report._material import Material, Paragraph, Section
 from masrel.report._tables import (
@@ -84,6 +84,7 @@ def design_section(material: Material) -> Section:
     stretches = stretches_asked_for(protocol.presentation)
     if stretches:
         texts[0] += f" {stretches}"
+    texts[0] += _beside_presentations(protocol.occasions)
     if protocol.schedule.scheme != "random-order":
         texts[0] += (
             " In each session a rater meets the models in "
@@ -126,6 +127,19 @@ def stretches_asked_for(rules: PresentationRules) -> str:
     if rules.stretches > 1:
         return f"Before each grade a rater stretches the arm {rules.stretches} times."
     return ""
+
+
+def _beside_presentations(occasions: Occasions) -> str:
+    # practice and breaks, unless there are none
+    text = ""
+    if occasions.practice:
+        models = ", ".join(occasions.practice)
+        text += f" Each session begins with practice on {models}, which is not rated."
+    if occasions.break_after is not None:
+        presentations = counted(occasions.break_after, "presentation")
+        minutes = as_entered(occasions.break_minutes)
+        text += f" A break of {minutes} min comes after every {presentations}."
+    return text
 
 
 def _models(material: Material) -> Table:

@@ -3,11 +3,12 @@
 from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from masrel.analysis import QuestionSummary, analyze
 from masrel.errors import RatingsError
-from masrel.protocol import Protocol, StudyPaths, read_protocol
+from masrel.protocol import Occasions, Protocol, StudyPaths, read_protocol
 from masrel.ratings import (
     GivenAnswer,
     answers_csv,
@@ -73,6 +74,23 @@ def test_one_answer_has_no_deviation_and_an_excluded_rater_none() -> None:
     (summary,) = analysis.questionnaires
     assert (summary.n, summary.mean) == (1, 5.0)
     assert summary.sd != summary.sd
+
+
+def test_the_design_says_what_is_practised_and_when_there_are_breaks(
+    tmp_path: Path,
+) -> None:
+    data = read_study_data(HESS, read_protocol(HESS.protocol))
+    occasions = Occasions(practice=("HM1", "D02"), break_after=8)
+    report = msgspec.structs.replace(data.protocol.report, sections=("design",))
+    protocol = msgspec.structs.replace(
+        data.protocol, occasions=occasions, report=report
+    )
+    files = write_report(
+        protocol, data.ratings, analyze(protocol, data.ratings), tmp_path
+    )
+    text = files.markdown.read_text(encoding="utf-8")
+    assert "begins with practice on HM1, D02, which is not rated." in text
+    assert "A break of 5 min comes after every 8 presentations." in text
 
 
 CHOICE = {"id": "again", "text": "Again?", "type": "choice", "choices": ["yes", "no"]}
