@@ -31,8 +31,8 @@ from masrel.protocol import StudyPaths, read_protocol
     "--include",
     multiple=True,
     metavar="NAME",
-    help="Export what is private, too: notes (on raters), logs, or a field of raters "
-    "that is not public. Repeatable.",
+    help="Export what is private, too: notes (on raters), logs, a field of raters or a "
+    "QUESTIONNAIRE.QUESTION that is not public. Repeatable.",
 )
 @output_options(quiet="No progress bar.")
 def export(

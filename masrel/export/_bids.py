@@ -53,6 +53,10 @@ def bids_files(dataset: Dataset) -> Iterator[tuple[str, bytes]]:
         yield f"{place}.json", json_bytes({**facts, **_described(variables)})
     # what masrel reads again, as it is
     yield "sourcedata/ratings/ratings.csv", dataset.ratings.as_csv()
+    if dataset.answers is not None:
+        yield "sourcedata/ratings/answers.csv", dataset.answers.as_csv()
+        described = _described(dataset.answers.variables)
+        yield "sourcedata/ratings/answers.json", json_bytes(described)
     for name, content in dataset.files.items():
         yield f"sourcedata/{name}", content
 

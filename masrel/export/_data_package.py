@@ -70,9 +70,10 @@ def _resource(
 def _schema(table: DataTable) -> dict[str, object]:
     schema: dict[str, object] = {
         "fields": [_field(variable) for variable in table.variables],
-        "missingValues": [MISSING],
-        "primaryKey": list(table.keys),
+        "missingValues": [table.missing],
     }
+    if table.keys:
+        schema["primaryKey"] = list(table.keys)
     if table.name != "raters":
         schema["foreignKeys"] = [
             {

@@ -17,8 +17,15 @@ from typing import Any, Literal
 from masrel._input import MAX_SMALL, listed, read_regular
 from masrel.errors import ParameterError
 from masrel.progress import rater_progress, raters_csv, session_progress
-from masrel.protocol import Protocol, StudyPaths
-from masrel.ratings import Ratings, ratings_csv, read_study_data
+from masrel.protocol import Protocol, Question, StudyPaths
+from masrel.ratings import (
+    Ratings,
+    StudyData,
+    answers_csv,
+    answers_of,
+    ratings_csv,
+    read_study_data,
+)
 from masrel.run import read_log
 
 Kind = Literal["text", "whole", "number", "list"]
@@ -41,13 +48,14 @@ class Variable:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DataTable:
-    """A table as texts, `MISSING` where there is nothing."""
+    """A table as texts."""
 
     name: str
     title: str
     variables: tuple[Variable, ...]
     rows: tuple[tuple[str, ...], ...]
     keys: tuple[str, ...]  # variables that together name a row
+    missing: str = MISSING  # what stands where there is nothing
 
     def column(self, name: str) -> tuple[str, ...]:
         """Return the cells of a column."""
@@ -89,6 +97,7 @@ class Dataset:
     protocol: Protocol
     ratings: DataTable
     raters: DataTable
+    answers: DataTable | None  # None where nothing is asked, or may leave
     recordings: tuple[RecordingFile, ...]
     # files of the study by their place in it, as they leave it
     files: dict[str, bytes]
@@ -99,7 +108,8 @@ class Dataset:
     @property
     def tables(self) -> tuple[DataTable, ...]:
         """The tables."""
-        return (self.ratings, self.raters)
+        answers = () if self.answers is None else (self.answers,)
+        return (self.ratings, self.raters, *answers)
 
 
 def gather_dataset(
@@ -114,6 +124,16 @@ def gather_dataset(
         if field.public or name in include
     ]
     text, left_out = _protocol_text(paths, protocol, fields, "notes" in include)
+    questions = [
+        name
+        for name, question in _questions(protocol).items()
+        if question.public or name in include
+    ]
+    left_out += tuple(
+        f"answers to {name} ({name})"
+        for name in _questions(protocol)
+        if name not in questions
+    )
     files = {"protocol.toml": text}
     if data.in_person is not None:
         files["ratings/in_person.csv"] = _bytes(paths.in_person_file)
@@ -131,6 +151,7 @@ def gather_dataset(
         protocol=protocol,
         ratings=_ratings_table(protocol, data.ratings, excluded),
         raters=_raters_table(paths, protocol, fields),
+        answers=_answers_table(data, questions, excluded),
         recordings=tuple(
             recording
             for recording in _recordings(paths, protocol)
@@ -149,12 +170,22 @@ _PRIVATE = ("notes", "logs")
 
 def _check_names(protocol: Protocol, include: Collection[str]) -> None:
     fields = [name for name, field in protocol.rater_fields.items() if not field.public]
-    known = (*_PRIVATE, *fields)
+    questions = [name for name, each in _questions(protocol).items() if not each.public]
+    known = (*_PRIVATE, *fields, *questions)
     for name in include:
         if name not in known:
             raise ParameterError(
                 f"include: needed one of {', '.join(known)}, got {name!r}"
             )
+
+
+def _questions(protocol: Protocol) -> dict[str, Question]:
+    # by questionnaire and question, with a dot between
+    return {
+        f"{questionnaire.id}.{question.id}": question
+        for questionnaire in protocol.questionnaires
+        for question in questionnaire.questions
+    }
 
 
 def _bytes(path: Path) -> bytes:
@@ -292,6 +323,40 @@ def _field_variable(protocol: Protocol, name: str) -> Variable:
         kind=_KINDS.get(field.type, "text"),
         unit=field.unit,
         levels=field.choices,
+    )
+
+
+_OF_ANSWERS = {
+    "session": "Session; empty for a question about the study",
+    "rater": "Rater; empty where it is not known whose answer it is",
+    "questionnaire": "Questionnaire",
+    "question": "Question",
+    "model": "Haptic model that the question was about",
+    "repeat": "Which presentation of the model",
+    "answer": "Answer",
+    "grades_from": "Where the answer comes from",
+}
+
+
+def _answers_table(
+    data: StudyData, questions: Collection[str], excluded: Collection[str]
+) -> DataTable | None:
+    answers = tuple(
+        each
+        for each in answers_of(data.paths, data.protocol)
+        if f"{each.questionnaire}.{each.question}" in questions
+        and each.rater not in excluded
+    )
+    if not answers:
+        return None
+    names, *rows = _records(answers_csv(answers))
+    return DataTable(
+        name="answers",
+        title="Answers to questionnaires, one row a question",
+        variables=tuple(Variable(name=name, title=_OF_ANSWERS[name]) for name in names),
+        rows=tuple(map(tuple, rows)),
+        keys=(),
+        missing="",
     )
 
 

@@ -52,7 +52,7 @@ def export_study(
     include : collection of str
         What is private and exported all the same: ``"notes"`` on raters; ``"logs"``, in
         which people and their reasons stand; fields of raters that are not public, by
-        their names.
+        their names; questions that are not, as ``"QUESTIONNAIRE.QUESTION"``.
     day : date, optional
         The day of the export, today unless given; an RO-Crate has it.
     progress : callable, optional

@@ -42,6 +42,8 @@ def _contents(dataset: Dataset) -> Iterator[tuple[str, bytes]]:
     root = dataset.paths.root
     yield from dataset.files.items()
     yield "ratings/ratings.csv", dataset.ratings.as_csv()
+    if dataset.answers is not None:
+        yield "ratings/answers.csv", dataset.answers.as_csv()
     made = [*sorted(dataset.paths.schedules.glob("*.csv"))]
     made += [dataset.paths.analysis_file, *sorted(dataset.paths.report.rglob("*"))]
     for recording in dataset.recordings:

@@ -40,7 +40,7 @@ sessions = ["test"]
 target = "items"
 interval = "jackknife"
 """
-ALL = ("notes", "logs", "illness")
+ALL = ("notes", "logs", "illness", "after.secret")
 SECRETS = (b"very private", b"private, too", b"Somebody Private", b"a private reason")
 FIELDS = """
 [rater_fields.years]
@@ -51,6 +51,25 @@ public = true
 
 [rater_fields.illness]
 type = "text"
+"""
+ANSWERS = {"after.real": 7, "after.secret": "a private answer"}
+QUESTIONS = """
+[[questionnaires]]
+id = "after"
+title = "After it"
+when = "presentation"
+[[questionnaires.questions]]
+id = "real"
+text = "How real?"
+type = "whole"
+low = 1
+high = 10
+public = true
+[[questionnaires.questions]]
+id = "secret"
+text = "What else?"
+type = "text"
+required = false
 """
 NOTE = (
     '[[raters]]\nid = "R2"',
@@ -64,7 +83,7 @@ def rated(tmp_path_factory: pytest.TempPathFactory) -> Study:
     """Two sessions with grades, a note on a rater, and a correction; only read."""
     study = StudyPaths(tmp_path_factory.mktemp("export") / "study")
     study.root.mkdir()
-    text = f"{PROTOCOL.replace(*NOTE)}\n{FIELDS}\n{PLAN}"
+    text = f"{PROTOCOL.replace(*NOTE)}\n{FIELDS}\n{QUESTIONS}\n{PLAN}"
     study.protocol.write_text(text, encoding="utf-8")
     protocol = read_protocol(study.protocol)
     with_secret(study)
@@ -79,7 +98,7 @@ def rated(tmp_path_factory: pytest.TempPathFactory) -> Study:
             protocol,
             rater,
             "test",
-            grades=ScriptGrades(of_code),
+            grades=ScriptGrades(of_code, answers=ANSWERS),
             clock="simulated",
         )
     record_correction(
@@ -136,14 +155,12 @@ def test_what_is_private_stays_unless_it_is_named(
     rated: Study, form: str, tmp_path: Path
 ) -> None:
     left_out = export_study(*rated, form, tmp_path / "a")
-    assert len(left_out) == 3
+    assert len(left_out) == 4
     assert all("private" not in text.lower() for text in left_out)
     for name, data in files(tmp_path / "a"):
         assert b"rivate" not in data, name
-    assert (
-        export_study(*rated, form, tmp_path / "b", include=("notes", "logs", "illness"))
-        == ()
-    )
+    private = ("notes", "logs", "illness", "after.secret")
+    assert export_study(*rated, form, tmp_path / "b", include=private) == ()
     everything = b"".join(data for _, data in files(tmp_path / "b"))
     for text in (
         b"very private",
@@ -222,7 +239,7 @@ def test_a_data_package_is_valid(rated: Study, tmp_path: Path) -> None:
             check=False,
         )
         report = json.loads(done.stdout)
-        assert report["stats"]["tasks"] == 2 + 6  # tables, recordings
+        assert report["stats"]["tasks"] == 3 + 6  # tables, recordings
         return [error for task in report["tasks"] for error in task["errors"]]
 
     assert problems() == []
@@ -258,7 +275,7 @@ def test_psych_ds_describes_every_column_of_files_with_names_of_keywords(
     described = {variable["name"] for variable in head["variableMeasured"]}
     name = re.compile(r"([a-z]+-[a-zA-Z0-9]+)(_[a-z]+-[a-zA-Z0-9]+)*_data\.csv")
     data = list((folder / "data").iterdir())
-    assert len(data) == 2 + 6
+    assert len(data) == 3 + 6
     for path in data:
         assert name.fullmatch(path.name)
         with path.open(newline="") as file:
@@ -278,6 +295,14 @@ def test_public_fields_of_raters_go_along(rated: Study, tmp_path: Path) -> None:
     ]
     described = json.loads((folder / "participants.json").read_text())
     assert described["years"] == {"Description": "Years of practice", "Units": "a"}
+
+
+def test_public_answers_go_along(rated: Study, tmp_path: Path) -> None:
+    folder = exported(rated, "datapackage", tmp_path / "out")
+    with (folder / "ratings" / "answers.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert {row["question"] for row in rows} == {"real"}
+    assert [row["answer"] for row in rows] == ["7"] * 6
 
 
 def test_who_is_excluded_is_left_out_and_said(rated: Study, tmp_path: Path) -> None:
