@@ -38,7 +38,9 @@ _channels = count()
 def stretching(speed_deg_s: float = 92.0, n_stretches: int = 1) -> SimulatedHand:
     speed = radians(speed_deg_s)
     again = (speed,) * (n_stretches - 1)
-    return SimulatedHand(start=START, end=END, mean_speed=speed, again=again)
+    return SimulatedHand(
+        start=START, end=END, mean_speed=speed, again=again, returns=n_stretches > 1
+    )
 
 
 def loose(start_deg: float = 90.0) -> SimulatedHand:
