@@ -152,7 +152,7 @@ def test_a_recording_without_channels_says_nothing_of_them(
     with np.load(tmp_path / "a.npz") as archive:
         assert archive.files == list(RECORDING_COLUMNS)
     facts = json.loads((tmp_path / "a.json").read_text())
-    assert facts.keys() == {"sha256", *recording.facts}
+    assert facts.keys() == {"format", "sha256", *recording.facts}
 
 
 def test_a_channel_needs_its_column_and_a_column_its_channel(

@@ -70,7 +70,7 @@ def _resource(
 def _schema(table: DataTable) -> dict[str, object]:
     schema: dict[str, object] = {
         "fields": [_field(variable) for variable in table.variables],
-        "missingValues": [table.missing],
+        "missingValues": [table.nothing],
     }
     if table.keys:
         schema["primaryKey"] = list(table.keys)

@@ -55,7 +55,7 @@ class DataTable:
     variables: tuple[Variable, ...]
     rows: tuple[tuple[str, ...], ...]
     keys: tuple[str, ...]  # variables that together name a row
-    missing: str = MISSING  # what stands where there is nothing
+    nothing: str = MISSING  # what stands where there is nothing
 
     def column(self, name: str) -> tuple[str, ...]:
         """Return the cells of a column."""
@@ -356,7 +356,7 @@ def _answers_table(
         variables=tuple(Variable(name=name, title=_OF_ANSWERS[name]) for name in names),
         rows=tuple(map(tuple, rows)),
         keys=(),
-        missing="",
+        nothing="",
     )
 
 

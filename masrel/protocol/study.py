@@ -167,7 +167,7 @@ def template_names() -> tuple[str, ...]:
     Examples
     --------
     >>> template_names()
-    ('hess2012', 'small', 'tone')
+    ('hess2012', 'small', 'tone', 'two-sites')
     """
     return tuple(sorted(file.parent.name for file in _home().glob("*/protocol.toml")))
 

@@ -23,7 +23,7 @@ def replayed(*steps: Step) -> SessionState:
     return replay(Path("a.jsonl"), events)
 
 
-BEGUN = step("session", rater="R1")
+BEGUN = step("session", format=2, rater="R1")
 A_SHOWN, A_GRADED = step("presented", code="A"), step("grade", code="A", grade="1")
 B_SHOWN, B_GRADED = step("presented", code="B"), step("grade", code="B", grade="2")
 FAULT = step("presented", code="A", fault="too fast")
