@@ -53,7 +53,7 @@ class Bench:
 
     def code(self, position: int = 1) -> str:
         sheet = self.study / "schedules" / "test_R1_sheet.csv"
-        return sheet.read_text().splitlines()[position].split(",")[1]
+        return sheet.read_text().splitlines()[position + 1].split(",")[1]
 
     def correct(self, grade: str) -> str:
         where = ("--rater", "R1", "--session", "test", "--who", "Kim", "--why", "typo")
