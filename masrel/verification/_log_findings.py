@@ -7,7 +7,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TypeVar
 
-from masrel._event_log import Event, read_log
+from masrel._event_log import Event
 from masrel._input import (
     MAX_RECORDING,
     MAX_SMALL,
@@ -28,14 +28,13 @@ _FROM_LOG = ("attempt", "mean_speed_deg_s", "n_missed_ticks", "fault", "simulate
 
 
 def checked_log(
-    log: Path, check: Callable[[Path, tuple[Event, ...]], _Checked]
+    log: Path, read: Callable[[Path], tuple[tuple[Event, ...], _Checked]]
 ) -> tuple[tuple[Event, ...], _Checked | None, Finding | None]:
-    """Return a log's events and what a check makes of them, or what is wrong."""
+    """Return a log's events and what reading makes of them, or what is wrong."""
     if not log.exists():
         return (), None, None
     try:
-        events = read_log(log)
-        checked = check(log, events)
+        events, checked = read(log)
     except (SessionLogError, OSError) as error:
         return (), None, Finding(weight="broken", path=log, message=str(error))
     if not events:

@@ -11,7 +11,8 @@ from masrel.errors import ParameterError
 from masrel.protocol import Protocol, StudyPaths
 from masrel.protocol._questions import checked_answer
 from masrel.run._practice import practice_presentations
-from masrel.run._state import SessionState, replay
+from masrel.run._session_logs import read_session
+from masrel.run._state import SessionState
 from masrel.schedule import Presentation, Schedule
 from masrel.verification._finding import Finding, broken
 from masrel.verification._log_findings import (
@@ -68,7 +69,7 @@ def check_session(
 ) -> CheckedSession:
     """Hold a log against its schedule, and its recordings against the log."""
     log = study.log_file(rater, session)
-    events, state, finding = checked_log(log, replay)
+    events, state, finding = checked_log(log, read_session)
     if state is None or schedule is None:
         stage: Stage = "not begun" if finding is None and not events else "unreadable"
         return CheckedSession(

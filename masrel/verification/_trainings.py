@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from masrel._event_log import Event
+from masrel._event_log import Event, read_log
 from masrel.protocol import Protocol, StudyPaths, presented_hash
 from masrel.schedule import Presentation
 from masrel.verification._finding import Finding, broken, doubt
@@ -47,12 +47,18 @@ class CheckedTraining:
     files: frozenset[Path]
 
 
-def check_training(study: StudyPaths, protocol: Protocol, log: Path) -> CheckedTraining:
-    """Hold a training's log against the protocol, and its recordings against it."""
+def _read_training(log: Path) -> tuple[tuple[Event, ...], None]:
     from masrel.training._lessons import check_events  # loads scipy
 
+    events = read_log(log)
+    check_events(log, events)
+    return events, None
+
+
+def check_training(study: StudyPaths, protocol: Protocol, log: Path) -> CheckedTraining:
+    """Hold a training's log against the protocol, and its recordings against it."""
     rater = log.stem
-    events, _, finding = checked_log(log, check_events)
+    events, _, finding = checked_log(log, _read_training)
     if finding is not None:
         return CheckedTraining(
             record=VerifiedTraining(rater=rater, stage="unreadable"),

@@ -8,6 +8,7 @@ from masrel.conduct._allotment import allotment_problems
 from masrel.conduct._merged_logs import merged_log_problems
 from masrel.errors import ProtocolError, ScheduleError, SessionLogError
 from masrel.protocol import Protocol, StudyPaths, read_protocol
+from masrel.run._session_logs import logs_read_once
 from masrel.schedule import read_schedule, schedule_problems
 from masrel.verification._finding import Finding, broken, doubt
 from masrel.verification._outputs import output_findings
@@ -78,16 +79,17 @@ def verify_study(study: StudyPaths) -> Verification:
         return Verification(
             sessions=(), findings=_of_problems(study.protocol, error.problems)
         )
-    record = verify_sessions(study, protocol)
-    return Verification(
-        sessions=record.sessions,
-        trainings=record.trainings,
-        findings=(
-            *_of_problems(study.schedules, schedule_problems(protocol, study)),
-            *record.findings,
-            *output_findings(study, protocol),
-        ),
-    )
+    with logs_read_once():
+        record = verify_sessions(study, protocol)
+        return Verification(
+            sessions=record.sessions,
+            trainings=record.trainings,
+            findings=(
+                *_of_problems(study.schedules, schedule_problems(protocol, study)),
+                *record.findings,
+                *output_findings(study, protocol),
+            ),
+        )
 
 
 def verify_sessions(study: StudyPaths, protocol: Protocol) -> Verification:
