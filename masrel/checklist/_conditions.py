@@ -4,14 +4,17 @@ from collections import Counter
 
 from masrel.checklist._facts import StudyFacts, days_between
 from masrel.report._tables import counted
+from masrel.schedule._orders import orders_in_words
 
 
 def order_of_presentations(facts: StudyFacts) -> tuple[str, ...]:
     """Say how the order of presentations comes about."""
-    scheme = facts.protocol.schedule.scheme
+    order = "an order of their own, all orders equally likely"
+    if facts.protocol.schedule.scheme != "random-order":
+        order = orders_in_words(facts.protocol.schedule)
     return (
-        f"Each rater meets the models of each session in an order drawn for him or her "
-        f"(scheme {scheme}); {counted(facts.n_schedules, 'schedule')} drawn.",
+        f"In each session a rater meets the models in {order}; "
+        f"{counted(facts.n_schedules, 'schedule')} drawn.",
     )
 
 
@@ -39,7 +42,18 @@ def independence(facts: StudyFacts) -> tuple[str, ...]:
         "Every session is of one rater, with codes and an order of its own; masrel "
         "shows no rater the grades of another, and a grade once given is changed by a "
         "correction only, of which the log has who, when and why.",
+        *_on_paper(facts),
         f"{counted(len(facts.corrections), 'correction')} of a grade.",
+    )
+
+
+def _on_paper(facts: StudyFacts) -> tuple[str, ...]:
+    n_sheets = sum(dict(each.header)["grades"] == "paper" for each in facts.sessions)
+    if not n_sheets:
+        return ()
+    return (
+        f"{counted(n_sheets, 'session')} on paper: sheets with codes, and no models; "
+        "the log has who typed them.",
     )
 
 

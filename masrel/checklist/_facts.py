@@ -6,6 +6,7 @@ from datetime import date
 from pathlib import Path
 
 from masrel.analysis import Analysis, analyze
+from masrel.progress import RaterProgress, rater_progress, session_progress
 from masrel.protocol import Protocol, StudyPaths
 from masrel.ratings import (
     Correction,
@@ -44,6 +45,7 @@ class StudyFacts:
     sessions: tuple[SessionFacts, ...]
     corrections: tuple[Correction, ...]
     remarks: tuple[str, ...]
+    raters: tuple[RaterProgress, ...]
     n_schedules: int  # drawn
     n_concealed: int  # of these, those drawn from a secret that is not published
 
@@ -75,7 +77,8 @@ def gather_facts(paths: StudyPaths, protocol: Protocol) -> StudyFacts:
         analysis=analysis,
         sessions=_sessions(paths, protocol),
         corrections=corrections_of(paths, protocol),
-        remarks=study_remarks(paths, protocol),
+        remarks=study_remarks(paths, protocol, names=False),
+        raters=rater_progress(paths, protocol, session_progress(paths, protocol)),
         n_schedules=len(drawn),
         n_concealed=len(concealed),
     )

@@ -14,7 +14,8 @@ from masrel.checklist._conditions import (
 )
 from masrel.checklist._facts import StudyFacts
 from masrel.checklist._items import ChecklistItem
-from masrel.report._design import stretches_asked_for
+from masrel.checklist._rater_facts import rater_characteristics, rater_flow
+from masrel.report._design import beside_presentations, stretches_asked_for
 from masrel.report._estimate_words import TARGETS, coefficient_name, sentence
 from masrel.report._tables import counted, percent
 
@@ -40,7 +41,10 @@ def grras_items(facts: StudyFacts) -> tuple[ChecklistItem, ...]:
         _in_part(
             "4",
             "Raters: the population that is of interest",
-            (f"{counted(len(facts.protocol.raters), 'rater')} in the protocol.",),
+            (
+                f"{counted(len(facts.protocol.raters), 'rater')} in the protocol.",
+                *rater_characteristics(facts),
+            ),
             "Whom these raters stand for: profession, experience, training.",
             protocol,
         ),
@@ -172,10 +176,12 @@ def _sampling(facts: StudyFacts) -> tuple[str, ...]:
 
 def _process(facts: StudyFacts) -> tuple[str, ...]:
     stretches = stretches_asked_for(facts.protocol.presentation)
+    beside = beside_presentations(facts.protocol.occasions).strip()
     return (
         *order_of_presentations(facts),
         *blinding(facts),
         stretches or "Before each grade a rater stretches the arm once.",
+        *([beside] if beside else []),
         *dates(facts),
     )
 
@@ -208,7 +214,8 @@ def _actual(facts: StudyFacts) -> tuple[str, ...]:
         f"{int(rows['grade'].isna().sum())} missing."
         for session, rows in table.groupby("session", sort=False)
     )
-    return (*lines, *facts.remarks)
+    flow = (rater_flow(facts),) if facts.sessions else ()
+    return (*flow, *lines, *facts.remarks)
 
 
 def _subjects(facts: StudyFacts) -> tuple[str, ...]:
@@ -221,6 +228,7 @@ def _subjects(facts: StudyFacts) -> tuple[str, ...]:
     return (
         f"Models by the grade they were made to have: {intended or 'none has one'}; "
         "the parameters of each are in the protocol.",
+        *rater_characteristics(facts),
     )
 
 

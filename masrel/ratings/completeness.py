@@ -102,7 +102,11 @@ def _corrections(study: StudyPaths, rater: str, session: str) -> Iterator[Correc
 
 
 def study_remarks(
-    study: StudyPaths, protocol: Protocol, *, file: Path | None = None
+    study: StudyPaths,
+    protocol: Protocol,
+    *,
+    file: Path | None = None,
+    names: bool = True,
 ) -> tuple[str, ...]:
     """Say everything that a reader of a study's ratings must know beside them.
 
@@ -114,6 +118,9 @@ def study_remarks(
         The study's protocol.
     file : Path, optional
         A table that is used whatever the session logs say.
+
+    names : bool, optional
+        Whether to say who recorded each.
 
     Returns
     -------
@@ -136,7 +143,8 @@ def study_remarks(
     >>> study_remarks(study, read_protocol(study.protocol))
     ()
     """
-    return (*_of_conduct(study), *session_remarks(study, protocol, file=file))
+    of_sessions = session_remarks(study, protocol, file=file, names=names)
+    return (*_of_conduct(study, names=names), *of_sessions)
 
 
 def session_remarks(
@@ -173,7 +181,7 @@ def session_remarks(
     return tuple(remarks)
 
 
-def _of_conduct(study: StudyPaths) -> Iterator[str]:
+def _of_conduct(study: StudyPaths, *, names: bool) -> Iterator[str]:
     events = read_conduct(study)
     raters = excluded_raters(study)
     latest = {
@@ -183,7 +191,8 @@ def _of_conduct(study: StudyPaths) -> Iterator[str]:
     }
     for event in events:
         fields = event.fields
-        by = f"on {event.time_utc[:10]} by {fields.get('who')}: {fields.get('why')}."
+        by = f" by {fields.get('who')}" if names else ""
+        by = f"on {event.time_utc[:10]}{by}: {fields.get('why')}."
         if event.kind == "withdrawn":
             n_graded = _n_graded(study, str(fields["rater"]))
             counted = "" if fields["rater"] in latest else " and counted"

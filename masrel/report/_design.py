@@ -84,7 +84,7 @@ def design_section(material: Material) -> Section:
     stretches = stretches_asked_for(protocol.presentation)
     if stretches:
         texts[0] += f" {stretches}"
-    texts[0] += _beside_presentations(protocol.occasions)
+    texts[0] += beside_presentations(protocol.occasions)
     if protocol.schedule.scheme != "random-order":
         texts[0] += (
             " In each session a rater meets the models in "
@@ -114,7 +114,7 @@ def design_section(material: Material) -> Section:
 
 
 def stretches_asked_for(rules: PresentationRules) -> str:
-    # how often a rater stretches the arm for one grade, unless it is once
+    """Say how often a rater stretches the arm for one grade, unless it is once."""
     if rules.stretches == "free":
         return "Before each grade a rater stretches the arm as often as wanted."
     if isinstance(rules.stretches, tuple):
@@ -129,8 +129,8 @@ def stretches_asked_for(rules: PresentationRules) -> str:
     return ""
 
 
-def _beside_presentations(occasions: Occasions) -> str:
-    # practice and breaks, unless there are none
+def beside_presentations(occasions: Occasions) -> str:
+    """Say what a session has beside its presentations: practice and breaks."""
     text = ""
     if occasions.practice:
         models = ", ".join(occasions.practice)

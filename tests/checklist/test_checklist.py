@@ -6,6 +6,7 @@ import json
 import re
 import zipfile
 from collections import Counter
+from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from masrel.checklist import (
     fill_checklist,
     write_checklist,
 )
+from masrel.conduct import record_withdrawal
 from masrel.errors import ParameterError
 from masrel.protocol import Protocol, StudyPaths, read_protocol
 from masrel.run import ScriptGrades, record_correction, run_session
@@ -28,6 +30,22 @@ __all__ = ["new_study", "small"]
 
 Small = tuple[StudyPaths, Protocol]
 PUBLISHED = StudyPaths(Path("studies/hess2012"))
+OLD_RATERS = '[[raters]]\nid = "R1"\n\n[[raters]]\nid = "R2"\n'
+FIELDS = """
+[rater_fields.years]
+type = "whole"
+unit = "a"
+title = "Years of practice"
+public = true
+
+[rater_fields.illness]
+type = "text"
+
+"""
+NEW_RATERS = (
+    '[[raters]]\nid = "R1"\nfields = { years = 3, illness = "influenza" }\n\n'
+    '[[raters]]\nid = "R2"\nfields = { years = 8 }\n'
+)
 FIRST = datetime(2026, 3, 1, 9, tzinfo=UTC)
 
 
@@ -97,6 +115,25 @@ def test_days_and_corrections_come_from_the_logs(rated: Small) -> None:
     assert "Session test: 2 raters, 3 models, 6 ratings, 0 missing." in facts(
         checklist, "11"
     )
+
+
+def test_raters_who_left_are_said_and_not_by_whom(rated: Small) -> None:
+    study, protocol = rated
+    record_withdrawal(study, protocol, "R2", who="Somebody", why="moved away")
+    said = facts(grras(study), "11")
+    assert "2 raters planned: 1 complete, 1 withdrawn." in said
+    assert "Rater R2 was withdrawn on" in said
+    assert "moved away" in said
+    assert "Somebody" not in checklist_markdown(grras(study))
+
+
+def test_public_fields_of_raters_are_told(new_study: Callable[..., Small]) -> None:
+    study, _ = new_study((OLD_RATERS, f"{FIELDS}{NEW_RATERS}"))
+    for number in ("4", "12"):
+        said = facts(grras(study), number)
+        assert "Years of practice: 3 to 8 a, median 5.5." in said
+        assert "Kept, and not public: illness." in said
+        assert "influenza" not in said
 
 
 def test_every_file_that_is_named_has_its_hash(rated: Small) -> None:
