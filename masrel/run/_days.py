@@ -87,5 +87,6 @@ def _problem(rules: Session, days: int | None) -> str | None:
     ):
         if not is_kept:
             words = key.replace("_", " ").removesuffix(" days")
-            return f"{words} {limit} days after session {rules.after}, got {days}"
+            unit = "day" if limit == 1 else "days"
+            return f"{words} {limit} {unit} after session {rules.after}, got {days}"
     return None
