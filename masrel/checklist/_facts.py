@@ -15,8 +15,8 @@ from masrel.ratings import (
     read_study_data,
     study_remarks,
 )
-from masrel.run import read_log
-from masrel.run._state import SessionState, replay
+from masrel.run._session_logs import read_session
+from masrel.run._state import SessionState
 from masrel.schedule import read_schedule
 
 
@@ -61,7 +61,9 @@ def gather_facts(paths: StudyPaths, protocol: Protocol) -> StudyFacts:
     if paths.logs() or any(file.is_file() for file in files):
         data = read_study_data(paths, protocol)
         ratings = data.ratings
-        analysis = analyze(protocol, ratings, in_person=data.in_person)
+        analysis = analyze(
+            protocol, ratings, in_person=data.in_person, excluded=data.excluded
+        )
     drawn = [
         read_schedule(file)
         for each in protocol.sessions
@@ -94,8 +96,7 @@ def _sessions(paths: StudyPaths, protocol: Protocol) -> tuple[SessionFacts, ...]
             log = paths.log_file(rater, each.id)
             if not log.is_file():
                 continue
-            events = read_log(log)
-            state = replay(log, events)
+            events, state = read_session(log)
             if not state.header:
                 continue
             day = date.fromisoformat(events[0].time_utc[:10])

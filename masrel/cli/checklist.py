@@ -7,6 +7,7 @@ import click
 from masrel.cli._options import warnings_as_notes
 from masrel.cli._paths import OutputFile
 from masrel.protocol import StudyPaths, read_protocol
+from masrel.run._session_logs import logs_read_once
 
 
 @click.command("checklist")
@@ -23,6 +24,7 @@ from masrel.protocol import StudyPaths, read_protocol
     type=OutputFile(path_type=Path),
     help="File to write: .html, .md or .docx; Markdown on the screen unless given.",
 )
+@logs_read_once()
 def checklist(study: Path, guideline: str, output: Path | None) -> None:
     """Fill the checklist of a reporting guideline for STUDY.
 

@@ -63,7 +63,7 @@ def _words(planned: PlannedEstimate) -> str:
 def _absence(planned: PlannedEstimate) -> str | None:
     # why there is no number, or None
     if planned.estimate is None:
-        return None if planned.by_rater else planned.reason or "not in these data"
+        return planned.reason or "there is none of all raters together"
     if math.isnan(planned.estimate.value):
         return planned.estimate.reason
     return None

@@ -19,7 +19,7 @@ from masrel.checklist import (
     fill_checklist,
     write_checklist,
 )
-from masrel.conduct import record_withdrawal
+from masrel.conduct import record_exclusion, record_withdrawal
 from masrel.errors import ParameterError
 from masrel.protocol import Protocol, StudyPaths, read_protocol
 from masrel.run import ScriptGrades, record_correction, run_session
@@ -31,6 +31,20 @@ __all__ = ["new_study", "small"]
 Small = tuple[StudyPaths, Protocol]
 PUBLISHED = StudyPaths(Path("studies/hess2012"))
 OLD_RATERS = '[[raters]]\nid = "R1"\n\n[[raters]]\nid = "R2"\n'
+THREE = f'{OLD_RATERS}\n[[raters]]\nid = "R3"\n'
+OLD_TEST = 'raters = ["R1", "R2"]'
+NEW_TEST = 'raters = ["R1", "R2", "R3"]'
+SEED = "[simulated_raters]\nseed = 5\n"
+PLAN = """
+
+[[analysis.estimates]]
+id = "percent"
+kind = "inter-rater"
+coefficient = "percent_agreement"
+models = "all"
+sessions = ["test"]
+target = "items"
+"""
 FIELDS = """
 [rater_fields.years]
 type = "whole"
@@ -125,6 +139,22 @@ def test_raters_who_left_are_said_and_not_by_whom(rated: Small) -> None:
     assert "Rater R2 was withdrawn on" in said
     assert "moved away" in said
     assert "Somebody" not in checklist_markdown(grras(study))
+
+
+def test_who_is_excluded_enters_no_estimate(new_study: Callable[..., Small]) -> None:
+    study, protocol = new_study(
+        (OLD_RATERS, THREE), (OLD_TEST, NEW_TEST), (SEED, f"{SEED}{PLAN}")
+    )
+    for rater, dummy in (("R1", "1"), ("R2", "1"), ("R3", "3")):
+        schedule = read_schedule(study.schedule_file(rater, "test"))
+        grades = {"HM1": "1", "HM3": "2", "D1": dummy}
+        of_code = {shown.code: grades[shown.model] for shown in schedule.presentations}
+        source = ScriptGrades(of_code)
+        run_session(study, protocol, rater, "test", grades=source, clock="simulated")
+    assert "Percent agreement = .78," in facts(grras(study), "13")  # (1 + 1 + 1/3) / 3
+    record_exclusion(study, protocol, "R3", who="MK", why="was not trained")
+    # R1 and R2 agree on all three
+    assert "Percent agreement = 1.00," in facts(grras(study), "13")
 
 
 def test_public_fields_of_raters_are_told(new_study: Callable[..., Small]) -> None:
