@@ -26,11 +26,19 @@ def question_summaries(
     for each in answers:
         key = (each.questionnaire, each.question, each.session, each.model)
         groups.setdefault(key, []).append(each)
+    # As the protocol has them: the order in which models came says who met which when.
     order = {key: place for place, key in enumerate(questions)}
-    return tuple(
-        _summary(questions[key[:2]], *key, group)
-        for key, group in sorted(groups.items(), key=lambda item: order[item[0][:2]])
+    sessions = {each.id: place for place, each in enumerate(protocol.sessions)}
+    models = {each.id: place for place, each in enumerate(protocol.models)}
+    keys = sorted(
+        groups,
+        key=lambda key: (
+            order[key[:2]],
+            sessions.get(str(key[2]), len(sessions)),
+            models.get(str(key[3]), len(models)),
+        ),
     )
+    return tuple(_summary(questions[key[:2]], *key, groups[key]) for key in keys)
 
 
 def _summary(
