@@ -6,11 +6,8 @@ in ``manifest.json``. The same inputs give the same bytes; there is no time of d
 any of them.
 """
 
-import base64
-import html
-import re
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -22,11 +19,12 @@ from masrel.report._agreement import estimates_section
 from masrel.report._conduct import StudyConduct, conduct_section
 from masrel.report._design import design_section
 from masrel.report._grades import grades_section, in_person_section, intended_section
-from masrel.report._material import Drawing, Material, Paragraph, Section, gather
+from masrel.report._material import Drawing, Material, Section, gather
+from masrel.report._pages import WRITERS, Block, Chapter, Document
 from masrel.report._question_tables import questionnaires_section
 from masrel.report._report_folder import MANIFEST, Assets, replace_report
 from masrel.report._stretches import speeds_section, traces_section
-from masrel.report._tables import Table, as_csv, page_cells, tag_of
+from masrel.report._tables import Table, as_csv, tag_of
 from masrel.verification import Anchor
 
 Progress = Callable[[str], object]
@@ -51,11 +49,6 @@ _INPUTS = {
     "in_person_sha256": "grades given in person",
     "answers_sha256": "answers to questionnaires",
 }
-
-_KINDS = {Paragraph: "paragraph", Table: "table", Drawing: "figure"}
-
-# Symbols of the model as they are written in plain text: an index after "_".
-_SYMBOL = re.compile(r"(?<!\w)(ΔT|k|ν|θ|p)_(peak|post|th|L|start|end|o|e)(?!\w)")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -142,8 +135,16 @@ def write_report(
     if conduct is not None and (first := conduct_section(material, conduct)):
         sections.insert(0, first)
     assets = Assets()
-    shown = _make_blocks(sections, assets, progress, raw_csv=raw_csv)
-    pages = _pages(material, shown, anchors)
+    document = Document(
+        title=protocol.report.title or protocol.study.title,
+        tag=tag_of(material.data),
+        banner=material.banner,
+        provenance=material.provenance,
+        sections=_make_sections(sections, assets, progress, raw_csv=raw_csv),
+        inputs=_inputs(analysis, anchors),
+        version=analysis.masrel_version,
+    )
+    pages = {writer.file: writer.write(document) for writer in WRITERS.values()}
     replace_report(destination, assets, pages, analysis.inputs)
     if progress is not None:
         progress("pages")
@@ -166,89 +167,56 @@ def _section_names(protocol: Protocol) -> tuple[str, ...]:
     return names
 
 
-def _make_blocks(
+def _make_sections(
     sections: Sequence[Section],
     assets: Assets,
     progress: Progress | None,
     *,
     raw_csv: bool,
-) -> list[dict[str, object]]:
-    # what templates show, every block with its number among those of its kind
-    shown: list[dict[str, object]] = []
-    numbers: Counter[str] = Counter()
+) -> tuple[Chapter, ...]:
+    # as they are shown; the files of their tables and figures go to the assets
+    made = []
+    numbers: Counter[type] = Counter()
     for section in sections:
         blocks = []
-        for block in section.blocks:
-            kind = _KINDS[type(block)]
-            numbers[kind] += 1
-            entry = {"kind": kind, "number": numbers[kind], "content": block}
-            blocks.append(entry)
-            if isinstance(block, Table):
-                entry["columns"], entry["rows"] = page_cells(block)
-                content = as_csv(block, raw=raw_csv).encode()
-                assets.add("tables", block.name, "csv", content)
-            elif isinstance(block, Drawing):
-                # Imported here: a report without figures loads nothing that draws.
-                from masrel.report.figures import draw
-
-                pictures = draw(block.content, stamp=block.stamp)
-                entry["files"] = {
-                    form: assets.add("figures", block.name, form, picture)
-                    for form, picture in pictures.items()
-                }
-                # An image of its own, not inline: ids inside two SVGs would collide.
-                encoded = base64.b64encode(pictures["svg"]).decode("ascii")
-                entry["uri"] = f"data:image/svg+xml;base64,{encoded}"
+        for content in section.blocks:
+            numbers[type(content)] += 1
+            number = numbers[type(content)]
+            if isinstance(content, Drawing):
+                blocks.append(_draw(content, number, assets))
                 if progress is not None:
-                    progress(block.name)
-        shown.append({"name": section.name, "title": section.title, "blocks": blocks})
-    return shown
+                    progress(content.name)
+                continue
+            if isinstance(content, Table):
+                file = as_csv(content, raw=raw_csv).encode()
+                assets.add("tables", content.name, "csv", file)
+            blocks.append(Block(number=number, content=content))
+        made.append(
+            Chapter(name=section.name, title=section.title, blocks=tuple(blocks))
+        )
+    return tuple(made)
 
 
-def _pages(
-    material: Material,
-    sections: Sequence[Mapping[str, object]],
-    anchors: Sequence[Anchor],
-) -> dict[str, str]:
-    # Imported here: a section's tables alone load no templates.
-    from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
+def _draw(drawing: Drawing, number: int, assets: Assets) -> Block:
+    # Imported here: a report without figures loads nothing that draws.
+    from masrel.report.figures import draw
 
-    environment = Environment(
-        loader=PackageLoader("masrel.report"),
-        autoescape=select_autoescape(enabled_extensions=("html",)),
-        undefined=StrictUndefined,
-        keep_trailing_newline=True,
+    pictures: dict[str, bytes] = {}
+    files: dict[str, str] = {}
+    for form, picture in draw(drawing.content, stamp=drawing.stamp).items():
+        pictures[form] = picture
+        files[form] = assets.add("figures", drawing.name, form, picture)
+    return Block(number=number, content=drawing, pictures=pictures, files=files)
+
+
+def _inputs(
+    analysis: Analysis, anchors: Sequence[Anchor]
+) -> tuple[tuple[str, str], ...]:
+    # what the pages end with: the hash of everything they were made from
+    return (
+        *(
+            (f"SHA-256 of the {_INPUTS[name]}", digest)
+            for name, digest in analysis.inputs.items()
+        ),
+        *((f"SHA-256 of line {a.line} of {a.log}", a.sha256) for a in anchors),
     )
-    environment.filters |= {"md": _markdown, "symbols": _symbols}
-    analysis, study = material.analysis, material.protocol.study
-    style = Path(__file__).with_name("templates") / "report.css"
-    context = {
-        "title": material.protocol.report.title or study.title,
-        "tag": tag_of(material.data),
-        "banner": material.banner,
-        "provenance": material.provenance,
-        "sections": sections,
-        "inputs": [
-            *(
-                (f"SHA-256 of the {_INPUTS[name]}", digest)
-                for name, digest in analysis.inputs.items()
-            ),
-            *((f"SHA-256 of line {a.line} of {a.log}", a.sha256) for a in anchors),
-        ],
-        "style": style.read_text(encoding="utf-8"),
-        "version": analysis.masrel_version,
-    }
-    names = ("report.html", "report.md")
-    return {name: environment.get_template(name).render(context) for name in names}
-
-
-def _symbols(text: str) -> str:
-    # Escaped first; what is added after that is ours, and so safe in a template.
-    return _SYMBOL.sub(r"\1<sub>\2</sub>", html.escape(text))
-
-
-_MARKDOWN_ESCAPES = str.maketrans({letter: f"\\{letter}" for letter in "\\`*_|<>[]#"})
-
-
-def _markdown(text: str) -> str:
-    return " ".join(text.translate(_MARKDOWN_ESCAPES).split())

@@ -40,7 +40,7 @@ class Assets:
 def replace_report(
     folder: Path,
     assets: Assets,
-    pages: Mapping[str, str],
+    pages: Mapping[str, bytes],
     inputs: Mapping[str, str],
 ) -> None:
     """Put a report into a folder, in the place of the one that is there."""
@@ -52,9 +52,9 @@ def replace_report(
         if not _is_there(folder / place, data)
     }
     write_files(new, within=folder)
-    for page, text in pages.items():
-        write_files({folder / page: text}, within=folder)
-    written = assets.contents | {page: text.encode() for page, text in pages.items()}
+    for page, data in pages.items():
+        write_files({folder / page: data}, within=folder)
+    written = {**assets.contents, **pages}
     document = {
         "format": REPORT_FORMAT,
         "inputs": dict(inputs),

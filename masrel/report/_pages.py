@@ -1,0 +1,121 @@
+"""The document a report is, and the pages it is written as.
+
+In: sections whose figures are drawn. Out: the bytes of a page, in every format that
+`WRITERS` names.
+"""
+
+import base64
+import html
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from masrel.report._material import Drawing, Paragraph
+from masrel.report._tables import Table, page_cells
+
+_KINDS = {Paragraph: "paragraph", Table: "table", Drawing: "figure"}
+
+# Symbols of the model as they are written in plain text: an index after "_".
+_SYMBOL = re.compile(r"(?<!\w)(ΔT|k|ν|θ|p)_(peak|post|th|L|start|end|o|e)(?!\w)")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Block:
+    """A paragraph, table or figure, with its number among those of its kind."""
+
+    number: int
+    content: Paragraph | Table | Drawing
+    # of a figure: its bytes, and its file from the report's folder, by form (png, svg)
+    pictures: Mapping[str, bytes] = field(default_factory=dict)
+    files: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def kind(self) -> str:
+        """What it is: paragraph, table or figure."""
+        return _KINDS[type(self.content)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Chapter:
+    """A section of the report as it is shown."""
+
+    name: str  # its name in the protocol's ``report.sections``
+    title: str
+    blocks: tuple[Block, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Document:
+    """All that a page of a report says."""
+
+    title: str
+    tag: str  # what stands before a caption where data are simulated
+    banner: str  # what the page says in large letters, if anything
+    provenance: str  # the sentence at its head
+    sections: tuple[Chapter, ...]
+    inputs: tuple[tuple[str, str], ...]  # what it was made from, and the hash of that
+    version: str  # of masrel
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Writer:
+    """A format of pages."""
+
+    file: str  # name of the page, in the report's folder
+    write: Callable[[Document], bytes]
+
+
+def _as_html(document: Document) -> bytes:
+    return _from_template("report.html", document)
+
+
+def _as_markdown(document: Document) -> bytes:
+    return _from_template("report.md", document)
+
+
+WRITERS: dict[str, Writer] = {
+    "html": Writer(file="report.html", write=_as_html),
+    "markdown": Writer(file="report.md", write=_as_markdown),
+}
+"""The formats of pages by name, in the order in which they are written."""
+
+
+def _from_template(name: str, document: Document) -> bytes:
+    # Imported here: a section's tables alone load no templates.
+    from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
+
+    environment = Environment(
+        loader=PackageLoader("masrel.report"),
+        autoescape=select_autoescape(enabled_extensions=("html",)),
+        undefined=StrictUndefined,
+        keep_trailing_newline=True,
+    )
+    environment.filters |= {
+        "md": _markdown,
+        "symbols": _symbols,
+        "cells": page_cells,
+        "uri": _uri,
+    }
+    style = Path(__file__).with_name("templates") / "report.css"
+    template = environment.get_template(name)
+    page = template.render(document=document, style=style.read_text(encoding="utf-8"))
+    return page.encode()
+
+
+def _uri(picture: bytes) -> str:
+    # An image of its own, not inline: ids inside two SVGs would collide.
+    encoded = base64.b64encode(picture).decode("ascii")
+    return f"data:image/svg+xml;base64,{encoded}"
+
+
+def _symbols(text: str) -> str:
+    # Escaped first; what is added after that is ours, and so safe in a template.
+    return _SYMBOL.sub(r"\1<sub>\2</sub>", html.escape(text))
+
+
+_MARKDOWN_ESCAPES = str.maketrans({letter: f"\\{letter}" for letter in "\\`*_|<>[]#"})
+
+
+def _markdown(text: str) -> str:
+    return " ".join(text.translate(_MARKDOWN_ESCAPES).split())
