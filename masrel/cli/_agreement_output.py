@@ -110,7 +110,12 @@ class FileAgreement:
         read = self.ratings.read
         record = agreement_record(
             self.rows,
-            read={**read, "options": self.reading.record()},
+            read={
+                "file": read["file"],
+                "sha256": self.ratings.sha256(),
+                **read,
+                "options": self.reading.record(),
+            },
             options={**self.options.record(), "by": read["by"]},
             scale=self.ratings.scale,
             notes=self.notes(),

@@ -165,7 +165,7 @@ def _parquet(path: Path, stream: bool | None) -> LargeFile | None:
     return LargeFile(
         sheet=named_sheet(
             name,
-            _sha256_of(path),
+            partial(_sha256_of, path),  # which reads it once more
             records,
             {"format": "parquet"},
             SheetOptions(),
@@ -259,7 +259,8 @@ def _text(path: Path, options: SheetOptions) -> LargeFile | None:
         return None
     first = int(line_of(0).split()[-1]) - int(options.no_header)  # lines before rows
     lines = _TextLines(path, delimiter, facts["encoding"], first, records.shape[1])
-    sheet = named_sheet(name, _sha256_of(path), records, facts, options, line_of)
+    sha256 = partial(_sha256_of, path)
+    sheet = named_sheet(name, sha256, records, facts, options, line_of)
     return LargeFile(
         sheet=replace(sheet, is_simulated=simulated),
         n_bytes=size,

@@ -47,7 +47,7 @@ class Sheet:
     """A file as text, row by row and column by column."""
 
     name: str  # the file, as the caller calls it
-    sha256: str  # of its bytes
+    sha256: Callable[[], str]  # of its bytes
     header: tuple[str, ...]  # names of the columns, all different
     cells: Cells = field(repr=False)  # (n_rows, n_columns), as text
     # (n_rows,): number of the record of every row in the file, from 0
@@ -78,7 +78,7 @@ def read_sheet(path: Path | str, options: SheetOptions) -> Sheet:
     name, data = str(path), bytes_of(path)
     if not data:
         raise RatingsError(f"{name}: needed a header and rows, the file is empty")
-    sha256 = hashlib.sha256(data).hexdigest()
+    sha256 = partial(str, hashlib.sha256(data).hexdigest())  # which pickle takes
     inner, data = unpacked(name, data, is_export=options.source is not None)
     suffix = Path(inner).suffix.lower()
     left_out: dict[str, int] = {}
@@ -113,7 +113,7 @@ def _column_number(number: int) -> str:
 
 def named_sheet(
     name: str,
-    sha256: str,
+    sha256: Callable[[], str],
     records: Cells,
     facts: dict[str, Any],
     options: SheetOptions,

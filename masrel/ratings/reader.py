@@ -63,6 +63,8 @@ class RatingsFile:
         Whether that order is more than the alphabet's.
     read : dict
         What was read, ready for JSON: format, columns, grades, missing ones, scale.
+    sha256 : callable
+        Returns the hash of the file's bytes; that of a stream is read again for it.
     warnings : tuple of str
         What may have been read wrongly, and which option would tell.
     simulated : bool
@@ -73,6 +75,7 @@ class RatingsFile:
     scale: Scale
     is_ordered: bool
     read: dict[str, Any] = field(repr=False)
+    sha256: Callable[[], str] = field(repr=False, compare=False)
     warnings: tuple[str, ...]
     simulated: bool
 
@@ -427,10 +430,10 @@ def _file(
         is_ordered=contents.grades.is_ordered,
         read={
             "file": sheet.name,
-            "sha256": sheet.sha256,
             **_record(sheet, layout, options, contents),
             "warnings": list(messages),
         },
+        sha256=sheet.sha256,
         warnings=messages,
         simulated=contents.is_simulated or _is_simulated(sheet),
     )

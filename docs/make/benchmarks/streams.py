@@ -227,7 +227,7 @@ def page(points: list[Point]) -> list[str]:
         "## Files larger than memory",
         "",
         "`python -m docs.make.benchmarks.streams` repeats this: `masrel agree FILE "
-        "--stream` of Parquet as a process of its own, imports, hash and all checks, "
+        "--stream` of Parquet as a process of its own, imports and all checks, "
         "beside a process in which DuckDB counts how often each combination of grades "
         "occurs and does nothing else, in turn, once to three times; processor time "
         "and the largest memory; ± is half the range of the ratios. Items are numbers "
@@ -253,8 +253,7 @@ def page(points: list[Point]) -> list[str]:
         "they are not extrapolated.",
         "",
         "Of a wide table masrel takes longer than DuckDB, also where starting does not "
-        "count: it reads the names of the items, to see that none is there twice, and "
-        "hashes the file.",
+        "count: it reads the names of the items, to see that none is there twice.",
     ]
 
 
