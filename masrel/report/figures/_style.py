@@ -21,6 +21,8 @@ from masrel.report import _figure_data as data
 if TYPE_CHECKING:
     from matplotlib.typing import RcKeyType
 
+    from masrel.report._material import Drawing
+
 BLACK = "#000000"
 GREY = "#6B6B6B"
 BLUE = "#0072B2"
@@ -113,6 +115,22 @@ def draw(
                 weight="bold" if is_loud else "normal",
             )
         return {form: file_of(figure, form) for form in forms}
+
+
+def draw_all(drawings: "Sequence[Drawing]") -> list[dict[data.Form, bytes]]:
+    """Draw the figures of a report, one after the other.
+
+    Parameters
+    ----------
+    drawings : sequence of Drawing
+        What is drawn, and the line below which it stands.
+
+    Returns
+    -------
+    list of dict of str to bytes
+        The files of each drawing: its PNG and its SVG.
+    """
+    return [draw(drawing.content, stamp=drawing.stamp) for drawing in drawings]
 
 
 def _figure(content: data.Content) -> Figure:
