@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Self
 
 from masrel._files import make_folder, no_follow, sync_folder
 from masrel._input import MAX_TABLE, parse_json, read_regular
+from masrel._once import once
 from masrel.errors import SessionLogError
 
 if TYPE_CHECKING:
@@ -54,6 +55,7 @@ class Event:
     fields: "Mapping[str, _Facts]" = field(hash=False)
 
 
+@once
 def read_log(path: Path) -> tuple[Event, ...]:
     """Read a session log and verify its whole chain.
 

@@ -21,6 +21,9 @@ MAX_TABLE = 64_000_000
 # of a recording, and of what one is unpacked to: half an hour at 1 kHz
 MAX_RECORDING = 128_000_000
 
+# of a file that grows while it is read
+_PIECE = 65_536
+
 # Each missing on some systems
 _NO_WAIT = getattr(os, "O_NONBLOCK", 0)
 _BINARY = getattr(os, "O_BINARY", 0)
@@ -41,8 +44,14 @@ def read_regular(path: Path, *, most: int) -> bytes:
     """Return the bytes of a regular file of at most so many."""
     # A pipe without a writer would keep it waiting, and a device never ends.
     descriptor = os.open(path, os.O_RDONLY | _NO_WAIT | _BINARY)
-    with os.fdopen(regular(descriptor, path), "rb") as file:
-        data = file.read(most + 1)
+    regular(descriptor, path)
+    try:
+        # room for what is there, not for the most that there may be
+        data = os.read(descriptor, min(os.fstat(descriptor).st_size, most) + 1)
+        while len(data) <= most and (more := os.read(descriptor, _PIECE)):
+            data += more
+    finally:
+        os.close(descriptor)
     if len(data) > most:
         raise OSError(errno.EFBIG, f"larger than {most} bytes", str(path))
     return data

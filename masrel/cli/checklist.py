@@ -4,10 +4,10 @@ from pathlib import Path
 
 import click
 
+from masrel._once import read_once
 from masrel.cli._options import warnings_as_notes
 from masrel.cli._paths import OutputFile
 from masrel.protocol import StudyPaths, read_protocol
-from masrel.run._session_logs import logs_read_once
 
 
 @click.command("checklist")
@@ -24,7 +24,7 @@ from masrel.run._session_logs import logs_read_once
     type=OutputFile(path_type=Path),
     help="File to write: .html, .md or .docx; Markdown on the screen unless given.",
 )
-@logs_read_once()
+@read_once()
 def checklist(study: Path, guideline: str, output: Path | None) -> None:
     """Fill the checklist of a reporting guideline for STUDY.
 

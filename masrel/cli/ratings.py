@@ -5,10 +5,10 @@ from pathlib import Path
 import click
 
 from masrel._files import write_file
+from masrel._once import read_once
 from masrel.cli._options import echo_remarks
 from masrel.cli._paths import OutputFile, note_inputs
 from masrel.protocol import Protocol, StudyPaths, read_protocol
-from masrel.run._session_logs import logs_read_once
 
 
 @click.command("ratings")
@@ -19,7 +19,7 @@ from masrel.run._session_logs import logs_read_once
     type=OutputFile(path_type=Path),
     help="File to write; default: STUDY/ratings/ratings.csv.",
 )
-@logs_read_once()
+@read_once()
 def ratings(study: Path, output: Path | None) -> None:
     """Collect the ratings of STUDY from its session logs.
 

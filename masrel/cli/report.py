@@ -6,6 +6,7 @@ import click
 from tqdm import tqdm
 
 from masrel._files import check_inside, refuse_record
+from masrel._once import read_once
 from masrel.cli._gating import GateOptions, conclude, gate_options
 from masrel.cli._options import (
     OutputOptions,
@@ -14,7 +15,6 @@ from masrel.cli._options import (
     read_study,
     warnings_as_notes,
 )
-from masrel.run._session_logs import logs_read_once
 
 
 @click.command("report")
@@ -39,7 +39,7 @@ from masrel.run._session_logs import logs_read_once
     raw_csv="No apostrophe before a text that a spreadsheet would run.",
     quiet="No progress bar.",
 )
-@logs_read_once()
+@read_once()
 def report(
     study: Path,
     destination: Path | None,

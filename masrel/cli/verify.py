@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from masrel._once import read_once
 from masrel.cli._options import (
     STDOUT,
     OutputOptions,
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     "the logs are held against.",
 )
 @output_options(json="Write everything here as JSON; - prints it, and nothing else.")
+@read_once()
 def verify(study: Path, anchor_file: Path | None, output: OutputOptions) -> None:
     """Verify the record of STUDY, every file against the one it was made from.
 

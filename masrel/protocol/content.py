@@ -6,6 +6,7 @@ from typing import Any
 
 import msgspec
 
+from masrel._once import once
 from masrel.elbow.joint_model import JointModel
 from masrel.elbow.parameters import ElbowParameters
 from masrel.errors import ParameterError
@@ -230,6 +231,7 @@ _LATER_OF_RATERS: dict[str, object] = {"fields": {}, "site": None}
 """The same of every rater."""
 
 
+@once
 def protocol_hash(protocol: Protocol) -> str:
     """Hash the whole content of a protocol.
 
@@ -248,6 +250,7 @@ def protocol_hash(protocol: Protocol) -> str:
     return hashlib.sha256(_canonical(protocol)).hexdigest()
 
 
+@once
 def presented_hash(protocol: Protocol) -> str:
     """Hash the part of a protocol that decides what a rater meets.
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from masrel._files import make_folder, write_files
 from masrel._input import MAX_SMALL, csv_format, format_problem, not_utf8, read_regular
+from masrel._once import once
 from masrel.errors import ScheduleError
 from masrel.protocol import (
     Protocol,
@@ -68,6 +69,7 @@ class _ScheduleFiles:
     log: Path
 
 
+@once
 def read_schedule(path: Path) -> Schedule:
     """Read a schedule file.
 

@@ -71,25 +71,34 @@ def recording_findings(
 ) -> Iterator[Finding]:
     """Yield what is wrong with the recording that an event names."""
     # of: study, rater and session; where: the event's line and log, in words
-    for file, sha256 in (
-        (path, event.fields["sha256"]),
-        (path.with_suffix(".json"), event.fields.get("facts_sha256")),
+    data = b""
+    for file, most, sha256 in (
+        (path, MAX_RECORDING, event.fields["sha256"]),
+        (path.with_suffix(".json"), MAX_SMALL, event.fields.get("facts_sha256")),
     ):
-        if not file.is_file():
+        try:
+            data = read_regular(file, most=most)
+        except OSError:
+            if file.is_file():
+                raise
             yield broken(file, f"needed a recording that {where} names, got no file")
             return
-        data = read_regular(file, most=MAX_RECORDING)
         if sha256 not in (None, hashlib.sha256(data).hexdigest()):
             yield broken(file, f"is not the file whose SHA-256 {where} has")
-    yield from _fact_findings(path.with_suffix(".json"), shown, of, event, where)
+    yield from _fact_findings(path.with_suffix(".json"), data, shown, of, event, where)
 
 
 def _fact_findings(
-    path: Path, shown: Presentation, of: Mapping[str, str], event: Event, where: str
+    path: Path,
+    data: bytes,
+    shown: Presentation,
+    of: Mapping[str, str],
+    event: Event,
+    where: str,
 ) -> Iterator[Finding]:
     # what a file says that was not hashed once must at least agree with what was
     try:
-        facts = parse_json(read_regular(path, most=MAX_SMALL))
+        facts = parse_json(data)
     except ValueError:
         facts = None
     if not isinstance(facts, dict):

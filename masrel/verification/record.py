@@ -1,14 +1,15 @@
 """The record of a study, from protocol to analysis, each file held against the last."""
 
+import os
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from masrel._once import read_once
 from masrel.conduct._allotment import allotment_problems
 from masrel.conduct._merged_logs import merged_log_problems
 from masrel.errors import ProtocolError, ScheduleError, SessionLogError
 from masrel.protocol import Protocol, StudyPaths, read_protocol
-from masrel.run._session_logs import logs_read_once
 from masrel.schedule import read_schedule, schedule_problems
 from masrel.verification._finding import Finding, broken, doubt
 from masrel.verification._outputs import output_findings
@@ -79,7 +80,7 @@ def verify_study(study: StudyPaths) -> Verification:
         return Verification(
             sessions=(), findings=_of_problems(study.protocol, error.problems)
         )
-    with logs_read_once():
+    with read_once():
         record = verify_sessions(study, protocol)
         return Verification(
             sessions=record.sessions,
@@ -173,7 +174,7 @@ def _unnamed(
     folder: Path, checked: Sequence[CheckedSession | CheckedTraining], whose: str
 ) -> Iterator[Finding]:
     # what lies in a folder of logs and no log speaks for
-    named = {path for of_log in checked for path in of_log.files}
+    named = {str(path) for of_log in checked for path in of_log.files}
     # what a log that cannot be read names, nobody can say
     unknown = {
         path
@@ -181,12 +182,17 @@ def _unnamed(
         if of_log.record.stage == "unreadable"
         for path in of_log.files
     }
-    for path in sorted(folder.rglob("*")):
+    there = (
+        f"{parent}{os.sep}{name}"
+        for parent, folders, files in os.walk(folder)
+        for name in (*folders, *files)
+    )
+    for path in sorted(Path(name) for name in there if name not in named):
         if path.parent.with_name(f"{path.parent.name}.jsonl") in unknown:
             continue
-        if path in named or (path.is_dir() and any(path.iterdir())):
+        if path.is_dir() and any(path.iterdir()):
             continue
-        if path.name.endswith(".jsonl.torn") and path.with_suffix("") in named:
+        if path.name.endswith(".jsonl.torn") and str(path.with_suffix("")) in named:
             yield doubt(path, "bytes of a line that was not finished; the log says so")
         elif path.suffix == ".partial":
             yield doubt(path, "a presentation that was cut off; going on recovers it")

@@ -15,11 +15,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 from masrel._event_log import read_log
+from masrel._once import read_once
 from masrel.progress import next_step, rater_progress, session_progress
 from masrel.protocol import Protocol, StudyPaths, read_protocol
 from masrel.ratings import ratings_from_logs, study_remarks
 from masrel.run import SimulatedGrades, run_session
-from masrel.run._session_logs import logs_read_once
 from masrel.schedule import Schedule, read_schedule, write_schedules
 
 N_MODELS, N_REPEATS = 10, 5
@@ -116,7 +116,7 @@ def status(study: StudyPaths, protocol: Protocol) -> None:
     next_step(study, sessions, rater_progress(study, protocol, sessions))
 
 
-@logs_read_once()
+@read_once()
 def ratings(study: StudyPaths, protocol: Protocol) -> None:
     """What masrel ratings computes."""
     study_remarks(study, protocol)
