@@ -8,7 +8,7 @@ from masrel._files import write_file
 from masrel._once import read_once
 from masrel.cli._options import echo_remarks
 from masrel.cli._paths import OutputFile, note_inputs
-from masrel.protocol import Protocol, StudyPaths, read_protocol
+from masrel.protocol import StudyPaths, read_protocol
 
 
 @click.command("ratings")
@@ -27,6 +27,7 @@ def ratings(study: Path, output: Path | None) -> None:
     against its checksum. Corrections take the place of the grades they correct. The
     table of raters, raters.csv, is written beside STUDY/ratings/ratings.csv.
     """
+    from masrel.progress._raters import raters_text
     from masrel.ratings import (
         answers_from_logs,
         ratings_from_logs,
@@ -43,7 +44,7 @@ def ratings(study: Path, output: Path | None) -> None:
     destination = output or paths.ratings_file
     write_ratings(ratings, destination, within=None if output else study)
     if output is None:
-        _write_raters(paths, protocol)
+        write_file(paths.raters_file, raters_text(paths, protocol), within=study)
     n_rows = len(ratings.table)
     n_missing = int(ratings.table["grade"].isna().sum())
     label = " (simulated)" if ratings.simulated else ""
@@ -63,13 +64,3 @@ def ratings(study: Path, output: Path | None) -> None:
     n_slow = int(ratings.table["felt"].isin(["below-threshold", "no-catch"]).sum())
     if n_slow:
         click.echo(f"{n_slow} after stretches too slow to feel the catch: column felt")
-
-
-def _write_raters(paths: StudyPaths, protocol: Protocol) -> None:
-    from masrel.progress import rater_progress, raters_csv, session_progress
-
-    sessions = session_progress(paths, protocol)
-    raters = rater_progress(paths, protocol, sessions)
-    simulated = any(session.simulated for session in sessions)
-    text = raters_csv(raters, protocol, simulated=simulated)
-    write_file(paths.raters_file, text, within=paths.root)

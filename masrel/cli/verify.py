@@ -36,10 +36,10 @@ if TYPE_CHECKING:
 def verify(study: Path, anchor_file: Path | None, output: OutputOptions) -> None:
     """Verify the record of STUDY, every file against the one it was made from.
 
-    Protocol, schedules, logs and recordings of sessions and trainings, table of
-    ratings, analysis and report. Prints every session and training, what is
-    wrong, and an anchor for each log: a hash that, kept elsewhere, shows that
-    its lines were not written anew.
+    Protocol, schedules, logs and recordings of sessions, trainings and rehearsals,
+    tables, analysis and report. Prints how far each came, what is wrong, and an
+    anchor for each log: a hash that, kept elsewhere, shows that its lines were not
+    written anew.
     Exit code 2 when something is broken.
     """
     from masrel.verification import anchors_of, verify_study
@@ -91,6 +91,9 @@ def _document(
         "is_whole": is_whole,
         "sessions": [dataclasses.asdict(record) for record in verification.sessions],
         "trainings": [dataclasses.asdict(record) for record in verification.trainings],
+        "rehearsals": [
+            dataclasses.asdict(record) for record in verification.rehearsals
+        ],
         "findings": [
             {**dataclasses.asdict(finding), "path": str(finding.path)}
             for finding in findings
@@ -117,8 +120,10 @@ def _show(
     *,
     is_whole: bool,
 ) -> None:
-    for record in verification.sessions:
-        click.echo(f"{record.session} {record.rater}: {_stage_of(record)}")
+    for record in (*verification.sessions, *verification.rehearsals):
+        number = record.rehearsal
+        which = "" if number is None else f"rehearsal {number} of "
+        click.echo(f"{which}{record.session} {record.rater}: {_stage_of(record)}")
     for training in verification.trainings:
         click.echo(
             f"training {training.rater}: {training.stage}, {training.n_graded} graded, "

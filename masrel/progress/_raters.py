@@ -10,7 +10,7 @@ from typing import Literal
 from masrel._cells import safe_cell
 from masrel.conduct import excluded_raters, rater_values, read_conduct
 from masrel.errors import ScheduleError
-from masrel.progress._session_stages import SessionProgress
+from masrel.progress._session_stages import SessionProgress, session_progress
 from masrel.protocol import Protocol, StudyPaths
 from masrel.protocol._rater_fields import FieldValue
 from masrel.schedule import read_schedule
@@ -159,6 +159,14 @@ def raters_csv(
         known = [each.rater, _cell(each.site), each.status, late]
         writer.writerow([*known, *map(_cell, cells)])
     return f"{head}# format: 1\n{text.getvalue()}"
+
+
+def raters_text(study: StudyPaths, protocol: Protocol) -> str:
+    """Return the table of raters as protocol and logs have it now."""
+    sessions = session_progress(study, protocol)
+    raters = rater_progress(study, protocol, sessions)
+    simulated = any(session.simulated for session in sessions)
+    return raters_csv(raters, protocol, simulated=simulated)
 
 
 def _cell(value: FieldValue | None) -> str:

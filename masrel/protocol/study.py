@@ -107,6 +107,11 @@ class StudyPaths:
         return self.root / "training"
 
     @property
+    def rehearsals(self) -> Path:
+        """The folder of logs and recordings of rehearsals; no rating of the study."""
+        return self.root / "rehearsals"
+
+    @property
     def sheets(self) -> Path:
         """The folder of sheets to print, and of files to type them into."""
         return self.root / "sheets"

@@ -1,5 +1,6 @@
 """Rehearsals of a session: in a folder of their own, and never among the ratings."""
 
+import dataclasses
 import hashlib
 import json
 from dataclasses import dataclass
@@ -7,7 +8,7 @@ from pathlib import Path
 
 import msgspec
 
-from masrel.protocol import Protocol, StudyPaths
+from masrel.protocol import Protocol, StudyPaths, presented_hash
 from masrel.schedule import Schedule
 from masrel.schedule._secret import StudySecret, find_secret, new_secret
 from masrel.schedule.presentation import _draw_with_key
@@ -24,7 +25,7 @@ class RehearsalPaths(StudyPaths):
     @property
     def sessions(self) -> Path:
         """The folder of the rehearsal's logs and recordings."""
-        return self.root / "rehearsals" / str(self.number)
+        return self.rehearsals / str(self.number)
 
     def log_file(self, rater: str, session: str) -> Path:
         """Return the file of one rater's log."""
@@ -45,11 +46,21 @@ def begin_rehearsal(
     while True:
         number += 1
         paths = RehearsalPaths(study.root, number)
-        schedule = _draw(protocol, rater, session, number, secret)
-        shown = [[p.code, p.model, p.repeat] for p in schedule.presentations]
-        checksum = hashlib.sha256(json.dumps(shown).encode()).hexdigest()
+        schedule, checksum = _draw(protocol, rater, session, number, secret)
         if not _is_over(paths.log_file(rater, session), checksum):
             return paths, schedule, checksum
+
+
+def drawn_rehearsal(
+    paths: RehearsalPaths, protocol: Protocol, rater: str, session: str
+) -> tuple[Schedule, str] | None:
+    """Return what a rehearsal presents, and its hash; None without a secret."""
+    secret = find_secret(paths)
+    if secret is None:
+        return None
+    schedule, checksum = _draw(protocol, rater, session, paths.number, secret)
+    sha256 = presented_hash(protocol)  # by its log; it has a seed of its own
+    return dataclasses.replace(schedule, presented_sha256=sha256), checksum
 
 
 def _is_over(log: Path, checksum: str) -> bool:
@@ -61,11 +72,14 @@ def _is_over(log: Path, checksum: str) -> bool:
 
 def _draw(
     protocol: Protocol, rater: str, session: str, number: int, secret: StudySecret
-) -> Schedule:
+) -> tuple[Schedule, str]:
+    # and the hash that its log has for that of a schedule's file
     name = json.dumps([protocol.schedule.seed, "rehearsal", number])
     seed = int.from_bytes(hashlib.sha256(name.encode()).digest()[:8], "big") >> 1
     scheme = msgspec.structs.replace(
         protocol.schedule, seed=seed, scheme="random-order"
     )
     of_rehearsal = msgspec.structs.replace(protocol, schedule=scheme)
-    return _draw_with_key(of_rehearsal, rater, session, key=secret, row=None)
+    schedule = _draw_with_key(of_rehearsal, rater, session, key=secret, row=None)
+    shown = [[p.code, p.model, p.repeat] for p in schedule.presentations]
+    return schedule, hashlib.sha256(json.dumps(shown).encode()).hexdigest()

@@ -71,7 +71,19 @@ def recording_findings(
 ) -> Iterator[Finding]:
     """Yield what is wrong with the recording that an event names."""
     # of: study, rater and session; where: the event's line and log, in words
+    facts, findings = hashed_facts(path, event, where)
+    yield from findings
+    if facts is not None:
+        path = path.with_suffix(".json")
+        yield from _fact_findings(path, facts, shown, of, event, where)
+
+
+def hashed_facts(
+    path: Path, event: Event, where: str
+) -> tuple[bytes | None, list[Finding]]:
+    """Return the facts of a recording, and whether both files have their hashes."""
     data = b""
+    findings: list[Finding] = []
     for file, most, sha256 in (
         (path, MAX_RECORDING, event.fields["sha256"]),
         (path.with_suffix(".json"), MAX_SMALL, event.fields.get("facts_sha256")),
@@ -81,11 +93,11 @@ def recording_findings(
         except OSError:
             if file.is_file():
                 raise
-            yield broken(file, f"needed a recording that {where} names, got no file")
-            return
+            needed = f"needed a recording that {where} names, got no file"
+            return None, [*findings, broken(file, needed)]
         if sha256 not in (None, hashlib.sha256(data).hexdigest()):
-            yield broken(file, f"is not the file whose SHA-256 {where} has")
-    yield from _fact_findings(path.with_suffix(".json"), data, shown, of, event, where)
+            findings.append(broken(file, f"is not the file whose SHA-256 {where} has"))
+    return data, findings
 
 
 def _fact_findings(

@@ -5,12 +5,14 @@ import json
 import warnings
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from masrel._input import (
     MAX_RECORDING,
     MAX_TABLE,
+    csv_format,
     format_problem,
     parse_json,
     read_regular,
@@ -33,7 +35,8 @@ _SHOWN = 20  # differences of the table that are listed
 def output_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]:
     """Yield what is wrong with everything that was made from the logs."""
     table, manifest = study.ratings_file, study.report / "manifest.json"
-    outputs = (table, study.answers_file, study.analysis_file, manifest)
+    tables = (table, study.answers_file, study.raters_file)
+    outputs = (*tables, study.analysis_file, manifest)
     files = [file for file in outputs if file.is_file()]
     if not files:
         return  # nothing is loaded for it
@@ -46,6 +49,7 @@ def output_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]:
             ratings = _of_logs(study, protocol, check_recordings=False)
             yield from _table_findings(table, ratings)
             yield from _answers_findings(study, protocol)
+            yield from _raters_findings(study, protocol)
         else:
             ratings = read_study_data(study, protocol).ratings
             if table.is_file():
@@ -90,6 +94,32 @@ def _answers_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding
             yield broken(
                 path, "is not what the logs say; masrel ratings writes it anew"
             )
+
+
+def _raters_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]:
+    from masrel.progress._raters import raters_text
+
+    path = study.raters_file
+    if not path.is_file():
+        return
+    text = read_regular(path, most=MAX_TABLE).decode("utf-8", errors="replace")
+    problem = format_problem(csv_format(text), newest=1)
+    needed = raters_text(study, protocol)
+    if problem is not None:
+        yield broken(path, problem)
+    elif text != needed:
+        lines, needed_lines = text.splitlines(), needed.splitlines()
+        pairs = zip_longest(lines, needed_lines, fillvalue="no line")
+        line, (got, row) = next(
+            (number, pair)
+            for number, pair in enumerate(pairs, start=1)
+            if pair[0] != pair[1]
+        )
+        yield broken(
+            path,
+            f"line {line}: needed {row[:80]!r}, as protocol and logs say, got "
+            f"{got[:80]!r}; masrel ratings writes it anew",
+        )
 
 
 def _table_findings(path: Path, ratings: "Ratings") -> Iterator[Finding]:

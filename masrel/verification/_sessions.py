@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from masrel._event_log import Event
+from masrel._input import MAX_SMALL, read_regular
 from masrel.errors import ParameterError
 from masrel.protocol import Protocol, StudyPaths
 from masrel.protocol._questions import checked_answer
@@ -39,6 +40,8 @@ class SessionRecord:
         fault, and corrections.
     n_recordings : int
         Recordings that the log names.
+    rehearsal : int or None
+        Which rehearsal of the session it is; None of the session itself.
     """
 
     session: str
@@ -49,6 +52,7 @@ class SessionRecord:
     n_skipped: int = 0
     n_corrections: int = 0
     n_recordings: int = 0
+    rehearsal: int | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,46 +81,79 @@ def check_session(
             findings=() if finding is None else (finding,),
             files=frozenset([log]),
         )
-    presented = state.all_presented
-    recordings = [study.sessions / str(e.fields["recording"]) for e in presented]
+    file = study.schedule_file(rater, session)
+    checksum = hashlib.sha256(read_regular(file, most=MAX_SMALL)).hexdigest()
+    return check_against_schedule(
+        study, protocol, schedule, events, state, schedule_sha256=checksum
+    )
+
+
+def check_against_schedule(
+    study: StudyPaths,
+    protocol: Protocol,
+    schedule: Schedule,
+    events: Sequence[Event],
+    state: SessionState,
+    *,
+    schedule_sha256: str,
+) -> CheckedSession:
+    """Hold the events of a log against a schedule that has this hash."""
+    log = study.log_file(schedule.rater, schedule.session)
     findings = [
-        *_head_findings(study, protocol, schedule, state, log),
+        *_head_findings(protocol, schedule, state, log, schedule_sha256),
         *_event_findings(protocol, schedule, events, log),
         *_answer_findings(protocol, events, log),
         *time_findings(events, log),
     ]
     shown = _all_shown(protocol, schedule)
-    for event, recording in zip(presented, recordings, strict=True):
-        findings += _recording_findings(study, schedule, shown, log, event, recording)
+    for event in state.all_presented:
+        findings += _recording_findings(study, schedule, shown, log, event)
+    return checked_session(
+        study, events, state, findings, n_presentations=len(schedule.presentations)
+    )
+
+
+def checked_session(
+    study: StudyPaths,
+    events: Sequence[Event],
+    state: SessionState,
+    findings: Sequence[Finding],
+    *,
+    n_presentations: int,
+) -> CheckedSession:
+    """Return how far a session came by its log, with what is wrong with it."""
+    rater, session = str(state.header["rater"]), str(state.header["session"])
+    recordings = [
+        study.sessions / str(event.fields["recording"]) for event in state.all_presented
+    ]
     record = SessionRecord(
         session=session,
         rater=rater,
         stage="complete" if state.is_complete else "begun",
-        n_presentations=len(schedule.presentations),
+        n_presentations=n_presentations,
         n_graded=len(state.grades),
         n_skipped=len(state.skipped),
         n_corrections=sum(event.kind == "correction" for event in events),
-        n_recordings=len(presented),
+        n_recordings=len(recordings),
     )
     facts = (recording.with_suffix(".json") for recording in recordings)
-    files = frozenset([log, *recordings, *facts])
+    files = frozenset([study.log_file(rater, session), *recordings, *facts])
     return CheckedSession(record=record, findings=tuple(findings), files=files)
 
 
 def _head_findings(
-    study: StudyPaths,
     protocol: Protocol,
     schedule: Schedule,
     state: SessionState,
     log: Path,
+    schedule_sha256: str,
 ) -> Iterator[Finding]:
-    path = study.schedule_file(schedule.rater, schedule.session)
     needed = {
         "study": protocol.study.id,
         "rater": schedule.rater,
         "session": schedule.session,
         "presented_sha256": schedule.presented_sha256,
-        "schedule_sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
+        "schedule_sha256": schedule_sha256,
     }
     for name, value in needed.items():
         if state.header[name] != value:
@@ -200,9 +237,9 @@ def _recording_findings(
     all_shown: Mapping[str, Presentation],
     log: Path,
     event: Event,
-    path: Path,
 ) -> Iterator[Finding]:
     fields, where = event.fields, f"line {event.line} of {log}"
+    path = study.sessions / str(fields["recording"])
     code, attempt = str(fields["code"]), fields["attempt"]
     shown = all_shown.get(code)
     name = code if attempt == 1 else f"{code}-{attempt}"

@@ -54,7 +54,7 @@ def anchors_of(study: StudyPaths) -> tuple[Anchor, ...]:
     -------
     tuple of Anchor
         Of the last line of each: of the study's conduct, then of every session, then of
-        every training. A log whose chain does not hold has none.
+        every training and rehearsal. A log whose chain does not hold has none.
 
     Raises
     ------
@@ -75,8 +75,12 @@ def anchors_of(study: StudyPaths) -> tuple[Anchor, ...]:
 
 
 def _logs(study: StudyPaths) -> list[Path]:
-    trainings = [log for log in sorted(study.training.glob("*.jsonl")) if log.is_file()]
-    return [*study.conduct_logs(), *study.logs(), *trainings]
+    beside = [
+        *sorted(study.training.glob("*.jsonl")),
+        *sorted(study.rehearsals.glob("*/*.jsonl")),
+    ]
+    logs = [log for log in beside if log.is_file()]
+    return [*study.conduct_logs(), *study.logs(), *logs]
 
 
 def read_anchors(path: Path) -> tuple[Anchor, ...]:

@@ -13,6 +13,7 @@ from masrel.protocol import Protocol, StudyPaths, read_protocol
 from masrel.schedule import read_schedule, schedule_problems
 from masrel.verification._finding import Finding, broken, doubt
 from masrel.verification._outputs import output_findings
+from masrel.verification._rehearsals import check_rehearsal
 from masrel.verification._sessions import CheckedSession, SessionRecord, check_session
 from masrel.verification._trainings import (
     CheckedTraining,
@@ -31,13 +32,16 @@ class Verification:
         Every session of the protocol, one line a rater.
     trainings : tuple of VerifiedTraining
         Every training that has a log, by rater.
+    rehearsals : tuple of SessionRecord
+        Every rehearsal that has a log.
     findings : tuple of Finding
-        In the order of the record: protocol, schedules, logs and recordings of sessions
-        and of trainings, table, analysis, report.
+        In the order of the record: protocol, schedules, logs and recordings of
+        sessions, trainings and rehearsals, tables, analysis, report.
     """
 
     sessions: tuple[SessionRecord, ...]
     trainings: tuple[VerifiedTraining, ...] = ()
+    rehearsals: tuple[SessionRecord, ...] = ()
     findings: tuple[Finding, ...]
 
     @property
@@ -85,6 +89,7 @@ def verify_study(study: StudyPaths) -> Verification:
         return Verification(
             sessions=record.sessions,
             trainings=record.trainings,
+            rehearsals=record.rehearsals,
             findings=(
                 *_of_problems(study.schedules, schedule_problems(protocol, study)),
                 *record.findings,
@@ -106,8 +111,8 @@ def verify_sessions(study: StudyPaths, protocol: Protocol) -> Verification:
     Returns
     -------
     Verification
-        Every session of the protocol, every training, and what is wrong in
-        ``sessions/``, in ``training/`` and in the log of what happened beside them.
+        Every session of the protocol, every training and rehearsal, and what is wrong
+        in their folders and in the log of what happened beside them.
 
     Raises
     ------
@@ -123,14 +128,21 @@ def verify_sessions(study: StudyPaths, protocol: Protocol) -> Verification:
     trained = [
         check_training(study, protocol, log) for log in training_logs if log.is_file()
     ]
+    rehearsed = [
+        check_rehearsal(study, protocol, log)
+        for log in sorted(study.rehearsals.glob("*/*.jsonl"))
+    ]
     return Verification(
         sessions=tuple(of_session.record for of_session in checked),
         trainings=tuple(of_rater.record for of_rater in trained),
+        rehearsals=tuple(rehearsal.record for rehearsal in rehearsed),
         findings=(
             *(finding for of_session in checked for finding in of_session.findings),
             *_unnamed(study.sessions, checked, "rater in a session"),
             *(finding for of_rater in trained for finding in of_rater.findings),
             *_unnamed(study.training, trained, "rater"),
+            *(finding for rehearsal in rehearsed for finding in rehearsal.findings),
+            *_unnamed(study.rehearsals, rehearsed, "rehearsal"),
             *_conduct_findings(study, protocol),
         ),
     )

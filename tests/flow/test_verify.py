@@ -103,6 +103,18 @@ def a_line_taken_from_the_banner(study: StudyPaths) -> Path:
     return edited(study.ratings_file, b"# SIMULATED", b"# Recorded")
 
 
+def the_status_of_a_rater(study: StudyPaths) -> Path:
+    run("ratings", str(study.root))
+    return edited(study.raters_file, b"R2,NA,complete", b"R2,NA,planned")
+
+
+def a_rater_withdrawn_after_the_table(study: StudyPaths) -> Path:
+    of_whom = ("--rater", "R2", "--who", "Kim", "--why", "left")
+    run("ratings", str(study.root))
+    run("withdraw", str(study.root), *of_whom)
+    return study.raters_file
+
+
 def an_estimate(study: StudyPaths) -> Path:
     document = json.loads(study.analysis_file.read_text())
     document["estimates"][0]["estimate"]["value"] = 0.99
@@ -207,6 +219,8 @@ FORGERIES: list[Forgery] = [
     a_row_taken_from_the_table,
     recorded_for_simulated,
     a_line_taken_from_the_banner,
+    the_status_of_a_rater,
+    a_rater_withdrawn_after_the_table,
     an_estimate,
     a_log_taken_away,
     an_emptied_log,
