@@ -93,8 +93,8 @@ def _compare(
     if differences:
         click.echo(
             "Look at the paper. Where the first entry is wrong: masrel run --correct "
-            "CODE --grade GRADE --who WHO --why TEXT; where the second is: mend FILE "
-            "and compare it again"
+            "CODE --grade GRADE, or --question QUESTION --answer ANSWER, --who WHO "
+            "--why TEXT; where the second is: mend FILE and compare it again"
         )
         return 1
     click.echo(f"session {session} of {rater}: both entries agree")
@@ -102,8 +102,8 @@ def _compare(
 
 
 def _in_words(each: "SheetDifference") -> str:
-    where = "session" if each.code is None else f"code {each.code}"
+    where = "" if each.code is None else f"code {each.code}: "
     return (
-        f"{each.file}: row {each.row}: {where}: {each.column}: first {each.first}, "
+        f"{each.file}: row {each.row}: {where}{each.column}: first {each.first}, "
         f"second {each.second}"
     )

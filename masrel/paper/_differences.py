@@ -1,9 +1,13 @@
 """What differs between the two entries of a sheet, by the session's log."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
+from masrel.protocol._questions import Answer
 from masrel.run._state import SessionState
+
+StudyAnswers = Mapping[tuple[str, str], Answer]
+"""What a rater answered about the study, by questionnaire and question."""
 
 GRADE = "grade"
 """The column of grades."""
@@ -19,7 +23,7 @@ class SheetDifference:
     Attributes
     ----------
     code : str or None
-        Of the presentation; None for a question about the session.
+        Of the presentation; None for a question about the session or the study.
     column : str
         ``"grade"``, or the column of a question.
     first, second : str
@@ -41,15 +45,21 @@ class SheetDifference:
     who: str
 
 
-def sheet_differences(state: SessionState) -> tuple[SheetDifference, ...]:
-    """Return in what the last second entry of a sheet differs from the log."""
-    return tuple(sorted(_differences(state), key=lambda each: each.row))
+def sheet_differences(
+    state: SessionState, of_study: StudyAnswers
+) -> tuple[SheetDifference, ...]:
+    """Return in what the last second entry of a sheet differs from the logs."""
+    return tuple(sorted(_differences(state, of_study), key=lambda each: each.row))
 
 
-def _differences(state: SessionState) -> Iterator[SheetDifference]:
+def _differences(
+    state: SessionState, of_study: StudyAnswers
+) -> Iterator[SheetDifference]:
     first: dict[tuple[str | None, str], object] = {
         (code, GRADE): grade for code, grade in state.grades.items()
     }
+    for (questionnaire, question), answer in of_study.items():
+        first[None, f"{questionnaire}.{question}"] = answer
     for (questionnaire, question, code), answer in state.answers.items():
         first[code, f"{questionnaire}.{question}"] = answer
     for (code, column), event in state.reentered.items():

@@ -2,7 +2,7 @@
 
 import hashlib
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import date, datetime, time
 from pathlib import Path
@@ -15,7 +15,7 @@ from masrel._event_log import SessionLog, utc_now
 from masrel._files import check_inside
 from masrel.conduct._study_answers import study_answers
 from masrel.conduct._study_log import append_event, stated
-from masrel.errors import ParameterError, SessionLogError
+from masrel.errors import ParameterError, RatingsError, SessionLogError
 from masrel.paper._filled_form import FilledRow, fill_form
 from masrel.paper._form import Form, drawn_schedule, form_of
 from masrel.paper._typed import TypedSheet, read_typed
@@ -122,6 +122,7 @@ def enter_sheet(
     _check_day(on, now)
     _check_device(device)
     sheet, rows, form = filled_sheet(study, protocol, file, rater, session)
+    _refuse_answered(study, sheet, rows, rater)
     log_file = study.log_file(rater, session)
     check_inside(log_file.parent, study.root)
     with SessionLog.open(log_file, now=now) as log:
@@ -250,6 +251,22 @@ def _refuse_entered(sheet: TypedSheet, log: SessionLog) -> None:
         f"{before.fields['row']}: --second compares a second entry, and masrel run "
         "--correct corrects a grade"
     )
+
+
+def _refuse_answered(
+    study: StudyPaths, sheet: TypedSheet, rows: Sequence[FilledRow], rater: str
+) -> None:
+    # about the study, in another session: an answer is corrected, not given twice
+    answered = study_answers(study).get(rater, {})
+    for row in rows if answered else ():
+        for column, answer in row.answers if row.place == "study" else ():
+            before = answered.get((column.questionnaire, column.question.id), answer)
+            if before != answer:
+                raise RatingsError(
+                    f"{sheet.path}: row {row.number}: {column.column}: needed "
+                    f"{before!r}, which {rater} has answered already, got {answer!r}: "
+                    "masrel run --question corrects an answer"
+                )
 
 
 def _enter(

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from masrel._event_log import Event, SessionLog, utc_now
+from masrel.conduct._study_answers import study_answers
 from masrel.conduct._study_log import stated
 from masrel.errors import ParameterError, RatingsError, SessionLogError
 from masrel.paper._differences import GRADE, SheetDifference, sheet_differences
@@ -32,7 +33,7 @@ def compare_sheet(
     """Compare a sheet that somebody else typed again with what was entered of it.
 
     Every cell of the second entry is added to the session's log, and no grade changes.
-    A difference lasts until the grade is corrected, or a second file agrees.
+    A difference lasts until the first entry is corrected, or a second file agrees.
 
     Parameters
     ----------
@@ -85,10 +86,9 @@ def compare_sheet(
             )
         _refuse_first(sheet, reasons["who"], log.events)
         for row in rows:
-            if row.place == "study":  # answered in another log
-                continue
             _reenter(row, sheet, reasons, state, log)
-        return sheet_differences(replay(log.path, log.events))
+        of_study = study_answers(study).get(rater, {})
+        return sheet_differences(replay(log.path, log.events), of_study)
 
 
 def _refuse_first(sheet: TypedSheet, who: str, events: Sequence[Event]) -> None:

@@ -1,13 +1,14 @@
 """What a study's table of ratings leaves out, and what happened to the study."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from masrel._event_log import Event
 from masrel.conduct import excluded_raters, read_conduct
+from masrel.conduct._study_answers import study_answers
 from masrel.errors import MasrelError, SessionLogError
-from masrel.paper._differences import sheet_differences
+from masrel.paper._differences import StudyAnswers, sheet_differences
 from masrel.protocol import Protocol, StudyPaths
 from masrel.run._session_logs import read_session
 from masrel.run._state import SessionState
@@ -239,6 +240,7 @@ def _of_sessions(
         for rater in session.raters
     }
     there = sorted(study.sessions.glob("*.jsonl"))
+    of_study = study_answers(study)
     for log in there:
         if log not in expected:
             yield (
@@ -249,7 +251,7 @@ def _of_sessions(
             )
         elif log.stat().st_size:
             yield from _of_skips(study, log, names=names)
-            yield from _of_second_entries(study, log)
+            yield from _of_second_entries(study, log, of_study)
         else:
             yield (
                 f"{_name(study, log)} is empty: its grades, if there were any, are not "
@@ -281,14 +283,18 @@ def _of_skips(study: StudyPaths, log: Path, *, names: bool) -> Iterator[str]:
             )
 
 
-def _of_second_entries(study: StudyPaths, log: Path) -> Iterator[str]:
-    for each in sheet_differences(_state_of(log)):
-        code = "session" if each.code is None else f"code {each.code}"
+def _of_second_entries(
+    study: StudyPaths, log: Path, of_study: Mapping[str, StudyAnswers]
+) -> Iterator[str]:
+    state = _state_of(log)
+    of_rater = of_study.get(str(state.header.get("rater")), {})
+    for each in sheet_differences(state, of_rater):
+        code = "" if each.code is None else f" code {each.code},"
         values = ""
         if each.column == "grade":  # an answer is its rater's
             values = f": the first has {each.first}, the second {each.second}"
         yield (
-            f"{_name(study, log)}: the two entries of its sheet differ, {code}, "
+            f"{_name(study, log)}: the two entries of its sheet differ,{code} "
             f"{each.column}{values} ({each.file}, row {each.row}). The first counts "
             "until one is mended."
         )

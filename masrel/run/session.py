@@ -12,7 +12,7 @@ from pathlib import Path
 from masrel._event_log import Event, SessionLog, utc_now
 from masrel._files import check_inside
 from masrel.conduct._study_answers import study_answers
-from masrel.conduct._study_log import append_event, stated
+from masrel.conduct._study_log import append_event, check_rater, stated
 from masrel.conduct._withdrawal import refuse_withdrawn
 from masrel.errors import (
     ParameterError,
@@ -341,7 +341,8 @@ def record_answer(
         **stated(who=who, why=why),
     }
     if questionnaire.when == "study":
-        of_study = {"rater": _known_rater(protocol, rater), **fields}
+        check_rater(protocol, rater)
+        of_study = {"rater": rater, **fields}
         append_event(study, protocol, "answer-correction", of_study, now=now)
         return study.conduct_file
     with _begun_log(study, rater, session, now) as log:
@@ -350,13 +351,6 @@ def record_answer(
             _check_code(log.path, code, state.presented, "was presented")
         log.append("answer-correction", {**fields, "code": code})
     return log.path
-
-
-def _known_rater(protocol: Protocol, rater: str) -> str:
-    known = [each.id for each in protocol.raters]
-    if rater not in known:
-        raise ParameterError(f"rater: needed one of {', '.join(known)}, got {rater!r}")
-    return rater
 
 
 def record_skip(

@@ -11,7 +11,7 @@ from masrel.errors import ParameterError, RatingsError, SessionLogError
 from masrel.paper import SheetDifference, compare_sheet
 from masrel.protocol import Protocol, StudyPaths
 from masrel.ratings import ratings_from_logs, study_remarks
-from masrel.run import read_log, record_correction
+from masrel.run import read_log, record_answer, record_correction
 from masrel.verification import verify_study
 from tests.paper.conftest import QUESTIONS
 from tests.paper.test_entry import Rows, enter, filled, typed
@@ -95,6 +95,40 @@ def test_answers_are_compared_too(new_study: New) -> None:
     remarks = " ".join(study_remarks(*small))  # an answer is private
     assert "arm.realism (b.csv, row 3)" in remarks
     assert "50" not in remarks
+
+
+def test_answers_about_the_study_are_compared_with_the_log_they_are_in(
+    new_study: New,
+) -> None:
+    about = QUESTIONS.replace('when = "session"', 'when = "study"')
+    small = new_study(("[schedule]", about), ('raters = ["R1"]', 'raters = ["R2"]'))
+    study, protocol = small
+    rows = filled(small, "1", "2", "3")
+    for row in rows[1:4]:
+        row[4] = "7"
+    rows[4][5:] = ["50", "more"]
+    enter(small, typed(small, rows))
+    rows[4][5:] = ["5", "more"]
+    second = typed(small, rows, name="b.csv")
+    (found,) = compare(small, second)
+    assert (found.code, found.column) == (None, "end.tired")
+    assert (found.first, found.second) == ("50", "5")
+    (remark,) = study_remarks(study, protocol)
+    assert "sheet differ, end.tired (b.csv, row 5)" in remark
+    # the first was wrong
+    record_answer(
+        study,
+        protocol,
+        "R1",
+        "test",
+        question="end.tired",
+        answer=5.0,
+        who="MK",
+        why="typed wrongly",
+    )
+    assert study_remarks(study, protocol) == ()
+    assert compare(small, second) == ()
+    assert verify_study(study).is_whole
 
 
 def test_the_second_entry_is_of_another_file_and_another_person(small: Small) -> None:
