@@ -21,7 +21,8 @@ def merge(studies: tuple[Path, ...], output: Path) -> None:
 
     Everything is verified before and after. Protocols may differ in their raters
     alone, schedules are drawn from one secret, and no rater has sessions in two
-    folders. No secret is copied, and no ratings, analysis or report.
+    folders. No secret is copied, and nothing that is made of the logs: ratings,
+    analysis and report are made anew, and so are sheets to print.
     """
     from masrel.merging import merge_studies
 

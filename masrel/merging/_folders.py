@@ -11,6 +11,7 @@ from masrel._input import MAX_RECORDING, read_regular
 from masrel.conduct._study_log import append_event
 from masrel.errors import ParameterError, ScheduleError
 from masrel.merging._site_protocols import check_protocols, merged_protocol
+from masrel.paper._printing import has_answers
 from masrel.protocol import Protocol, StudyPaths, protocol_hash, read_protocol
 from masrel.schedule import read_schedule
 from masrel.schedule._secret import find_secret
@@ -57,8 +58,9 @@ def merge_studies(
     Returns
     -------
     MergedStudy
-        All raters, schedules, session logs, recordings and logs of conduct, byte for
-        byte. No secret is copied, nor what was made of the logs.
+        All raters, schedules, sheets that were typed, logs and recordings of sessions,
+        trainings and rehearsals, and logs of conduct, byte for byte. No secret is
+        copied, nor what was made of the logs.
 
     Raises
     ------
@@ -180,22 +182,42 @@ def _files(
             for file in (
                 study.schedule_file(rater, session.id),
                 study.sheet_file(rater, session.id),
+                study.typed_file(rater, session.id),
             )
         }
         for file in _files_of(study, protocol):
             if file not in others:
                 _add(files, file.relative_to(study.root).as_posix(), file)
-    for name, log in _conduct_logs(studies):
+    for name, log in (*_rehearsals(studies), *_conduct_logs(studies)):
         _add(files, name, log)
     return files
 
 
 def _files_of(study: StudyPaths, protocol: Protocol) -> Iterator[Path]:
-    for folder in (study.schedules, study.sessions):
-        yield from (path for path in sorted(folder.rglob("*")) if not path.is_dir())
+    for folder in (study.schedules, study.sessions, study.training):
+        yield from _inside(folder)
     yield from (study.root / model.file for model in protocol.models if model.file)
-    sources = (study.published_file, study.in_person_file)
+    typed = (path for path in study.sheets.glob("*.csv") if has_answers(path))
+    yield from sorted(typed)
+    sources = (study.published_file, study.published_answers_file, study.in_person_file)
     yield from (file for file in sources if file.exists())
+
+
+def _inside(folder: Path) -> list[Path]:
+    return [path for path in sorted(folder.rglob("*")) if not path.is_dir()]
+
+
+def _rehearsals(studies: Sequence[StudyPaths]) -> Iterator[tuple[str, Path]]:
+    # every site counts its own from 1: those of the next follow those of the one before
+    n_before = 0
+    for study in studies:
+        folders = [f for f in study.rehearsals.glob("*") if f.name.isdecimal()]
+        for folder in folders:
+            number = n_before + int(folder.name)
+            for file in _inside(folder):
+                place = file.relative_to(folder).as_posix()
+                yield f"{study.rehearsals.name}/{number}/{place}", file
+        n_before += max((int(folder.name) for folder in folders), default=0)
 
 
 def _add(files: dict[str, Path], name: str, file: Path) -> None:
@@ -245,8 +267,10 @@ def _merged_logs(
 
 
 def _write(merged: StudyPaths, files: dict[str, Path], protocol: bytes) -> None:
-    for folder in (merged.schedules, merged.sessions):  # they name the models
-        make_folder(folder, mode=0o700)
+    private = (merged.schedules, merged.sessions, merged.training, merged.rehearsals)
+    for folder in private:  # they name the models
+        if any(name.startswith(f"{folder.name}/") for name in files):
+            make_folder(folder, mode=0o700)
     for name, file in files.items():
         write_files({merged.root / name: _content(file)}, within=merged.root)
     write_files({merged.protocol: protocol})

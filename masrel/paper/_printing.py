@@ -82,7 +82,7 @@ def write_sheets(
     ]
     html = study.sheets / "sheets.html"
     typed = tuple(study.typed_file(form.rater, form.session) for form in forms)
-    unchanged = tuple(path for path in typed if path.exists() and _has_answers(path))
+    unchanged = tuple(path for path in typed if path.exists() and has_answers(path))
     texts = {
         path: _typed_text(form)
         for path, form in zip(typed, forms, strict=True)
@@ -129,8 +129,8 @@ def _places(
     return places if raters or not drawn else drawn
 
 
-def _has_answers(path: Path) -> bool:
-    # what cannot be read is not replaced either
+def has_answers(path: Path) -> bool:
+    """Return whether something has been typed into a file, or it cannot be read."""
     blank = {"sheet", "position", "code"}
     try:
         rows = read_typed(path).rows

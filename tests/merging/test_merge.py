@@ -14,10 +14,13 @@ from masrel.conduct import (
 )
 from masrel.errors import MasrelError, ParameterError, ProtocolError, ScheduleError
 from masrel.merging import merge_studies
+from masrel.paper import write_sheets
 from masrel.protocol import Protocol, StudyPaths, read_protocol
 from masrel.ratings import ratings_from_logs
-from masrel.run import ScriptGrades, run_session
+from masrel.run import ScriptGrades, SimulatedGrades, run_session
+from masrel.training import SimulatedTrainee, train_rater
 from masrel.verification import anchors_of, verify_study
+from tests.cli.test_train import RULES
 
 NewStudy = Callable[..., tuple[StudyPaths, Protocol]]
 Sites = tuple[StudyPaths, StudyPaths]
@@ -86,6 +89,56 @@ def test_all_raters_logs_and_recordings_come_over(sites: Sites, tmp_path: Path) 
     assert not [name for name in after if "secret" in name or name.startswith(".")]
     run(merged.study, "R4")  # the study goes on in the new folder
     assert {p.stat().st_mode & 0o077 for p in (merged.study.sessions,)} == {0}
+
+
+@pytest.mark.slow
+def test_what_is_no_rating_comes_over_too(sites: Sites, tmp_path: Path) -> None:
+    for study, rater in zip(sites, ("R2", "R3"), strict=True):
+        with study.protocol.open("a", encoding="utf-8") as file:
+            file.write(RULES)
+        protocol = read_protocol(study.protocol)
+        trainee = SimulatedTrainee(protocol)
+        train_rater(study, protocol, rater, grades=trainee, clock="simulated")
+        for _ in range(2):
+            run_session(
+                study,
+                protocol,
+                rater,
+                "test",
+                grades=SimulatedGrades(protocol),
+                clock="simulated",
+                rehearsal=True,
+            )
+        write_sheets(study, protocol)
+    filled_in = sites[0].typed_file("R1", "test")
+    text = filled_in.read_text(encoding="utf-8")
+    filled_in.write_text(text.replace(",\n", ",2\n"), encoding="utf-8")
+    (sites[1].root / "ratings").mkdir()
+    sites[1].published_answers_file.write_text("as it was", encoding="utf-8")
+    before = [contents(study.root) for study in sites]
+    merged = merge_studies(sites, tmp_path / "both").study
+    after = contents(merged.root)
+    # those of the second site follow those of the first
+    north, south = ({n for n in b if n.startswith("rehearsals/")} for b in before)
+    numbers = {name.split("/")[1] for name in after if name.startswith("rehearsals/")}
+    assert numbers == {"1", "2", "3", "4"}
+    assert all(after[name] == before[0][name] for name in north)
+    for name in south:
+        _, number, place = name.split("/", 2)
+        moved = f"rehearsals/{int(number) + 2}/{place}"
+        assert after[moved] == before[1][name]
+    for of_site in before:
+        for name in of_site:
+            if name.startswith("training/"):
+                assert after[name] == of_site[name]
+    assert after["ratings/published_answers.csv"] == b"as it was"
+    # a sheet in which nothing was typed is made again
+    assert [n for n in after if n.startswith("sheets/")] == ["sheets/test_R1.csv"]
+    verification = verify_study(merged)
+    assert verification.is_whole
+    assert [each.rater for each in verification.trainings] == ["R2", "R3"]
+    private = (merged.training, merged.rehearsals)
+    assert {path.stat().st_mode & 0o077 for path in private} == {0}
 
 
 def test_both_chains_of_conduct_stay_whole(sites: Sites, tmp_path: Path) -> None:
