@@ -12,6 +12,9 @@ from masrel.ratings import RECONSTRUCTED, GivenAnswer
 _MOST_BARS = 21  # a range of more whole numbers is counted in tenths
 _N_BINS = 10
 
+FEWEST_RATERS = 5
+"""With fewer, a summary could show what one of them answered."""
+
 
 def question_summaries(
     protocol: Protocol, answers: Sequence[GivenAnswer]
@@ -49,8 +52,9 @@ def _summary(
     model: str | None,
     group: Sequence[GivenAnswer],
 ) -> QuestionSummary:
-    answered = [each.answer for each in group if each.answer is not None]
-    numbers = [float(x) for x in answered if isinstance(x, int | float)]
+    answered = [each for each in group if each.answer is not None]
+    shown = [each.answer for each in answered if question.public or _are_many(answered)]
+    numbers = [float(x) for x in shown if isinstance(x, int | float)]
     return QuestionSummary(
         questionnaire=questionnaire,
         question=name,
@@ -63,24 +67,28 @@ def _summary(
         median=statistics.median(numbers) if numbers else math.nan,
         least=min(numbers, default=math.nan),
         most=max(numbers, default=math.nan),
-        counts=_counts(question, answered),
+        counts=_counts(question, shown) if shown else (),
         is_reconstructed=any(each.grades_from == RECONSTRUCTED for each in group),
     )
 
 
-def _counts(question: Question, answered: Sequence[object]) -> tuple[AnswerCount, ...]:
+def _are_many(answered: Sequence[GivenAnswer]) -> bool:
+    # an answer of which nobody knows whose it is stands for a rater
+    raters = [each.rater for each in answered]
+    return len({*raters} - {None}) + raters.count(None) >= FEWEST_RATERS
+
+
+def _counts(question: Question, shown: Sequence[object]) -> tuple[AnswerCount, ...]:
     # of each choice or whole number, or of each tenth of a range; none of texts
     if question.range is None:
-        return tuple(
-            AnswerCount(label=x, n=answered.count(x)) for x in question.choices
-        )
+        return tuple(AnswerCount(label=x, n=shown.count(x)) for x in question.choices)
     low, high = question.range
     if question.type == "whole" and high - low < _MOST_BARS:
         return tuple(
-            AnswerCount(label=str(x), n=answered.count(x)) for x in range(low, high + 1)
+            AnswerCount(label=str(x), n=shown.count(x)) for x in range(low, high + 1)
         )
     width = (high - low) / _N_BINS
-    places = [min(int((x - low) / width), _N_BINS - 1) for x in answered]  # type: ignore[operator]
+    places = [min(int((x - low) / width), _N_BINS - 1) for x in shown]  # type: ignore[operator]
     ends = pairwise(low + width * i for i in range(_N_BINS + 1))
     return tuple(
         AnswerCount(label=f"{left:g}–{right:g}", n=places.count(place))

@@ -278,7 +278,8 @@ class QuestionSummary:
         undefined.
     counts : tuple of AnswerCount
         Of each choice or whole number, or of each tenth of a wide range; empty for
-        texts.
+        texts, and where there is no answer. It is empty, too, and all numbers are
+        ``nan``, where fewer than 5 raters answered a question that is not public.
     is_reconstructed : bool
         Whether the answers were never given, and only fit what is printed of them.
     """

@@ -3,6 +3,8 @@
 from collections import Counter
 
 from masrel.analysis import QuestionSummary
+from masrel.analysis._question_summaries import FEWEST_RATERS
+from masrel.protocol import Protocol
 from masrel.report._figure_data import AnswerBars, AnswerPanel
 from masrel.report._material import (
     Drawing,
@@ -18,6 +20,11 @@ _TITLE = "Questionnaires"
 _RECONSTRUCTED = (
     "Reconstructed answers are one set that fits the published mean and standard "
     "deviation, not the answers that were given."
+)
+
+_WITHHELD = (
+    f"Where fewer than {FEWEST_RATERS} raters answered a question that is not public, "
+    "only n is shown: more could show what one of them answered."
 )
 
 _COLUMNS = (
@@ -49,13 +56,15 @@ def questionnaires_section(material: Material) -> Section:
         for question in questionnaire.questions
     ]
     blocks: list[Paragraph | Table | Drawing] = [Paragraph(text=text) for text in texts]
+    notes = [_RECONSTRUCTED] * is_made_up
+    notes += [_WITHHELD] * _is_any_withheld(material.protocol, summaries)
     blocks.append(
         Table(
             name="questionnaires",
             caption="Answers to each question, over all raters",
             columns=_COLUMNS,
             rows=tuple(_row(summary) for summary in summaries),
-            notes=(_RECONSTRUCTED,) if is_made_up else (),
+            notes=tuple(notes),
             data=data,
         )
     )
@@ -63,6 +72,21 @@ def questionnaires_section(material: Material) -> Section:
     if panels:
         blocks.append(_drawing(material, panels, is_made_up=is_made_up))
     return Section(name="questionnaires", title=_TITLE, blocks=tuple(blocks))
+
+
+def _is_any_withheld(
+    protocol: Protocol, summaries: tuple[QuestionSummary, ...]
+) -> bool:
+    texts = {
+        (questionnaire.id, question.id)
+        for questionnaire in protocol.questionnaires
+        for question in questionnaire.questions
+        if question.type == "text"  # of which nothing but n is ever shown
+    }
+    return any(
+        each.n and not each.counts and (each.questionnaire, each.question) not in texts
+        for each in summaries
+    )
 
 
 def _row(summary: QuestionSummary) -> tuple[Value, ...]:

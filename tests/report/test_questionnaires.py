@@ -1,6 +1,7 @@
 """The section of questionnaires says how questions were answered, not by whom."""
 
 import dataclasses
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from masrel.errors import RatingsError
 from masrel.protocol import Occasions, Protocol, StudyPaths, read_protocol
 from masrel.ratings import (
     GivenAnswer,
+    StudyData,
     answers_csv,
     read_answers,
     read_study_data,
@@ -26,6 +28,22 @@ HESS = StudyPaths(Path(__file__).parents[2] / "studies" / "hess2012")
 def summaries_of(*answers: GivenAnswer) -> tuple[QuestionSummary, ...]:
     data = read_study_data(HESS, read_protocol(HESS.protocol))
     return analyze(data.protocol, data.ratings, answers=answers).questionnaires
+
+
+def public(data: StudyData) -> StudyData:
+    """The study with questions whose answers may stand beside their raters."""
+    asked = [
+        msgspec.structs.replace(
+            each,
+            questions=tuple(
+                msgspec.structs.replace(question, public=True)
+                for question in each.questions
+            ),
+        )
+        for each in data.protocol.questionnaires
+    ]
+    protocol = msgspec.structs.replace(data.protocol, questionnaires=tuple(asked))
+    return replace(data, protocol=protocol)
 
 
 def score(answer: int | None, rater: str = "R1") -> GivenAnswer:
@@ -65,19 +83,45 @@ def test_models_stand_in_the_order_of_the_protocol() -> None:
 
 
 def test_numbers_are_summed_up_as_by_hand() -> None:
-    # mean 6, deviations -4, 0, 1, 3: SD = sqrt(26 / 3)
-    (summary,) = summaries_of(*(score(x) for x in (2, 6, 7, 9, None)))
-    assert (summary.n, summary.n_missing) == (4, 1)
+    # mean 6, deviations -4, 0, 0, 1, 3: SD = sqrt(26 / 4)
+    answers = (2, 6, 6, 7, 9, None)
+    (summary,) = summaries_of(*(score(x, f"R{i}") for i, x in enumerate(answers)))
+    assert (summary.n, summary.n_missing) == (5, 1)
     assert summary.mean == 6.0
-    assert summary.sd == pytest.approx((26 / 3) ** 0.5, rel=1e-15)
-    assert (summary.median, summary.least, summary.most) == (6.5, 2.0, 9.0)
+    assert summary.sd == pytest.approx((26 / 4) ** 0.5, rel=1e-15)
+    assert (summary.median, summary.least, summary.most) == (6.0, 2.0, 9.0)
     counts = {count.label: count.n for count in summary.counts}
     assert len(counts) == 10
     assert [label for label, n in counts.items() if n] == ["2", "6", "7", "9"]
 
 
-def test_one_answer_has_no_deviation_and_an_excluded_rater_none() -> None:
+def test_what_few_raters_answered_shows_nobodys_answer(tmp_path: Path) -> None:
     data = read_study_data(HESS, read_protocol(HESS.protocol))
+    report = msgspec.structs.replace(data.protocol.report, sections=("questionnaires",))
+    protocol = msgspec.structs.replace(data.protocol, report=report)
+
+    def shown(*answers: GivenAnswer) -> tuple[QuestionSummary, str]:
+        analysis = analyze(protocol, data.ratings, answers=answers)
+        files = write_report(protocol, data.ratings, analysis, tmp_path)
+        texts = [files.markdown, *files.tables]
+        (summary,) = analysis.questionnaires
+        return summary, "".join(text.read_text(encoding="utf-8") for text in texts)
+
+    four = [score(3, f"R{i}") for i in range(4)]
+    few, page = shown(*four, *four)  # each asked twice
+    assert (few.n, few.counts) == (8, ())
+    numbers = (few.mean, few.sd, few.median, few.least, few.most)
+    assert all(math.isnan(number) for number in numbers)
+    assert "3.00" not in page
+    assert "fewer than 5 raters answered a question" in page
+    many, page = shown(*four, score(8, "R4"))
+    assert (many.n, many.mean, many.least, many.most) == (5, 4.0, 3.0, 8.0)
+    assert "4.00 ± 2.24" in page
+    assert "fewer than" not in page
+
+
+def test_one_answer_has_no_deviation_and_an_excluded_rater_none() -> None:
+    data = public(read_study_data(HESS, read_protocol(HESS.protocol)))
     answers = (score(5), score(9, "R2"))
     analysis = analyze(data.protocol, data.ratings, answers=answers, excluded=["R2"])
     (summary,) = analysis.questionnaires
@@ -102,8 +146,14 @@ def test_the_design_says_what_is_practised_and_when_there_are_breaks(
     assert "A break of 5 min comes after every 8 presentations." in text
 
 
-CHOICE = {"id": "again", "text": "Again?", "type": "choice", "choices": ["yes", "no"]}
-ANALOGUE = {"id": "sure", "text": "Sure?", "type": "visual-analogue"}
+CHOICE = {
+    "id": "again",
+    "text": "Again?",
+    "type": "choice",
+    "choices": ["yes", "no"],
+    "public": True,
+}
+ANALOGUE = {"id": "sure", "text": "Sure?", "type": "visual-analogue", "public": True}
 TEXT = {"id": "note", "text": "What?", "type": "text"}
 
 
