@@ -208,16 +208,21 @@ def _inside(folder: Path) -> list[Path]:
 
 
 def _rehearsals(studies: Sequence[StudyPaths]) -> Iterator[tuple[str, Path]]:
-    # every site counts its own from 1: those of the next follow those of the one before
-    n_before = 0
-    for study in studies:
-        folders = [f for f in study.rehearsals.glob("*") if f.name.isdecimal()]
-        for folder in folders:
-            number = n_before + int(folder.name)
-            for file in _inside(folder):
-                place = file.relative_to(folder).as_posix()
-                yield f"{study.rehearsals.name}/{number}/{place}", file
-        n_before += max((int(folder.name) for folder in folders), default=0)
+    # A number that holds another rehearsal of the same rater at a site before is taken:
+    # then the next one that no site has.
+    folders = [f for s in studies for f in s.rehearsals.glob("*") if f.name.isdecimal()]
+    last = max((int(folder.name) for folder in folders), default=0)
+    files: dict[str, Path] = {}
+    for folder in folders:
+        inside = {f.relative_to(folder).as_posix(): f for f in _inside(folder)}
+        number = folder.name
+        others = {name: files.get(f"{number}/{name}") for name in inside}
+        if any(o and _content(o) != _content(inside[n]) for n, o in others.items()):
+            last += 1
+            number = str(last)
+        files |= {f"{number}/{name}": file for name, file in inside.items()}
+    for name, file in files.items():
+        yield f"{studies[0].rehearsals.name}/{name}", file
 
 
 def _add(files: dict[str, Path], name: str, file: Path) -> None:

@@ -99,11 +99,11 @@ def test_what_is_no_rating_comes_over_too(sites: Sites, tmp_path: Path) -> None:
         protocol = read_protocol(study.protocol)
         trainee = SimulatedTrainee(protocol)
         train_rater(study, protocol, rater, grades=trainee, clock="simulated")
-        for _ in range(2):
+        for rehearsing in (rater, "R2"):
             run_session(
                 study,
                 protocol,
-                rater,
+                rehearsing,
                 "test",
                 grades=SimulatedGrades(protocol),
                 clock="simulated",
@@ -118,19 +118,15 @@ def test_what_is_no_rating_comes_over_too(sites: Sites, tmp_path: Path) -> None:
     before = [contents(study.root) for study in sites]
     merged = merge_studies(sites, tmp_path / "both").study
     after = contents(merged.root)
-    # those of the second site follow those of the first
-    north, south = ({n for n in b if n.startswith("rehearsals/")} for b in before)
-    numbers = {name.split("/")[1] for name in after if name.startswith("rehearsals/")}
-    assert numbers == {"1", "2", "3", "4"}
-    assert all(after[name] == before[0][name] for name in north)
-    for name in south:
-        _, number, place = name.split("/", 2)
-        moved = f"rehearsals/{int(number) + 2}/{place}"
-        assert after[moved] == before[1][name]
-    for of_site in before:
-        for name in of_site:
-            if name.startswith("training/"):
-                assert after[name] == of_site[name]
+    # R2 rehearsed at both sites: the second one has the next number
+    logs = [n for n in after if n.startswith("rehearsals/") and n.endswith(".jsonl")]
+    names = "1/rehearsal_test_R2", "2/rehearsal_test_R2"
+    moved = "3/rehearsal_test_R2", "3/rehearsal_test_R3"
+    assert sorted(logs) == [f"rehearsals/{name}.jsonl" for name in (*names, *moved)]
+    for of_site, number in zip(before, ("1", "3"), strict=True):
+        for name, content in of_site.items():
+            if name.startswith(("training/", "rehearsals/1")):
+                assert after[name.replace("s/1/", f"s/{number}/")] == content
     assert after["ratings/published_answers.csv"] == b"as it was"
     # a sheet in which nothing was typed is made again
     assert [n for n in after if n.startswith("sheets/")] == ["sheets/test_R1.csv"]
