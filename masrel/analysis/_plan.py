@@ -24,7 +24,13 @@ from masrel.errors import (
     RatingsError,
 )
 from masrel.estimates import Estimate
-from masrel.protocol import EstimatePlan, Protocol, protocol_hash, scale_of
+from masrel.protocol import (
+    EstimatePlan,
+    Protocol,
+    protocol_hash,
+    report_sections,
+    scale_of,
+)
 from masrel.ratings import (
     GivenAnswer,
     InPerson,
@@ -91,7 +97,7 @@ def analyze(
         ratings = analysed_ratings(ratings, excluded)
         in_person = analysed_in_person(in_person, excluded)
         answers = [each for each in answers if each.rater not in excluded]
-    sections = set(protocol.report.sections)
+    sections = set(report_sections(protocol))
     # descriptions of grades speak of the first session that has ratings
     present = set(ratings.table["session"])
     session = next((s.id for s in protocol.sessions if s.id in present), None)

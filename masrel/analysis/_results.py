@@ -53,6 +53,11 @@ class PlannedEstimate:
     by_rater: tuple[RaterEstimate, ...] = ()
     reason: str | None = None
 
+    @property
+    def models(self) -> tuple[str, ...]:
+        """The models of the items: one that came again is an item each time."""
+        return tuple(dict.fromkeys(item.partition("#")[0] for item in self.items))
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ModelAgreement:

@@ -13,6 +13,7 @@ from masrel.protocol.content import (
     presented_content,
     presented_hash,
     protocol_hash,
+    report_sections,
     scale_of,
 )
 from masrel.protocol.definition import (
@@ -73,6 +74,7 @@ __all__ = [
     "protocol_hash",
     "read_model_file",
     "read_protocol",
+    "report_sections",
     "scale_of",
     "template_names",
 ]

@@ -91,6 +91,50 @@ def elbow_parameters(protocol: Protocol, model_id: str) -> ElbowParameters:
     return _joint_of(model, protocol.elbow)
 
 
+def report_sections(protocol: Protocol) -> tuple[str, ...]:
+    """Return the sections of a protocol's report.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        A protocol.
+
+    Returns
+    -------
+    tuple of str
+        Those that ``report.sections`` names. Where it names none, all that the study
+        has something for, in the order of a paper; grades given in person are shown
+        only where they are named.
+    """
+    if protocol.report.sections is not None:
+        return protocol.report.sections
+    has_something = {
+        "test-retest": any(
+            line.kind == "test-retest" for line in protocol.analysis.estimates
+        ),
+        "confusion": any(model.intended_grade is not None for model in protocol.models),
+        "questionnaires": bool(protocol.questionnaires),
+    }
+    return tuple(name for name in _STORY if has_something.get(name, True))
+
+
+_STORY = (
+    "design",
+    "grades",
+    "agreement",
+    "test-retest",
+    "categories",
+    "intended",
+    "confusion",
+    "order",
+    "speeds",
+    "traces",
+    "questionnaires",
+    "methods",
+)
+"""Sections in the order in which a paper tells them."""
+
+
 def _model_of(protocol: Protocol, model_id: str) -> Model:
     models = {model.id: model for model in protocol.models}
     if model_id not in models:
@@ -203,6 +247,17 @@ _LATER: dict[str, dict[str, object]] = {
 """Keys that protocols once had not, by table, with the defaults they then had: these
 do not enter, so that no schedule drawn before turns stale."""
 
+
+_FORMER_SECTIONS = (
+    "design",
+    "grades",
+    "agreement",
+    "intended",
+    "test-retest",
+    "speeds",
+    "traces",
+)
+"""The default of ``report.sections`` when it entered: it still does, for no choice."""
 
 _LATER_ARRAYS = ("questionnaires", "rater_fields")
 """Arrays and tables of tables that protocols once had not: empty, they do not enter."""
@@ -317,6 +372,8 @@ def _drop_later(plain: dict[str, Any]) -> None:
     for array in _LATER_ARRAYS:
         if not plain.get(array, True):
             del plain[array]
+    if "report" in plain and plain["report"]["sections"] is None:
+        plain["report"]["sections"] = _FORMER_SECTIONS
     for table, defaults in _LATER.items():
         if table not in plain:
             continue

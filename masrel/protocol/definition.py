@@ -291,20 +291,28 @@ class Report(_Table, frozen=True, kw_only=True):
     """``[report]``: which sections the report has, in order."""
 
     title: str = ""
-    sections: tuple[
-        Literal[
-            "design",
-            "grades",
-            "agreement",
-            "intended",
-            "in-person",
-            "test-retest",
-            "speeds",
-            "traces",
-            "questionnaires",
-        ],
-        ...,
-    ] = ("design", "grades", "agreement", "intended", "test-retest", "speeds", "traces")
+    # None leaves them to masrel: `report_sections` says which
+    sections: (
+        tuple[
+            Literal[
+                "design",
+                "grades",
+                "agreement",
+                "test-retest",
+                "categories",
+                "intended",
+                "confusion",
+                "in-person",
+                "order",
+                "speeds",
+                "traces",
+                "questionnaires",
+                "methods",
+            ],
+            ...,
+        ]
+        | None
+    ) = None
     gates: tuple[GateKeys, ...] = ()
 
 

@@ -1,4 +1,4 @@
-"""Section `conduct`: what became of the raters, and what happened to the study."""
+"""Sections `flow` and `conduct`: what became of the raters, and what happened."""
 
 import statistics
 from collections import Counter
@@ -19,7 +19,7 @@ from masrel.progress import (
 from masrel.protocol import Protocol, RaterField, StudyPaths
 from masrel.ratings import Correction, corrections_of, session_remarks
 from masrel.report._figure_data import FlowStep, RaterFlow
-from masrel.report._material import Drawing, Material, Paragraph, Section
+from masrel.report._material import Content, Drawing, Material, Paragraph, Section
 from masrel.report._tables import Column, Table, Value
 
 _WHO, _NOTES = "who", "notes"
@@ -109,28 +109,37 @@ def study_conduct(
     )
 
 
-def conduct_section(material: Material, conduct: StudyConduct) -> Section | None:
-    """Say what became of the raters and what happened; None where nothing is known."""
-    blocks: list[Paragraph | Table | Drawing] = []
+def conduct_sections(material: Material, conduct: StudyConduct) -> list[Section]:
+    """Say what became of the raters and what happened, as far as it is known."""
+    sections = []
     if any(session.last_event is not None for session in conduct.sessions):
-        blocks += [_flow_table(material, conduct), _flow_figure(material, conduct)]
-        blocks += _characteristics(material, conduct)
+        blocks: tuple[Content, ...] = (
+            _flow_table(material, conduct),
+            _flow_figure(material, conduct),
+            *_characteristics(material, conduct),
+        )
+        sections.append(Section(name="flow", title="Flow of the raters", blocks=blocks))
+    if happened := _happened(material, conduct):
+        sections.append(Section(name="conduct", title="Conduct", blocks=happened))
+    return sections
+
+
+def _happened(material: Material, conduct: StudyConduct) -> tuple[Content, ...]:
+    blocks: list[Content] = []
     if conduct.events:
         blocks += _event_tables(material, conduct)
     if conduct.corrections:
         blocks.append(_corrections_table(material, conduct))
     blocks += [Paragraph(text=text) for text in conduct.remarks]
     left_out = "; ".join(_left_out(material, conduct))
-    if blocks and left_out:
+    if left_out:
         blocks.append(
             Paragraph(
                 text=f"Left out, as nobody asked for it: {left_out}. masrel report "
                 "--include NAME shows what is in parentheses."
             )
         )
-    if not blocks:
-        return None
-    return Section(name="conduct", title="Conduct", blocks=tuple(blocks))
+    return tuple(blocks)
 
 
 def _analysed(material: Material, session: str | None = None) -> set[str]:

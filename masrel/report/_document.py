@@ -13,16 +13,20 @@ from functools import partial
 from pathlib import Path
 
 from masrel.analysis import Analysis
-from masrel.protocol import Protocol, Report
+from masrel.protocol import Protocol, report_sections
 from masrel.ratings import InPerson, Ratings
 from masrel.report._agreement import estimates_section
-from masrel.report._conduct import StudyConduct, conduct_section
+from masrel.report._conduct import StudyConduct, conduct_sections
 from masrel.report._design import design_section
+from masrel.report._grade_tables import categories_section, confusion_section
 from masrel.report._grades import grades_section, in_person_section, intended_section
 from masrel.report._material import Drawing, Material, Section, gather
+from masrel.report._methods import methods_section
+from masrel.report._order_section import order_section
 from masrel.report._pages import WRITERS, Block, Chapter, Document
 from masrel.report._question_tables import questionnaires_section
 from masrel.report._report_folder import MANIFEST, Assets, replace_report
+from masrel.report._result import result_text
 from masrel.report._stretches import speeds_section, traces_section
 from masrel.report._tables import Table, as_csv, tag_of
 from masrel.verification import Anchor
@@ -34,14 +38,18 @@ SECTIONS: dict[str, Callable[[Material], Section]] = {
     "design": design_section,
     "grades": grades_section,
     "agreement": partial(estimates_section, kind="inter-rater"),
-    "intended": intended_section,
-    "in-person": in_person_section,
     "test-retest": partial(estimates_section, kind="test-retest"),
+    "categories": categories_section,
+    "intended": intended_section,
+    "confusion": confusion_section,
+    "in-person": in_person_section,
+    "order": order_section,
     "speeds": speeds_section,
     "traces": traces_section,
     "questionnaires": questionnaires_section,
+    "methods": methods_section,
 }
-"""Name in ``report.sections`` to what makes it: only what a protocol names is made."""
+"""Name in ``report.sections`` to what makes it."""
 
 _INPUTS = {
     "protocol_sha256": "protocol",
@@ -89,8 +97,9 @@ def write_report(
 ) -> ReportFiles:
     """Write the report a protocol asks for.
 
-    Only the sections named in the protocol's ``report.sections`` are made, in
-    that order; matplotlib is loaded when a section has a figure.
+    It begins with what the study came to, in sentences. Of the sections only those are
+    made that `masrel.protocol.report_sections` names, in that order; matplotlib is
+    loaded when a section has a figure.
 
     Parameters
     ----------
@@ -107,8 +116,8 @@ def write_report(
     recordings : Path, optional
         The folder of the sessions' recordings, of which measured torque is drawn.
     conduct : StudyConduct, optional
-        How the study was run (`study_conduct`); where there is anything to say, the
-        report begins with it.
+        How the study was run (`study_conduct`); where there is anything to say, it is
+        said after the design.
     anchors : sequence of Anchor, optional
         Hashes of the session logs (`masrel.verification.anchors_of`), printed at the
         end: a report kept elsewhere shows whether the logs were written anew.
@@ -131,15 +140,17 @@ def write_report(
         If a file cannot be written; the pages that were there are then there still.
     """
     material = gather(protocol, ratings, analysis, in_person, recordings)
-    sections = [SECTIONS[name](material) for name in _section_names(protocol)]
-    if conduct is not None and (first := conduct_section(material, conduct)):
-        sections.insert(0, first)
+    sections = [SECTIONS[name](material) for name in report_sections(protocol)]
+    if conduct is not None:
+        place = 1 + next((i for i, s in enumerate(sections) if s.name == "design"), -1)
+        sections[place:place] = conduct_sections(material, conduct)
     assets = Assets()
     document = Document(
         title=protocol.report.title or protocol.study.title,
         tag=tag_of(material.data),
         banner=material.banner,
         provenance=material.provenance,
+        result=result_text(analysis),
         sections=_make_sections(sections, assets, progress, raw_csv=raw_csv),
         inputs=_inputs(analysis, anchors),
         version=analysis.masrel_version,
@@ -157,14 +168,6 @@ def write_report(
             destination / p for p in assets.contents if not p.endswith(".csv")
         ),
     )
-
-
-def _section_names(protocol: Protocol) -> tuple[str, ...]:
-    # who leaves the choice to masrel sees the questionnaires where there are some
-    names: tuple[str, ...] = protocol.report.sections
-    if names == Report().sections and protocol.questionnaires:
-        return (*names, "questionnaires")
-    return names
 
 
 def _make_sections(

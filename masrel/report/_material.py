@@ -6,7 +6,7 @@ from pathlib import Path
 from masrel.analysis import Analysis
 from masrel.protocol import Protocol
 from masrel.ratings import InPerson, Ratings
-from masrel.report._figure_data import Content
+from masrel.report import _figure_data as figure
 from masrel.report._tables import SIMULATED, SIMULATED_DEVICE, Table
 
 _SIMULATED_GRADES = (
@@ -116,8 +116,20 @@ class Drawing:
     name: str  # name of its files, without extension
     caption: str  # what it shows, understood alone
     alt: str  # what a reader who cannot see it needs to know
-    content: Content  # what is drawn
+    content: figure.Content  # what is drawn
     stamp: str  # the line that says where its data come from
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Listing:
+    """Text that is shown letter by letter, to be copied."""
+
+    title: str
+    text: str
+
+
+Content = Paragraph | Table | Drawing | Listing
+"""What a section is made of."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -126,7 +138,7 @@ class Section:
 
     name: str  # its name in the protocol's ``report.sections``
     title: str  # its heading
-    blocks: tuple[Paragraph | Table | Drawing, ...]  # its contents in order
+    blocks: tuple[Content, ...]  # in order
 
 
 def absent_section(name: str, title: str, reason: str | None) -> Section:

@@ -11,10 +11,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from masrel.report._material import Drawing, Paragraph
+from masrel.report._material import Content, Drawing, Listing, Paragraph
 from masrel.report._tables import Table, page_cells
 
-_KINDS = {Paragraph: "paragraph", Table: "table", Drawing: "figure"}
+_KINDS = {
+    Paragraph: "paragraph",
+    Table: "table",
+    Drawing: "figure",
+    Listing: "listing",
+}
 
 # Symbols of the model as they are written in plain text: an index after "_".
 _SYMBOL = re.compile(r"(?<!\w)(ΔT|k|ν|θ|p)_(peak|post|th|L|start|end|o|e)(?!\w)")
@@ -22,17 +27,17 @@ _SYMBOL = re.compile(r"(?<!\w)(ΔT|k|ν|θ|p)_(peak|post|th|L|start|end|o|e)(?!\
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Block:
-    """A paragraph, table or figure, with its number among those of its kind."""
+    """A part of a section, with its number among those of its kind."""
 
     number: int
-    content: Paragraph | Table | Drawing
+    content: Content
     # of a figure: its bytes, and its file from the report's folder, by form (png, svg)
     pictures: Mapping[str, bytes] = field(default_factory=dict)
     files: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def kind(self) -> str:
-        """What it is: paragraph, table or figure."""
+        """What it is: paragraph, table, figure or listing."""
         return _KINDS[type(self.content)]
 
 
@@ -53,6 +58,7 @@ class Document:
     tag: str  # what stands before a caption where data are simulated
     banner: str  # what the page says in large letters, if anything
     provenance: str  # the sentence at its head
+    result: str  # the first paragraph: what the study came to
     sections: tuple[Chapter, ...]
     inputs: tuple[tuple[str, str], ...]  # what it was made from, and the hash of that
     version: str  # of masrel

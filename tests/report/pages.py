@@ -18,12 +18,16 @@ ALL = (
     "design",
     "grades",
     "agreement",
-    "intended",
-    "in-person",
     "test-retest",
+    "categories",
+    "intended",
+    "confusion",
+    "in-person",
+    "order",
     "speeds",
     "traces",
     "questionnaires",
+    "methods",
 )
 
 AGAIN = plan(

@@ -28,6 +28,7 @@ GREY = "#6B6B6B"
 BLUE = "#0072B2"
 ORANGE = "#E69F00"
 VERMILLION = "#D55E00"
+ALARM = "#A63C00"  # darker, so that letters in it can be read on white
 
 DASHES = (0, (4, 3))
 """Line style of what is a reference, not data."""
@@ -111,7 +112,7 @@ def draw(
                 x=0.995,
                 ha="right",
                 fontsize=9.5 if is_loud else 7,
-                color=VERMILLION if is_loud else GREY,
+                color=ALARM if is_loud else GREY,
                 weight="bold" if is_loud else "normal",
             )
         return {form: file_of(figure, form) for form in forms}

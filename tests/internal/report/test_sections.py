@@ -43,7 +43,10 @@ def said(rows: Ratings, section: str) -> list[str]:
 def test_every_section_of_a_protocol_is_made_here() -> None:
     hints = msgspec.inspect.type_info(type(hess2012().report))
     (sections,) = [f.type for f in hints.fields if f.name == "sections"]
-    assert set(sections.item_type.values) == set(SECTIONS) == set(ALL)
+    (names,) = [
+        t for t in sections.types if not isinstance(t, msgspec.inspect.NoneType)
+    ]
+    assert set(names.item_type.values) == set(SECTIONS) == set(ALL)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,95 @@
+"""What a paper cites: the entries of a BibTeX file, and what each is cited for."""
+
+import re
+from collections.abc import Iterable
+from functools import cache
+from pathlib import Path
+
+from masrel.agreement import COEFFICIENTS
+from masrel.estimates import Interval
+from masrel.scales import PublishedScale
+
+_FILE = Path(__file__).with_name("templates") / "references.bib"
+
+_COEFFICIENTS = {
+    "cohen_kappa": ("cohen1960",),
+    "conger_kappa": ("conger1980",),
+    "fleiss_kappa": ("fleiss1971",),
+    "light_kappa": ("light1971",),
+    "scott_pi": ("scott1955",),
+    "brennan_prediger": ("brennan1981",),
+    "gwet_ac": ("gwet2008",),
+    "krippendorff_alpha": ("hayes2007",),
+    "stratified_kappa": ("barlow1991",),
+    "pooled_kappa": ("barlow1991",),
+    "kendall_w": ("kendall1939",),
+    "robinson_a": ("robinson1957",),
+    "lin_ccc": ("lin1989",),
+    "percent_agreement": (),  # everybody knows it
+}
+
+_METHODS = {
+    "jackknife": "efron1981",
+    "bootstrap": "efron1993",
+    "Dirichlet-multinomial": "mosimann1962",
+    "delta method": "gwet2014",
+}
+"""Words in the method of an interval to what it rests on."""
+
+_SCALES = {
+    "modified-ashworth": ("bohannon1987",),
+    "ashworth": ("ashworth1964",),
+    "tardieu": ("gracies2010",),
+    "modified-tardieu": ("boyd1999",),
+    "updrs-rigidity": ("goetz2008",),
+}
+
+
+def coefficient_references(coefficient: str, weights: str) -> tuple[str, ...]:
+    """Return the keys of what a coefficient is cited for."""
+    keys = _COEFFICIENTS.get(coefficient)
+    if keys is None:  # the forms of ICC, and errors in the units of the ratings
+        in_units = COEFFICIENTS[coefficient].in_units
+        keys = ("devet2006",) if in_units else ("mcgraw1996",)
+    return keys if weights == "identity" else (*keys, "cohen1968")
+
+
+def interval_references(interval: Interval) -> tuple[str, ...]:
+    """Return the keys of what the method of an interval is cited for."""
+    return tuple(key for words, key in _METHODS.items() if words in interval.method)
+
+
+def scale_references(scale: PublishedScale | None) -> tuple[str, ...]:
+    """Return the keys of what a scale is cited for, if it is one of the literature."""
+    return () if scale is None else _SCALES[scale.id]
+
+
+@cache
+def _entries() -> dict[str, str]:
+    # key -> entry as it stands in the file
+    text = _FILE.read_text(encoding="utf-8")
+    entries = (entry.strip() for entry in text.split("\n\n"))
+    return {entry.partition("{")[2].partition(",")[0]: entry for entry in entries}
+
+
+def bibtex(keys: Iterable[str]) -> str:
+    """Return entries as BibTeX, in the order of their keys."""
+    return "\n\n".join(_entries()[key] for key in sorted(set(keys)))
+
+
+def cited(keys: Iterable[str]) -> str:
+    """Return references in brackets with a space before them; nothing for none."""
+    names = "; ".join(map(_author_year, keys))
+    return f" ({names})" if names else ""
+
+
+def _author_year(key: str) -> str:
+    entry = _entries()[key]
+    authors = re.search(r"author = \{(.*)\},", entry)
+    year = re.search(r"year = \{(\d+)\}", entry)
+    if authors is None or year is None:
+        raise KeyError(f"{_FILE.name}: {key} has no author or year")
+    surnames = [name.partition(",")[0] for name in authors[1].split(" and ")]
+    if len(surnames) > 2 or surnames[-1] == "others":
+        return f"{surnames[0]} et al., {year[1]}"
+    return f"{' & '.join(surnames)}, {year[1]}"
