@@ -16,7 +16,7 @@ from pathlib import Path
 from types import MappingProxyType, TracebackType
 from typing import TYPE_CHECKING, Self
 
-from masrel._files import make_folder, no_follow, sync_folder
+from masrel._files import make_folder, naming, no_follow, sync_folder
 from masrel._input import MAX_TABLE, parse_json, read_regular
 from masrel._once import once
 from masrel.errors import SessionLogError
@@ -264,7 +264,7 @@ class SessionLog:
             self.append("recovered", {**facts, "kept": True, "moved_to": None})
             return
         torn_file = self.path.with_name(self.path.name + ".torn")
-        with open(torn_file, "ab", opener=no_follow) as file:
+        with naming(torn_file), open(torn_file, "ab", opener=no_follow) as file:
             file.write(torn + b"\n")
             file.flush()
             os.fsync(file.fileno())
@@ -324,11 +324,12 @@ class SessionLog:
         descriptor, self._descriptor = self._descriptor, None
         is_written = False
         try:
-            remaining = memoryview(line + b"\n")
-            while remaining:
-                remaining = remaining[os.write(descriptor, remaining) :]
-            os.ftruncate(descriptor, os.lseek(descriptor, 0, os.SEEK_CUR))
-            os.fsync(descriptor)
+            with naming(self.path):
+                remaining = memoryview(line + b"\n")
+                while remaining:
+                    remaining = remaining[os.write(descriptor, remaining) :]
+                os.ftruncate(descriptor, os.lseek(descriptor, 0, os.SEEK_CUR))
+                os.fsync(descriptor)
             is_written = True
         finally:
             # After a failed or interrupted write nothing may follow on this line.

@@ -66,7 +66,7 @@ def write_files(
         for path, data in contents.items():
             parts[path] = _write_part(path, data, within, mode)
         for path in contents:
-            with _naming(path):
+            with naming(path):
                 os.replace(parts[path], path)
             del parts[path]
     finally:
@@ -83,7 +83,7 @@ def new_file(path: Path) -> Iterator[BinaryIO]:
     refuse_record(path)
     part, descriptor = _new_part(path)
     try:
-        with _naming(path):
+        with naming(path):
             try:
                 with os.fdopen(descriptor, "wb", closefd=False) as out:
                     yield out
@@ -119,7 +119,7 @@ def _write_part(
     """Write what a file is to hold into a new one beside it, which is returned."""
     part, descriptor = _new_part(path, within, mode)
     try:
-        with _naming(path):
+        with naming(path):
             remaining = memoryview(data.encode() if isinstance(data, str) else data)
             while remaining:
                 remaining = remaining[os.write(descriptor, remaining) :]
@@ -143,7 +143,7 @@ def _new_part(
     make_folder(path.parent)
     part = path.with_name(f"{_PART_BEGINS}{os.urandom(8).hex()}{_PART_ENDS}")
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | _NO_FOLLOW | _BINARY
-    with _naming(path):
+    with naming(path):
         descriptor = os.open(part, flags, 0o666 if mode is None else mode)
     if mode is not None:
         part.chmod(mode)  # as it was, whatever the umask is now
@@ -167,7 +167,8 @@ def _remove_left_over(folder: Path) -> None:
 
 
 @contextmanager
-def _naming(path: Path) -> Iterator[None]:
+def naming(path: Path) -> Iterator[None]:
+    """Within it, an error of the system that names no file names this one."""
     try:
         yield
     except OSError as error:

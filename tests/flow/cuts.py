@@ -20,6 +20,8 @@ from typing import Any
 
 import pytest
 
+from masrel.run import read_log
+
 CHANGING = ("open", "write", "fsync", "replace", "unlink", "mkdir", "chmod")
 
 # Calls of the system that change a file or a folder, and those that need space
@@ -41,9 +43,27 @@ def contents(root: Path) -> Contents:
     """Hashes of the files under a folder but those that are not whole yet."""
     return {
         str(path.relative_to(root)): hashlib.sha256(path.read_bytes()).hexdigest()
-        for path in root.rglob("*")
-        if path.is_file() and not path.name.startswith(".masrel-")
+        for path in _whole_files(root)
     }
+
+
+def events_and_contents(root: Path) -> Contents:
+    """The same, of logs their events but when they were; every chain must hold."""
+    logs = [path for path in _whole_files(root) if path.suffix == ".jsonl"]
+    events = {
+        str(log.relative_to(root)): "".join(
+            f"{event.kind} {dict(event.fields)}\n" for event in read_log(log)
+        )
+        for log in logs
+    }
+    return contents(root) | events
+
+
+def _whole_files(root: Path) -> Iterator[Path]:
+    for path in root.rglob("*"):
+        places = path.relative_to(root).parts
+        if path.is_file() and not any(part.startswith(".masrel-") for part in places):
+            yield path
 
 
 @contextmanager
@@ -90,7 +110,12 @@ class Cuts:
 def check_old_or_new(before: Contents, left: list[Contents], after: Contents) -> None:
     for moment in left:
         for path in {*before, *moment, *after}:
-            assert moment.get(path) in (before.get(path), after.get(path)), path
+            old, now, new = (each.get(path) for each in (before, moment, after))
+            if path.endswith(".jsonl") and now is not None and new is not None:
+                assert new.startswith(now), path  # events are added one by one
+                assert now.startswith(old or ""), path
+            else:
+                assert now in (old, new), path
 
 
 def check_links(root: Path) -> None:
