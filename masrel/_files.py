@@ -104,10 +104,16 @@ def new_folder(folder: Path) -> Iterator[Path]:
         raise ParameterError(f"{folder}: needed a new or empty folder, got another")
     make_folder(folder.parent)
     part = folder.with_name(f"{_PART_BEGINS}{os.urandom(8).hex()}{_PART_ENDS}")
-    part.mkdir()
     try:
+        part.mkdir()
         yield part
         os.replace(part, folder)
+    except OSError as error:
+        place = Path(str(error.filename))
+        if place.is_relative_to(part):  # nobody knows it
+            error.filename = str(folder / place.relative_to(part))
+            error.filename2 = None
+        raise
     finally:
         shutil.rmtree(part, ignore_errors=True)
     sync_folder(folder.parent)

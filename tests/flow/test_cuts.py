@@ -269,16 +269,21 @@ def some(syscalls: list[Syscall], share: float) -> list[Syscall]:
 
 
 EVERY = pytest.mark.parametrize(
-    "share",
+    ("verb", "share"),
     [
-        pytest.param(0.1, marks=pytest.mark.slow),
-        pytest.param(1.0, marks=[pytest.mark.long, pytest.mark.faults]),
+        *(
+            pytest.param(verb, 0.1, marks=pytest.mark.slow)
+            for verb in (*VERBS, "note", "merge")
+        ),
+        *(
+            pytest.param(verb, 1.0, marks=[pytest.mark.long, pytest.mark.faults])
+            for verb in (*VERBS, *OTHERS)
+        ),
     ],
 )
 
 
 @EVERY
-@pytest.mark.parametrize("verb", [*VERBS, *OTHERS])
 def test_a_kill_at_every_system_call(
     verb: str, share: float, traced: Callable[[str], Traced], faults: Faults
 ) -> None:
@@ -291,7 +296,6 @@ def test_a_kill_at_every_system_call(
 
 
 @EVERY
-@pytest.mark.parametrize("verb", [*VERBS, *OTHERS])
 def test_a_full_disk_at_every_system_call(
     verb: str, share: float, traced: Callable[[str], Traced], faults: Faults
 ) -> None:
