@@ -11,8 +11,10 @@ from masrel.elbow import (
     ConstantSpeed,
     ElbowParameters,
     JointModel,
+    Outline,
     Trace,
     evaluate,
+    outline,
     trace,
 )
 from masrel.protocol import Protocol, joint_model
@@ -41,6 +43,7 @@ from masrel.report._tables import (
 )
 
 _PANELS_PER_FIGURE = 4
+_N_POINTS = 200  # of a line: a panel is not much wider
 
 # Slower is no stretch, and its trace would last for minutes.
 _SLOWEST_DRAWN_DEG_S = 1.0
@@ -157,9 +160,8 @@ def _has_many(speeds: Sequence[Speed]) -> bool:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Stretch:
     speed: Speed  # whose it is, and how fast
-    trace: Trace  # what the controller commands, at the device's rate
-    # the largest torque, N·m: of the exact law, or of the samples of another kind
-    peak: float
+    trace: Outline | Trace  # of the exact law, or samples of another kind
+    peak: float  # its largest torque, N·m
 
 
 def traces_section(material: Material) -> Section:
@@ -186,8 +188,7 @@ def traces_section(material: Material) -> Section:
         f"at constant speed from {as_entered(protocol.stretch.start_deg)}° to "
         f"{as_entered(end_deg)}°, at the {kind} of session "
         f"{session}, one line a {each}. Torque resists extension; the arm's own "
-        "inertia is not in it. Torque and phases are what the control law sends at "
-        f"{as_entered(protocol.device.rate_hz)} Hz."
+        "inertia is not in it."
     )
     if any(value.is_graded for value in values):
         text += " A thicker line is the stretch that the rater said the grade rests on."
@@ -230,10 +231,13 @@ def _of_model(
         ConstantSpeed(start=start, end=end, speed=math.radians(speed.mean_speed_deg_s))
         for speed in speeds
     ]
-    made = [trace(joint, motion, rate_hz=rate_hz) for motion in motions]
-    peaks = [float(line.torque.max()) for line in made]
+    made: Sequence[Outline | Trace]
     if isinstance(joint, ElbowParameters):
+        made = [outline(joint, motion, n_points=_N_POINTS) for motion in motions]
         peaks = evaluate(joint, motions, ["peak_torque"]).column("peak_torque").tolist()
+    else:
+        made = [trace(joint, motion, rate_hz=rate_hz) for motion in motions]
+        peaks = [float(line.torque.max()) for line in made]
     return [
         _Stretch(speed=speed, trace=line, peak=peak)
         for speed, line, peak in zip(speeds, made, peaks, strict=True)

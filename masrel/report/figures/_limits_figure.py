@@ -136,9 +136,13 @@ def _draw_hexagons(axes: Axes, panel: DifferencePanel) -> None:
     )
     figure = axes.get_figure()
     if figure is not None:
-        bar = figure.colorbar(drawn, ax=axes, pad=0.02, shrink=0.8)
-        bar.ax.yaxis.set_major_formatter("{x:g}")
-        bar.ax.yaxis.set_minor_formatter(LogFormatter())
+        # above the axes: at its right are the names of the lines
+        place = axes.inset_axes((0.5, 1.03, 0.5, 0.03))
+        bar = figure.colorbar(drawn, cax=place, orientation="horizontal")
+        place.xaxis.tick_top()
+        place.xaxis.set_label_position("top")
+        place.xaxis.set_major_formatter("{x:g}")
+        place.xaxis.set_minor_formatter(LogFormatter())
         bar.set_label("items in a hexagon")
 
 

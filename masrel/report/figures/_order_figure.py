@@ -74,7 +74,7 @@ def _draw(
         axes.xaxis.set_major_locator(MaxNLocator(nbins=8, integer=True, min_n_ticks=1))
     if n_columns <= _MAX_NUMBERS:
         _write_numbers(axes, shown)
-    bar = figure.colorbar(image, ax=axes, pad=0.02, shrink=0.9)
+    bar = figure.colorbar(image, cax=axes.inset_axes((1.02, 0.05, 0.03, 0.9)))
     bar.ax.yaxis.set_major_locator(MaxNLocator(nbins=4, integer=True))
     bar.ax.tick_params(labelsize=7)
     bar.outline.set_visible(False)

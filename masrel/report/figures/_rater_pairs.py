@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from masrel.report._figure_data import PairMaps, RaterPairs
 from masrel.report._tables import number, percent
-from masrel.report.figures._style import BLACK, BLUE, DASHES, GREY
+from masrel.report.figures._style import BLACK, BLUE, DASHES, GREY, short_name
 
 _Floats = NDArray[np.float64]
 
@@ -29,7 +29,6 @@ _NO_PAIR = "#E8E8E8"
 
 _CELLS = ((8, 0.42), (14, 0.33), (40, 0.2), (10_000, 0.13))  # raters, inches of a cell
 _MAX_NUMBERS = 14  # raters up to which numbers are written in the cells
-_MAX_LETTERS = 22  # of a name
 # inches: of the panel at the right and what is before it, below and above both, and of
 # the narrowest bar of colours
 _PANEL, _BETWEEN, _BELOW, _STAMP, _MIN_BAR = 2.3, 0.35, 0.95, 0.25, 1.4
@@ -57,7 +56,7 @@ class _Layout:
         cell = next(inches for most, inches in _CELLS if r <= most)
         letters = 9.0 if cell > 0.25 else 7.5 if cell > 0.15 else 6.0
         names = [*group.raters, *filter(None, [group.reference])]
-        labels = [_short(name) for name in names]
+        labels = [short_name(name) for name in names]
         return cls(
             labels=labels,
             letters=letters,
@@ -89,7 +88,6 @@ def rater_figure(content: PairMaps) -> Figure:
         for group, at in zip(content.groups, layouts, strict=True)
     ]
     figure = Figure(figsize=(max(at.width for at in layouts), sum(heights)))
-    figure.set_layout_engine("none")
     below = sum(heights)
     for group, layout, height in zip(content.groups, layouts, heights, strict=True):
         below -= height
@@ -232,11 +230,3 @@ def _influence(axes: Axes, content: RaterPairs, cell: float) -> None:
             bbox_to_anchor=(0.5, 1.0),
             fontsize=8,
         )
-
-
-def _short(name: str) -> str:
-    # the middle goes: names often differ at their end
-    if len(name) <= _MAX_LETTERS:
-        return name
-    half = (_MAX_LETTERS - 1) // 2
-    return f"{name[:half]}…{name[-half:]}"

@@ -1,4 +1,4 @@
-"""Figures of a study's report: grades, speeds, and traces of torque and angle."""
+"""Figures of a study's report: grades and speeds."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -9,14 +9,8 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
-from numpy.typing import NDArray
 
-from masrel.report._figure_data import (
-    GradeGrid,
-    MeasuredTorque,
-    SpeedDots,
-    TraceColumns,
-)
+from masrel.report._figure_data import GradeGrid, SpeedDots
 from masrel.report.figures._style import (
     BLACK,
     BLUE,
@@ -24,22 +18,16 @@ from masrel.report.figures._style import (
     GREY,
     ORANGE,
     VERMILLION,
+    short_name,
 )
 
 _INTENDED_X = -1.3  # where intended grades stand; raters are at 0, 1, 2, ...
 _SHADES = LinearSegmentedColormap.from_list("grades", ["#F2F6FA", "#7FB6DA", "#003A5D"])
 
+_UPRIGHT_LETTERS = 7  # of a rater's name that fits above a column
+
 _MODELS_IN_A_ROW = 8  # more go into further rows: a page is no wider
 _SESSION_LOOKS = (("o", BLUE), ("s", ORANGE), ("^", VERMILLION), ("v", GREY))
-
-_GRADED_WIDTH = 2.2  # of the line of a stretch that a grade rests on, of the others
-
-# Name of each phase, and how its line looks.
-_PHASES: tuple[tuple[str, dict[str, Any]], ...] = (
-    ("pre-catch", {"color": GREY, "linewidth": 0.8}),
-    ("catch", {"color": VERMILLION, "linewidth": 1.5}),
-    ("post-catch", {"color": BLUE, "linewidth": 1.0, "linestyle": (0, (4, 1.2))}),
-)
 
 
 def grade_figure(grid: GradeGrid) -> Figure:
@@ -54,11 +42,12 @@ def grade_figure(grid: GradeGrid) -> Figure:
             _cell(axes, column, row, grades, grid.scale, aim)
     axes.set_xlim(_INTENDED_X - 0.55, n_columns - 0.45)
     axes.set_ylim(n_rows - 0.4, -0.6)
-    axes.set_xticks([_INTENDED_X, *range(n_columns)], ["intended", *grid.raters])
-    axes.set_yticks(range(n_rows), grid.models)
+    raters = [short_name(rater) for rater in grid.raters]
+    axes.set_xticks([_INTENDED_X, *range(n_columns)], ["intended", *raters])
+    axes.set_yticks(range(n_rows), [short_name(model) for model in grid.models])
     axes.tick_params(length=0)
     axes.xaxis.tick_top()
-    if n_columns > 12:
+    if n_columns > 12 or max(map(len, raters)) > _UPRIGHT_LETTERS:
         axes.tick_params(axis="x", rotation=90)
     for spine in axes.spines.values():
         spine.set_visible(False)
@@ -119,7 +108,8 @@ def speed_figure(dots: SpeedDots) -> Figure:
     if len(dots.raters) > 1:
         label += f"; in each, raters {dots.raters[0]} to {dots.raters[-1]} from left"
     rows[-1].set_xlabel(label)
-    figure.supylabel("mean speed before the catch (deg/s)", fontsize=9)
+    for axes in rows:
+        axes.set_ylabel("mean speed before\nthe catch (deg/s)")
     looks = zip(sessions, _SESSION_LOOKS * len(sessions), strict=False)
     marks = [
         Line2D([], [], marker=marker, color=colour, linestyle="none", label=session)
@@ -140,123 +130,47 @@ def _speed_row(
         session = sessions.index(column.session)
         middle = models.index(column.model) - 0.38 + width * (session + 0.5)
         marker, colour = _SESSION_LOOKS[session % len(_SESSION_LOOKS)]
-        n_raters = len(column.speeds)
-        for rater, speeds in enumerate(column.speeds):
-            place = middle + 0.9 * width * ((rater + 0.5) / n_raters - 0.5)
-            places = [place] * len(speeds)
-            axes.plot(places, speeds, marker, color=colour, markersize=5, alpha=0.9)
-            graded = column.graded[rater] if column.graded else ()
-            places = [place] * len(graded)
-            axes.plot(places, graded, "o", color=BLACK, markersize=8, fillstyle="none")
+        axes.plot(
+            *_strip(column.speeds, middle, width), marker, color=colour, markersize=5,
+            alpha=0.9,
+        )  # fmt: skip
+        if any(column.graded):
+            axes.plot(
+                *_strip(column.graded, middle, width), "o", color=BLACK, markersize=8,
+                fillstyle="none",
+            )  # fmt: skip
         ends = [middle - 0.45 * width, middle + 0.45 * width]
         axes.plot(ends, [column.mean, column.mean], color=BLACK, linewidth=1.6)
     axes.axhline(dots.slowest, color=GREY, linewidth=0.8, linestyle=DASHES)
-    axes.annotate(
-        r"$\nu_L$",
-        (1.0, dots.slowest),
-        xycoords=("axes fraction", "data"),
-        xytext=(3, 0),
-        textcoords="offset points",
-        va="center",
-        color=GREY,
-        parse_math=True,
-    )
-    axes.set_xticks(range(len(models)), models)
+    # ν_L as two texts: to parse it as mathematics takes as long as to draw the rest
+    for letter, size, offset in (("ν", 9.0, (3.0, 0.0)), ("L", 6.5, (8.5, -3.0))):
+        axes.annotate(
+            letter,
+            (1.0, dots.slowest),
+            xycoords=("axes fraction", "data"),
+            xytext=offset,
+            textcoords="offset points",
+            va="center",
+            color=GREY,
+            fontsize=size,
+            style="italic",
+        )
+    names = [short_name(model) for model in models]
+    is_long = max(map(len, names)) > _UPRIGHT_LETTERS
+    slanted: dict[str, Any] = {"rotation": 30, "ha": "right", "rotation_mode": "anchor"}
+    axes.set_xticks(range(len(models)), names, **slanted if is_long else {})
     axes.set_xlim(-0.55, len(models) - 0.45)
     axes.grid(axis="y")
 
 
-def trace_figure(columns: TraceColumns) -> Figure:
-    """Return torque and angle against time, one column a model."""
-    figure, grid = _torque_above_angle(len(columns.panels))
-    for (top, bottom), panel in zip(grid.T, columns.panels, strict=True):
-        graded = panel.graded or (False,) * len(panel.stretches)
-        for is_graded, lines in zip(graded, panel.stretches, strict=True):
-            time, angle, torque, phase = lines
-            width = _GRADED_WIDTH if is_graded else 1.0
-            _by_phase(top, time, torque, phase, width)
-            _by_phase(bottom, time, angle, phase, width)
-        top.set_title(panel.title)
-    _finish(figure, grid, "model torque (N·m)")
-    handles = [Line2D([], [], solid_capstyle="butt", **look) for _, look in _PHASES]
-    for handle in handles:
-        handle.set_linewidth(handle.get_linewidth() + 0.5)
-    figure.legend(
-        handles,
-        [name for name, _ in _PHASES],
-        loc="outside lower center",
-        ncols=3,
-        handlelength=3.0,
-    )
-    return figure
-
-
-def measured_figure(content: MeasuredTorque) -> Figure:
-    """Return the torque that was sent and that was measured, above the angle."""
-    figure, grid = _torque_above_angle(len(content.panels))
-    for (top, bottom), panel in zip(grid.T, content.panels, strict=True):
-        top.plot(panel.time, panel.measured, color=BLUE, linewidth=0.8)
-        top.plot(panel.time, panel.sent, color=BLACK, linewidth=1.0, dashes=(3, 1.5))
-        bottom.plot(panel.time, panel.angle, color=GREY, linewidth=1.0)
-        top.set_title(panel.title)
-    _finish(figure, grid, "torque (N·m)")
-    figure.legend(
-        handles=[
-            Line2D([], [], color=BLUE, linewidth=1.3, label="measured"),
-            Line2D([], [], color=BLACK, linewidth=1.3, dashes=(3, 1.5), label="sent"),
-        ],
-        loc="outside lower center",
-        ncols=2,
-        handlelength=3.0,
-    )
-    return figure
-
-
-def _torque_above_angle(n_panels: int) -> tuple[Figure, NDArray[Any]]:
-    # -> the figure, and its axes (2, n_panels)
-    figure = Figure(figsize=(max(3.4, 0.5 + 2.05 * n_panels), 4.7))
-    grid = figure.subplots(
-        2,
-        n_panels,
-        sharex=True,
-        sharey="row",
-        squeeze=False,
-        height_ratios=(1.5, 1.0),
-    )
-    return figure, grid
-
-
-def _finish(figure: Figure, grid: NDArray[Any], torque_label: str) -> None:
-    for axes in grid.flat:
-        axes.grid(axis="y")
-    for axes in grid[1]:
-        axes.set_xlabel("time (s)")
-    # Limits come last: set before the last stretch they would cut it off.
-    grid[0, 0].set_xlim(left=0)
-    grid[0, 0].set_ylim(bottom=min(0.0, grid[0, 0].get_ylim()[0]))
-    grid[0, 0].set_ylabel(torque_label)
-    grid[1, 0].set_ylabel("elbow angle (deg)")
-    figure.align_ylabels(grid[:, 0])
-
-
-def _by_phase(
-    axes: Axes,
-    time: NDArray[np.generic],
-    values: NDArray[np.generic],
-    phase: NDArray[np.generic],
-    width: float,
-) -> None:
-    # One line per run of a phase; each begins where the one before ended.
-    codes = np.asarray(phase, dtype=np.intp)
-    starts = np.flatnonzero(np.diff(codes, prepend=-1))
-    ends = np.append(starts[1:] + 1, codes.size)
-    for start, end in zip(starts, ends, strict=True):
-        _, look = _PHASES[codes[start]]
-        run = slice(start, end)
-        line = Line2D(time[run], values[run], solid_capstyle="butt", **look)
-        line.set_linewidth(width * line.get_linewidth())
-        axes.add_line(line)
-    for start in starts[1:]:
-        colour = _PHASES[codes[start]][1]["color"]
-        axes.plot(time[start], values[start], "o", color=colour, markersize=2.4)
-    axes.autoscale_view()
+def _strip(
+    speeds: Sequence[Sequence[float]], middle: float, width: float
+) -> tuple[list[float], list[float]]:
+    # every rater's speeds above each other, raters from left to right
+    n_raters = len(speeds)
+    places = [
+        middle + 0.9 * width * ((rater + 0.5) / n_raters - 0.5)
+        for rater, of_rater in enumerate(speeds)
+        for _ in of_rater
+    ]
+    return places, [speed for of_rater in speeds for speed in of_rater]

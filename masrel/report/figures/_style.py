@@ -4,19 +4,19 @@ Colours are Okabe and Ito's, which colour-blind readers tell apart; shapes, line
 styles and text repeat what the colours say, so that a grey print loses nothing.
 """
 
-import io
+import gc
 import textwrap
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import matplotlib as mpl
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.backends.backend_pdf import FigureCanvasPdf
-from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from masrel.report import _figure_data as data
+from masrel.report.figures._layout import arrange
+from masrel.report.figures._picture import files_of
 
 if TYPE_CHECKING:
     from matplotlib.typing import RcKeyType
@@ -52,8 +52,22 @@ STYLE: "dict[RcKeyType, object]" = {
     "svg.hashsalt": "masrel",  # ids of an SVG are otherwise random
     "svg.fonttype": "path",
     "pdf.fonttype": 42,  # letters stay letters, as journals ask
-    "figure.constrained_layout.use": True,
+    "text.hinting": "none",  # as in vectors, where texts are measured
+    "figure.dpi": 72,  # a point is a pixel where labels are measured
+    "axes.titley": 1.0,  # titles stand where they are placed, and are not moved about
 }
+
+
+_MAX_LETTERS = 22  # of a name
+
+
+def short_name(name: str) -> str:
+    """Return a name that has room at an axis: the middle of a long one goes."""
+    # names often differ at their end
+    if len(name) <= _MAX_LETTERS:
+        return name
+    half = (_MAX_LETTERS - 1) // 2
+    return f"{name[:half]}…{name[-half:]}"
 
 
 @contextmanager
@@ -65,21 +79,16 @@ def house_style() -> Iterator[None]:
         yield
 
 
-def file_of(figure: Figure, form: data.Form) -> bytes:
-    """Return one file of a figure, without a time of day."""
-    file = io.BytesIO()
-    if form == "png":
-        canvas = FigureCanvasAgg(figure)
-        canvas.print_figure(file, format="png", dpi=200, metadata={"Software": None})
-    elif form == "svg":
-        FigureCanvasSVG(figure).print_figure(
-            file, format="svg", metadata={"Date": None}
-        )
-    else:
-        FigureCanvasPdf(figure).print_figure(
-            file, format="pdf", metadata={"CreationDate": None}
-        )
-    return file.getvalue()
+@contextmanager
+def _no_collection() -> Iterator[None]:
+    """Collect no garbage: what a figure is made of is in use until it is drawn."""
+    was_on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_on:
+            gc.enable()
 
 
 def draw(
@@ -101,21 +110,26 @@ def draw(
     dict of str to bytes
         Each form's file.
     """
-    with house_style():
+    with house_style(), _no_collection():
         figure = _figure(content)
-        if stamp:
-            is_loud = stamp.isupper()
-            # 7 pt letters are about 0.054 in wide; a long source goes on two lines
-            n_letters = int(figure.get_figwidth() / 0.054) - 2
-            figure.suptitle(
-                textwrap.fill(stamp, n_letters),
-                x=0.995,
-                ha="right",
-                fontsize=9.5 if is_loud else 7,
-                color=ALARM if is_loud else GREY,
-                weight="bold" if is_loud else "normal",
-            )
-        return {form: file_of(figure, form) for form in forms}
+        arrange(figure, _stamp(figure, stamp) if stamp else None)
+        return files_of(figure, forms)
+
+
+def _stamp(figure: Figure, text: str) -> Text:
+    is_loud = text.isupper()
+    # 7 pt letters are about 0.054 in wide; a long source goes on two lines
+    n_letters = int(figure.get_figwidth() / 0.054) - 2
+    return figure.text(
+        0.995,
+        1.0,
+        textwrap.fill(text, n_letters),
+        ha="right",
+        va="top",
+        fontsize=9.5 if is_loud else 7,
+        color=ALARM if is_loud else GREY,
+        weight="bold" if is_loud else "normal",
+    )
 
 
 def draw_all(drawings: "Sequence[Drawing]") -> list[dict[data.Form, bytes]]:
@@ -137,18 +151,18 @@ def draw_all(drawings: "Sequence[Drawing]") -> list[dict[data.Form, bytes]]:
 def _figure(content: data.Content) -> Figure:
     # Imported here: one figure loads what no other needs.
     match content:
-        case data.GradeGrid() | data.SpeedDots() | data.TraceColumns():
+        case data.GradeGrid() | data.SpeedDots():
             from masrel.report.figures import _study_figures as study
 
             if isinstance(content, data.GradeGrid):
                 return study.grade_figure(content)
-            if isinstance(content, data.SpeedDots):
-                return study.speed_figure(content)
-            return study.trace_figure(content)
-        case data.MeasuredTorque():
-            from masrel.report.figures._study_figures import measured_figure
+            return study.speed_figure(content)
+        case data.TraceColumns() | data.MeasuredTorque():
+            from masrel.report.figures import _trace_figures as traces
 
-            return measured_figure(content)
+            if isinstance(content, data.TraceColumns):
+                return traces.trace_figure(content)
+            return traces.measured_figure(content)
         case data.Forest():
             from masrel.report.figures._forest import forest_figure
 

@@ -23,8 +23,9 @@ from masrel.report._figure_data import (
 from masrel.report.figures import draw
 from masrel.report.figures._forest import forest_figure
 from masrel.report.figures._rater_pairs import rater_figure
-from masrel.report.figures._study_figures import speed_figure, trace_figure
+from masrel.report.figures._study_figures import speed_figure
 from masrel.report.figures._style import STYLE, house_style
+from masrel.report.figures._trace_figures import trace_figure
 
 PNG = b"\x89PNG\r\n\x1a\n"
 

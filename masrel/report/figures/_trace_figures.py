@@ -1,0 +1,145 @@
+"""Figures of torque and angle against time, of the model and as it was measured."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+from masrel.report._figure_data import MeasuredTorque, TraceColumns, TracePanel
+from masrel.report.figures._style import BLACK, BLUE, GREY, VERMILLION
+
+_GRADED_WIDTH = 2.2  # of the line of a stretch that a grade rests on, of the others
+
+# Name of each phase, and how its line looks.
+_PHASES: tuple[tuple[str, dict[str, Any]], ...] = (
+    ("pre-catch", {"color": GREY, "linewidth": 0.8}),
+    ("catch", {"color": VERMILLION, "linewidth": 1.5}),
+    ("post-catch", {"color": BLUE, "linewidth": 1.0, "linestyle": (0, (4, 1.2))}),
+)
+
+_Values = NDArray[np.generic]
+
+
+def trace_figure(columns: TraceColumns) -> Figure:
+    """Return torque and angle against time, one column a model."""
+    figure, grid = _torque_above_angle(len(columns.panels))
+    for (top, bottom), panel in zip(grid.T, columns.panels, strict=True):
+        _draw_panel(top, panel, 2)
+        _draw_panel(bottom, panel, 1)
+        top.set_title(panel.title)
+    _finish(figure, grid, "model torque (N·m)")
+    handles = [Line2D([], [], solid_capstyle="butt", **look) for _, look in _PHASES]
+    for handle in handles:
+        handle.set_linewidth(handle.get_linewidth() + 0.5)
+    figure.legend(
+        handles,
+        [name for name, _ in _PHASES],
+        loc="outside lower center",
+        ncols=3,
+        handlelength=3.0,
+    )
+    return figure
+
+
+def measured_figure(content: MeasuredTorque) -> Figure:
+    """Return the torque that was sent and that was measured, above the angle."""
+    figure, grid = _torque_above_angle(len(content.panels))
+    for (top, bottom), panel in zip(grid.T, content.panels, strict=True):
+        top.plot(panel.time, panel.measured, color=BLUE, linewidth=0.8)
+        top.plot(panel.time, panel.sent, color=BLACK, linewidth=1.0, dashes=(3, 1.5))
+        bottom.plot(panel.time, panel.angle, color=GREY, linewidth=1.0)
+        top.set_title(panel.title)
+    _finish(figure, grid, "torque (N·m)")
+    figure.legend(
+        handles=[
+            Line2D([], [], color=BLUE, linewidth=1.3, label="measured"),
+            Line2D([], [], color=BLACK, linewidth=1.3, dashes=(3, 1.5), label="sent"),
+        ],
+        loc="outside lower center",
+        ncols=2,
+        handlelength=3.0,
+    )
+    return figure
+
+
+def _torque_above_angle(n_panels: int) -> tuple[Figure, NDArray[Any]]:
+    # -> the figure, and its axes (2, n_panels)
+    figure = Figure(figsize=(max(3.4, 0.5 + 2.05 * n_panels), 4.7))
+    grid = figure.subplots(
+        2,
+        n_panels,
+        sharex=True,
+        sharey="row",
+        squeeze=False,
+        height_ratios=(1.5, 1.0),
+    )
+    return figure, grid
+
+
+def _finish(figure: Figure, grid: NDArray[Any], torque_label: str) -> None:
+    for axes in grid.flat:
+        axes.grid(axis="y")
+    for axes in grid[1]:
+        axes.set_xlabel("time (s)")
+    # Limits come last: set before the last stretch they would cut it off.
+    grid[0, 0].set_xlim(left=0)
+    grid[0, 0].set_ylim(bottom=min(0.0, grid[0, 0].get_ylim()[0]))
+    grid[0, 0].set_ylabel(torque_label)
+    grid[1, 0].set_ylabel("elbow angle (deg)")
+    figure.align_ylabels(grid[:, 0])
+
+
+def _draw_panel(axes: Axes, panel: TracePanel, which: int) -> None:
+    # which: the column of a stretch that is drawn against its time
+    graded = panel.graded or (False,) * len(panel.stretches)
+    for is_graded, factor in ((False, 1.0), (True, _GRADED_WIDTH)):
+        shown = [
+            (stretch[0], stretch[which], _runs(stretch[3]))
+            for stretch, of_grade in zip(panel.stretches, graded, strict=True)
+            if of_grade == is_graded
+        ]
+        for code in range(len(_PHASES)) if shown else ():
+            _draw_phase(axes, shown, code, factor)
+
+
+def _draw_phase(
+    axes: Axes,
+    stretches: Sequence[tuple[_Values, _Values, list[tuple[int, slice]]]],
+    code: int,
+    factor: float,
+) -> None:
+    # One line for all stretches, with a gap wherever a run of the phase ends; a dot
+    # where a run begins, but for the first of a stretch.
+    pieces: list[_Values] = []
+    dots: list[_Values] = []
+    for time, values, runs in stretches:
+        for of_run, run in runs:
+            if of_run == code:
+                pieces += [np.array([time[run], values[run]]), _GAP]
+                if run.start:
+                    dots.append(np.array([time[run.start], values[run.start]]))
+    look = _PHASES[code][1]
+    if pieces:
+        wide = {"linewidth": factor * look["linewidth"]}
+        line = np.concatenate(pieces, axis=1)
+        axes.plot(*line, solid_capstyle="butt", **{**look, **wide})
+    if dots:
+        axes.plot(*np.array(dots).T, "o", color=look["color"], markersize=2.4)
+
+
+_GAP = np.full((2, 1), np.nan)
+
+
+def _runs(phase: _Values) -> list[tuple[int, slice]]:
+    # code and place of each run of a phase; each begins where the one before ended
+    codes = np.asarray(phase, dtype=np.intp)
+    starts = np.flatnonzero(np.diff(codes, prepend=-1))
+    ends = np.append(starts[1:] + 1, codes.size)
+    return [
+        (int(codes[start]), slice(start, end))
+        for start, end in zip(starts.tolist(), ends.tolist(), strict=True)
+    ]
