@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from masrel.report import _figure_data as data
-from masrel.report.figures._layout import arrange
+from masrel.report.figures._margins import arrange
 from masrel.report.figures._picture import files_of
 
 if TYPE_CHECKING:
