@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
+from masrel.report.figures._margins import arrange
+from masrel.report.figures._picture import files_of
 from masrel.report.figures._style import (
     BLACK,
     BLUE,
     DASHES,
     GREY,
     ORANGE,
-    file_of,
     house_style,
 )
 
@@ -55,7 +56,9 @@ def draw_work(points: Sequence["Point"]) -> None:
         axes.grid(which="major")
         axes.set_xlim(right=axes.get_xlim()[1] * 4)
         axes.legend(fontsize=7.5, loc="center left", bbox_to_anchor=(0.0, 0.42))
-        (FIGURES / "elbow_work.png").write_bytes(file_of(figure, "png"))
+        arrange(figure, None)
+        picture = files_of(figure, ["png"])["png"]
+        (FIGURES / "elbow_work.png").write_bytes(picture)
 
 
 def draw_approach(rates: Sequence[float], late: dict[str, np.ndarray]) -> None:
@@ -78,4 +81,6 @@ def draw_approach(rates: Sequence[float], late: dict[str, np.ndarray]) -> None:
             axes.set_xlabel("samples a second (Hz)")
             axes.legend(fontsize=7.5, loc="upper right")
         panels[0].set_ylabel("sampled − exact (ms)")
-        (FIGURES / "elbow_sampled.png").write_bytes(file_of(figure, "png"))
+        arrange(figure, None)
+        picture = files_of(figure, ["png"])["png"]
+        (FIGURES / "elbow_sampled.png").write_bytes(picture)
