@@ -13,6 +13,7 @@ PAGE = Path(__file__).parents[1] / "api.md"
 MODULES = (
     "masrel.agreement",
     "masrel.intervals",
+    "masrel.audit",
     "masrel.elbow",
     "masrel.elbow.tone",
     "masrel.elbow.identification",

@@ -1,0 +1,1 @@
+"""Printed agreement, held against every table."""

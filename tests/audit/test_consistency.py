@@ -1,0 +1,347 @@
+"""Every table is counted, no other one, and the work that it takes is bounded."""
+
+import itertools
+import json
+from collections.abc import Callable, Iterator
+from fractions import Fraction
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from masrel.agreement import cohen_kappa_from_table, fleiss_kappa_from_counts
+from masrel.audit import ConsistentTables, consistent_tables
+from masrel.errors import ParameterError
+from tests.audit.printing import (
+    Rows,
+    disagreement,
+    of_items,
+    of_two_raters,
+    rounded,
+    shown,
+)
+
+ORACLE = json.loads(
+    (Path(__file__).parents[1] / "oracles" / "audit.json").read_text(encoding="utf-8")
+)
+RULES = ("half_even", "half_up")
+WEIGHTS = ("identity", "linear", "quadratic")
+
+
+@pytest.mark.parametrize("case", ORACLE["cases"], ids=lambda case: case["id"])
+def test_published_style_summaries_have_as_many_tables(case: dict[str, object]) -> None:
+    keys = ("n_items", "n_categories", "agreement", "kappa", "agreement_weights")
+    claim = {key: case[key] for key in keys}
+    for weights, numbers in case["n_tables"].items():
+        for rounding, n_tables in numbers.items():
+            result = consistent_tables(
+                **claim, kappa_weights=weights, rounding=rounding
+            )
+            assert result.n_tables == min(n_tables, 10_000)
+            assert result.status == ("exact" if n_tables < 10_000 else "at least")
+            assert result.is_possible is (n_tables > 0)
+
+
+def shares(total: int, cells: int) -> Iterator[tuple[int, ...]]:
+    if cells == 1:
+        yield (total,)
+        return
+    for first in range(total + 1):
+        for rest in shares(total - first, cells - 1):
+            yield (first, *rest)
+
+
+def every_table(n_items: int, q: int, n_raters: int) -> list[Rows]:
+    if n_raters > 2:
+        return list(itertools.product(shares(n_raters, q), repeat=n_items))
+    return [
+        tuple(cells[k : k + q] for k in range(0, q * q, q))
+        for cells in shares(n_items, q * q)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("n_items", "q", "n_raters"),
+    [(1, 2, 2), (5, 2, 2), (8, 2, 2), (3, 3, 2), (2, 4, 2), (3, 2, 3), (2, 3, 3)],
+)
+def test_the_count_is_that_of_all_tables_one_by_one(
+    n_items: int, q: int, n_raters: int
+) -> None:
+    rng = np.random.default_rng(n_items + 10 * q + 100 * n_raters)
+    tables = every_table(n_items, q, n_raters)
+    of_table = of_two_raters if n_raters == 2 else of_items
+    for weights in itertools.product(WEIGHTS, WEIGHTS):
+        values = [of_table(table, *weights) for table in tables]
+        for _ in range(3):
+            check_count(rng, tables, values, of_table, weights, n_raters)
+
+
+def check_count(
+    rng: np.random.Generator,
+    tables: list[Rows],
+    values: list[tuple[Fraction, Fraction | None]],
+    of_table: Callable[..., tuple[Fraction, Fraction | None]],
+    weights: tuple[str, str],
+    n_raters: int,
+) -> None:
+    rule, decimals = str(rng.choice(RULES)), int(rng.integers(0, 3))
+    # agreement and kappa of two tables: about half of these claims are impossible
+    percent = rounded(values[rng.integers(len(values))][0], decimals, rule)
+    kappa = rounded(
+        values[rng.integers(len(values))][1] or Fraction(1, 3), decimals, rule
+    )
+    if abs(kappa) > 10**decimals:  # Fleiss' kappa can be below -1 for few ratings
+        return
+
+    def fits(value: tuple[Fraction, Fraction | None], by: str) -> bool:
+        return (
+            value[1] is not None
+            and rounded(value[0], decimals, by) == percent
+            and rounded(value[1], decimals, by) == kappa
+        )
+
+    result = consistent_tables(
+        n_items=len(tables[0]) if n_raters > 2 else sum(map(sum, tables[0])),
+        n_categories=len(tables[0][0]),
+        n_raters=n_raters,
+        agreement=shown(percent, decimals),
+        kappa=shown(kappa, decimals),
+        agreement_weights=weights[0],
+        kappa_weights=weights[1],
+    )
+    assert result.n_tables == sum(any(fits(v, by) for by in RULES) for v in values)
+    for reading in result.readings:
+        assert reading.n_tables == sum(fits(v, reading.rounding) for v in values)
+    for example in result.examples:
+        assert any(fits(of_table(example, *weights), by) for by in RULES)
+
+
+def test_a_table_and_its_transpose_are_two() -> None:
+    result = consistent_tables(
+        n_items=20, n_categories=2, agreement="85.0", kappa="0.58"
+    )
+    tables = set(result.examples)
+    assert len(tables) == result.n_tables == 4
+    assert {tuple(zip(*table, strict=True)) for table in tables} == tables
+
+
+def random_claim(
+    rng: np.random.Generator, rule: str, max_items: tuple[int, int] = (120, 45)
+) -> dict[str, object]:
+    """What would be printed of a table of 2 or 3 categories that is drawn."""
+    while True:
+        q = int(rng.integers(2, 4))
+        n_items = int(rng.integers(5, max_items[q - 2] + 1))
+        shape = rng.dirichlet(np.full(q * q, 0.5) + 3.0 * np.eye(q).ravel())
+        table = rng.multinomial(n_items, shape).reshape(q, q).tolist()
+        names = [str(name) for name in rng.choice(WEIGHTS, 2)]
+        percent, kappa = of_two_raters(table, *names)
+        if kappa is not None:
+            break
+    decimals = [int(rng.integers(0, 3)), int(rng.integers(1, 4))]
+    return {
+        "n_items": n_items,
+        "n_categories": q,
+        "agreement": shown(rounded(percent, decimals[0], rule), decimals[0]),
+        "kappa": shown(rounded(kappa, decimals[1], rule), decimals[1]),
+        "agreement_weights": names[0],
+        "kappa_weights": names[1],
+    }
+
+
+N_TRUE = [
+    pytest.param(range(40), id="some"),
+    pytest.param(range(40, 1040), id="tenth", marks=pytest.mark.slow),
+    pytest.param(range(10_000), id="all", marks=pytest.mark.long),
+]
+
+
+@pytest.mark.parametrize("seeds", N_TRUE)
+def test_no_true_table_raises_an_alarm(seeds: range) -> None:
+    for seed in seeds:
+        rng = np.random.default_rng(seed)
+        rule = RULES[seed % 2]
+        claim = random_claim(rng, rule)
+        for rounding in (rule, "either"):
+            result = consistent_tables(**claim, rounding=rounding)
+            assert result.is_possible, (seed, claim)
+
+
+def planted(rng: np.random.Generator) -> dict[str, object]:
+    """A claim of a true table in which one number was changed."""
+    claim = random_claim(rng, "half_up", (60, 9))
+    change = str(rng.choice(["kappa", "agreement", "n_items"]))
+    if change == "n_items":
+        return claim | {"n_items": int(claim["n_items"]) - 1}
+    text = str(claim[change])
+    place = len(text) - 1 - int(rng.integers(0, 2)) * (text[-2] != ".")
+    if not text[place].isdecimal():
+        place = len(text) - 1
+    other = (int(text[place]) + int(rng.integers(1, 10))) % 10
+    return claim | {change: f"{text[:place]}{other}{text[place + 1 :]}"}
+
+
+@cache
+def sums_of_all_tables(
+    n: int, q: int, agreement_weights: str, kappa_weights: str
+) -> list[list[int]]:
+    """The sums of disagreement and the chance sum that occur."""
+    tables = np.array(every_table(n, q, 2))  # (n_tables, q, q)
+    v, w = (
+        np.array([[disagreement(name, k, m) for m in range(q)] for k in range(q)])
+        for name in (agreement_weights, kappa_weights)
+    )
+    rows, columns = tables.sum(axis=2), tables.sum(axis=1)
+    chance = np.einsum("tk,km,tm->t", rows, w, columns)
+    sums = [(tables * v).sum(axis=(1, 2)), (tables * w).sum(axis=(1, 2)), chance]
+    return np.unique(np.column_stack(sums)[chance > 0], axis=0).tolist()
+
+
+def any_table_fits(claim: dict[str, object]) -> bool:
+    n, q = int(claim["n_items"]), int(claim["n_categories"])
+    weights = str(claim["agreement_weights"]), str(claim["kappa_weights"])
+    worst = n * disagreement(weights[0], 0, q - 1)
+    printed = [str(claim[key]) for key in ("agreement", "kappa")]
+    decimals = [len(text.partition(".")[2]) for text in printed]
+    units = [round(Fraction(t) * 10**d) for t, d in zip(printed, decimals, strict=True)]
+    for s_agreement, s_kappa, chance in sums_of_all_tables(n, q, *weights):
+        values = (
+            100 * (1 - Fraction(s_agreement, worst)),
+            1 - Fraction(n * s_kappa, chance),
+        )
+        for rule in RULES:
+            both = zip(values, decimals, strict=True)
+            if [rounded(value, d, rule) for value, d in both] == units:
+                return True
+    return False
+
+
+N_PLANTED = [
+    pytest.param(range(6), id="some"),
+    pytest.param(range(6, 106), id="tenth", marks=pytest.mark.slow),
+    pytest.param(range(1_000), id="all", marks=pytest.mark.long),
+]
+
+
+@pytest.mark.parametrize("seeds", N_PLANTED)
+def test_impossible_claims_are_seen(seeds: range) -> None:
+    """All of them: existence is decided exactly."""
+    n_impossible = 0
+    for seed in seeds:
+        claim = planted(np.random.default_rng(seed))
+        if float(str(claim["agreement"])) > 100 or float(str(claim["kappa"])) > 1:
+            continue
+        is_possible = any_table_fits(claim)
+        n_impossible += not is_possible
+        assert consistent_tables(**claim).is_possible is is_possible, (seed, claim)
+    assert n_impossible > len(seeds) // 5
+
+
+def test_numbers_of_the_statistics_here_are_consistent() -> None:
+    table = [[11, 2, 0], [1, 9, 3], [0, 2, 12]]
+    for weights in WEIGHTS:
+        value = cohen_kappa_from_table(table, weights=weights).value
+        result = consistent_tables(
+            n_items=40,
+            n_categories=3,
+            agreement="80.00",
+            kappa=f"{value:.9f}",
+            kappa_weights=weights,
+        )
+        assert result.n_tables is not None
+        assert result.n_tables > 0
+    counts = [[4, 0], [3, 1], [0, 4], [1, 3], [0, 4], [4, 0]]
+    value = fleiss_kappa_from_counts(counts).value
+    result = consistent_tables(
+        n_items=6, n_categories=2, n_raters=4, kappa=f"{value:.9f}"
+    )
+    assert result.is_possible
+
+
+@pytest.mark.parametrize(
+    ("claim", "n_visited"),
+    [
+        ({"n_items": 100, "n_categories": 2, "kappa": "0.755"}, 400_000),
+        ({"n_items": 40, "n_categories": 3, "kappa": "0.755"}, 400_000),
+        ({"n_items": 40, "n_categories": 3, "kappa": "0.200"}, 5_000_000),
+        (
+            {
+                "n_items": 60,
+                "n_categories": 3,
+                "agreement": "73.3",
+                "kappa": "0.588",
+            },
+            1_000_000,
+        ),
+    ],
+)
+def test_little_is_visited(claim: dict[str, object], n_visited: int) -> None:
+    result = consistent_tables(**claim)
+    assert result.status in ("exact", "at least")
+    assert result.n_visited <= n_visited
+
+
+def test_all_that_an_impossible_kappa_could_be_is_visited() -> None:
+    # the most that 40 items in 3 categories can take: no agreement, and a kappa that
+    # many margins come near to but none gives
+    result = consistent_tables(n_items=40, n_categories=3, kappa="0.2000001")
+    assert result.n_tables == 0
+    assert result.n_visited <= 20_000_000
+
+
+def test_it_says_where_the_bound_on_work_was_met() -> None:
+    result = consistent_tables(
+        n_items=10_000, n_categories=3, n_raters=1000, kappa="0.3"
+    )
+    assert (result.n_tables, result.status, str(result)) == (
+        None,
+        "cannot tell",
+        "cannot tell",
+    )
+    assert result.is_possible is None
+
+
+def test_retest_kappa_of_the_published_study_is_ten_of_twelve() -> None:
+    # Park, Kim and Damiano (2012): .771, three raters and four models
+    for n_categories in (4, 5):
+        result = consistent_tables(n_items=12, n_categories=n_categories, kappa="0.771")
+        assert result.is_possible
+        assert result.n_agreed == (10,)
+
+
+BAD = [
+    ({"kappa": "1.2"}, "kappa: needs a number from -1 to 1, got '1.2'"),
+    ({"kappa": 0.8}, "kappa: needs a text such as '0.81'"),
+    ({"agreement": "97,4"}, "agreement: needs a number with a decimal point and no"),
+    ({"agreement": "97.4%"}, "agreement: needs a number with a decimal point and no"),
+    ({"agreement": "101"}, "agreement: needs a number from 0 to 100, got '101'"),
+    ({"agreement": ""}, "agreement: needs a number"),
+    ({"kappa": "0.1234567890123"}, "kappa: needs at most 12 decimals"),
+    ({}, "agreement, kappa: needs at least one of them, got neither"),
+    ({"kappa": "0.5", "n_items": 0}, "n_items: needs a whole number from 1 to 10000"),
+    ({"kappa": "0.5", "n_items": 9.0}, "n_items: needs a whole number"),
+    ({"kappa": "0.5", "n_categories": 1}, "n_categories: needs a whole number from 2"),
+    ({"kappa": "0.5", "n_raters": True}, "n_raters: needs a whole number from 2"),
+    ({"kappa": "0.5", "kappa_weights": "radical"}, "kappa_weights: needs one of"),
+    ({"kappa": "0.5", "rounding": "up"}, "rounding: needs half_even, half_up or eith"),
+]
+
+
+@pytest.mark.parametrize(("parameters", "message"), BAD)
+def test_what_cannot_be_is_refused(parameters: dict[str, object], message: str) -> None:
+    with pytest.raises(ParameterError) as caught:
+        consistent_tables(**{"n_items": 20, "n_categories": 2} | parameters)
+    assert str(caught.value).startswith(message)
+
+
+def test_forms_in_which_numbers_are_printed() -> None:
+    plain = {"n_items": 20, "n_categories": 2, "agreement": "85.0"}
+    assert consistent_tables(**plain, kappa=".58") == consistent_tables(
+        **plain, kappa="0.58"
+    )
+    assert consistent_tables(
+        n_items=20, n_categories=2, kappa="−0.11"
+    ) == consistent_tables(n_items=20, n_categories=2, kappa="-0.11")
+    two: ConsistentTables = consistent_tables(**plain, kappa="1.0")
+    assert str(two) == "no table"
