@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 import click
 
 from masrel._files import no_follow, write_file
+from masrel._input import read_regular
 from masrel.cli._options import Decorator, grouped
 from masrel.cli._paths import OutputFile
-from masrel.protocol import Gate, Protocol, gates_of, parse_gate
 
 if TYPE_CHECKING:
     from masrel.analysis import Analysis
+    from masrel.protocol import Gate, Protocol
 
 _LARGEST_SUMMARY = 1 << 20  # GitHub takes no more of a step
 
@@ -25,8 +26,11 @@ class GateOptions:
     require: tuple[str, ...]
     junit: Path | None
 
-    def gates(self, protocol: Protocol) -> tuple[Gate, ...]:
+    def gates(self, protocol: "Protocol") -> "tuple[Gate, ...]":
         """Return the gates of the protocol and of the call, each checked."""
+        # Imported here, as below: a report that is current is told so without them.
+        from masrel.protocol import gates_of, parse_gate
+
         ids = [line.id for line in protocol.analysis.estimates]
         of_call = (parse_gate(text, ids, where="--require") for text in self.require)
         return (*gates_of(protocol), *of_call)
@@ -52,23 +56,48 @@ def gate_options() -> Decorator:
     )
 
 
-def conclude(
-    analysis: "Analysis", gates: tuple[Gate, ...], options: GateOptions
-) -> None:
-    """Write what came of the gates, say which fail, and end with 1 if one does."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verdict:
+    """What came of the gates of a call, as it is said and written."""
+
+    holds: bool  # whether all of them do
+    lines: tuple[str, ...]
+    junit: str
+    summary: str
+
+    def conclude(self, options: GateOptions) -> None:
+        """Write it, say which gates fail, and end with 1 if one does."""
+        if options.junit is not None and not _is_text_of(options.junit, self.junit):
+            write_file(options.junit, self.junit)
+        summary = os.environ.get("GITHUB_STEP_SUMMARY")
+        if summary:
+            _append(Path(summary), self.summary)
+        for line in self.lines:
+            click.echo(line, err=True)
+        if not self.holds:
+            click.get_current_context().exit(1)
+
+
+def verdict_of(analysis: "Analysis", gates: "tuple[Gate, ...]") -> Verdict:
+    """Hold an analysis against gates."""
     from masrel.analysis import check_gates
     from masrel.report._junit import job_summary, junit_text
 
     results = check_gates(analysis, gates)
-    if options.junit is not None:
-        write_file(options.junit, junit_text(analysis, results))
-    summary = os.environ.get("GITHUB_STEP_SUMMARY")
-    if summary:
-        _append(Path(summary), job_summary(analysis, results))
-    for result in results:
-        click.echo(result, err=True)
-    if not all(result.holds for result in results):
-        click.get_current_context().exit(1)
+    return Verdict(
+        holds=all(result.holds for result in results),
+        lines=tuple(map(str, results)),
+        junit=junit_text(analysis, results),
+        summary=job_summary(analysis, results),
+    )
+
+
+def _is_text_of(file: Path, text: str) -> bool:
+    data = text.encode()
+    try:
+        return read_regular(file, most=len(data)) == data
+    except OSError:
+        return False
 
 
 def _append(file: Path, text: str) -> None:

@@ -224,8 +224,19 @@ def write_json(document: dict[str, object], file: Path) -> None:
     write_file(file, text + "\n")
 
 
-def echo_notes(notes: tuple[str, ...]) -> None:
+_NOTES = "masrel.notes"
+
+
+def notes_of_call() -> list[str]:
+    """Return the notes that this call has printed."""
+    ctx = click.get_current_context(silent=True)
+    notes: list[str] = [] if ctx is None else ctx.meta.setdefault(_NOTES, [])
+    return notes
+
+
+def echo_notes(notes: Sequence[str]) -> None:
     """Print notes on stderr, one a line."""
+    notes_of_call().extend(notes)
     click.echo("".join(f"{note}\n" for note in notes), err=True, nl=False)
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from masrel.cli._gating import GateOptions, conclude, gate_options
+from masrel.cli._gating import GateOptions, gate_options, verdict_of
 from masrel.cli._options import (
     STDOUT,
     OutputOptions,
@@ -54,7 +54,7 @@ def analyze(
         )
     if output.json_file == STDOUT:
         write_json(library.as_analysis_document(analysis), STDOUT)
-        conclude(analysis, gates, gating)
+        verdict_of(analysis, gates).conclude(gating)
         return
     destination = output.json_file or data.paths.analysis_file
     library.write_analysis(
@@ -62,7 +62,7 @@ def analyze(
     )
     _show(data, analysis, csv=output.csv, raw=output.raw_csv)
     click.echo(f"read: {data.read}\nanalysis: {destination}", err=True)
-    conclude(analysis, gates, gating)
+    verdict_of(analysis, gates).conclude(gating)
 
 
 def _show(data: "StudyData", analysis: "Analysis", *, csv: bool, raw: bool) -> None:

@@ -1,20 +1,35 @@
 """``masrel report``: write the report of a study."""
 
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
-from tqdm import tqdm
 
+from masrel._cache import FOLDER, Cache
 from masrel._files import check_inside, refuse_record
 from masrel._once import read_once
-from masrel.cli._gating import GateOptions, conclude, gate_options
+from masrel.cli._gating import GateOptions, Verdict, gate_options, verdict_of
 from masrel.cli._options import (
     OutputOptions,
+    echo_notes,
+    notes_of_call,
     output_options,
     ratings_option,
     read_study,
     warnings_as_notes,
 )
+from masrel.errors import ParameterError
+from masrel.report._builds import Build
+
+if TYPE_CHECKING:
+    from masrel.analysis import Analysis
+    from masrel.protocol import Protocol
+    from masrel.ratings import StudyData
+
+# They change nothing that is made or said
+_OTHER_OPTIONS = ("cache_folder", "check", "junit", "quiet")
 
 
 @click.command("report")
@@ -27,6 +42,19 @@ from masrel.cli._options import (
     help="Folder to write into; default: STUDY/report.",
 )
 @ratings_option
+@click.option(
+    "--only",
+    multiple=True,
+    metavar="SECTION",
+    help="Make a report of this section alone, in place of the one in the folder: its "
+    "text, tables and figures, and no others. Repeatable.",
+)
+@click.option(
+    "--check",
+    is_flag=True,
+    help="Write nothing; name the files that would change, and exit with 1 if there "
+    "are some.",
+)
 @gate_options()
 @click.option(
     "--include",
@@ -35,64 +63,171 @@ from masrel.cli._options import (
     help="Show what is private, too: who (recorded events), notes (their texts), or a "
     "field of raters that is not public. Repeatable.",
 )
+@click.option(
+    "--cache",
+    "cache_folder",
+    type=click.Path(path_type=Path, file_okay=False),
+    help="Folder in which figures are kept until what they show changes; default: "
+    f"STUDY/{FOLDER}.",
+)
 @output_options(
     raw_csv="No apostrophe before a text that a spreadsheet would run.",
     quiet="No progress bar.",
 )
-@read_once()
 def report(
     study: Path,
     destination: Path | None,
     ratings_file: Path | None,
+    only: tuple[str, ...],
+    check: bool,
     gating: GateOptions,
     include: tuple[str, ...],
+    cache_folder: Path | None,
     output: OutputOptions,
 ) -> None:
     """Write the report of STUDY: HTML, Markdown, tables and figures.
 
     The analysis is computed from the protocol's plan; the same inputs give the
-    same bytes.
+    same bytes. Where nothing has changed since the last report, nothing is written.
     """
-    from masrel.analysis import analyze
-    from masrel.report import study_conduct, write_report
-    from masrel.verification import anchors_of
-
     if destination is None:
         destination = study / "report"
         check_inside(destination, study)
     refuse_record(destination / "report.html")  # before anything is computed
-    data = read_study(study, ratings_file)
-    gates = gating.gates(data.protocol)
-    conduct = study_conduct(
-        data.paths, data.protocol, file=ratings_file, include=include
+    build = Build(
+        study=study,
+        folder=destination,
+        options=_options_of_call(),
+        cache=_cache(study, cache_folder, check=check),
     )
-    with warnings_as_notes():
-        analysis = analyze(
-            data.protocol,
-            data.ratings,
-            in_person=data.in_person,
-            answers=data.answers,
-            excluded=data.excluded,
-        )
-    with tqdm(desc="report", unit=" parts", disable=output.hides_progress) as bar:
+    changes: list[str] = []
+    shown = build.last()
+    if shown is None:
+        making = _Making(build, ratings_file, only, gating, include, output)
+        with build.noted() as shown:
+            files, what_is_shown = making.run()
+            shown.update(what_is_shown)
+            changes = _write_or_compare(files, destination, check=check)
+    else:
+        echo_notes(shown["notes"])
+    click.echo(shown["read"], err=True)
+    for line in changes if check else [destination / "report.html"]:
+        click.echo(line)
+    Verdict(**shown["verdict"]).conclude(gating)
+    if check and changes:
+        click.get_current_context().exit(1)
 
-        def progress(part: str) -> None:
-            bar.set_postfix_str(part, refresh=False)
-            bar.update()
 
-        files = write_report(
-            data.protocol,
-            data.ratings,
-            analysis,
-            destination,
-            in_person=data.in_person,
-            recordings=data.paths.sessions,
-            # of what is simulated none, so that it repeats byte for byte
-            anchors=() if data.ratings.simulated else anchors_of(data.paths),
-            conduct=conduct,
-            progress=progress,
-            raw_csv=output.raw_csv,
+def _options_of_call() -> dict[str, str]:
+    params = click.get_current_context().params
+    return {k: str(v) for k, v in params.items() if k not in _OTHER_OPTIONS}
+
+
+def _cache(study: Path, folder: Path | None, *, check: bool) -> Cache:
+    if folder is None:
+        folder = study / FOLDER
+        check_inside(folder, study)
+    refuse_record(folder / "any")
+    return Cache(folder, is_read_only=check)
+
+
+@dataclass(frozen=True, slots=True)
+class _Making:
+    """What a report is made with."""
+
+    build: Build
+    ratings_file: Path | None
+    only: tuple[str, ...]
+    gating: GateOptions
+    include: tuple[str, ...]
+    output: OutputOptions
+
+    def run(self) -> tuple[dict[str, bytes], dict[str, object]]:
+        """Return the files of the report, and what is said of it."""
+        with read_once():
+            data = read_study(self.build.study, self.ratings_file)
+            _check_sections(self.only, data.protocol)
+            gates = self.gating.gates(data.protocol)
+            analysis, files = self._files(data)
+        return files, {
+            "notes": notes_of_call(),
+            "read": f"read: {data.read}",
+            "verdict": asdict(verdict_of(analysis, gates)),
+        }
+
+    def _files(self, data: "StudyData") -> "tuple[Analysis, dict[str, bytes]]":
+        # Imported here: who has a report that is current needs none of it.
+        from tqdm import tqdm
+
+        from masrel.analysis import analyze
+        from masrel.report import study_conduct
+        from masrel.report._document import make_report
+        from masrel.verification import anchors_of
+
+        conduct = study_conduct(
+            data.paths, data.protocol, file=self.ratings_file, include=self.include
         )
-    click.echo(f"read: {data.read}", err=True)
-    click.echo(files.html)
-    conclude(analysis, gates, gating)
+        with warnings_as_notes():
+            analysis = analyze(
+                data.protocol,
+                data.ratings,
+                in_person=data.in_person,
+                answers=data.answers,
+                excluded=data.excluded,
+            )
+        with tqdm(
+            desc="report", unit=" parts", disable=self.output.hides_progress
+        ) as bar:
+
+            def progress(part: str) -> None:
+                bar.set_postfix_str(part, refresh=False)
+                bar.update()
+
+            return analysis, make_report(
+                data.protocol,
+                data.ratings,
+                analysis,
+                in_person=data.in_person,
+                recordings=data.paths.sessions,
+                # of what is simulated none, so that it repeats byte for byte
+                anchors=() if data.ratings.simulated else anchors_of(data.paths),
+                conduct=conduct,
+                progress=progress,
+                raw_csv=self.output.raw_csv,
+                only=self.only,
+                cache=self.build.cache,
+            )
+
+
+def _check_sections(only: Collection[str], protocol: "Protocol") -> None:
+    from masrel.report._document import section_names
+
+    known = section_names(protocol)
+    for name in only:
+        if name not in known:
+            raise ParameterError(
+                f"--only: needed a section of this report, {', '.join(known)}, got "
+                f"{name!r}"
+            )
+
+
+def _write_or_compare(
+    files: Mapping[str, bytes], folder: Path, *, check: bool
+) -> list[str]:
+    # what would change if it is only looked at; else it is written
+    from masrel.report._report_folder import replace_report
+
+    if check:
+        return list(_changes(files, folder))
+    replace_report(folder, files)
+    return []
+
+
+def _changes(files: Mapping[str, bytes], folder: Path) -> Iterator[str]:
+    from masrel.report._report_folder import changed_files, stale_assets
+
+    for name in changed_files(folder, files):
+        is_there = (folder / name).exists()
+        yield f"{folder / name}: {'would change' if is_there else 'would be new'}"
+    for path in stale_assets(folder, files):
+        yield f"{path}: would go"

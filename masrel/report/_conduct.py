@@ -109,6 +109,10 @@ def study_conduct(
     )
 
 
+CONDUCT_SECTIONS = ("flow", "conduct")
+"""Sections that no protocol names: they are there where there is anything to say."""
+
+
 def conduct_sections(material: Material, conduct: StudyConduct) -> list[Section]:
     """Say what became of the raters and what happened, as far as it is known."""
     sections = []

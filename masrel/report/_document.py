@@ -7,25 +7,31 @@ any of them.
 """
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from masrel._cache import Cache, installed
 from masrel.analysis import Analysis
 from masrel.protocol import Protocol, report_sections
 from masrel.ratings import InPerson, Ratings
 from masrel.report._agreement import estimates_section
-from masrel.report._conduct import StudyConduct, conduct_sections
+from masrel.report._conduct import CONDUCT_SECTIONS, StudyConduct, conduct_sections
 from masrel.report._design import design_section
 from masrel.report._grade_tables import categories_section, confusion_section
 from masrel.report._grades import grades_section, in_person_section, intended_section
 from masrel.report._material import Drawing, Material, Section, gather
 from masrel.report._methods import methods_section
 from masrel.report._order_section import order_section
-from masrel.report._pages import WRITERS, Block, Chapter, Document
+from masrel.report._pages import WRITERS, Block, Chapter, Document, Writer
 from masrel.report._question_tables import questionnaires_section
-from masrel.report._report_folder import MANIFEST, Assets, replace_report
+from masrel.report._report_folder import (
+    MANIFEST,
+    Assets,
+    replace_report,
+    report_files,
+)
 from masrel.report._result import result_text
 from masrel.report._stretches import speeds_section, traces_section
 from masrel.report._tables import Table, as_csv, tag_of
@@ -94,6 +100,7 @@ def write_report(
     anchors: Sequence[Anchor] = (),
     progress: Progress | None = None,
     raw_csv: bool = False,
+    cache: Path | None = None,
 ) -> ReportFiles:
     """Write the report a protocol asks for.
 
@@ -126,6 +133,9 @@ def write_report(
     raw_csv : bool, optional
         Whether texts of the tables' files are as they are. Else those that a
         spreadsheet would run as formulas stand after an apostrophe.
+    cache : Path, optional
+        A folder in which figures and pages are kept, by all that they are made from;
+        those that are there already are not made again.
 
     Returns
     -------
@@ -139,11 +149,51 @@ def write_report(
     OSError
         If a file cannot be written; the pages that were there are then there still.
     """
+    files = make_report(
+        protocol,
+        ratings,
+        analysis,
+        in_person=in_person,
+        recordings=recordings,
+        conduct=conduct,
+        anchors=anchors,
+        progress=progress,
+        raw_csv=raw_csv,
+        cache=Cache(cache),
+    )
+    replace_report(destination, files)
+    return ReportFiles(
+        html=destination / "report.html",
+        markdown=destination / "report.md",
+        manifest=destination / MANIFEST,
+        tables=tuple(destination / p for p in files if p.startswith("tables/")),
+        figures=tuple(destination / p for p in files if p.startswith("figures/")),
+    )
+
+
+def make_report(
+    protocol: Protocol,
+    ratings: Ratings,
+    analysis: Analysis,
+    *,
+    in_person: InPerson | None = None,
+    recordings: Path | None = None,
+    conduct: StudyConduct | None = None,
+    anchors: Sequence[Anchor] = (),
+    progress: Progress | None = None,
+    raw_csv: bool = False,
+    only: Collection[str] = (),
+    cache: Cache,
+) -> dict[str, bytes]:
+    """Return the files of a report, of these sections only if some are named."""
+    # By name from the report's folder, in the order in which they are to be written
     material = gather(protocol, ratings, analysis, in_person, recordings)
-    sections = [SECTIONS[name](material) for name in report_sections(protocol)]
+    names = [name for name in report_sections(protocol) if not only or name in only]
+    sections = [SECTIONS[name](material) for name in names]
     if conduct is not None:
         place = 1 + next((i for i, s in enumerate(sections) if s.name == "design"), -1)
-        sections[place:place] = conduct_sections(material, conduct)
+        of_conduct = conduct_sections(material, conduct)
+        sections[place:place] = [s for s in of_conduct if not only or s.name in only]
     assets = Assets()
     document = Document(
         title=protocol.report.title or protocol.study.title,
@@ -151,33 +201,33 @@ def write_report(
         banner=material.banner,
         provenance=material.provenance,
         result=result_text(analysis),
-        sections=_make_sections(sections, assets, progress, raw_csv=raw_csv),
+        sections=_make_sections(sections, assets, progress, cache, raw_csv=raw_csv),
         inputs=_inputs(analysis, anchors),
         version=analysis.masrel_version,
     )
-    pages = {writer.file: writer.write(document) for writer in WRITERS.values()}
-    replace_report(destination, assets, pages, analysis.inputs)
+    pages = {w.file: _page(w, document, cache) for w in WRITERS.values()}
     if progress is not None:
         progress("pages")
-    return ReportFiles(
-        html=destination / "report.html",
-        markdown=destination / "report.md",
-        manifest=destination / MANIFEST,
-        tables=tuple(destination / p for p in assets.contents if p.endswith(".csv")),
-        figures=tuple(
-            destination / p for p in assets.contents if not p.endswith(".csv")
-        ),
-    )
+    return report_files(assets, pages, analysis.inputs)
+
+
+def section_names(protocol: Protocol) -> tuple[str, ...]:
+    """Return the names of the sections that the report of a study can have."""
+    return (*report_sections(protocol), *CONDUCT_SECTIONS)
 
 
 def _make_sections(
     sections: Sequence[Section],
     assets: Assets,
     progress: Progress | None,
+    cache: Cache,
     *,
     raw_csv: bool,
 ) -> tuple[Chapter, ...]:
     # as they are shown; the files of their tables and figures go to the assets
+    contents = [content for section in sections for content in section.blocks]
+    drawings = [content for content in contents if isinstance(content, Drawing)]
+    drawn = iter(_pictures(drawings, cache))
     made = []
     numbers: Counter[type] = Counter()
     for section in sections:
@@ -186,7 +236,7 @@ def _make_sections(
             numbers[type(content)] += 1
             number = numbers[type(content)]
             if isinstance(content, Drawing):
-                blocks.append(_draw(content, number, assets))
+                blocks.append(_figure(content, number, next(drawn), assets))
                 if progress is not None:
                     progress(content.name)
                 continue
@@ -200,16 +250,51 @@ def _make_sections(
     return tuple(made)
 
 
-def _draw(drawing: Drawing, number: int, assets: Assets) -> Block:
-    # Imported here: a report without figures loads nothing that draws.
-    from masrel.report.figures import draw
+def _pictures(drawings: Sequence[Drawing], cache: Cache) -> list[Mapping[str, bytes]]:
+    # of each drawing its files by form: those that were kept, and the others drawn
+    keys = [
+        cache.key("figure", each.content, each.stamp, libraries=_DRAWING)
+        for each in drawings
+    ]
+    pictures: dict[int, Mapping[str, bytes]] = {}
+    for place, key in enumerate(keys):
+        if (stored := cache.read(key)) is not None:
+            pictures[place] = stored
+    lacking = [place for place in range(len(drawings)) if place not in pictures]
+    if lacking:
+        # Imported here: a report without new figures loads nothing that draws.
+        from masrel.report.figures import draw_all
 
-    pictures: dict[str, bytes] = {}
-    files: dict[str, str] = {}
-    for form, picture in draw(drawing.content, stamp=drawing.stamp).items():
-        pictures[form] = picture
-        files[form] = assets.add("figures", drawing.name, form, picture)
+        drawn = draw_all([drawings[place] for place in lacking])
+        for place, files in zip(lacking, drawn, strict=True):
+            pictures[place] = {str(form): data for form, data in files.items()}
+            cache.write(keys[place], pictures[place])
+    return [pictures[place] for place in range(len(drawings))]
+
+
+_DRAWING = ("matplotlib", "numpy", "pillow", "scipy")
+_PAGE = "page"
+
+
+def _figure(
+    drawing: Drawing, number: int, pictures: Mapping[str, bytes], assets: Assets
+) -> Block:
+    files = {
+        form: assets.add("figures", drawing.name, form, picture)
+        for form, picture in pictures.items()
+    }
     return Block(number=number, content=drawing, pictures=pictures, files=files)
+
+
+def _page(writer: Writer, document: Document, cache: Cache) -> bytes:
+    docx = installed().get("python-docx")
+    key = cache.key("page", writer.file, document, docx, libraries=("jinja2",))
+    stored = cache.read(key)
+    if stored is not None:
+        return stored[_PAGE]
+    page = writer.write(document)
+    cache.write(key, {_PAGE: page})
+    return page
 
 
 def _inputs(

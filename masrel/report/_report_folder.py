@@ -6,16 +6,23 @@ the first page is replaced; the manifest names them all; then those go that it d
 name, also of a report that was never finished. What else is in the folder stays.
 """
 
+import contextlib
 import hashlib
 import json
+import os
 import re
-from collections.abc import Mapping
+import sys
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from masrel._files import refuse_record, sync_folder, write_files
-from masrel._input import MAX_RECORDING, read_regular
-from masrel.verification._outputs import REPORT_FORMAT
+from masrel._cache import file_hash
+from masrel._files import make_folder, refuse_record, sync_folder, write_files
+from masrel._input import read_regular
+
+if sys.platform != "win32":
+    import fcntl
 
 MANIFEST = "manifest.json"
 
@@ -37,23 +44,13 @@ class Assets:
         return place
 
 
-def replace_report(
-    folder: Path,
-    assets: Assets,
-    pages: Mapping[str, bytes],
-    inputs: Mapping[str, str],
-) -> None:
-    """Put a report into a folder, in the place of the one that is there."""
-    for name in (*pages, MANIFEST):
-        refuse_record(folder / name)
-    new = {
-        folder / place: data
-        for place, data in assets.contents.items()
-        if not _is_there(folder / place, data)
-    }
-    write_files(new, within=folder)
-    for page, data in pages.items():
-        write_files({folder / page: data}, within=folder)
+def report_files(
+    assets: Assets, pages: Mapping[str, bytes], inputs: Mapping[str, str]
+) -> dict[str, bytes]:
+    """Return every file of a report in the order in which they are written."""
+    # Imported here: whether a report is current is known without it.
+    from masrel.verification._outputs import REPORT_FORMAT
+
     written = {**assets.contents, **pages}
     document = {
         "format": REPORT_FORMAT,
@@ -61,9 +58,49 @@ def replace_report(
         "files": {place: _hash(data) for place, data in written.items()},
     }
     manifest = json.dumps(document, indent=1, ensure_ascii=False) + "\n"
-    write_files({folder / MANIFEST: manifest}, within=folder)
-    for name in _ASSET_FOLDERS:
-        _remove_others(folder, name, assets.contents)
+    return {**written, MANIFEST: manifest.encode()}
+
+
+def replace_report(folder: Path, files: Mapping[str, bytes]) -> None:
+    """Put the files of a report into a folder, in the place of the one there is."""
+    for name in files:
+        if "/" not in name:
+            refuse_record(folder / name)
+    with _alone(folder):
+        new = {folder / place: files[place] for place in changed_files(folder, files)}
+        assets = {path: data for path, data in new.items() if path.parent != folder}
+        write_files(assets, within=folder)
+        for path, data in new.items():  # the pages, and the manifest last
+            if path not in assets:
+                write_files({path: data}, within=folder)
+        _remove(list(stale_assets(folder, files)))
+
+
+@contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    # Of two builds at once one waits: else it would remove what the other links to.
+    make_folder(folder)
+    if sys.platform == "win32":
+        yield
+        return
+    with contextlib.ExitStack() as stack:
+        with contextlib.suppress(OSError):  # a file system without locks
+            descriptor = os.open(folder, os.O_RDONLY)
+            stack.callback(os.close, descriptor)
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
+
+
+def _remove(paths: Sequence[Path]) -> None:
+    for path in paths:
+        path.unlink()
+    for folder in dict.fromkeys(path.parent for path in paths):
+        sync_folder(folder)
+
+
+def changed_files(folder: Path, files: Mapping[str, bytes]) -> list[str]:
+    """Return those files of a report that are not in a folder as they should be."""
+    return [p for p, data in files.items() if not _is_there(folder / p, data)]
 
 
 def _hash(data: bytes) -> str:
@@ -79,20 +116,18 @@ def _is_there(path: Path, data: bytes) -> bool:
         return False
 
 
-def _remove_others(folder: Path, name: str, named: Mapping[str, bytes]) -> None:
-    # A file goes only if it is what a report wrote: its name holds its hash.
-    inside = folder / name
-    if inside.is_symlink() or not inside.is_dir():
-        return
-    for path in sorted(inside.iterdir()):
-        place = f"{name}/{path.name}"
-        asset = _ASSET.fullmatch(place)
-        if asset is None or place in named or path.is_symlink():
+def stale_assets(folder: Path, named: Collection[str]) -> Iterator[Path]:
+    """Yield tables and figures of a folder that its report does not name."""
+    # Only what a report wrote: its name holds its hash.
+    for name in _ASSET_FOLDERS:
+        inside = folder / name
+        if inside.is_symlink() or not inside.is_dir():
             continue
-        try:
-            data = read_regular(path, most=MAX_RECORDING)
-        except OSError:  # gone, or no file
-            continue
-        if _hash(data).startswith(asset[1]):
-            path.unlink()
-    sync_folder(inside)
+        for path in sorted(inside.iterdir()):
+            place = f"{name}/{path.name}"
+            asset = _ASSET.fullmatch(place)
+            if asset is None or place in named or path.is_symlink():
+                continue
+            digest = file_hash(str(path))
+            if digest is not None and digest.startswith(asset[1]):
+                yield path

@@ -1,0 +1,176 @@
+"""Whether a report is what a build would write, seen before anything is loaded.
+
+In: a call of ``masrel report``, and what the last build of the same call left in the
+cache: the hash of every file that it read, of the names of all files there were, and of
+what it wrote. Out: what that build shown, if all of it still holds.
+"""
+
+import json
+import os
+import re
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from masrel._cache import Cache, content_hash, file_hash, installed
+from masrel._input import MAX_TABLE, parse_json, read_regular
+from masrel.report._report_folder import MANIFEST, stale_assets
+
+_NOTE = "note"
+# What a user sets or matplotlib keeps: figures are drawn in the report's style alone
+_OF_MATPLOTLIB = re.compile(r"matplotlibrc|fontlist-v.*\.json|.*\.mplstyle")
+_DEPTH = 3  # of the folders in a study whose files are listed
+_HIDDEN = ".key"  # the one hidden folder of a study that has files of it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Build:
+    """A call of ``masrel report``."""
+
+    study: Path
+    folder: Path  # of the report
+    options: Mapping[str, object]  # all of the call that changes what is made or said
+    cache: Cache
+
+    def last(self) -> dict[str, Any] | None:
+        """Return what the last build shown if a new one would change nothing."""
+        stored = self.cache.read(self._key())
+        if stored is None:
+            return None
+        note: dict[str, Any] = parse_json(stored[_NOTE])
+        is_current = (
+            note["made_from"] == self._made_from()
+            and all(file_hash(path) == known for path, known in note["read"].items())
+            and _is_whole(self.folder, note["manifest"])
+        )
+        shown: dict[str, Any] = note["shown"]
+        return shown if is_current else None
+
+    @contextmanager
+    def noted(self) -> Iterator[dict[str, Any]]:
+        """Take what a build says, and keep it with all that it has read."""
+        shown: dict[str, Any] = {}
+        # Listed before anything is read: a file that comes later is a change.
+        made_from = self._made_from()
+        with _files_read(self.study, self._outputs()) as readings:
+            yield shown
+        if not readings.are_as_they_were():
+            return
+        note = {
+            "made_from": made_from,
+            "read": {path: digest for path, (digest, _) in readings.files.items()},
+            "manifest": file_hash(str(self.folder / MANIFEST)),
+            "shown": shown,
+        }
+        self.cache.write(self._key(), {_NOTE: json.dumps(note).encode()})
+        self.cache.remove_oldest()
+
+    def _key(self) -> str | None:
+        # Paths as they were typed, too: they are in what is said.
+        places = [self.study, self.folder]
+        at = [os.path.abspath(place) for place in places]
+        call = ([str(p) for p in places], at, sorted(self.options.items()))
+        return self.cache.key("build", call, libraries=())
+
+    def _made_from(self) -> str:
+        return content_hash(installed(), *_listing(self.study, self._outputs(), _DEPTH))
+
+    def _outputs(self) -> tuple[str, ...]:
+        folders = (self.folder, self.cache.folder)
+        return tuple(os.path.abspath(folder) for folder in folders if folder)
+
+
+def _listing(folder: Path | str, but: tuple[str, ...], depth: int) -> Iterator[str]:
+    # What a study has or has not is seen without any file being opened.
+    try:
+        entries = sorted(os.scandir(folder), key=lambda entry: entry.name)
+    except OSError as error:
+        yield f"{folder}: {error.errno}"
+        return
+    for entry in entries:
+        if entry.name.startswith(".") and entry.name != _HIDDEN:
+            continue
+        if os.path.abspath(entry.path) in but:
+            continue
+        is_folder = entry.is_dir()
+        yield f"{entry.path}{'/' * is_folder}"
+        if is_folder and depth:
+            yield from _listing(entry.path, but, depth - 1)
+
+
+def _is_whole(folder: Path, manifest: str | None) -> bool:
+    # Whether a report is there as it was written, and nothing that a build would remove
+    path = folder / MANIFEST
+    if manifest is None or file_hash(str(path)) != manifest:
+        return False
+    files = parse_json(read_regular(path, most=MAX_TABLE))["files"]
+    return not any(
+        os.path.islink(folder / name) or file_hash(str(folder / name)) != digest
+        for name, digest in files.items()
+    ) and not any(stale_assets(folder, files))
+
+
+class _Readings:
+    """The files that this process opens to read, each as it was at first."""
+
+    def __init__(self, study: Path, but: tuple[str, ...]) -> None:
+        # hash, or None of what could not be read; size and times
+        self.files: dict[str, tuple[str | None, tuple[int, ...] | None]] = {}
+        self._study = os.path.join(os.path.abspath(study), "")
+        self._outputs = tuple(os.path.join(folder, "") for folder in but)
+        libraries = os.path.dirname(os.path.dirname(os.__file__))
+        self._code = (os.path.join(libraries, ""), os.path.join(_MASREL, ""))
+
+    def add(self, path: str) -> None:
+        """Note a file, unless it is code or was written by a build."""
+        if path in self.files or path.startswith(self._outputs):
+            return
+        is_code = path.startswith(self._code) or "-packages" + os.sep in path
+        is_code |= bool(_OF_MATPLOTLIB.fullmatch(os.path.basename(path)))
+        if (is_code and not path.startswith(self._study)) or os.path.isdir(path):
+            return
+        self.files[path] = (None, None)  # it is opened once more here
+        self.files[path] = (file_hash(path), _status(path))
+
+    def are_as_they_were(self) -> bool:
+        """Return whether no file has changed since it was noted."""
+        return all(_status(path) == status for path, (_, status) in self.files.items())
+
+
+_MASREL = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+_readings: list[_Readings] = []
+"""Where files that are opened are noted: in one place, or in none."""
+
+_hooks: list[object] = []
+
+
+def _see(event: str, args: tuple[Any, ...]) -> None:
+    # Python calls this at every opening of a file, and can never be told not to.
+    if event != "open" or not _readings or not isinstance(args[0], str | os.PathLike):
+        return
+    if not args[2] & (os.O_WRONLY | os.O_RDWR):
+        _readings[0].add(os.path.abspath(os.fsdecode(args[0])))
+
+
+@contextmanager
+def _files_read(study: Path, but: tuple[str, ...]) -> Iterator[_Readings]:
+    # Python's own audit sees every file: no reader is forgotten.
+    if not _hooks:
+        sys.addaudithook(_see)
+        _hooks.append(_see)
+    _readings.append(_Readings(study, but))
+    try:
+        yield _readings[0]
+    finally:
+        _readings.clear()
+
+
+def _status(path: str) -> tuple[int, ...] | None:
+    try:
+        status = os.stat(path)
+    except OSError:
+        return None
+    return (status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns)

@@ -1,0 +1,384 @@
+"""A report is made anew where something has changed, and nowhere else."""
+
+import os
+import shutil
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import pytest
+
+import masrel.report.figures
+from masrel import _cache
+from masrel.cli import cli
+from masrel.protocol import copy_template
+from masrel.report import figures
+from tests.architecture.test_imports import HEAVY, loaded_after
+from tests.cli.process import Caller
+
+LINES = """
+[[analysis.estimates]]
+id = "kappa"
+kind = "inter-rater"
+coefficient = "fleiss_kappa"
+models = "standard"
+sessions = ["test"]
+target = "raters"
+interval = "jackknife"
+
+[[analysis.estimates]]
+id = "dummies"
+kind = "inter-rater"
+coefficient = "fleiss_kappa"
+models = "dummy"
+sessions = ["test"]
+target = "raters"
+interval = "none"
+
+[report]
+sections = ["agreement", "grades"]
+"""
+
+
+@pytest.fixture(scope="module")
+def reported(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The published study with two estimates, and what its report leaves in a cache."""
+    root = tmp_path_factory.mktemp("reported") / "study"
+    copy_template("hess2012", root)
+    protocol = root / "protocol.toml"
+    head = protocol.read_text(encoding="utf-8").partition("[[analysis.estimates]]")[0]
+    protocol.write_text(head + LINES, encoding="utf-8")
+    cli(["report", str(root), "--quiet"], standalone_mode=False)
+    shutil.rmtree(root / "report")
+    return root
+
+
+@pytest.fixture
+def study(reported: Path, tmp_path: Path) -> Path:
+    """That study, with its cache and without its report."""
+    return Path(shutil.copytree(reported, tmp_path / "study"))
+
+
+Contents = dict[str, bytes]
+
+
+def contents(folder: Path) -> Contents:
+    files = (path for path in sorted(folder.rglob("*")) if path.is_file())
+    return {str(path.relative_to(folder)): path.read_bytes() for path in files}
+
+
+def times(folder: Path) -> dict[Path, int]:
+    return {path: path.lstat().st_mtime_ns for path in folder.rglob("*")}
+
+
+def edit(file: Path, old: str, new: str) -> None:
+    text = file.read_text(encoding="utf-8")
+    assert old in text
+    file.write_text(text.replace(old, new, 1), encoding="utf-8")
+
+
+@pytest.fixture
+def drawn(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The names of figures that are drawn, as they are."""
+    names: list[str] = []
+    draw_all = figures.draw_all
+
+    def counted(drawings: Sequence[object], **options: object) -> object:
+        names.extend(drawing.name for drawing in drawings)
+        return draw_all(drawings, **options)
+
+    monkeypatch.setattr(masrel.report.figures, "draw_all", counted)
+    return names
+
+
+def cold(masrel: Caller, study: Path, folder: Path, *options: object) -> Contents:
+    """What a build writes that can look nothing up."""
+    cache = folder.with_suffix(".cache")
+    masrel("report", study, "-o", folder, "--cache", cache, "--quiet", *options)
+    made = contents(folder)
+    shutil.rmtree(folder)
+    shutil.rmtree(cache)
+    return made
+
+
+def test_nothing_changed_touches_nothing_and_says_the_same(
+    masrel: Caller, study: Path, tmp_path: Path
+) -> None:
+    gates = ("--require", "kappa.low >= 0.1", "--require", "kappa.n >= 9")
+    junit = ("--junit", tmp_path / "junit.xml")
+    first = masrel("report", study, *gates, *junit)
+    assert first.code == 1
+    assert "kappa.n >= 9 fails: 4" in first.err
+    before = times(tmp_path)
+    assert masrel("report", study, *gates, *junit) == first
+    assert times(tmp_path) == before
+    (tmp_path / "junit.xml").unlink()
+    masrel("report", study, *gates, *junit)
+    assert 'failures="1"' in (tmp_path / "junit.xml").read_text()
+
+
+def test_what_must_be_known_of_the_numbers_is_said_again(
+    masrel: Caller, study: Path
+) -> None:
+    edit(study / "protocol.toml", '"jackknife"', '"bootstrap"')
+    edit(study / "protocol.toml", 'target = "raters"', 'target = "items"')
+    first = masrel("report", study)
+    assert "note: " in first.err
+    assert masrel("report", study) == first
+
+
+def test_nothing_changed_loads_nothing_heavy(study: Path) -> None:
+    call = f"from masrel.cli import cli\ncli(['report', {str(study)!r}])"
+    assert loaded_after(call) & HEAVY >= {"pandas"}
+    assert loaded_after(call) & (HEAVY | {"numpy", "msgspec", "jinja2"}) == set()
+
+
+EDITS = {
+    "a grade": ("ratings/published.csv", "1+", "1"),
+    "the plan": ("protocol.toml", '"jackknife"', '"none"'),
+    "the title": ("protocol.toml", 'title = "', 'title = "Of '),
+    "the sections": ("protocol.toml", '"agreement", ', ""),
+}
+
+
+@pytest.mark.parametrize("what", EDITS)
+@pytest.mark.slow
+def test_an_edit_is_seen(
+    masrel: Caller, study: Path, tmp_path: Path, what: str
+) -> None:
+    masrel("report", study, "--quiet")
+    before = contents(study / "report")
+    name, old, new = EDITS[what]
+    text = (study / name).read_bytes()
+    edit(study / name, old, new)
+    os.utime(study / name, ns=(0, 0))  # as a copy has it
+    masrel("report", study, "--quiet")
+    assert contents(study / "report") != before
+    assert contents(study / "report") == cold(masrel, study, tmp_path / "cold")
+    (study / name).write_bytes(text)
+    masrel("report", study, "--quiet")
+    assert contents(study / "report") == before
+
+
+def test_a_file_that_comes_is_seen(masrel: Caller, study: Path) -> None:
+    edit(study / "protocol.toml", '"agreement", ', '"in-person", ')
+    in_person = study / "ratings/in_person.csv"
+    data = in_person.read_bytes()
+    in_person.unlink()
+    masrel("report", study, "--quiet")
+    without = contents(study / "report")
+    in_person.write_bytes(data)
+    masrel("report", study, "--quiet")
+    assert contents(study / "report") != without
+
+
+@pytest.mark.slow
+def test_another_version_of_what_draws_is_seen(
+    masrel: Caller,
+    study: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    drawn: list[str],
+) -> None:
+    masrel("report", study)
+    site = tmp_path / "site"
+    (site / "matplotlib-99.0.dist-info").mkdir(parents=True)
+    monkeypatch.setattr(sys, "path", [str(site), *sys.path])
+    _cache.installed.cache_clear()
+    drawn.clear()
+    masrel("report", study)
+    monkeypatch.undo()
+    _cache.installed.cache_clear()
+    assert drawn == ["agreement", "grades_test"]
+
+
+@pytest.mark.slow
+def test_another_code_is_seen(
+    masrel: Caller, study: Path, monkeypatch: pytest.MonkeyPatch, drawn: list[str]
+) -> None:
+    masrel("report", study)
+    drawn.clear()
+    monkeypatch.setattr(_cache, "code_hash", lambda: "of an edited file")
+    masrel("report", study)
+    assert drawn == ["agreement", "grades_test"]
+
+
+@pytest.mark.slow
+def test_one_grade_draws_what_it_reaches(
+    masrel: Caller, study: Path, drawn: list[str]
+) -> None:
+    edit(study / "protocol.toml", '"grades"]', '"grades", "speeds"]')
+    masrel("report", study)
+    assert drawn == ["speeds"]
+    drawn.clear()
+    edit(study / "ratings/published.csv", "1+", "1")
+    masrel("report", study)
+    assert drawn == ["agreement", "grades_test"]  # and not the speeds
+
+
+@pytest.mark.parametrize("what", ["report.md", "tables", "manifest.json"])
+@pytest.mark.parametrize("is_gone", [True, False])
+def test_a_file_of_the_report_is_made_good(
+    masrel: Caller, study: Path, what: str, is_gone: bool, drawn: list[str]
+) -> None:
+    masrel("report", study)
+    before = contents(study / "report")
+    file = study / "report" / what
+    file = next(file.iterdir()) if file.is_dir() else file
+    if is_gone:
+        file.unlink()
+    else:
+        file.write_bytes(b"spoilt")
+    drawn.clear()
+    assert masrel("report", study).code == 0
+    assert contents(study / "report") == before
+    assert drawn == []
+
+
+def test_a_table_that_nobody_links_to_goes(masrel: Caller, study: Path) -> None:
+    masrel("report", study)
+    before = contents(study / "report")
+    old = study / "report/tables/old-ba7816bf8f01cfea.csv"
+    old.write_bytes(b"abc")
+    other = study / "report/tables/mine.csv"
+    other.write_bytes(b"abc")
+    masrel("report", study)
+    assert contents(study / "report") == before | {"tables/mine.csv": b"abc"}
+
+
+SPOILT: dict[str, Callable[[bytes], bytes]] = {
+    "garbage": lambda data: os.urandom(len(data)),
+    "empty": lambda _: b"",
+    "cut": lambda data: data[: len(data) // 2],
+    "one bit": lambda data: data[:-9] + bytes([data[-9] ^ 1]) + data[-8:],
+    "another": lambda data: data,
+}
+
+
+def spoil(cache: Path, how: str) -> None:
+    files = [path for path in cache.glob("*") if len(path.name) == 64]
+    texts = [path.read_bytes() for path in files]
+    if how == "another":
+        texts = texts[1:] + texts[:1]
+    for path, text in zip(files, texts, strict=True):
+        path.write_bytes(SPOILT[how](text))
+
+
+@pytest.mark.parametrize("how", SPOILT)
+@pytest.mark.slow
+def test_a_spoilt_cache_is_of_no_consequence(
+    masrel: Caller, study: Path, how: str
+) -> None:
+    first = masrel("report", study)
+    before = contents(study / "report")
+    spoil(study / _cache.FOLDER, how)
+    assert masrel("report", study) == first
+    assert contents(study / "report") == before
+
+
+@pytest.mark.slow
+def test_a_cache_that_is_no_folder_is_of_no_consequence(
+    masrel: Caller, study: Path
+) -> None:
+    shutil.rmtree(study / _cache.FOLDER)
+    (study / _cache.FOLDER).write_text("a file")
+    first = masrel("report", study, "--only", "agreement")
+    assert first.code == 0
+    assert masrel("report", study, "--only", "agreement") == first
+    done = masrel("report", study, "--cache", study / _cache.FOLDER)
+    assert (done.code, "is a file" in done.err) == (2, True)
+
+
+@pytest.mark.slow
+def test_a_full_disk_leaves_a_report(
+    masrel: Caller, study: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(path: Path, _: object) -> None:
+        raise OSError(28, "No space left on device", str(path))
+
+    shutil.rmtree(study / _cache.FOLDER)
+    monkeypatch.setattr(_cache, "write_file", full)
+    assert masrel("report", study).code == 0
+    assert (study / "report/report.html").is_file()
+
+
+def test_a_cache_in_the_place_of_records_is_refused(
+    masrel: Caller, study: Path
+) -> None:
+    done = masrel("report", study, "--cache", study / "sessions")
+    assert (done.code, done.err.count("\n")) == (2, 1)
+    assert not (study / "report").exists()
+
+
+def test_a_cache_stays_small(
+    masrel: Caller, study: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    masrel("report", study)
+    monkeypatch.setattr(_cache, "_MOST_BYTES", 50_000)
+    edit(study / "ratings/published.csv", "1+", "1")
+    masrel("report", study)
+    sizes = [path.stat().st_size for path in (study / _cache.FOLDER).iterdir()]
+    assert 0 < sum(sizes) < 50_000
+
+
+def test_a_study_that_was_copied_makes_its_own_report(
+    masrel: Caller, study: Path, tmp_path: Path
+) -> None:
+    masrel("report", study)
+    copy = tmp_path / "copy"
+    shutil.copytree(study, copy)
+    edit(study / "ratings/published.csv", "1+", "1")
+    done = masrel("report", copy)
+    assert done.out == f"{copy}/report/report.html\n"
+    assert str(study) not in done.err
+
+
+def test_check_names_what_would_change_and_writes_nothing(
+    masrel: Caller, study: Path
+) -> None:
+    before = times(study)
+    done = masrel("report", study, "--check")
+    assert done.code == 1
+    assert f"{study}/report/report.html: would be new\n" in done.out
+    assert times(study) == before
+    masrel("report", study)
+    shutil.rmtree(study / _cache.FOLDER)  # as in a clone
+    before = times(study)
+    done = masrel("report", study, "--check")
+    assert (done.code, done.out) == (0, "")
+    edit(study / "ratings/published.csv", "1+", "1")
+    before = times(study)
+    done = masrel("report", study, "--check")
+    assert done.code == 1
+    assert times(study) == before
+    ends = {
+        line.rpartition(": ")[2]: line.partition(":")[0]
+        for line in done.out.splitlines()
+    }
+    assert set(ends) == {"would change", "would be new", "would go"}
+    assert ends["would change"] == f"{study}/report/manifest.json"
+    assert Path(ends["would go"]).is_file()
+
+
+def test_check_says_that_a_report_is_current_with_its_gates(
+    masrel: Caller, study: Path
+) -> None:
+    masrel("report", study)
+    done = masrel("report", study, "--check", "--require", "kappa.n >= 9")
+    assert (done.code, done.out) == (1, "")
+    assert "fails: 4" in done.err
+    assert masrel("report", study, "--check").code == 0
+
+
+def test_only_makes_a_report_of_what_is_named(masrel: Caller, study: Path) -> None:
+    masrel("report", study)
+    assert masrel("report", study, "--only", "grades").code == 0
+    names = {name.partition("-")[0] for name in contents(study / "report")}
+    assert "tables/grades_test" in names
+    assert "figures/agreement" not in names
+    text = (study / "report/report.md").read_text(encoding="utf-8")
+    assert "## Grades" in text
+    assert "## Agreement between raters" not in text
+    done = masrel("report", study, "--only", "grade")
+    assert (done.code, done.err.count("\n")) == (2, 1)
+    assert "--only: needed a section of this report" in done.err
