@@ -1,0 +1,189 @@
+"""A page as Chromium shows and prints it: in a dark room, on a telephone, on paper."""
+
+import json
+import re
+import shutil
+import subprocess
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+
+from masrel.report import ReportFiles
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+WORDS = shutil.which("pdftotext")
+XHTML = "{http://www.w3.org/1999/xhtml}"
+OPTIONS = (
+    *("--headless", "--no-sandbox", "--disable-gpu", "--no-first-run"),
+    *("--disable-background-networking", "--disable-component-update"),
+    *("--disable-sync", "--allow-file-access-from-files", "--enable-logging=stderr"),
+)
+# Relative luminance and contrast as WCAG 2.2 defines them.
+MEASURE = """
+const page = document.querySelector("iframe").contentDocument;
+const look = page.defaultView.getComputedStyle;
+const numbers = c => c.match(/[\\d.]+/g).map(Number);
+const channel = v => (v /= 255) <= .04045 ? v / 12.92 : ((v + .055) / 1.055) ** 2.4;
+const light = ([r, g, b]) =>
+  .2126 * channel(r) + .7152 * channel(g) + .0722 * channel(b);
+function ground(e) {
+  for (; e; e = e.parentElement) {
+    const c = numbers(look(e).backgroundColor);
+    if (c.length < 4 || c[3] === 1) return c;
+  }
+}
+function contrast(e) {
+  const both = [light(numbers(look(e).color)), light(ground(e))].sort((a, b) => b - a);
+  return (both[0] + .05) / (both[1] + .05);
+}
+const texts = [...page.body.querySelectorAll("*")].filter(e =>
+  [...e.childNodes].some(n => n.nodeType === 3 && n.data.trim()));
+const boxes = [...page.querySelectorAll("[role=region]")];
+const edge = page.documentElement.clientWidth + 1;
+document.title = JSON.stringify({
+  dark: light(ground(page.body)) < .1,
+  contrast: Math.min(...texts.map(contrast)),
+  n_texts: texts.length,
+  over: page.documentElement.scrollWidth - page.documentElement.clientWidth,
+  wide: [...page.querySelectorAll("p, h1, h2, h3, figcaption, li, dd, [role=region]")]
+    .filter(e => e.getBoundingClientRect().right > edge && !e.matches(".skip"))
+    .map(e => e.outerHTML.slice(0, 80)),
+  scrolling: boxes.filter(b => b.scrollWidth > b.clientWidth).length,
+  unreached: boxes.filter(b => {
+    b.focus();
+    return page.activeElement !== b || b.tabIndex !== 0 || !b.ariaLabel;
+  }).length,
+  outside: [...page.querySelectorAll("table, img")].filter(
+    e => !e.closest("[role=region]")).length,
+  shrunk: [...page.querySelectorAll("img")].filter(
+    i => i.complete && i.clientWidth < .99 * i.naturalWidth).length,
+  skips: page.querySelector("a").hash === "#content",
+});
+"""
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium to show a page"),
+]
+
+
+def run(*options: str, folder: Path) -> tuple[str, str]:
+    """What Chromium prints, and what it complains of."""
+    assert CHROMIUM is not None
+    call = [CHROMIUM, *OPTIONS, f"--user-data-dir={folder / 'profile'}", *options]
+    done = subprocess.run(
+        call, check=True, capture_output=True, timeout=120, encoding="utf-8"
+    )
+    return done.stdout, done.stderr
+
+
+def measured(page: Path, folder: Path, *options: str) -> dict[str, Any]:
+    """What a window of 400 px shows of a page."""
+    frame = folder / "frame.html"
+    box = (
+        f'<iframe src="{page.as_uri()}" style="width: 400px; height: 900px; border: 0">'
+    )
+    script = f"<script>onload = () => {{{MEASURE}}}</script>"
+    frame.write_text(f"<title></title>{box}</iframe>{script}", encoding="utf-8")
+    shown, said = run(*options, "--dump-dom", frame.as_uri(), folder=folder)
+    assert "CONSOLE" not in said
+    title = re.search("<title>(.*?)</title>", shown, re.S)
+    assert title is not None
+    found: dict[str, Any] = json.loads(
+        title[1].replace("&lt;", "<").replace("&gt;", ">")
+    )
+    return found
+
+
+@pytest.mark.parametrize("look", ["light", "dark"])
+def test_a_telephone_shows_all_of_a_page_with_enough_contrast(
+    look: str, simulated: ReportFiles, tmp_path: Path
+) -> None:
+    scheme = {"light": "1", "dark": "0"}[look]
+    option = f"--blink-settings=preferredColorScheme={scheme}"
+    page = measured(simulated.html, tmp_path, option)
+    assert page["dark"] == (look == "dark")
+    assert page["n_texts"] > 100
+    assert page["contrast"] >= 4.5
+    assert page["over"] == 0  # nothing beside the window
+    assert page["wide"] == []
+    assert page["scrolling"] > 3  # in boxes of their own
+    for count in ("unreached", "outside", "shrunk"):
+        assert page[count] == 0, count
+    assert page["skips"]
+
+
+@dataclass(frozen=True)
+class Word:
+    """A word of a PDF, and its box in points from the upper left corner."""
+
+    text: str
+    left: float
+    top: float
+    right: float
+    bottom: float
+
+
+def printed(page: Path, folder: Path) -> list[list[Word]]:
+    """The words on each sheet of paper."""
+    pdf, words = folder / "page.pdf", folder / "words.html"
+    run(
+        "--no-pdf-header-footer",
+        f"--print-to-pdf={pdf}",
+        page.as_uri(),
+        folder=folder,
+    )
+    assert WORDS is not None
+    subprocess.run([WORDS, "-bbox", str(pdf), str(words)], check=True)
+    keys = ("xMin", "yMin", "xMax", "yMax")
+    return [
+        [
+            Word(str(word.text), *(float(word.attrib[key]) for key in keys))
+            for word in sheet.iter(f"{XHTML}word")
+        ]
+        for sheet in ElementTree.parse(words).iter(f"{XHTML}page")
+    ]
+
+
+@pytest.mark.skipif(WORDS is None, reason="there is no pdftotext to read a PDF with")
+@pytest.mark.parametrize("report", ["published", "simulated"])
+def test_on_paper_no_text_is_under_the_banner_and_no_caption_is_alone(
+    report: str, request: pytest.FixtureRequest, tmp_path: Path
+) -> None:
+    files: ReportFiles = request.getfixturevalue(report)
+    sheets = printed(files.html, tmp_path)
+    assert len(sheets) > 4
+    top, foot = 18 / 25.4 * 72, (297 - 16) / 25.4 * 72  # of what is not margin
+    captions = []
+    for sheet in sheets:
+        head = [word.text for word in sheet if word.top < top - 1]
+        assert head == (["SIMULATED", "DATA"] if report == "simulated" else [])
+        body = [word for word in sheet if top - 1 <= word.top < foot]
+        for word in body:
+            assert word.bottom <= foot + 1, word
+            assert 30 < word.left, word
+            assert word.right < 565, word
+        for first, second in pairwise(body):
+            number = re.fullmatch(r"(\d+)\.", second.text)
+            if first.text not in ("Table", "Figure") or number is None:
+                continue
+            captions.append((first.text, int(number[1])))
+            if first.text == "Table":  # its head is just below, and rows are below that
+                below = sorted({w.top for w in body if w.top > first.bottom})
+                assert len(below) >= 3, second
+                assert below[0] - first.bottom < 40, second
+            else:  # the picture, whose letters are no words, is just above
+                above = max(
+                    (w.bottom for w in body if w.bottom < first.top), default=top
+                )
+                assert first.top - above > 60, second
+    n_tables = sum(name == "Table" for name, _ in captions)
+    assert [n for name, n in captions if name == "Table"] == list(
+        range(1, n_tables + 1)
+    )
+    assert n_tables == len(files.tables)
+    assert len(captions) - n_tables == len(files.figures) // 2
