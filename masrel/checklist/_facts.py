@@ -79,7 +79,7 @@ def gather_facts(paths: StudyPaths, protocol: Protocol) -> StudyFacts:
         analysis=analysis,
         sessions=_sessions(paths, protocol),
         corrections=corrections_of(paths, protocol),
-        remarks=study_remarks(paths, protocol, names=False),
+        remarks=study_remarks(paths, protocol, include=()),
         raters=rater_progress(paths, protocol, session_progress(paths, protocol)),
         n_schedules=len(drawn),
         n_concealed=len(concealed),

@@ -3,6 +3,8 @@
 ``conduct.jsonl`` is a chain of events as a session log is one.
 """
 
+import hashlib
+import json
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from datetime import datetime
@@ -85,6 +87,14 @@ def read_conduct(study: StudyPaths) -> tuple[Event, ...]:
         If a log is damaged or holds what is no such event.
     """
     return tuple(event for event in all_events(study) if event.kind in _SHOWN)
+
+
+def conduct_hash(study: StudyPaths) -> str | None:
+    """Return a hash of what `read_conduct` returns; None where that is nothing."""
+    events = [(e.time_utc, e.kind, dict(e.fields)) for e in read_conduct(study)]
+    if not events:
+        return None
+    return hashlib.sha256(json.dumps(events, sort_keys=True).encode()).hexdigest()
 
 
 def all_events(study: StudyPaths) -> tuple[Event, ...]:

@@ -14,7 +14,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Literal
 
-from masrel._input import MAX_SMALL, listed, read_regular
+from masrel._input import MAX_SMALL, listed, parse_json, read_regular
 from masrel.errors import ParameterError
 from masrel.progress import rater_progress, raters_csv, session_progress
 from masrel.protocol import Protocol, Question, StudyPaths
@@ -101,6 +101,8 @@ class Dataset:
     recordings: tuple[RecordingFile, ...]
     # files of the study by their place in it, as they leave it
     files: dict[str, bytes]
+    # those of the report, where it shows nothing that may not leave
+    report: tuple[Path, ...]
     description: str
     day: date  # of the export
     left_out: tuple[str, ...]
@@ -146,6 +148,9 @@ def gather_dataset(
         left_out += (f"{len(logs)} logs, which name who did what and why (logs)",)
     if excluded:
         left_out += (f"ratings of {listed(excluded)}, who are excluded (logs)",)
+    shown = [name for name in _shown_in_report(paths) if name not in include]
+    if shown:
+        left_out += (f"the report, which shows what is private ({listed(shown)})",)
     return Dataset(
         paths=paths,
         protocol=protocol,
@@ -158,6 +163,7 @@ def gather_dataset(
             if recording.rater not in excluded
         ),
         files=files,
+        report=() if shown else tuple(sorted(paths.report.rglob("*"))),
         description=_description(protocol, data.ratings),
         day=day,
         left_out=left_out,
@@ -186,6 +192,22 @@ def _questions(protocol: Protocol) -> dict[str, Question]:
         for questionnaire in protocol.questionnaires
         for question in questionnaire.questions
     }
+
+
+def _shown_in_report(paths: StudyPaths) -> list[str]:
+    # what a report names though it is private, by the names of an export
+    manifest = paths.report / "manifest.json"
+    if not manifest.is_file():
+        return []
+    try:
+        shown = str(parse_json(_bytes(manifest))["inputs"].get("include", ""))
+    except (ValueError, TypeError, KeyError, AttributeError):
+        raise ParameterError(
+            f"{manifest}: needed the manifest of a report, got another file; masrel "
+            "report writes it anew"
+        ) from None
+    in_logs = {"who": "logs", "notes": "logs"}
+    return sorted({in_logs.get(name, name) for name in shown.split()})
 
 
 def _bytes(path: Path) -> bytes:

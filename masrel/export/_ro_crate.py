@@ -45,7 +45,7 @@ def _contents(dataset: Dataset) -> Iterator[tuple[str, bytes]]:
     if dataset.answers is not None:
         yield "ratings/answers.csv", dataset.answers.as_csv()
     made = [*sorted(dataset.paths.schedules.glob("*.csv"))]
-    made += [dataset.paths.analysis_file, *sorted(dataset.paths.report.rglob("*"))]
+    made += [dataset.paths.analysis_file, *dataset.report]
     for recording in dataset.recordings:
         made += [recording.path, recording.path.with_suffix(".json")]
     for path in made:

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from masrel.ratings.completeness import (
         Correction,
         corrections_of,
-        session_remarks,
         study_remarks,
     )
     from masrel.ratings.in_person import InPerson, InPersonRow, read_in_person
@@ -79,7 +78,6 @@ __all__ = [
     "read_study_data",
     "read_study_ratings",
     "retest_pairs",
-    "session_remarks",
     "study_remarks",
     "table_differences",
     "write_answers",
@@ -99,7 +97,6 @@ _HOMES = {
     "completeness": (
         "Correction",
         "corrections_of",
-        "session_remarks",
         "study_remarks",
     ),
     "in_person": ("InPerson", "InPersonRow", "read_in_person"),

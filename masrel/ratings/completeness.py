@@ -1,6 +1,6 @@
 """What a study's table of ratings leaves out, and what happened to the study."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -107,7 +107,8 @@ def study_remarks(
     protocol: Protocol,
     *,
     file: Path | None = None,
-    names: bool = True,
+    has_conduct: bool = True,
+    include: Collection[str] = ("who", "notes"),
 ) -> tuple[str, ...]:
     """Say everything that a reader of a study's ratings must know beside them.
 
@@ -119,9 +120,11 @@ def study_remarks(
         The study's protocol.
     file : Path, optional
         A table that is used whatever the session logs say.
-
-    names : bool, optional
-        Whether to say who recorded each.
+    has_conduct : bool, optional
+        Whether to say what happened beside the sessions, too.
+    include : collection of str, optional
+        What is said though it is private: ``"who"`` recorded each, and ``"notes"``, the
+        reasons.
 
     Returns
     -------
@@ -144,36 +147,8 @@ def study_remarks(
     >>> study_remarks(study, read_protocol(study.protocol))
     ()
     """
-    of_sessions = session_remarks(study, protocol, file=file, names=names)
-    return (*_of_conduct(study, names=names), *of_sessions)
-
-
-def session_remarks(
-    study: StudyPaths,
-    protocol: Protocol,
-    *,
-    file: Path | None = None,
-    names: bool = True,
-) -> tuple[str, ...]:
-    """Say of the sessions what a reader of a study's ratings must know beside them.
-
-    Parameters
-    ----------
-    study : StudyPaths
-        Where the study is.
-    protocol : Protocol
-        The study's protocol.
-    file : Path, optional
-        A table that is used whatever the session logs say.
-    names : bool, optional
-        Whether to say who recorded each.
-
-    Returns
-    -------
-    tuple of str
-        What `study_remarks` returns, but for events beside the sessions.
-    """
-    remarks = [*_of_sessions(study, protocol, names=names)]
+    remarks = [*_of_conduct(study, include)] if has_conduct else []
+    remarks += _of_sessions(study, protocol, include)
     if file not in (None, study.published_file) and any(study.sessions.glob("*.jsonl")):
         remarks.append(
             f"The ratings are from {file.name}, a file named by hand, and not from the "
@@ -182,7 +157,13 @@ def session_remarks(
     return tuple(remarks)
 
 
-def _of_conduct(study: StudyPaths, *, names: bool) -> Iterator[str]:
+def _by_whom(event: Event, include: Collection[str]) -> str:
+    # who recorded an event and why, as far as that is said
+    who = f" by {event.fields['who']}" if "who" in include else ""
+    return who + (f": {event.fields['why']}" if "notes" in include else "")
+
+
+def _of_conduct(study: StudyPaths, include: Collection[str]) -> Iterator[str]:
     events = read_conduct(study)
     raters = excluded_raters(study)
     latest = {
@@ -192,8 +173,9 @@ def _of_conduct(study: StudyPaths, *, names: bool) -> Iterator[str]:
     }
     for event in events:
         fields = event.fields
-        by = f" by {fields.get('who')}" if names else ""
-        by = f"on {event.time_utc[:10]}{by}: {fields.get('why')}."
+        if "why" not in fields:
+            continue
+        by = f"on {event.time_utc[:10]}{_by_whom(event, include)}."
         if event.kind == "withdrawn":
             n_graded = _n_graded(study, str(fields["rater"]))
             counted = "" if fields["rater"] in latest else " and counted"
@@ -232,7 +214,7 @@ def _n_graded(study: StudyPaths, rater: str) -> int:
 
 
 def _of_sessions(
-    study: StudyPaths, protocol: Protocol, *, names: bool
+    study: StudyPaths, protocol: Protocol, include: Collection[str]
 ) -> Iterator[str]:
     expected = {
         study.log_file(rater, session.id)
@@ -250,7 +232,7 @@ def _of_sessions(
                 "move the log out of the study."
             )
         elif log.stat().st_size:
-            yield from _of_skips(study, log, names=names)
+            yield from _of_skips(study, log, include)
             yield from _of_second_entries(study, log, of_study)
         else:
             yield (
@@ -265,7 +247,7 @@ def _of_sessions(
             )
 
 
-def _of_skips(study: StudyPaths, log: Path, *, names: bool) -> Iterator[str]:
+def _of_skips(study: StudyPaths, log: Path, include: Collection[str]) -> Iterator[str]:
     # those that did not get their grade later, and grades that count no more
     state = _state_of(log)
     if state.n_set_aside:
@@ -275,10 +257,9 @@ def _of_skips(study: StudyPaths, log: Path, *, names: bool) -> Iterator[str]:
         )
     for code, event in state.skipped.items():
         if code not in state.grades:
-            by = f" by {event.fields['who']}" if names else ""
             yield (
                 f"{_name(study, log)}: presentation {event.fields['position']}, code "
-                f"{code}, was skipped after a fault{by}: {event.fields['why']}. Its "
+                f"{code}, was skipped after a fault{_by_whom(event, include)}. Its "
                 "grade is missing."
             )
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from masrel._event_log import Event
 from masrel._input import listed
 from masrel.conduct import read_conduct
+from masrel.conduct._study_log import conduct_hash
 from masrel.errors import ParameterError
 from masrel.progress import (
     RaterProgress,
@@ -17,7 +18,7 @@ from masrel.progress import (
     session_progress,
 )
 from masrel.protocol import Protocol, RaterField, StudyPaths
-from masrel.ratings import Correction, corrections_of, session_remarks
+from masrel.ratings import Correction, corrections_of, study_remarks
 from masrel.report._figure_data import FlowStep, RaterFlow
 from masrel.report._material import Content, Drawing, Material, Paragraph, Section
 from masrel.report._tables import Column, Table, Value
@@ -44,6 +45,8 @@ class StudyConduct:
         Grades that were corrected.
     remarks : tuple of str
         What a reader must know of the sessions.
+    sha256 : str or None
+        Of what happened beside the sessions; None for nothing.
     include : frozenset of str
         What is shown though it is private.
     """
@@ -53,7 +56,15 @@ class StudyConduct:
     events: tuple[Event, ...]
     corrections: tuple[Correction, ...]
     remarks: tuple[str, ...]
+    sha256: str | None
     include: frozenset[str]
+
+    @property
+    def inputs(self) -> dict[str, str]:
+        """What the manifest of a report says of it: a hash, and what is shown."""
+        sha256 = {} if self.sha256 is None else {"conduct_sha256": self.sha256}
+        shown = {"include": " ".join(sorted(self.include))} if self.include else {}
+        return sha256 | shown
 
 
 def study_conduct(
@@ -75,7 +86,7 @@ def study_conduct(
         A table of ratings that is used whatever the session logs say.
     include : collection of str, optional
         What is shown though it is private: ``"who"`` (who recorded each event),
-        ``"notes"`` (their texts), or fields of raters.
+        ``"notes"`` (texts and reasons), or fields of raters.
 
     Returns
     -------
@@ -104,7 +115,10 @@ def study_conduct(
         events=tuple(e for e in read_conduct(study) if e.kind in _LISTED),
         # a table named by hand is not the logs'
         corrections=corrections_of(study, protocol) if file is None else (),
-        remarks=session_remarks(study, protocol, file=file, names=_WHO in include),
+        remarks=study_remarks(
+            study, protocol, file=file, has_conduct=False, include=include
+        ),
+        sha256=conduct_hash(study),
         include=frozenset(include),
     )
 
@@ -304,8 +318,8 @@ def _event_tables(material: Material, conduct: StudyConduct) -> Iterator[Table]:
         who = [str(fields.get("who", "")) or None] * len(by)
         kind = str(fields["kind"]) if event.kind == "noted" else event.kind
         place = (_text(fields.get("rater")), _text(fields.get("session")))
-        details = _details(event, with_text=_NOTES in conduct.include)
-        rows.append((event.time_utc[:10], kind, *place, details, *who))
+        details = "; ".join(_details(event, has_texts=_NOTES in conduct.include))
+        rows.append((event.time_utc[:10], kind, *place, details or None, *who))
     yield Table(
         name="events",
         caption="What happened beside the sessions, in order of time",
@@ -314,7 +328,7 @@ def _event_tables(material: Material, conduct: StudyConduct) -> Iterator[Table]:
             Column(key="event", heading="Event", align="left"),
             Column(key="rater", heading="Rater", align="left"),
             Column(key="session", heading="Session", align="left"),
-            Column(key="details", heading="Reason or details", align="left"),
+            Column(key="details", heading="Details", align="left"),
             *by,
         ),
         rows=tuple(rows),
@@ -322,20 +336,20 @@ def _event_tables(material: Material, conduct: StudyConduct) -> Iterator[Table]:
     )
 
 
-def _details(event: Event, *, with_text: bool) -> str | None:
-    # the reason, or what else is said of an event
+def _details(event: Event, *, has_texts: bool) -> Iterator[str]:
+    # what else is said of an event, free texts last
     fields = event.fields
-    if event.kind == "noted":
-        texts = [_text(fields["text"])] if with_text else []
-        names = ("severity", *(("action", "outcome") if with_text else ()))
-        texts += [f"{n}: {fields[n]}" for n in names if fields[n] is not None]
-        return "; ".join(map(str, texts)) or None
     if event.kind == "merged":
-        return f"the folder {fields['name']}"
+        yield f"the folder {fields['name']}"
     if event.kind == "unblinded":
-        code = "all codes" if fields["code"] is None else f"code {fields['code']}"
-        return f"{code}: {fields['why']}"
-    return str(fields["why"])
+        yield "all codes" if fields["code"] is None else f"code {fields['code']}"
+    if fields.get("severity") is not None:
+        yield f"severity: {fields['severity']}"
+    if has_texts:
+        yield from (str(fields[name]) for name in ("text", "why") if name in fields)
+        for name in ("action", "outcome"):
+            if fields.get(name) is not None:
+                yield f"{name}: {fields[name]}"
 
 
 def _text(value: object) -> str | None:
@@ -350,8 +364,9 @@ def _corrections_table(material: Material, conduct: StudyConduct) -> Table:
         Column(key="repeat", heading="Repeat"),
         Column(key="first_grade", heading="First", align="center"),
         Column(key="grade", heading="Corrected", align="center"),
-        Column(key="why", heading="Reason", align="left"),
     ]
+    if _NOTES in conduct.include:
+        columns.append(Column(key="why", heading="Reason", align="left"))
     if _WHO in conduct.include:
         columns.append(Column(key="who", heading="By", align="left"))
     return Table(
@@ -371,12 +386,12 @@ def _corrections_table(material: Material, conduct: StudyConduct) -> Table:
 
 
 def _left_out(material: Material, conduct: StudyConduct) -> Iterator[str]:
-    notes = [e for e in conduct.events if e.kind == "noted"]
+    texts = [e for e in conduct.events if {"text", "why"} & {*e.fields}]
     named = [e for e in conduct.events if "who" in e.fields]
     if (named or conduct.corrections) and _WHO not in conduct.include:
         yield f"who recorded events and corrections ({_WHO})"
-    if notes and _NOTES not in conduct.include:
-        yield f"the texts of notes, deviations and adverse events ({_NOTES})"
+    if (texts or conduct.corrections) and _NOTES not in conduct.include:
+        yield f"texts of notes, deviations and adverse events, and reasons ({_NOTES})"
     for name, field in material.protocol.rater_fields.items():
         is_known = any(rater.values[name] is not None for rater in conduct.raters)
         if is_known and not field.public and name not in conduct.include:

@@ -208,7 +208,8 @@ def make_report(
     pages = {w.file: _page(w, document, cache) for w in WRITERS.values()}
     if progress is not None:
         progress("pages")
-    return report_files(assets, pages, analysis.inputs)
+    made_from = {**analysis.inputs, **({} if conduct is None else conduct.inputs)}
+    return report_files(assets, pages, made_from)
 
 
 def section_names(protocol: Protocol) -> tuple[str, ...]:

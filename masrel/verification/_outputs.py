@@ -18,6 +18,7 @@ from masrel._input import (
     read_regular,
 )
 from masrel.conduct import excluded_raters
+from masrel.conduct._study_log import conduct_hash
 from masrel.errors import MasrelError, MasrelWarning
 from masrel.protocol import Protocol, StudyPaths
 from masrel.verification._finding import Finding, broken, doubt
@@ -64,7 +65,7 @@ def output_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]:
     if study.analysis_file.is_file():
         yield from _analysis_findings(study.analysis_file, analysis, ratings)
     if manifest.is_file():
-        yield from _report_findings(manifest, analysis, ratings)
+        yield from _report_findings(study, manifest, analysis, ratings)
 
 
 def _analysis_of(
@@ -196,7 +197,7 @@ def _first_difference(got: object, needed: object, place: str = "") -> str | Non
 
 
 def _report_findings(
-    manifest: Path, analysis: "Analysis", ratings: "Ratings"
+    study: StudyPaths, manifest: Path, analysis: "Analysis", ratings: "Ratings"
 ) -> Iterator[Finding]:
     # of the pages and assets that a report consists of, and what it was made from
     document = _document(manifest)
@@ -210,10 +211,19 @@ def _report_findings(
             f"needed format {REPORT_FORMAT!r}, got {document.get('format')!r}",
         )
         return
-    analysis = _of_same_table(analysis, document.get("inputs"), ratings)
-    if document.get("inputs") != analysis.inputs:
+    inputs = document.get("inputs")
+    got = dict(inputs) if isinstance(inputs, dict) else {}
+    got.pop("include", None)  # what is shown of the same
+    of_conduct = got.pop("conduct_sha256", None)
+    if got != _of_same_table(analysis, got, ratings).inputs:
         yield broken(
             manifest, "the report is of another protocol or of other ratings: make anew"
+        )
+    if of_conduct != conduct_hash(study):
+        yield broken(
+            manifest,
+            "the report is not of what has happened beside the sessions, by "
+            f"{study.conduct_file.name}: make anew",
         )
     for name, needed in files.items():
         path = manifest.parent / name

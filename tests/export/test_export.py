@@ -23,6 +23,7 @@ from masrel.export import EXPORT_FORMS, export_study
 from masrel.protocol import Protocol, StudyPaths, read_protocol
 from masrel.ratings import RATING_COLUMNS, read_study_data
 from masrel.recording import RECORDING_COLUMNS, read_recording
+from masrel.report import study_conduct, write_report
 from masrel.run import ScriptGrades, record_correction, run_session
 from masrel.schedule import read_schedule, write_schedules
 from tests.run.conftest import PROTOCOL
@@ -264,6 +265,28 @@ def test_a_crate_loads_with_every_file_and_its_hash(
     }
     assert named == there
     assert "schedules/test_R1.csv" in named
+
+
+@pytest.mark.filterwarnings("ignore::masrel.errors.SmallSampleWarning")
+def test_a_report_that_shows_what_is_private_stays(
+    rated: Study, tmp_path: Path
+) -> None:
+    copy = StudyPaths(tmp_path / "study")
+    shutil.copytree(rated[0].root, copy.root)
+
+    def archived(name: str, shown: tuple[str, ...], *include: str) -> tuple[bool, bool]:
+        data = read_study_data(copy, rated[1])
+        conduct = study_conduct(copy, rated[1], include=shown)
+        analysis = analyze(rated[1], data.ratings)
+        write_report(rated[1], data.ratings, analysis, copy.report, conduct=conduct)
+        folder = tmp_path / name
+        left_out = export_study(copy, rated[1], "ro-crate", folder, include=include)
+        return (folder / "report/report.md").is_file(), "the report" in str(left_out)
+
+    assert archived("a", ()) == (True, False)
+    assert archived("b", ("who",)) == (False, True)
+    assert archived("c", ("notes", "illness"), "logs") == (False, True)
+    assert archived("d", ("notes", "illness"), "logs", "illness") == (True, False)
 
 
 def test_psych_ds_describes_every_column_of_files_with_names_of_keywords(

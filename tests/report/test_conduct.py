@@ -15,9 +15,10 @@ from masrel.conduct import (
 )
 from masrel.errors import ParameterError
 from masrel.protocol import Protocol, StudyPaths
-from masrel.ratings import read_study_data
+from masrel.ratings import read_study_data, write_ratings
 from masrel.report import study_conduct, write_report
 from masrel.run import ScriptGrades, run_session
+from masrel.verification import verify_study
 from tests.run.conftest import new_study
 
 __all__ = ["new_study"]
@@ -116,8 +117,9 @@ def test_what_is_private_is_shown_when_it_is_asked_for(
         "withdrawn",
     ]
     assert "severity: mild |" in events[0]
-    assert "all codes: an injury" in events[1]
-    assert "knew the models" in events[2]
+    assert "| all codes |" in events[1]
+    assert "an injury" not in text
+    assert "knew the models" not in text
     assert "| Experience (years) | 2 | 5.50 | 3.54 | 5.50 | 3.00 | 8.00 |" in text
     private = {"who": "| Kim |", "notes": "bruised thumb", "job": "| job | PT | 1 |"}
     for name, shown in private.items():
@@ -128,7 +130,29 @@ def test_what_is_private_is_shown_when_it_is_asked_for(
     for shown in private.values():
         assert shown in asked
     assert "action: ice" in asked
+    assert "all codes; an injury" in asked
+    assert "knew the models" in asked
     assert "Left out" not in asked
+
+
+def test_a_report_of_before_the_last_event_is_found(
+    run_study: tuple[StudyPaths, Protocol],
+) -> None:
+    study, protocol = run_study
+
+    def messages() -> list[str]:
+        return [finding.message for finding in verify_study(study).findings]
+
+    write_ratings(read_study_data(study, protocol).ratings, study.ratings_file)
+    page(study, protocol, "notes")
+    assert messages() == []
+    late = "the report is not of what has happened beside the sessions"
+    for record in (record_withdrawal, record_exclusion, record_inclusion):
+        record(study, protocol, "R3", **BY)
+        (message,) = messages()
+        assert late in message
+        page(study, protocol)
+        assert messages() == []
 
 
 def test_a_name_that_nothing_private_has_is_refused(
