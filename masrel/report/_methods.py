@@ -8,7 +8,7 @@ from masrel.analysis import PlannedEstimate
 from masrel.estimates import Estimate, Interval
 from masrel.protocol import report_sections, scale_of
 from masrel.protocol._kinds import DEFAULT_KIND
-from masrel.report._design import stretches_asked_for
+from masrel.report._design import beside_presentations, stretches_asked_for
 from masrel.report._material import Listing, Material, Paragraph, Section
 from masrel.report._order_section import shows_order
 from masrel.report._references import (
@@ -29,7 +29,7 @@ def methods_section(material: Material) -> Section:
     """Say how the study was made and its numbers computed, with references."""
     used: list[str] = []  # keys of all that is cited
     paragraphs = [
-        Paragraph(text=" ".join(sentences))
+        Paragraph(text=" ".join(filter(None, sentences)))
         for sentences in (
             [*_study(material, used)],
             [*_statistics(material, used)],
@@ -66,8 +66,8 @@ def _study(material: Material, used: list[str]) -> Iterator[str]:
     yield sentence("methods", "orders", orders=orders_in_words(protocol.schedule))
     if protocol.schedule.repeats > 1:
         yield sentence("methods", "repeats", repeats=protocol.schedule.repeats)
-    if stretches := stretches_asked_for(protocol.presentation):
-        yield stretches
+    yield stretches_asked_for(protocol.presentation)
+    yield beside_presentations(protocol.occasions).strip()
     if material.ratings.simulated:
         yield sentence("methods", "simulated")
     elif material.data == "published" and protocol.study.source:

@@ -51,7 +51,8 @@ def coefficient_references(coefficient: str, weights: str) -> tuple[str, ...]:
     if keys is None:  # the forms of ICC, and errors in the units of the ratings
         in_units = COEFFICIENTS[coefficient].in_units
         keys = ("devet2006",) if in_units else ("mcgraw1996",)
-    return keys if weights == "identity" else (*keys, "cohen1968")
+    is_of_kappa = weights != "identity" and coefficient != "krippendorff_alpha"
+    return (*keys, "cohen1968") if is_of_kappa else keys
 
 
 def interval_references(interval: Interval) -> tuple[str, ...]:

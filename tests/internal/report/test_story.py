@@ -157,9 +157,8 @@ def test_every_coefficient_and_scale_has_references_that_exist() -> None:
         key for scale in PUBLISHED_SCALES.values() for key in scale_references(scale)
     }
     for name in COEFFICIENTS:
-        found = coefficient_references(name, "linear")
-        assert found[:-1] or name == "percent_agreement"
-        keys.update(found)
+        assert coefficient_references(name, "identity") or name == "percent_agreement"
+        keys.update(coefficient_references(name, "linear"))
     for key in keys:
         assert bibtex([key]).startswith("@")
         assert re.fullmatch(r" \(.+, \d{4}\)", cited([key]))
