@@ -17,6 +17,8 @@ from masrel.paper._form import (
 )
 from masrel.paper._typed import read_typed
 from masrel.protocol import Protocol, Question, StudyPaths, scale_of
+from masrel.run._practice import practice_presentations
+from masrel.run.console import _instruction
 from masrel.scales import published_scale
 
 _MOST_BOXES = 12
@@ -206,6 +208,8 @@ def _page(protocol: Protocol, forms: Sequence[Form]) -> str:
             if scale is not None and grade in scale.meanings
         ],
         grades=grades,
+        how=_instruction(protocol.presentation, on_paper=True),
+        practice=[shown.code for shown in practice_presentations(protocol)],
         of_presentation=_shown(forms[0].questions["presentation"]),
         sheets=[
             {

@@ -326,18 +326,19 @@ def _remarks(request: GradeRequest) -> str:
     return remarks
 
 
-def _instruction(rules: PresentationRules) -> str:
-    # what the rater is asked to do, a sentence for each cue
+def _instruction(rules: PresentationRules, *, on_paper: bool = False) -> str:
+    # what the rater is asked to do, a sentence for each cue; on paper nothing says done
     stretches = rules.stretches
     if stretches == 1:
         return ""
     done = "Enter says done" if rules.done_with == "enter" else "the button says done"
     if stretches == "free":
-        return f"Stretch the arm as often as you want, then {done}. "
+        then = "" if on_paper else f", then {done}"
+        return f"Stretch the arm as often as you want{then}. "
     if isinstance(stretches, int):
+        before = "" if on_paper else f"; {done} before"
         return (
-            f"Stretch the arm {stretches} times and bring it back each time; {done} "
-            "before. "
+            f"Stretch the arm {stretches} times and bring it back each time{before}. "
         )
     cues = [f"{cue}. " for cue in _cues_in_words(rules)]
     return "".join([*cues, *(["Bring the arm back each time. "] if cues[1:] else [])])

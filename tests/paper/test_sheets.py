@@ -124,6 +124,25 @@ def test_breaks_instructions_and_the_meanings_of_grades_are_printed(
     assert "<dt>1+</dt><dd>tone slightly up" in page
 
 
+def test_practice_comes_first_and_how_to_stretch_is_said(new_study: New) -> None:
+    rules = (
+        '[occasions]\npractice = ["HM3", "D1"]\n\n[presentation]\n'
+        'stretches = ["slow", "fast"]\n\n[schedule]'
+    )
+    study, protocol = new_study(("[schedule]", rules))
+    made = write_sheets(study, protocol, raters=["R1"], sessions=["test"])
+    page = made.html.read_text(encoding="utf-8")
+    places = [page.index(code) for code in (">P1<", ">P2<", f">{codes(study)[0]}<")]
+    assert places == sorted(places)
+    assert page.count('class="box none"') == 2 + 3
+    assert "HM3" not in page
+    assert "Stretch 1: slow, at most 10 deg/s (V1). Stretch 2: fast" in page
+    assert "says done" not in page
+    # no rating comes of practice, and none is typed
+    (typed,) = made.typed
+    assert "P1" not in typed.read_text(encoding="utf-8")
+
+
 def test_whose_sheets_there_are_not_is_said(small: Small) -> None:
     study, protocol = small
     with pytest.raises(ParameterError, match=r"^rater: needed one of R1, R2, got 'R9'"):
