@@ -4,7 +4,10 @@ Kottner et al. (2011); topics are in our words.
 """
 
 from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from masrel.checklist._conditions import (
     blinding,
@@ -19,123 +22,58 @@ from masrel.report._design import beside_presentations, stretches_asked_for
 from masrel.report._estimate_words import TARGETS, coefficient_name, sentence
 from masrel.report._tables import counted, percent
 
+_Source = Literal["protocol", "logs", "ratings"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Asked:
+    """An item, what fills it, and what only the authors know."""
+
+    topic: str
+    # None where the record says nothing of it
+    facts: Callable[[StudyFacts], tuple[str, ...]] | None = None
+    sources: tuple[_Source, ...] = ("protocol",)
+    to_add: str = ""  # beside the facts
+
 
 def grras_items(facts: StudyFacts) -> tuple[ChecklistItem, ...]:
     """Return the 15 items."""
-    protocol = facts.relative(facts.paths.protocol)
-    logs = tuple(facts.relative(session.log) for session in facts.sessions)
-    table = facts.paths.ratings_file
-    if not table.is_file():
-        table = facts.paths.published_file
-    tables = (facts.relative(table),) if table.is_file() else ()
-    return (
-        _of_authors("1", "Title or abstract names agreement or reliability"),
-        _in_part(
-            "2",
-            "Device or scale",
-            _device(facts),
-            "Why this scale and this device; what is known of both.",
-            protocol,
-        ),
-        _of_authors("3", "Subjects: the population that is of interest"),
-        _in_part(
-            "4",
-            "Raters: the population that is of interest",
-            (
-                f"{counted(len(facts.protocol.raters), 'rater')} in the protocol.",
-                *rater_characteristics(facts),
-            ),
-            "Whom these raters stand for: profession, experience, training.",
-            protocol,
-        ),
-        _of_authors("5", "What is known already, and why this study is needed"),
-        _filled(
-            "6",
-            "Planned subjects, raters, replicates",
-            _sizes(facts),
-            protocol,
-        ),
-        _in_part(
-            "7",
-            "How subjects and raters were sampled",
-            _sampling(facts),
-            "How the raters were recruited, and how the models were chosen.",
-            protocol,
-        ),
-        _with_logs(
-            facts,
-            "8",
-            "The process of measurement and rating",
-            _process(facts),
-            protocol,
-            *logs,
-        ),
-        _with_logs(
-            facts, "9", "Whether ratings were independent", independence(facts), *logs
-        ),
-        _filled("10", "Statistical analysis", _analysis(facts), protocol),
-        _with_ratings(facts, "11", "Actual numbers", _actual(facts), *tables),
-        _in_part(
-            "12",
-            "Characteristics of raters and subjects",
-            _subjects(facts),
-            "Characteristics of the raters, as far as the protocol has none.",
-            protocol,
-        ),
-        _with_ratings(
-            facts, "13", "Estimates with their uncertainty", _estimates(facts), *tables
-        ),
-        _of_authors("14", "Relevance for practice"),
-        _with_ratings(facts, "15", "Detailed results", _details(facts), *tables),
+    return tuple(
+        _item(facts, str(number), asked) for number, asked in enumerate(_ITEMS, start=1)
     )
 
 
-def _of_authors(number: str, topic: str) -> ChecklistItem:
+def _item(facts: StudyFacts, number: str, asked: _Asked) -> ChecklistItem:
+    to_add = asked.to_add
+    if "ratings" in asked.sources and facts.ratings is None:
+        to_add = "There are no ratings yet."
+    elif asked.facts is None:
+        to_add = "For the authors to say."
+    else:
+        if "logs" in asked.sources and not facts.sessions:
+            to_add = "What no log of a session says."
+        return ChecklistItem(
+            number=number,
+            topic=asked.topic,
+            state="in part" if to_add else "filled",
+            facts=asked.facts(facts),
+            to_add=to_add,
+            sources=_files(facts, asked.sources),
+        )
     return ChecklistItem(
-        number=number, topic=topic, state="authors", to_add="For the authors to say."
+        number=number, topic=asked.topic, state="authors", to_add=to_add
     )
 
 
-def _filled(
-    number: str, topic: str, texts: tuple[str, ...], *sources: Path
-) -> ChecklistItem:
-    return ChecklistItem(
-        number=number, topic=topic, state="filled", facts=texts, sources=sources
-    )
-
-
-def _in_part(
-    number: str, topic: str, texts: tuple[str, ...], to_add: str, *sources: Path
-) -> ChecklistItem:
-    return ChecklistItem(
-        number=number,
-        topic=topic,
-        state="in part",
-        facts=texts,
-        to_add=to_add,
-        sources=sources,
-    )
-
-
-def _with_logs(
-    facts: StudyFacts, number: str, topic: str, texts: tuple[str, ...], *sources: Path
-) -> ChecklistItem:
-    if facts.sessions:
-        return _filled(number, topic, texts, *sources)
-    return _in_part(number, topic, texts, "What no log of a session says.", *sources)
-
-
-def _with_ratings(
-    facts: StudyFacts, number: str, topic: str, texts: tuple[str, ...], *sources: Path
-) -> ChecklistItem:
-    if facts.ratings is not None:
-        return _filled(number, topic, texts, *sources)
-    return ChecklistItem(
-        number=number,
-        topic=topic,
-        state="authors",
-        to_add="There are no ratings yet.",
-    )
+def _files(facts: StudyFacts, sources: Sequence[_Source]) -> tuple[Path, ...]:
+    # those that are there, from the study's folder
+    tables = (facts.paths.ratings_file, facts.paths.published_file)
+    files: dict[_Source, list[Path]] = {
+        "protocol": [facts.paths.protocol],
+        "logs": [session.log for session in facts.sessions],
+        "ratings": [table for table in tables if table.is_file()][:1],
+    }
+    return tuple(facts.relative(file) for name in sources for file in files[name])
 
 
 def _device(facts: StudyFacts) -> tuple[str, ...]:
@@ -148,6 +86,11 @@ def _device(facts: StudyFacts) -> tuple[str, ...]:
         f"A haptic simulator of the elbow, device {protocol.device.backend!r} at "
         f"{protocol.device.rate_hz} Hz, presents {models}.",
     )
+
+
+def _raters(facts: StudyFacts) -> tuple[str, ...]:
+    n_raters = counted(len(facts.protocol.raters), "rater")
+    return (f"{n_raters} in the protocol.", *rater_characteristics(facts))
 
 
 def _sizes(facts: StudyFacts) -> tuple[str, ...]:
@@ -250,3 +193,49 @@ def _details(facts: StudyFacts) -> tuple[str, ...]:
         "tables of grades by model and of every estimate.",
         f"{counted(n_corrections, 'correction')} of a grade.",
     )
+
+
+_ITEMS = (
+    _Asked(topic="Title or abstract names agreement or reliability"),
+    _Asked(
+        topic="Device or scale",
+        facts=_device,
+        to_add="Why this scale and this device; what is known of both.",
+    ),
+    _Asked(topic="Subjects: the population that is of interest"),
+    _Asked(
+        topic="Raters: the population that is of interest",
+        facts=_raters,
+        to_add="Whom these raters stand for: profession, experience, training.",
+    ),
+    _Asked(topic="What is known already, and why this study is needed"),
+    _Asked(topic="Planned subjects, raters, replicates", facts=_sizes),
+    _Asked(
+        topic="How subjects and raters were sampled",
+        facts=_sampling,
+        to_add="How the raters were recruited, and how the models were chosen.",
+    ),
+    _Asked(
+        topic="The process of measurement and rating",
+        facts=_process,
+        sources=("protocol", "logs"),
+    ),
+    _Asked(
+        topic="Whether ratings were independent", facts=independence, sources=("logs",)
+    ),
+    _Asked(topic="Statistical analysis", facts=_analysis),
+    _Asked(topic="Actual numbers", facts=_actual, sources=("ratings",)),
+    _Asked(
+        topic="Characteristics of raters and subjects",
+        facts=_subjects,
+        to_add="Characteristics of the raters, as far as the protocol has none.",
+    ),
+    _Asked(
+        topic="Estimates with their uncertainty",
+        facts=_estimates,
+        sources=("ratings",),
+    ),
+    _Asked(topic="Relevance for practice"),
+    _Asked(topic="Detailed results", facts=_details, sources=("ratings",)),
+)
+"""The items of the guideline in its order."""

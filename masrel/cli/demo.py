@@ -1,6 +1,7 @@
 """``masrel demo``: the whole flow on the simulated device, and the published report."""
 
 import warnings
+from datetime import UTC, datetime
 from pathlib import Path
 
 import click
@@ -9,7 +10,7 @@ from tqdm import tqdm
 from masrel._files import write_file
 from masrel.cli._options import OutputOptions, output_options, read_study
 from masrel.errors import MasrelWarning, ParameterError
-from masrel.protocol import StudyPaths, copy_template, read_protocol
+from masrel.protocol import Protocol, StudyPaths, copy_template, read_protocol
 
 
 @click.command("demo")
@@ -64,6 +65,7 @@ def _publish_secret(study: StudyPaths) -> None:
 
 def _simulate(study: StudyPaths, output: OutputOptions) -> None:
     # every rater of every session, on the simulated device and clock
+    from masrel.conduct import allot_schedules
     from masrel.ratings import (
         answers_from_logs,
         ratings_from_logs,
@@ -71,10 +73,9 @@ def _simulate(study: StudyPaths, output: OutputOptions) -> None:
         write_ratings,
     )
     from masrel.run import SimulatedGrades, run_session
-    from masrel.schedule import write_schedules
 
     protocol = read_protocol(study.protocol)
-    write_schedules(protocol, study)
+    allot_schedules(study, protocol)
     occasions = [(s.id, rater) for s in protocol.sessions for rater in s.raters]
     n_presentations = len(occasions) * len(protocol.models) * protocol.schedule.repeats
     with tqdm(
@@ -93,9 +94,29 @@ def _simulate(study: StudyPaths, output: OutputOptions) -> None:
                 clock="simulated",
                 progress=lambda _: bar.update(),
             )
+    _record_event(study, protocol)
     write_ratings(ratings_from_logs(study, protocol), study.ratings_file)
     if protocol.questionnaires:
         write_answers(answers_from_logs(study, protocol), study.answers_file)
+
+
+def _record_event(study: StudyPaths, protocol: Protocol) -> None:
+    # as a coordinator does; on a day that is the same each time, as the report has it
+    from masrel.conduct import record_note
+
+    record_note(
+        study,
+        protocol,
+        "simulated: sore wrist after the session",
+        who="demo",
+        kind="adverse-event",
+        severity="mild",
+        action="rest",
+        outcome="gone the next day",
+        rater=protocol.raters[0].id,
+        session=protocol.sessions[0].id,
+        now=lambda: datetime(2012, 1, 1, tzinfo=UTC),
+    )
 
 
 def _report(
@@ -103,7 +124,7 @@ def _report(
 ) -> Path:
     # beside the study, in a folder of this name
     from masrel.analysis import analyze, write_analysis
-    from masrel.report import write_report
+    from masrel.report import study_conduct, write_report
 
     destination = study.root.parent / f"report-{name}"
     is_simulated = ratings_file == study.ratings_file
@@ -124,6 +145,9 @@ def _report(
             analysis,
             destination,
             in_person=data.in_person,
+            conduct=study_conduct(study, data.protocol, include=["notes"])
+            if is_simulated
+            else None,
             progress=lambda _: bar.update(),
         )
     return files.html

@@ -28,7 +28,7 @@ def device() -> None:
 
 @device.command("probe")
 @puck_command
-def probe_command(session: PuckSession) -> None:
+def _probe(session: PuckSession) -> None:
     """Ask every node who it is; nothing is set and nobody is woken."""
     from masrel.hess.puck import probe
 
@@ -49,7 +49,7 @@ def probe_command(session: PuckSession) -> None:
 
 @device.command("check")
 @puck_command
-def check_command(session: PuckSession) -> None:
+def _check(session: PuckSession) -> None:
     """Wake a puck and see whether it can be driven. The arm must be at rest.
 
     It is told its groups and torque limit, goes into torque mode for some
@@ -85,7 +85,7 @@ def check_command(session: PuckSession) -> None:
     help="Where the arm is held now, 0 at full flexion.",
 )
 @puck_command
-def zero_command(session: PuckSession, angle_deg: float) -> None:
+def _zero(session: PuckSession, angle_deg: float) -> None:
     """Tell a puck where the arm is; it forgets when its supply is switched off."""
     from masrel.hess.puck import zero
 
@@ -106,7 +106,7 @@ def zero_command(session: PuckSession, angle_deg: float) -> None:
     help="Say that nobody holds the arm and nothing is in its way: IT MOVES.",
 )
 @puck_command
-def friction_command(session: PuckSession, arm_is_free: bool) -> None:
+def _friction(session: PuckSession, arm_is_free: bool) -> None:
     """Turn the free arm at steady speeds and fit B and β of equation (7).
 
     The arm moves by itself, between 40 and 115 deg, at up to 80 deg/s, with at most

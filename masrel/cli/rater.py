@@ -30,7 +30,7 @@ def rater() -> None:
 @_rater
 @click.argument("values", metavar="FIELD=VALUE...", nargs=-1, required=True)
 @_who
-def set_command(study: Path, rater: str, values: tuple[str, ...], who: str) -> None:
+def _set(study: Path, rater: str, values: tuple[str, ...], who: str) -> None:
     """Record fields of a rater of STUDY, such as years=12.
 
     The protocol declares the fields in [rater_fields]. What is recorded last counts,
@@ -57,7 +57,7 @@ def set_command(study: Path, rater: str, values: tuple[str, ...], who: str) -> N
 @_rater
 @_who
 @_why
-def exclude_command(study: Path, rater: str, who: str, why: str) -> None:
+def _exclude(study: Path, rater: str, who: str, why: str) -> None:
     """Leave a rater out of the analysis of STUDY; the grades stay in the study.
 
     Every verb that computes says so, and so does the report.
@@ -74,7 +74,7 @@ def exclude_command(study: Path, rater: str, who: str, why: str) -> None:
 @_rater
 @_who
 @_why
-def include_command(study: Path, rater: str, who: str, why: str) -> None:
+def _include(study: Path, rater: str, who: str, why: str) -> None:
     """Take a rater of STUDY who was excluded back into the analysis."""
     from masrel.conduct import record_inclusion
 
@@ -89,7 +89,7 @@ def include_command(study: Path, rater: str, who: str, why: str) -> None:
     json="Write the list here; - prints it, and nothing else.",
     csv="Print the list as CSV.",
 )
-def list_command(study: Path, output: OutputOptions) -> None:
+def _list(study: Path, output: OutputOptions) -> None:
     """List the raters of STUDY: how far each came, and what is known of him or her."""
     from masrel.progress import rater_progress, session_progress
 

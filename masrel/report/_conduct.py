@@ -337,19 +337,17 @@ def _event_tables(material: Material, conduct: StudyConduct) -> Iterator[Table]:
 
 
 def _details(event: Event, *, has_texts: bool) -> Iterator[str]:
-    # what else is said of an event, free texts last
+    # what else is said of an event
     fields = event.fields
     if event.kind == "merged":
         yield f"the folder {fields['name']}"
     if event.kind == "unblinded":
         yield "all codes" if fields["code"] is None else f"code {fields['code']}"
-    if fields.get("severity") is not None:
-        yield f"severity: {fields['severity']}"
     if has_texts:
         yield from (str(fields[name]) for name in ("text", "why") if name in fields)
-        for name in ("action", "outcome"):
-            if fields.get(name) is not None:
-                yield f"{name}: {fields[name]}"
+    for name in ("severity", *(("action", "outcome") if has_texts else ())):
+        if fields.get(name) is not None:
+            yield f"{name}: {fields[name]}"
 
 
 def _text(value: object) -> str | None:

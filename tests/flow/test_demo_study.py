@@ -11,6 +11,7 @@ from masrel.protocol import StudyPaths, read_protocol
 from masrel.recording import read_recording
 from masrel.run import read_log
 from masrel.schedule import read_schedule
+from masrel.verification import verify_study
 from tests.flow.conftest import run
 
 TIMES_OF_DAY = re.compile(rb'"time_utc": ?"[^"]*"|"previous": ?"[^"]*"')
@@ -52,6 +53,19 @@ def test_the_report_and_every_table_say_simulated(small_demo: Path) -> None:
         assert "simulated" in path.read_text(encoding="utf-8").lower(), path
     analysis = json.loads((small_demo / "study" / "analysis.json").read_text())
     assert analysis["simulated"] is True
+
+
+def test_its_report_shows_how_it_was_conducted(small_demo: Path) -> None:
+    page = (small_demo / "report-simulated" / "report.md").read_text(encoding="utf-8")
+    _, conduct = page.split("## Conduct\n")
+    assert "| 2012-01-01 | adverse-event | R1 | test | simulated: sore " in conduct
+    assert "**Simulated data.** What happened beside the sessions" in conduct
+
+
+@pytest.mark.slow
+def test_a_study_whose_orders_have_rows_is_run_too(tmp_path: Path) -> None:
+    run("demo", str(tmp_path / "out"), "--study", "two-sites", "--quiet")
+    assert verify_study(StudyPaths(tmp_path / "out" / "study")).is_whole
 
 
 def test_the_ratings_are_the_grades_of_the_logs(small_demo: Path) -> None:
