@@ -26,7 +26,7 @@ _Source = Literal["protocol", "logs", "ratings"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Asked:
+class _Entry:
     """An item, what fills it, and what only the authors know."""
 
     topic: str
@@ -39,29 +39,29 @@ class _Asked:
 def grras_items(facts: StudyFacts) -> tuple[ChecklistItem, ...]:
     """Return the 15 items."""
     return tuple(
-        _item(facts, str(number), asked) for number, asked in enumerate(_ITEMS, start=1)
+        _item(facts, str(number), entry) for number, entry in enumerate(_ITEMS, start=1)
     )
 
 
-def _item(facts: StudyFacts, number: str, asked: _Asked) -> ChecklistItem:
-    to_add = asked.to_add
-    if "ratings" in asked.sources and facts.ratings is None:
+def _item(facts: StudyFacts, number: str, entry: _Entry) -> ChecklistItem:
+    to_add = entry.to_add
+    if "ratings" in entry.sources and facts.ratings is None:
         to_add = "There are no ratings yet."
-    elif asked.facts is None:
+    elif entry.facts is None:
         to_add = "For the authors to say."
     else:
-        if "logs" in asked.sources and not facts.sessions:
+        if "logs" in entry.sources and not facts.sessions:
             to_add = "What no log of a session says."
         return ChecklistItem(
             number=number,
-            topic=asked.topic,
+            topic=entry.topic,
             state="in part" if to_add else "filled",
-            facts=asked.facts(facts),
+            facts=entry.facts(facts),
             to_add=to_add,
-            sources=_files(facts, asked.sources),
+            sources=_files(facts, entry.sources),
         )
     return ChecklistItem(
-        number=number, topic=asked.topic, state="authors", to_add=to_add
+        number=number, topic=entry.topic, state="authors", to_add=to_add
     )
 
 
@@ -196,46 +196,46 @@ def _details(facts: StudyFacts) -> tuple[str, ...]:
 
 
 _ITEMS = (
-    _Asked(topic="Title or abstract names agreement or reliability"),
-    _Asked(
+    _Entry(topic="Title or abstract names agreement or reliability"),
+    _Entry(
         topic="Device or scale",
         facts=_device,
         to_add="Why this scale and this device; what is known of both.",
     ),
-    _Asked(topic="Subjects: the population that is of interest"),
-    _Asked(
+    _Entry(topic="Subjects: the population that is of interest"),
+    _Entry(
         topic="Raters: the population that is of interest",
         facts=_raters,
         to_add="Whom these raters stand for: profession, experience, training.",
     ),
-    _Asked(topic="What is known already, and why this study is needed"),
-    _Asked(topic="Planned subjects, raters, replicates", facts=_sizes),
-    _Asked(
+    _Entry(topic="What is known already, and why this study is needed"),
+    _Entry(topic="Planned subjects, raters, replicates", facts=_sizes),
+    _Entry(
         topic="How subjects and raters were sampled",
         facts=_sampling,
         to_add="How the raters were recruited, and how the models were chosen.",
     ),
-    _Asked(
+    _Entry(
         topic="The process of measurement and rating",
         facts=_process,
         sources=("protocol", "logs"),
     ),
-    _Asked(
+    _Entry(
         topic="Whether ratings were independent", facts=independence, sources=("logs",)
     ),
-    _Asked(topic="Statistical analysis", facts=_analysis),
-    _Asked(topic="Actual numbers", facts=_actual, sources=("ratings",)),
-    _Asked(
+    _Entry(topic="Statistical analysis", facts=_analysis),
+    _Entry(topic="Actual numbers", facts=_actual, sources=("ratings",)),
+    _Entry(
         topic="Characteristics of raters and subjects",
         facts=_subjects,
         to_add="Characteristics of the raters, as far as the protocol has none.",
     ),
-    _Asked(
+    _Entry(
         topic="Estimates with their uncertainty",
         facts=_estimates,
         sources=("ratings",),
     ),
-    _Asked(topic="Relevance for practice"),
-    _Asked(topic="Detailed results", facts=_details, sources=("ratings",)),
+    _Entry(topic="Relevance for practice"),
+    _Entry(topic="Detailed results", facts=_details, sources=("ratings",)),
 )
 """The items of the guideline in its order."""
