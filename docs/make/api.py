@@ -14,6 +14,7 @@ MODULES = (
     "masrel.agreement",
     "masrel.intervals",
     "masrel.audit",
+    "masrel.planning",
     "masrel.elbow",
     "masrel.elbow.tone",
     "masrel.elbow.identification",

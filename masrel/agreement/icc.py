@@ -35,6 +35,8 @@ _NAMES: dict[IccForm, str] = {
 }
 """Form to its name in the register."""
 
+_Numbers = float | NDArray[np.float64]
+
 _SQUARABLE = 400
 """Binary exponent up to which squares, and sums and products of them, are floats."""
 
@@ -494,29 +496,42 @@ def _ratio(anova: _Anova, form: str, level: float) -> tuple[float, float]:
 
 
 def _absolute(anova: _Anova, level: float) -> tuple[float, float]:
-    # Table 7 of [1], Case 2A and 3A, with Satterthwaite's degrees at ICC(A,1)
-    n, k = anova.n, anova.k
-    rows, columns, error = anova.items, anova.raters, anova.residual
     rho = anova.value("ICC(A,1)")
     if rho == 1.0:
         return 1.0, 1.0
-    a = k * rho / (n * (1 - rho))
-    b = 1 + k * rho * (n - 1) / (n * (1 - rho))
-    both = a * columns + b * error
-    if both == 0.0:
-        return math.nan, math.nan
-    df = both**2 / (
-        (a * columns) ** 2 / (k - 1) + (b * error) ** 2 / ((n - 1) * (k - 1))
-    )
-    upper = 0.5 + 0.5 * level
-    rest = k * columns + (k * n - k - n) * error
-    f_low = _f_quantile(n - 1, df, upper)
-    f_high = _f_quantile(df, n - 1, upper)
-    if not (f_low >= 1.0 and f_high >= 1.0):  # nan, or the ends would leave ρ out
-        return math.nan, math.nan
-    low = n * (rows - f_low * error) / (f_low * rest + n * rows)
-    high = n * (f_high * rows - error) / (rest + n * f_high * rows)
-    return low, high
+    squares = (anova.items, anova.raters, anova.residual)
+    low, high = _absolute_ends(anova.n, anova.k, squares, rho, level)
+    return float(low), float(high)
+
+
+def _absolute_ends(
+    n: int,
+    k: int,
+    squares: "tuple[_Numbers, _Numbers, _Numbers]",
+    rho: "_Numbers",
+    level: float,
+) -> "tuple[_Numbers, _Numbers]":
+    """Return the ends of ICC(A,1) below 1, of one table or of many."""
+    # Table 7 of [1], Case 2A and 3A, with Satterthwaite's degrees at ICC(A,1); squares
+    # are the mean ones of items, raters and residual, each a number or (...)
+    from scipy.special import fdtri
+
+    rows, columns, error = squares
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        a = k * rho / (n * (1 - rho))
+        b = 1 + k * rho * (n - 1) / (n * (1 - rho))
+        df = np.divide(
+            (a * columns + b * error) ** 2,
+            (a * columns) ** 2 / (k - 1) + (b * error) ** 2 / ((n - 1) * (k - 1)),
+        )
+        upper = 0.5 + 0.5 * level
+        rest = k * columns + (k * n - k - n) * error
+        f_low, f_high = fdtri(n - 1, df, upper), fdtri(df, n - 1, upper)
+        low = n * (rows - f_low * error) / (f_low * rest + n * rows)
+        high = n * (f_high * rows - error) / (rest + n * f_high * rows)
+    # nan, or the ends would leave ρ out
+    holds = (f_low >= 1.0) & (f_high >= 1.0)
+    return np.where(holds, low, np.nan), np.where(holds, high, np.nan)
 
 
 def _f_quantile(first: float, second: float, share: float) -> float:

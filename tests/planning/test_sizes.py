@@ -1,0 +1,168 @@
+"""Sizes: the smallest that reaches an aim, and one sentence where none can."""
+
+from typing import Any
+
+import pytest
+
+from masrel.errors import ParameterError
+from masrel.planning import LatentModel, Plan, precision, sample_size
+
+KAPPA: dict[str, Any] = {
+    "coefficient": "fleiss_kappa",
+    "value": 0.5,
+    "prevalences": [0.7, 0.3],
+    "model": "mixture",
+    "target": "items",
+}
+
+
+def plan(**options: Any) -> Plan:
+    return sample_size(**{**KAPPA, "n_raters": 2, **options})
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"value": 1.2}, "value: needs [-1, 1], got 1.2"),
+        ({"value": -0.5}, "value: Fleiss' κ under mixture lies between 0.000"),
+        ({"value": None}, "value: needs the true coefficient"),
+        ({"prevalences": [0.7, 0.4]}, "prevalences: needs numbers of at least 0 with"),
+        ({"prevalences": ["a", "b"]}, "prevalences: needs numbers"),
+        ({"prevalences": None}, "categories: needs these or prevalences"),
+        ({"categories": 3}, "prevalences: needs one of each of 3 categories"),
+        ({"n_raters": 0}, "n_raters: needs a whole number above 0, got 0"),
+        ({"n_raters": 1}, "n_raters: Fleiss' κ for other items needs 2 or more"),
+        ({"n_raters": 2, "target": "raters"}, "n_raters: Fleiss' κ for other raters"),
+        ({"n_raters": None}, "n_items, n_raters: needs exactly one"),
+        ({"n_items": 10}, "n_items, n_raters: needs exactly one"),
+        ({"half_width": 1.5}, "half_width: needs (0, 1], since the scale"),
+        ({"half_width": 0.0}, "half_width: needs (0, 1]"),
+        ({"half_width": None}, "half_width: needs an aim"),
+        ({"null": 0.4}, "half_width: needs to be alone"),
+        ({"half_width": None, "null": 0.4}, "null: needs power"),
+        ({"half_width": None, "null": 0.5, "power": 0.8}, "null: needs another"),
+        ({"half_width": None, "lower": 0.6}, "lower: needs to lie below value"),
+        ({"half_width": None, "upper": 0.2}, "upper: needs to lie above value"),
+        ({"power": 0.8}, "power: needs null, lower or upper"),
+        ({"assurance": 80}, "assurance: needs (0, 1), got 80"),
+        ({"model": None}, "model: needs one of mixture"),
+        ({"model": "beta"}, "got 'beta'"),
+        ({"model": "table"}, "prevalences: a table needs the joint"),
+        ({"target": "all"}, "target: needs one of items, raters, both"),
+        ({"method": "guess"}, "method: needs one of auto, wald"),
+        ({"interval": "normal", "target": "both"}, "interval: "),
+        ({"sides": 3}, "sides: needs one of 1, 2"),
+        ({"level": 95}, "level: needs (0, 1), got 95"),
+        ({"p_missing": 1.0}, "p_missing: needs [0, 1)"),
+        ({"prices": (-1, 0, 0)}, "prices: needs three of at least 0"),
+        ({"coefficient": "kendall_w"}, "coefficient: Kendall's W cannot be planned"),
+        ({"coefficient": "kappa"}, "coefficient: needs"),
+        ({"coefficient": "icc_1"}, "model: ICC(1) takes none"),
+        ({"coefficient": "icc_1", "model": None}, "target: the interval of ICC(1)"),
+        ({"rater_share": 0.5}, "rater_share: is of icc_a1 alone"),
+    ],
+)
+def test_bad_input_is_one_sentence(options: dict[str, Any], words: str) -> None:
+    with pytest.raises(ParameterError) as error:
+        plan(**{"half_width": 0.2, **options})
+    assert words in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_an_aim_out_of_reach_says_the_best_that_can_be_had() -> None:
+    with pytest.raises(ParameterError, match="more than 100000 items; the best"):
+        plan(half_width=0.001, interval="normal", rng=1)
+    with pytest.raises(ParameterError, match=r"cost 308; 100 pays for 50 items, which"):
+        plan(half_width=0.15, max_cost=100, interval="normal")
+
+
+@pytest.mark.slow
+def test_so_many_raters_as_are_looked_at_may_be_too_few() -> None:
+    with pytest.raises(ParameterError, match=r"than 60 raters; the best .* half-width"):
+        sample_size(**KAPPA, n_items=5, half_width=0.05, interval="t", rng=1)
+
+
+def test_a_budget_alone_buys_what_it_can() -> None:
+    bought = plan(max_cost=101, prices=(0, 1, 1), interval="normal")
+    assert (bought.n_items, bought.cost) == (49, 100)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("weights", ["identity", "quadratic"])
+def test_more_raters_can_stand_for_items(weights: str) -> None:
+    common = {**KAPPA, "prevalences": [0.4, 0.3, 0.3], "weights": weights}
+    more = sample_size(**common, n_items=40, half_width=0.19, interval="t", rng=1)
+    fewer = precision(
+        **common, n_items=40, n_raters=more.n_raters - 1, interval="t", rng=1
+    )
+    assert more.expected_half_width <= 0.19 < fewer.expected_half_width
+
+
+def test_power_against_a_null_value_grows_with_items_and_is_the_level_at_it() -> None:
+    common = {**KAPPA, "n_raters": 2, "null": 0.3, "sides": 1, "interval": "normal"}
+    powers = [precision(**common, n_items=n).power for n in (30, 60, 120)]
+    assert powers == sorted(powers)
+    size = precision(**{**common, "value": 0.300001}, n_items=120).power
+    assert size == pytest.approx(0.05, abs=0.02)
+
+
+@pytest.mark.slow
+def test_non_inferiority_and_equivalence_are_ends_of_the_interval() -> None:
+    common: dict[str, Any] = {"interval": "normal", "power": 0.8}
+    superior = plan(**common, null=0.3, sides=1)
+    assert plan(**common, lower=0.3, sides=1).n_items == superior.n_items
+    assert plan(**common, lower=0.3, upper=0.7).n_items > superior.n_items
+
+
+def test_the_same_seed_gives_the_same_plan_and_one_is_recorded() -> None:
+    common = {
+        **KAPPA,
+        "n_items": 20,
+        "n_raters": 4,
+        "prevalences": [0.4, 0.3, 0.3],
+        "interval": "t",
+    }
+    first = precision(**common)
+    assert first.seed is not None
+    assert precision(**common, rng=first.seed) == first
+    assert first.method == "simulation"
+    assert first.monte_carlo_error == first.errors["expected_half_width"] > 0.0
+
+
+def test_missing_ratings_cost_precision() -> None:
+    common = {**KAPPA, "n_items": 40, "n_raters": 3, "interval": "t", "rng": 1}
+    whole = precision(**common).expected_half_width
+    assert precision(**common, p_missing=0.3).expected_half_width > 1.1 * whole
+
+
+def test_of_test_retest_every_rater_adds_pairs() -> None:
+    common = {**KAPPA, "coefficient": "pooled_kappa", "interval": "t", "rng": 1}
+    one = precision(**common, n_items=30, n_raters=1).expected_half_width
+    four = precision(**common, n_items=30, n_raters=4).expected_half_width
+    assert four == pytest.approx(one / 2, rel=0.1)
+
+
+def test_a_latent_model_has_its_own_value_and_its_items() -> None:
+    model = LatentModel(thresholds=(0.0,), noise_sd=0.5, positions=(-1.0, 0.0, 1.0))
+    common = {**KAPPA, "model": model, "prevalences": None, "n_raters": 4, "rng": 1}
+    with pytest.raises(ParameterError, match="positions of 3 items, got 5"):
+        precision(**{**common, "value": None}, n_items=5)
+    with pytest.raises(ParameterError, match="value: the model has"):
+        precision(**common, n_items=3)
+    with pytest.raises(ParameterError, match="noise_sd above 0"):
+        LatentModel(thresholds=(0.0,), noise_sd=0.0)
+
+
+def test_the_exact_interval_of_an_icc_covers_as_it_says() -> None:
+    plan = precision("icc_c1", value=0.7, n_items=20, n_raters=4, target="items")
+    assert (plan.method, plan.coverage) == ("exact", pytest.approx(0.95))
+    simulated = precision(
+        "icc_a1",
+        value=0.7,
+        n_items=20,
+        n_raters=4,
+        target="both",
+        rater_share=0.0,
+        rng=1,
+    )
+    assert simulated.coverage == pytest.approx(0.95, abs=0.03)
