@@ -9,9 +9,9 @@ import dataclasses
 import hashlib
 import json
 import os
-import platform
 import struct
 import sys
+import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
@@ -27,6 +27,10 @@ FOLDER = ".masrel_cache"
 
 _MOST_BYTES = 256_000_000
 _FORMAT = b"masrel made 1 "
+_ROOT = os.path.dirname(os.path.abspath(__file__))
+_MACHINE = os.uname().machine if sys.platform != "win32" else sys.platform
+_PYTHON = f"{sys.implementation.name} {sys.version} {_MACHINE}"
+_TICK_NS = 3_000_000_000
 _FLAGS = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
 _SOURCES = (".py", ".html", ".css", ".md", ".toml", ".bib")
 # Nobody wants it in a repository, or in a backup (https://bford.info/cachedir/)
@@ -127,17 +131,37 @@ def file_hash(path: str) -> str | None:
     return digest.hexdigest()
 
 
+def file_status(path: str) -> tuple[int, ...] | None:
+    """Return what changes whenever a file is written; None where there is none."""
+    try:
+        status = os.stat(path)
+    except OSError:
+        return None
+    return (status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns)
+
+
+def is_settled(status: tuple[int, ...] | None) -> bool:
+    """Return whether a file that is written from now on has another status."""
+    # Within a tick of a file system's clock it could have the same.
+    return status is not None and max(status[2:]) < time.time_ns() - _TICK_NS
+
+
 @cache
 def code_hash() -> str:
     """Return a hash of all that makes a report, but for other libraries."""
     # Every file of masrel: who edits its code has no other version.
-    digest = hashlib.sha256()
-    root = os.path.dirname(os.path.abspath(__file__))
-    for path in _source_files(root):
-        digest.update(f"{path[len(root) :]}\0{file_hash(path)}\n".encode())
-    python = (sys.implementation.name, *sys.version_info, platform.machine())
-    digest.update(repr((python, sys.platform)).encode())
+    digest = hashlib.sha256(_PYTHON.encode())
+    for path in _source_files(_ROOT):
+        digest.update(f"{path[len(_ROOT) :]}\0{file_hash(path)}\n".encode())
     return digest.hexdigest()
+
+
+def code_status() -> str | None:
+    """Return what changes whenever that code is written, if it is settled."""
+    files = [(path, file_status(path)) for path in _source_files(_ROOT)]
+    if not all(is_settled(status) for _, status in files):
+        return None
+    return hashlib.sha256(f"{_PYTHON} {files}".encode()).hexdigest()
 
 
 def _source_files(folder: str) -> Iterator[str]:

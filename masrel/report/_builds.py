@@ -15,7 +15,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from masrel._cache import Cache, content_hash, file_hash, installed
+from masrel._cache import (
+    Cache,
+    code_hash,
+    code_status,
+    content_hash,
+    file_hash,
+    file_status,
+    installed,
+    is_settled,
+)
 from masrel._input import MAX_TABLE, parse_json, read_regular
 from masrel.report._report_folder import MANIFEST, stale_assets
 
@@ -43,7 +52,8 @@ class Build:
         note: dict[str, Any] = parse_json(stored[_NOTE])
         is_current = (
             note["made_from"] == self._made_from()
-            and all(file_hash(path) == known for path, known in note["read"].items())
+            and _is_same_code(*note["code"])
+            and all(_is_same(path, *known) for path, known in note["read"].items())
             and _is_whole(self.folder, note["manifest"])
         )
         shown: dict[str, Any] = note["shown"]
@@ -54,26 +64,30 @@ class Build:
         """Take what a build says, and keep it with all that it has read."""
         shown: dict[str, Any] = {}
         # Listed before anything is read: a file that comes later is a change.
-        made_from = self._made_from()
+        made_from, code = self._made_from(), (code_hash(), code_status())
         with _files_read(self.study, self._outputs()) as readings:
             yield shown
         if not readings.are_as_they_were():
             return
         note = {
             "made_from": made_from,
-            "read": {path: digest for path, (digest, _) in readings.files.items()},
+            "code": code,
+            "read": {
+                path: (digest, status if is_settled(status) else None)
+                for path, (digest, status) in readings.files.items()
+            },
             "manifest": file_hash(str(self.folder / MANIFEST)),
             "shown": shown,
         }
         self.cache.write(self._key(), {_NOTE: json.dumps(note).encode()})
         self.cache.remove_oldest()
 
-    def _key(self) -> str | None:
+    def _key(self) -> str:
         # Paths as they were typed, too: they are in what is said.
         places = [self.study, self.folder]
         at = [os.path.abspath(place) for place in places]
         call = ([str(p) for p in places], at, sorted(self.options.items()))
-        return self.cache.key("build", call, libraries=())
+        return content_hash("build", call)
 
     def _made_from(self) -> str:
         return content_hash(installed(), *_listing(self.study, self._outputs(), _DEPTH))
@@ -99,6 +113,17 @@ def _listing(folder: Path | str, but: tuple[str, ...], depth: int) -> Iterator[s
         yield f"{entry.path}{'/' * is_folder}"
         if is_folder and depth:
             yield from _listing(entry.path, but, depth - 1)
+
+
+def _is_same_code(digest: str, status: str | None) -> bool:
+    return (status is not None and code_status() == status) or code_hash() == digest
+
+
+def _is_same(path: str, digest: str | None, status: list[int] | None) -> bool:
+    # Its hash is not computed again where it cannot have been written since.
+    if status is not None and file_status(path) == tuple(status):
+        return True
+    return file_hash(path) == digest
 
 
 def _is_whole(folder: Path, manifest: str | None) -> bool:
@@ -133,11 +158,13 @@ class _Readings:
         if (is_code and not path.startswith(self._study)) or os.path.isdir(path):
             return
         self.files[path] = (None, None)  # it is opened once more here
-        self.files[path] = (file_hash(path), _status(path))
+        self.files[path] = (file_hash(path), file_status(path))
 
     def are_as_they_were(self) -> bool:
         """Return whether no file has changed since it was noted."""
-        return all(_status(path) == status for path, (_, status) in self.files.items())
+        return all(
+            file_status(path) == status for path, (_, status) in self.files.items()
+        )
 
 
 _MASREL = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
@@ -166,11 +193,3 @@ def _files_read(study: Path, but: tuple[str, ...]) -> Iterator[_Readings]:
         yield _readings[0]
     finally:
         _readings.clear()
-
-
-def _status(path: str) -> tuple[int, ...] | None:
-    try:
-        status = os.stat(path)
-    except OSError:
-        return None
-    return (status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns)

@@ -2,12 +2,14 @@
 
 import os
 import shutil
+import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
 
+import masrel
 import masrel.report.figures
 from masrel import _cache
 from masrel.cli import cli
@@ -193,14 +195,21 @@ def test_another_version_of_what_draws_is_seen(
 
 
 @pytest.mark.slow
-def test_another_code_is_seen(
-    masrel: Caller, study: Path, monkeypatch: pytest.MonkeyPatch, drawn: list[str]
-) -> None:
-    masrel("report", study)
-    drawn.clear()
-    monkeypatch.setattr(_cache, "code_hash", lambda: "of an edited file")
-    masrel("report", study)
-    assert drawn == ["agreement", "grades_test"]
+def test_an_edit_of_the_code_is_seen(study: Path, tmp_path: Path) -> None:
+    shutil.copytree(Path(masrel.__file__).parent, tmp_path / "code/masrel")
+    command = [sys.executable, "-m", "masrel", "report", study, "--quiet"]
+    environment = os.environ | {"PYTHONPATH": str(tmp_path / "code")}
+
+    def page() -> str:
+        subprocess.run(command, check=True, env=environment, cwd=tmp_path)
+        return (study / "report/report.md").read_text(encoding="utf-8")
+
+    before = page()
+    template = tmp_path / "code/masrel/report/templates/report.md"
+    status = template.stat()
+    edit(template, "# ", "% ")  # as long as it was
+    os.utime(template, ns=(status.st_atime_ns, status.st_mtime_ns))
+    assert page() == before.replace("# ", "% ", 1)
 
 
 @pytest.mark.slow
