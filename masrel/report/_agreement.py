@@ -3,9 +3,12 @@
 Their table is narrow on a page, and has every field in the CSV.
 """
 
+import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
+from operator import attrgetter
 
 from masrel.agreement import strength
 from masrel.analysis import PlannedEstimate
@@ -19,12 +22,13 @@ from masrel.report._estimate_words import (
     interval_name,
     meaning,
 )
-from masrel.report._figure_data import Forest
+from masrel.report._figure_data import MANY_RATERS, Forest
 from masrel.report._material import Drawing, Material, Paragraph, Section
 from masrel.report._tables import (
     Column,
     Table,
     Value,
+    at_ranks,
     counted,
     interval_text,
     number,
@@ -96,12 +100,20 @@ def estimates_section(material: Material, kind: str) -> Section:
         texts = [f"{p.line.id} is not in these data: {p.reason}." for p in planned]
         blocks += [Paragraph(text=text, absent=True) for text in texts]
     else:
-        rows = estimate_rows(planned)
+        every = estimate_rows(planned)
+        rows = _few_of_many(every)
         file = name.replace("-", "_")
         intervals = [row.interval for row in rows if row.interval is not None]
         meanings = dict.fromkeys(meaning(interval, "model") for interval in intervals)
+        table = estimate_table(rows, name=file, caption=caption, data=material.data)
+        if len(rows) < len(every):
+            full = estimate_table(every, name=file, caption=caption, data=material.data)
+            note = "Of many raters, five by their value; the file has all."
+            table = dataclasses.replace(
+                table, rows=full.rows, page_rows=table.rows, notes=(*table.notes, note)
+            )
         blocks = [
-            estimate_table(rows, name=file, caption=caption, data=material.data),
+            table,
             *(Paragraph(text=text) for text in meanings),
             _forest(material, rows, file, caption),
         ]
@@ -148,6 +160,27 @@ def estimate_rows(planned: Sequence[PlannedEstimate]) -> list[EstimateRow]:
             for name, coefficient, estimate in estimates
         ]
     return rows
+
+
+def _few_of_many(rows: Sequence[EstimateRow]) -> list[EstimateRow]:
+    # five raters of each line of the plan that has too many to look at
+    shown: list[EstimateRow] = []
+    for single, group in groupby(rows, key=attrgetter("single")):
+        of_raters = list(group)
+        if not single or len(of_raters) <= MANY_RATERS:
+            shown += of_raters
+            continue
+        known = [
+            (row.estimate.value, row)
+            for row in of_raters
+            if row.estimate is not None and math.isfinite(row.estimate.value)
+        ]
+        ranks = at_ranks([value for value, _ in known]) if known else {}
+        shown += [
+            dataclasses.replace(known[at][1], name=f"{known[at][1].name} ({rank})")
+            for rank, at in ranks.items()
+        ]
+    return shown
 
 
 def estimate_table(

@@ -33,8 +33,9 @@ from masrel.report._report_folder import (
     report_files,
 )
 from masrel.report._result import result_text
-from masrel.report._stretches import speeds_section, traces_section
+from masrel.report._stretches import speeds_section
 from masrel.report._tables import Table, as_csv, tag_of
+from masrel.report._trace_section import traces_section
 from masrel.verification import Anchor
 
 Progress = Callable[[str], object]

@@ -16,6 +16,12 @@ Form = Literal["png", "svg", "pdf"]
 """What a figure's file can be."""
 
 
+# From more than so many on, a figure shows distributions instead of every one.
+MANY_RATERS = 30
+MANY_STRETCHES = 12
+MANY_MODELS = 12  # and panels are smaller
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GradeGrid:
     """Grades of one session, one row a model and one column a rater."""
@@ -27,6 +33,16 @@ class GradeGrid:
     # by model and rater, the grades of every presentation in order; no None
     grades: tuple[tuple[tuple[str, ...], ...], ...]
     scale: tuple[str, ...]  # every grade of the scale, mildest first
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GradeCounts:
+    """How often each model was given each grade in one session."""
+
+    models: tuple[str, ...]
+    intended: tuple[str | None, ...]  # by model
+    scale: tuple[str, ...]  # every grade of the scale, mildest first
+    counts: tuple[tuple[int, ...], ...]  # by model and grade
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,13 +89,26 @@ class SpeedDots:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class TraceBand:
+    """Where most of many stretches are at each time, while half of them go on."""
+
+    # (n_points,): s; (n_ends, n_points): deg and N·m, from the lowest to the highest
+    time: "Floats" = field(compare=False, repr=False)
+    angle: "Floats" = field(compare=False, repr=False)
+    torque: "Floats" = field(compare=False, repr=False)
+    shares: tuple[float, ...]  # of the stretches below each of them
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class TracePanel:
-    """All stretches of one model."""
+    """All stretches of one model, or a few of many and where most are."""
 
     title: str  # the model, its intended grade, and the range of speeds
     # per rater: time (s), angle (deg), torque (N·m), code of the phase
     stretches: "tuple[tuple[NDArray[np.generic], ...], ...]"
     graded: tuple[bool, ...] = ()  # by stretch, whether a grade is said to rest on it
+    names: tuple[str, ...] = ()  # by stretch, whose it is, if that is written at it
+    band: TraceBand | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,6 +116,7 @@ class TraceColumns:
     """Torque and angle against time, one column a model."""
 
     panels: tuple[TracePanel, ...]
+    has_angle: bool = True  # else torque alone, four panels a row
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -350,6 +380,7 @@ class AnswerBars:
 
 Content = (
     GradeGrid
+    | GradeCounts
     | RaterFlow
     | Forest
     | SpeedDots

@@ -2,7 +2,7 @@
 
 from collections import Counter
 
-from masrel.report._figure_data import GradeGrid
+from masrel.report._figure_data import MANY_RATERS, GradeCounts, GradeGrid
 from masrel.report._material import (
     Drawing,
     Material,
@@ -92,6 +92,8 @@ def _grid_blocks(
         notes.append(
             f"Excluded from every number of this report: {', '.join(excluded)}."
         )
+    if len(grid.raters) > MANY_RATERS:
+        return _counted_blocks(material, session, grid, table_rows, notes)
     table = Table(
         name=f"grades_{session}",
         caption=f"Grades of session {session}: models by raters",
@@ -112,6 +114,55 @@ def _grid_blocks(
         caption=f"{caption}.",
         alt=f"Grid of grades. {'; '.join(listed)}.",
         content=grid,
+        stamp=material.stamp,
+    )
+    return table, drawing
+
+
+def _counted_blocks(
+    material: Material,
+    session: str,
+    grid: GradeGrid,
+    rows: list[tuple[Value, ...]],
+    notes: list[str],
+) -> tuple[Table, Drawing]:
+    # of many raters: how often each grade was given; the CSV has who gave it
+    counts = tuple(
+        tuple(map(Counter(g for cell in cells for g in cell).__getitem__, grid.scale))
+        for cells in grid.grades
+    )
+    n_raters = counted(len(grid.raters), "rater")
+    by_rater = [Column(key=name, heading=name, where="csv") for name in grid.raters]
+    by_grade = [Column(key=f"n_{g}", heading=g, where="page") for g in grid.scale]
+    table = Table(
+        name=f"grades_{session}",
+        caption=f"How often {n_raters} gave each grade in session {session}",
+        columns=(
+            Column(key="model", heading="Model", align="left"),
+            Column(key="intended_grade", heading="Intended", align="center"),
+            *by_rater,
+            *by_grade,
+        ),
+        rows=tuple((*row, *of_row) for row, of_row in zip(rows, counts, strict=True)),
+        notes=(*notes, "The file has the grades of every rater."),
+        data=material.data,
+    )
+    texts = [
+        f"{model}: {', '.join(f'{n} of {g}' for g, n in pairs if n) or 'no grades'}"
+        for model, of_model in zip(grid.models, counts, strict=True)
+        for pairs in [list(zip(grid.scale, of_model, strict=True))]
+    ]
+    caption = f"How often {n_raters} gave each grade in session {session}. Darker is"
+    caption += " more often, of the grades of the model"
+    if any(intended is not None for intended in grid.intended):
+        caption += "; the intended grade is framed"
+    drawing = Drawing(
+        name=f"grades_{session}",
+        caption=f"{caption}.",
+        alt=f"Counts of grades. {'; '.join(texts)}.",
+        content=GradeCounts(
+            models=grid.models, intended=grid.intended, scale=grid.scale, counts=counts
+        ),
         stamp=material.stamp,
     )
     return table, drawing

@@ -68,6 +68,8 @@ class Table:
     columns: tuple[Column, ...]
     # values as computed: text, numbers, ``nan`` for undefined, None for absent
     rows: tuple[tuple[Value, ...], ...]
+    # what a page shows where the rows are too many for it; the CSV has all
+    page_rows: tuple[tuple[Value, ...], ...] | None = None
     in_units: tuple[int, ...] = ()  # rows of numbers that may be of any size
     notes: tuple[str, ...] = ()  # what the reader must know, below the table
     read: tuple[str, ...] = ()  # what was read for it, above the table
@@ -159,6 +161,13 @@ def p_text(p: float) -> str:
     return "<0.001" if p < 0.0005 else number(p, 3)
 
 
+def at_ranks(values: Sequence[float]) -> dict[str, int]:
+    """Return which of many values are the least, the quartiles and the most."""
+    order = sorted(range(len(values)), key=values.__getitem__)
+    names = ("lowest", "lower quartile", "median", "upper quartile", "highest")
+    return {name: order[k * (len(order) - 1) // 4] for k, name in enumerate(names)}
+
+
 def capital(text: str) -> str:
     """Return a text with a capital at its start."""
     return text[:1].upper() + text[1:]
@@ -170,11 +179,13 @@ def counted(count: int, noun: str) -> str:
 
 
 def page_cells(table: Table) -> tuple[list[Column], list[list[str]]]:
-    """Return the columns of a page or a screen, and every row as shown in them."""
+    """Return the columns of a page or a screen, and its rows as shown in them."""
     places = [(i, c) for i, c in enumerate(table.columns) if c.where != "csv"]
     rows = [
         [number(row[i], c.digits, in_units=at in table.in_units) for i, c in places]
-        for at, row in enumerate(table.rows)
+        for at, row in enumerate(
+            table.rows if table.page_rows is None else table.page_rows
+        )
     ]
     return [column for _, column in places], rows
 

@@ -9,8 +9,16 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
+from numpy.typing import NDArray
 
-from masrel.report._figure_data import GradeGrid, SpeedDots
+from masrel.report._figure_data import (
+    MANY_RATERS,
+    GradeCounts,
+    GradeGrid,
+    SpeedColumn,
+    SpeedDots,
+)
+from masrel.report._tables import percent
 from masrel.report.figures._style import (
     BLACK,
     BLUE,
@@ -26,7 +34,11 @@ _SHADES = LinearSegmentedColormap.from_list("grades", ["#F2F6FA", "#7FB6DA", "#0
 
 _UPRIGHT_LETTERS = 7  # of a rater's name that fits above a column
 
+_MOST_NUMBERS = 20  # grades up to which counts are written in the cells
+_DARK = 0.6  # share from which on a cell is so dark that letters are white
+
 _MODELS_IN_A_ROW = 8  # more go into further rows: a page is no wider
+_SPREADS = ((0.9, 1.4), (0.5, 6.0))  # share of the speeds, width of its line
 _SESSION_LOOKS = (("o", BLUE), ("s", ORANGE), ("^", VERMILLION), ("v", GREY))
 
 
@@ -93,31 +105,96 @@ def _cell(
         )
 
 
+def count_figure(content: GradeCounts) -> Figure:
+    """Return how often each model was given each grade, as shaded cells."""
+    n_rows, n_columns = len(content.models), len(content.scale)
+    size = (1.3 + min(9.0, 0.62 * n_columns), 0.9 + 0.3 * n_rows)
+    figure = Figure(figsize=size)
+    axes = figure.add_subplot()
+    counts = np.array(content.counts, dtype=np.int64).reshape(n_rows, n_columns)
+    shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
+    axes.imshow(
+        shares, cmap=_SHADES, vmin=0.0, vmax=1.0, aspect="auto",
+        interpolation="nearest",
+    )  # fmt: skip
+    look: dict[str, Any] = {"color": "white", "linewidth": 2.0}
+    axes.hlines(np.arange(0.5, n_rows - 1), -0.5, n_columns - 0.5, **look)
+    axes.vlines(np.arange(0.5, n_columns - 1), -0.5, n_rows - 0.5, **look)
+    for row, aim in enumerate(content.intended):
+        for column, grade in enumerate(content.scale):
+            if n_columns <= _MOST_NUMBERS and counts[row, column]:
+                _write_count(axes, row, column, counts, shares)
+            if grade == aim:
+                frame: dict[str, Any] = {"edgecolor": VERMILLION, "linewidth": 1.8}
+                corner = (column - 0.46, row - 0.42)
+                axes.add_patch(Rectangle(corner, 0.92, 0.84, facecolor="none", **frame))
+    every = 1 if n_columns <= _MOST_NUMBERS else -(-n_columns // 10)
+    axes.set_xticks(range(0, n_columns, every), content.scale[::every])
+    axes.set_yticks(range(n_rows), [short_name(model) for model in content.models])
+    axes.tick_params(length=0)
+    axes.xaxis.tick_top()
+    axes.spines[:].set_visible(False)
+    axes.set_xlabel("grade given; framed: the intended grade")
+    return figure
+
+
+def _write_count(
+    axes: Axes,
+    row: int,
+    column: int,
+    counts: NDArray[np.int64],
+    shares: NDArray[np.float64],
+) -> None:
+    axes.text(
+        column,
+        row,
+        str(counts[row, column]),
+        ha="center",
+        va="center",
+        fontsize=8,
+        color="white" if shares[row, column] > _DARK else BLACK,
+    )
+
+
 def speed_figure(dots: SpeedDots) -> Figure:
     """Return every rater's mean speed, one column a model."""
     models = list(dict.fromkeys(column.model for column in dots.columns))
     sessions = list(dict.fromkeys(column.session for column in dots.columns))
-    starts = range(0, len(models), _MODELS_IN_A_ROW)
-    width = min(8.8, max(4.6, 1.4 + 1.25 * len(models[:_MODELS_IN_A_ROW])))
+    in_a_row = -(-len(models) // -(-len(models) // _MODELS_IN_A_ROW))  # even rows
+    starts = range(0, len(models), in_a_row)
+    width = min(8.8, max(4.6, 1.4 + 1.25 * in_a_row))
     figure = Figure(figsize=(width, 0.6 + 2.6 * len(starts)))
     rows = figure.subplots(len(starts), 1, sharey=True, squeeze=False)[:, 0]
     for axes, start in zip(rows, starts, strict=True):
-        _speed_row(axes, dots, models[start : start + _MODELS_IN_A_ROW], sessions)
+        _speed_row(axes, dots, models[start : start + in_a_row], sessions)
     rows[0].set_ylim(bottom=0)
     label = "haptic model"
-    if len(dots.raters) > 1:
+    if 1 < len(dots.raters) <= MANY_RATERS:
         label += f"; in each, raters {dots.raters[0]} to {dots.raters[-1]} from left"
     rows[-1].set_xlabel(label)
     for axes in rows:
         axes.set_ylabel("mean speed before\nthe catch (deg/s)")
-    looks = zip(sessions, _SESSION_LOOKS * len(sessions), strict=False)
-    marks = [
-        Line2D([], [], marker=marker, color=colour, linestyle="none", label=session)
-        for session, (marker, colour) in looks
-    ]
-    marks.append(Line2D([], [], color=BLACK, linewidth=1.6, label="mean"))
+    marks = _speed_marks(sessions, has_many=len(dots.raters) > MANY_RATERS)
     figure.legend(handles=marks, ncols=5, loc="outside lower center")
     return figure
+
+
+def _speed_marks(sessions: Sequence[str], *, has_many: bool) -> list[Line2D]:
+    looks = zip(sessions, _SESSION_LOOKS * len(sessions), strict=False)
+    marks = [
+        Line2D([], [], color=colour, linewidth=6.0, label=session)
+        if has_many
+        else Line2D([], [], marker=marker, color=colour, ls="none", label=session)
+        for session, (marker, colour) in looks
+    ]
+    if has_many:
+        marks += [
+            Line2D(
+                [], [], color=GREY, linewidth=wide, label=f"middle {percent(share)} %"
+            )
+            for share, wide in _SPREADS
+        ]
+    return [*marks, Line2D([], [], color=BLACK, linewidth=1.6, label="mean")]
 
 
 def _speed_row(
@@ -130,6 +207,11 @@ def _speed_row(
         session = sessions.index(column.session)
         middle = models.index(column.model) - 0.38 + width * (session + 0.5)
         marker, colour = _SESSION_LOOKS[session % len(_SESSION_LOOKS)]
+        ends = [middle - 0.45 * width, middle + 0.45 * width]
+        axes.plot(ends, [column.mean] * 2, color=BLACK, linewidth=1.6, zorder=2.5)
+        if len(dots.raters) > MANY_RATERS:
+            _draw_spread(axes, column, middle, colour)
+            continue
         axes.plot(
             *_strip(column.speeds, middle, width), marker, color=colour, markersize=5,
             alpha=0.9,
@@ -139,8 +221,6 @@ def _speed_row(
                 *_strip(column.graded, middle, width), "o", color=BLACK, markersize=8,
                 fillstyle="none",
             )  # fmt: skip
-        ends = [middle - 0.45 * width, middle + 0.45 * width]
-        axes.plot(ends, [column.mean, column.mean], color=BLACK, linewidth=1.6)
     axes.axhline(dots.slowest, color=GREY, linewidth=0.8, linestyle=DASHES)
     # ν_L as two texts: to parse it as mathematics takes as long as to draw the rest
     for letter, size, offset in (("ν", 9.0, (3.0, 0.0)), ("L", 6.5, (8.5, -3.0))):
@@ -161,6 +241,17 @@ def _speed_row(
     axes.set_xticks(range(len(models)), names, **slanted if is_long else {})
     axes.set_xlim(-0.55, len(models) - 0.45)
     axes.grid(axis="y")
+
+
+def _draw_spread(axes: Axes, column: SpeedColumn, middle: float, colour: str) -> None:
+    # where most of many speeds are
+    every = [speed for of_rater in column.speeds for speed in of_rater]
+    for share, wide in _SPREADS:
+        ends = np.quantile(every, [0.5 - 0.5 * share, 0.5 + 0.5 * share])
+        axes.plot(
+            [middle, middle], ends, color=colour, linewidth=wide,
+            solid_capstyle="butt", zorder=1.5,
+        )  # fmt: skip
 
 
 def _strip(

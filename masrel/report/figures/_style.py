@@ -151,12 +151,8 @@ def draw_all(drawings: "Sequence[Drawing]") -> list[dict[data.Form, bytes]]:
 def _figure(content: data.Content) -> Figure:
     # Imported here: one figure loads what no other needs.
     match content:
-        case data.GradeGrid() | data.SpeedDots():
-            from masrel.report.figures import _study_figures as study
-
-            if isinstance(content, data.GradeGrid):
-                return study.grade_figure(content)
-            return study.speed_figure(content)
+        case data.GradeGrid() | data.GradeCounts() | data.SpeedDots():
+            return _study_figure(content)
         case data.TraceColumns() | data.MeasuredTorque():
             from masrel.report.figures import _trace_figures as traces
 
@@ -189,6 +185,18 @@ def _figure(content: data.Content) -> Figure:
             return scene_figure(content)
         case _:
             return _joint_figure(content)
+
+
+def _study_figure(
+    content: data.GradeGrid | data.GradeCounts | data.SpeedDots,
+) -> Figure:
+    from masrel.report.figures import _study_figures as study
+
+    if isinstance(content, data.GradeGrid):
+        return study.grade_figure(content)
+    if isinstance(content, data.GradeCounts):
+        return study.count_figure(content)
+    return study.speed_figure(content)
 
 
 def _rater_figure(

@@ -7,12 +7,18 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from masrel.report._figure_data import MeasuredTorque, TraceColumns, TracePanel
-from masrel.report.figures._style import BLACK, BLUE, GREY, VERMILLION
+from masrel.report.figures._style import BLACK, BLUE, GREY, VERMILLION, short_name
 
 _GRADED_WIDTH = 2.2  # of the line of a stretch that a grade rests on, of the others
+
+_TORQUE, _ANGLE = 2, 1  # their columns in a stretch
+_CATCH = 1  # position in _PHASES
+_SMALL_IN_A_ROW = 4
+_BAND_SHADES = ("#E9EFF5", "#C9D9E8")  # of the middle 90 % and of the middle 50 %
 
 # Name of each phase, and how its line looks.
 _PHASES: tuple[tuple[str, dict[str, Any]], ...] = (
@@ -25,23 +31,52 @@ _Values = NDArray[np.generic]
 
 
 def trace_figure(columns: TraceColumns) -> Figure:
-    """Return torque and angle against time, one column a model."""
-    figure, grid = _torque_above_angle(len(columns.panels))
-    for (top, bottom), panel in zip(grid.T, columns.panels, strict=True):
-        _draw_panel(top, panel, 2)
-        _draw_panel(bottom, panel, 1)
-        top.set_title(panel.title)
-    _finish(figure, grid, "model torque (N·m)")
-    handles = [Line2D([], [], solid_capstyle="butt", **look) for _, look in _PHASES]
+    """Return torque and angle against time, one column a model, or torque alone."""
+    if columns.has_angle:
+        figure, grid = _torque_above_angle(len(columns.panels))
+        for (top, bottom), panel in zip(grid.T, columns.panels, strict=True):
+            _draw_panel(top, panel, _TORQUE)
+            _draw_panel(bottom, panel, _ANGLE)
+            top.set_title(panel.title)
+        _finish(figure, grid, "model torque (N·m)")
+    else:
+        figure = _small_panels(columns.panels)
+    handles: list[Any] = [
+        Line2D([], [], solid_capstyle="butt", **look) for _, look in _PHASES
+    ]
     for handle in handles:
         handle.set_linewidth(handle.get_linewidth() + 0.5)
+    names = [name for name, _ in _PHASES]
+    if any(panel.band is not None for panel in columns.panels):
+        handles += [Patch(facecolor=shade) for shade in _BAND_SHADES]
+        names += ["middle 90 %", "middle 50 %"]
     figure.legend(
-        handles,
-        [name for name, _ in _PHASES],
-        loc="outside lower center",
-        ncols=3,
-        handlelength=3.0,
+        handles, names, loc="outside lower center", ncols=len(names), handlelength=3.0
     )
+    return figure
+
+
+def _small_panels(panels: Sequence[TracePanel]) -> Figure:
+    # torque alone, all on the same axes
+    n_columns = min(_SMALL_IN_A_ROW, len(panels))
+    n_rows = -(-len(panels) // n_columns)
+    figure = Figure(figsize=(8.7, 0.6 + 1.75 * n_rows))
+    grid = figure.subplots(n_rows, n_columns, sharex=True, sharey=True, squeeze=False)
+    for axes, panel in zip(grid.flat, panels, strict=False):
+        _draw_panel(axes, panel, _TORQUE)
+        axes.set_title(panel.title, fontsize=8)
+        axes.grid(axis="y")
+    for axes in grid.ravel()[len(panels) :]:
+        axes.set_visible(False)
+    grid[0, 0].set_xlim(left=0)
+    grid[0, 0].set_ylim(bottom=min(0.0, grid[0, 0].get_ylim()[0]))
+    for place in range(n_columns):  # the last panel of each column has the label
+        last = n_rows - 1 if (n_rows - 1) * n_columns + place < len(panels) else -2
+        axes = grid[last, place]
+        axes.set_xlabel("time (s)")
+        axes.tick_params(labelbottom=True)
+    for axes in grid[:, 0]:
+        axes.set_ylabel("torque (N·m)")
     return figure
 
 
@@ -95,6 +130,8 @@ def _finish(figure: Figure, grid: NDArray[Any], torque_label: str) -> None:
 
 def _draw_panel(axes: Axes, panel: TracePanel, which: int) -> None:
     # which: the column of a stretch that is drawn against its time
+    if panel.band is not None:
+        _draw_band(axes, panel, which)
     graded = panel.graded or (False,) * len(panel.stretches)
     for is_graded, factor in ((False, 1.0), (True, _GRADED_WIDTH)):
         shown = [
@@ -104,6 +141,25 @@ def _draw_panel(axes: Axes, panel: TracePanel, which: int) -> None:
         ]
         for code in range(len(_PHASES)) if shown else ():
             _draw_phase(axes, shown, code, factor)
+
+
+def _draw_band(axes: Axes, panel: TracePanel, which: int) -> None:
+    # the outer pair of ends, and the inner one before it; names where the catch is
+    if panel.band is None:
+        return
+    ends = panel.band.torque if which == _TORQUE else panel.band.angle
+    for place, shade in enumerate(_BAND_SHADES):
+        low, high = ends[place], ends[-1 - place]
+        axes.fill_between(
+            panel.band.time, low, high, color=shade, linewidth=0, zorder=0.5
+        )
+    for name, stretch in zip(panel.names, panel.stretches, strict=True):
+        if which == _TORQUE:
+            at = int(np.argmax(stretch[3] == _CATCH)) or -1  # or the end without one
+            axes.annotate(
+                short_name(name), (stretch[0][at], stretch[which][at]), (0, 3),
+                textcoords="offset points", fontsize=6, color=GREY,
+            )  # fmt: skip
 
 
 def _draw_phase(
