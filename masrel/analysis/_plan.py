@@ -176,21 +176,28 @@ def _inputs(
 def _estimate(
     line: EstimatePlan, protocol: Protocol, ratings: Ratings
 ) -> PlannedEstimate:
-    compute = _inter_rater if line.kind == "inter-rater" else _retest
     try:
-        models, reason = _rated_models(line, protocol, ratings)
-        if reason is not None:
-            return PlannedEstimate(line=line, reason=reason)
-        return compute(line, protocol, ratings, models)
+        return _planned(line, protocol, ratings)
     except (ParameterError, CountsError, RatingsError) as error:
-        if not _fits_whole_study(line, protocol):
+        if unanswered(line, protocol) is not None:
             raise ProtocolError(f"analysis.estimates {line.id!r}: {error}") from error
         reason = f"not with the ratings that are there: {error}"
         return PlannedEstimate(line=line, reason=reason)
 
 
-def _fits_whole_study(line: EstimatePlan, protocol: Protocol) -> bool:
-    # Whether there is an estimate once every rating is there, whatever the grades
+def _planned(
+    line: EstimatePlan, protocol: Protocol, ratings: Ratings
+) -> PlannedEstimate:
+    compute = _inter_rater if line.kind == "inter-rater" else _retest
+    models, reason = _rated_models(line, protocol, ratings)
+    if reason is not None:
+        return PlannedEstimate(line=line, reason=reason)
+    return compute(line, protocol, ratings, models)
+
+
+def unanswered(line: EstimatePlan, protocol: Protocol) -> str | None:
+    """Return why there is no estimate even once every rating is there, or None."""
+    # whatever the grades; they are random ones here
     grades, rng = protocol.scale.grades, random.Random(line.id)
     rows = [
         {
@@ -206,14 +213,12 @@ def _fits_whole_study(line: EstimatePlan, protocol: Protocol) -> bool:
         for repeat in range(1, protocol.schedule.repeats + 1)
     ]
     whole = ratings_from_rows(rows, scale_of(protocol))
-    compute = _inter_rater if line.kind == "inter-rater" else _retest
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", MasrelWarning)
         try:
-            models, reason = _rated_models(line, protocol, whole)
-            return reason is None and bool(compute(line, protocol, whole, models))
-        except (ParameterError, CountsError, RatingsError):
-            return False
+            return _planned(line, protocol, whole).reason
+        except (ParameterError, CountsError, RatingsError) as error:
+            return str(error)
 
 
 def _rated_models(

@@ -27,9 +27,8 @@ _EMULATED_START = math.radians(60.0)
 _OPTIONS = (
     click.option(
         "--interface",
-        default="socketcan",
-        show_default=True,
-        help="The adapter, as python-can names it.",
+        help="The adapter, as python-can names it; default: socketcan, with --emulate "
+        "virtual.",
     ),
     click.option("--channel", default="can0", show_default=True, help="Its channel."),
     click.option("--puck", type=int, default=1, show_default=True, help="Its node."),
@@ -47,7 +46,7 @@ _OPTIONS = (
         help="TOML file with the property numbers of a firmware unknown to masrel.",
     ),
     click.option(
-        "--emulate", is_flag=True, help="Emulate the puck; with --interface virtual."
+        "--emulate", is_flag=True, help="Emulate the puck; there is no hardware then."
     ),
 )
 _output_options = output_options(
@@ -130,7 +129,7 @@ def puck_command(function: Callable[..., None]) -> Callable[..., None]:
     @functools.wraps(function)
     def command(
         *,
-        interface: str,
+        interface: str | None,
         channel: str,
         puck: int,
         direction: str,
@@ -142,7 +141,7 @@ def puck_command(function: Callable[..., None]) -> Callable[..., None]:
     ) -> None:
         output.check_files()
         options = PuckOptions(
-            interface=interface,
+            interface=interface or ("virtual" if emulate else "socketcan"),
             channel=channel,
             puck=puck,
             gear_ratio=gear_ratio,

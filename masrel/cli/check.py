@@ -48,13 +48,20 @@ def _check_study(study: StudyPaths) -> tuple[Sequence[str], Sequence[str]]:
 
 def _plan_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
     from masrel.agreement import coefficient  # loads numpy
+    from masrel.analysis._plan import unanswered  # loads pandas
 
     for index, line in enumerate(protocol.analysis.estimates):
+        where = f"{study.protocol}: analysis.estimates[{index}]"
         try:
             coefficient(line.coefficient)
         except ParameterError as error:
-            where = f"{study.protocol}: analysis.estimates[{index}]"
             yield f'{where}.{error} (id "{line.id}")'
+            continue
+        if (reason := unanswered(line, protocol)) is not None:
+            yield (
+                f"{where}: has no estimate even once every rating is there: {reason} "
+                f'(id "{line.id}")'
+            )
 
 
 def _device_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
@@ -89,6 +96,17 @@ def _record_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
             yield finding.message
 
 
+def _sheet_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
+    from masrel.paper._filled_form import off_scale
+
+    for session in protocol.sessions:
+        for rater in session.raters:
+            place = (rater, session.id)
+            for file in (study.sheet_file(*place), study.typed_file(*place)):
+                if file.is_file():
+                    yield from off_scale(file, protocol.scale.grades)
+
+
 def _ratings_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
     files = [f for f in (study.ratings_file, study.published_file) if f.exists()]
     if not files:
@@ -110,6 +128,7 @@ _CHECKERS: tuple[Callable[[Protocol, StudyPaths], Iterable[str]], ...] = (
     _plan_problems,
     _device_problems,
     schedule_problems,
+    _sheet_problems,
     _record_problems,
     _ratings_problems,
 )

@@ -3,11 +3,12 @@
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from masrel.errors import ParameterError, RatingsError
 from masrel.paper._differences import NO_GRADE
 from masrel.paper._form import FIRST_COLUMNS, Form, QuestionColumn
-from masrel.paper._typed import TypedRow, TypedSheet, shortened
+from masrel.paper._typed import TypedRow, TypedSheet, read_typed, shortened
 from masrel.protocol._questions import Answer, When, checked_answer
 
 _MAX_PROBLEMS = 20
@@ -132,11 +133,7 @@ def _filled_row(
 ) -> FilledRow:
     grade, is_graded = row["grade"], isinstance(place, int)
     if is_graded and grade not in (*grades, NO_GRADE):
-        problems.append(
-            f"{where}: grade: needed one of {', '.join(grades)}, or {NO_GRADE} where "
-            f"there is none, got "
-            f"{repr(shortened(grade)) if grade else 'an empty cell'}"
-        )
+        problems.append(f"{where}: {_needed_grade(grades, grade)}")
     if not is_graded and grade:
         problems.append(
             f"{where}: grade: needed of presentations, got {shortened(grade)!r}"
@@ -156,6 +153,25 @@ def _filled_row(
         grade=None if grade in ("", NO_GRADE) else grade,
         answers=tuple(_answers(row, form.questions[about], where, problems)),
     )
+
+
+def _needed_grade(grades: Sequence[str], got: str) -> str:
+    return (
+        f"grade: needed one of {', '.join(grades)}, or {NO_GRADE} where there is none, "
+        f"got {repr(shortened(got)) if got else 'an empty cell'}"
+    )
+
+
+def off_scale(file: Path, grades: Sequence[str]) -> Iterator[str]:
+    """Yield each grade off the scale on a sheet that may not be filled in yet."""
+    try:
+        rows = read_typed(file).rows
+    except RatingsError as error:
+        yield str(error)
+        return
+    for row in rows:
+        if row["grade"] not in ("", *grades, NO_GRADE):
+            yield f"{file}: row {row.number}: {_needed_grade(grades, row['grade'])}"
 
 
 def _answers(

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 
 _SPEED_DEG_S = 0.01  # to which speeds are determined that are shown whole
+_PEAK_TO_MEAN = 1.875  # of a stretch with minimum jerk
+_WATCHED_S = 10.0  # for how long Tardieu's scale watches clonus
 _WITH_BUTTON = ("simulated",)  # which the simulated hand presses
 
 
@@ -92,31 +94,34 @@ def _torque_problems(protocol: Protocol, model: Model) -> Iterator[str]:
 
 
 def torque_notes(protocol: Protocol) -> Iterator[str]:
-    """Yield where the device stops a model though it may be presented."""
+    """Yield where the device stops a model in what raters may well do with it."""
     # A sentence for each limit that some motion passes
     settings = protocol.device
+    peak = _PEAK_TO_MEAN * protocol.stretch.largest_speed_deg_s
     fastest: dict[str, list[tuple[float, str]]] = {}
     held = []
     for model in protocol.models:
         key, limit = _torque_limit(protocol, model)
         speed = _speed_of_torque(protocol, model, limit)
-        if speed < settings.speed_limit_deg_s:
+        if speed < min(settings.speed_limit_deg_s, peak):
             fastest.setdefault(key, []).append((speed, model.id))
         if _largest_torque(protocol, model, 0.0) > settings.standing_torque_nm:
             held.append(model.id)
     for key, models in fastest.items():
-        speeds = (f"{name} {math.floor(speed)} deg/s" for speed, name in sorted(models))
+        (speed, name), *others = sorted(models)
+        more = f", and {len(others)} more at higher speeds" if others else ""
         yield (
-            f"device.{key} ({getattr(settings, key):g} N·m) may be passed, and the "
-            f"model stopped, in a stretch faster than this: {listed(speeds)}"
+            f"device.{key} ({getattr(settings, key):g} N·m) stops a stretch that is "
+            f"for a moment faster than {math.floor(speed)} deg/s with {name}{more}: "
+            "raise it, or have raters practise slower ones"
         )
-    if held:
-        longest = settings.standing_limit_ms * 1e-3 * HELD_TIMES
+    longest = settings.standing_limit_ms * 1e-3 * HELD_TIMES
+    if held and longest < _WATCHED_S:
         yield (
-            f"device.standing_torque_nm ({settings.standing_torque_nm:g} N·m) stops an "
-            f"arm that is held still for {longest:g} s against more, which these ask "
-            "for: "
-            + ("all models" if len(held) == len(protocol.models) else listed(held))
+            f"device.standing_limit_ms ({settings.standing_limit_ms:g} ms) stops an "
+            f"arm that is held still for {longest:g} s with "
+            f"{'any model' if len(held) == len(protocol.models) else listed(held)}: "
+            f"{_WATCHED_S / HELD_TIMES * 1e3:g} ms let raters watch for clonus"
         )
 
 

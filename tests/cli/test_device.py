@@ -11,7 +11,7 @@ from masrel.hess.puck import steady_runs
 
 from .process import Caller
 
-EMULATED = ("--interface", "virtual", "--channel", "cli", "--emulate")
+EMULATED = ("--channel", "cli", "--emulate")
 
 
 def test_probe_says_who_is_there(masrel: Caller) -> None:
@@ -113,7 +113,11 @@ def test_friction_does_not_move_an_arm_unasked(masrel: Caller) -> None:
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
-        (("check", "--emulate"), 2, "interface: needs 'virtual' for an emulated puck"),
+        (
+            ("check", "--emulate", "--interface", "socketcan"),
+            2,
+            "interface: needs 'virtual' for an emulated puck",
+        ),
         (("check", "--puck", 9), 2, "puck: needs a motor's node, 1 to 7, got 9"),
         (("zero", *EMULATED), 2, "Missing option '--angle-deg'"),
         (("zero", "--angle-deg", 200, *EMULATED), 2, "200.0 is not in the range"),

@@ -13,7 +13,7 @@ import pytest
 
 from tests.cli.process import Caller, Done
 from tests.faults import Faults
-from tests.flow.cuts import contents, masrel_command
+from tests.flow.cuts import Syscall, contents, masrel_command
 from tests.run.conftest import PROTOCOL
 
 FORMULA = "; touch X #"
@@ -231,6 +231,39 @@ def a_folder_without_locks(bench: Bench) -> None:
         where = ("--rater", "R1", "--session", "test", "--grades", "simulated")
         said = bench("run", *where, code=2).err
     assert "another process has this log open" in said
+
+
+def a_file_system_without_locks(bench: Bench) -> None:
+    # it is said, and not taken for another process
+    if shutil.which("strace") is None:
+        pytest.skip("needs strace: it lets a call of the system fail")
+    bench("note", "before", "--who", "Kim")
+    command = masrel_command("note", bench.study, "power cut", "--who", "Kim")
+    done = Syscall("flock", 1).inject("error=ENOLCK", command)
+    assert done.returncode == 2
+    assert "another process" not in done.stderr
+    assert f"{bench.study / 'conduct.jsonl'}: No locks available" in done.stderr
+
+
+def a_grade_off_the_scale_on_a_sheet(bench: Bench) -> None:
+    bench("sheet")
+    for sheet, row in (("schedules/test_R2_sheet.csv", 4), ("sheets/test_R1.csv", 3)):
+        path = bench.study / sheet
+        lines = path.read_text().splitlines(keepends=True)
+        lines[row - 1] = lines[row - 1].replace("\n", "9\n")
+        path.write_text("".join(lines))
+        said = bench("check", code=2).err
+        assert f"{path}: row {row}: grade: needed one of 0, 1, 1+, 2, 3, 4" in said
+        lines[row - 1] = lines[row - 1].replace("9\n", "1+\n")
+        path.write_text("".join(lines))
+    bench("check")
+
+
+def a_plan_that_no_study_answers(bench: Bench) -> None:
+    bench.edit("protocol.toml", 'target = "items"', 'target = "raters"')
+    said = bench("check", code=2).err
+    assert "analysis.estimates[0]: has no estimate even once every rating" in said
+    assert said.count("analysis.estimates") == 1
 
 
 REPRODUCERS: dict[str, Callable[[Bench], None]] = {
