@@ -23,6 +23,13 @@ _PAIRS = ("stratified_kappa", "pooled_kappa")
 """Coefficients of each rater's grades of two sessions."""
 
 
+# What is asked for as a coefficient and is a table of its own
+_NO_COEFFICIENTS = {
+    **dict.fromkeys(("mcnemar", "bowker", "stuart_maxwell", "bhapkar"), "--symmetry"),
+    "bland_altman": "--limits-of-agreement",
+}
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FurtherOptions:
     """Which tables are printed beside that of agreement."""
@@ -62,6 +69,13 @@ class FurtherOptions:
         return options
 
     def _check_own(self, options: EstimateOptions) -> None:
+        for name in options.names:
+            option = _NO_COEFFICIENTS.get(name.lower().replace("-", "_"))
+            if option is not None:
+                raise ParameterError(
+                    f"--coefficients: needed coefficients, got {name!r}: {option} has "
+                    "that table"
+                )
         if self.reference is not None and not self.diagnose:
             raise ParameterError("--reference: belongs to --diagnose, got it alone")
         if self.unit is not None and not self.limits_of_agreement:

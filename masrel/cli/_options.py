@@ -123,6 +123,7 @@ class OutputOptions:
         return self.quiet or None
 
 
+_FORMAT = 1  # of what verbs write as JSON
 _RAW = "With --csv: no apostrophe before a text that a spreadsheet would run."
 
 
@@ -137,20 +138,31 @@ def output_options(
     quiet: str | None = None,
 ) -> Decorator:
     """Return the options with these helps, as one argument `output` of a command."""
+    # of verbs that print no table unless asked, it is nothing by itself
+    needs_csv = _needs_csv if raw_csv is None else None
     raw_csv = raw_csv or (_RAW if csv is not None else None)
     path = OutputFile(path_type=Path, dir_okay=False)
     json_path = OutputFile(path_type=Path, allow_dash=True)
     options = [
         (json, click.option("--json", "json_file", type=json_path, help=json)),
         (figure, click.option("--figure", type=path, help=figure)),
-        (csv, click.option("--csv", is_flag=True, help=csv)),
-        (raw_csv, click.option("--raw-csv", is_flag=True, help=raw_csv)),
+        (csv, click.option("--csv", is_flag=True, is_eager=True, help=csv)),
+        (
+            raw_csv,
+            click.option("--raw-csv", is_flag=True, help=raw_csv, callback=needs_csv),
+        ),
         (latex, click.option("--latex", is_flag=True, help=latex)),
         (sentence, click.option("--sentence", is_flag=True, help=sentence)),
         (quiet, click.option("--quiet", is_flag=True, help=quiet)),
     ]
     offered = [option for text, option in options if text is not None]
     return grouped("output", OutputOptions, *offered)
+
+
+def _needs_csv(context: click.Context, _: click.Parameter, raw_csv: bool) -> bool:
+    if raw_csv and not context.params["csv"]:
+        raise click.UsageError("--raw-csv: needs --csv, whose table it is about")
+    return raw_csv
 
 
 def check_folder(option: str, file: Path) -> None:
@@ -215,13 +227,23 @@ def _print_table(table: "Table", output: OutputOptions, width: int | None) -> No
 
 
 def write_json(document: dict[str, object], file: Path) -> None:
-    """Write a document, or print it where the file is "-"."""
+    """Write a document, or print it where the file is "-"; it names its format."""
+    if "format" not in document:
+        document = {"format": f"masrel {_verb()} {_FORMAT}", **document}
     text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
     if file == STDOUT:
         # escapes of JSON where the screen cannot show the letters
         click.echo(text if is_encodable(text) else json.dumps(document, indent=1))
         return
     write_file(file, text + "\n")
+
+
+def _verb() -> str:
+    names, context = [], click.get_current_context()
+    while context.parent is not None:  # the first is called as the user called it
+        names.append(str(context.info_name))
+        context = context.parent
+    return " ".join(reversed(names))
 
 
 _NOTES = "masrel.notes"

@@ -586,6 +586,22 @@ def test_an_unknown_coefficient_is_guessed(
     assert f"did you mean {meant}?" in done.err
 
 
+@pytest.mark.parametrize(
+    ("typed", "option"),
+    [
+        ("mcnemar", "--symmetry"),
+        ("fleiss_kappa,Stuart-Maxwell", "--symmetry"),
+        ("bland_altman", "--limits-of-agreement"),
+    ],
+)
+def test_a_table_that_is_asked_for_as_a_coefficient_is_named(
+    masrel: Caller, wide: Path, typed: str, option: str
+) -> None:
+    done = masrel("agree", wide, "--coefficients", typed)
+    assert (done.code, done.out) == (2, "")
+    assert f"{option} has that table" in done.err
+
+
 def test_what_could_be_many_is_not_guessed(masrel: Caller, wide: Path) -> None:
     for typed in ("kappa", "icc", "qqqqqq", "", "all,fleiss_kappa"):
         assert "did you mean" not in masrel("agree", wide, "--coefficients", typed).err

@@ -36,6 +36,16 @@ def test_a_study_reads_the_grades_that_it_wrote(tmp_path: Path) -> None:
     assert read.table["grade"].tolist() == list(scale.grades)
 
 
+def test_raw_cells_are_those_of_a_table_that_is_printed(
+    tmp_path: Path, masrel: Caller
+) -> None:
+    table = tmp_path / "table.csv"
+    table.write_text("item,A,B\n1,2,2\n2,x,x\n")
+    done = masrel("agree", table, "--raw-csv")
+    assert (done.code, done.out) == (2, "")
+    assert "--raw-csv: needs --csv" in done.err
+
+
 @pytest.mark.parametrize("raw", [False, True])
 def test_csv_on_the_screen(raw: bool, tmp_path: Path, masrel: Caller) -> None:
     table = tmp_path / "table.csv"
