@@ -5,7 +5,8 @@ sampled. Out: a `Plan`, exact where all studies can be summed over, else simulat
 its Monte Carlo error.
 """
 
+from masrel.planning._grids import plan_grid
 from masrel.planning._item_models import LatentModel
 from masrel.planning._sizes import Plan, precision, sample_size
 
-__all__ = ["LatentModel", "Plan", "precision", "sample_size"]
+__all__ = ["LatentModel", "Plan", "plan_grid", "precision", "sample_size"]

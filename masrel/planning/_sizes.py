@@ -423,12 +423,13 @@ def _plan_of(question: Question, design: StudyDesign) -> Plan:
         if is_exact
         else simulated_sums(design, question.seed, question.rater_share)
     )
-    return _plan_from(question, design, sums, is_exact)
+    return plan_from(question, design, sums, is_exact)
 
 
-def _plan_from(
+def plan_from(
     question: Question, design: StudyDesign, sums: StudySums, is_exact: bool
 ) -> Plan:
+    """Return the plan that sums over studies of a design make."""
     means = {name: sums.mean(place) for name, place in _PLACES.items()}
     aim = question.aim
     shares = [sums.share(place) for place in range(4)]
