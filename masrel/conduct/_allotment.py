@@ -4,13 +4,14 @@ Nobody asks for a row: whoever comes next gets the next one that no event has, i
 session and at the site; a row that was allotted once stays that rater's.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from masrel._event_log import Event, utc_now
-from masrel.conduct._study_log import all_events, open_conduct
+from masrel._input import listed
+from masrel.conduct._study_log import events_of_logs, open_conduct
 from masrel.errors import ScheduleError
 from masrel.protocol import Protocol, StudyPaths
 from masrel.schedule import Schedule, read_schedule, write_schedules
@@ -79,7 +80,7 @@ def _allot(
     """Return the rows of raters in sessions; those without one get the next."""
     scheme = protocol.schedule.scheme
     with open_conduct(study, protocol, now=now) as log:  # nobody else allots meanwhile
-        rows = _Rows(all_events(study))
+        rows = _Rows(events_of_logs(study))
         allotted = {}
         for rater, session in places:
             design = (session, site_of(protocol, rater), scheme)
@@ -93,7 +94,7 @@ def _allot(
                     "scheme": scheme,
                     "row": row,
                 }
-                rows.add(log.append("allotted", fields))
+                rows.add(log.path, log.append("allotted", fields))
             allotted[rater, session] = row
     return allotted
 
@@ -104,19 +105,20 @@ _Design = tuple[str, str | None, str]  # session, site, scheme
 class _Rows:
     """The rows that events of a log allotted."""
 
-    def __init__(self, events: Sequence[Event]) -> None:
+    def __init__(self, events: Iterable[tuple[Path, Event]]) -> None:
         self.of_rater: dict[tuple[str, str, str | None, str], int] = {}
         self._n: dict[_Design, int] = {}
-        self.problems: list[str] = []
-        for event in events:
+        self.log_of_row: dict[tuple[str, str, str | None, str], Path] = {}
+        self.problems: list[tuple[Path, str]] = []
+        for log, event in events:
             if event.kind == "allotted":
-                self.add(event)
+                self.add(log, event)
 
     def n_allotted(self, design: _Design) -> int:
         """Return how many rows of a design were allotted."""
         return self._n.get(design, 0)
 
-    def add(self, event: Event) -> None:
+    def add(self, log: Path, event: Event) -> None:
         """Take in an event, and note what is wrong with it."""
         fields = event.fields
         rater, site = str(fields["rater"]), fields["site"]
@@ -130,32 +132,33 @@ class _Rows:
         row = self._n[design] = self.n_allotted(design) + 1
         where = f"line {event.line}: allotted: rater {rater} in session {design[0]}"
         if fields["row"] != row:
-            self.problems.append(
-                f"{where}: needed row {row}, the next one, got {fields['row']}"
-            )
+            needed = f"needed row {row}, the next one, got {fields['row']}"
+            self.problems.append((log, f"{where}: {needed}"))
         if (rater, *design) in self.of_rater:
-            self.problems.append(
-                f"{where}: needed a rater without a row, got one with row "
-                f"{self.of_rater[rater, *design]}"
-            )
+            got = f"row {self.of_rater[rater, *design]}"
+            needed = f"needed a rater without a row, got one with {got}"
+            self.problems.append((log, f"{where}: {needed}"))
             return
         self.of_rater[rater, *design] = row
+        self.log_of_row[rater, *design] = log
 
 
-def allotment_problems(study: StudyPaths, protocol: Protocol) -> tuple[str, ...]:
-    """Return where allotted rows, or rows of schedules, are not those of the log."""
-    rows = _Rows(all_events(study))
-    problems = [f"{study.conduct_file}: {problem}" for problem in rows.problems]
+def allotment_problems(
+    study: StudyPaths, protocol: Protocol
+) -> Iterator[tuple[Path, str]]:
+    """Yield where allotted rows, or rows of schedules, are not those of the logs."""
+    # of a merged study the logs of its sites
+    rows = _Rows(events_of_logs(study))
+    yield from rows.problems
+    logs = listed(map(str, study.conduct_logs() or [study.conduct_file]))
     for schedule, path in _drawn(study, protocol):
         design = (schedule.session, schedule.site, schedule.scheme)
         row = rows.of_rater.get((schedule.rater, *design))
         if schedule.row != row and schedule.scheme in WITH_ROWS:
-            needed = "a row that was allotted" if row is None else f"row {row}"
-            problems.append(
-                f"{path}: needed {needed}, by {study.conduct_file}, got row "
-                f"{schedule.row}"
-            )
-    return tuple(problems)
+            needed = f"a row that was allotted, by {logs}"
+            if row is not None:
+                needed = f"row {row}, by {rows.log_of_row[schedule.rater, *design]}"
+            yield path, f"needed {needed}, got row {schedule.row}"
 
 
 def _drawn(study: StudyPaths, protocol: Protocol) -> Iterator[tuple[Schedule, Path]]:

@@ -99,14 +99,21 @@ def conduct_hash(study: StudyPaths) -> str | None:
 
 def all_events(study: StudyPaths) -> tuple[Event, ...]:
     """Return every event of a study's logs, in order of time."""
-    logs = [_timed(_checked(path, read_log(path))) for path in study.conduct_logs()]
-    return tuple(event for _, event in merge(*logs, key=lambda timed: timed[0]))
+    return tuple(event for _, event in events_of_logs(study))
 
 
-def _timed(events: tuple[Event, ...]) -> list[tuple[str, Event]]:
+def events_of_logs(study: StudyPaths) -> Iterator[tuple[Path, Event]]:
+    """Yield the same, each with the log that it is in."""
+    logs = [_timed(path) for path in study.conduct_logs()]
+    for _, log, event in merge(*logs, key=lambda timed: timed[0]):
+        yield log, event
+
+
+def _timed(log: Path) -> list[tuple[str, Path, Event]]:
     # a clock that is set back changes no order within a log
+    events = _checked(log, read_log(log))
     latest = accumulate((event.time_utc for event in events), max)
-    return list(zip(latest, events, strict=True))
+    return [(time, log, event) for time, event in zip(latest, events, strict=True)]
 
 
 def append_event(

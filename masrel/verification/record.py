@@ -150,13 +150,12 @@ def verify_sessions(study: StudyPaths, protocol: Protocol) -> Verification:
 
 def _conduct_findings(study: StudyPaths, protocol: Protocol) -> tuple[Finding, ...]:
     try:
-        problems = (
-            *merged_log_problems(study),
-            *allotment_problems(study, protocol),
+        return (
+            *(broken(*problem) for problem in merged_log_problems(study)),
+            *(broken(*problem) for problem in allotment_problems(study, protocol)),
         )
     except SessionLogError as error:
-        problems = (str(error),)
-    return _of_problems(study.conduct_file, problems)
+        return _of_problems(study.conduct_file, [str(error)])
 
 
 def _of_problems(path: Path, problems: Iterable[str]) -> tuple[Finding, ...]:

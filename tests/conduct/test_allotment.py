@@ -341,4 +341,10 @@ def test_two_copies_that_dealt_one_row_are_found(
     study.merged_conduct.mkdir()
     (study.merged_conduct / "a.jsonl").write_bytes(copy.conduct_file.read_bytes())
     problems = broken(study, williams())
-    assert any("needed row 3, the next one, got 1" in problem for problem in problems)
+    (second,) = [each for each in problems if "needed row 3, the next one" in each]
+    # the log of the copy, not that of the study that it was merged into
+    logs = (study.conduct_file, study.merged_conduct / "a.jsonl")
+    assert second.startswith(tuple(f"{log}: line 2: allotted: rater" for log in logs))
+    allotted_by = {log: log.read_text() for log in logs}
+    rater = second.partition("rater ")[2].partition(" ")[0]
+    assert f'"{rater}"' in allotted_by[Path(second.partition(": line")[0])]
