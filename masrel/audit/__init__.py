@@ -4,6 +4,17 @@ In: how many items, categories and raters, and the numbers as they are printed. 
 how many integer tables give them, under which reading of what was printed.
 """
 
+from masrel.audit._claims import Claim, read_claims
 from masrel.audit._consistency import ConsistentTables, Reading, consistent_tables
+from masrel.audit._readings import ClaimAudit, ClaimReading, audit_claim
 
-__all__ = ["ConsistentTables", "Reading", "consistent_tables"]
+__all__ = [
+    "Claim",
+    "ClaimAudit",
+    "ClaimReading",
+    "ConsistentTables",
+    "Reading",
+    "audit_claim",
+    "consistent_tables",
+    "read_claims",
+]

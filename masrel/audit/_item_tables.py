@@ -24,7 +24,7 @@ from masrel.audit._square_tables import (
 )
 from masrel.audit._windows import Integers, Question, matrix_of, union
 
-MAX_VISITED_ITEMS = 40_000_000
+MAX_VISITED_ITEMS = 20_000_000
 """States that are visited before a search is given up."""
 
 _BLOCK = 1_000_000  # states that are made at once

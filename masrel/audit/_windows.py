@@ -192,12 +192,15 @@ def check_count(name: str, count: object, least: int, limit: int) -> None:
         )
 
 
-def check_weights(name: str, weights: object) -> AuditWeights:
-    """Return the name of weights that can be audited."""
+def check_weights(
+    name: str, weights: object, *, more: tuple[str, ...] = ()
+) -> AuditWeights:
+    """Return the name of weights that can be audited; `more` may be said as well."""
     for known in WEIGHTS:
         if weights == known:
             return known
-    raise ParameterError(f"{name}: needs one of {', '.join(WEIGHTS)}, got {weights!r}")
+    names = ", ".join((*WEIGHTS, *more))
+    raise ParameterError(f"{name}: needs one of {names}, got {weights!r}")
 
 
 def check_rounding(rounding: object) -> tuple[Rule, ...]:

@@ -24,6 +24,7 @@ __all__ = ["main"]
 GROUPS = {
     "Ratings you have": {
         "agree": "Agreement of the raters in any file, no study needed.",
+        "audit": "Whether any table gives the agreement that a paper prints.",
         "latent": "Biases and noises of the raters in any file, items on one scale.",
     },
     "A study": {

@@ -67,6 +67,11 @@ class StudyPaths:
         return self.root / "ratings" / "in_person.csv"
 
     @property
+    def claims_file(self) -> Path:
+        """What a paper prints of the agreement, when the study was published."""
+        return self.root / "ratings" / "claims.csv"
+
+    @property
     def analysis_file(self) -> Path:
         """The analysis, in full precision."""
         return self.root / "analysis.json"

@@ -1,0 +1,190 @@
+"""What a paper prints is read in every way that it may be meant."""
+
+import itertools
+from pathlib import Path
+from statistics import NormalDist
+
+import numpy as np
+import pytest
+from statsmodels.stats.inter_rater import cohens_kappa
+
+from masrel.agreement import cohen_kappa_from_table
+from masrel.audit import Claim, audit_claim, read_claims
+from masrel.errors import ParameterError, RatingsError
+
+TABLE = [[5, 2], [4, 16]]
+PLAIN = {"n_items": 27, "n_categories": 2, "agreement": "77.8", "kappa": "0.471"}
+
+
+def fitting(**printed: object) -> dict[tuple[str | None, str | None], bool]:
+    """Whether `TABLE` has what is printed, by each reading of errors and tests."""
+    margins = {"margins_1": (7, 20), "margins_2": (9, 18)}  # which leave no other table
+    audit = audit_claim(Claim(**PLAIN, **margins, **printed))
+    return {(r.error, r.test): bool(r.n_tables) for r in audit.readings}
+
+
+def test_margins_leave_the_tables_that_have_them() -> None:
+    audit = audit_claim(Claim(**PLAIN, margins_1=(7, 20)))
+    assert audit.examples == (((5, 2), (4, 16)),)
+    assert [reading.n_tables for reading in audit.readings] == [1]
+    none = audit_claim(Claim(**PLAIN, margins_1=(8, 19)))
+    assert none.is_possible is False
+    assert [str(result) for result in none.alone.values()][-1] == "4 tables"
+
+
+@pytest.mark.parametrize("error", ["delta", "delta n-1", "null", "simple"])
+def test_standard_errors_and_intervals_are_of_one_kind(error: str) -> None:
+    other = cohens_kappa(np.array(TABLE))
+    n, p_o, p_e = 27, 21 / 27, (7 * 9 + 20 * 18) / 27**2
+    spread = {
+        "delta": other.std_kappa,
+        "delta n-1": cohen_kappa_from_table(TABLE).standard_error,
+        "null": other.std_kappa0,
+        "simple": (p_o * (1 - p_o) / n) ** 0.5 / (1 - p_e),
+    }[error]
+    z = NormalDist().inv_cdf(0.95)
+    ends = other.kappa - z * spread, other.kappa + z * spread
+    for printed in (
+        {"standard_error": f"{spread:.6f}"},
+        {"low": f"{ends[0]:.6f}", "high": f"{ends[1]:.6f}", "level": 0.9},
+    ):
+        fits = fitting(**printed)
+        assert [kind for (kind, _), is_fit in fits.items() if is_fit] == [error]
+        assert len(fits) == 4
+
+
+@pytest.mark.parametrize("weights", ["linear", "quadratic"])
+def test_weighted_standard_errors_are_those_of_statsmodels(weights: str) -> None:
+    table = [[11, 2, 0], [1, 9, 3], [0, 2, 12]]
+    other = cohens_kappa(np.array(table), wt=weights)
+    for error, spread in (("delta", other.std_kappa), ("null", other.std_kappa0)):
+        claim = Claim(
+            n_items=40,
+            n_categories=3,
+            kappa=f"{other.kappa:.6f}",
+            kappa_weights=weights,
+            margins_1=(13, 13, 14),
+            margins_2=(12, 13, 15),
+            standard_error=f"{spread:.6f}",
+        )
+        fits = {r.error for r in audit_claim(claim).readings if r.n_tables}
+        assert error in fits
+
+
+def test_p_is_of_one_or_two_sides_and_of_either_error() -> None:
+    other = cohens_kappa(np.array(TABLE))
+    for error, sides in itertools.product(("null", "delta"), (1, 2)):
+        spread = {"null": other.std_kappa0, "delta": other.std_kappa}[error]
+        p = sides * (1 - NormalDist().cdf(other.kappa / spread))
+        fits = fitting(p=f"{p:.6f}")
+        name = f"{error}, {'one' if sides == 1 else 'two'}-sided"
+        assert [test for (_, test), is_fit in fits.items() if is_fit] == [name]
+    assert all(fitting(p="<0.05").values())
+    assert not any(fitting(p="<0.001").values())
+
+
+def test_a_rating_may_be_absent() -> None:
+    # 17 of 20 items; the paper says that it had 21
+    claim = Claim(
+        n_items=21, n_categories=2, agreement="85.0", kappa="0.58", n_unrated=2
+    )
+    numbers = {r.n_items: r.n_tables for r in audit_claim(claim).readings}
+    assert numbers == {21: 0, 20: 4, 19: 0}
+
+
+def test_weights_that_are_not_named_are_all_tried() -> None:
+    audit = audit_claim(
+        Claim(n_items=35, n_categories=3, agreement="65.7", kappa="0.528")
+    )
+    tried = {r.kappa_weights: r.n_tables for r in audit.readings}
+    assert tried.keys() == {"identity", "linear", "quadratic"}
+    assert (tried["identity"], tried["quadratic"]) == (0, 3340)
+    assert "by 2 of 3 readings" in audit.sentence or "by 1 of 3" in audit.sentence
+    two = audit_claim(Claim(**PLAIN))
+    assert len(two.readings) == 1  # all weights are alike of two categories
+
+
+def test_rules_that_differ_are_two_readings() -> None:
+    # 9 of 16 are 56.25 %
+    claim = Claim(n_items=16, n_categories=2, agreement="56.3", kappa="0.263")
+    numbers = {r.rounding: r.n_tables for r in audit_claim(claim).readings}
+    assert numbers == {"half_even": 0, "half_up": 4}
+
+
+def test_nobody_is_accused() -> None:
+    audit = audit_claim(
+        Claim(n_items=30, n_categories=4, agreement="97.4", kappa="0.873")
+    )
+    assert audit.sentence == (
+        "no table of 30 items in 4 categories gives both 97.4 % agreement and κ 0.873, "
+        "by any of the 3 readings tried"
+    )
+    assert str(audit.alone["97.4 % agreement"]) == "no table"
+
+
+def test_the_published_study_audits_its_paper() -> None:
+    study = Path(__file__).parents[2] / "studies" / "hess2012"
+    claims = read_claims(study / "ratings" / "claims.csv")
+    retest = next(claim for claim in claims if claim.name == "retest-standard")
+    audit = audit_claim(retest)
+    assert [reading.n_agreed for reading in audit.readings] == [(10,)]
+    assert audit.sentence.endswith("in them the raters agree on 10 of 12")
+
+
+BAD_CLAIMS = [
+    ({"kappa": "0.5", "margins_1": (3, 4)}, "margins_1: needs counts that sum to"),
+    ({"kappa": "0.5", "margins_1": (20,)}, "margins_1: needs 2 counts"),
+    ({"kappa": "0.5", "margins_2": (3, 17), "n_raters": 3}, "margins_2: needs two"),
+    ({"agreement": "85.0", "p": "0.01"}, "p: needs the kappa of two raters"),
+    ({"kappa": "0.5", "p": 0.01}, "p: needs a text"),
+    ({"kappa": "0.5", "low": "0.1"}, "high: needed beside low"),
+    ({"kappa": "0.5", "level": 95.0}, "level: needs a number from 0.5"),
+    ({"kappa": "0.5", "n_unrated": 20}, "n_unrated: needs a whole number from 0 to 19"),
+    ({"kappa": "0.5", "kappa_weights": "squared"}, "kappa_weights: needs one of"),
+]
+
+
+@pytest.mark.parametrize(("parameters", "message"), BAD_CLAIMS)
+def test_a_claim_that_cannot_be_is_refused(
+    parameters: dict[str, object], message: str
+) -> None:
+    with pytest.raises(ParameterError) as caught:
+        Claim(**{"n_items": 20, "n_categories": 2} | parameters)
+    assert str(caught.value).startswith(message)
+
+
+def test_a_file_has_a_claim_a_row(tmp_path: Path) -> None:
+    file = tmp_path / "claims.csv"
+    file.write_text(
+        "# two claims\n"
+        "name;n_items;n_categories;agreement;kappa;margins_1;level\n"
+        "A;20;2;85.0;0.58;;\n"
+        ";27;2;;.47;7 20;0.9\n",
+        encoding="utf-8",
+    )
+    first, second = read_claims(file)
+    assert (first.name, first.agreement, first.margins_1) == ("A", "85.0", None)
+    assert (second.name, second.margins_1, second.level) == ("row 4", (7, 20), 0.9)
+
+
+BAD_FILES = [
+    ("n_items,n_categories,kappa\n", "needs a line of column names and a row a claim"),
+    ("n_items,kappa\n20,0.5\n", "needs the columns n_items, n_categories"),
+    ("n_items,n_categories,kap\n20,2,0.5\n", "needs columns among name,"),
+    ("n_items,n_categories,kappa\n20,2,1.5\n", "row 2, column kappa: needs a number"),
+    ("n_items,n_categories,kappa\n20,2\n", "row 2: needs 3 cells"),
+    ("n_items,n_categories,kappa\n20.5,2,0.5\n", "row 2, column n_items: needs a who"),
+    ("n_items,n_categories,kappa\n,2,0.5\n", "row 2, column n_items: needs a number"),
+    ("n_items,n_categories,kappa,level\n9,2,0.5,x\n", "row 2, column level: needs a"),
+]
+
+
+@pytest.mark.parametrize(("text", "message"), BAD_FILES)
+def test_a_file_that_is_none_is_refused(
+    text: str, message: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "claims.csv"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(RatingsError) as caught:
+        read_claims(file)
+    assert str(caught.value).startswith(f"{file}: {message}")

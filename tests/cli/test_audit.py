@@ -1,0 +1,76 @@
+"""masrel audit: claims as options, as a file, or of a study; and what is refused."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.cli.process import Caller
+
+CLAIM = ("audit", "--items", 20, "--categories", 2, "--agreement", "85.0")
+STUDY = Path(__file__).parents[2] / "studies" / "hess2012"
+
+
+def test_a_claim_as_options_is_shown_with_all_its_tables(masrel: Caller) -> None:
+    done = masrel(*CLAIM, "--kappa", "0.58")
+    assert done.code == 0
+    assert "4 tables of 20 items in 2 categories give both" in done.out
+    assert "[3 0; 3 14], [3 3; 0 14], [14 0; 3 3], [14 3; 0 3]" in done.out
+    assert "Every reading that was tried" in done.out
+
+
+def test_json_has_every_reading_and_prints_nothing_else(masrel: Caller) -> None:
+    done = masrel(*CLAIM, "--kappa", "0.244", "--unrated", 1, "--json", "-")
+    (claim,) = json.loads(done.out)["claims"]
+    assert claim["is_possible"] is False
+    assert [reading["n_items"] for reading in claim["readings"]] == [20, 19]
+    assert claim["claim"]["kappa"] == "0.244"
+    assert claim["alone"]["85.0 % agreement"]["n_tables"] > 0
+
+
+def test_a_file_has_a_row_a_claim(masrel: Caller, tmp_path: Path) -> None:
+    file = tmp_path / "claims.csv"
+    file.write_text(
+        "name,n_items,n_categories,agreement,kappa\nA,20,2,85.0,0.58\nB,20,2,65.0,.244\n"
+    )
+    done = masrel("audit", file, "--csv")
+    assert done.out.splitlines()[1:] == [
+        "A,20,identity,identity,either,,,4,17,published",
+        "B,20,identity,identity,either,,,0,,published",
+    ]
+    sentences = masrel("audit", file, "--sentence").out.splitlines()
+    assert [line.split()[1] for line in sentences] == ["4", "no"]
+
+
+@pytest.mark.slow
+def test_the_published_study_audits_its_paper(masrel: Caller) -> None:
+    lines = masrel("audit", STUDY, "--sentence").out.splitlines()
+    assert lines[0].startswith("kappa-standard: 8 640 tables of 4 items")
+    assert lines[2].endswith("in them the raters agree on 10 of 12.")
+
+
+BAD = [
+    (("--kappa", "1.2"), "--kappa: needs a number from -1 to 1"),
+    (("--kappa", "0,5"), "--kappa: needs a number with a decimal point"),
+    (("--kappa", "0.5", "--items", "0"), "--items: needs a whole number from 1"),
+    (("--kappa", "0.5", "--interval", "0", "x"), "--interval: needs a number"),
+    (("--kappa", "0.5", "--margins-1", "3 x"), "--margins-1: needs a whole number"),
+    (("--kappa", "0.5", "--agreement", "101"), "--agreement: needs a number from 0"),
+    ((), "--agreement, --kappa: needs at least one of them"),
+]
+
+
+@pytest.mark.parametrize(("options", "message"), BAD)
+def test_what_cannot_be_is_refused_in_one_sentence(
+    options: tuple[str, ...], message: str, masrel: Caller
+) -> None:
+    done = masrel("audit", "--items", 20, "--categories", 2, *options)
+    assert (done.code, done.out) == (2, "")
+    assert done.err.startswith(f"masrel: {message}")
+    assert done.err.count("\n") == 1
+
+
+def test_a_source_comes_without_options(masrel: Caller, tmp_path: Path) -> None:
+    assert "no option" in masrel("audit", STUDY, "--kappa", "0.5").err
+    assert "ratings/claims.csv" in masrel("audit", tmp_path).err
+    assert "--items: needed" in masrel("audit", "--kappa", "0.5").err
