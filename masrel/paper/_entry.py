@@ -17,11 +17,12 @@ from masrel.conduct._study_answers import study_answers
 from masrel.conduct._study_log import append_event, stated
 from masrel.errors import ParameterError, RatingsError, SessionLogError
 from masrel.paper._filled_form import FilledRow, fill_form
-from masrel.paper._form import Form, drawn_schedule, form_of
+from masrel.paper._form import Form, form_of
 from masrel.paper._typed import TypedSheet, read_typed
 from masrel.protocol import Protocol, StudyPaths, presented_hash, protocol_hash
 from masrel.run._days import interval_fields
 from masrel.run._state import FORMAT, FROM_PAPER, SessionState, replay
+from masrel.schedule.sheets import _drawn_schedule
 
 if TYPE_CHECKING:
     from masrel.recording import _Fact  # loads numpy
@@ -152,7 +153,7 @@ def filled_sheet(
     study: StudyPaths, protocol: Protocol, file: Path, rater: str, session: str
 ) -> tuple[TypedSheet, tuple[FilledRow, ...], Form]:
     """Return a file that a sheet was typed into, its rows, and what it asks for."""
-    schedule = drawn_schedule(study, protocol, rater, session)
+    schedule = _drawn_schedule(study, protocol, rater, session)
     form, sheet = form_of(protocol, schedule), read_typed(file)
     others = _other_forms(study, protocol, form)
     return sheet, fill_form(sheet, form, protocol.scale.grades, others), form
@@ -164,7 +165,7 @@ def _other_forms(study: StudyPaths, protocol: Protocol, form: Form) -> Iterator[
             is_other = (rater, session.id) != (form.rater, form.session)
             if is_other and study.schedule_file(rater, session.id).exists():
                 yield form_of(
-                    protocol, drawn_schedule(study, protocol, rater, session.id)
+                    protocol, _drawn_schedule(study, protocol, rater, session.id)
                 )
 
 

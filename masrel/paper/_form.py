@@ -5,10 +5,9 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from masrel.errors import ScheduleError
-from masrel.protocol import Protocol, Question, StudyPaths
+from masrel.protocol import Protocol, Question
 from masrel.protocol._questions import When, questions_of
-from masrel.schedule import Schedule, check_schedule, read_schedule
+from masrel.schedule import Schedule
 
 FIRST_COLUMNS = ("sheet", "position", "code", "grade")
 """Columns of every sheet that is typed in; those of questions follow."""
@@ -90,18 +89,3 @@ def _id_of(study: str, rater: str, session: str, codes: Sequence[str]) -> str:
     content = json.dumps([study, rater, session, *codes]).encode()
     digest = hashlib.sha256(content).hexdigest().upper()
     return f"S{digest[:4]}-{digest[4:8]}"
-
-
-def drawn_schedule(
-    study: StudyPaths, protocol: Protocol, rater: str, session: str
-) -> Schedule:
-    """Return the schedule of a rater in a session, checked against the protocol."""
-    path = study.schedule_file(rater, session)
-    schedule = read_schedule(path)
-    check_schedule(schedule, protocol)
-    if (schedule.rater, schedule.session) != (rater, session):
-        raise ScheduleError(
-            f"{path}: needed the schedule of rater {rater} in session {session}, got "
-            f"that of {schedule.rater} in {schedule.session}"
-        )
-    return schedule

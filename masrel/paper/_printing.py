@@ -12,7 +12,6 @@ from masrel.errors import ParameterError, RatingsError
 from masrel.paper._form import (
     Form,
     QuestionColumn,
-    drawn_schedule,
     form_of,
 )
 from masrel.paper._typed import read_typed
@@ -20,6 +19,7 @@ from masrel.protocol import Protocol, Question, StudyPaths, scale_of
 from masrel.run._practice import practice_presentations
 from masrel.run.console import _instruction
 from masrel.scales import published_scale
+from masrel.schedule.sheets import _drawn_schedule
 
 _MOST_BOXES = 12
 """Answers of a question that are boxes; for more there is a blank."""
@@ -79,7 +79,7 @@ def write_sheets(
         If the system refuses a folder or file.
     """
     forms = [
-        form_of(protocol, drawn_schedule(study, protocol, rater, session))
+        form_of(protocol, _drawn_schedule(study, protocol, rater, session))
         for rater, session in _places(study, protocol, raters, sessions, sites)
     ]
     html = study.sheets / "sheets.html"

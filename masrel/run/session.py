@@ -17,7 +17,6 @@ from masrel.conduct._withdrawal import refuse_withdrawn
 from masrel.errors import (
     ParameterError,
     ProtocolError,
-    ScheduleError,
     SessionLogError,
 )
 from masrel.protocol import Protocol, StudyPaths
@@ -38,7 +37,8 @@ from masrel.run._settings import (
     torque_problems,
 )
 from masrel.run._state import replay
-from masrel.schedule import Presentation, Schedule, check_schedule, read_schedule
+from masrel.schedule import Presentation
+from masrel.schedule.sheets import _drawn_schedule
 
 
 def run_session(
@@ -120,7 +120,9 @@ def run_session(
         begun = begin_rehearsal(study, protocol, rater, session)
         study, schedule, checksum = begun
     else:
-        schedule, checksum = _drawn_schedule(study, protocol, rater, session)
+        schedule = _drawn_schedule(study, protocol, rater, session)
+        file = study.schedule_file(rater, session)
+        checksum = hashlib.sha256(file.read_bytes()).hexdigest()
     log_file = study.log_file(rater, session)
     check_inside(log_file.parent, study.root)
     both = (*schedule.presentations, *practice_presentations(protocol))
@@ -161,21 +163,6 @@ def _ask_about_study(
                 study, protocol, "answered", {"rater": rater, **fields}, now=now
             ),
         )
-
-
-def _drawn_schedule(
-    study: StudyPaths, protocol: Protocol, rater: str, session: str
-) -> tuple[Schedule, str]:
-    # the schedule, and the checksum of its file
-    path = study.schedule_file(rater, session)
-    schedule = read_schedule(path)
-    check_schedule(schedule, protocol)
-    if (schedule.rater, schedule.session) != (rater, session):
-        raise ScheduleError(
-            f"{path}: needed the schedule of rater {rater} in session {session}, "
-            f"got that of {schedule.rater} in {schedule.session}"
-        )
-    return schedule, hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def _check_recordings(

@@ -26,6 +26,7 @@ from masrel.schedule.presentation import (
     Presentation,
     Schedule,
     _draw_with_key,
+    _require_place,
     check_schedule,
 )
 
@@ -114,6 +115,26 @@ def read_schedule(path: Path) -> Schedule:
         row=int(head["row"]) if "row" in head else None,
         presentations=tuple(rows),
     )
+
+
+def _drawn_schedule(
+    study: StudyPaths, protocol: Protocol, rater: str, session: str
+) -> Schedule:
+    """Return the schedule of a rater in a session, checked against the protocol."""
+    _require_place(protocol, rater, session)
+    path = study.schedule_file(rater, session)
+    if not path.exists():
+        raise ScheduleError(
+            f"{path}: needed a schedule file, got none: masrel schedule draws it"
+        )
+    schedule = read_schedule(path)
+    check_schedule(schedule, protocol)
+    if (schedule.rater, schedule.session) != (rater, session):
+        raise ScheduleError(
+            f"{path}: needed the schedule of rater {rater} in session {session}, got "
+            f"that of {schedule.rater} in {schedule.session}"
+        )
+    return schedule
 
 
 def _read_lines(path: Path) -> list[str]:
