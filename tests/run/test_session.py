@@ -298,7 +298,7 @@ def test_a_schedule_of_somebody_else_is_refused(small: Small) -> None:
 
 def test_an_unknown_rater_has_no_schedule(small: Small) -> None:
     with pytest.raises(
-        ScheduleError, match="^rater: needed one of R1, R2 for session test, got 'R9'"
+        ScheduleError, match=r"^rater: needed one of R1, R2 for session test, got 'R9'"
     ):
         run_session(*small, "R9", "test", grades=ScriptGrades([]), clock="simulated")
     assert not small[0].log_file("R9", "test").exists()
