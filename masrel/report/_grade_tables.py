@@ -67,18 +67,13 @@ def confusion_section(material: Material) -> Section:
         reason = "no model with an intended grade has ratings"
         return absent_section("confusion", _CONFUSION, reason)
     rows: list[tuple[Value, ...]] = []
-    n_lower = n_higher = 0
-    for place, aim in enumerate(grades):
+    for aim in grades:
         counts = [met[aim, grade] for grade in grades]
-        n, lower, higher = sum(counts), sum(counts[:place]), sum(counts[place + 1 :])
-        n_lower, n_higher = n_lower + lower, n_higher + higher
-        if n:
-            share = 100.0 * counts[place] / n
-            rows.append((aim, *counts, n, lower, higher, share))
+        if n := sum(counts):
+            rows.append((aim, *counts, n, 100.0 * met[aim, aim] / n))
     text = (
         f"Of {counted(met.total(), 'grade')} of models with an intended grade, "
-        f"{met.total() - n_lower - n_higher} are the intended one, {n_lower} lower and "
-        f"{n_higher} higher."
+        f"{sum(met[aim, aim] for aim in grades)} are the intended one."
     )
     table = Table(
         name="confusion",
@@ -87,12 +82,14 @@ def confusion_section(material: Material) -> Section:
             Column(key="intended_grade", heading="Intended", align="left"),
             *(Column(key=f"grade_{g}", heading=g) for g in grades),
             Column(key="n_ratings", heading="Ratings"),
-            Column(key="n_lower", heading="Lower"),
-            Column(key="n_higher", heading="Higher"),
             Column(key="percent", heading="As intended (%)", digits=1),
         ),
         rows=tuple(rows),
-        notes=("Rows: the grade a model was built for; columns: the grades given.",),
+        notes=(
+            "Rows: the grade a model was built for; columns: the grades given. Where "
+            "the scale has an order, those left of the intended one are too low and "
+            "those right of it too high.",
+        ),
         data=material.data,
     )
     blocks = (Paragraph(text=text), table)

@@ -9,7 +9,7 @@ from masrel.estimates import Estimate, Interval
 from masrel.protocol import report_sections, scale_of
 from masrel.protocol._kinds import DEFAULT_KIND
 from masrel.report._design import beside_presentations, stretches_asked_for
-from masrel.report._material import Listing, Material, Paragraph, Section
+from masrel.report._material import Content, Listing, Material, Paragraph, Section
 from masrel.report._order_section import shows_order
 from masrel.report._references import (
     bibtex,
@@ -28,15 +28,14 @@ from masrel.schedule._orders import orders_in_words
 def methods_section(material: Material) -> Section:
     """Say how the study was made and its numbers computed, with references."""
     used: list[str] = []  # keys of all that is cited
-    paragraphs = [
+    blocks: list[Content] = [
         Paragraph(text=" ".join(filter(None, sentences)))
-        for sentences in (
-            [*_study(material, used)],
-            [*_statistics(material, used)],
-        )
+        for sentences in (_study(material, used), _statistics(material, used))
     ]
-    listing = Listing(title=sentence("references", "listing"), text=bibtex(used))
-    return Section(name="methods", title="Methods", blocks=(*paragraphs, listing))
+    if used:
+        title = sentence("references", "listing")
+        blocks.append(Listing(title=title, text=bibtex(used)))
+    return Section(name="methods", title="Methods", blocks=tuple(blocks))
 
 
 def _cite(keys: tuple[str, ...], used: list[str]) -> str:
@@ -90,8 +89,22 @@ def _statistics(material: Material, used: list[str]) -> Iterator[str]:
         yield excluded_text("methods", analysis.excluded)
     if any(e.coefficient.endswith("kappa") for p in known for e in _estimates(p)):
         yield sentence("methods", "strength", reference=_cite(("landis1977",), used))
+    of_sections = [*_of_sections(material, used)]
+    yield from of_sections
+    has_intervals = any(e.interval for p in known for e in _estimates(p))
+    names = ("numpy", "scipy") if of_sections or has_intervals else ("numpy",)
+    yield sentence(
+        "methods",
+        "software",
+        masrel=analysis.masrel_version,
+        libraries=", ".join(f"{name} {version(name)}" for name in names),
+    )
+
+
+def _of_sections(material: Material, used: list[str]) -> Iterator[str]:
+    # how what only single sections show is computed, of those that have something
     sections = report_sections(material.protocol)
-    main = main_estimate(analysis)
+    main = main_estimate(material.analysis)
     if "categories" in sections and main is not None and main.estimate is not None:
         yield sentence(
             "methods",
@@ -102,15 +115,6 @@ def _statistics(material: Material, used: list[str]) -> Iterator[str]:
         )
     if "order" in sections and shows_order(material):
         yield sentence("methods", "order")
-    is_of_scipy = any(e.interval for p in known for e in _estimates(p))
-    names = ("numpy", "scipy") if is_of_scipy else ("numpy",)
-    libraries = [f"{name} {version(name)}" for name in names]
-    yield sentence(
-        "methods",
-        "software",
-        masrel=analysis.masrel_version,
-        libraries=", ".join(libraries),
-    )
 
 
 def _coefficients(planned: list[PlannedEstimate], used: list[str]) -> str:

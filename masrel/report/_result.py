@@ -39,10 +39,10 @@ def excluded_text(group: str, raters: Sequence[str]) -> str:
 
 def name_within(line: EstimatePlan) -> str:
     """Return the name of a line's coefficient within a sentence."""
-    name = coefficient_name(line.coefficient, line.weights)
+    name = coefficient_name(line.coefficient)
     if line.coefficient in _COMMON:
-        return name[0].lower() + name[1:]
-    return name
+        name = name[0].lower() + name[1:]
+    return name if line.weights == "identity" else f"{name} with {line.weights} weights"
 
 
 _COMMON = ("percent_agreement", "pooled_kappa", "stratified_kappa")

@@ -161,3 +161,9 @@ def test_a_model_that_came_again_is_one_model(tmp_path: Path) -> None:
     assert (
         "2 raters graded 2 standard models, 4 presentations of them, (6 grades" in text
     )
+
+
+def test_weights_are_told_within_a_sentence(tmp_path: Path) -> None:
+    line = plan(coefficient="krippendorff_alpha", weights="quadratic")
+    text, _ = result_of(table_v(), tmp_path, line)
+    assert "none missing): Krippendorff's α with quadratic weights was 0.886." in text
