@@ -224,10 +224,11 @@ def _tokens_of_object(value: object) -> Iterator[bytes]:
     kind = f"{type(value).__module__}.{type(value).__qualname__}"
     array: Any = value
     if hasattr(array, "tobytes") and hasattr(array, "dtype"):  # numpy's
-        if array.dtype.hasobject:
-            raise TypeError(kind)
         yield _token(kind, repr((array.dtype.str, array.shape)).encode())
-        yield _token("bytes", array.tobytes())
+        if array.dtype.hasobject:
+            yield from _tokens(array.tolist())
+        else:
+            yield _token("bytes", array.tobytes())
         return
     names: tuple[str, ...] | None = getattr(value, "__struct_fields__", None)  # msgspec
     if names is None and dataclasses.is_dataclass(value):

@@ -4,6 +4,7 @@ import hashlib
 import random
 import warnings
 from collections.abc import Sequence
+from functools import partial
 
 import masrel
 from masrel.agreement import coefficient, cohen_kappa
@@ -14,6 +15,7 @@ from masrel.analysis._descriptions import (
     stretching_speeds,
 )
 from masrel.analysis._exclusions import analysed_in_person, analysed_ratings
+from masrel.analysis._known_estimates import known_estimate
 from masrel.analysis._question_summaries import question_summaries
 from masrel.analysis._results import Analysis, PlannedEstimate, RaterEstimate
 from masrel.errors import (
@@ -321,6 +323,15 @@ def _compute(
     line: EstimatePlan, protocol: Protocol, ratings: object, purpose: str
 ) -> Estimate:
     # the coefficient of a line, with the interval it asks for
+    categories, plan = scale_of(protocol).values, protocol.analysis
+    read = (line, ratings, purpose, categories, plan.level, plan.seed, plan.n_resamples)
+    compute = partial(_compute_anew, line, protocol, ratings, purpose)
+    return known_estimate(compute, *read)
+
+
+def _compute_anew(
+    line: EstimatePlan, protocol: Protocol, ratings: object, purpose: str
+) -> Estimate:
     categories, level = scale_of(protocol).values, protocol.analysis.level
     if line.interval == "none":
         return coefficient(line.coefficient)(

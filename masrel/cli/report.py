@@ -160,6 +160,7 @@ class _Making:
         from tqdm import tqdm
 
         from masrel.analysis import analyze
+        from masrel.analysis._known_estimates import estimates_known
         from masrel.report import study_conduct
         from masrel.report._document import make_report
         from masrel.verification import anchors_of
@@ -167,7 +168,7 @@ class _Making:
         conduct = study_conduct(
             data.paths, data.protocol, file=self.ratings_file, include=self.include
         )
-        with warnings_as_notes():
+        with warnings_as_notes(), estimates_known(self.build.cache):
             analysis = analyze(
                 data.protocol,
                 data.ratings,

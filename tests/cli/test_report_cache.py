@@ -6,13 +6,15 @@ import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 import masrel
 import masrel.report.figures
-from masrel import _cache
+from masrel import _cache, intervals
 from masrel.cli import cli
+from masrel.estimates import Estimate
 from masrel.protocol import copy_template
 from masrel.report import figures
 from tests.architecture.test_imports import HEAVY, loaded_after
@@ -223,6 +225,35 @@ def test_one_grade_draws_what_it_reaches(
     edit(study / "ratings/published.csv", "1+", "1")
     masrel("report", study)
     assert drawn == ["agreement", "grades_test"]  # and not the speeds
+
+
+@pytest.mark.slow
+def test_one_grade_is_estimated_where_it_counts(
+    masrel: Caller, study: Path, drawn: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    later = LINES.replace('"kappa"', '"later"').replace('"test"', '"retest"')
+    later = later.partition("[report]")[0].partition("\n\n[[")[0]
+    edit(study / "protocol.toml", "[report]", f"{later}\n[report]")
+    table = study / "ratings/published.csv"
+    lines = table.read_text(encoding="utf-8").splitlines(keepends=True)
+    again = [line.replace("test,", "retest,", 1) for line in lines]
+    table.write_text("".join(dict.fromkeys([*lines, *again])), encoding="utf-8")
+    computed: list[object] = []
+    estimate = intervals.estimate
+
+    def counted(*args: Any, **options: Any) -> Estimate:
+        computed.append(options["rng"])
+        return estimate(*args, **options)
+
+    monkeypatch.setattr(intervals, "estimate", counted)
+    first = masrel("report", study)
+    of_both = list(computed)
+    drawn.clear()
+    edit(table, "\nretest,R1,HM1,1", "\nretest,R1,HM1,2")
+    done = masrel("report", study)
+    assert computed == [*of_both, of_both[-1]]
+    assert drawn == ["agreement", "grades_retest"]
+    assert (done.out, done.err) == (first.out, first.err)
 
 
 @pytest.mark.parametrize("what", ["report.md", "tables", "manifest.json"])
