@@ -4,6 +4,7 @@ import json
 import os
 import random
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -204,20 +205,27 @@ def test_a_kill_leaves_whole_pages_with_what_they_link_to(
         text = edits.protocol.partition("[report]")[0]
         states.append(f"{text}[report]\nsections = {sections}\n")
     call = (study, "-o", folder, "--cache", cache)
-    needed, lasts_s = [], []
-    for state in states:
+
+    def begin(state: str, *, cold: bool) -> None:
         (study / "protocol.toml").write_text(state, encoding="utf-8")
-        shutil.rmtree(cache, ignore_errors=True)
-        begun = time.perf_counter()
-        assert builder(call, after_s=None) == [0]
-        lasts_s.append(time.perf_counter() - begun)
-        needed.append(contents(folder))
-    for number in range(n_kills):
-        (study / "protocol.toml").write_text(states[number % 2], encoding="utf-8")
-        if number % 3 == 0:
+        if cold:
             shutil.rmtree(cache, ignore_errors=True)
+
+    needed, lasts_s, n_killed = [], {}, 0
+    for cold in (True, False):
+        for state in states:
+            begin(state, cold=cold)
+            begun = time.perf_counter()
+            assert builder(call, after_s=None) == [0]
+            lasts_s[cold] = time.perf_counter() - begun
+            needed.append(contents(folder))
+    assert needed[:2] == needed[2:]
+    for number in range(n_kills):
+        cold = number % 4 == 0
+        begin(states[number % 2], cold=cold)
         with faults("a report's build killed"):
-            builder(call, after_s=chance.uniform(0, 0.7 * max(lasts_s)))
+            end = builder(call, after_s=chance.uniform(0, lasts_s[cold]))
+            n_killed += end == [-signal.SIGKILL]
             check_links(folder)
             left = contents(folder)
             for page in ("report.html", "report.md", "manifest.json"):
@@ -225,6 +233,7 @@ def test_a_kill_leaves_whole_pages_with_what_they_link_to(
             if number % 8 == 7:
                 assert builder(call, after_s=None) == [0]
                 assert contents(folder) == needed[number % 2]
+    assert n_killed > n_kills // 3
 
 
 @pytest.mark.slow
