@@ -19,7 +19,7 @@ from docs.make.benchmarks.parts import write_part
 
 DOCS = Path(__file__).parents[2]
 TURNS = 5
-_COMPILED = Path(tempfile.gettempdir()) / "masrel_compiled"
+COMPILED = Path(tempfile.gettempdir()) / "masrel_compiled"
 
 CROSSTAB = """
 import sys, pandas as pd
@@ -126,7 +126,7 @@ def run(command: Sequence[str]) -> tuple[float, float]:
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
     # compiled, as pip leaves what it installs
     environment.pop("PYTHONDONTWRITEBYTECODE", None)
-    environment["PYTHONPYCACHEPREFIX"] = str(_COMPILED)
+    environment["PYTHONPYCACHEPREFIX"] = str(COMPILED)
     with tempfile.TemporaryFile() as errors:
         process = subprocess.Popen(
             command, stdout=subprocess.DEVNULL, stderr=errors, env=environment

@@ -108,7 +108,7 @@ def _cell(
 def count_figure(content: GradeCounts) -> Figure:
     """Return how often each model was given each grade, as shaded cells."""
     n_rows, n_columns = len(content.models), len(content.scale)
-    size = (1.3 + min(9.0, 0.62 * n_columns), 0.9 + 0.3 * n_rows)
+    size = (1.3 + min(7.4, 0.62 * n_columns), 0.9 + 0.3 * n_rows)
     figure = Figure(figsize=size)
     axes = figure.add_subplot()
     counts = np.array(content.counts, dtype=np.int64).reshape(n_rows, n_columns)
