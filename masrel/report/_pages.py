@@ -117,7 +117,8 @@ def _uri(picture: bytes) -> str:
 
 def _symbols(text: str) -> str:
     # Escaped first; what is added after that is ours, and so safe in a template.
-    return _SYMBOL.sub(r"\1<sub>\2</sub>", html.escape(text))
+    text = _SYMBOL.sub(r"\1<sub>\2</sub>", html.escape(text))
+    return text.replace(" %", "&nbsp;%")  # no line begins with the sign
 
 
 _MARKDOWN_ESCAPES = str.maketrans({letter: f"\\{letter}" for letter in "\\`*_|<>[]#"})

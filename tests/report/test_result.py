@@ -45,7 +45,7 @@ def paragraph(files: ReportFiles) -> str:
     page = files.html.read_text(encoding="utf-8")
     found = re.search(r'<p class="result">(.*?)</p>', page)
     assert found is not None
-    text = re.sub("<.*?>", "", found[1]).replace("&#39;", "'")
+    text = re.sub("<.*?>", "", found[1]).replace("&#x27;", "'").replace("&nbsp;", " ")
     plain = files.markdown.read_text(encoding="utf-8").replace("*", "")
     assert text in plain.replace("\\", "")
     return text
