@@ -163,6 +163,7 @@ class _Making:
         from masrel.analysis._known_estimates import estimates_known
         from masrel.report import study_conduct
         from masrel.report._document import make_report
+        from masrel.report._published_numbers import published_claims
         from masrel.verification import anchors_of
 
         conduct = study_conduct(
@@ -193,6 +194,7 @@ class _Making:
                 # of what is simulated none, so that it repeats byte for byte
                 anchors=() if data.ratings.simulated else anchors_of(data.paths),
                 conduct=conduct,
+                claims=published_claims(data.paths, data.protocol),
                 progress=progress,
                 raw_csv=self.output.raw_csv,
                 only=self.only,

@@ -103,8 +103,8 @@ def report_sections(protocol: Protocol) -> tuple[str, ...]:
     -------
     tuple of str
         Those that ``report.sections`` names. Where it names none, all that the study
-        has something for, in the order of a paper; grades given in person are shown
-        only where they are named.
+        has something for, in the order of a paper; grades given in person, and
+        claims of a paper, are shown only where they are named.
     """
     if protocol.report.sections is not None:
         return protocol.report.sections

@@ -307,6 +307,7 @@ class Report(_Table, frozen=True, kw_only=True):
                 "speeds",
                 "traces",
                 "questionnaires",
+                "claims",
                 "methods",
             ],
             ...,

@@ -25,6 +25,7 @@ from masrel.report._material import Drawing, Material, Section, gather
 from masrel.report._methods import methods_section
 from masrel.report._order_section import order_section
 from masrel.report._pages import WRITERS, Block, Chapter, Document, Writer
+from masrel.report._published_numbers import PublishedClaims, claims_section
 from masrel.report._question_tables import questionnaires_section
 from masrel.report._report_folder import (
     MANIFEST,
@@ -54,6 +55,7 @@ SECTIONS: dict[str, Callable[[Material], Section]] = {
     "speeds": speeds_section,
     "traces": traces_section,
     "questionnaires": questionnaires_section,
+    "claims": claims_section,
     "methods": methods_section,
 }
 """Name in ``report.sections`` to what makes it."""
@@ -63,6 +65,7 @@ _INPUTS = {
     "ratings_sha256": "ratings",
     "in_person_sha256": "grades given in person",
     "answers_sha256": "answers to questionnaires",
+    "claims_sha256": "claims of the paper",
 }
 
 
@@ -184,11 +187,14 @@ def make_report(
     progress: Progress | None = None,
     raw_csv: bool = False,
     only: Collection[str] = (),
+    claims: PublishedClaims | None = None,
     cache: Cache,
 ) -> dict[str, bytes]:
     """Return the files of a report, of these sections only if some are named."""
     # By name from the report's folder, in the order in which they are to be written
-    material = gather(protocol, ratings, analysis, in_person, recordings)
+    printed = () if claims is None else claims.claims
+    material = gather(protocol, ratings, analysis, in_person, recordings, printed)
+    inputs = {**analysis.inputs, **({} if claims is None else claims.inputs)}
     names = [name for name in report_sections(protocol) if not only or name in only]
     sections = [SECTIONS[name](material) for name in names]
     if conduct is not None:
@@ -203,13 +209,13 @@ def make_report(
         provenance=material.provenance,
         result=result_text(analysis),
         sections=_make_sections(sections, assets, progress, cache, raw_csv=raw_csv),
-        inputs=_inputs(analysis, anchors),
+        inputs=_inputs(inputs, anchors),
         version=analysis.masrel_version,
     )
     pages = {w.file: _page(w, document, cache) for w in WRITERS.values()}
     if progress is not None:
         progress("pages")
-    made_from = {**analysis.inputs, **({} if conduct is None else conduct.inputs)}
+    made_from = {**inputs, **({} if conduct is None else conduct.inputs)}
     return report_files(assets, pages, made_from)
 
 
@@ -300,13 +306,13 @@ def _page(writer: Writer, document: Document, cache: Cache) -> bytes:
 
 
 def _inputs(
-    analysis: Analysis, anchors: Sequence[Anchor]
+    inputs: Mapping[str, str], anchors: Sequence[Anchor]
 ) -> tuple[tuple[str, str], ...]:
     # what the pages end with: the hash of everything they were made from
     return (
         *(
             (f"SHA-256 of the {_INPUTS[name]}", digest)
-            for name, digest in analysis.inputs.items()
+            for name, digest in inputs.items()
         ),
         *((f"SHA-256 of line {a.line} of {a.log}", a.sha256) for a in anchors),
     )

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from masrel.analysis import Analysis
+from masrel.audit import Claim
 from masrel.protocol import Protocol
 from masrel.ratings import InPerson, Ratings
 from masrel.report import _figure_data as figure
@@ -41,6 +42,7 @@ class Material:
     sessions: tuple[str, ...]
     raters: tuple[str, ...]
     recordings: Path | None = None  # the folder of the sessions' recordings, if known
+    claims: tuple[Claim, ...] = ()  # what a paper printed
 
 
 def gather(
@@ -49,6 +51,7 @@ def gather(
     analysis: Analysis,
     in_person: InPerson | None = None,
     recordings: Path | None = None,
+    claims: tuple[Claim, ...] = (),
 ) -> Material:
     """Return ratings and their analysis with what every section says of them."""
     table = ratings.table
@@ -88,6 +91,7 @@ def gather(
         sessions=tuple(s.id for s in protocol.sessions if s.id in sessions),
         raters=tuple(r.id for r in protocol.raters if r.id in raters),
         recordings=recordings,
+        claims=claims,
     )
 
 

@@ -1,10 +1,12 @@
 """masrel audit: claims as options, as a file, or of a study; and what is refused."""
 
+import hashlib
 import json
 from pathlib import Path
 
 import pytest
 
+from masrel.protocol import copy_template
 from tests.cli.process import Caller
 
 CLAIM = ("audit", "--items", 20, "--categories", 2, "--agreement", "85.0")
@@ -74,3 +76,28 @@ def test_a_source_comes_without_options(masrel: Caller, tmp_path: Path) -> None:
     assert "no option" in masrel("audit", STUDY, "--kappa", "0.5").err
     assert "ratings/claims.csv" in masrel("audit", tmp_path).err
     assert "--items: needed" in masrel("audit", "--kappa", "0.5").err
+
+
+def test_a_report_that_names_them_has_the_claims(
+    masrel: Caller, tmp_path: Path
+) -> None:
+    root = tmp_path / "study"
+    copy_template("hess2012", root)
+    protocol = root / "protocol.toml"
+    head = protocol.read_text(encoding="utf-8").partition("[[analysis.estimates]]")[0]
+    protocol.write_text(head + '\n[report]\nsections = ["claims"]\n', encoding="utf-8")
+    claims = root / "ratings" / "claims.csv"
+    for kappa, words in (("0.771", "agree on 10 of 12"), ("0.772", "no table of 12")):
+        claims.write_text(
+            f"name,n_items,n_categories,kappa,kappa_weights\nretest,12,4,{kappa},identity\n"
+        )
+        assert masrel("report", root, "--quiet").code == 0
+        page = (root / "report" / "report.md").read_text(encoding="utf-8")
+        assert "Published numbers" in page
+        assert words in page
+        digest = hashlib.sha256(claims.read_bytes()).hexdigest()
+        assert digest in page
+    claims.unlink()
+    assert masrel("report", root, "--quiet").code == 0
+    page = (root / "report" / "report.md").read_text(encoding="utf-8")
+    assert "there is no ratings/claims.csv" in page

@@ -27,6 +27,7 @@ ALL = (
     "speeds",
     "traces",
     "questionnaires",
+    "claims",
     "methods",
 )
 

@@ -31,6 +31,7 @@ TITLES = {
     "speeds": "Stretching speeds",
     "traces": "Torque traces",
     "questionnaires": "Questionnaires",
+    "claims": "Published numbers",
     "methods": "Methods",
 }
 

@@ -1,0 +1,45 @@
+"""Section `claims`: what a paper printed of the study, held against every table."""
+
+import hashlib
+from dataclasses import dataclass
+
+from masrel._input import MAX_TABLE, read_regular
+from masrel.audit import Claim, audit_claim, read_claims
+from masrel.protocol import Protocol, StudyPaths, report_sections
+from masrel.report._claims_table import claims_table, readings_table
+from masrel.report._material import Material, Section, absent_section
+
+_TITLE = "Published numbers"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PublishedClaims:
+    """What a paper printed, with the hash of the file that says it."""
+
+    claims: tuple[Claim, ...]
+    sha256: str
+
+    @property
+    def inputs(self) -> dict[str, str]:
+        """The file, as inputs of a report are named."""
+        return {"claims_sha256": self.sha256}
+
+
+def published_claims(paths: StudyPaths, protocol: Protocol) -> PublishedClaims | None:
+    """Return what the paper of a study printed, if its report is to have it."""
+    file = paths.claims_file
+    if "claims" not in report_sections(protocol) or not file.exists():
+        return None
+    data = read_regular(file, most=MAX_TABLE)
+    return PublishedClaims(
+        claims=read_claims(file), sha256=hashlib.sha256(data).hexdigest()
+    )
+
+
+def claims_section(material: Material) -> Section:
+    """Show which tables give the numbers that were published."""
+    if not material.claims:
+        return absent_section("claims", _TITLE, "there is no ratings/claims.csv")
+    audits = [audit_claim(claim) for claim in material.claims]
+    tables = (claims_table(audits), readings_table(audits))
+    return Section(name="claims", title=_TITLE, blocks=tables)
