@@ -91,4 +91,4 @@ def test_the_default_sections_are_all_that_every_study_has() -> None:
     protocol = read_protocol(study / "protocol.toml")
     report = msgspec.structs.replace(protocol.report, sections=None)
     default = report_sections(msgspec.structs.replace(protocol, report=report))
-    assert {*default, "in-person"} == set(info.item_type.values)
+    assert {*default, "in-person", "claims"} == set(info.item_type.values)
