@@ -1,9 +1,10 @@
 """``masrel report``: write the report of a study."""
 
+import hashlib
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -22,6 +23,12 @@ from masrel.cli._options import (
 )
 from masrel.errors import ParameterError
 from masrel.report._builds import Build
+from masrel.report._report_folder import (
+    MANIFEST,
+    changed_files,
+    replace_report,
+    stale_assets,
+)
 
 if TYPE_CHECKING:
     from masrel.analysis import Analysis
@@ -104,9 +111,11 @@ def report(
     shown = build.last()
     if shown is None:
         making = _Making(build, ratings_file, only, gating, include, output)
-        with build.noted() as shown:
-            files, what_is_shown = making.run()
-            shown.update(what_is_shown)
+        with build.noted() as made:
+            files, shown = making.run()
+            # of what is written, not of what is there: others may write there, too
+            made["manifest"] = hashlib.sha256(files[MANIFEST]).hexdigest()
+            made["shown"] = shown
             changes = _write_or_compare(files, destination, check=check)
     else:
         echo_notes(shown["notes"])
@@ -142,7 +151,7 @@ class _Making:
     include: tuple[str, ...]
     output: OutputOptions
 
-    def run(self) -> tuple[dict[str, bytes], dict[str, object]]:
+    def run(self) -> tuple[dict[str, bytes], dict[str, Any]]:
         """Return the files of the report, and what is said of it."""
         with read_once():
             data = read_study(self.build.study, self.ratings_file)
@@ -218,8 +227,6 @@ def _write_or_compare(
     files: Mapping[str, bytes], folder: Path, *, check: bool
 ) -> list[str]:
     # what would change if it is only looked at; else it is written
-    from masrel.report._report_folder import replace_report
-
     if check:
         return list(_changes(files, folder))
     replace_report(folder, files)
@@ -227,8 +234,6 @@ def _write_or_compare(
 
 
 def _changes(files: Mapping[str, bytes], folder: Path) -> Iterator[str]:
-    from masrel.report._report_folder import changed_files, stale_assets
-
     for name in changed_files(folder, files):
         is_there = (folder / name).exists()
         yield f"{folder / name}: {'would change' if is_there else 'would be new'}"

@@ -45,14 +45,15 @@ class Build:
     cache: Cache
 
     def last(self) -> dict[str, Any] | None:
-        """Return what the last build shown if a new one would change nothing."""
+        """Return what the last build has shown if a new one would change nothing."""
         stored = self.cache.read(self._key())
         if stored is None:
             return None
         note: dict[str, Any] = parse_json(stored[_NOTE])
         is_current = (
-            note["made_from"] == self._made_from()
-            and _is_same_code(*note["code"])
+            # first: the same code has left the same kind of note
+            _is_same_code(note.get("code"))
+            and note["made_from"] == self._made_from()
             and all(_is_same(path, *known) for path, known in note["read"].items())
             and _is_whole(self.folder, note["manifest"])
         )
@@ -61,23 +62,23 @@ class Build:
 
     @contextmanager
     def noted(self) -> Iterator[dict[str, Any]]:
-        """Take what a build says, and keep it with all that it has read."""
-        shown: dict[str, Any] = {}
+        """Keep what a build has read with what it says of itself in what is given."""
+        # To be filled in: the hash of its manifest, and what it has shown
+        made: dict[str, Any] = {}
         # Listed before anything is read: a file that comes later is a change.
         made_from, code = self._made_from(), (code_hash(), code_status())
         with _files_read(self.study, self._outputs()) as readings:
-            yield shown
+            yield made
         if not readings.are_as_they_were():
             return
         note = {
+            **made,
             "made_from": made_from,
-            "code": code,
+            "code": {"sha256": code[0], "status": code[1]},
             "read": {
                 path: (digest, status if is_settled(status) else None)
                 for path, (digest, status) in readings.files.items()
             },
-            "manifest": file_hash(str(self.folder / MANIFEST)),
-            "shown": shown,
         }
         self.cache.write(self._key(), {_NOTE: json.dumps(note).encode()})
         self.cache.remove_oldest()
@@ -115,8 +116,13 @@ def _listing(folder: Path | str, but: tuple[str, ...], depth: int) -> Iterator[s
             yield from _listing(entry.path, but, depth - 1)
 
 
-def _is_same_code(digest: str, status: str | None) -> bool:
-    return (status is not None and code_status() == status) or code_hash() == digest
+def _is_same_code(code: object) -> bool:
+    if not isinstance(code, dict):
+        return False
+    status = code.get("status")
+    if status is not None and code_status() == status:
+        return True
+    return code_hash() == code.get("sha256")
 
 
 def _is_same(path: str, digest: str | None, status: list[int] | None) -> bool:

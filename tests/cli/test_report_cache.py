@@ -14,6 +14,7 @@ import masrel
 import masrel.report.figures
 from masrel import _cache, intervals
 from masrel.cli import cli
+from masrel.cli import report as verb
 from masrel.estimates import Estimate
 from masrel.protocol import copy_template
 from masrel.report import figures
@@ -359,6 +360,28 @@ def test_a_cache_stays_small(
     masrel("report", study)
     sizes = [path.stat().st_size for path in (study / _cache.FOLDER).iterdir()]
     assert 0 < sum(sizes) < 50_000
+
+
+def test_a_report_that_another_build_has_replaced_is_made_again(
+    masrel: Caller, study: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    masrel("report", study, "--only", "grades")
+    grades = contents(study / "report")
+    masrel("report", study, "--only", "agreement")
+    agreement = contents(study / "report")
+    shutil.rmtree(study / "report")
+    write = verb.replace_report
+
+    def with_another(folder: Path, files: Contents) -> None:
+        write(folder, files)
+        write(folder, grades)  # in the moment after
+
+    monkeypatch.setattr(verb, "replace_report", with_another)
+    masrel("report", study, "--only", "agreement")
+    assert contents(study / "report") == grades
+    monkeypatch.setattr(verb, "replace_report", write)
+    masrel("report", study, "--only", "agreement")
+    assert contents(study / "report") == agreement
 
 
 def test_a_study_that_was_copied_makes_its_own_report(
