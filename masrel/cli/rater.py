@@ -8,6 +8,7 @@ import click
 from masrel.cli._options import OutputOptions, output_options, write_output
 from masrel.errors import ParameterError
 from masrel.protocol import StudyPaths, read_protocol
+from masrel.protocol._rater_fields import field_heading
 
 if TYPE_CHECKING:
     from masrel.progress import RaterProgress
@@ -120,39 +121,34 @@ def _table(
 ) -> "Table":
     from masrel.report._tables import Column, Table
 
-    fields = protocol.rater_fields
-    sites = [rater.site for rater in raters]
-    of_site = [Column(key="site", heading="Site", align="left")] if any(sites) else []
-    headings = {
-        name: (field.title or name) + (f" ({field.unit})" if field.unit else "")
-        for name, field in fields.items()
-    }
+    has_sites = any(rater.site for rater in raters)
+    columns = [Column(key="rater", heading="Rater", align="left")]
+    columns += [Column(key="site", heading="Site", align="left")] * has_sites
+    columns.append(Column(key="status", heading="Status", align="left"))
+    columns.append(Column(key="late", heading="Late", align="left"))
+    for name, field in protocol.rater_fields.items():
+        is_number = field.type in ("whole", "number")
+        columns.append(
+            Column(
+                key=name,
+                heading=field_heading(name, field),
+                align="right" if is_number else "left",
+            )
+        )
+    rows = (
+        (
+            each.rater,
+            *[each.site] * has_sites,
+            each.status,
+            "yes" if each.is_late else None,
+            *each.values.values(),
+        )
+        for each in raters
+    )
     return Table(
         name="raters",
         caption=f"Raters of study {protocol.study.id}",
-        columns=(
-            Column(key="rater", heading="Rater", align="left"),
-            *of_site,
-            Column(key="status", heading="Status", align="left"),
-            Column(key="late", heading="Late", align="left"),
-            *(
-                Column(
-                    key=name,
-                    heading=headings[name],
-                    align="right" if field.type in ("whole", "number") else "left",
-                )
-                for name, field in fields.items()
-            ),
-        ),
-        rows=tuple(
-            (
-                each.rater,
-                *([each.site] if any(sites) else []),
-                each.status,
-                "yes" if each.is_late else None,
-                *each.values.values(),
-            )
-            for each in raters
-        ),
+        columns=tuple(columns),
+        rows=tuple(rows),
         data="simulated" if simulated else "recorded",
     )

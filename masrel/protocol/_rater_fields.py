@@ -82,6 +82,11 @@ def rater_field_rules(values: Mapping[str, Any]) -> Iterator[str]:
                 yield f"{where}.{name}: {problem}{with_id(rater)}"
 
 
+def field_heading(name: str, field: RaterField) -> str:
+    """Return what a field is called in a table, unit included."""
+    return (field.title or name) + (f" ({field.unit})" if field.unit else "")
+
+
 def _declaration(name: str, field: Mapping[str, Any]) -> Iterator[str]:
     where = f"rater_fields.{name}"
     if not _FIELD_NAME.fullmatch(name) or name in RESERVED:

@@ -17,7 +17,8 @@ from masrel.progress import (
     rater_progress,
     session_progress,
 )
-from masrel.protocol import Protocol, RaterField, StudyPaths
+from masrel.protocol import Protocol, StudyPaths
+from masrel.protocol._rater_fields import field_heading
 from masrel.ratings import Correction, corrections_of, study_remarks
 from masrel.report._figure_data import FlowStep, RaterFlow
 from masrel.report._material import Content, Drawing, Material, Paragraph, Section
@@ -265,10 +266,12 @@ def _characteristics(material: Material, conduct: StudyConduct) -> Iterator[Tabl
         if not (field.public or name in conduct.include):
             continue
         if field.type in ("whole", "number"):
-            numbers.append((_heading(name, field), len(known), *_summary(known)))
+            numbers.append((field_heading(name, field), len(known), *_summary(known)))
         else:
             tally = Counter(map(str, known))
-            counts += [(_heading(name, field), text, n) for text, n in tally.items()]
+            counts += [
+                (field_heading(name, field), text, n) for text, n in tally.items()
+            ]
     if numbers:
         measures = ("Mean", "SD", "Median", "Least", "Most")
         yield Table(
@@ -295,10 +298,6 @@ def _characteristics(material: Material, conduct: StudyConduct) -> Iterator[Tabl
             rows=tuple(counts),
             data=material.data,
         )
-
-
-def _heading(name: str, field: RaterField) -> str:
-    return (field.title or name) + (f" ({field.unit})" if field.unit else "")
 
 
 def _summary(known: Sequence[object]) -> tuple[Value, ...]:
@@ -393,4 +392,4 @@ def _left_out(material: Material, conduct: StudyConduct) -> Iterator[str]:
     for name, field in material.protocol.rater_fields.items():
         is_known = any(rater.values[name] is not None for rater in conduct.raters)
         if is_known and not field.public and name not in conduct.include:
-            yield f"the field {_heading(name, field)} of raters ({name})"
+            yield f"the field {field_heading(name, field)} of raters ({name})"
