@@ -4,11 +4,14 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Literal
 
-from masrel.audit._item_tables import ItemTables
+from masrel.audit._item_tables import (
+    FIRST_VISITED_ITEMS,
+    MAX_VISITED_ITEMS,
+    ItemTables,
+)
 from masrel.audit._printed import Rule
 from masrel.audit._square_tables import (
     MAX_COUNTED,
-    MAX_VISITED,
     SquareTables,
     Work,
     WorkLimitError,
@@ -68,7 +71,8 @@ class ConsistentTables:
         On how many items two raters agree in any of these tables; empty for more
         raters, and where not every table was counted.
     n_visited : int
-        Partial tables that were visited; at most 10⁸.
+        Partial tables that were visited, at most 10⁸; a step counts as a thousand of
+        them at the least.
     """
 
     n_tables: int | None
@@ -173,10 +177,19 @@ def consistent_tables(
 
 def answer(question: Question) -> ConsistentTables:
     """Return the tables of a question that was checked."""
-    count = _Count(question)
+    if question.n_raters == 2:
+        return _answer(question, Work())
+    first = _answer(question, Work(limit=FIRST_VISITED_ITEMS))
+    if first.status == "exact" or first.n_tables == MAX_COUNTED:
+        return first
+    return _answer(question, Work(limit=MAX_VISITED_ITEMS))
+
+
+def _answer(question: Question, work: Work) -> ConsistentTables:
+    count = _Count(question, work)
     search = _square_counts if question.n_raters == 2 else _item_counts
     try:
-        for numbers, n_agreed, examples in search(question, count.work):
+        for numbers, n_agreed, examples in search(question, work):
             count.add(numbers, n_agreed, examples)
             if count.numbers[None] >= MAX_COUNTED:
                 return count.result("at least")
@@ -208,9 +221,9 @@ def _item_counts(question: Question, work: Work) -> Iterator[_Step]:
 class _Count:
     """What was counted so far."""
 
-    def __init__(self, question: Question) -> None:
+    def __init__(self, question: Question, work: Work) -> None:
         self.question = question
-        self.work = Work(limit=MAX_VISITED)
+        self.work = work
         self.numbers: dict[Rule | None, int] = dict.fromkeys((None, *question.rules), 0)
         self.examples: list[CellRows] = []
         self.n_agreed: set[int] = set()

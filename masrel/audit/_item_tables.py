@@ -27,6 +27,9 @@ from masrel.audit._windows import Integers, Question, matrix_of, union
 MAX_VISITED_ITEMS = 20_000_000
 """States that are visited before a search is given up."""
 
+FIRST_VISITED_ITEMS = 1_000_000
+"""States of a first search, which is enough where tables are many."""
+
 _BLOCK = 1_000_000  # states that are made at once
 
 Rows = tuple[tuple[int, ...], ...]
@@ -59,7 +62,6 @@ class ItemTables:
             self.question.n_raters,
             self.question.n_items,
         )
-        self.work.limit = MAX_VISITED_ITEMS
         self.work.charge(comb(raters + q - 1, q - 1))
         self._rows = np.vstack(list(compositions([(raters, q)])))
         disagreements = [
