@@ -1,7 +1,9 @@
 """``masrel report``: write the report of a study."""
 
+import gc
 import hashlib
 from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -153,7 +155,7 @@ class _Making:
 
     def run(self) -> tuple[dict[str, bytes], dict[str, Any]]:
         """Return the files of the report, and what is said of it."""
-        with read_once():
+        with read_once(), _no_collection():
             data = read_study(self.build.study, self.ratings_file)
             _check_sections(self.only, data.protocol)
             gates = self.gating.gates(data.protocol)
@@ -209,6 +211,18 @@ class _Making:
                 only=self.only,
                 cache=self.build.cache,
             )
+
+
+@contextmanager
+def _no_collection() -> Iterator[None]:
+    """Look for no garbage: most of what libraries and figures make stays in use."""
+    was_on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_on:
+            gc.enable()
 
 
 def _check_sections(only: Collection[str], protocol: "Protocol") -> None:

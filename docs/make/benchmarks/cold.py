@@ -74,10 +74,12 @@ def main() -> None:
     os.environ["PYTHONPYCACHEPREFIX"] = str(COMPILED)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        demo = (sys.executable, "-m", "masrel", "demo", str(folder / "demo"), "--quiet")
-        subprocess.run(demo, check=True, stdout=subprocess.DEVNULL)
+        oldest = before or ROOT  # what it makes, both read
+        os.environ["PYTHONPATH"] = str(oldest)
+        demo = ("-P", "-m", "masrel", "demo", str(folder / "demo"), "--quiet")
+        subprocess.run((sys.executable, *demo), check=True, stdout=subprocess.DEVNULL)
         published = folder / "published"
-        shutil.copytree(ROOT / "studies" / "hess2012", published)
+        shutil.copytree(oldest / "studies" / "hess2012", published)
         rows = [
             row("the demo's simulated study", folder / "demo" / "study", before),
             row("the published study", published, before),

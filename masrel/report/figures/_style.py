@@ -4,7 +4,6 @@ Colours are Okabe and Ito's, which colour-blind readers tell apart; shapes, line
 styles and text repeat what the colours say, so that a grey print loses nothing.
 """
 
-import gc
 import textwrap
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -79,18 +78,6 @@ def house_style() -> Iterator[None]:
         yield
 
 
-@contextmanager
-def _no_collection() -> Iterator[None]:
-    """Collect no garbage: what a figure is made of is in use until it is drawn."""
-    was_on = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_on:
-            gc.enable()
-
-
 def draw(
     content: data.Content, *, stamp: str, forms: Sequence[data.Form] = ("png", "svg")
 ) -> dict[data.Form, bytes]:
@@ -110,7 +97,7 @@ def draw(
     dict of str to bytes
         Each form's file.
     """
-    with house_style(), _no_collection():
+    with house_style():
         figure = _figure(content)
         arrange(figure, _stamp(figure, stamp) if stamp else None)
         return files_of(figure, forms)
