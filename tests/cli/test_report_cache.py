@@ -351,6 +351,7 @@ def test_a_cache_in_the_place_of_records_is_refused(
     assert not (study / "report").exists()
 
 
+@pytest.mark.slow
 def test_a_cache_stays_small(
     masrel: Caller, study: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

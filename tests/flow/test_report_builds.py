@@ -40,6 +40,7 @@ class Edits:
         self.protocol = (study / "protocol.toml").read_text(encoding="utf-8")
         table = study / "ratings/ratings.csv"
         self.rows = table.read_text(encoding="utf-8").splitlines()
+        table.unlink()  # it would be refused whenever a log says something else
         self.table = study.with_name("ratings.csv")
         self.log = sorted((study / "sessions").glob("*.jsonl"))[0]
         self.log_bytes = self.log.read_bytes()
