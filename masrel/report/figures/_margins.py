@@ -19,7 +19,7 @@ from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
-_EDGE, _GAP = 4.0, 6.0  # points: around all, and between two axes
+_EDGE, _GAP = 4.0, 10.0  # points: around all, and between two axes
 _LEAST = 72.0  # points of an axes, across and down
 _LEAST_ACROSS = 144.0  # points of all axes of a row
 _POINTS = 72.0  # an inch
