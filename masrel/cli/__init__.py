@@ -28,6 +28,7 @@ GROUPS = {
         "latent": "Biases and noises of the raters in any file, items on one scale.",
     },
     "A study": {
+        "plan": "How many items and raters a study needs, and what it can show.",
         "init": "Make a new study from a template.",
         "check": "Validate a study and say every error.",
         "schedule": "Draw the schedules of a study, once.",

@@ -14,12 +14,14 @@ from masrel.planning._studies import StudyDesign, StudyMaker, StudySums
 Errors = dict[str, float]
 
 TASK = 10_000  # studies
-_CHOSEN_TASK = 1_000  # where the interval is chosen study by study
+_CHOSEN_TASK = 250  # where the interval is chosen study by study
 _MAX_TABLES = 1_000_000  # that are summed over
 _MAX_CHOSEN = 4_000  # where an interval is chosen for each
 _MAX_TASKS = 100
-_RELATIVE = 0.003  # Monte Carlo error of a half-width that is small enough
-_SHARE = 0.004  # the same of a chance
+# Monte Carlo errors that are small enough, of a half-width and of a chance; twice as
+# much where intervals are chosen study by study
+_RELATIVE = 0.003
+_SHARE = 0.004
 
 
 def is_enumerable(design: StudyDesign) -> bool:
@@ -92,5 +94,6 @@ def is_enough(design: StudyDesign, sums: StudySums) -> bool:
     if design.lower is not None or design.upper is not None:
         chances_of.append(sums.share(2))
     of_shares = [math.sqrt(p * (1 - p) / sums.weight) for p in chances_of]
-    limit = 2 * _SHARE if task_size(design) < TASK else _SHARE
-    return error <= _RELATIVE * half and max(of_shares, default=0.0) <= limit
+    factor = 2.0 if task_size(design) < TASK else 1.0
+    worst = max(of_shares, default=0.0)
+    return error <= factor * _RELATIVE * half and worst <= factor * _SHARE

@@ -329,6 +329,24 @@ class LearningView:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class PlanCurve:
+    """What studies of so many raters can show, by their number of items."""
+
+    label: str
+    n_items: tuple[int, ...]
+    numbers: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlanCurves:
+    """Plans of many sizes."""
+
+    title: str
+    what: str  # the number
+    curves: tuple[PlanCurve, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class OrderPanel:
     """Schedules of one session, counted."""
 
@@ -398,5 +416,6 @@ Content = (
     | LearningView
     | OrderPanels
     | AnswerBars
+    | PlanCurves
 )
 """Whatever can be drawn."""

@@ -158,6 +158,10 @@ def _figure(content: data.Content) -> Figure:
             | data.AnswerBars()
         ):
             return _rater_figure(content)
+        case data.PlanCurves():
+            from masrel.report.figures._planning_figure import planning_figure
+
+            return planning_figure(content)
         case data.Differences():
             from masrel.report.figures._limits_figure import limits_figure
 
