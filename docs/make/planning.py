@@ -330,8 +330,8 @@ def main() -> None:
                 *_paper(),
                 "",
                 "An interval for other raters is about the same items. Two of the "
-                "models draw items anew in every study, so that with four of them it seldom "
-                "holds the κ of all items; where all studies have the same four, it "
+                "models draw items anew in every study, so that with four of them it "
+                "seldom holds the κ of all items; where all have the same four, it "
                 "covers.",
                 "",
                 "## Time and error",

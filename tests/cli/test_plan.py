@@ -52,8 +52,12 @@ def test_a_grid_has_a_curve(masrel: Caller, tmp_path: Path) -> None:
     ]
 
 
-@pytest.mark.slow
-def test_a_study_says_what_its_plan_can_show(masrel: Caller, tmp_path: Path) -> None:
+def test_a_study_says_what_its_plan_can_show(
+    masrel: Caller, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("masrel.planning._tasks.TASK", 10)  # each line takes seconds
+    monkeypatch.setattr("masrel.planning._tasks._CHOSEN_TASK", 5)
+    monkeypatch.setattr("masrel.planning._tasks._RELATIVE", 1.0)
     assert masrel("init", tmp_path / "study").code == 0
     done = masrel("plan", tmp_path / "study", "--value", "0.6", "--csv")
     assert done.code == 0

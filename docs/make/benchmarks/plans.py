@@ -1,0 +1,96 @@
+"""A million simulated studies beside a loop over ``fleiss_kappa``.
+
+``python -m docs.make.benchmarks.plans`` writes its part of ``docs/benchmarks.md``:
+Fleiss' kappa with its standard error in 1e6 studies of 30 items by 5 raters, in one
+process, and by calling `fleiss_kappa` study by study on 2 000 of them, in one run.
+"""
+
+import platform
+import time
+from pathlib import Path
+
+import numpy as np
+
+import masrel
+from docs.make.benchmarks.parts import write_part
+from masrel.agreement import fleiss_kappa
+from masrel.planning._item_models import ItemModel
+from masrel.planning._studies import StudyDesign, StudyMaker
+
+PAGE = Path(__file__).parents[2] / "benchmarks.md"
+N_STUDIES, N_LOOPED = 1_000_000, 2_000
+
+
+def maker() -> StudyMaker:
+    """Return studies of 30 items by 5 raters, four categories."""
+    model = ItemModel(
+        name="dirichlet-multinomial", prevalences=(0.4, 0.3, 0.2, 0.1), kappa=0.5
+    )
+    return StudyMaker(
+        StudyDesign(
+            coefficient="fleiss_kappa",
+            weights="identity",
+            model=model,
+            n_items=30,
+            n_raters=5,
+            target="items",
+            level=0.95,
+            interval="t",
+            value=0.5,
+        )
+    )
+
+
+def simulated(n_studies: int) -> tuple[float, float]:
+    """Return seconds of the clock and of the processor."""
+    studies = maker()
+    clock, processor = time.perf_counter(), time.process_time()
+    studies.simulate(np.random.default_rng(1), n_studies)
+    return time.perf_counter() - clock, time.process_time() - processor
+
+
+def looped(n_studies: int) -> tuple[float, float]:
+    """Return the same of one call a study, tables ready."""
+    studies = maker()
+    freq = np.random.default_rng(1).multinomial(30, studies.p, size=n_studies)
+    tables = [studies.rows.repeat(of_study, axis=0) for of_study in freq]
+    clock, processor = time.perf_counter(), time.process_time()
+    for table in tables:
+        _ = fleiss_kappa(table, categories=range(4)).standard_error
+    return time.perf_counter() - clock, time.process_time() - processor
+
+
+def main() -> None:
+    """Write the part."""
+    first = looped(N_LOOPED)
+    clock, processor = simulated(N_STUDIES)
+    second = looped(N_LOOPED)
+    each = 0.5 * (first[1] + second[1]) / N_LOOPED
+    write_part(
+        PAGE,
+        "plans",
+        [
+            "## Simulated studies",
+            "",
+            "`python -m docs.make.benchmarks.plans` repeats this part: Fleiss' κ "
+            "and its standard error in 1,000,000 studies of 30 items by 5 raters, four "
+            "categories, drawn and computed; beside it `fleiss_kappa(…)"
+            f".standard_error` study by study, tables ready, on {N_LOOPED:,} of "
+            "them before and after, in one run.",
+            "",
+            f"{platform.machine()}, Python {platform.python_version()}; masrel "
+            f"{masrel.__version__}, numpy {np.__version__}.",
+            "",
+            "| | clock | processor | a study |",
+            "|---|---|---|---|",
+            f"| whole studies in arrays | {clock:.1f} s | {processor:.1f} s "
+            f"| {1e6 * processor / N_STUDIES:.1f} µs |",
+            f"| a call a study | – | – | {1e6 * each:.0f} µs |",
+            "",
+            f"Ratio: 1/{each * N_STUDIES / processor:.0f}.",
+        ],
+    )
+
+
+if __name__ == "__main__":
+    main()
