@@ -63,10 +63,12 @@ def _exclude(study: Path, rater: str, who: str, why: str) -> None:
 
     Every verb that computes says so, and so does the report.
     """
-    from masrel.conduct import record_exclusion
+    from masrel.conduct import record_standing
 
     paths = StudyPaths(study)
-    record_exclusion(paths, read_protocol(paths.protocol), rater, who=who, why=why)
+    record_standing(
+        paths, read_protocol(paths.protocol), rater, "excluded", who=who, why=why
+    )
     click.echo(f"{rater} is excluded; the grades are kept: {paths.conduct_file}")
 
 
@@ -77,10 +79,12 @@ def _exclude(study: Path, rater: str, who: str, why: str) -> None:
 @_why
 def _include(study: Path, rater: str, who: str, why: str) -> None:
     """Take a rater of STUDY who was excluded back into the analysis."""
-    from masrel.conduct import record_inclusion
+    from masrel.conduct import record_standing
 
     paths = StudyPaths(study)
-    record_inclusion(paths, read_protocol(paths.protocol), rater, who=who, why=why)
+    record_standing(
+        paths, read_protocol(paths.protocol), rater, "included", who=who, why=why
+    )
     click.echo(f"{rater} is analysed again: {paths.conduct_file}")
 
 

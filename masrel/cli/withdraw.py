@@ -18,10 +18,12 @@ def withdraw(study: Path, rater: str, who: str, why: str) -> None:
     The rater stays in the protocol, the grades given before stay in the study and are
     counted, and the report says so. No session of the rater goes on.
     """
-    from masrel.conduct import record_withdrawal
+    from masrel.conduct import record_standing
 
     paths = StudyPaths(study)
-    record_withdrawal(paths, read_protocol(paths.protocol), rater, who=who, why=why)
+    record_standing(
+        paths, read_protocol(paths.protocol), rater, "withdrawn", who=who, why=why
+    )
     click.echo(
         f"{rater} is withdrawn; the grades given before are kept: {paths.conduct_file}"
     )

@@ -5,26 +5,19 @@ study.
 """
 
 from masrel.conduct._allotment import allot_schedules
-from masrel.conduct._exclusion import (
-    excluded_raters,
-    record_exclusion,
-    record_inclusion,
-)
 from masrel.conduct._notes import record_note
 from masrel.conduct._rater_values import rater_values, record_rater_values
+from masrel.conduct._standing import excluded_raters, record_standing
 from masrel.conduct._study_log import read_conduct
 from masrel.conduct._unblinding import record_unblinding
-from masrel.conduct._withdrawal import record_withdrawal
 
 __all__ = [
     "allot_schedules",
     "excluded_raters",
     "rater_values",
     "read_conduct",
-    "record_exclusion",
-    "record_inclusion",
     "record_note",
     "record_rater_values",
+    "record_standing",
     "record_unblinding",
-    "record_withdrawal",
 ]

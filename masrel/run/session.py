@@ -11,9 +11,9 @@ from pathlib import Path
 
 from masrel._event_log import Event, SessionLog, utc_now
 from masrel._files import check_inside
+from masrel.conduct._standing import refuse_withdrawn
 from masrel.conduct._study_answers import study_answers
 from masrel.conduct._study_log import append_event, check_rater, stated
-from masrel.conduct._withdrawal import refuse_withdrawn
 from masrel.errors import (
     ParameterError,
     ProtocolError,

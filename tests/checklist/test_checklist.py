@@ -19,7 +19,7 @@ from masrel.checklist import (
     fill_checklist,
     write_checklist,
 )
-from masrel.conduct import record_exclusion, record_withdrawal
+from masrel.conduct import record_standing
 from masrel.errors import ParameterError
 from masrel.protocol import Protocol, StudyPaths, read_protocol
 from masrel.run import ScriptGrades, record_correction, run_session
@@ -133,7 +133,9 @@ def test_days_and_corrections_come_from_the_logs(rated: Small) -> None:
 
 def test_raters_who_left_are_said_and_not_by_whom(rated: Small) -> None:
     study, protocol = rated
-    record_withdrawal(study, protocol, "R2", who="Somebody", why="moved away")
+    record_standing(
+        study, protocol, "R2", "withdrawn", who="Somebody", why="moved away"
+    )
     said = facts(grras(study), "11")
     assert "2 raters planned: 1 complete, 1 withdrawn." in said
     assert "Rater R2 was withdrawn on" in said
@@ -152,7 +154,7 @@ def test_who_is_excluded_enters_no_estimate(new_study: Callable[..., Small]) -> 
         source = ScriptGrades(of_code)
         run_session(study, protocol, rater, "test", grades=source, clock="simulated")
     assert "Percent agreement = .78," in facts(grras(study), "13")  # (1 + 1 + 1/3) / 3
-    record_exclusion(study, protocol, "R3", who="MK", why="was not trained")
+    record_standing(study, protocol, "R3", "excluded", who="MK", why="was not trained")
     # R1 and R2 agree on all three
     assert "Percent agreement = 1.00," in facts(grras(study), "13")
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from masrel.conduct import allot_schedules, record_withdrawal
+from masrel.conduct import allot_schedules, record_standing
 from masrel.errors import ParameterError, ScheduleError, SessionLogError
 from masrel.protocol import Protocol, StudyPaths
 from masrel.schedule import (
@@ -70,7 +70,7 @@ def test_a_late_rater_gets_the_next_row_wherever_the_protocol_has_the_name(
     study: StudyPaths,
 ) -> None:
     allot_schedules(study, williams())
-    record_withdrawal(study, williams(), "R1", who="MK", why="moved away")
+    record_standing(study, williams(), "R1", "withdrawn", who="MK", why="moved away")
     later = williams(raters=("R0", "R1", "R2"))
     written = allot_schedules(study, later)
     assert [path.name for path in written] == ["test_R0_sheet.csv", "test_R0.csv"]

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from masrel.conduct import read_conduct, record_unblinding, record_withdrawal
+from masrel.conduct import read_conduct, record_standing, record_unblinding
 from masrel.errors import ParameterError, ScheduleError, SessionLogError
 from masrel.protocol import Protocol, StudyPaths
 from masrel.run import ScriptGrades, record_correction, run_session
@@ -26,7 +26,7 @@ def test_a_study_to_which_nothing_happened_has_no_log(small: Small) -> None:
 
 def test_events_are_a_chain_with_a_head(small: Small) -> None:
     study, protocol = small
-    record_withdrawal(study, protocol, "R2", **BY)
+    record_standing(study, protocol, "R2", "withdrawn", **BY)
     record_unblinding(study, protocol, None, rater="R1", who="A", why="b")
     kinds = [event.kind for event in read_conduct(study)]
     assert kinds == ["withdrawn", "unblinded"]
@@ -42,14 +42,14 @@ def test_events_are_a_chain_with_a_head(small: Small) -> None:
 
 def test_a_changed_line_is_found(small: Small) -> None:
     study, protocol = small
-    record_withdrawal(study, protocol, "R2", **BY)
+    record_standing(study, protocol, "R2", "withdrawn", **BY)
     record_unblinding(study, protocol, None, who="A", why="b")
     text = study.conduct_file.read_text(encoding="utf-8")
     study.conduct_file.write_text(text.replace('"R2"', '"R1"'), encoding="utf-8")
     with pytest.raises(SessionLogError, match="line 3: needed previous"):
         read_conduct(study)
     with pytest.raises(SessionLogError, match="line 3: needed previous"):
-        record_withdrawal(study, protocol, "R1", **BY)
+        record_standing(study, protocol, "R1", "withdrawn", **BY)
 
 
 def test_a_session_log_in_its_place_is_refused(small: Small) -> None:
@@ -59,7 +59,7 @@ def test_a_session_log_in_its_place_is_refused(small: Small) -> None:
     with pytest.raises(SessionLogError, match="needed an event of conduct, withdrawn"):
         read_conduct(study)
     with pytest.raises(SessionLogError, match="line 1: needed an event"):
-        record_withdrawal(study, protocol, "R2", **BY)
+        record_standing(study, protocol, "R2", "withdrawn", **BY)
 
 
 def run(small: Small, rater: str) -> None:
@@ -73,12 +73,12 @@ def test_a_withdrawn_rater_goes_on_with_no_session_but_is_corrected(
     study, protocol = small
     run(small, "R1")
     before = study.log_file("R1", "test").read_bytes()
-    record_withdrawal(study, protocol, "R1", **BY)
+    record_standing(study, protocol, "R1", "withdrawn", **BY)
     assert study.log_file("R1", "test").read_bytes() == before
     with pytest.raises(ParameterError, match=r"R1 was withdrawn on \d{4}-.* by MK"):
         run(small, "R1")
     with pytest.raises(ParameterError, match="R1 was withdrawn"):
-        record_withdrawal(study, protocol, "R1", **BY)
+        record_standing(study, protocol, "R1", "withdrawn", **BY)
     record_correction(
         study, protocol, "R1", "test", code=codes(study, "R1")[0], grade="4", **BY
     )
@@ -90,7 +90,7 @@ def test_nobody_is_withdrawn_and_nothing_unblinded_without_a_reason(
 ) -> None:
     study, protocol = small
     with pytest.raises(ParameterError, match=f"{blank}: needed text"):
-        record_withdrawal(study, protocol, "R1", **{**BY, blank: " "})
+        record_standing(study, protocol, "R1", "withdrawn", **{**BY, blank: " "})
     with pytest.raises(ParameterError, match=f"{blank}: needed text"):
         record_unblinding(study, protocol, None, **{**BY, blank: ""})
     assert not study.conduct_file.exists()
@@ -98,7 +98,7 @@ def test_nobody_is_withdrawn_and_nothing_unblinded_without_a_reason(
 
 def test_a_rater_the_protocol_does_not_have_is_refused(small: Small) -> None:
     with pytest.raises(ParameterError, match="rater: needed one of R1, R2, got 'R7'"):
-        record_withdrawal(*small, "R7", **BY)
+        record_standing(*small, "R7", "withdrawn", **BY)
 
 
 def test_a_code_is_unblinded_after_the_event_is_on_disk(small: Small) -> None:

@@ -10,10 +10,9 @@ from masrel.conduct import (
     excluded_raters,
     rater_values,
     read_conduct,
-    record_exclusion,
-    record_inclusion,
     record_note,
     record_rater_values,
+    record_standing,
 )
 from masrel.errors import ParameterError, SessionLogError
 from masrel.protocol import Protocol, StudyPaths, read_protocol
@@ -79,14 +78,14 @@ def test_a_value_that_the_protocol_no_longer_has_is_refused(fielded: Small) -> N
 
 def test_an_exclusion_is_taken_back_by_another_event(small: Small) -> None:
     study, protocol = small
-    record_exclusion(study, protocol, "R2", **BY)
+    record_standing(study, protocol, "R2", "excluded", **BY)
     assert excluded_raters(study) == ("R2",)
     with pytest.raises(ParameterError, match="needed one who is not excluded, R2 is"):
-        record_exclusion(study, protocol, "R2", **BY)
-    record_inclusion(study, protocol, "R2", **BY)
+        record_standing(study, protocol, "R2", "excluded", **BY)
+    record_standing(study, protocol, "R2", "included", **BY)
     assert excluded_raters(study) == ()
     with pytest.raises(ParameterError, match="needed one who is excluded, R2 is not"):
-        record_inclusion(study, protocol, "R2", **BY)
+        record_standing(study, protocol, "R2", "included", **BY)
     assert [e.kind for e in read_conduct(study)] == ["excluded", "included"]
 
 

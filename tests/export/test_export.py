@@ -17,7 +17,7 @@ import pytest
 from rocrate.rocrate import ROCrate
 
 from masrel.analysis import analyze, as_analysis_document
-from masrel.conduct import record_exclusion
+from masrel.conduct import record_standing
 from masrel.errors import ParameterError
 from masrel.export import EXPORT_FORMS, export_study
 from masrel.protocol import Protocol, StudyPaths, read_protocol
@@ -331,7 +331,9 @@ def test_public_answers_go_along(rated: Study, tmp_path: Path) -> None:
 def test_who_is_excluded_is_left_out_and_said(rated: Study, tmp_path: Path) -> None:
     copy = StudyPaths(tmp_path / "study")
     shutil.copytree(rated[0].root, copy.root)
-    record_exclusion(copy, rated[1], "R2", who="Somebody Private", why="rivate")
+    record_standing(
+        copy, rated[1], "R2", "excluded", who="Somebody Private", why="rivate"
+    )
     study = (copy, rated[1])
     left_out = export_study(*study, "datapackage", tmp_path / "a")
     assert "ratings of R2, who are excluded (logs)" in left_out

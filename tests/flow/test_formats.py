@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from masrel.conduct import record_withdrawal
+from masrel.conduct import record_standing
 from masrel.protocol import StudyPaths, read_protocol
 from masrel.verification import anchors_of, read_anchors, verify_study, write_anchors
 from tests.cli.test_train import new_study, train_simulated
@@ -26,8 +26,10 @@ def once(small_demo: Path, tmp_path_factory: pytest.TempPathFactory) -> StudyPat
     root = tmp_path_factory.mktemp("formats") / "study"
     study = StudyPaths(shutil.copytree(small_demo / "study", root))
     shutil.copytree(trained / "training", study.training)
+    record_standing(
+        study, read_protocol(study.protocol), "R1", "withdrawn", who="A", why="b"
+    )
     run("report", str(root), "--quiet")
-    record_withdrawal(study, read_protocol(study.protocol), "R1", who="A", why="b")
     return study
 
 

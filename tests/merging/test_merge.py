@@ -9,8 +9,8 @@ import pytest
 from masrel.conduct import (
     excluded_raters,
     read_conduct,
-    record_exclusion,
     record_note,
+    record_standing,
 )
 from masrel.errors import MasrelError, ParameterError, ProtocolError, ScheduleError
 from masrel.merging import merge_studies
@@ -140,7 +140,9 @@ def test_what_is_no_rating_comes_over_too(sites: Sites, tmp_path: Path) -> None:
 def test_both_chains_of_conduct_stay_whole(sites: Sites, tmp_path: Path) -> None:
     north, south = sites
     record_note(north, read_protocol(north.protocol), "power cut", who="MK")
-    record_exclusion(south, read_protocol(south.protocol), "R3", who="AB", why="ill")
+    record_standing(
+        south, read_protocol(south.protocol), "R3", "excluded", who="AB", why="ill"
+    )
     merged = merge_studies(sites, tmp_path / "both").study
     for study in sites:
         copied = merged.merged_conduct / f"{study.root.name}.jsonl"

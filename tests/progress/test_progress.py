@@ -8,7 +8,7 @@ from click.testing import CliRunner
 
 from masrel._event_log import Event
 from masrel.cli import cli
-from masrel.conduct import record_exclusion, record_note, record_withdrawal
+from masrel.conduct import record_note, record_standing
 from masrel.errors import ParameterError
 from masrel.progress import (
     NextStep,
@@ -77,7 +77,7 @@ def test_a_damaged_log_is_said_and_hides_no_other_session(small: Small) -> None:
 def test_a_line_that_a_kill_cut_off_hides_nothing(small: Small) -> None:
     study, protocol = small
     stop_after(small, "R1", 2)
-    record_withdrawal(study, protocol, "R2", **BY)
+    record_standing(study, protocol, "R2", "withdrawn", **BY)
     for log in (study.log_file("R1", "test"), study.conduct_file):
         log.write_bytes(log.read_bytes() + b'{"event": "gra')
     (of_r1, _, _) = session_progress(*small)
@@ -98,8 +98,8 @@ def test_raters_go_from_planned_to_excluded(small: Small) -> None:
     run(small, "R1")
     run(small, "R2")
     assert status(small) == {"R1": "begun", "R2": "complete"}
-    record_withdrawal(study, protocol, "R1", **BY)
-    record_exclusion(study, protocol, "R2", **BY)
+    record_standing(study, protocol, "R1", "withdrawn", **BY)
+    record_standing(study, protocol, "R2", "excluded", **BY)
     assert status(small) == {"R1": "withdrawn", "R2": "excluded"}
 
 
@@ -122,7 +122,7 @@ def test_the_next_step_is_one_command(small: Small) -> None:
     stop_after(small, "R2", 1)
     assert step(small).command == f"masrel run {root} --rater R2 --session test"
     assert step(small).why == "1 of 3 graded"
-    record_withdrawal(study, protocol, "R2", **BY)
+    record_standing(study, protocol, "R2", "withdrawn", **BY)
     run(small, "R1")
     assert step(small).command == f"masrel run {root} --rater R1 --session retest"
     study.schedule_file("R1", "retest").unlink()

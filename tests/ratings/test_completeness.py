@@ -8,7 +8,7 @@ import pytest
 from click.testing import CliRunner
 
 from masrel.cli import cli
-from masrel.conduct import record_unblinding, record_withdrawal
+from masrel.conduct import record_standing, record_unblinding
 from masrel.protocol import Protocol, StudyPaths, read_protocol
 from masrel.ratings import (
     ratings_from_logs,
@@ -84,7 +84,9 @@ FAULTS: dict[str, tuple[Callable[[StudyPaths], object], str]] = {
     "emptied": (emptied, "sessions/test_R2.jsonl is empty"),
     "deleted": (deleted, "sessions/test_R2 has recordings and there is no log"),
     "withdrawn": (
-        lambda s: record_withdrawal(s, read_protocol(s.protocol), "R2", **BY),
+        lambda s: record_standing(
+            s, read_protocol(s.protocol), "R2", "withdrawn", **BY
+        ),
         "by MK: moved away. Grades given before, 3 by the logs, are kept",
     ),
     "unblinded": (

@@ -6,12 +6,10 @@ import pytest
 
 from masrel.analysis import analyze
 from masrel.conduct import (
-    record_exclusion,
-    record_inclusion,
     record_note,
     record_rater_values,
+    record_standing,
     record_unblinding,
-    record_withdrawal,
 )
 from masrel.errors import ParameterError
 from masrel.protocol import Protocol, StudyPaths
@@ -82,13 +80,13 @@ def test_an_excluded_rater_is_in_the_data_and_in_no_number(
 
     before, _, sha256 = agreement()
     assert before == pytest.approx(1 / 3)  # R1 and R2 always agree, R3 with nobody
-    record_exclusion(study, protocol, "R3", **BY)
+    record_standing(study, protocol, "R3", "excluded", **BY)
     assert agreement() == (1.0, ("R1", "R2"), sha256)
     text = page(study, protocol)
     assert "| test | 3 | 3 | 3 | 0 | 1 | 0 | 2 |" in text
     assert "Excluded: 1 (R3)" in text
     assert "Excluded from every number of this report: R3." in text
-    record_inclusion(study, protocol, "R3", **BY)
+    record_standing(study, protocol, "R3", "included", **BY)
     assert agreement()[0] == before
 
 
@@ -108,7 +106,7 @@ def test_what_is_private_is_shown_when_it_is_asked_for(
         action="ice",
     )
     record_unblinding(study, protocol, None, who="Kim", why="an injury")
-    record_withdrawal(study, protocol, "R1", **BY)
+    record_standing(study, protocol, "R1", "withdrawn", **BY)
     text = page(study, protocol)
     events = [line for line in text.splitlines() if line.startswith("| 20")]
     assert [line.split(" | ")[1] for line in events] == [
@@ -147,8 +145,8 @@ def test_a_report_of_before_the_last_event_is_found(
     page(study, protocol, "notes")
     assert messages() == []
     late = "the report is not of what has happened beside the sessions"
-    for record in (record_withdrawal, record_exclusion, record_inclusion):
-        record(study, protocol, "R3", **BY)
+    for standing in ("withdrawn", "excluded", "included"):
+        record_standing(study, protocol, "R3", standing, **BY)
         (message,) = messages()
         assert late in message
         page(study, protocol)
