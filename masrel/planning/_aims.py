@@ -416,7 +416,10 @@ def _n_categories(categories: int | Sequence[Label] | None, prevalences: object)
         if prevalences is None:
             raise ParameterError("categories: needs these or prevalences, got none")
         return len(_numbers(prevalences))
-    return int(categories) if isinstance(categories, int) else len(categories)
+    q = int(categories) if isinstance(categories, int) else len(categories)
+    if q < 2:
+        raise ParameterError(f"categories: needs at least 2, got {q}")
+    return q
 
 
 def _numbers(prevalences: object) -> "np.ndarray[Any, np.dtype[np.float64]]":
@@ -497,6 +500,11 @@ def at_value(
         return at(ends[0])
     if model.name != "latent" and abs(high) < 1e-12:
         return at(ends[1])
+    if math.isnan(low) or math.isnan(high):
+        raise ParameterError(
+            f"prevalences: {entry.title} is undefined with these, "
+            f"{list(model.prevalences)}: it needs two categories that occur"
+        )
     if not low < 0.0 < high:
         raise ParameterError(
             f"value: {entry.title} under {model.name} lies between {low + value:.3f} "
@@ -547,4 +555,6 @@ def _seed(rng: np.random.Generator | int | None) -> int:
         return int(rng.integers(2**63))
     if rng is None:
         return int(np.random.SeedSequence().generate_state(1, np.uint64)[0] >> 1)
+    if not isinstance(rng, int | np.integer) or rng < 0:
+        raise ParameterError(f"rng: needs a seed of at least 0, got {rng!r}")
     return int(rng)

@@ -161,6 +161,8 @@ def plan_grid(
         raise ParameterError(
             f"executor: needs one of processes, dask, got {executor!r}"
         )
+    if n_studies < 1:
+        raise ParameterError(f"n_studies: needs at least 1, got {n_studies}")
     first: Question | None = None
     cells: list[tuple[Question, StudyDesign]] = []
     for truth, shares in itertools.product(

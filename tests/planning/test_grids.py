@@ -66,6 +66,11 @@ def test_prevalences_and_exact_cells_can_be_ranges_too() -> None:
     assert plans[0].p_undefined < plans[2].p_undefined
 
 
+def test_a_grid_needs_studies() -> None:
+    with pytest.raises(ParameterError, match="n_studies: needs at least 1, got -5"):
+        plan_grid(**GRID, n_studies=-5)
+
+
 def test_an_executor_is_one_of_two() -> None:
     with pytest.raises(ParameterError, match="executor: needs one of processes, dask"):
         plan_grid(**{**GRID, "executor": "slurm"})

@@ -59,6 +59,9 @@ def plan(**options: Any) -> Plan:
         ({"coefficient": "kappa"}, "coefficient: needs"),
         ({"coefficient": "icc_1"}, "model: ICC(1) takes none"),
         ({"coefficient": "icc_1", "model": None}, "target: the interval of ICC(1)"),
+        ({"rng": -1}, "rng: needs a seed of at least 0"),
+        ({"categories": 0, "prevalences": None}, "categories: needs at least 2, got 0"),
+        ({"prevalences": [1.0, 0.0]}, "needs two categories that occur"),
         ({"rater_share": 0.5}, "rater_share: is of icc_a1 alone"),
     ],
 )
