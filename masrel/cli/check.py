@@ -7,8 +7,9 @@ from pathlib import Path
 
 import click
 
+from masrel._once import read_once
 from masrel.cli._options import echo_remarks
-from masrel.errors import MasrelError, ParameterError, ProtocolError
+from masrel.errors import MasrelError, ParameterError, ProtocolError, RatingsError
 from masrel.protocol import Protocol, StudyPaths, read_protocol, scale_of
 from masrel.ratings import study_remarks
 from masrel.schedule import concealment_notes, schedule_problems
@@ -16,6 +17,7 @@ from masrel.schedule import concealment_notes, schedule_problems
 
 @click.command("check")
 @click.argument("study", type=click.Path(path_type=Path))
+@read_once()
 def check(study: Path) -> None:
     """Check protocol, schedules, record and ratings of STUDY; say every problem."""
     problems, notes = _check_study(StudyPaths(study))
@@ -118,6 +120,23 @@ def _ratings_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
             read_study_ratings(path, scale_of(protocol))
         except MasrelError as error:
             yield str(error)
+            return
+    if study.ratings_file.exists() and study.logs():
+        yield from _table_problems(protocol, study)
+
+
+def _table_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
+    from masrel.ratings.logs import _of_logs
+    from masrel.ratings.study_data import refuse_other_table
+
+    try:
+        ratings = _of_logs(study, protocol, check_recordings=False)
+    except MasrelError:
+        return  # another checker has said what is wrong with the logs
+    try:
+        refuse_other_table(study.ratings_file, ratings)
+    except RatingsError as error:
+        yield str(error)
 
 
 def _has_record(study: StudyPaths) -> bool:

@@ -111,7 +111,7 @@ def a_table_that_was_edited(bench: Bench) -> None:
         changed = line.replace(old, new, 1)
         if changed != line:
             bench.edit("ratings/ratings.csv", line, changed)
-            for verb in ("verify", "analyze", "report"):
+            for verb in ("check", "verify", "analyze", "report"):
                 assert "is not what the session logs say" in bench(verb, code=2).err
         table.write_bytes(kept)
 
