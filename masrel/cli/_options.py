@@ -213,7 +213,8 @@ def write_output(
 
 
 def _print_table(table: "Table", output: OutputOptions, width: int | None) -> None:
-    from masrel.report._tables import as_csv, as_latex, as_text
+    from masrel.report._latex import as_latex
+    from masrel.report._tables import as_csv, as_text
 
     if output.csv:
         shown = as_csv(table, raw=output.raw_csv)

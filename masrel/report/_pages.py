@@ -21,8 +21,8 @@ _KINDS = {
     Listing: "listing",
 }
 
-# Symbols of the model as they are written in plain text: an index after "_".
-_SYMBOL = re.compile(r"(?<!\w)(ΔT|k|ν|θ|p)_(peak|post|th|L|start|end|o|e)(?!\w)")
+SYMBOL = re.compile(r"(?<!\w)(ΔT|k|ν|θ|p)_(peak|post|th|L|start|end|o|e)(?!\w)")
+"""Symbols of the model as they are written in plain text: an index after "_"."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,9 +80,24 @@ def _as_markdown(document: Document) -> bytes:
     return _from_template("report.md", document)
 
 
+def _as_latex(document: Document) -> bytes:
+    # Imported here, as below: who wants a page loads no other format.
+    from masrel.report._latex import report_latex
+
+    return report_latex(document).encode()
+
+
+def _as_docx(document: Document) -> bytes:
+    from masrel.report._docx import report_docx
+
+    return report_docx(document)
+
+
 WRITERS: dict[str, Writer] = {
     "html": Writer(file="report.html", write=_as_html),
     "markdown": Writer(file="report.md", write=_as_markdown),
+    "latex": Writer(file="report.tex", write=_as_latex),
+    "docx": Writer(file="report.docx", write=_as_docx),
 }
 """The formats of pages by name, in the order in which they are written."""
 
@@ -117,7 +132,7 @@ def _uri(picture: bytes) -> str:
 
 def _symbols(text: str) -> str:
     # Escaped first; what is added after that is ours, and so safe in a template.
-    text = _SYMBOL.sub(r"\1<sub>\2</sub>", html.escape(text))
+    text = SYMBOL.sub(r"\1<sub>\2</sub>", html.escape(text))
     return text.replace(" %", "&nbsp;%")  # no line begins with the sign
 
 

@@ -7,13 +7,13 @@ import math
 from hypothesis import given
 from hypothesis import strategies as st
 
+from masrel.report._latex import as_latex
 from masrel.report._tables import (
     Column,
     Table,
     aligned,
     as_csv,
     as_entered,
-    as_latex,
     as_text,
     counted,
     fixed_or_significant,

@@ -1,0 +1,286 @@
+r"""Tables as LaTeX, and a whole report as a file that pdflatex and lualatex compile.
+
+Every text is escaped. A letter that pdflatex cannot set is named in the first lines.
+"""
+
+import unicodedata
+from collections.abc import Iterator, Sequence
+
+from masrel.report._material import Drawing
+from masrel.report._pages import SYMBOL, Block, Document
+from masrel.report._tables import Column, Table, page_cells
+
+_ROWS_OF_A_PAGE = 40
+_APART = "\N{ZERO WIDTH SPACE}"
+
+# Widths in letters of ten points: of a line, of what a column takes beside its letters,
+# and from which on a column of text may be broken into lines; how many more letters
+# there are in a line of each smaller size.
+_LINE, _GAP, _NARROW_GAP, _LONG_TEXT = 88.0, 2.4, 1.6, 18
+_SIZES = {r"\small": 1.1, r"\footnotesize": 1.25, r"\scriptsize": 1.43}
+_SMALLEST = (r"\scriptsize", 1.43)
+
+_GREEK = dict(
+    zip(
+        "αβγδεζηθκλμνξπρστυφχψωΓΔΘΛΞΠΣΥΦΨΩ",
+        "alpha beta gamma delta varepsilon zeta eta theta kappa lambda mu nu xi pi rho "
+        "sigma tau upsilon varphi chi psi omega Gamma Delta Theta Lambda Xi Pi Sigma "
+        "Upsilon Phi Psi Omega".split(),
+        strict=True,
+    )
+)
+
+_ESCAPES = str.maketrans(
+    {
+        "\\": r"\textbackslash{}",
+        "&": r"\&",
+        "%": r"\%",
+        "$": r"\$",
+        "#": r"\#",
+        "_": r"\_",
+        "{": r"\{",
+        "}": r"\}",
+        "~": r"\textasciitilde{}",
+        "^": r"\textasciicircum{}",
+        _APART: "{}",
+        "−": "$-$",
+        "–": "--",
+        "±": r"$\pm$",
+        "∞": r"$\infty$",
+        "≥": r"$\geq$",
+        "≤": r"$\leq$",
+        "≠": r"$\neq$",
+        "≈": r"$\approx$",
+        "×": r"$\times$",
+        "→": r"$\rightarrow$",
+        "<": r"$<$",
+        ">": r"$>$",
+        "|": r"$|$",
+        "[": "{[}",  # after the end of a line LaTeX would take it for a distance
+        "*": "{*}",
+        "²": "$^2$",
+        "\t": " ",
+        "\n": " ",
+        **{letter: rf"$\{name}$" for letter, name in _GREEK.items()},
+        **{
+            letter: rf"\textsuperscript{{{unicodedata.normalize('NFKD', letter)}}}"
+            for letter in "ᵃᵇᶜᵈᵉᶠᵍʰⁱʲᵏˡᵐⁿᵒᵖʳˢᵗᵘᵛʷˣʸᶻ"
+        },
+    }
+)
+_ACCENTS = frozenset(
+    "\N{COMBINING GRAVE ACCENT}\N{COMBINING ACUTE ACCENT}\N{COMBINING TILDE}"
+    "\N{COMBINING CIRCUMFLEX ACCENT}\N{COMBINING DIAERESIS}\N{COMBINING CARON}"
+    "\N{COMBINING RING ABOVE}\N{COMBINING CEDILLA}"
+)
+_LETTERS = frozenset("ßæøœłıÆØŒŁ…‘’“”—§¶£·³¹°")
+
+
+def as_latex(table: Table) -> str:
+    r"""Return a table as LaTeX that needs the packages its first line names.
+
+    What was read stands above it in comments.
+    """
+    text = _table(table)
+    packages = [
+        name
+        for name, mark in {
+            "array": "arraybackslash",
+            "booktabs": "toprule",
+            "graphicx": "resizebox",
+            "longtable": r"\begin{longtable}",
+        }.items()
+        if mark in text
+    ]
+    comments = [rf"needs \usepackage{{{','.join(packages)}}}"]
+    if lacking := lacking_letters(text):
+        comments += [f"needs lualatex and a font with {' '.join(lacking)}"]
+    comments += "\n".join(table.read).splitlines()
+    return "".join(f"% {line}\n" for line in comments) + text
+
+
+def lacking_letters(text: str) -> list[str]:
+    """Return the letters of a LaTeX text that pdflatex does not set."""
+    return sorted({letter for letter in text if not _is_set(letter)})
+
+
+def report_latex(document: Document) -> str:
+    """Return a report as a LaTeX file beside the folder of its figures."""
+    body = "\n".join(_body(document))
+    lacking = lacking_letters(body)
+    head = [
+        f"% Made by masrel {_text(document.version)}. Compile it twice in this folder.",
+        *(_HEAD_OF_LUALATEX if lacking else _HEAD),
+        *_PREAMBLE,
+    ]
+    letters = " ".join(lacking)
+    return "\n".join(head).replace("LETTERS", letters) + "\n" + body + "\n"
+
+
+_HEAD = (
+    r"\documentclass[a4paper]{article}",
+    r"\usepackage{iftex}",
+    r"\ifPDFTeX",
+    r"\usepackage[T1]{fontenc}",
+    r"\IfFileExists{lmodern.sty}{\usepackage{lmodern}}{}",
+    r"\fi",
+)
+_HEAD_OF_LUALATEX = (
+    "% Needs lualatex, and in the line of setmainfont a font with LETTERS",
+    r"\documentclass[a4paper]{article}",
+    r"\usepackage{iftex}",
+    r"\ifPDFTeX",
+    r"\errmessage{This report has letters that pdflatex cannot set: use lualatex}",
+    r"\fi",
+    r"\usepackage{fontspec}",
+    r"% \setmainfont{Noto Serif CJK KR}",
+)
+_PREAMBLE = (
+    r"\usepackage[margin=25mm]{geometry}",
+    r"\usepackage{array,booktabs,float,graphicx,longtable}",
+    r"\usepackage[hidelinks,pdfusetitle]{hyperref}",
+    "% Without this line tables and figures float",
+    r"\floatplacement{table}{H}\floatplacement{figure}{H}",
+    "% An old graphicx knows no texts for who cannot see a figure",
+    r"\makeatletter\@ifundefined{KV@Gin@alt}{\define@key{Gin}{alt}{}}{}\makeatother",
+    "% No figure is enlarged",
+    r"\makeatletter\def\naturalwidth{\ifdim\Gin@nat@width>\linewidth\linewidth",
+    r"\else\Gin@nat@width\fi}\makeatother",
+    r"\setlength{\emergencystretch}{3em}\setlength{\belowcaptionskip}{6pt}",
+)
+
+
+def _body(document: Document) -> Iterator[str]:
+    yield rf"\title{{{_text(document.title)}}}"
+    yield r"\author{}"
+    yield r"\date{}"
+    if document.tag:
+        head = _text(document.tag.removesuffix(".").upper())
+        yield rf"\pagestyle{{myheadings}}\markright{{\textbf{{{head}}}}}"
+    yield r"\begin{document}"
+    yield r"\maketitle"
+    if document.banner:
+        banner = rf"\centering\bfseries {_text(document.banner)}"
+        yield (
+            rf"\noindent\fbox{{\parbox{{\dimexpr\linewidth-2\fboxsep-2\fboxrule}}"
+            rf"{{{banner}}}}}\par\medskip"
+        )
+    yield _text(document.provenance)
+    for section in document.sections:
+        yield ""
+        yield rf"\section{{{_text(section.title)}}}\label{{sec:{section.name}}}"
+        for block in section.blocks:
+            yield ""
+            yield _block(block, document.tag)
+    yield ""
+    yield r"\section*{Made from}"
+    yield rf"masrel {_text(document.version)}."
+    yield r"\begin{description}\raggedright\small"
+    for name, digest in document.inputs:
+        yield rf"\item[{_text(name)}] \texttt{{{_text(digest)}}}"
+    yield r"\end{description}"
+    yield r"\end{document}"
+
+
+def _block(block: Block, tag: str) -> str:
+    content = block.content
+    if isinstance(content, Table):
+        return _table(content)
+    if isinstance(content, Drawing):
+        return _figure(content, block.files["png"], tag)
+    text = _text(content.text)
+    return rf"\emph{{{text}}}" if content.absent else text
+
+
+def _figure(drawing: Drawing, file: str, tag: str) -> str:
+    label = rf"\textbf{{{_text(tag)}}} " if tag else ""
+    size = r"width=\naturalwidth,height=.8\textheight,keepaspectratio"
+    lines = [
+        r"\begin{figure}",
+        r"\centering",
+        rf"\includegraphics[{size},alt={{{_text(drawing.alt)}}}]{{{file}}}",
+        rf"\caption{{{label}{_text(drawing.caption)}}}",
+        rf"\label{{fig:{drawing.name}}}",
+        r"\end{figure}",
+    ]
+    return "\n".join(lines)
+
+
+def _table(table: Table) -> str:
+    columns, body = page_cells(table)
+    size, letters, is_shrunk = _layout(columns, body)
+    caption = rf"\caption{{{_text(table.labelled_caption)}}}"
+    label = rf"\label{{tab:{table.name}}}"
+    heading = [r"\toprule", _line([c.heading for c in columns]), r"\midrule"]
+    sizes = [size] if size else []
+    if len(body) > _ROWS_OF_A_PAGE:  # the heading stands again on every page
+        kind, end, is_shrunk = "longtable", r"\par\endgroup", False
+        begin = [r"\begingroup", *sizes, rf"\begin{{longtable}}{{{letters}}}"]
+        begin += [rf"{caption} {label} \\", *heading, r"\endfirsthead"]
+        begin += [*heading, r"\endhead"]
+    else:
+        kind, end = "tabular", r"\end{table}"
+        begin = [r"\begin{table}", r"\centering", caption, label, *sizes]
+        begin += [r"\resizebox{\linewidth}{!}{%"] if is_shrunk else []
+        begin += [rf"\begin{{tabular}}{{{letters}}}", *heading]
+    close = rf"\end{{{kind}}}" + ("}" if is_shrunk else "")
+    lines = [*begin, *map(_line, body), r"\bottomrule", close]
+    if table.notes:
+        notes = r" \\ ".join(map(_text, table.notes))
+        lines.append(rf"\par\smallskip\footnotesize\raggedright {notes}")
+    return "\n".join([*lines, end]) + "\n"
+
+
+def _layout(
+    columns: Sequence[Column], body: Sequence[Sequence[str]]
+) -> tuple[str, str, bool]:
+    # size of the letters, how columns are set, and whether the table is scaled to fit
+    cells = [[column.heading for column in columns], *body]
+    widths = [max(map(len, texts)) for texts in zip(*cells, strict=True)]
+    plain = [{"left": "l", "center": "c"}.get(c.align, "r") for c in columns]
+    if sum(widths) + _GAP * len(columns) <= _LINE:
+        return "", "".join(plain), False
+    room = _LINE - _NARROW_GAP * len(columns)
+    long = {
+        place: width
+        for place, (column, width) in enumerate(zip(columns, widths, strict=True))
+        if column.align == "left" and width > _LONG_TEXT
+    }
+    short = sum(widths) - sum(long.values())
+    needed = short + _LONG_TEXT * len(long)
+    size, factor = next(
+        (each for each in _SIZES.items() if needed <= room * each[1]), _SMALLEST
+    )
+    for place, width in long.items():  # what the others leave, by their lengths
+        left = max(room * factor - short, _LONG_TEXT * len(long))
+        part = min(left * width / sum(long.values()), width) / factor / _LINE
+        plain[place] = rf">{{\raggedright\arraybackslash}}p{{{part:.3f}\linewidth}}"
+    is_shrunk = not long and needed > room * factor
+    return size + r"\setlength{\tabcolsep}{4pt}", "".join(plain), is_shrunk
+
+
+def _line(cells: Sequence[str]) -> str:
+    return " & ".join(map(_text, cells)) + r" \\"
+
+
+def _text(text: str) -> str:
+    # symbols of the model are set as such; all else is escaped
+    parts = SYMBOL.split(unicodedata.normalize("NFC", text))
+    shown = [_escape(parts[0])]
+    for letters, index, after in zip(*(parts[k::3] for k in (1, 2, 3)), strict=True):
+        symbol = _escape(letters).replace("$", " ").strip()
+        shown += [rf"${symbol}_{{\mathrm{{{index}}}}}$", _escape(after)]
+    return "".join(shown)
+
+
+def _escape(text: str) -> str:
+    # of an option's two hyphens TeX would make a dash
+    return text.replace("--", f"-{_APART}-").translate(_ESCAPES)
+
+
+def _is_set(letter: str) -> bool:
+    # whether pdflatex sets it without further packages: of letters with accents those
+    # of Latin-1 and Latin Extended-A
+    parts = unicodedata.normalize("NFD", letter)
+    is_accented = parts[0].isascii() and _ACCENTS.issuperset(parts[1:])
+    return letter in _LETTERS or (is_accented and letter <= "ſ")
