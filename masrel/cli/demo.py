@@ -139,7 +139,7 @@ def _report(
     with tqdm(
         desc=destination.name, unit=" files", disable=output.hides_progress
     ) as bar:
-        files = write_report(
+        write_report(
             data.protocol,
             data.ratings,
             analysis,
@@ -150,4 +150,4 @@ def _report(
             else None,
             progress=lambda _: bar.update(),
         )
-    return files.html
+    return destination / "report.html"

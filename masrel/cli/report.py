@@ -30,6 +30,7 @@ from masrel.report._report_folder import (
     changed_files,
     replace_report,
     stale_assets,
+    stale_pages,
 )
 
 if TYPE_CHECKING:
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
     from masrel.protocol import Protocol
     from masrel.ratings import StudyData
 
+FORMATS = ("html", "markdown", "latex", "docx")
 # They change nothing that is made or said
 _OTHER_OPTIONS = ("cache_folder", "check", "junit", "quiet")
 
@@ -57,6 +59,14 @@ _OTHER_OPTIONS = ("cache_folder", "check", "junit", "quiet")
     metavar="SECTION",
     help="Make a report of this section alone, in place of the one in the folder: its "
     "text, tables and figures, and no others. Repeatable.",
+)
+@click.option(
+    "--format",
+    "formats",
+    multiple=True,
+    type=click.Choice(FORMATS),
+    help="Write this format, too, beside those of the protocol; docx needs the extra "
+    "masrel[docx]. Repeatable.",
 )
 @click.option(
     "--check",
@@ -88,6 +98,7 @@ def report(
     destination: Path | None,
     ratings_file: Path | None,
     only: tuple[str, ...],
+    formats: tuple[str, ...],
     check: bool,
     gating: GateOptions,
     include: tuple[str, ...],
@@ -112,7 +123,7 @@ def report(
     changes: list[str] = []
     shown = build.last()
     if shown is None:
-        making = _Making(build, ratings_file, only, gating, include, output)
+        making = _Making(build, ratings_file, only, formats, gating, include, output)
         with build.noted() as made:
             files, shown = making.run()
             # of what is written, not of what is there: others may write there, too
@@ -122,7 +133,8 @@ def report(
     else:
         echo_notes(shown["notes"])
     click.echo(shown["read"], err=True)
-    for line in changes if check else [destination / "report.html"]:
+    pages = [destination / page for page in shown["pages"] if page != "report.md"]
+    for line in changes if check else pages or [destination / "report.md"]:
         click.echo(line)
     Verdict(**shown["verdict"]).conclude(gating)
     if check and changes:
@@ -149,6 +161,7 @@ class _Making:
     build: Build
     ratings_file: Path | None
     only: tuple[str, ...]
+    formats: tuple[str, ...]
     gating: GateOptions
     include: tuple[str, ...]
     output: OutputOptions
@@ -158,11 +171,17 @@ class _Making:
         with read_once(), _no_collection():
             data = read_study(self.build.study, self.ratings_file)
             _check_sections(self.only, data.protocol)
+            if "docx" in (*data.protocol.report.formats, *self.formats):
+                # Imported here: who has a report that is current needs none of it.
+                from masrel.report._docx import check_docx
+
+                check_docx()
             gates = self.gating.gates(data.protocol)
             analysis, files = self._files(data)
         return files, {
             "notes": notes_of_call(),
             "read": f"read: {data.read}",
+            "pages": [name for name in files if "/" not in name and name != MANIFEST],
             "verdict": asdict(verdict_of(analysis, gates)),
         }
 
@@ -209,6 +228,7 @@ class _Making:
                 progress=progress,
                 raw_csv=self.output.raw_csv,
                 only=self.only,
+                formats=self.formats,
                 cache=self.build.cache,
             )
 
@@ -251,5 +271,5 @@ def _changes(files: Mapping[str, bytes], folder: Path) -> Iterator[str]:
     for name in changed_files(folder, files):
         is_there = (folder / name).exists()
         yield f"{folder / name}: {'would change' if is_there else 'would be new'}"
-    for path in stale_assets(folder, files):
+    for path in (*stale_assets(folder, files), *stale_pages(folder, files)):
         yield f"{path}: would go"

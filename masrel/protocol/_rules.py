@@ -398,13 +398,14 @@ def _plan(values: Values) -> Iterator[str]:
     for index, line in _entries(values.get("analysis") or {}, "estimates"):
         for problem in _plan_line(line, values):
             yield f"analysis.estimates[{index}].{problem}{with_id(line)}"
-    sections = (values.get("report") or {}).get("sections") or []
-    for index, section in enumerate(sections):
-        if section is not None and section in sections[:index]:
-            yield (
-                f"report.sections[{index}]: needed each section once, "
-                f"got {got(section)} again"
-            )
+    for key in ("sections", "formats"):
+        names = (values.get("report") or {}).get(key) or []
+        for index, name in enumerate(names):
+            if name is not None and name in names[:index]:
+                yield (
+                    f"report.{key}[{index}]: needed each {key[:-1]} once, "
+                    f"got {got(name)} again"
+                )
 
 
 def _plan_line(line: Values, values: Values) -> Iterator[str]:

@@ -231,7 +231,7 @@ _LATER: dict[str, dict[str, object]] = {
         "torque_sensor": False,
     },
     "simulated_raters": {"hold_s": 0.0, "hand": "clamp"},
-    "report": {"gates": ()},
+    "report": {"gates": (), "formats": ("html", "markdown")},
     "training": {
         "kappa_insufficient": 0.6,
         "kappa_sufficient": 0.8,

@@ -315,6 +315,9 @@ class Report(_Table, frozen=True, kw_only=True):
         | None
     ) = None
     gates: tuple[GateKeys, ...] = ()
+    formats: Annotated[
+        tuple[Literal["html", "markdown", "latex", "docx"], ...], Meta(min_length=1)
+    ] = ("html", "markdown")
 
 
 class Protocol(_Table, frozen=True, kw_only=True):

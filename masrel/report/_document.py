@@ -75,8 +75,8 @@ class ReportFiles:
 
     Attributes
     ----------
-    html, markdown : Path
-        The document.
+    html, markdown, latex, docx : Path or None
+        The document in the formats that the protocol names; None for others.
     manifest : Path
         The hash of every file, as JSON.
     tables : tuple of Path
@@ -85,8 +85,10 @@ class ReportFiles:
         A PNG and an SVG per figure, named like tables.
     """
 
-    html: Path
-    markdown: Path
+    html: Path | None
+    markdown: Path | None
+    latex: Path | None
+    docx: Path | None
     manifest: Path
     tables: tuple[Path, ...]
     figures: tuple[Path, ...]
@@ -149,7 +151,8 @@ def write_report(
     Raises
     ------
     ParameterError
-        If the folder is one of a study's primary records, or a link in it leads out.
+        If the folder is one of a study's primary records, or a link in it leads out;
+        if the protocol asks for DOCX and python-docx is not installed.
     OSError
         If a file cannot be written; the pages that were there are then there still.
     """
@@ -166,9 +169,12 @@ def write_report(
         cache=Cache(cache),
     )
     replace_report(destination, files)
+    pages = {
+        name: destination / writer.file if writer.file in files else None
+        for name, writer in WRITERS.items()
+    }
     return ReportFiles(
-        html=destination / "report.html",
-        markdown=destination / "report.md",
+        **pages,
         manifest=destination / MANIFEST,
         tables=tuple(destination / p for p in files if p.startswith("tables/")),
         figures=tuple(destination / p for p in files if p.startswith("figures/")),
@@ -187,10 +193,12 @@ def make_report(
     progress: Progress | None = None,
     raw_csv: bool = False,
     only: Collection[str] = (),
+    formats: Collection[str] = (),
     claims: PublishedClaims | None = None,
     cache: Cache,
 ) -> dict[str, bytes]:
     """Return the files of a report, of these sections only if some are named."""
+    # formats: those that are made beside the protocol's
     # By name from the report's folder, in the order in which they are to be written
     printed = () if claims is None else claims.claims
     material = gather(protocol, ratings, analysis, in_person, recordings, printed)
@@ -212,7 +220,11 @@ def make_report(
         inputs=_inputs(inputs, anchors),
         version=analysis.masrel_version,
     )
-    pages = {w.file: _page(w, document, cache) for w in WRITERS.values()}
+    pages = {
+        writer.file: _page(writer, document, cache)
+        for name, writer in WRITERS.items()
+        if name in protocol.report.formats or name in formats
+    }
     if progress is not None:
         progress("pages")
     made_from = {**inputs, **({} if conduct is None else conduct.inputs)}

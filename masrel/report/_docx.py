@@ -1,19 +1,21 @@
 """Text and tables as a document of a word processor, the same bytes every time."""
 
 import importlib
+import importlib.util
 import io
 import zipfile
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import TYPE_CHECKING
 
 from masrel.errors import ParameterError
-from masrel.report._material import Paragraph
+from masrel.report._material import Drawing, Listing, Paragraph
+from masrel.report._pages import Block, Document
 from masrel.report._tables import Table, page_cells
 
 if TYPE_CHECKING:
-    from docx.document import Document
+    from docx.document import Document as WordDocument
 
 _FIRST_DAY = (1980, 1, 1, 0, 0, 0)  # the earliest that a zip can say
 
@@ -26,36 +28,113 @@ class Heading:
     level: int = 0
 
 
-def as_docx(
-    blocks: Sequence[Heading | Paragraph | Table], *, landscape: bool = False
-) -> bytes:
-    """Return headings, paragraphs and tables as the bytes of a DOCX file."""
-    try:
-        docx = importlib.import_module("docx")
-    except ModuleNotFoundError as error:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Picture:
+    """A figure with what is said below it, and to who cannot see it."""
+
+    png: bytes
+    caption: str
+    alt: str
+
+
+Part = Heading | Paragraph | Table | Listing | Picture
+"""What a document is made of."""
+
+
+def check_docx() -> None:
+    """Refuse documents of a word processor where what writes them is not installed."""
+    if importlib.util.find_spec("docx") is None:
         raise ParameterError(
             "docx: needs python-docx; install it with: pip install 'masrel[docx]'"
-        ) from error
-    document: Document = docx.Document()
+        )
+
+
+def report_docx(document: Document) -> bytes:
+    """Return a report as the bytes of a DOCX file."""
+    parts: list[Part] = [Heading(text=document.title)]
+    parts += [Paragraph(text=document.banner)] if document.banner else []
+    parts.append(Paragraph(text=document.provenance))
+    parts.append(Paragraph(text=f"{document.tag} {document.result}".strip()))
+    for section in document.sections:
+        parts.append(Heading(text=section.title, level=1))
+        parts += [_part(block, document.tag) for block in section.blocks]
+    parts.append(Heading(text="Made from", level=1))
+    parts.append(Paragraph(text=f"masrel {document.version}"))
+    parts += [Paragraph(text=f"{name}: {hash_}") for name, hash_ in document.inputs]
+    return as_docx(parts, header=document.tag.removesuffix(".").upper())
+
+
+def _part(block: Block, tag: str) -> Part:
+    # with its number among tables, or figures
+    content = block.content
+    if isinstance(content, Table):
+        return replace(content, caption=f"Table {block.number}. {content.caption}")
+    if isinstance(content, Drawing):
+        caption = f"{tag} {content.caption}".strip()
+        return Picture(
+            png=block.pictures["png"],
+            caption=f"Figure {block.number}. {caption}",
+            alt=content.alt,
+        )
+    return content
+
+
+def as_docx(
+    parts: Sequence[Part], *, landscape: bool = False, header: str = ""
+) -> bytes:
+    """Return parts as the bytes of a DOCX file; every page has the header."""
+    check_docx()
+    docx = importlib.import_module("docx")
+    document: WordDocument = docx.Document()
+    if header:
+        document.sections[0].header.paragraphs[0].text = header
     if landscape:
         _turn(document)
-    for block in blocks:
-        if isinstance(block, Heading):
-            document.add_heading(block.text, block.level)
-        elif isinstance(block, Paragraph):
-            document.add_paragraph(block.text)
-        else:
-            _add_table(document, block)
+    for part in parts:
+        _add(document, part)
     properties = document.core_properties
     properties.author = properties.comments = ""
     properties.created = properties.modified = datetime(*_FIRST_DAY)
-    properties.title = next((b.text for b in blocks if isinstance(b, Heading)), "")
+    properties.title = next((p.text for p in parts if isinstance(p, Heading)), "")
     out = io.BytesIO()
     document.save(out)
     return _without_times(out.getvalue())
 
 
-def _turn(document: "Document") -> None:
+def _add(document: "WordDocument", part: Part) -> None:
+    if isinstance(part, Heading):
+        document.add_heading(_clean(part.text), part.level)
+    elif isinstance(part, Paragraph):
+        document.add_paragraph(_clean(part.text))
+    elif isinstance(part, Listing):
+        document.add_heading(part.title, 2)
+        document.add_paragraph(part.text, style="macro")
+    elif isinstance(part, Picture):
+        _add_picture(document, part)
+    else:
+        _add_table(document, part)
+
+
+def _clean(text: str) -> str:
+    # without the letters that XML cannot hold
+    return "".join(c for c in text if c in "\t\n" or ord(c) >= 32)
+
+
+def _add_picture(document: "WordDocument", picture: Picture) -> None:
+    section = document.sections[0]
+    sides = section.page_width, section.left_margin, section.right_margin
+    page, left, right = (int(side or 0) for side in sides)
+    width = page - left - right
+    shape = document.add_picture(io.BytesIO(picture.png))
+    scale = min(1.0, width / shape.width, width / shape.height)  # none is enlarged
+    shape.width, shape.height = (
+        type(shape.width)(side * scale) for side in (shape.width, shape.height)
+    )
+    shape._inline.docPr.set("descr", _clean(picture.alt))
+    document.add_paragraph(_clean(picture.caption), style="Caption")
+
+
+def _turn(document: "WordDocument") -> None:
     from docx.enum.section import WD_ORIENT
 
     (section,) = document.sections
@@ -64,10 +143,10 @@ def _turn(document: "Document") -> None:
     section.page_width, section.page_height = size
 
 
-def _add_table(document: "Document", table: Table) -> None:
+def _add_table(document: "WordDocument", table: Table) -> None:
     from docx.enum.text import WD_ALIGN_PARAGRAPH
 
-    document.add_paragraph(table.labelled_caption, style="Caption")
+    document.add_paragraph(_clean(table.labelled_caption), style="Caption")
     columns, rows = page_cells(table)
     aligns = {
         "left": WD_ALIGN_PARAGRAPH.LEFT,
@@ -79,12 +158,12 @@ def _add_table(document: "Document", table: Table) -> None:
     for number, texts in enumerate([heads, *rows]):
         cells = grid.add_row().cells
         for cell, text, column in zip(cells, texts, columns, strict=True):
-            cell.text = text
+            cell.text = _clean(text)
             cell.paragraphs[0].alignment = aligns[column.align]
         if number == 0:
             _repeat_on_pages(grid.rows[0])
     for note in table.notes:
-        document.add_paragraph(note)
+        document.add_paragraph(_clean(note))
     document.add_paragraph()
 
 

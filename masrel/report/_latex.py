@@ -6,7 +6,7 @@ Every text is escaped. A letter that pdflatex cannot set is named in the first l
 import unicodedata
 from collections.abc import Iterator, Sequence
 
-from masrel.report._material import Drawing
+from masrel.report._material import Drawing, Listing
 from masrel.report._pages import SYMBOL, Block, Document
 from masrel.report._tables import Column, Table, page_cells
 
@@ -166,6 +166,8 @@ def _body(document: Document) -> Iterator[str]:
             rf"{{{banner}}}}}\par\medskip"
         )
     yield _text(document.provenance)
+    yield ""
+    yield _text(f"{document.tag} {document.result}".strip())
     for section in document.sections:
         yield ""
         yield rf"\section{{{_text(section.title)}}}\label{{sec:{section.name}}}"
@@ -188,6 +190,11 @@ def _block(block: Block, tag: str) -> str:
         return _table(content)
     if isinstance(content, Drawing):
         return _figure(content, block.files["png"], tag)
+    if isinstance(content, Listing):
+        lines = [rf"\leavevmode {_text(line)}\\" for line in content.text.splitlines()]
+        begin = rf"\subsection*{{{_text(content.title)}}}"
+        small = r"\begin{flushleft}\footnotesize\ttfamily"
+        return "\n".join([begin, small, *lines, r"\end{flushleft}"])
     text = _text(content.text)
     return rf"\emph{{{text}}}" if content.absent else text
 

@@ -19,7 +19,7 @@ from pathlib import Path
 
 from masrel._cache import file_hash
 from masrel._files import make_folder, refuse_record, sync_folder, write_files
-from masrel._input import read_regular
+from masrel._input import MAX_TABLE, read_regular
 
 if sys.platform != "win32":
     import fcntl
@@ -67,13 +67,14 @@ def replace_report(folder: Path, files: Mapping[str, bytes]) -> None:
         if "/" not in name:
             refuse_record(folder / name)
     with _alone(folder):
+        stale = [*stale_assets(folder, files), *stale_pages(folder, files)]
         new = {folder / place: files[place] for place in changed_files(folder, files)}
         assets = {path: data for path, data in new.items() if path.parent != folder}
         write_files(assets, within=folder)
         for path, data in new.items():  # the pages, and the manifest last
             if path not in assets:
                 write_files({path: data}, within=folder)
-        _remove(list(stale_assets(folder, files)))
+        _remove(stale)
 
 
 @contextmanager
@@ -114,6 +115,29 @@ def _is_there(path: Path, data: bytes) -> bool:
         return read_regular(path, most=len(data)) == data
     except OSError:
         return False
+
+
+def stale_pages(folder: Path, named: Collection[str]) -> Iterator[Path]:
+    """Yield pages of the last report in a folder that this one does not have."""
+    # Only if nobody has written in them since: the manifest has their hashes.
+    path = folder / MANIFEST
+    for name in ("report.html", "report.md", "report.tex", "report.docx"):
+        page = folder / name
+        if name in named or page.is_symlink() or not page.is_file():
+            continue
+        if _hash_in(path, name) == file_hash(str(page)):
+            yield page
+
+
+def _hash_in(manifest: Path, name: str) -> str | None:
+    # what a manifest says of a file; None if it says nothing
+    try:
+        document = json.loads(read_regular(manifest, most=MAX_TABLE))
+    except (OSError, ValueError):
+        return None
+    files = document.get("files") if isinstance(document, dict) else None
+    digest = files.get(name) if isinstance(files, dict) else None
+    return digest if isinstance(digest, str) else None
 
 
 def stale_assets(folder: Path, named: Collection[str]) -> Iterator[Path]:

@@ -1,0 +1,145 @@
+"""A report as LaTeX and as DOCX: the same tables and figures, and the same bytes."""
+
+import os
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import docx
+import msgspec
+import pytest
+
+from masrel.protocol import copy_template
+from tests.cli.process import Caller
+
+FORMATS = ("html", "markdown", "latex", "docx")
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The published study with a hostile title, asking for all formats."""
+    root = tmp_path_factory.mktemp("formats") / "study"
+    copy_template("hess2012", root)
+    protocol = root / "protocol.toml"
+    text = protocol.read_text(encoding="utf-8")
+    title = "title = " + msgspec.json.encode("κ & 5 % of A_b #1 ± [x] {y} ~ ^").decode()
+    head = text.partition("[[analysis.estimates]]")[0]
+    report = f'sections = ["design", "grades", "methods"]\nformats = {list(FORMATS)}\n'
+    protocol.write_text(f"{head}\n[report]\n{title}\n{report}", encoding="utf-8")
+    return root
+
+
+@pytest.fixture(scope="module")
+def folder(study: Path) -> Path:
+    build(study, study / "report", {})
+    return study / "report"
+
+
+def build(study: Path, folder: Path, variables: dict[str, str]) -> None:
+    call = [sys.executable, "-m", "masrel", "report", str(study), "-o", str(folder)]
+    cache = ["--cache", f"{folder}-cache"]
+    environment = {**os.environ, **variables}
+    subprocess.run([*call, *cache], env=environment, check=True, capture_output=True)
+
+
+def test_every_format_has_the_same_tables_and_figures(folder: Path) -> None:
+    latex = (folder / "report.tex").read_text(encoding="utf-8")
+    word = docx.Document(str(folder / "report.docx"))
+    n_tables = len(list((folder / "tables").iterdir()))
+    n_figures = len(list((folder / "figures").glob("*.png")))
+    assert n_tables > 2
+    assert n_figures > 0
+    assert latex.count("\\toprule") == len(word.tables) == n_tables
+    assert latex.count("\\includegraphics") == len(word.inline_shapes) == n_figures
+    for name in (folder / "figures").glob("*.png"):
+        assert f"{{figures/{name.name}}}" in latex
+
+
+def test_a_word_document_has_headings_captions_and_texts_for_pictures(
+    folder: Path,
+) -> None:
+    word = docx.Document(str(folder / "report.docx"))
+    styles = [paragraph.style.name for paragraph in word.paragraphs]
+    assert styles.count("Heading 1") == 4
+    captions = [p.text for p in word.paragraphs if p.style.name == "Caption"]
+    assert len(captions) == len(word.tables) + len(word.inline_shapes)
+    assert captions[0].startswith("Table 1. ")
+    for shape in word.inline_shapes:
+        assert len(shape._inline.docPr.get("descr")) > 30
+    for table in word.tables:
+        assert "w:tblHeader" in table.rows[0]._tr.xml
+    assert word.core_properties.title == "κ & 5 % of A_b #1 ± [x] {y} ~ ^"
+    with zipfile.ZipFile(folder / "report.docx") as archive:
+        assert {entry.date_time[:3] for entry in archive.infolist()} == {(1980, 1, 1)}
+
+
+def test_text_of_a_study_is_escaped_in_latex(folder: Path) -> None:
+    latex = (folder / "report.tex").read_text(encoding="utf-8")
+    title = r"$\kappa$ \& 5 \% of A\_b \#1 $\pm$ {[}x] \{y\} "
+    assert title + r"\textasciitilde{} \textasciicircum{}" in latex
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ["pdflatex", "lualatex"])
+def test_latex_compiles(folder: Path, tmp_path: Path, engine: str) -> None:
+    if shutil.which(engine) is None:
+        pytest.skip(f"{engine} is not installed")
+    shutil.copytree(folder, tmp_path / "copy")
+    done = subprocess.run(
+        [engine, "-halt-on-error", "-interaction=nonstopmode", "report.tex"],
+        cwd=tmp_path / "copy", capture_output=True, check=False,
+    )  # fmt: skip
+    log = done.stdout.decode("utf-8", "replace")
+    assert done.returncode == 0, log[-2000:]
+    assert "Overfull" not in log
+    assert "Missing character" not in log
+
+
+@pytest.mark.slow
+def test_a_foreign_environment_gives_the_same_bytes(
+    study: Path, folder: Path, tmp_path: Path
+) -> None:
+    settings = tmp_path / "matplotlibrc"
+    settings.write_text("font.size: 30\nsavefig.dpi: 30\nsvg.fonttype: path\n")
+    variables = {
+        "LANG": "de_DE.UTF-8",
+        "LC_ALL": "C",
+        "TZ": "Asia/Seoul",
+        "HOME": str(tmp_path),
+        "MPLBACKEND": "module://matplotlib_inline.backend_inline",
+        "MATPLOTLIBRC": str(settings),
+        "PYTHONHASHSEED": "7",
+    }
+    build(study, tmp_path / "other", variables)
+    names = sorted(p.relative_to(folder) for p in folder.rglob("*") if p.is_file())
+    assert len(names) > 8
+    for name in names:
+        assert (tmp_path / "other" / name).read_bytes() == (folder / name).read_bytes()
+
+
+def test_a_format_that_is_not_made_again_goes(
+    masrel: Caller, study: Path, tmp_path: Path
+) -> None:
+    root = tmp_path / "study"
+    shutil.copytree(study, root)
+    protocol = root / "protocol.toml"
+    text = protocol.read_text(encoding="utf-8")
+    text = text.replace(f"formats = {list(FORMATS)}", 'formats = ["html"]')
+    protocol.write_text(text, encoding="utf-8")
+    done = masrel("report", root, "--format", "latex", "--quiet")
+    assert done.code == 0, done.err
+    pages = [root / "report" / name for name in ("report.html", "report.tex")]
+    assert done.out.split() == [str(page) for page in pages]
+    assert not (root / "report" / "report.docx").exists()
+    assert masrel("report", root, "--check", "--quiet").code == 1
+    masrel("report", root, "--quiet")
+    assert [page.exists() for page in pages] == [True, False]
+    assert masrel("report", root, "--check", "--quiet").code == 0
+
+
+def test_what_is_no_format_is_refused(masrel: Caller, study: Path) -> None:
+    done = masrel("report", study, "--format", "pdf")
+    assert done.code == 2
+    assert "'pdf' is not one of 'html', 'markdown', 'latex', 'docx'" in done.err
