@@ -171,6 +171,7 @@ def test_a_protocol_without_files_has_the_hash_it_had_before_there_were_any() ->
     assert all(rater.pop("fields") == {} for rater in content["raters"])
     assert content.pop("rater_fields") == {}
     assert content["report"].pop("gates") == ()
+    assert content["report"].pop("formats") == ("html", "markdown")
     assert content["stretch"].pop("largest_speed_deg_s") == 131.0
     assert content.pop("presentation")["stretches"] == 1
     assert content.pop("occasions")["resume"] == "always"
