@@ -261,7 +261,7 @@ def _layout(
     for place, width in long.items():  # what the others leave, by their lengths
         left = max(room * factor - short, _LONG_TEXT * len(long))
         share = min(left * width / sum(long.values()), width) / factor / _LINE
-        part = f".{min(int(1000 * share), 999):03d}"  # of a line
+        part = "." + str(min(int(1000 * share), 999)).zfill(3)  # of a line
         plain[place] = rf">{{\raggedright\arraybackslash}}p{{{part}\linewidth}}"
     is_shrunk = not long and needed > room * factor
     return size + r"\setlength{\tabcolsep}{4pt}", "".join(plain), is_shrunk
