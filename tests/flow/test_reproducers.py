@@ -129,7 +129,7 @@ def a_correction_after_the_table(bench: Bench) -> None:
     bench.correct("4")
     assert "is not what the session logs say" in bench("analyze", code=2).err
     bench("ratings")
-    bench("report")
+    bench("report", "--include", "notes")
     assert "typo" in bench.page()
 
 
