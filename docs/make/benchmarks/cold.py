@@ -93,8 +93,9 @@ def main() -> None:
         "`masrel report STUDY` as a process of its own, imports and all, no cache; "
         f"medians of {TURNS} turns of processor time, ± is half the range of the "
         "ratios. Before: layout by constraints, each figure drawn for each of its "
-        "files. Figures are drawn one after the other: to load "
-        "matplotlib in another process takes as long as to draw three of them.",
+        "files. Figures are drawn one after the other: another "
+        "process would load matplotlib first. The report has more sections now than "
+        "before.",
         "",
         f"{platform.machine()}, Python {platform.python_version()}; "
         f"masrel {masrel.__version__}, matplotlib {mpl.__version__}.",
