@@ -26,10 +26,6 @@ _LATER = ("excluded", "questionnaires")
 """Fields that analyses once had not, and have not in a file where they are empty."""
 
 
-_LATER = ("excluded", "questionnaires")
-"""Fields that analyses once had not, and have not in a file where they are empty."""
-
-
 def as_analysis_document(analysis: Analysis) -> dict[str, object]:
     """Turn an analysis into plain values for JSON, ``nan`` as None.
 
