@@ -74,10 +74,14 @@ def write_analysis(
     OSError
         If the file cannot be written; what was there is then there still.
     """
-    text = json.dumps(
-        as_analysis_document(analysis), indent=1, ensure_ascii=False, allow_nan=False
-    )
-    write_file(path, text + "\n", within=within)
+    write_file(path, analysis_text(analysis), within=within)
+
+
+def analysis_text(analysis: Analysis) -> str:
+    """Return an analysis as its file has it."""
+    document = as_analysis_document(analysis)
+    text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
+    return text + "\n"
 
 
 def to_frame(results: "Iterable[Estimate] | Mapping[str, Estimate]") -> "DataFrame":

@@ -1,5 +1,6 @@
 """Options by which a verb fails when the numbers do not keep their limits."""
 
+import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +14,7 @@ from masrel.cli._options import Decorator, grouped
 from masrel.cli._paths import OutputFile
 
 if TYPE_CHECKING:
-    from masrel.analysis import Analysis
+    from masrel.analysis import Analysis, GateResult
     from masrel.protocol import Gate, Protocol
 
 _LARGEST_SUMMARY = 1 << 20  # GitHub takes no more of a step
@@ -61,6 +62,7 @@ class Verdict:
     """What came of the gates of a call, as it is said and written."""
 
     holds: bool  # whether all of them do
+    gates: tuple[dict[str, object], ...]  # each for JSON
     lines: tuple[str, ...]
     junit: str
     summary: str
@@ -86,10 +88,23 @@ def verdict_of(analysis: "Analysis", gates: "tuple[Gate, ...]") -> Verdict:
     results = check_gates(analysis, gates)
     return Verdict(
         holds=all(result.holds for result in results),
+        gates=tuple(map(_as_document, results)),
         lines=tuple(map(str, results)),
         junit=junit_text(analysis, results),
         summary=job_summary(analysis, results),
     )
+
+
+def _as_document(result: "GateResult") -> dict[str, object]:
+    gate = result.gate
+    return {
+        "gate": str(gate),
+        "why": gate.why,
+        "where": gate.where,
+        "number": result.number if math.isfinite(result.number) else None,
+        "holds": result.holds,
+        "reason": result.reason,
+    }
 
 
 def _is_text_of(file: Path, text: str) -> bool:

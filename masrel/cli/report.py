@@ -12,9 +12,12 @@ import click
 
 from masrel._cache import FOLDER, Cache
 from masrel._files import check_inside, refuse_record
+from masrel._input import MAX_TABLE, parse_json, read_regular
 from masrel._once import read_once
+from masrel.cli._comparing import CompareOptions, compare_options
 from masrel.cli._gating import GateOptions, Verdict, gate_options, verdict_of
 from masrel.cli._options import (
+    STDOUT,
     OutputOptions,
     echo_notes,
     notes_of_call,
@@ -22,11 +25,13 @@ from masrel.cli._options import (
     ratings_option,
     read_study,
     warnings_as_notes,
+    write_json,
 )
 from masrel.errors import ParameterError
 from masrel.report._builds import Build
 from masrel.report._report_folder import (
     MANIFEST,
+    NUMBERS,
     changed_files,
     replace_report,
     stale_assets,
@@ -40,7 +45,9 @@ if TYPE_CHECKING:
 
 FORMATS = ("html", "markdown", "latex", "docx")
 # They change nothing that is made or said
-_OTHER_OPTIONS = ("cache_folder", "check", "junit", "quiet")
+_OTHER_OPTIONS = (
+    *("cache_folder", "check", "junit", "quiet", "json_file", "against", "no_change"),
+)
 
 
 @click.command("report")
@@ -89,7 +96,10 @@ _OTHER_OPTIONS = ("cache_folder", "check", "junit", "quiet")
     help="Folder in which figures are kept until what they show changes; default: "
     f"STUDY/{FOLDER}.",
 )
+@compare_options()
 @output_options(
+    json="Write here what came of gates, --check and --against; - prints it, and "
+    "nothing else, on stdout.",
     raw_csv="No apostrophe before a text that a spreadsheet would run.",
     quiet="No progress bar.",
 )
@@ -103,6 +113,7 @@ def report(
     gating: GateOptions,
     include: tuple[str, ...],
     cache_folder: Path | None,
+    comparing: CompareOptions,
     output: OutputOptions,
 ) -> None:
     """Write the report of STUDY: HTML, Markdown, tables and figures.
@@ -120,24 +131,26 @@ def report(
         options=_options_of_call(),
         cache=_cache(study, cache_folder, check=check),
     )
-    changes: list[str] = []
-    shown = build.last()
-    if shown is None:
-        making = _Making(build, ratings_file, only, formats, gating, include, output)
-        with build.noted() as made:
-            files, shown = making.run()
-            # of what is written, not of what is there: others may write there, too
-            made["manifest"] = hashlib.sha256(files[MANIFEST]).hexdigest()
-            made["shown"] = shown
-            changes = _write_or_compare(files, destination, check=check)
-    else:
-        echo_notes(shown["notes"])
-    click.echo(shown["read"], err=True)
-    pages = [destination / page for page in shown["pages"] if page != "report.md"]
-    for line in changes if check else pages or [destination / "report.md"]:
-        click.echo(line)
-    Verdict(**shown["verdict"]).conclude(gating)
-    if check and changes:
+    old = comparing.read(study)  # which may be what is replaced
+    making = _Making(build, ratings_file, only, formats, gating, include, output)
+    outcome = making.outcome(check=check)
+    verdict = Verdict(**outcome.shown["verdict"])
+    prints_json = output.json_file == STDOUT
+    click.echo(outcome.shown["read"], err=True)
+    names = outcome.shown["pages"]
+    pages = [destination / name for name in names if name != "report.md"]
+    for line in outcome.changes if check else pages or [destination / "report.md"]:
+        click.echo(line, err=prints_json)
+    document: dict[str, Any] = {"gates": verdict.gates}
+    if check:
+        document["check"] = outcome.changes
+    if old is not None:
+        new = parse_json(outcome.numbers)
+        document |= comparing.compare(old, new, shows=not prints_json)
+    if output.json_file is not None:
+        write_json(document, output.json_file)
+    verdict.conclude(gating)
+    if outcome.changes or (comparing.no_change and document["changes"]):
         click.get_current_context().exit(1)
 
 
@@ -154,6 +167,15 @@ def _cache(study: Path, folder: Path | None, *, check: bool) -> Cache:
     return Cache(folder, is_read_only=check)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Outcome:
+    """What a call came to, whether anything had to be made or not."""
+
+    shown: dict[str, Any]  # what is said of it
+    changes: list[str]  # what a build would change, if it was only looked at
+    numbers: bytes  # the analysis, as the report's folder has it
+
+
 @dataclass(frozen=True, slots=True)
 class _Making:
     """What a report is made with."""
@@ -166,7 +188,23 @@ class _Making:
     include: tuple[str, ...]
     output: OutputOptions
 
-    def run(self) -> tuple[dict[str, bytes], dict[str, Any]]:
+    def outcome(self, *, check: bool) -> _Outcome:
+        """Make the report, or see that it is current."""
+        build = self.build
+        shown = build.last()
+        if shown is not None:
+            echo_notes(shown["notes"])
+            numbers = read_regular(build.folder / NUMBERS, most=MAX_TABLE)
+            return _Outcome(shown=shown, changes=[], numbers=numbers)
+        with build.noted() as made:
+            files, shown = self._run()
+            # of what is written, not of what is there: others may write there, too
+            made["manifest"] = hashlib.sha256(files[MANIFEST]).hexdigest()
+            made["shown"] = shown
+            changes = _write_or_compare(files, build.folder, check=check)
+        return _Outcome(shown=shown, changes=changes, numbers=files[NUMBERS])
+
+    def _run(self) -> tuple[dict[str, bytes], dict[str, Any]]:
         """Return the files of the report, and what is said of it."""
         with read_once(), _no_collection():
             data = read_study(self.build.study, self.ratings_file)
@@ -181,7 +219,11 @@ class _Making:
         return files, {
             "notes": notes_of_call(),
             "read": f"read: {data.read}",
-            "pages": [name for name in files if "/" not in name and name != MANIFEST],
+            "pages": [
+                name
+                for name in files
+                if "/" not in name and name not in (MANIFEST, NUMBERS)
+            ],
             "verdict": asdict(verdict_of(analysis, gates)),
         }
 

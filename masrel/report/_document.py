@@ -14,6 +14,7 @@ from pathlib import Path
 
 from masrel._cache import Cache, installed
 from masrel.analysis import Analysis
+from masrel.analysis._analysis_json import analysis_text
 from masrel.protocol import Protocol, report_sections
 from masrel.ratings import InPerson, Ratings
 from masrel.report._agreement import estimates_section
@@ -29,6 +30,7 @@ from masrel.report._published_numbers import PublishedClaims, claims_section
 from masrel.report._question_tables import questionnaires_section
 from masrel.report._report_folder import (
     MANIFEST,
+    NUMBERS,
     Assets,
     replace_report,
     report_files,
@@ -225,6 +227,7 @@ def make_report(
         for name, writer in WRITERS.items()
         if name in protocol.report.formats or name in formats
     }
+    pages[NUMBERS] = analysis_text(analysis).encode()
     if progress is not None:
         progress("pages")
     made_from = {**inputs, **({} if conduct is None else conduct.inputs)}

@@ -25,6 +25,7 @@ if sys.platform != "win32":
     import fcntl
 
 MANIFEST = "manifest.json"
+NUMBERS = "analysis.json"
 
 _N_HEX = 16  # of a hash in a name
 _ASSET_FOLDERS = ("tables", "figures")

@@ -45,6 +45,7 @@ def test_the_page_is_written_and_its_place_printed(masrel: Caller, study: Path) 
     assert {without_hash(name) for name in contents(study / "report")} == {
         "report.html",
         "report.md",
+        "analysis.json",
         "manifest.json",
         "tables/intended.csv",
         "tables/grades_test.csv",

@@ -229,7 +229,7 @@ def test_a_kill_leaves_whole_pages_with_what_they_link_to(
             n_killed += end == [-signal.SIGKILL]
             check_links(folder)
             left = contents(folder)
-            for page in ("report.html", "report.md", "manifest.json"):
+            for page in ("report.html", "report.md", "analysis.json", "manifest.json"):
                 assert left[page] in [each[page] for each in needed]
             if number % 8 == 7:
                 assert builder(call, after_s=None) == [0]

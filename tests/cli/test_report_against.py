@@ -1,0 +1,144 @@
+"""What has changed since an older report, number by number."""
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from masrel.cli import cli
+from masrel.protocol import copy_template
+from tests.cli.process import Caller
+
+LINE = """
+[[analysis.estimates]]
+id = "{name}"
+kind = "inter-rater"
+coefficient = "percent_agreement"
+models = "standard"
+sessions = ["test"]
+target = "raters"
+interval = "none"
+"""
+REPORT = '[report]\nsections = ["agreement", "intended"]\n'
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The published study with one estimate, and its report."""
+    root = tmp_path_factory.mktemp("made") / "study"
+    copy_template("hess2012", root)
+    plan(root, LINE.format(name="percent") + REPORT)
+    cli(["report", str(root), "--quiet"], standalone_mode=False)
+    return root
+
+
+@pytest.fixture
+def study(made: Path, tmp_path: Path) -> Path:
+    """A copy with its report, which a test may change."""
+    return Path(shutil.copytree(made, tmp_path / "study"))
+
+
+def plan(root: Path, lines: str) -> None:
+    protocol = root / "protocol.toml"
+    head = protocol.read_text(encoding="utf-8").partition("[[analysis.estimates]]")[0]
+    protocol.write_text(head + lines, encoding="utf-8")
+
+
+def change_a_grade(root: Path) -> None:
+    table = root / "ratings" / "published.csv"
+    text = table.read_text(encoding="utf-8")
+    assert "test,R8,HM2,1," in text
+    table.write_text(text.replace("test,R8,HM2,1,", "test,R8,HM2,1+,"))
+
+
+def compared(masrel: Caller, root: Path, *more: object) -> dict[str, Any]:
+    done = masrel("report", root, "--json", "-", "--quiet", *more)
+    return dict(json.loads(done.out))
+
+
+def test_nothing_has_changed(masrel: Caller, study: Path) -> None:
+    done = masrel("report", study, "--against", study / "report", "--no-change")
+    assert done.code == 0
+    assert f"no number has changed since {study / 'report'}" in done.out
+
+
+def test_another_input_of_the_same_numbers_is_no_change(
+    masrel: Caller, study: Path
+) -> None:
+    protocol = study / "protocol.toml"
+    text = protocol.read_text(encoding="utf-8")
+    protocol.write_text(text.replace('title = "', 'title = "New: ', 1), "utf-8")
+    document = compared(masrel, study, "--against", study / "report", "--no-change")
+    assert document["changes"] == []
+    (line,) = document["inputs"]
+    assert line.startswith("protocol: SHA-256 ")
+
+
+def test_a_grade_changes_what_it_enters(masrel: Caller, study: Path) -> None:
+    change_a_grade(study)
+    document = compared(masrel, study, "--against", study / "report")
+    changes = {(each["of"], each["field"]): each for each in document["changes"]}
+    # six of eight pairs of raters' grades of HM2 were 1+, now seven: of 28 pairs 21
+    # are equal, not 16; the mean is over four models
+    value = changes["percent", "value"]
+    assert value["difference"] == pytest.approx((21 - 16) / 28 / 4, abs=1e-15)
+    assert value["new"] == pytest.approx(value["old"] + 5 / 112, abs=1e-15)
+    agreed = changes["intended models HM2", "n agree"]
+    assert (agreed["old"], agreed["new"], agreed["difference"]) == (6, 7, 1)
+    assert document["inputs"][0].startswith("ratings: SHA-256 ")
+
+
+@pytest.mark.parametrize("writes", [False, True])
+def test_a_change_fails_if_asked_to(
+    masrel: Caller, study: Path, tmp_path: Path, writes: bool
+) -> None:
+    old = Path(shutil.copytree(study / "report", tmp_path / "old"))
+    change_a_grade(study)
+    before = (study / "report" / "analysis.json").read_bytes()
+    check = [] if writes else ["--check"]
+    done = masrel("report", study, "--against", old, "--no-change", *check)
+    assert done.code == 1
+    assert "What has changed since" in done.out
+    after = (study / "report" / "analysis.json").read_bytes()
+    assert (after != before) is writes
+
+
+def test_an_estimate_that_is_new_or_gone_is_a_change(
+    masrel: Caller, study: Path
+) -> None:
+    plan(study, LINE.format(name="other") + REPORT)
+    document = compared(masrel, study, "--against", study / "report")
+    values = {each["of"]: each for each in document["changes"] if each["field"] == "id"}
+    assert values["other"]["old"] is None
+    assert values["percent"]["new"] is None
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (None, "needs an analysis.json, or a folder that has one"),
+        ("{", "is no analysis: "),
+        ("[]", "is no analysis of a study"),
+        ('{"study": "tone"}', "needs an analysis of the study 'hess2012', "),
+        ('{"study": "hess2012", "format": 9}', "needs format 1, got 9"),
+    ],
+)
+def test_what_is_no_older_report_is_refused_before_anything_is_made(
+    masrel: Caller, study: Path, tmp_path: Path, text: str | None, words: str
+) -> None:
+    shutil.rmtree(study / "report")
+    old = tmp_path / "old.json"
+    if text is not None:
+        old.write_text(text)
+    done = masrel("report", study, "--against", old)
+    assert done.code == 2
+    assert done.err.startswith("masrel: --against: ")
+    assert words in done.err
+    assert not (study / "report").exists()
+
+
+def test_no_change_needs_something_to_compare_with(masrel: Caller, study: Path) -> None:
+    done = masrel("report", study, "--no-change")
+    assert "masrel: --no-change: needs --against" in done.err
