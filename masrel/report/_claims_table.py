@@ -1,9 +1,10 @@
 """Printed agreement held against every table: a row a claim, a row a reading."""
 
 from collections.abc import Sequence
+from dataclasses import fields
 
-from masrel.audit import ClaimAudit, ClaimReading, ConsistentTables
-from masrel.report._tables import Column, Table, Value
+from masrel.audit import Claim, ClaimAudit, ClaimReading, ConsistentTables
+from masrel.report._tables import Column, Table, Value, in_thousands
 
 _CLAIM_COLUMNS = (
     Column(key="claim", heading="Claim", align="left"),
@@ -94,8 +95,8 @@ def claims_document(audits: Sequence[ClaimAudit]) -> dict[str, object]:
     }
 
 
-def _fields(result: object) -> dict[str, object]:
-    return {name: getattr(result, name) for name in type(result).__dataclass_fields__}  # type: ignore[attr-defined]
+def _fields(result: Claim | ClaimReading) -> dict[str, object]:
+    return {each.name: getattr(result, each.name) for each in fields(result)}
 
 
 def _claim_row(audit: ClaimAudit) -> tuple[Value, ...]:
@@ -134,7 +135,7 @@ def _reading_row(audit: ClaimAudit, reading: ClaimReading) -> tuple[Value, ...]:
 def _number(result: ClaimReading | ConsistentTables) -> Value:
     if result.n_tables is None:
         return "cannot tell"
-    number = f"{result.n_tables:,}".replace(",", " ")
+    number = in_thousands(result.n_tables)
     return f"at least {number}" if result.status == "at least" else number
 
 

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from masrel.agreement import coefficient
 from masrel.planning import Plan
 from masrel.report._figure_data import PlanCurve, PlanCurves
-from masrel.report._tables import Column, Table, number
+from masrel.report._tables import Column, Table, number, percent, significant
 
 _COLUMNS = (
     Column(key="value", heading="κ or ICC", digits=3),
@@ -33,7 +33,7 @@ def planning_table(plans: Sequence[Plan], *, labels: Sequence[str] = ()) -> Tabl
     name = Column(key="line", heading="line of the plan", align="left")
     caption = (
         f"What studies can show of {coefficient(first.coefficient).title}, "
-        f"{first.level * 100:g} % interval for other {_TARGETS[first.target]}, model: "
+        f"{percent(first.level)} % interval for other {_TARGETS[first.target]}, model: "
         f"{first.model}"
         if not labels
         else "What the study can show, by line of its plan"
@@ -113,9 +113,9 @@ def planning_sentence(plan: Plan) -> str:
     sides = "" if plan.sides == 2 else "one-sided "
     return (
         f"With {plan.n_items} items and {plan.n_raters} raters, the {sides}"
-        f"{plan.level * 100:g} % interval of {title}{weights} for other "
+        f"{percent(plan.level)} % interval of {title}{weights} for other "
         f"{_TARGETS[plan.target]}{width or ' reaches the aim'}{rest}, if the "
-        f"coefficient is {plan.value:.3g} ({plan.model} model; {how})."
+        f"coefficient is {significant(plan.value, 3)} ({plan.model} model; {how})."
     )
 
 
@@ -171,7 +171,8 @@ def planning_curves(plans: Sequence[Plan]) -> PlanCurves:
         what="power" if has_power else "expected half-width",
         curves=tuple(
             PlanCurve(
-                label=f"{n_raters} raters" + (f", {value:g}" if several else ""),
+                label=f"{n_raters} raters"
+                + (f", {significant(value)}" if several else ""),
                 n_items=tuple(plan.n_items for plan in group),
                 numbers=tuple(
                     plan.power if has_power else plan.expected_half_width

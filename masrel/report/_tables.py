@@ -178,6 +178,11 @@ def counted(count: int, noun: str) -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
+def in_thousands(count: int) -> str:
+    """Return a whole number with a space every three digits."""
+    return f"{count:,}".replace(",", " ")
+
+
 def page_cells(table: Table) -> tuple[list[Column], list[list[str]]]:
     """Return the columns of a page or a screen, and its rows as shown in them."""
     places = [(i, c) for i, c in enumerate(table.columns) if c.where != "csv"]
