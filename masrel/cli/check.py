@@ -127,14 +127,14 @@ def _ratings_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
 
 def _table_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
     from masrel.ratings.logs import _of_logs
-    from masrel.ratings.study_data import refuse_other_table
+    from masrel.ratings.study_data import _refuse_other_table
 
     try:
         ratings = _of_logs(study, protocol, check_recordings=False)
     except MasrelError:
         return  # another checker has said what is wrong with the logs
     try:
-        refuse_other_table(study.ratings_file, ratings)
+        _refuse_other_table(study.ratings_file, ratings)
     except RatingsError as error:
         yield str(error)
 

@@ -82,7 +82,7 @@ def read_study_data(
     """
     if file is None and study.logs():
         ratings = ratings_from_logs(study, protocol)
-        refuse_other_table(study.ratings_file, ratings)
+        _refuse_other_table(study.ratings_file, ratings)
         read = f"{len(ratings.table)} ratings from the logs in {study.sessions}"
     else:
         source = file or _file_of(study)
@@ -135,7 +135,7 @@ def _file_of(study: StudyPaths) -> Path:
     )
 
 
-def refuse_other_table(path: Path, ratings: Ratings) -> None:
+def _refuse_other_table(path: Path, ratings: Ratings) -> None:
     """Refuse a study's ``ratings.csv`` that is not what its logs say."""
     differences = list(table_differences(path, ratings))
     if differences:

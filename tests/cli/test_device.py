@@ -61,6 +61,7 @@ def test_zero_says_the_count(masrel: Caller, tmp_path: Path) -> None:
     assert done.code == 0
     assert done.out.startswith("the arm is at 90 deg: 19251 counts\n")
     document = json.loads(file.read_text(encoding="utf-8"))
+    assert document.pop("format") == "masrel device zero 1"
     assert document == {"angle_deg": 90.0, "counts": 19251, "simulated": True}
 
 

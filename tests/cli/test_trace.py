@@ -14,6 +14,7 @@ from masrel.elbow import STANDARD_MODELS, MinimumJerk, events, peak_torque
 STUDIES = Path(__file__).parents[2] / "studies"
 
 KEYS = [
+    "format",
     "model",
     "motion",
     "speed_deg_s",
