@@ -167,6 +167,7 @@ def test_tardieu_of_hm1_by_hand() -> None:
     # (2): L - α·v = 130 - 0.35 · 100 and · 150 deg; at 10 deg/s nothing catches.
     made = document("--tardieu", "--model", "HM1")
     assert list(made) == [
+        "format",
         "model",
         "kind",
         "from_deg",
