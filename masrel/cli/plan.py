@@ -1,7 +1,7 @@
 """``masrel plan``: how large a study must be, and what a study can show."""
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -51,6 +51,7 @@ class PlanningOptions:
     """What is planned."""
 
     coefficient: str
+    pilot: Path | None
     value: list[float] | None
     items: list[int] | None
     raters: list[int] | None
@@ -131,6 +132,13 @@ _options = grouped(
     "options",
     PlanningOptions,
     click.option("--coefficient", default="fleiss_kappa", show_default=True),
+    click.option(
+        "--pilot",
+        metavar="FILE",
+        type=InputFile(path_type=Path),
+        help="Ratings of which value, prevalences and missing share are taken, unless "
+        "they are given.",
+    ),
     click.option("--value", type=_NUMBERS, help="True coefficient, or several."),
     click.option("--items", type=_WHOLE, help="How many, as 30, 20,40 or 20:60:10."),
     click.option("--raters", type=_WHOLE, help="The same; one of both is solved for."),
@@ -226,6 +234,7 @@ def plan(
     of its plan is described at its size.
     """
     output.check_files()
+    options = _with_pilot(options)
     labels: tuple[str, ...] = ()
     if study is not None:
         labels, plans = _of_study(study, options, is_quiet=output.quiet)
@@ -254,6 +263,38 @@ def plan(
             else planning_table(plans, labels=labels)
         ),
         figure=lambda: planning_curves(plans),
+    )
+
+
+def _with_pilot(options: PlanningOptions) -> PlanningOptions:
+    # what nobody gave is what a pilot had
+    if options.pilot is None:
+        return options
+    from masrel.planning import pilot
+    from masrel.ratings import read_ratings
+
+    target = options.common()["target"]
+    file = read_ratings(options.pilot)
+    if len(file.parts) != 1:
+        raise ParameterError(
+            f"--pilot: needs the ratings of one group and session, {options.pilot} has "
+            f"{len(file.parts)}"
+        )
+    made = pilot(
+        options.coefficient,
+        file.parts[0].ratings,
+        target=target,
+        weights=options.weights,
+        level=options.level,
+    )
+    click.echo(f"pilot {options.pilot}: {made.estimate}", err=True)
+    shares = ",".join(map(repr, made.prevalences))
+    is_normal = options.coefficient.startswith("icc")
+    return replace(
+        options,
+        value=options.value or [made.estimate.value],
+        prevalences=options.prevalences or (None if is_normal else shares),
+        p_missing=options.p_missing or made.p_missing,
     )
 
 

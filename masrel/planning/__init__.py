@@ -7,6 +7,15 @@ its Monte Carlo error.
 
 from masrel.planning._grids import plan_grid
 from masrel.planning._item_models import LatentModel
+from masrel.planning._pilot import Pilot, pilot
 from masrel.planning._sizes import Plan, precision, sample_size
 
-__all__ = ["LatentModel", "Plan", "plan_grid", "precision", "sample_size"]
+__all__ = [
+    "LatentModel",
+    "Pilot",
+    "Plan",
+    "pilot",
+    "plan_grid",
+    "precision",
+    "sample_size",
+]
