@@ -12,7 +12,7 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from masrel.hess import HandTraits
-from tests.hess.tone_held import HEAD, KINDS, N_HANDS, outcome, presented, raters, row
+from tests.hess.tone_held import HEAD, KINDS, SEEDS, outcome, presented, raters, row
 
 FIGURE = Path(__file__).parents[1] / "figures" / "tone_held.png"
 BLUE, VERMILLION, GREY = "#0072B2", "#D55E00", "#6B6B6B"
@@ -42,8 +42,10 @@ def draw(path: Path) -> None:
 
 
 if __name__ == "__main__":
-    n_hands = int(sys.argv[1]) if len(sys.argv) > 1 else N_HANDS
+    n_hands = int(sys.argv[1]) if len(sys.argv) > 1 else len(SEEDS)
     draw(FIGURE)
     print(HEAD)
     for kind in KINDS if n_hands else ():
-        print(row(kind, [outcome(r) for r in raters(kind, range(n_hands))]), flush=True)
+        print(
+            row(kind, [outcome(r) for r in raters(kind, SEEDS[:n_hands])]), flush=True
+        )

@@ -16,6 +16,7 @@ from masrel.protocol import Training
 from masrel.training import Calibration, Criterion, calibrate, confusion
 from masrel.training._trainees import (
     SKILLS,
+    adaptive_weights,
     confusion_with_kappa,
     draw_blocks,
     draw_grades,
@@ -69,8 +70,8 @@ def calibrated(rule: Criterion, false_pass: float = RULES.false_pass) -> Calibra
 
 def grades_of(
     rule: Criterion, table: Floats, shape: tuple[int, int], rng: np.random.Generator
-) -> tuple[Integers, Integers]:
-    """Intended grades and those of trainees of one confusion, both of the shape."""
+) -> tuple[Integers, Integers, Floats | None]:
+    """Intended grades, those of trainees of one confusion, and what each counts."""
     return draw_training(table, rule.intended, rule.order, shape, rng)
 
 
@@ -147,7 +148,12 @@ def fixed_errors(
     return fails, float(limit)
 
 
-def kappa_of_all(rule: Criterion, intended: Integers, codes: Integers) -> Floats:
+def kappa_of_all(
+    rule: Criterion,
+    intended: Integers,
+    codes: Integers,
+    weights: Floats | None = None,
+) -> Floats:
     """Kappa of all presentations of each trainee: (n,)."""
     n_presentations = intended.shape[1]
     whole = replace(
@@ -157,7 +163,7 @@ def kappa_of_all(rule: Criterion, intended: Integers, codes: Integers) -> Floats
         sufficient=1.0,  # the evidence is n times (kappa - 0)
         window=n_presentations,
     )
-    return whole.evidence(intended, codes)[:, 0] / n_presentations
+    return whole.evidence(intended, codes, weights)[:, 0] / n_presentations
 
 
 def percent(share: float) -> str:
@@ -301,7 +307,7 @@ def grouped_test(rule: Criterion, size: int, n: int) -> float:
     limits = []
     for table in tables_with(rule, rule.insufficient).values():
         drawn = grades_of(rule, table, (n, rule.max_presentations), rng)
-        best = np.max(group_kappas(rule, size, *drawn), axis=1)
+        best = np.max(group_kappas(rule, size, *drawn[:2]), axis=1)
         limits.append(np.quantile(best, 1.0 - RULES.false_pass, method="higher"))
     return float(max(limits))
 
@@ -338,8 +344,10 @@ def beyond(n: int) -> None:
     boundary = calibrated(rule).boundary
     shape = n, rule.max_presentations
 
-    def show(name: str, intended: Integers, codes: Integers) -> None:
-        passed, _ = lengths(rule, rule.evidence(intended, codes), boundary)
+    def show(
+        name: str, intended: Integers, codes: Integers, weights: Floats | None = None
+    ) -> None:
+        passed, _ = lengths(rule, rule.evidence(intended, codes, weights), boundary)
         print(f"| {name} | {percent(float(passed.mean()))} |")
 
     print("| trainee, κ = 0.6 | passes |\n|---|---|")
@@ -431,7 +439,7 @@ def orders(n: int) -> None:
 
 def learnt_by_meeting(
     rule: Criterion, paces: Floats, n: int
-) -> tuple[Integers, Integers]:
+) -> tuple[Integers, Integers, Floats | None]:
     """Grades of trainees whose noise falls, of each model, as they meet that model."""
     rng = np.random.default_rng(SEED)
     first, last = noise_with_kappa(rule, 0.3), noise_with_kappa(rule, 0.9)
@@ -448,17 +456,20 @@ def learnt_by_meeting(
     trainees, codes = np.arange(n), np.asarray(INTENDED)
     met, wrong = np.zeros((2, n, len(INTENDED)), dtype=np.int64)
     fixed = draw_blocks(len(INTENDED), (n, rule.max_presentations), rng)
+    drawn = fixed.copy()
     intended, grades = np.empty((2, n, rule.max_presentations), dtype=np.int64)
     for at in range(rule.max_presentations):
         models = fixed[:, at]
         if rule.order == "adaptive":
             shares = (1 + wrong).cumsum(axis=1)
             models = (rng.integers(0, shares[:, -1])[:, None] >= shares).sum(axis=1)
-        intended[:, at] = codes[models]
+        drawn[:, at], intended[:, at] = models, codes[models]
         grades[:, at] = draw_grades(rows[met[trainees, models], models], rng)
         met[trainees, models] += 1
         wrong[trainees, models] = grades[:, at] != intended[:, at]
-    return intended, grades
+    if rule.order == "blocked":
+        return intended, grades, None
+    return intended, grades, adaptive_weights(drawn, grades != intended, len(codes))
 
 
 def coverage(n: int) -> None:
@@ -470,7 +481,7 @@ def coverage(n: int) -> None:
         cells = []
         for size in (8, 16):
             drawn = grades_of(rule, table, (n, size), rng)
-            cells.append(percent(_covered(rule, kappa, *drawn)))
+            cells.append(percent(_covered(rule, kappa, *drawn[:2])))
         print(f"| {kappa:g} | " + " | ".join(cells) + " |")
     print()
 

@@ -25,10 +25,10 @@ _LOOSE_WINDOW_S = 0.005  # under 3 N·m a loose arm loses 18 times the speed's n
 # fifths, a loose one all but what the low-pass holds back.
 _LOOSE_SHARE = 0.6
 # Behind the guard a beat of clonus throws light hands back as well, and a hand may turn
-# the arm by itself, at up to 30 rad/s²: more counts, of what 2.4 N·m take in 6 ms.
-_GUARDED_SHARE = 0.75
+# the arm by itself, at up to 30 rad/s²: more counts, of what 2.8 N·m take in 6 ms.
+_GUARDED_SHARE = 0.78
 _GUARDED_WINDOW_S = 0.006
-_LEAST_LOSS = math.radians(14.0)
+_LEAST_LOSS = math.radians(16.0)
 _RANGE_END_MARGIN = math.radians(3.0)  # what the loop takes for arrived, too
 
 
@@ -46,8 +46,8 @@ class Controller:
     meanwhile ends this at once.
 
     A model that is not passive is guarded: in every phase it is a fault when the arm
-    gets within 6 ms more than 0.75 of the speed that the torque would give it if nobody
-    held it, from 2.4 N·m on, or when its speed falls by more than `slip_speed_drop`
+    gets within 6 ms more than 0.78 of the speed that the torque would give it if nobody
+    held it, from 2.8 N·m on, or when its speed falls by more than `slip_speed_drop`
     within 10 ms while the model resists extension. The paper's own law has a trigger
     too, and is released as the paper has it instead.
 

@@ -79,13 +79,17 @@ class Criterion:
         """Models that are presented, which make a set."""
         return len(self.intended)
 
-    def evidence(self, intended: _Integers, codes: _Integers) -> _Floats:
+    def evidence(
+        self, intended: _Integers, codes: _Integers, weights: _Floats | None = None
+    ) -> _Floats:
         """Return the evidence after each set of presentations.
 
         Parameters
         ----------
         intended, codes : ndarray of int, shape (..., n_presentations)
             Codes of the intended grades and of the rater's, in order.
+        weights : ndarray of float, shape (..., n_presentations), optional
+            How much each presentation counts; alike by default.
 
         Returns
         -------
@@ -93,7 +97,7 @@ class Criterion:
             The largest of all runs that end there; minus infinity where kappa is
             undefined in all of them.
         """
-        sums = self._sums(intended, codes)  # (..., n_sets + 1, n_features)
+        sums = self._sums(intended, codes, weights)  # (..., n_sets + 1, n_features)
         n_sets = sums.shape[-2] - 1
         largest = np.full((*sums.shape[:-2], n_sets), -np.inf)
         for length in range(1, min(n_sets, self.window // self.n_models) + 1):
@@ -132,11 +136,15 @@ class Criterion:
         coded = CodedRatings(codes=pairs.reshape(-1, 2), categories=self.grades)
         return COHEN_KERNEL.features(coded, self._disagreement())
 
-    def _sums(self, intended: _Integers, codes: _Integers) -> _Floats:
+    def _sums(
+        self, intended: _Integers, codes: _Integers, weights: _Floats | None
+    ) -> _Floats:
         # cumulative over sets, from 0 on
         n_sets = intended.shape[-1] // self.n_models
         cells = (intended * len(self.grades) + codes)[..., : n_sets * self.n_models]
         features = self._features()[cells]
+        if weights is not None:
+            features = features * weights[..., : cells.shape[-1], None]
         by_set = features.reshape(
             *cells.shape[:-1], n_sets, self.n_models, features.shape[-1]
         ).sum(axis=-2)

@@ -17,6 +17,7 @@ from masrel._input import format_problem
 from masrel.errors import SessionLogError
 from masrel.protocol import Protocol, StudyPaths, presented_hash
 from masrel.training._criterion import Criterion, training_criterion
+from masrel.training._trainees import adaptive_weights
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -97,6 +98,9 @@ class TrainingRecord:
         The largest chances of both errors, the latter as calibrated.
     order_seed : int
         What the order was drawn from.
+    is_weighted : bool
+        Whether presentations in adaptive order count by how likely they were; in a
+        training begun before they did, they count alike to its end.
     lessons : tuple of Lesson
         In order.
     passed : bool or None
@@ -111,6 +115,7 @@ class TrainingRecord:
     false_pass: float
     false_fail: float
     order_seed: int
+    is_weighted: bool
     lessons: tuple[Lesson, ...]
     passed: bool | None
     simulated: bool
@@ -126,7 +131,16 @@ class TrainingRecord:
         code = {grade: at for at, grade in enumerate(self.criterion.grades)}
         pairs = [(code[one.intended], code[one.grade]) for one in self.lessons]
         codes = np.array(pairs, dtype=np.int64).reshape(-1, 2)
-        return self.criterion.evidence(codes[:, 0], codes[:, 1])
+        weights = None
+        if self.is_weighted and self.criterion.order == "adaptive":
+            models = {one.model: None for one in self.lessons}
+            number = {model: at for at, model in enumerate(models)}
+            weights = adaptive_weights(
+                np.array([number[one.model] for one in self.lessons], dtype=np.int64),
+                codes[:, 0] != codes[:, 1],
+                self.criterion.n_models,
+            )
+        return self.criterion.evidence(codes[:, 0], codes[:, 1], weights)
 
 
 def read_training(study: StudyPaths, protocol: Protocol, rater: str) -> TrainingRecord:
@@ -219,6 +233,7 @@ def record_of(
         false_pass=float(str(header["false_pass"])),
         false_fail=float(str(header["calibrated_false_fail"])),
         order_seed=int(str(header["order_seed"])),
+        is_weighted=bool(header.get("is_weighted", False)),
         lessons=tuple(_lesson(e) for e in events if e.kind == "grade"),
         passed=bool(ended[-1]["passed"]) if ended else None,
         simulated=bool(header["simulated"]),

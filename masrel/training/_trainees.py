@@ -118,24 +118,42 @@ def draw_training(
     order: str,
     shape: tuple[int, int],
     rng: np.random.Generator,
-) -> tuple[_Integers, _Integers]:
-    """Return codes of intended grades and of those given, both of the shape."""
-    # of so many trainees and presentations
+) -> tuple[_Integers, _Integers, _Floats | None]:
+    """Return codes of intended grades and of those given, and how much each counts."""
+    # all of the shape, so many trainees and presentations; None where all count alike
     codes = np.asarray(intended, dtype=np.int64)
     if order == "blocked":
         met = codes[draw_blocks(codes.size, shape, rng)]
-        return met, draw_grades(confusion[met], rng)
+        return met, draw_grades(confusion[met], rng), None
     trainees = np.arange(shape[0])
     wrong = np.zeros((shape[0], codes.size), dtype=np.int64)  # the last time
-    met, grades = np.empty(shape, dtype=np.int64), np.empty(shape, dtype=np.int64)
+    models, grades = np.empty(shape, dtype=np.int64), np.empty(shape, dtype=np.int64)
     for at in range(shape[1]):
         shares = (1 + wrong).cumsum(axis=1)
         drawn = rng.integers(0, shares[:, -1])
-        models = (drawn[:, None] >= shares).sum(axis=1)
-        met[:, at] = codes[models]
-        grades[:, at] = draw_grades(confusion[met[:, at]], rng)
-        wrong[trainees, models] = grades[:, at] != met[:, at]
-    return met, grades
+        model = (drawn[:, None] >= shares).sum(axis=1)
+        models[:, at] = model
+        grades[:, at] = draw_grades(confusion[codes[model]], rng)
+        wrong[trainees, model] = grades[:, at] != codes[model]
+    met = codes[models]
+    return met, grades, adaptive_weights(models, grades != met, codes.size)
+
+
+def adaptive_weights(
+    models: _Integers, wrong: NDArray[np.bool_], n_models: int
+) -> _Floats:
+    """Return how much each presentation in adaptive order counts, 1 in the mean."""
+    # models, from 0, and whether they were misgraded: both (..., n_presentations). A
+    # model counts the less the likelier it was to be drawn, so that kappa is that of
+    # models which are as likely as each other.
+    chances = np.ones((*models.shape[:-1], n_models))  # 2 if misgraded the last time
+    weights = np.empty(models.shape)
+    for at in range(models.shape[-1]):
+        model = models[..., at, None]
+        drawn = np.take_along_axis(chances, model, axis=-1)
+        weights[..., at] = chances.sum(axis=-1) / (n_models * drawn[..., 0])
+        np.put_along_axis(chances, model, 1.0 + wrong[..., at, None], axis=-1)
+    return weights
 
 
 def draw_blocks(

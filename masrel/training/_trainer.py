@@ -208,6 +208,7 @@ class _Trainer:
             "boundary": calibration.boundary,
             "calibrated_false_fail": calibration.false_fail,
             "order_seed": seed,
+            "is_weighted": True,
         }
 
     def run(self, feedback: Callable[[Lesson], object] | None) -> TrainingRecord:

@@ -245,7 +245,7 @@ def test_a_lost_grip_is_a_fault_with_the_ramp_in_every_phase() -> None:
     assert fault is not None
     assert fault.kind == "slip"
     assert fault.message.startswith(
-        "slip: needs an arm whose speed changes by at most 0.75 of a loose arm's 31 "
+        "slip: needs an arm whose speed changes by at most 0.78 of a loose arm's 31 "
         "deg/s in 6 ms, got 2"
     )
     assert 0.6 < fault.time_s < 0.62

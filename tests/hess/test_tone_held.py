@@ -12,9 +12,9 @@ from masrel.recording import stretches
 from .tone_held import (
     HOLD_S,
     KINDS,
-    N_HANDS,
     N_STRETCHES,
     NOTICE_S,
+    SEEDS,
     Outcome,
     outcome,
     presented,
@@ -73,7 +73,7 @@ def test_three_hands_that_let_go_are_told_from_three_that_hold(kind: str) -> Non
 def test_hands_hold_a_kind_and_those_that_let_go_are_noticed(
     kind: str,
 ) -> None:
-    outcomes = [outcome(rater) for rater in raters(kind, range(N_HANDS))]
+    outcomes = [outcome(rater) for rater in raters(kind, SEEDS)]
     assert row(kind, outcomes) in PAGE.read_text(encoding="utf-8")
     assert all(o.is_law and o.ramps for o in outcomes)
     assert max((o.slip_s or 0.0) for o in outcomes) <= NOTICE_S

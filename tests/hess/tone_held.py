@@ -34,7 +34,7 @@ from masrel.hess import (
 
 START, END = radians(30.0), radians(146.0)
 N_STRETCHES, HOLD_S = 3, 1.5
-N_HANDS = 100  # of the page, drawn by the seeds 0 to 99
+SEEDS = range(200, 300)  # of the hands of the page; the rule was set on 0 to 99
 LIMITS = DeviceLimits(active_speed=radians(240.0))  # as in studies/tone
 FELT_NM = 3.0  # from which torque on a lost grip is noticed in time
 RETURN_SPEED = radians(60.0)

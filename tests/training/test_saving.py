@@ -1,5 +1,7 @@
 """The test of a training needs fewer presentations than a fixed number as sure."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -19,8 +21,9 @@ N = 1_000
 
 
 @pytest.mark.slow
-def test_it_needs_30_percent_fewer_presentations_at_equal_errors() -> None:
-    rule, rng = criterion(), np.random.default_rng(SEED)
+@pytest.mark.parametrize("order", ["blocked", "adaptive"])
+def test_it_needs_30_percent_fewer_presentations_at_equal_errors(order: str) -> None:
+    rule, rng = criterion(order=order), np.random.default_rng(SEED)
     boundary = calibrated(rule).boundary
     bad = sequential(rule, boundary, rule.insufficient, N, rng)
     good = sequential(rule, boundary, rule.sufficient, N, rng)
@@ -31,7 +34,7 @@ def test_it_needs_30_percent_fewer_presentations_at_equal_errors() -> None:
     assert false_fail <= 0.1
     mean = max(length for _, length in good.values())
     as_many = int(mean / 0.7 / rule.n_models) * rule.n_models
-    fails, _ = fixed_errors(rule, as_many, false_pass, N)
+    fails, _ = fixed_errors(replace(rule, order="blocked"), as_many, false_pass, N)
     # a fixed number that is 30 % larger fails more
     assert fails > false_fail + 4.0 * (2.0 * false_fail / N) ** 0.5
 

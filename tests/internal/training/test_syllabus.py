@@ -7,7 +7,11 @@ import pytest
 
 from masrel.training import Lesson
 from masrel.training._syllabus import next_model
-from masrel.training._trainees import draw_blocks, draw_training
+from masrel.training._trainees import (
+    adaptive_weights,
+    draw_blocks,
+    draw_training,
+)
 
 INTENDED = {"A": "1", "B": "2", "C": "3"}
 
@@ -70,9 +74,13 @@ def test_the_adaptive_order_of_trainees_is_that_of_raters() -> None:
     # the third grade is always given wrong
     table = np.eye(4)
     table[2] = [1.0, 0.0, 0.0, 0.0]
-    intended, codes = draw_training(
+    intended, codes, weights = draw_training(
         table, (0, 1, 2), "adaptive", (2_000, 60), np.random.default_rng(1)
     )
+    # by what it counts, each model is as frequent as any other
+    assert weights is not None
+    counted = np.bincount(intended.ravel(), weights.ravel()) / intended.size
+    assert counted == pytest.approx([1.0 / 3.0] * 3, abs=0.01)
     assert (codes[intended == 2] == 0).all()
     assert (codes[intended < 2] == intended[intended < 2]).all()
     rater = Counter(
@@ -83,3 +91,12 @@ def test_the_adaptive_order_of_trainees_is_that_of_raters() -> None:
     shares = np.bincount(intended.ravel()) / intended.size
     expected = [rater[model] / 18_000 for model in "ABC"]
     assert shares == pytest.approx(expected, abs=0.02)
+
+
+def test_what_a_presentation_counts_by_hand() -> None:
+    # Of two models, chances 1/2; B misgraded: A 1/3, B 2/3; right again: 1/2
+    models, wrong = np.array([1, 1, 0]), np.array([True, False, False])
+    expected = [1.0, 0.5 / (2.0 / 3.0), 1.0]
+    assert adaptive_weights(models, wrong, 2) == pytest.approx(expected)
+    models, wrong = np.array([1, 0, 0]), np.array([True, True, False])
+    assert adaptive_weights(models, wrong, 2) == pytest.approx([1.0, 1.5, 1.0])
