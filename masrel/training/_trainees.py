@@ -146,13 +146,13 @@ def adaptive_weights(
     # models, from 0, and whether they were misgraded: both (..., n_presentations). A
     # model counts the less the likelier it was to be drawn, so that kappa is that of
     # models which are as likely as each other.
-    chances = np.ones((*models.shape[:-1], n_models))  # 2 if misgraded the last time
+    tickets = np.ones((*models.shape[:-1], n_models))  # 2 if misgraded the last time
     weights = np.empty(models.shape)
     for at in range(models.shape[-1]):
         model = models[..., at, None]
-        drawn = np.take_along_axis(chances, model, axis=-1)
-        weights[..., at] = chances.sum(axis=-1) / (n_models * drawn[..., 0])
-        np.put_along_axis(chances, model, 1.0 + wrong[..., at, None], axis=-1)
+        drawn = np.take_along_axis(tickets, model, axis=-1)
+        weights[..., at] = tickets.sum(axis=-1) / (n_models * drawn[..., 0])
+        np.put_along_axis(tickets, model, 1.0 + wrong[..., at, None], axis=-1)
     return weights
 
 
