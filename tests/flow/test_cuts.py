@@ -305,6 +305,9 @@ def test_a_full_disk_at_every_system_call(
         made.restore()
         with faults(f"`{verb}` with a full disk at a system call that needs space"):
             done = syscall.inject("error=ENOSPC", masrel_command(*made.call))
-            assert done.returncode == 2, done.stderr
-            check_disk_is_said_full(made.root, done.stderr)
+            if verb == "report" and done.returncode == 0:  # of its cache alone
+                assert events_and_contents(made.root) == made.after
+            else:
+                assert done.returncode == 2, done.stderr
+                check_disk_is_said_full(made.root, done.stderr)
             made.check()
