@@ -6,12 +6,14 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
+from masrel._files import write_file
 from masrel.cli._options import (
     OutputOptions,
     output_options,
     warnings_as_notes,
     write_output,
 )
+from masrel.cli._paths import OutputFile
 from masrel.protocol import Protocol, StudyPaths, read_protocol, scale_of
 
 if TYPE_CHECKING:
@@ -42,6 +44,12 @@ _WIDTH = 88  # of notes below a table
     type=float,
     help="With --report: level of the intervals; default: 0.95.",
 )
+@click.option(
+    "--html",
+    "page",
+    type=OutputFile(path_type=Path, dir_okay=False),
+    help="With --report: write a page with the curve and the tables here.",
+)
 @output_options(
     json="With --report: write it here; - prints it, and nothing else, on stdout.",
     figure="With --report: draw the learning curve, as .png, .svg or .pdf.",
@@ -55,6 +63,7 @@ def train(
     clock: Literal["real", "simulated"] | None,
     report: bool,
     level: float | None,
+    page: Path | None,
     output: OutputOptions,
 ) -> None:
     """Train one rater of STUDY, or go on with the training where it stopped.
@@ -69,10 +78,17 @@ def train(
     protocol = read_protocol(paths.protocol)
     if report:
         _refuse("without --report", {"--grades": grades, "--clock": clock})
-        _report(paths, protocol, rater, 0.95 if level is None else level, output)
+        level = 0.95 if level is None else level
+        record = _report(paths, protocol, rater, level, output)
+        if page is not None:
+            # Imported here: the tables alone load nothing that draws.
+            from masrel.report._training_page import training_page
+
+            write_file(page, training_page(record, protocol, level=level))
         return
     strays = {
         "--level": level,
+        "--html": page,
         "--json": output.json_file,
         "--figure": output.figure,
         "--csv": output.csv or None,
@@ -141,23 +157,24 @@ def _report(
     rater: str,
     level: float,
     output: OutputOptions,
-) -> None:
-    from masrel.report._tables import SIMULATED
+) -> "TrainingRecord":
     from masrel.report._training_tables import (
         learning_view,
         training_document,
+        training_stamp,
         training_tables,
     )
     from masrel.training import read_training
 
-    record: TrainingRecord = read_training(paths, protocol, rater)
+    record = read_training(paths, protocol, rater)
     curve, confusion = training_tables(record, level=level)
     write_output(
         output,
         document=lambda: training_document(record, level=level),
         text=lambda: curve,
         figure=lambda: learning_view(record, level=level),
-        stamp=SIMULATED if record.simulated else f"{protocol.study.id}, training",
+        stamp=training_stamp(record, protocol.study.id),
         more=() if output.csv else (confusion,),
         width=_WIDTH,
     )
+    return record

@@ -10,7 +10,7 @@ from masrel.ratings import InPerson, Ratings
 from masrel.report import _figure_data as figure
 from masrel.report._tables import SIMULATED, SIMULATED_DEVICE, Table
 
-_SIMULATED_GRADES = (
+SIMULATED_GRADES = (
     "SIMULATED DATA – no person gave these grades",
     "The grades and speeds in this report are simulated. They show that the study "
     "runs; they say nothing about people or about the models.",
@@ -63,7 +63,7 @@ def gather(
     provenance = f"Study {study.id}, {data} ratings."
     trace_stamp = "Model reconstruction at recorded mean speeds, not a measurement"
     if ratings.simulated:
-        banner, provenance = _SIMULATED_GRADES
+        banner, provenance = SIMULATED_GRADES
         stamp = trace_stamp = SIMULATED
         if ratings.n_from_persons == len(table):
             data = data.replace("simulated", "simulated device")

@@ -9,6 +9,7 @@ from collections import Counter
 from masrel.estimates import Interval
 from masrel.report._figure_data import LearningView
 from masrel.report._tables import (
+    SIMULATED,
     Column,
     Table,
     Value,
@@ -117,6 +118,11 @@ def _confusion_table(record: TrainingRecord) -> Table:
         rows=tuple((one, *(freq[one, grade] for grade in grades)) for one in intended),
         data=_data_of(record),
     )
+
+
+def training_stamp(record: TrainingRecord, study: str) -> str:
+    """Return the line that the figure of a training carries."""
+    return SIMULATED if record.simulated else f"{study}, training"
 
 
 def _data_of(record: TrainingRecord) -> str:

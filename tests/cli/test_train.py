@@ -110,6 +110,13 @@ def test_a_simulated_trainee_learns_passes_and_is_reported(
     assert last["evidence"] >= document["criterion"]["boundary"]
     assert all(p["evidence"] < document["criterion"]["boundary"]
                for p in document["curve"][:-1])  # fmt: skip
+    page = tmp_path / "training.html"
+    masrel(*report, "--html", page)
+    text = page.read_text(encoding="utf-8")
+    assert "SIMULATED DATA" in text
+    assert f"Training of R1: passed after {len(lessons)} presentations." in text
+    assert "data:image/svg+xml;base64," in text
+    assert f">{last['kappa']:.3f}</td>" in text
     rows = list(csv.DictReader(masrel(*report, "--csv").out.splitlines()))
     assert [float(row["kappa"]) for row in rows] == [
         point["kappa"] for point in document["curve"]
@@ -256,6 +263,7 @@ def test_bad_calls_are_one_sentence_each(study: Path, masrel: Caller) -> None:
     assert "rater: needed one of R1, R2, got 'R9'" in said("--rater", "R9")
     assert "no such log" in said("--rater", "R1", "--report")
     assert "--csv: needed with --report only" in said("--rater", "R1", "--csv")
+    assert "--html: needed with --report only" in said("--rater", "R1", "--html", "x")
     assert "--clock: needed without --report only" in said(
         "--rater", "R1", "--report", "--clock", "real"
     )
