@@ -13,7 +13,7 @@ from masrel.report._training_tables import (
     training_tables,
 )
 from masrel.report.figures import draw
-from masrel.training import TrainingRecord
+from masrel.training._lessons import TrainingRecord
 
 
 def training_page(record: TrainingRecord, protocol: Protocol, *, level: float) -> bytes:
