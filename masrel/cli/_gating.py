@@ -71,11 +71,11 @@ class Verdict:
         """Write it, say which gates fail, and end with 1 if one does."""
         if options.junit is not None and not _is_text_of(options.junit, self.junit):
             write_file(options.junit, self.junit)
+        for line in self.lines:
+            click.echo(line, err=True)
         summary = os.environ.get("GITHUB_STEP_SUMMARY")
         if summary:
             _append(Path(summary), self.summary)
-        for line in self.lines:
-            click.echo(line, err=True)
         if not self.holds:
             click.get_current_context().exit(1)
 
@@ -117,4 +117,5 @@ def _is_text_of(file: Path, text: str) -> bool:
 
 def _append(file: Path, text: str) -> None:
     with open(file, "ab", opener=no_follow) as out:
-        out.write(text.encode()[:_LARGEST_SUMMARY])
+        # whole letters: a cut may go through one
+        out.write(text.encode()[:_LARGEST_SUMMARY].decode(errors="ignore").encode())

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from masrel._input import listed
 from masrel.errors import ParameterError
+from masrel.protocol._decode import got
 from masrel.protocol._keys import _Table, _Text
 
 if TYPE_CHECKING:
@@ -23,6 +24,7 @@ _COMPARISONS: dict[str, Callable[[float, float], bool]] = {
     ">": operator.gt,
     "<": operator.lt,
 }
+_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _PARTS = re.compile(r"\s*([^<>=\s]+)\s*(>=|<=|>|<)\s*([^<>=\s]+)\s*")
 
 
@@ -163,10 +165,7 @@ def gates_of(protocol: "Protocol") -> tuple[Gate, ...]:
 
 
 def _limit(text: str, where: str) -> float:
-    try:
-        limit = float(text)
-    except ValueError:
-        limit = math.nan
+    limit = float(text) if _NUMBER.fullmatch(text) else math.nan
     if not math.isfinite(limit):
         raise ParameterError(f"{where}: needed a number as limit, got {text!r}")
     return limit
@@ -181,6 +180,12 @@ def gate_rules(values: dict[str, Any]) -> Iterator[str]:
     for index, gate in enumerate((values.get("report") or {}).get("gates") or []):
         if gate is None or gate.get("require") is None:
             continue
+        why = gate.get("why") or ""
+        if not why.isprintable():  # it stands in a line of a table, and in XML
+            yield (
+                f"report.gates[{index}].why: needed one line without control "
+                f"characters, got {got(why)}"
+            )
         try:
             parse_gate(gate["require"], names, where=f"report.gates[{index}].require")
         except ParameterError as error:

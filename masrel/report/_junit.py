@@ -6,6 +6,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from masrel.analysis import Analysis, GateResult, PlannedEstimate
 from masrel.report._estimate_words import sentence
+from masrel.report._pages import as_markdown
 
 
 def junit_text(analysis: Analysis, gates: Sequence[GateResult]) -> str:
@@ -28,9 +29,11 @@ def junit_text(analysis: Analysis, gates: Sequence[GateResult]) -> str:
             SubElement(case, "failure", message=str(result))
     counts = {
         "tests": len(suite),
+        "errors": 0,
         "failures": len(suite.findall("*/failure")),
         "skipped": len(suite.findall("*/skipped")),
     }
+    suite.set("time", "0")
     for name, count in counts.items():
         suite.set(name, str(count))
     indent(suite)
@@ -43,12 +46,14 @@ def job_summary(analysis: Analysis, gates: Sequence[GateResult]) -> str:
     if analysis.simulated:
         lines += ["**SIMULATED DATA**", ""]
     lines += [
-        f"- {planned.line.id}: {_words(planned)}" for planned in analysis.estimates
+        f"- {as_markdown(f'{planned.line.id}: {_words(planned)}')}"
+        for planned in analysis.estimates
     ]
     if gates:
         lines += ["", "| gate | |", "|---|---|"]
         lines += [
-            f"| {'holds' if result.holds else '**fails**'} | {result} |"
+            f"| {'holds' if result.holds else '**fails**'} | "
+            f"{as_markdown(str(result))} |"
             for result in gates
         ]
     return "\n".join([*lines, ""]) + "\n"

@@ -113,7 +113,7 @@ def _from_template(name: str, document: Document) -> bytes:
         keep_trailing_newline=True,
     )
     environment.filters |= {
-        "md": _markdown,
+        "md": as_markdown,
         "symbols": _symbols,
         "cells": page_cells,
         "uri": _uri,
@@ -139,5 +139,6 @@ def _symbols(text: str) -> str:
 _MARKDOWN_ESCAPES = str.maketrans({letter: f"\\{letter}" for letter in "\\`*_|<>[]#"})
 
 
-def _markdown(text: str) -> str:
+def as_markdown(text: str) -> str:
+    """Return a text as one line of Markdown that shows it as it is."""
     return " ".join(text.translate(_MARKDOWN_ESCAPES).split())

@@ -105,6 +105,66 @@ def test_gates_of_the_protocol_are_checked_by_the_report_too(
     assert (tmp_path / "out" / "report.html").is_file()
 
 
+# What the schema of Jenkins' xUnit plugin, which others follow, has of each element.
+JUNIT = {
+    "testsuite": (
+        {"name", "tests", "failures", "errors", "skipped", "time"},
+        {"testcase"},
+    ),
+    "testcase": (
+        {"name", "classname", "time"},
+        {"skipped", "failure", "error", "system-out", "system-err"},
+    ),
+    "skipped": ({"message"}, set()),
+    "failure": ({"message"}, set()),
+    "system-out": (set(), set()),
+}
+
+
+def check_junit(root: ElementTree.Element) -> None:
+    assert root.tag == "testsuite"
+    for element in root.iter():
+        attributes, children = JUNIT[element.tag]
+        assert set(element.attrib) <= attributes
+        assert {child.tag for child in element} <= children
+    assert int(root.get("tests", "")) == len(root.findall("testcase"))
+    for tag in ("failure", "error", "skipped"):
+        name = tag if tag == "skipped" else f"{tag}s"
+        assert int(root.get(name, "")) == len(root.findall(f"*/{tag}"))
+
+
+def test_a_reason_keeps_to_its_cell(
+    masrel: Caller, study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    summary = tmp_path / "summary.md"
+    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(summary))
+    with (study / "protocol.toml").open("a") as file:
+        file.write('\n[[report.gates]]\nrequire = "kappa.std.n >= 5"\n')
+        file.write('why = "a | b <i>"\n')
+    assert masrel("analyze", study).code == 1
+    (row,) = [line for line in summary.read_text().splitlines() if "fails" in line]
+    assert r"(a \| b \<i\>)" in row
+
+
+@pytest.mark.parametrize("why", [r"odd \u0001 sign", r"two\nlines"])
+def test_a_reason_is_one_line(masrel: Caller, study: Path, why: str) -> None:
+    with (study / "protocol.toml").open("a") as file:
+        file.write(f'\n[[report.gates]]\nrequire = "kappa.std.n >= 5"\nwhy = "{why}"\n')
+    done = masrel("check", study)
+    assert done.code == 2
+    assert "report.gates[0].why: needed one line without control" in done.err
+
+
+def test_a_summary_that_cannot_be_written_hides_no_gate(
+    masrel: Caller, study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(tmp_path / "none" / "summary.md"))
+    done = masrel("analyze", study, "--require", "kappa.std.n > 4")
+    assert done.code == 2
+    assert "--require: kappa.std.n > 4 fails: 4" in done.err
+    assert done.err.splitlines()[-1].startswith(f"masrel: {tmp_path / 'none'}")
+
+
 def test_junit_and_the_summary_of_a_job_have_every_estimate_and_gate(
     masrel: Caller, study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -121,6 +181,7 @@ def test_junit_and_the_summary_of_a_job_have_every_estimate_and_gate(
         "failures": "1",
         "skipped": "1",
     }
+    check_junit(suite)
     cases = {case.get("name"): [child.tag for child in case] for case in suite}
     assert cases == {
         "kappa.std": ["system-out"],
@@ -131,7 +192,7 @@ def test_junit_and_the_summary_of_a_job_have_every_estimate_and_gate(
     text = summary.read_text()
     assert text.startswith("before\n")
     assert "Fleiss' κ = .63" in text
-    assert "| **fails** | --require: kappa.std.n > 4 fails: 4 |" in text
+    assert r"| **fails** | --require: kappa.std.n \> 4 fails: 4 |" in text
     first = junit.read_bytes()
     masrel("analyze", study, *gates, "--junit", junit)
     assert junit.read_bytes() == first
@@ -145,6 +206,8 @@ def test_junit_and_the_summary_of_a_job_have_every_estimate_and_gate(
         ("kappa.std.low = 0.4", "one of >=, <=, >, <, and a limit"),
         ("kappa.low >= 0.4", "needed an estimate of the plan (kappa.std, again), got"),
         ("kappa.std.low >= nan", "needed a number as limit, got 'nan'"),
+        ("kappa.std.low >= 1_0", "needed a number as limit, got '1_0'"),
+        ("kappa.std.low >= ٣", "needed a number as limit, got '٣'"),
     ],
 )
 def test_a_bad_gate_is_refused_before_anything_is_computed(
