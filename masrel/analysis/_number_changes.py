@@ -21,7 +21,7 @@ _NAMES = ("id", "questionnaire", "question", "session", "model", "rater", "name"
 """Fields that tell the elements of a list apart."""
 
 _WITHIN = ("estimates", "estimate", "interval")
-"""Fields that say nothing beside the name of a line of the plan."""
+"""Parts of a place that say nothing beside the name of a line of the plan."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,10 +36,10 @@ class Change:
     @property
     def difference(self) -> float | None:
         """The new number less the old one, if both are numbers."""
-        # whole ones and truth values are numbers of Python
-        if isinstance(self.old, float | int) and isinstance(self.new, float | int):
-            return self.new - self.old
-        return None
+        old, new = self.old, self.new
+        if isinstance(old, bool | str) or isinstance(new, bool | str):
+            return None
+        return None if old is None or new is None else new - old
 
 
 def read_old_analysis(place: Path, study: str, *, option: str) -> dict[str, Any]:
@@ -76,9 +76,9 @@ def changes_between(
     """Return every value that two analyses do not have in common."""
     before, after = dict(_values(old)), dict(_values(new))
     places = [*after, *(place for place in before if place not in after)]
-    return tuple(
+    changes = (
         Change(
-            of=" ".join(place[:-1]).replace("_", " "),
+            of=" ".join(p for p in place[:-1] if p not in _WITHIN).replace("_", " "),
             field=place[-1].replace("_", " "),
             old=before.get(place),
             new=after.get(place),
@@ -86,6 +86,8 @@ def changes_between(
         for place in places
         if before.get(place) != after.get(place)
     )
+    # once where an estimate repeats what its line of the plan says
+    return tuple(dict.fromkeys(changes))
 
 
 def changed_inputs(old: Mapping[str, Any], new: Mapping[str, Any]) -> tuple[str, ...]:
@@ -111,10 +113,8 @@ def _values(
     # every value by its place: names of fields, and of elements of lists
     if isinstance(value, Mapping):
         for name, part in value.items():
-            if name in _LEFT_OUT:
-                continue
-            inside = name in _WITHIN and isinstance(part, Mapping | list)
-            yield from _values(part, place if inside else (*place, name))
+            if name not in _LEFT_OUT:
+                yield from _values(part, (*place, name))
     elif isinstance(value, list) and any(isinstance(part, Mapping) for part in value):
         met: Counter[str] = Counter()
         for part in value:

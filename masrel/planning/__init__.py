@@ -8,7 +8,8 @@ its Monte Carlo error.
 from masrel.planning._grids import plan_grid
 from masrel.planning._item_models import LatentModel
 from masrel.planning._pilot import Pilot, pilot
-from masrel.planning._sizes import Plan, precision, sample_size
+from masrel.planning._precision import Plan
+from masrel.planning._sizes import precision, sample_size
 
 __all__ = [
     "LatentModel",

@@ -21,7 +21,7 @@ from masrel.planning._item_models import (
 from masrel.planning._studies import StudyDesign, StudyMaker, check_raters
 
 if TYPE_CHECKING:
-    from masrel.planning._sizes import Plan
+    from masrel.planning._precision import Plan
 
 _METHODS = ("auto", "wald", "goodness-of-fit", "exact", "simulation")
 _INTERVALS = ("auto", "t", "normal")

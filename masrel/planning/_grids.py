@@ -22,7 +22,7 @@ from masrel.errors import ParameterError
 from masrel.estimates import Target
 from masrel.planning._aims import RATER_SHARE, Aim, Question, pose_question
 from masrel.planning._item_models import LatentModel
-from masrel.planning._sizes import Plan, plan_from
+from masrel.planning._precision import Plan, plan_from
 from masrel.planning._studies import StudyDesign, StudySums
 from masrel.planning._tasks import TASK, exact_sums, is_enumerable, run_task
 
