@@ -3,6 +3,7 @@ r"""Tables as LaTeX, and a whole report as a file that pdflatex and lualatex com
 Every text is escaped. A letter that pdflatex cannot set is named in the first lines.
 """
 
+import textwrap
 import unicodedata
 from collections.abc import Iterator, Sequence
 
@@ -168,6 +169,7 @@ def _body(document: Document) -> Iterator[str]:
     yield _text(document.provenance)
     yield ""
     yield _text(f"{document.tag} {document.result}".strip())
+    yield r"\tableofcontents"
     for section in document.sections:
         yield ""
         yield rf"\section{{{_text(section.title)}}}\label{{sec:{section.name}}}"
@@ -175,7 +177,7 @@ def _body(document: Document) -> Iterator[str]:
             yield ""
             yield _block(block, document.tag)
     yield ""
-    yield r"\section*{Made from}"
+    yield r"\section*{Provenance}"
     yield rf"masrel {_text(document.version)}."
     yield r"\begin{description}\raggedright\small"
     for name, digest in document.inputs:
@@ -191,12 +193,18 @@ def _block(block: Block, tag: str) -> str:
     if isinstance(content, Drawing):
         return _figure(content, block.files["png"], tag)
     if isinstance(content, Listing):
-        lines = [rf"\leavevmode {_text(line)}\\" for line in content.text.splitlines()]
+        # as it is, so that it can be copied out of the file
+        lines = [part for line in content.text.splitlines() for part in _broken(line)]
         begin = rf"\subsection*{{{_text(content.title)}}}"
-        small = r"\begin{flushleft}\footnotesize\ttfamily"
-        return "\n".join([begin, small, *lines, r"\end{flushleft}"])
+        small = r"\begingroup\footnotesize\begin{verbatim}"
+        return "\n".join([begin, small, *lines, r"\end{verbatim}\endgroup"])
     text = _text(content.text)
     return rf"\emph{{{text}}}" if content.absent else text
+
+
+def _broken(line: str) -> list[str]:
+    # a line of a listing, in lines that fit
+    return textwrap.wrap(line, 96, subsequent_indent="    ") or [""]
 
 
 def _figure(drawing: Drawing, file: str, tag: str) -> str:
