@@ -1,9 +1,7 @@
 """``masrel report``: write the report of a study."""
 
-import gc
 import hashlib
 from collections.abc import Collection, Iterator, Mapping
-from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from masrel._cache import FOLDER, Cache
+from masrel._collector import collector_off
 from masrel._files import check_inside, refuse_record
 from masrel._input import MAX_TABLE, parse_json, read_regular
 from masrel._once import read_once
@@ -206,7 +205,8 @@ class _Making:
 
     def _run(self) -> tuple[dict[str, bytes], dict[str, Any]]:
         """Return the files of the report, and what is said of it."""
-        with read_once(), _no_collection():
+        # most of what libraries and figures make stays in use
+        with read_once(), collector_off():
             data = read_study(self.build.study, self.ratings_file)
             _check_sections(self.only, data.protocol)
             if "docx" in (*data.protocol.report.formats, *self.formats):
@@ -273,18 +273,6 @@ class _Making:
                 formats=self.formats,
                 cache=self.build.cache,
             )
-
-
-@contextmanager
-def _no_collection() -> Iterator[None]:
-    """Look for no garbage: most of what libraries and figures make stays in use."""
-    was_on = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_on:
-            gc.enable()
 
 
 def _check_sections(only: Collection[str], protocol: "Protocol") -> None:

@@ -2,7 +2,6 @@
 
 import contextlib
 import ctypes
-import gc
 import os
 import sys
 from collections.abc import Iterator
@@ -26,19 +25,6 @@ def scheduled(clock: Clock) -> Iterator[str | None]:
         return
     with real_time() as granted:
         yield granted
-
-
-@contextmanager
-def collector_off() -> Iterator[None]:
-    """Keep the garbage collector off until the block ends."""
-    # A collection could take longer than a tick
-    collecting = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if collecting:
-            gc.enable()
 
 
 @contextmanager

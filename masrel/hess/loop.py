@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from masrel._collector import collector_off
 from masrel.errors import (
     DeviceError,
     OverrunWarning,
@@ -14,7 +15,7 @@ from masrel.errors import (
 )
 from masrel.hess._course import Course
 from masrel.hess._presented import Presented, as_presented
-from masrel.hess._realtime import collector_off, scheduled
+from masrel.hess._realtime import scheduled
 from masrel.hess._shutdown import run_to_the_end
 from masrel.hess._spool import Samples, Spool, n_samples
 from masrel.hess._stop import EmergencyStop
@@ -166,6 +167,7 @@ def run_presentation(
             stop or EmergencyStop(),
             watchdog or NoWatchdog(),
         )
+        # a collection could take longer than a tick
         with scheduled(clock) as facts["scheduling"], collector_off():
             ended, fault = run_to_the_end(ticks)
         columns = samples.columns()

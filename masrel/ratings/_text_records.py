@@ -1,7 +1,6 @@
 """A text as records of cells: its comments, its separator, its lines."""
 
 import csv
-import gc
 import io
 import itertools
 import re
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from masrel._collector import collector_off
 from masrel.errors import RatingsError
 
 if TYPE_CHECKING:
@@ -143,19 +143,6 @@ def width_error(name: str, line: int, width: int, record: list[str]) -> RatingsE
         f"{name}: line {line}: needed {width} cells, as the first line has, got "
         f"{len(record)}: {', '.join(record)[:60]!r}"
     )
-
-
-@contextmanager
-def _collector_off() -> Iterator[None]:
-    # lists of text are no cycles; to look for some in 100 000 of them costs as much as
-    # to read them
-    was_on = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_on:
-            gc.enable()
 
 
 @contextmanager
@@ -317,7 +304,9 @@ class _Lines:
         # by the csv module, a quote that is not closed refused
         rows: list[list[str]] = []
         try:
-            with long_cells(len(self._body)), _collector_off():
+            # lists of text are no cycles; to look for some in 100 000 of them costs as
+            # much as to read them
+            with long_cells(len(self._body)), collector_off():
                 lines = io.StringIO(self._body, newline="")
                 rows = list(_csv_reader(lines, self._delimiter, strict=True))
         except csv.Error as error:
