@@ -18,7 +18,8 @@ from masrel.elbow._torque import (
     torque_at,
     work,
 )
-from masrel.elbow.joint_model import MODELS, JointModel, Stepper
+from masrel.elbow.joint_model import JointModel, Stepper
+from masrel.elbow.laws import MODELS
 from masrel.elbow.motions import (
     ConstantSpeed,
     Hold,

@@ -5,10 +5,9 @@ https://doi.org/10.1109/TNSRE.2012.2195330, equations (2), (4), (6) and Fig. 7.
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from itertools import pairwise
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 from masrel.elbow import _law
 from masrel.elbow._law import TorqueLaw
@@ -31,7 +30,6 @@ from masrel.recording import PHASES, Phase
 __all__ = ["Events", "PhaseSpan", "StretchEvents", "events"]
 
 _PRE_CATCH, _CATCH, _POST_CATCH = range(3)  # positions in PHASES
-_Stretch = TypeVar("_Stretch", "StretchEvents", "Stretch")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -178,17 +176,13 @@ def events(parameters: ElbowParameters, motion: Motion) -> Events:
         if until.time > start.time  # one of no length is left out
     ]
     stretches = [rounded(stretch, origin, end) for stretch in line.stretches]
-    first = first_stretch(stretches)
-    reached = {} if first is None else {name: getattr(first, name) for name in _REACHED}
+    reached = {}
+    if line.first is not None:
+        first = stretches[line.stretches.index(line.first)]
+        reached = {name: getattr(first, name) for name in _REACHED}
     return Events(
         **reached, stretches=tuple(stretches), end=end.time, phases=tuple(phases)
     )
-
-
-def first_stretch(stretches: Sequence[_Stretch]) -> _Stretch | None:
-    """Return the first stretch that catches, or the first if none does."""
-    caught = [stretch for stretch in stretches if stretch.catch is not None]
-    return next(iter(caught or stretches), None)
 
 
 def rounded(stretch: "Stretch", origin: float, end: "State") -> StretchEvents:
@@ -215,7 +209,7 @@ class State(NamedTuple):
     angle: float  # rad from the motion's origin
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class Stretch:
     """A movement in extension that reached ν_th, as far as it has got."""
 
@@ -227,17 +221,24 @@ class Stretch:
     rise: float = 0.0  # H·v_c of (3)
     peak_end: float = 0.0  # s; the catch may end before
     catch_end: State | None = None  # by the angle travelled, or as the arm is flexed
-    post_catch: State | None = None
     post_catch_end: State | None = None
+
+
+class Change(NamedTuple):
+    """The beginning of a phase."""
+
+    phase: int  # position in PHASES
+    state: State
+    stretch: Stretch | None = None  # whose catch or post-catch it is
 
 
 class Timeline(NamedTuple):
     """What happens in a motion."""
 
     law: TorqueLaw  # of pre-catch
-    # phases in order, each with the stretch whose catch or post-catch it is
-    changes: list[tuple[int, State, Stretch | None]]
+    changes: list[Change]  # in order
     stretches: list[Stretch]
+    first: Stretch | None  # that catches, or the first of all if none does
     end: State  # of the motion, or of the range of motion
 
 
@@ -253,7 +254,7 @@ def timeline(p: ElbowParameters, motion: Motion) -> Timeline:
     near = limit + NOTHING * abs(limit)
     for start, length, angle, slowest, fastest in motion.pieces():
         if not machine.changes:
-            machine.change(_PRE_CATCH, State(0.0, angle[0]))
+            machine.changes.append(Change(_PRE_CATCH, State(0.0, angle[0])))
         last, end = None, value(angle, length)
         if (end if slowest >= 0.0 else angle[0] + fastest * length) > near:
             last = first_above([angle[0] - limit, *angle[1:]], 0.0, length)
@@ -265,7 +266,10 @@ def timeline(p: ElbowParameters, motion: Motion) -> Timeline:
     end = State(motion.duration, motion.end - motion.origin)
     if last is not None:
         end = State(start + last, limit)
-    return Timeline(machine.law, machine.changes, machine.stretches, end)
+    stretches = machine.stretches
+    caught = [stretch for stretch in stretches if stretch.catch is not None]
+    first = next(iter(caught or stretches), None)
+    return Timeline(machine.law, machine.changes, stretches, first, end)
 
 
 class _PhaseMachine:
@@ -280,17 +284,11 @@ class _PhaseMachine:
         # θ_catch jumps at ν_H where ν_L is above that
         self.jumps = smallest > largest
         self.lowest, self.highest = sorted((smallest, largest))
-        self.phase = _PRE_CATCH
         self.goal = math.inf  # angle at which the catch ends, rad from the origin
         self.is_armed = True
         self.since: float | None = None  # time since onset, of a movement in pre-catch
-        self.changes: list[tuple[int, State, Stretch | None]] = []
+        self.changes: list[Change] = []  # the last is the phase it is in
         self.stretches: list[Stretch] = []
-
-    def change(self, phase: int, state: State) -> None:
-        stretch = None if phase == _PRE_CATCH else self.stretches[-1]
-        self.phase = phase
-        self.changes.append((phase, state, stretch))
 
     def piece(
         self,
@@ -326,33 +324,34 @@ class _PhaseMachine:
 
     def flexed(self, state: State) -> None:
         # the stretch is over, and the next may catch
-        if self.phase == _CATCH:
-            self.stretches[-1].catch_end = state
-        if self.phase == _POST_CATCH:
-            self.stretches[-1].post_catch_end = state
-        if self.phase != _PRE_CATCH:
-            self.change(_PRE_CATCH, state)
+        phase, _, stretch = self.changes[-1]
+        if stretch is not None:
+            if phase == _CATCH:
+                stretch.catch_end = state
+            else:
+                stretch.post_catch_end = state
+            self.changes.append(Change(_PRE_CATCH, state))
         self.is_armed, self.since = True, None
 
     def slow(
         self, start: float, angle: Polynomial, low: float, high: float, fastest: float
     ) -> None:
         if (
-            self.phase == _CATCH
+            self.changes[-1].phase == _CATCH
             and value(angle, low) + fastest * (high - low) > self.goal
         ):
             low = self.leave_catch(start, angle, low, high, grows=False)
-        if self.phase == _POST_CATCH:  # ends below ν_th, Fig. 7
+        if self.changes[-1].phase == _POST_CATCH:  # ends below ν_th, Fig. 7
             state = State(start + low, value(angle, low))
             self.stretches[-1].post_catch_end = state
-            self.change(_PRE_CATCH, state)
+            self.changes.append(Change(_PRE_CATCH, state))
         self.since = None
 
     def fast(
         self, start: float, angle: Polynomial, length: float, *, may_catch: bool
     ) -> None:
         at = 0.0
-        if self.phase == _PRE_CATCH:
+        if self.changes[-1].phase == _PRE_CATCH:
             if self.since is None:
                 self.since = 0.0
                 self.stretches.append(Stretch(State(start, angle[0])))
@@ -364,7 +363,7 @@ class _PhaseMachine:
                 return
             self.catch(start, angle, place)
             at = place
-        if self.phase == _CATCH:
+        if self.changes[-1].phase == _CATCH:
             self.leave_catch(start, angle, at, length, grows=True)
 
     def catch_place(self, angle: Polynomial, length: float) -> float | None:
@@ -409,7 +408,7 @@ class _PhaseMachine:
         stretch.peak_end = state.time + p.peak_duration
         self.goal = state.angle + p.catch_travel
         self.is_armed, self.since = False, None
-        self.change(_CATCH, state)
+        self.changes.append(Change(_CATCH, state, stretch))
 
     def leave_catch(
         self, start: float, angle: Polynomial, low: float, high: float, *, grows: bool
@@ -425,8 +424,9 @@ class _PhaseMachine:
         if place is None or high - place <= TIE * high:
             return low
         state = State(start + place, value(angle, place))
-        self.stretches[-1].catch_end = self.stretches[-1].post_catch = state
-        self.change(_POST_CATCH, state)
+        stretch = self.stretches[-1]
+        stretch.catch_end = state
+        self.changes.append(Change(_POST_CATCH, state, stretch))
         return place
 
 

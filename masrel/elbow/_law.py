@@ -10,33 +10,51 @@ columns under the same names.
 
 from typing import Any, NamedTuple
 
-from masrel.elbow._polynomials import NOTHING, Number, Polynomial, derivative
+from masrel.elbow._polynomials import (
+    NOTHING,
+    Number,
+    Polynomial,
+    derivative,
+    product,
+)
 
 Parameters = Any  # ElbowParameters, or columns under the same names
 
 
 class TorqueLaw(NamedTuple):
-    """Torque as long as one law holds: level + k (θ - origin) + b θ̇ + m θ̈."""
+    """Torque as long as one law holds: level + k (θ - origin) + b θ̇ + m θ̈.
+
+    Of a smoothed onset also rise (3y² - 2y³), y the share of its time that has passed.
+    """
 
     level: Number  # N·m
     stiffness: Number = 0.0  # N·m/rad
     origin: Number = 0.0  # rad
     damping: Number = 0.0  # N·m·s/rad
     inertia: Number = 0.0  # kg·m²
+    onset: tuple[Number, Number] | None = None  # rise, N·m, and its time, s
 
     def commanded(self, angle: Number, velocity: Number) -> Number:
         """Return the torque without m·θ̈: the mannequin's arm has the inertia."""
-        level, stiffness, origin, damping, _ = self  # twice as fast as by their names
+        level, stiffness, origin, damping, _, _ = (
+            self  # twice as fast as by their names
+        )
         return level + stiffness * (angle - origin) + damping * velocity
 
     @property
     def is_level(self) -> bool:
-        """Whether the torque is constant, whatever the arm does."""
+        """Whether the torque does not depend on what the arm does."""
         terms = (self.stiffness, self.damping, self.inertia)
         return all(isinstance(term, float) and term == 0.0 for term in terms)
 
-    def along(self, angle: Polynomial) -> Polynomial:
-        """Return the torque along a polynomial angle."""
+    def along(self, angle: Polynomial, since: Number) -> Polynomial:
+        """Return the torque along an angle that begins so long after the law, s."""
+        if self.onset is not None:
+            rise, time = self.onset
+            y = [since / time, 1.0 / time]
+            square, last = product(y, y), [3.0 - 2.0 * y[0], -2.0 * y[1]]
+            first, *later = product(square, last)  # `onset_share`
+            return [self.level + rise * first, *[rise * c for c in later]]
         if self.is_level:
             return [self.level]
         speed = [*derivative(angle), 0.0]

@@ -186,10 +186,10 @@ def refined(
     if len(p) == 3 and p[2]:
         return min(max(_of_square(p, rises=rises), low), high)
     x, before, is_newton = guess, high - low, False
-    digit, backwards = 1e-16 * high, p[::-1]
+    digit, lead, others = 1e-16 * high, p[-1], p[-2::-1]
     for _ in range(200):
-        height = slope = 0.0
-        for c in backwards:
+        height, slope = lead, 0.0
+        for c in others:
             slope = slope * x + height
             height = height * x + c
         if height == 0.0:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from masrel.elbow._events import first_stretch, rounded, timeline
+from masrel.elbow._events import rounded, timeline
 from masrel.elbow._motion import Floats, Motion
 from masrel.elbow._polynomials import Number
 from masrel.elbow._single_stretches import PIECES, SingleStretches, Which
@@ -270,8 +270,9 @@ def _alone(
     joint: ElbowParameters, motion: Motion, outputs: tuple[str, ...]
 ) -> list[float]:
     line = timeline(joint, motion)
-    first = first_stretch(line.stretches)
-    events = None if first is None else rounded(first, motion.origin, line.end)
+    events = None
+    if line.first is not None:
+        events = rounded(line.first, motion.origin, line.end)
     row = []
     for name in outputs:
         if name in LOADS:
@@ -355,22 +356,15 @@ def _groups(
             yield kind, np.array(of_kind[first : first + chunk])
 
 
-_NUMBERS = tuple(
-    item.name
-    for item in fields(ElbowParameters)
-    if item.name not in ("rest_angle", "post_catch", "residual_reading")
-)
-
-
 _FIELDS: dict[type, tuple[str, ...]] = {
     kind: tuple(item.name for item in fields(kind))
-    for kind in (ConstantSpeed, MinimumJerk, Trapezoid)
+    for kind in (ElbowParameters, ConstantSpeed, MinimumJerk, Trapezoid)
 }
 
 
 _DEFAULTS: dict[type, dict[str, Any]] = {
     kind: {f.name: f.default for f in fields(kind) if f.default is not MISSING}
-    for kind in (ElbowParameters, *_FIELDS)
+    for kind in _FIELDS
 }
 
 
@@ -392,18 +386,9 @@ def _joint_columns(
     # parameters by name, each a column or one value for all
     if isinstance(joints, Columns):
         p = SimpleNamespace(**_taken(joints, rows))
-        p.rest_angle = math.nan if p.rest_angle is None else p.rest_angle
-        return p
-    distinct, index = _distinct(joints, rows)
-    p = SimpleNamespace(**_read(distinct, index, _NUMBERS))
-    for name in ("rest_angle", "post_catch", "residual_reading"):
-        values = list(map(attrgetter(name), distinct))
-        if len(set(values)) == 1:
-            column = math.nan if values[0] is None else values[0]
-        else:
-            column = np.array([math.nan if v is None else v for v in values])
-            column = column if index is None else column[index]
-        setattr(p, name, column)
+    else:
+        p = SimpleNamespace(**_read(*_distinct(joints, rows), _FIELDS[ElbowParameters]))
+    p.rest_angle = math.nan if p.rest_angle is None else p.rest_angle
     return p
 
 
@@ -449,11 +434,16 @@ def _distinct(
 
 def _read(
     items: Sequence[Any], index: NDArray[np.intp] | None, names: tuple[str, ...]
-) -> dict[str, Number]:
-    if len(items) == 1:
-        return {name: getattr(items[0], name) for name in names}
-    n = len(items) * len(names)
-    every = chain.from_iterable(map(attrgetter(*names), items))
-    table = np.fromiter(every, dtype=np.float64, count=n).reshape(len(items), -1)
-    table = np.ascontiguousarray((table if index is None else table[index]).T)
-    return dict(zip(names, table, strict=True))
+) -> dict[str, Any]:
+    # fields by name: a column each, or the one value that all have
+    every = list(chain.from_iterable(map(attrgetter(*names), items)))
+    columns: dict[str, Any] = {}
+    for i, name in enumerate(names):
+        column = every[i :: len(names)]
+        first, last = column[0], column[-1]
+        if first == last and column.count(first) == len(column):
+            columns[name] = first
+        else:  # None, no rest angle, becomes nan
+            values = np.array(column, dtype=None if isinstance(first, str) else float)
+            columns[name] = values if index is None else values[index]
+    return columns

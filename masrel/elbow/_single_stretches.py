@@ -30,7 +30,6 @@ from masrel.elbow._polynomials import (
 from masrel.elbow._torque import (
     Section,
     TorqueSegment,
-    along,
     section_impulse,
     section_peak,
     section_work,
@@ -279,7 +278,7 @@ class SingleStretches:
         if np.any(p.catch_rise):
             risen = np.minimum(catch + p.catch_rise, left)
             onset = rise, np.where(p.catch_rise, p.catch_rise, 1.0)
-            laid.append(TorqueSegment(catch, risen, TorqueLaw(pre_end), onset))
+            laid.append(TorqueSegment(catch, risen, TorqueLaw(pre_end, onset=onset)))
         fallen = np.minimum(catch + p.peak_duration, left)
         return [
             *laid,
@@ -297,7 +296,7 @@ class SingleStretches:
                 until = np.minimum(segment.end - start, length)
                 if (until > low).any():
                     part = shifted(angle, low) if low.any() else angle
-                    torque = along(segment, part, start + low - segment.start)
+                    torque = segment.law.along(part, start + low - segment.start)
                     yield Section(np.maximum(until - low, 0.0), part, torque)
 
     def _peak(self) -> Floats:
@@ -336,9 +335,9 @@ def _torque(
 
 def _last_level(segment: TorqueSegment) -> Number:
     # the largest torque of the catch: a smoothed onset only rises
-    if segment.onset is None:
+    if segment.law.onset is None:
         return segment.law.level
-    rise, time = segment.onset
+    rise, time = segment.law.onset
     return segment.law.level + rise * _law.onset_share(
         (segment.end - segment.start) / time
     )
@@ -366,7 +365,7 @@ def _moving_peak(
         for x in (low, high)
     )
     peak = np.maximum(start, end)
-    torque = law.along(shifted(angle, low))
+    torque = law.along(shifted(angle, low), 0.0)
     bound = functools.reduce(np.maximum, bernstein(torque, high - low))
     if (rows := _chosen(bound > np.maximum(best, peak))) is not None:
         turns = _turning_peak(_rows(torque, rows), (high - low)[rows])

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from masrel.elbow import _law
-from masrel.elbow._events import Timeline, first_stretch, timeline
+from masrel.elbow._events import Timeline, timeline
 from masrel.elbow._law import TorqueLaw
 from masrel.elbow._motion import Floats, Motion
 from masrel.elbow._polynomials import (
@@ -85,10 +85,9 @@ def torque(parameters: ElbowParameters, motion: Motion, times: ArrayLike) -> Flo
     at = np.atleast_1d(np.asarray(times, dtype=np.float64))
     line = timeline(parameters, motion)
     end = line.end.time
-    if at.size and not (at.min() >= 0.0 and at.max() <= end):
+    if (outside := at[~((at >= 0.0) & (at <= end))]).size:
         raise ParameterError(
-            f"times: need 0 to {end:g} s, the end of the stretch, "
-            f"got {at.min():g} to {at.max():g} s"
+            f"times: need 0 to {end:g} s, the end of the stretch, got {outside[0]:g} s"
         )
     values = np.empty(at.shape)
     laid = segments(parameters, line)
@@ -326,8 +325,6 @@ class TorqueSegment(NamedTuple):
     start: Number
     end: Number
     law: TorqueLaw  # angles count from the motion's origin
-    onset: tuple[Number, Number] | None = None
-    # of a smoothed onset: what it adds along 3y² - 2y³, N·m, and in which time, s
 
 
 def segments(p: ElbowParameters, line: Timeline) -> list[TorqueSegment]:
@@ -342,9 +339,9 @@ def segments(p: ElbowParameters, line: Timeline) -> list[TorqueSegment]:
             peak, residual = _law.catch(p, stretch.pre_end, stretch.rise)
             risen = min(start + p.catch_rise, end)
             fallen = min(stretch.peak_end, end)
-            flat = TorqueLaw(stretch.pre_end)
+            onset = TorqueLaw(stretch.pre_end, onset=(stretch.rise, p.catch_rise))
             laid += [
-                TorqueSegment(start, risen, flat, (stretch.rise, p.catch_rise)),
+                TorqueSegment(start, risen, onset),
                 TorqueSegment(risen, fallen, peak),
                 TorqueSegment(fallen, end, residual),
             ]
@@ -363,8 +360,8 @@ def segment_torque(segment: TorqueSegment, motion: Motion, at: Floats) -> Floats
     values = law.commanded(motion.angle(at, motion.origin), motion.velocity(at))
     if law.inertia:
         values = values + law.inertia * motion.acceleration(at)
-    if segment.onset is not None:
-        rise, time = segment.onset
+    if law.onset is not None:
+        rise, time = law.onset
         share = np.clip((at - segment.start) / time, 0.0, 1.0)
         values = values + rise * _law.onset_share(share)
     return np.asarray(values)
@@ -390,7 +387,7 @@ def sections(laid: list[TorqueSegment], motion: Motion) -> Iterator[Section]:
             if low < high:
                 part = shifted(angle, low) if low else angle
                 since = start + low - segment.start
-                yield Section(high - low, part, along(segment, part, since))
+                yield Section(high - low, part, segment.law.along(part, since))
 
 
 def _column_sections(laid: list[TorqueSegment], motion: Motion) -> Iterator[Section]:
@@ -404,27 +401,13 @@ def _column_sections(laid: list[TorqueSegment], motion: Motion) -> Iterator[Sect
         high = np.minimum(segment.end, stop[rows]) - start[rows]
         part = shifted(list(angle[:, rows]), low)
         since = start[rows] + low - segment.start
-        yield Section(high - low, part, along(segment, part, since))
-
-
-def along(segment: TorqueSegment, angle: Polynomial, since: Number) -> Polynomial:
-    """Return the torque along an angle that begins some time after the segment."""
-    torque = segment.law.along(angle)
-    if segment.onset is None:
-        return torque
-    rise, time = segment.onset
-    y = [since / time, 1.0 / time]
-    share = product(product(y, y), [3.0 - 2.0 * y[0], -2.0 * y[1]])  # _law.onset_share
-    total = [*torque, *[0.0] * (len(share) - len(torque))]
-    for i, c in enumerate(share):
-        total[i] = total[i] + rise * c
-    return total
+        yield Section(high - low, part, segment.law.along(part, since))
 
 
 def loads(p: ElbowParameters, motion: Motion, line: Timeline, name: str) -> float:
     """Return one of the loads, by the name of its function."""
     if name == "residual_torque":
-        first = first_stretch(line.stretches)
+        first = line.first
         if first is None or first.catch is None:
             return math.nan
         return float(_law.catch(p, first.pre_end, first.rise)[1].level)

@@ -6,19 +6,44 @@ compared with the largest torque and slope that it can ask for.
 
 from typing import ClassVar, Protocol
 
-from masrel.elbow.parameters import ElbowParameters
-from masrel.elbow.tone import (
-    ClaspKnife,
-    Clonus,
-    Cogwheel,
-    Contracture,
-    Dystonia,
-    LeadPipe,
-    ThresholdReflex,
-)
-from masrel.elbow.tone._stepper import Stepper
+__all__ = ["JointModel", "Stepper"]
 
-__all__ = ["MODELS", "JointModel", "Stepper"]
+
+class Stepper(Protocol):
+    """A joint as a state machine that sees one sample at a time.
+
+    Attributes
+    ----------
+    phase : int
+        Position in `masrel.recording.PHASES`: "pre-catch" while nothing has been
+        triggered, "catch" from a trigger on, "post-catch" once it has given way. A
+        joint without triggers stays in "pre-catch".
+    """
+
+    phase: int
+
+    def step(self, time_s: float, angle: float, velocity: float) -> float:
+        """Decide the torque of one sample.
+
+        Parameters
+        ----------
+        time_s : float
+            Time of the sample, s; later than that of the one before.
+        angle : float
+            Angle, rad.
+        velocity : float
+            Angular velocity, rad/s.
+
+        Returns
+        -------
+        float
+            Torque that resists extension, N·m.
+        """
+        ...
+
+    def release(self) -> None:
+        """Give up at once what has been triggered, as when the grip is lost."""
+        ...
 
 
 class JointModel(Protocol):
@@ -31,6 +56,8 @@ class JointModel(Protocol):
     kind : str
         Name of the law in `MODELS`, as a protocol file spells it.
     """
+
+    __slots__ = ()
 
     kind: ClassVar[str]
 
@@ -99,18 +126,3 @@ class JointModel(Protocol):
             Over angle, N·m/rad, and over angular velocity, N·m·s/rad.
         """
         ...
-
-
-_LAWS: tuple[type[JointModel], ...] = (
-    ElbowParameters,
-    LeadPipe,
-    Cogwheel,
-    ClaspKnife,
-    Contracture,
-    Dystonia,
-    Clonus,
-    ThresholdReflex,
-)
-
-MODELS: dict[str, type[JointModel]] = {law.kind: law for law in _LAWS}
-"""Every law by the name of its kind; `kind = "..."` of a protocol file."""

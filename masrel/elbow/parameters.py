@@ -188,35 +188,13 @@ class ElbowParameters:
         return False
 
     def stepper(self, start_angle: float) -> SampledJoint:
-        """Return the joint as a state machine that has not seen a sample yet.
-
-        Parameters
-        ----------
-        start_angle : float
-            Where the stretch starts, rad.
-
-        Returns
-        -------
-        SampledJoint
-            The law as a controller decides it.
-        """
+        """Return the joint as a state machine that has not seen a sample yet."""
         return SampledJoint(self, start_angle=start_angle)
 
     def largest_torque(self, *, start_angle: float, speed: float) -> float:
-        """Return the largest torque of a stretch and the way back.
+        """Return the largest torque of a stretch and the way back, N·m.
 
-        Parameters
-        ----------
-        start_angle : float
-            Where the stretch starts, rad; it goes to `range_end` at most.
-        speed : float
-            The largest speed, either way, rad/s.
-
-        Returns
-        -------
-        float
-            A bound of the torque's size, N·m, that no such motion passes; inertia,
-            which is not commanded, left out.
+        Inertia, which is not commanded, is left out.
 
         Examples
         --------
@@ -247,18 +225,7 @@ class ElbowParameters:
         )
 
     def largest_slope(self, *, speed: float) -> tuple[float, float]:
-        """Return the largest slopes of the torque where it does not jump.
-
-        Parameters
-        ----------
-        speed : float
-            The largest speed, rad/s; the slopes do not depend on it.
-
-        Returns
-        -------
-        tuple of two floats
-            Over angle, N·m/rad, and over angular velocity, N·m·s/rad.
-        """
+        """Return the largest slopes, over angle and velocity, where nothing jumps."""
         del speed
         after = self.post_catch_stiffness
         if self.post_catch == "additive":

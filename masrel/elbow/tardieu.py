@@ -96,13 +96,13 @@ def tardieu(
     slow, falling, fast = speeds
     if not 0.0 < slow < falling < fast < math.inf:
         raise ParameterError(
-            "speeds: need three above 0 rad/s, each faster than the one before, got "
-            + ", ".join(f"{speed:g}" for speed in speeds)
+            "speeds: need three above 0 deg/s, each faster than the one before, got "
+            + ", ".join(f"{math.degrees(speed):g}" for speed in speeds)
         )
     if not 0.0 <= start_angle < model.range_end:
         raise ParameterError(
-            f"start_angle: needs 0 to less than {model.range_end:g} rad, the end of "
-            f"range, got {start_angle:g} rad"
+            f"start_angle: needs 0 to less than {math.degrees(model.range_end):g} "
+            f"degrees, the end of range, got {math.degrees(start_angle):g} degrees"
         )
     first, second, third = (_caught(model, start_angle, speed) for speed in speeds)
     return Tardieu(

@@ -71,6 +71,8 @@ def check_options(options: FitOptions, inertia: str) -> None:
         )
     if not 0.0 < options.slow_below < math.inf:
         raise ParameterError(f"slow_below: needs more than 0, got {options.slow_below}")
+    if not 0.0 < options.window < math.inf:
+        raise ParameterError(f"window: needs more than 0 s, got {options.window}")
     if inertia not in ("zero", "fitted"):
         raise ParameterError(f'inertia: needs "zero" or "fitted", got {inertia!r}')
     if inertia == "fitted" and held.post_catch == "additive":

@@ -123,7 +123,8 @@ def fit(
         A stretch whose speed stays below is slow, rad/s; ν_th by default, below which
         nothing can catch.
     window : float, optional
-        Length of the window of the filter that gives speed and acceleration, s.
+        Length of the window of the filter that gives speed and acceleration, s; of 7
+        samples at least.
     level : float, optional
         Level of the confidence intervals.
 
@@ -213,7 +214,10 @@ def _stretches(
                 raise RecordingError(f"{name}: the recording is there twice")
             named[name] = stretch
     if not named:
-        raise RecordingError("recordings: none has an extension of 15 degrees or more")
+        raise RecordingError(
+            "recordings: none has an extension of 15 degrees or more; the angle must "
+            "grow with extension"
+        )
     return named, float(np.median(noise)) if noise else math.nan
 
 

@@ -134,7 +134,8 @@ def _check_time(name: str, time: _Floats) -> None:
             f"{time[at]:.9g} s (samples {at} and {at + 1}, counted from 0)"
         )
     rate = 1.0 / float(np.median(steps))
-    if not _MIN_RATE_HZ <= rate <= _MAX_RATE_HZ:
+    # times that were rounded as they were written may be a little off
+    if not 0.999 * _MIN_RATE_HZ <= rate <= 1.001 * _MAX_RATE_HZ:
         raise RecordingError(
             f"{name}: needs {_MIN_RATE_HZ:g} to {_MAX_RATE_HZ:g} samples a "
             f"second, got {rate:.3g}; is the unit of time right?"
@@ -209,12 +210,13 @@ def _find_columns(
     source: str,
     columns: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None,
+    quantities: Iterable[str] = _UNITS,
 ) -> dict[str, _Column]:
     """Find the columns of time, angle, torque and, if there is one, velocity."""
     columns, units = dict(columns or {}), dict(units or {})
     _check_options(columns, units)
     result = {}
-    for quantity in _UNITS:
+    for quantity in quantities:
         column = _find(names, quantity, source, columns.get(quantity), units)
         if column is not None:
             result[quantity] = column
@@ -410,6 +412,25 @@ def _is_simulated(remark: str) -> bool:
     return key.strip() == "simulated" and value.strip() == json.dumps(True)
 
 
+def _read_table(path: Path) -> tuple[_Archive | _Text, bytes]:
+    # a recording of any kind, and its bytes
+    if not path.is_file():
+        why = "a folder; needs a file" if path.is_dir() else "no such file"
+        why = "not a regular file" if path.exists() and not path.is_dir() else why
+        raise RecordingError(f"{path}: {why}")
+    content = read_regular(path, most=MAX_RECORDING)
+    read = _read_archive if path.suffix.lower() == ".npz" else _read_text
+    return read(path, content), content
+
+
+def read_angles(path: Path) -> tuple[_Floats, _Floats]:
+    """Return times, s, and angles, rad, of a recording, whatever else is in it."""
+    table, _ = _read_table(path)
+    columns = _find_columns(table.names, source=str(path), quantities=("time", "angle"))
+    time, angle = (table.column(c.name) * c.factor for c in columns.values())
+    return time, angle
+
+
 _MODEL, _COMMANDED = "model_torque_nm", "command_torque_nm"
 
 
@@ -470,16 +491,7 @@ def read_movement(
     -----
     Columns that are not named here, such as EMG, are left alone.
     """
-    if not path.is_file():
-        why = "a folder; needs a file" if path.is_dir() else "no such file"
-        why = "not a regular file" if path.exists() and not path.is_dir() else why
-        raise RecordingError(f"{path}: {why}")
-    content = read_regular(path, most=MAX_RECORDING)
-    table = (
-        _read_archive(path, content)
-        if path.suffix == ".npz"
-        else _read_text(path, content)
-    )
+    table, content = _read_table(path)
     source: TorqueSource = "recorded"
     if _is_own(table.names) and "torque" not in (columns or {}):
         source = "sensor" if MEASURED_TORQUE.column in table.names else "model"

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from masrel.elbow.identification._reading import MIN_TRAVEL, Movement, Samples
-from masrel.errors import ParameterError, RecordingError
+from masrel.errors import RecordingError
 
 _Floats = NDArray[np.float64]
 _Bools = NDArray[np.bool_]
@@ -17,6 +17,7 @@ _Bools = NDArray[np.bool_]
 Pace = Literal["slow", "fast"]
 
 _ORDER = 3  # of the polynomials that are fitted in the window of the filter
+_MIN_LENGTH = 7  # of that window, samples
 
 # Reach of the fit of the speed at a catch, to either side, s.
 _REACH = 0.1
@@ -30,12 +31,7 @@ _MIN_REST = 0.1
 
 def window_length(window: float, period: float) -> int:
     """Return the samples of a filter's window: odd, enough for its polynomial."""
-    length = 2 * round(0.5 * window / period) + 1
-    if length < 7:
-        raise ParameterError(
-            f"window: needs 7 samples, {7 * period:g} s at this rate, got {window:g} s"
-        )
-    return length
+    return max(2 * round(0.5 * window / period) + 1, _MIN_LENGTH)
 
 
 def differentiate(

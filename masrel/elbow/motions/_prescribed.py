@@ -14,28 +14,36 @@ __all__ = ["ConstantSpeed", "Hold", "MinimumJerk", "Trapezoid"]
 _UNITS = {"speed": "deg/s", "mean_speed": "deg/s", "acceleration_rate": "deg/s²"}
 
 
-def _check_stretch(start: float, end: float, **rates: float) -> None:
-    # from one angle to a larger one, at speeds that move the arm
-    if not 0.0 <= start < end <= math.pi:
-        raise ParameterError(
-            "start, end: need 0 <= start < end <= 180 degrees, got "
-            f"{math.degrees(start):g} and {math.degrees(end):g} degrees"
-        )
-    for name, rate in rates.items():
-        if not 0.0 < rate < math.inf:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Stretch(Motion):
+    """From one angle to a larger one, at speeds that move the arm."""
+
+    start: float
+    end: float
+
+    def __post_init__(self) -> None:
+        start, end = self.start, self.end
+        if not 0.0 <= start < end <= math.pi:
             raise ParameterError(
-                f"{name}: needs more than 0 and finite, got {math.degrees(rate):g} "
-                f"{_UNITS[name]}"
+                "start, end: need 0 <= start < end <= 180 degrees, got "
+                f"{math.degrees(start):g} and {math.degrees(end):g} degrees"
             )
-        if not 1e-30 <= rate <= 1e30:  # whose tenth powers a float holds
-            raise ParameterError(
-                f"{name}: needs a rate that some motion has, 1e-28 to 1e31 "
-                f"{_UNITS[name]}, got {math.degrees(rate):g} {_UNITS[name]}"
-            )
+        for name in self.__slots__:  # those that a kind adds
+            rate, unit = getattr(self, name), _UNITS[name]
+            if not 0.0 < rate < math.inf:
+                raise ParameterError(
+                    f"{name}: needs more than 0 and finite, got {math.degrees(rate):g} "
+                    f"{unit}"
+                )
+            if not 1e-30 <= rate <= 1e30:  # whose tenth powers a float holds
+                raise ParameterError(
+                    f"{name}: needs a rate that some motion has, 1e-28 to 1e31 {unit}, "
+                    f"got {math.degrees(rate):g} {unit}"
+                )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ConstantSpeed(Motion):
+class ConstantSpeed(_Stretch):
     """A stretch at one speed from the first instant to the last, a `Motion`.
 
     Attributes
@@ -57,12 +65,7 @@ class ConstantSpeed(Motion):
     2.0
     """
 
-    start: float
-    end: float
     speed: float
-
-    def __post_init__(self) -> None:
-        _check_stretch(self.start, self.end, speed=self.speed)
 
     @property
     def duration(self) -> float:
@@ -76,7 +79,7 @@ class ConstantSpeed(Motion):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MinimumJerk(Motion):
+class MinimumJerk(_Stretch):
     """A stretch from rest to rest with the least squared jerk, a `Motion`.
 
     Attributes
@@ -104,12 +107,7 @@ class MinimumJerk(Motion):
     1.875
     """
 
-    start: float
-    end: float
     mean_speed: float
-
-    def __post_init__(self) -> None:
-        _check_stretch(self.start, self.end, mean_speed=self.mean_speed)
 
     @property
     def duration(self) -> float:
@@ -143,7 +141,7 @@ def quintic(way: Number, mean_speed: Number) -> list[tuple[Number, Number, Polyn
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Trapezoid(Motion):
+class Trapezoid(_Stretch):
     """A stretch from rest to rest with a trapezoidal speed, a `Motion`.
 
     Attributes
@@ -169,18 +167,11 @@ class Trapezoid(Motion):
     2.5
     """
 
-    start: float
-    end: float
     speed: float
     acceleration_rate: float
 
     def __post_init__(self) -> None:
-        _check_stretch(
-            self.start,
-            self.end,
-            speed=self.speed,
-            acceleration_rate=self.acceleration_rate,
-        )
+        _Stretch.__post_init__(self)
         way = self.end - self.start
         if self.speed**2 > way * self.acceleration_rate * (1.0 + 1e-15):
             min_rate = np.degrees(self.speed**2 / way)

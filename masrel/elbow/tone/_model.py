@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from masrel.elbow._motion import Floats, Motion
-from masrel.elbow.tone._stepper import Stepper
+from masrel.elbow.joint_model import JointModel
 from masrel.errors import ParameterError
 
 Needs = Literal["positive", "not negative", "share", "angle", "frequency"]
@@ -73,7 +73,7 @@ class ToneEvent:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ToneModel(ABC):
+class ToneModel(JointModel, ABC):
     """A law of tone: what every model of `masrel.elbow.tone` is, and a `JointModel`.
 
     Attributes
@@ -131,53 +131,6 @@ class ToneModel(ABC):
     @classmethod
     def _may_be_none(cls) -> frozenset[str]:
         return frozenset(entry.name for entry in fields(cls) if entry.default is None)
-
-    @abstractmethod
-    def stepper(self, start_angle: float) -> Stepper:
-        """Return a joint that has not seen a sample yet.
-
-        Parameters
-        ----------
-        start_angle : float
-            Where the stretch starts, rad.
-
-        Returns
-        -------
-        Stepper
-            The state machine of one presentation.
-        """
-
-    @abstractmethod
-    def largest_torque(self, *, start_angle: float, speed: float) -> float:
-        """Return the largest torque of a stretch and the way back.
-
-        Parameters
-        ----------
-        start_angle : float
-            Where the stretch starts, rad; it goes to `range_end` at most.
-        speed : float
-            The largest speed, either way, rad/s.
-
-        Returns
-        -------
-        float
-            A bound of the torque's size, N·m, that no such motion passes.
-        """
-
-    @abstractmethod
-    def largest_slope(self, *, speed: float) -> tuple[float, float]:
-        """Return the largest slopes of the torque where it does not jump.
-
-        Parameters
-        ----------
-        speed : float
-            The largest speed, either way, rad/s.
-
-        Returns
-        -------
-        tuple of two floats
-            Over angle, N·m/rad, and over angular velocity, N·m·s/rad.
-        """
 
     @abstractmethod
     def events(self, motion: Motion) -> tuple[ToneEvent, ...]:

@@ -111,6 +111,13 @@ def test_the_right_law_fits_and_what_is_left_is_noise() -> None:
         assert phase.autocorrelation == pytest.approx(0.0, abs=0.1)
 
 
+def test_a_camera_s_60_samples_a_second_are_enough() -> None:
+    made = quiet_fit(study(HM3, seed=9001, rate=60.0))
+    assert made.lack_of_fit.verdict == "fits"
+    held = [made[name].covers(getattr(HM3, name)) for name in NAMES]
+    assert sum(held) >= 7
+
+
 @pytest.mark.slow
 def test_runs_and_autocorrelation_see_what_is_left() -> None:
     phases = fit(study(HM3, seed=5000, arm=WRONG["lag"])).lack_of_fit.phases

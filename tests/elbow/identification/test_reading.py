@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from masrel.elbow.identification import read_movement
+from masrel.elbow.identification import Movement, read_movement
 from masrel.errors import ParameterError, RecordingError, RecordingWarning
 from masrel.recording import Recording, write_recording
 
@@ -295,3 +295,10 @@ def test_archives_that_hold_something_else_are_refused(tmp_path: Path) -> None:
     path.write_bytes(bytes(content))
     with pytest.raises(RecordingError, match="not an archive of columns"):
         read_movement(path)
+
+
+def test_times_rounded_as_they_are_written_are_of_50_hz_still() -> None:
+    time = np.round(np.arange(200) * 0.020001, 6)  # 49.9975 a second
+    angle = np.linspace(0.5, 1.5, 200)
+    made = Movement(name="film", time=time, angle=angle, torque=angle)
+    assert made.time.size == 200

@@ -61,7 +61,7 @@ def test_clonus_is_set_off_by_fast_stretches_only() -> None:
 
 @pytest.mark.parametrize("speeds", [(0.1, 0.1, 1.0), (0.0, 1.0, 2.0), (3.0, 2.0, 1.0)])
 def test_speeds_out_of_order_are_refused(speeds: tuple[float, float, float]) -> None:
-    with pytest.raises(ParameterError, match="speeds: need three above 0 rad/s"):
+    with pytest.raises(ParameterError, match="speeds: need three above 0 deg/s"):
         tardieu(LeadPipe(), speeds=speeds)
 
 
