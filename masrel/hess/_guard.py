@@ -33,6 +33,12 @@ _CREEP_DRIFTS = 5.0  # in drift angles
 # friction and a hand that holds it: so long, in standing times, may that last.
 HELD_TIMES = 20.0
 
+# Where an arm bounces off the joint's end, the estimated speed is still that of the
+# bounce. But so short a way in so long was no faster than a creep either, which covers
+# 0.018 deg less a step of the encoder.
+_SETTLED = math.radians(0.0125)
+_SETTLED_S = 0.0035  # four ticks
+
 # Of so many ticks `DeviceLimits.missed_replies_per_100` may be without a reading.
 _WINDOW_TICKS = 100
 
@@ -63,6 +69,8 @@ class Guard:
         "_raw_speed",
         "_sent",
         "_sent_at",
+        "_settled_at",
+        "_settled_from",
         "_slow_from",
         "_speed",
         "_stopped_dead",
@@ -82,6 +90,8 @@ class Guard:
         self._raw_speed = 0.0  # between the last two readings, rad/s
         self._moved_at = 0.0  # when the angle changed last, s
         self._speed = 0.0  # estimated when the angle changed last, rad/s
+        # where it has stayed near since when, rad and s
+        self._settled_from, self._settled_at = 0.0, 0.0
         self._slow_from: float | None = None  # where it was faster than a creep, rad
         self._creep_angle = _CREEP_DRIFTS * limits.drift_angle
         self._stopped_dead = False  # whether it moved fast one tick before that
@@ -112,7 +122,8 @@ class Guard:
             )
         self.dropouts.n_in_a_row = 0
         if self._time == -math.inf:
-            self._moved_at = time_s
+            self._moved_at = self._settled_at = time_s
+            self._settled_from = angle
             self._drift = Drift(limits, angle)
         else:
             self._follows(time_s, angle)
@@ -143,6 +154,8 @@ class Guard:
             self._drift = None
         self._raw_speed = speed = change / interval
         self._moved_at = time_s
+        if not -_SETTLED <= angle - self._settled_from <= _SETTLED:
+            self._settled_from, self._settled_at = angle, time_s
         # Over a longer gap it may well have come to rest, against an end stop say.
         self._stopped_dead = abs(speed) > _MOVING_SPEED and ticks < _MAX_STOP_TICKS
 
@@ -164,7 +177,10 @@ class Guard:
 
     def _not_held_for(self, duration_s: float) -> None:
         limits = self._limits
-        was_held = -_CREEP_SPEED < self._speed < _CREEP_SPEED
+        was_held = (
+            -_CREEP_SPEED < self._speed < _CREEP_SPEED
+            or self._moved_at - self._settled_at > _SETTLED_S
+        )
         longest = self._held_time if was_held else limits.standing_time
         if duration_s > longest:
             raise LimitExceededError(

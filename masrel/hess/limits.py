@@ -83,8 +83,8 @@ class DeviceLimits:
         How long an arm that was moving may read one angle to the last step, s.
     standing_time, standing_torque : float, optional
         How long any arm may do so while more than this torque is sent, s and N·m; 20
-        times as long if it was slower than 4.5 deg/s before, which a hand that holds it
-        does. The first torque may not be more either.
+        times as long if it was slower than 4.5 deg/s before, or had settled, which a
+        hand that holds it makes it do. The first torque may not be more either.
     jump_angle : float, optional
         How far a reading may lie from where the speed before would have it, a tick
         later, rad.

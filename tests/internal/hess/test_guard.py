@@ -222,6 +222,16 @@ def test_a_standing_torque_is_named_after_half_a_second_or_10_s_if_it_was_held(
         made.reading(after_s + 0.0025, 1.5 + STEP, 0.0)
 
 
+def test_an_arm_that_bounced_off_its_end_and_settled_may_be_held() -> None:
+    # the estimated speed is still that of the bounce when the angle changes last
+    made = begun()
+    made.torque(0.0, 2.1)
+    fed(made, [1.5 + STEP * n for n in (0, 4, 1, 0, -1, -1, -1, 0)])
+    made.speed(radians(5.3))
+    fed(made, [1.5] * 9000, start=8)
+    assert made.is_new(9.01)
+
+
 def test_at_most_2_n_m_may_stand_for_ever() -> None:
     made = guard()
     made.torque(0.0, -2.0)
