@@ -100,7 +100,7 @@ def category_arrays(
     values = np.array(specific_agreement(table))
     low, high = np.full((2, len(values)), np.nan)
     if level is not None:
-        low, high = _share_interval(
+        low, high = share_interval(
             level,
             parts=freq @ same,
             wholes=freq @ pairs,
@@ -143,7 +143,7 @@ def confusion_arrays(
         squares = (of_others**2).T @ mine  # Σ a², which is Σ ab
         n_items = ((of_others > 0).T.astype(np.float64) @ mine).sum(axis=1)
         wide = (q, q)  # a row of the table has one whole
-        low[place], high[place] = _share_interval(
+        low[place], high[place] = share_interval(
             level,
             parts=confusion[place].astype(np.float64),
             wholes=rows[place].astype(np.float64),
@@ -175,7 +175,7 @@ def _each_other(counts: PairCounts, others: Sequence[int]) -> NDArray[np.bool_]:
     return against
 
 
-def _share_interval(
+def share_interval(
     level: float,
     *,
     parts: Floats,
@@ -185,7 +185,7 @@ def _share_interval(
     whole_squares: Floats,
     n_items: Floats,
 ) -> tuple[Floats, Floats]:
-    """Return Clopper and Pearson's intervals at the effective size [1]."""
+    """Return Clopper and Pearson's intervals of shares at the effective size [1]."""
     # Takes sums over items of parts a of wholes b: Σ a, Σ b, Σ a², Σ ab, Σ b², and how
     # many items have b > 0; an array has one for each share
     from scipy.special import betaincinv, stdtrit

@@ -8,11 +8,12 @@ file of the tasks that are done lets a grid go on where it stopped.
 import hashlib
 import itertools
 import json
+import re
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, TypeVar
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 
@@ -20,15 +21,19 @@ from masrel._files import write_file
 from masrel.agreement import Label, WeightsLike
 from masrel.errors import ParameterError
 from masrel.estimates import Target
-from masrel.planning._aims import RATER_SHARE, Aim, Question, pose_question
+from masrel.planning._aims import Aim
 from masrel.planning._item_models import LatentModel
+from masrel.planning._plan_question import RATER_SHARE, Question, pose_question
 from masrel.planning._precision import Plan, plan_from
+from masrel.planning._smallest_size import Search
 from masrel.planning._studies import StudyDesign, StudySums
 from masrel.planning._tasks import TASK, exact_sums, is_enumerable, run_task
 
 Executor = Literal["processes", "dask"]
+GridProgress = Callable[[int, int], None]  # tasks that are done, and of how many
 
 _EXACT = -1  # the task of a cell that is summed over all studies
+_ADDRESS = re.compile(r"(\w+://)?[^\s/]+:[0-9]+/?")
 _PERIOD_S = 2.0  # between two writings of what is done
 
 
@@ -53,11 +58,31 @@ class _GridTask:
         return hashlib.sha256(text.encode()).hexdigest()
 
 
+@dataclass(frozen=True, slots=True)
+class _SizeTask:
+    """A cell of which one size is solved for."""
+
+    question: Question
+    n_items: int | None
+    n_raters: int | None
+
+    def run(self) -> Plan:
+        """Solve for it, or return the best that can be had."""
+        search = Search(self.question, n_items=self.n_items, n_raters=self.n_raters)
+        return search.reached()
+
+    @property
+    def key(self) -> str:
+        """What tells it from any other."""
+        text = repr((self.question, self.n_items, self.n_raters))
+        return hashlib.sha256(text.encode()).hexdigest()
+
+
 def plan_grid(
     coefficient: str,
     *,
-    n_items: int | Sequence[int],
-    n_raters: int | Sequence[int],
+    n_items: int | Sequence[int] | None,
+    n_raters: int | Sequence[int] | None,
     value: float | Sequence[float] | None,
     weights: WeightsLike = "identity",
     categories: int | Sequence[Label] | None = None,
@@ -71,6 +96,8 @@ def plan_grid(
     lower: float | None = None,
     upper: float | None = None,
     null: float | None = None,
+    power: float | None = None,
+    assurance: float | None = None,
     prices: tuple[float, float, float] = (0.0, 0.0, 1.0),
     interval: str = "auto",
     rater_share: float = RATER_SHARE,
@@ -78,7 +105,7 @@ def plan_grid(
     executor: Executor | None = None,
     scheduler: str | None = None,
     file: Path | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: GridProgress | None = None,
     rng: np.random.Generator | int | None = None,
 ) -> tuple[Plan, ...]:
     """Say what studies of many sizes, and under several truths, can show.
@@ -86,35 +113,21 @@ def plan_grid(
     Parameters
     ----------
     coefficient : str
-        Its name; see `sample_size`, which has the same parameters.
-    n_items, n_raters : int or sequence of int
-        Sizes.
+        Its name.
+    n_items, n_raters : int or sequence of int, or None
+        Sizes. Where one is None it is solved for in every cell.
     value : float or sequence of float, or None
         True coefficients.
-    weights : str or array_like, optional
-        How much two categories agree.
-    categories : int or sequence, optional
-        How many there are, or the scale in order.
+    weights, categories : optional
+        As of `sample_size`.
     prevalences : sequence of float, or several of them, optional
         Of the categories; with model "table" one table.
-    model : str or LatentModel, optional
-        How the ratings of an item come about.
-    target : {"items", "raters", "both"}
-        What a new study would draw anew.
-    p_missing : float, optional
-        Chance of every rating to be missing.
-    level : float, optional
-        Nominal level of the interval.
-    sides : {1, 2}, optional
-        How many tails share 1 - level.
-    half_width, lower, upper, null : float, optional
-        What assurance and power are of; see `precision`.
-    prices : tuple of float, optional
-        Of an item, a rater, and a rating.
-    interval : {"auto", "t", "normal"}, optional
-        The interval that is planned.
-    rater_share : float, optional
-        Of the error of icc_a1, how much the levels of the raters make.
+    model, target, p_missing, level, sides : optional
+        What else is taken to be true, and the interval, as of `sample_size`.
+    half_width, lower, upper, null, power, assurance : float, optional
+        The aim, as of `sample_size`: the plans say which of them reach it.
+    prices, interval, rater_share : optional
+        As of `sample_size`.
     n_studies : int, optional
         Studies of a cell that is simulated, in whole tasks of 10 000.
     executor : {"processes", "dask"}, optional
@@ -133,7 +146,8 @@ def plan_grid(
     -------
     tuple of Plan
         One for each value, prevalences, number of items and number of raters, the last
-        of them varying first.
+        of them varying first. Where a size is solved for and none reaches the aim, the
+        best that can be had, whose `reaches_aim` is False.
 
     Raises
     ------
@@ -156,15 +170,26 @@ def plan_grid(
     >>> [round(plan.expected_half_width, 3) for plan in plans]
     [0.383, 0.274]
     """
-    aim = Aim(half_width=half_width, lower=lower, upper=upper, null=null)
     if executor not in (None, "processes", "dask"):
         raise ParameterError(
             f"executor: needs one of processes, dask, got {executor!r}"
         )
+    if scheduler is not None and executor != "dask":
+        raise ParameterError(
+            f'scheduler: is of executor "dask" alone, got {executor!r}'
+        )
     if n_studies < 1:
         raise ParameterError(f"n_studies: needs at least 1, got {n_studies}")
-    first: Question | None = None
-    cells: list[tuple[Question, StudyDesign]] = []
+    is_solved = _check_sizes(n_items, n_raters, file)
+    aim = Aim(
+        half_width=half_width,
+        lower=lower,
+        upper=upper,
+        null=null,
+        power=power,
+        assurance=assurance,
+    ).checked(needs_chance=is_solved or power is not None or assurance is not None)
+    questions: list[Question] = []
     for truth, shares in itertools.product(
         _several(value), _several_prevalences(prevalences, model)
     ):
@@ -181,17 +206,58 @@ def plan_grid(
             sides=sides,
             interval=interval,
             method="auto",
-            aim=aim.checked(needs_chance=False),
+            aim=aim,
             prices=prices,
             max_cost=None,
-            rng=rng if first is None else first.seed,
+            rng=questions[0].seed if questions else rng,
             rater_share=rater_share,
         )
-        first = first or question
-        cells += [
-            (question, question.design(n, r))
-            for n, r in itertools.product(_several(n_items), _several(n_raters))
-        ]
+        questions.append(question)
+    sizes = itertools.product(questions, _several(n_items), _several(n_raters))
+    if is_solved:
+        return _solved(
+            [_SizeTask(*cell) for cell in sizes], executor, scheduler, progress
+        )
+    cells = [(question, question.design(n or 0, r or 0)) for question, n, r in sizes]
+    return _described(cells, n_studies, executor, scheduler, file, progress)
+
+
+def _check_sizes(n_items: object, n_raters: object, file: Path | None) -> bool:
+    # whether one of both is solved for
+    if n_items is None and n_raters is None:
+        raise ParameterError("n_items, n_raters: a grid needs one of them, got none")
+    is_solved = n_items is None or n_raters is None
+    if is_solved and file is not None:
+        raise ParameterError("file: is of grids of which both sizes are known")
+    return is_solved
+
+
+def _solved(
+    tasks: list[_SizeTask],
+    executor: Executor | None,
+    scheduler: str | None,
+    progress: GridProgress | None,
+) -> tuple[Plan, ...]:
+    if tasks and tasks[0].question.aim.kind is None:
+        raise ParameterError(
+            "half_width: needs an aim, where one of the sizes is solved for; got none"
+        )
+    plans: dict[str, Plan] = {}
+    for task, plan in _results(tasks, executor, scheduler):
+        plans[task.key] = plan
+        if progress is not None:
+            progress(len(plans), len(tasks))
+    return tuple(plans[task.key] for task in tasks)
+
+
+def _described(
+    cells: list[tuple[Question, StudyDesign]],
+    n_studies: int,
+    executor: Executor | None,
+    scheduler: str | None,
+    file: Path | None,
+    progress: GridProgress | None,
+) -> tuple[Plan, ...]:
     tasks = [
         _GridTask(cell, design, question.seed, task, question.rater_share)
         for cell, (question, design) in enumerate(cells)
@@ -207,10 +273,11 @@ def plan_grid(
     return tuple(plans)
 
 
-_T = TypeVar("_T")
+_Value = TypeVar("_Value")
+_T = TypeVar("_T", _GridTask, _SizeTask)
 
 
-def _several(values: _T | Sequence[_T]) -> Sequence[_T]:
+def _several(values: _Value | Sequence[_Value]) -> Sequence[_Value]:
     return values if isinstance(values, Sequence) else (values,)
 
 
@@ -232,7 +299,7 @@ def _sums_of(
     executor: Executor | None,
     scheduler: str | None,
     file: Path | None,
-    progress: Callable[[int, int], None] | None,
+    progress: GridProgress | None,
 ) -> dict[str, StudySums]:
     sums = _read(file)
     due = [task for task in tasks if task.key not in sums]
@@ -253,8 +320,8 @@ def _sums_of(
 
 
 def _results(
-    tasks: list[_GridTask], executor: Executor | None, scheduler: str | None
-) -> Iterator[tuple[_GridTask, StudySums]]:
+    tasks: Sequence[_T], executor: Executor | None, scheduler: str | None
+) -> Iterator[tuple[_T, Any]]:
     if executor is None or not tasks:
         yield from ((task, task.run()) for task in tasks)
     elif executor == "processes":
@@ -263,26 +330,33 @@ def _results(
         yield from _by_dask(tasks, scheduler)
 
 
-def _by_processes(tasks: list[_GridTask]) -> Iterator[tuple[_GridTask, StudySums]]:
+def _run(task: _GridTask | _SizeTask) -> StudySums | Plan:
+    return task.run()
+
+
+def _by_processes(tasks: Sequence[_T]) -> Iterator[tuple[_T, Any]]:
     import multiprocessing
     from concurrent.futures import ProcessPoolExecutor, as_completed
 
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(mp_context=context) as pool:
-        futures = {pool.submit(_GridTask.run, task): task for task in tasks}
+        futures = {pool.submit(_run, task): task for task in tasks}
         for future in as_completed(futures):
             yield futures[future], future.result()
 
 
-def _by_dask(
-    tasks: list[_GridTask], scheduler: str | None
-) -> Iterator[tuple[_GridTask, StudySums]]:
+def _by_dask(tasks: Sequence[_T], scheduler: str | None) -> Iterator[tuple[_T, Any]]:
     try:
         from distributed import Client, as_completed
     except ImportError as error:
         raise ParameterError(
             'executor: "dask" needs Dask: pip install "masrel[dask]"'
         ) from error
+    # a client that never connected takes long to give up
+    if scheduler is not None and not _ADDRESS.fullmatch(scheduler):
+        raise ParameterError(
+            f"scheduler: needs an address as tcp://127.0.0.1:8786, got {scheduler!r}"
+        )
     try:
         client = Client(  # type: ignore[no-untyped-call]
             scheduler, set_as_default=False, timeout="10s"
@@ -294,7 +368,7 @@ def _by_dask(
         ) from error
     with client, client.as_current():
         # A task whose worker dies is run again by another.
-        futures = client.map(_GridTask.run, tasks, key=[t.key for t in tasks])
+        futures = client.map(_run, tasks, key=[t.key for t in tasks])
         of_key = {task.key: task for task in tasks}
         done = as_completed(futures, with_results=True)  # type: ignore[no-untyped-call]
         for future, result in done:

@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from masrel.agreement import Label
 from masrel.errors import ParameterError
 
 Floats = NDArray[np.float64]
@@ -75,11 +76,18 @@ class ItemModel:
     latent: LatentModel | None = None
     table: tuple[tuple[float, ...], ...] = ()  # joint probabilities of two raters
     p_missing: float = 0.0  # of every rating, independently
+    scale: tuple[Label, ...] = ()  # the categories, where they were named
 
     @property
     def n_categories(self) -> int:
         """Categories of the scale."""
         return len(self.prevalences)
+
+    @property
+    def shown_prevalences(self) -> tuple[float, ...]:
+        """Prevalences that were declared: none of normal ratings or own thresholds."""
+        is_declared = self.n_categories > 1 and self.latent_is_solved
+        return self.prevalences if is_declared else ()
 
     @property
     def latent_is_solved(self) -> bool:

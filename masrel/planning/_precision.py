@@ -2,17 +2,17 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from masrel.errors import ParameterError
 from masrel.estimates import Target
-from masrel.planning._aims import Question
 from masrel.planning._closed_forms import critical, fit_power
 from masrel.planning._icc_studies import FORMS
 from masrel.planning._item_models import probabilities, rows_of
+from masrel.planning._plan_question import Question
 from masrel.planning._studies import StudyDesign, StudyMaker, StudySums
 from masrel.planning._tasks import Errors, exact_sums, is_enumerable, simulated_sums
 
@@ -44,6 +44,14 @@ class Plan:
         2 leaves half of 1 - level in each tail, 1 all of it in one.
     method : {"exact", "simulation", "wald", "goodness-of-fit"}
         How the numbers were computed.
+    prevalences : tuple of float
+        Of the categories; empty where a model has none.
+    table : tuple of tuple of float
+        The joint probabilities of two raters, of model "table".
+    p_missing : float
+        Chance of every rating to be missing.
+    half_width, lower, upper, null : float or None
+        What `assurance` and `power` are of.
     expected_half_width : float
         Half the width of the interval, on average over studies.
     expected_low, expected_high : float
@@ -63,6 +71,8 @@ class Plan:
         `expected_half_width` without an aim. 0 where nothing was drawn.
     errors : mapping of str to float
         The same beside every number.
+    reaches_aim : bool or None
+        Whether it reaches what was aimed at; None without an aim.
     cost : float
         Of items, raters and ratings at their prices.
     n_studies : int
@@ -100,6 +110,13 @@ class Plan:
     level: float
     sides: int
     method: str
+    prevalences: tuple[float, ...] = ()
+    table: tuple[tuple[float, ...], ...] = ()
+    p_missing: float = 0.0
+    half_width: float | None = None
+    lower: float | None = None
+    upper: float | None = None
+    null: float | None = None
     expected_half_width: float = math.nan
     expected_low: float = math.nan
     expected_high: float = math.nan
@@ -109,6 +126,7 @@ class Plan:
     p_undefined: float = math.nan
     monte_carlo_error: float = 0.0
     errors: Mapping[str, float] = field(default_factory=dict)
+    reaches_aim: bool | None = None
     cost: float = math.nan
     n_studies: int = 0
     seed: int | None = None
@@ -125,7 +143,9 @@ def plan_of(question: Question, design: StudyDesign) -> Plan:
     sums = (
         exact_sums(design)
         if is_exact
-        else simulated_sums(design, question.seed, question.rater_share)
+        else simulated_sums(
+            design, question.seed, question.rater_share, question.progress
+        )
     )
     return plan_from(question, design, sums, is_exact)
 
@@ -147,7 +167,7 @@ def plan_from(
     n = 0.0 if is_exact else sums.weight
     chances_of = {"assurance": assurance, "power": power, "coverage": shares[3]}
     errors = {} if is_exact else _errors(means, chances_of, sums.p_undefined, n)
-    return Plan(
+    plan = Plan(
         **question.words(design),
         method="exact" if is_exact else "simulation",
         expected_half_width=means["half-width"][0],
@@ -163,6 +183,9 @@ def plan_from(
         n_studies=round(n),
         seed=None if is_exact else question.seed,
     )
+    if aim.kind is None:
+        return plan
+    return replace(plan, reaches_aim=aim.is_met(plan))
 
 
 def _errors(

@@ -8,13 +8,18 @@ import numpy as np
 from masrel.agreement import Label, WeightsLike
 from masrel.errors import ParameterError
 from masrel.estimates import Target
-from masrel.planning._aims import RATER_SHARE, Aim, pose_question
+from masrel.planning._aims import Aim
+from masrel.planning._cheapest import cheapest_plan
 from masrel.planning._item_models import LatentModel
+from masrel.planning._plan_question import RATER_SHARE, pose_question
 from masrel.planning._precision import Plan, plan_of
 from masrel.planning._smallest_size import Search
+from masrel.planning._tasks import Progress
 
 Method = Literal["auto", "wald", "goodness-of-fit", "exact", "simulation"]
 Model = str | LatentModel | None
+Prices = tuple[float, float, float]  # of an item, a rater, a rating
+_RATINGS: Prices = (0.0, 0.0, 1.0)
 
 
 def sample_size(
@@ -38,11 +43,12 @@ def sample_size(
     power: float | None = None,
     assurance: float | None = None,
     max_cost: float | None = None,
-    prices: tuple[float, float, float] = (0.0, 0.0, 1.0),
+    prices: Prices | None = None,
     interval: str = "auto",
     rater_share: float = RATER_SHARE,
     rng: np.random.Generator | int | None = None,
     method: Method = "auto",
+    progress: Progress | None = None,
 ) -> Plan:
     """Solve for the number of items or of raters that a study needs.
 
@@ -55,11 +61,12 @@ def sample_size(
         The coefficient that is taken to be true; None where the model has it: a table,
         or a `LatentModel`.
     n_raters, n_items : int, optional
-        Exactly one of them: the other is solved for.
+        Exactly one of them: the other is solved for. With `prices` neither: the
+        cheapest study is.
     weights : str or array_like, optional
         How much two categories agree.
     categories : int or sequence, optional
-        How many there are, or the scale in order.
+        How many there are, or the scale in order, by which weights of numbers go.
     prevalences : sequence of float, optional
         Of the categories, with sum 1; equal when not given. With model "table" the
         joint probabilities of two raters, shape (n_categories, n_categories).
@@ -84,23 +91,26 @@ def sample_size(
     power, assurance : float, optional
         Chances to be reached.
     max_cost : float, optional
-        What the study may cost.
+        What the study may cost; without an aim, the study is the most that this buys.
     prices : tuple of float, optional
-        Of an item, a rater, and a rating.
-    interval : {"auto", "t", "normal"}, optional
-        The interval that is planned: that of an analysis, or estimate ± quantile times
-        standard error, over items or (with "t") by leaving raters out.
+        Of an item, a rater, and a rating; (0, 0, 1) when not given.
+    interval : str, optional
+        The interval that is planned: a method of `masrel.intervals.estimate`, such as
+        "auto" or "jackknife", or estimate ± quantile times standard error, not cut at
+        the ends of the scale: "t" or "normal".
     rater_share : float, optional
         Of the error of icc_a1, how much the levels of the raters make.
     rng : numpy.random.Generator or int, optional
         Seed of simulated studies; drawn and kept in the plan when not given.
     method : {"auto", "exact", "simulation", "wald", "goodness-of-fit"}, optional
         "auto" sums over all studies where there are few, and else draws them.
+    progress : callable, optional
+        Called as studies are drawn, with how many there are and how many there will be.
 
     Returns
     -------
     Plan
-        The smallest study that reaches the aim, and what it shows.
+        The smallest study that reaches the aim, or the cheapest, and what it shows.
 
     Raises
     ------
@@ -130,11 +140,16 @@ def sample_size(
     >>> plan.n_items, plan.method
     (154, 'exact')
     """
-    if (n_items is None) == (n_raters is None):
-        both = "both" if n_items is not None else "none"
+    is_cheapest = n_items is None and n_raters is None and prices is not None
+    if (n_items is None) == (n_raters is None) and not is_cheapest:
+        got = (
+            "both"
+            if n_items is not None
+            else "none, and no prices by which to find the cheapest of both"
+        )
         raise ParameterError(
             f"n_items, n_raters: needs exactly one of them, since the other is solved "
-            f"for; got {both}"
+            f"for; got {got}"
         )
     aim = Aim(
         half_width=half_width,
@@ -158,16 +173,19 @@ def sample_size(
         interval=interval,
         method=method,
         aim=aim,
-        prices=prices,
+        prices=_RATINGS if prices is None else prices,
         max_cost=max_cost,
         rng=rng,
         rater_share=rater_share,
+        progress=progress,
     )
     if aim.kind is None and max_cost is None:
         raise ParameterError(
             "half_width: needs an aim: a half-width, a lower or upper limit, or a null "
             "value with power; got none"
         )
+    if is_cheapest:
+        return cheapest_plan(question)
     return Search(question, n_items=n_items, n_raters=n_raters).plan()
 
 
@@ -189,58 +207,39 @@ def precision(
     lower: float | None = None,
     upper: float | None = None,
     null: float | None = None,
-    prices: tuple[float, float, float] = (0.0, 0.0, 1.0),
+    prices: Prices = _RATINGS,
     interval: str = "auto",
     rater_share: float = RATER_SHARE,
     prior: tuple[float, float] | None = None,
     rng: np.random.Generator | int | None = None,
     method: Method = "auto",
+    progress: Progress | None = None,
 ) -> Plan:
     """Say what a study of a given size can show.
 
     Parameters
     ----------
     coefficient : str
-        Its name; see `sample_size`, which has the same parameters.
+        Its name.
     n_items, n_raters : int
         The size of the study.
-    value : float or None
-        The coefficient that is taken to be true.
-    weights : str or array_like, optional
-        How much two categories agree.
-    categories : int or sequence, optional
-        How many there are, or the scale in order.
-    prevalences : sequence of float, optional
-        Of the categories, or the joint probabilities of two raters.
-    model : str or LatentModel, optional
-        How the ratings of an item come about; needed but for normal ratings.
-    target : {"items", "raters", "both"}
-        What a new study would draw anew.
-    p_missing : float, optional
-        Chance of every rating to be missing.
-    level : float, optional
-        Nominal level of the interval.
-    sides : {1, 2}, optional
-        How many tails share 1 - level.
+    value, weights, categories, prevalences, model, target, p_missing : optional
+        What is taken to be true, as of `sample_size`.
+    level, sides : optional
+        Of the interval, as of `sample_size`.
     half_width : float, optional
         The plan's assurance is the chance of an interval as narrow as this.
     lower, upper : float, optional
         Its assurance is the chance of an interval inside these.
     null : float, optional
         Its power is the chance of an interval that excludes this.
-    prices : tuple of float, optional
-        Of an item, a rater, and a rating.
-    interval : {"auto", "t", "normal"}, optional
-        The interval that is planned.
-    rater_share : float, optional
-        Of the error of icc_a1, how much the levels of the raters make.
+    prices, interval, rater_share : optional
+        As of `sample_size`.
     prior : tuple of float, optional
         Parameters of a Beta distribution of the true value, over which the power of
         method "goodness-of-fit" is averaged.
-    rng : numpy.random.Generator or int, optional
-        Seed of simulated studies.
-    method : {"auto", "exact", "simulation", "wald", "goodness-of-fit"}, optional
-        How to compute.
+    rng, method, progress : optional
+        How it is computed, as of `sample_size`.
 
     Returns
     -------
@@ -280,5 +279,6 @@ def precision(
         rng=rng,
         rater_share=rater_share,
         prior=prior,
+        progress=progress,
     )
     return plan_of(question, question.design(n_items, n_raters))

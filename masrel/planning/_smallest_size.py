@@ -2,10 +2,8 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import NoReturn
 
 from masrel.errors import ParameterError
-from masrel.planning._aims import Question
 from masrel.planning._closed_forms import (
     critical,
     n_by_fit,
@@ -17,10 +15,12 @@ from masrel.planning._closed_forms import (
     n_icc_width,
 )
 from masrel.planning._icc_studies import FORMS, ONE_WAY
+from masrel.planning._plan_question import Question
 from masrel.planning._precision import Plan, fit_cells, plan_by_formula, plan_of
 from masrel.planning._studies import StudyDesign, StudyMaker
 
 MAX_ITEMS, MAX_RATERS = 100_000, 60
+_FAR = 1.3  # times a size: where a formula asks for more, the size does not do
 _MAX_SCAN = 1_500_000  # tables that are looked at around a size
 
 
@@ -49,35 +49,42 @@ class Search:
         return self._plans[n]
 
     def plan(self) -> Plan:
-        """Return the plan of the smallest size."""
+        """Return the plan of the smallest size, or refuse with the best there is."""
+        plan = self.reached()
+        if plan.reaches_aim is False:
+            raise ParameterError(plan.notes[0])
+        return plan
+
+    def reached(self) -> Plan:
+        """Return the plan of the smallest size, or the best, with what it lacks."""
         question = self.question
         if question.method in ("wald", "goodness-of-fit"):
-            n = self._by_formula()
-            plan = self._of_formula(n)
+            plan = self._of_formula(self._by_formula())
         elif question.aim.kind is None:
             plan = self.at(self._affordable_size())
         else:
-            plan = self._searched()
+            plan = self.up_to(MAX_RATERS if self.n_items is not None else MAX_ITEMS)
         return self._affordable(plan)
 
-    def _searched(self) -> Plan:
-        lowest = self._lowest()
-        highest = MAX_RATERS if self.n_items is not None else MAX_ITEMS
-        n = smallest(
-            lambda size: self.question.aim.is_met(self.at(size)),
-            guess=self._guess(lowest, highest),
-            lowest=lowest,
-            highest=highest,
-        )
-        if n is None:
-            self._refuse(highest)
-        return self._stable(n)
+    def up_to(self, highest: int) -> Plan:
+        """Return the plan of the smallest size that is no larger than one."""
+        guess = self._guess(self.lowest, highest)
+        n = None
+        if guess <= _FAR * highest:
+            n = smallest(
+                lambda size: self.question.aim.is_met(self.at(size)),
+                guess=min(guess, highest),
+                lowest=self.lowest,
+                highest=highest,
+            )
+        return self._best(highest) if n is None else self._stable(n)
 
-    def _lowest(self) -> int:
+    @property
+    def lowest(self) -> int:
+        """The smallest size that the coefficient and the target can have."""
         if self.n_items is None:
             return 3 if self.question.is_icc else 2
-        fewest = 2 if self.question.target == "items" or self.question.is_icc else 3
-        return max(fewest, self.question.entry.n_raters[0])
+        return self.question.min_raters
 
     def _guess(self, lowest: int, highest: int) -> int:
         # near the size by the normal formula; raters one by one from the fewest
@@ -89,22 +96,21 @@ class Search:
         if self.question.is_icc:
             n = n_icc_width(self.question.value, design.n_raters, 2 * half, z)
         elif self.question.target != "items" or not design.model.has_rows:
-            n = 20
+            n = min(20, highest)
         else:
             n = n_for_half_width(StudyMaker(design).item_sd(), half, z)
-        if n > highest:
-            self._refuse(highest)
         return max(lowest, n)
 
-    def _refuse(self, highest: int) -> NoReturn:
+    def _best(self, highest: int) -> Plan:
         aim, n = self.question.aim, highest
         if self.n_items is None and not self._design(20).has_rows:
-            n = 200  # a study of so many whose ratings are drawn one by one
+            n = min(n, 200)  # a study of so many whose ratings are drawn one by one
         best = self.at(n)
-        raise ParameterError(
+        note = (
             f"{aim.name}: {aim.words} needs more than {highest} {self._name}; "
             f"the best that can be had with {n} is {aim.reached(best)}"
         )
+        return replace(best, notes=(note,), reaches_aim=False)
 
     def _stable(self, n: int) -> Plan:
         # An exact chance goes up and down with n: from where on it holds.
@@ -112,7 +118,7 @@ class Search:
             return self.at(n)
         if self.question.is_icc or self.n_items is not None:
             return self.at(n)
-        around = range(max(self._lowest(), int(0.85 * n)), int(1.25 * n) + 2)
+        around = range(max(self.lowest, int(0.85 * n)), int(1.25 * n) + 2)
         if sum(self._design(size).n_tables for size in around) > _MAX_SCAN:
             note = "larger sizes were not looked at: a chance can fall with one more"
             return replace(self.at(n), notes=(note,))
@@ -196,19 +202,26 @@ class Search:
 
     # -- cost -------------------------------------------------------------------------
 
-    def _affordable_size(self) -> int:
-        cost = self._cost
+    def affordable(self, limit: float) -> int | None:
+        """Return the largest size that costs no more than a limit, if any does."""
+        cost, highest = self._cost, MAX_RATERS if self.n_items else MAX_ITEMS
+        if cost(self.lowest) > limit:
+            return None
         n = smallest(
-            lambda size: cost(size + 1) > (self.question.max_cost or 0.0),
+            lambda size: cost(size + 1) > limit,
             guess=10,
-            lowest=self._lowest(),
-            highest=MAX_ITEMS if self.n_items is None else MAX_RATERS,
+            lowest=self.lowest,
+            highest=highest,
         )
-        if n is None or cost(n) > (self.question.max_cost or 0.0):
+        return highest if n is None else n
+
+    def _affordable_size(self) -> int:
+        limit = self.question.max_cost or 0.0
+        n = self.affordable(limit)
+        if n is None or self._cost(n + 1) <= limit:
             raise ParameterError(
-                f"max_cost: needs a limit between {cost(self._lowest()):g}, of the "
-                f"smallest study, and what some study costs; got "
-                f"{self.question.max_cost:g}"
+                f"max_cost: needs a limit between {self._cost(self.lowest):g}, of the "
+                f"smallest study, and what some study costs; got {limit:g}"
             )
         return n
 
@@ -218,17 +231,18 @@ class Search:
 
     def _affordable(self, plan: Plan) -> Plan:
         limit = self.question.max_cost
-        if limit is None or plan.cost <= limit:
+        if limit is None or plan.cost <= limit or plan.reaches_aim is False:
             return plan
         aim, n = self.question.aim, self._affordable_size()
-        best = ""
-        if self.question.method not in ("wald", "goodness-of-fit"):
-            best = f", which reach {aim.reached(self.at(n))}"
-        raise ParameterError(
+        note = (
             f"max_cost: {aim.words} needs {plan.n_items} items and {plan.n_raters} "
             f"raters, which cost {plan.cost:g}; {limit:g} pays for {n} {self._name}"
-            + best
         )
+        if self.question.method in ("wald", "goodness-of-fit"):
+            return replace(plan, notes=(note,), reaches_aim=False)
+        best = self.at(n)
+        note += f", which reach {aim.reached(best)}"
+        return replace(best, notes=(note,), reaches_aim=False)
 
 
 def smallest(

@@ -16,9 +16,15 @@ from masrel.agreement import CodedRatings, Coefficient, coefficient
 from masrel.agreement._counts import distinct_rows
 from masrel.agreement._weights import WeightsLike
 from masrel.errors import ParameterError, SmallSampleWarning, UndefinedStatisticWarning
-from masrel.estimates import Target
+from masrel.estimates import Interval, Target
 from masrel.intervals._choice import choose_interval
 from masrel.intervals._problem import IntervalProblem, pose_problem, rows_problem
+from masrel.intervals.bootstrap import bootstrap
+from masrel.intervals.jackknife import (
+    _interval_around_estimate,
+    _jackknife_variance,
+)
+from masrel.intervals.posterior import posterior
 from masrel.planning._item_models import (
     MAX_ROWS,
     Floats,
@@ -36,6 +42,7 @@ _STEP = 1e-30  # of a derivative by a complex step, which cancels no digits
 _PLACES = 1 << 20  # numbers held at once
 _LARGE = 1e12  # items of a population
 _LEAST = 1e-13  # of a half-width: what rounding may leave above the aim
+_WALD = ("t", "normal", "analytic")  # computed for all studies at once
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,7 +56,7 @@ class StudyDesign:
     n_raters: int
     target: Target
     level: float  # of the two-sided interval that is computed
-    interval: str  # "auto", "t" or "normal"
+    interval: str  # "t", "normal", or a method of `masrel.intervals`
     value: float  # the true coefficient
     half_width: float | None = None
     lower: float | None = None
@@ -80,7 +87,13 @@ class StudyDesign:
     @property
     def is_jackknife(self) -> bool:
         """Whether raters are left out, one at a time, of all studies at once."""
-        return self.target == "raters" and self.entry.shape == "ratings"
+        of_raters = self.target == "raters" and self.entry.shape == "ratings"
+        return of_raters and self.interval in ("auto", "t", "jackknife")
+
+    @property
+    def is_chosen(self) -> bool:
+        """Whether an interval is computed study by study."""
+        return self.interval not in _WALD and not self.is_jackknife
 
     @property
     def n_tables(self) -> float:
@@ -190,7 +203,9 @@ class StudyMaker:
             warnings.simplefilter("ignore")
             return pose_problem(
                 replace(design.entry, code=lambda ratings, _categories: ratings),
-                CodedRatings(codes=codes, categories=tuple(range(q))),
+                CodedRatings(
+                    codes=codes, categories=design.model.scale or tuple(range(q))
+                ),
                 target=design.target,
                 categories=None,
                 weights=design.weights,
@@ -291,7 +306,7 @@ class StudyMaker:
 
     def _of_freq(self, freq: Integers) -> Floats:
         # how often each distinct row occurs (n_studies, n_rows) -> (n_studies, 4)
-        if self.design.interval == "auto":
+        if self.design.is_chosen:
             distinct, place = np.unique(freq, axis=0, return_inverse=True)
             results = [self._chosen(self.rows, row) for row in distinct]
             return np.array(results).reshape(-1, 4)[place.ravel()]
@@ -315,13 +330,22 @@ class StudyMaker:
         df = np.maximum(n_paired - 1.0, 1.0)
         is_normal = self.design.interval == "normal"
         half = error * (ndtri(upper) if is_normal else stdtrit(df, upper))
-        return np.column_stack([value, half, value - half, value + half])
+        if self.design.interval != "analytic":
+            return np.column_stack([value, half, value - half, value + half])
+        # as `analytic` gives it: cut at the ends of the scale, none without spread
+        has_spread = (error > 0.0) & (n_paired > 1)
+        return self._cut(value, np.asarray(np.where(has_spread, half, np.nan)))
+
+    def _cut(self, value: Floats, half: Floats) -> Floats:
+        lowest = np.minimum(self.design.entry.lowest, value)
+        low, high = np.maximum(value - half, lowest), np.minimum(value + half, 1.0)
+        return np.column_stack([value, 0.5 * (high - low), low, high])
 
     def _of_codes(self, codes: Integers) -> Floats:
         # codes (n_studies, n_items, n_raters) -> (n_studies, 4)
         if self.design.is_jackknife:
             return self._raters_left_out(codes)
-        if self.design.interval != "auto":
+        if not self.design.is_chosen:
             return self._wald_of_codes(codes)
         return np.array([self._chosen_of_codes(of) for of in codes]).reshape(-1, 4)
 
@@ -339,7 +363,10 @@ class StudyMaker:
         sums = features.sum(axis=1)
         u = np.einsum("sif,sf->si", features, self._slopes(sums))
         n_rated = features.any(axis=2).sum(axis=1).astype(float)
-        n_paired = ((codes >= 0).sum(axis=2) >= 2).sum(axis=1).astype(float)
+        is_paired = (codes >= 0).sum(axis=2) >= 2
+        if self.design.entry.shape == "pairs":
+            is_paired = features.any(axis=2)  # a pair is of one rater
+        n_paired = is_paired.sum(axis=1).astype(float)
         squares = (u**2).sum(axis=1)
         return self._wald(self._values(sums), squares, n_rated, n_paired)
 
@@ -364,9 +391,7 @@ class StudyMaker:
         half = stdtrit(r - 1, 0.5 + 0.5 * self.design.level) * np.sqrt(variance)
         if self.design.interval == "t":
             return np.column_stack([value, half, value - half, value + half])
-        lowest = self.design.entry.lowest
-        low, high = np.maximum(value - half, lowest), np.minimum(value + half, 1.0)
-        outcomes = np.column_stack([value, 0.5 * (high - low), low, high])
+        outcomes = self._cut(value, half)
         for study in np.flatnonzero(~(variance > 1e-3 / codes[0].size)):
             outcomes[study] = self._chosen_of_codes(codes[study])
         return outcomes
@@ -385,31 +410,49 @@ class StudyMaker:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UndefinedStatisticWarning)
             warnings.simplefilter("ignore", SmallSampleWarning)
-            interval, _ = choose_interval(problem, unweighted=problem.unweighted)
+            interval = self._interval_of(problem)
         return problem.value, interval.low, interval.high
+
+    def _interval_of(self, problem: IntervalProblem) -> Interval:
+        # what an analysis would compute by the method that is planned
+        method = self.design.interval
+        if method in ("auto", "t"):
+            return choose_interval(problem, unweighted=problem.unweighted)[0]
+        if method == "jackknife":
+            return _interval_around_estimate(problem, _jackknife_variance(problem))
+        rows, freq = problem.distinct.codes, problem.distinct_freq
+        ratings = replace(problem.coded, codes=np.repeat(rows, freq, axis=0))
+        compute = bootstrap if method == "bootstrap" else posterior
+        return compute(
+            problem.entry,
+            ratings,
+            target=self.design.target,
+            weights=self.design.weights,
+            level=self.design.level,
+            rng=0,
+        )
 
 
 def _tables(n: int, n_cells: int) -> Iterator[Integers]:
     """Yield every way in which n items fall into cells, in blocks of rows."""
-    # by the first cells one after the other, the last two at once
-    if n_cells == 1:
-        yield np.array([[n]])
+    if n_cells * math.comb(n + n_cells - 1, n) <= _PLACES:
+        yield _all_tables(n, n_cells)
         return
-    if n_cells == 2:
-        first = np.arange(n + 1)
-        yield np.column_stack([first, n - first])
-        return
-    block: list[Integers] = []
-    held = 0
     for count in range(n + 1):
         for rest in _tables(n - count, n_cells - 1):
-            block.append(np.column_stack([np.full(len(rest), count), rest]))
-            held += len(rest)
-            if held * n_cells > _PLACES:
-                yield np.concatenate(block)
-                block, held = [], 0
-    if block:
-        yield np.concatenate(block)
+            yield np.column_stack([np.full(len(rest), count), rest])
+
+
+def _all_tables(n: int, n_cells: int) -> Integers:
+    # cell by cell: each row as often as there are counts left for the next cell
+    tables, left = np.zeros((1, 0), dtype=np.int64), np.array([n])
+    for _ in range(n_cells - 1):
+        row = np.repeat(np.arange(len(left)), left + 1)
+        count = np.arange(len(row)) - np.repeat(
+            np.cumsum(left + 1) - left - 1, left + 1
+        )
+        tables, left = np.column_stack([tables[row], count]), left[row] - count
+    return np.column_stack([tables, left])
 
 
 def check_raters(design: StudyDesign) -> None:

@@ -4,6 +4,7 @@ Each task has its own seed, so that any number of processes gives the same numbe
 """
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -12,9 +13,11 @@ from masrel.planning._icc_studies import AGREEMENT, FORMS, exact_icc, simulate_i
 from masrel.planning._studies import StudyDesign, StudyMaker, StudySums
 
 Errors = dict[str, float]
+Progress = Callable[[int, int], None]  # studies that are drawn, and that will be
 
 TASK = 10_000  # studies
-_CHOSEN_TASK = 250  # where the interval is chosen study by study
+_CHOSEN_TASK = 250  # where an interval is computed study by study
+_RESAMPLED_TASK = 50  # where that takes resamples
 _MAX_TABLES = 1_000_000  # that are summed over
 _MAX_CHOSEN = 4_000  # where an interval is chosen for each
 _MAX_TASKS = 100
@@ -28,8 +31,9 @@ def is_enumerable(design: StudyDesign) -> bool:
     """Whether all studies can be summed over."""
     if design.coefficient in FORMS:
         return design.coefficient != AGREEMENT
-    most = _MAX_CHOSEN if design.interval == "auto" else _MAX_TABLES
-    return design.n_tables <= most
+    if design.interval == "bootstrap":
+        return False
+    return design.n_tables <= (_MAX_CHOSEN if design.is_chosen else _MAX_TABLES)
 
 
 def exact_sums(design: StudyDesign) -> StudySums:
@@ -48,8 +52,9 @@ def exact_sums(design: StudyDesign) -> StudySums:
 
 def task_size(design: StudyDesign) -> int:
     """Return how many studies a task draws."""
-    is_chosen = design.interval == "auto" and design.coefficient not in FORMS
-    return _CHOSEN_TASK if is_chosen and not design.is_jackknife else TASK
+    if design.coefficient in FORMS or not design.is_chosen:
+        return TASK
+    return _RESAMPLED_TASK if design.interval == "bootstrap" else _CHOSEN_TASK
 
 
 def run_task(
@@ -69,23 +74,30 @@ def run_task(
 
 
 def simulated_sums(
-    design: StudyDesign, seed: int, rater_share: float = 0.0
+    design: StudyDesign,
+    seed: int,
+    rater_share: float = 0.0,
+    progress: Progress | None = None,
 ) -> StudySums:
     """Draw studies until the Monte Carlo errors are small."""
     maker, size = StudyMaker(design), task_size(design)
     total = StudySums(np.zeros(14))
     for task in range(_MAX_TASKS):
         total += run_task(maker, seed, task, size, rater_share)
-        if is_enough(design, total):
+        n_more = math.ceil(task_ratio(design, total) * (task + 1)) - task - 1
+        n_tasks = task + 1 + min(max(n_more, 0), _MAX_TASKS - task - 1)
+        if progress is not None:
+            progress((task + 1) * size, n_tasks * size)
+        if n_tasks == task + 1:
             break
     return total
 
 
-def is_enough(design: StudyDesign, sums: StudySums) -> bool:
-    """Whether the Monte Carlo errors are small."""
+def task_ratio(design: StudyDesign, sums: StudySums) -> float:
+    """Return how many times the studies are needed for errors that are small."""
     half, error = sums.mean(0)
     if math.isnan(half):
-        return True
+        return 0.0
     chances_of = []
     if design.half_width is not None:
         chances_of.append(sums.share(0))
@@ -93,7 +105,7 @@ def is_enough(design: StudyDesign, sums: StudySums) -> bool:
         chances_of.append(sums.share(1))
     if design.lower is not None or design.upper is not None:
         chances_of.append(sums.share(2))
-    of_shares = [math.sqrt(p * (1 - p) / sums.weight) for p in chances_of]
+    variances = [p * (1 - p) / sums.weight for p in chances_of]
     factor = 2.0 if task_size(design) < TASK else 1.0
-    worst = max(of_shares, default=0.0)
-    return error <= factor * _RELATIVE * half and worst <= factor * _SHARE
+    of_half = (error / (factor * _RELATIVE * half)) ** 2 if half > 0.0 else 0.0
+    return max(of_half, max(variances, default=0.0) / (factor * _SHARE) ** 2)

@@ -12,7 +12,7 @@ import pytest
 
 import masrel.planning._grids as grids
 from masrel.errors import ParameterError
-from masrel.planning import plan_grid
+from masrel.planning import plan_grid, sample_size
 
 GRID: dict[str, Any] = {
     "coefficient": "fleiss_kappa",
@@ -71,9 +71,64 @@ def test_a_grid_needs_studies() -> None:
         plan_grid(**GRID, n_studies=-5)
 
 
+SOLVED: dict[str, Any] = {
+    **GRID,
+    "prevalences": [0.7, 0.3],
+    "value": [0.6, 0.8],
+    "n_items": None,
+    "n_raters": [2, 3],
+}
+
+
+def test_one_size_can_be_solved_for_in_every_cell() -> None:
+    plans = plan_grid(**SOLVED)
+    common = {**SOLVED, "value": 0.8, "n_raters": 3}
+    assert plans[-1] == sample_size(**common)
+    assert [plan.n_raters for plan in plans] == [2, 3, 2, 3]
+    (unreached,) = plan_grid(
+        **{**common, "n_items": 10, "n_raters": None, "value": 0.6}
+    )
+    assert unreached.reaches_aim is False
+    assert (
+        "half_width: a half-width of 0.2 needs more than 60 raters"
+        in (unreached.notes[0])
+    )
+
+
+def test_grids_aim_at_chances_as_a_single_plan_does() -> None:
+    common: dict[str, Any] = {**SOLVED, "value": 0.6, "n_items": [40, 80]}
+    plans = plan_grid(**common, assurance=0.8)
+    assert [plan.reaches_aim for plan in plans] == [
+        plan.assurance >= 0.8 for plan in plans
+    ]
+    assert {plan.reaches_aim for plan in plans} == {True, False}
+    del common["half_width"]
+    both = {"lower": 0.3, "upper": 0.9}
+    plans = plan_grid(**common, **both, power=0.5)  # equivalence
+    inside = plan_grid(**common, **both)
+    assert [plan.power for plan in plans] == [plan.assurance for plan in inside]
+
+
+def test_a_grid_needs_a_size_and_an_aim_for_the_other(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match="n_raters: a grid needs one of them"):
+        plan_grid(**{**SOLVED, "n_raters": None})
+    with pytest.raises(ParameterError, match="half_width: needs an aim, where"):
+        plan_grid(**{**SOLVED, "half_width": None})
+    with pytest.raises(ParameterError, match="file: is of grids"):
+        plan_grid(**SOLVED, file=tmp_path / "grid.json")
+
+
 def test_an_executor_is_one_of_two() -> None:
     with pytest.raises(ParameterError, match="executor: needs one of processes, dask"):
         plan_grid(**{**GRID, "executor": "slurm"})
+
+
+def test_a_scheduler_has_an_address_and_is_of_dask() -> None:
+    with pytest.raises(ParameterError, match='scheduler: is of executor "dask" alone'):
+        plan_grid(**GRID, scheduler="tcp://127.0.0.1:1")
+    pytest.importorskip("distributed")
+    with pytest.raises(ParameterError, match="scheduler: needs an address as tcp"):
+        plan_grid(**GRID, executor="dask", scheduler="nowhere")
 
 
 def test_a_missing_dask_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -85,6 +140,8 @@ def test_a_missing_dask_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.slow
 def test_processes_give_the_same_numbers() -> None:
     assert plan_grid(**GRID, executor="processes") == plan_grid(**GRID)
+    # as text: nan that comes from another process is equal to none
+    assert repr(plan_grid(**SOLVED, executor="processes")) == repr(plan_grid(**SOLVED))
 
 
 @pytest.mark.slow

@@ -88,8 +88,9 @@ def test_drawn_ratings_have_the_prevalences_and_the_kappa(
     model: str, p_missing: float
 ) -> None:
     # 400 studies of 50 items; four standard errors fail once in 15 000 runs
-    from masrel.planning._aims import Aim, pose_question
+    from masrel.planning._aims import Aim
     from masrel.planning._item_models import draw_ratings
+    from masrel.planning._plan_question import pose_question
 
     question = question_of(model, p_missing, Aim(), pose_question)
     codes = draw_ratings(
@@ -146,9 +147,9 @@ def question_of(model: str, p_missing: float, aim: Any, pose_question: Any) -> A
 def test_a_simulated_study_has_the_error_and_the_interval_of_an_analysis(
     name: str, weights: str, p_missing: float
 ) -> None:
-    from masrel.planning._aims import at_value
     from masrel.planning._item_models import ItemModel
     from masrel.planning._studies import StudyDesign, StudyMaker
+    from masrel.planning._true_models import at_value
 
     entry = coefficient(name)
     model = ItemModel(

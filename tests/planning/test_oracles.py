@@ -1,12 +1,14 @@
 """Plans agree with reference values that were computed without masrel."""
 
 import math
+from pathlib import Path
+from statistics import NormalDist
 from typing import Any
 
 import pytest
 
 from masrel.planning import LatentModel, precision, sample_size
-from tests.planning.oracles import of_kappa, settings
+from tests.planning.oracles import MODELS, SETTINGS, of_kappa, settings
 
 INTERVALS = {"normal": "normal", "t(n-1)": "t"}
 
@@ -80,7 +82,6 @@ def test_the_smallest_expected_width_over_all_studies(setting: Any) -> None:
         setting
         for setting in settings("half_width")
         if "n_assurance_80" in setting.values[0]["reference"]
-        and setting.values[0]["id"] != "half_width-01"  # a minute; run once by hand
     ],
 )
 def test_the_size_from_which_on_an_assurance_holds(
@@ -248,21 +249,44 @@ def test_simulated_studies_of_absolute_agreement(setting: Any) -> None:
     assert plan.coverage == pytest.approx(reference["coverage"], abs=4.0 * error)
 
 
+@pytest.mark.parametrize("setting", settings("power_wald"))
+def test_power_of_a_wald_interval_by_formula(setting: Any) -> None:
+    # Phi(|difference| / se - z), with the standard error at the alternative
+    design, reference = setting["design"], setting["reference"]
+    names = {"fleiss": "fleiss_kappa", "ac1": "gwet_ac"}
+    plan = precision(
+        names[design["coefficient"]],
+        value=design["coefficient_alternative"],
+        prevalences=design["prevalences"],
+        model=MODELS[setting["model"]],
+        n_items=design["n_items"],
+        n_raters=design["n_raters"],
+        target="items",
+        level=design["level"],
+        sides=design["sides"],
+        method="wald",
+    )
+    z = NormalDist().inv_cdf(1.0 - (1.0 - design["level"]) / design["sides"])
+    error = plan.expected_half_width / z
+    sd = error * math.sqrt(design["n_items"])
+    assert sd == pytest.approx(reference["sd_per_item"], rel=1e-8)
+    difference = design["coefficient_alternative"] - design["coefficient_null"]
+    power = NormalDist().cdf(difference / error - z)
+    assert power == pytest.approx(reference["power_formula"], rel=1e-8)
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "setting",
-    [
-        setting
-        for setting in settings("raters_target")
-        # item probabilities that are fixed follow no model here
-        if "item_probabilities" not in setting.values[0]["design"]
-    ],
-)
+@pytest.mark.parametrize("setting", settings("raters_target"))
 def test_simulated_studies_of_other_raters(setting: Any) -> None:
     design, reference = setting["design"], setting["reference"]
     value, prevalences = None, None
     model: Any = "dirichlet-multinomial"
-    if design["type"] == "latent":
+    if "item_probabilities" in design:
+        # one threshold, and noise of 1: a rater names the second grade with these
+        inverse = NormalDist().inv_cdf
+        positions = tuple(map(inverse, design["item_probabilities"]))
+        model = LatentModel(thresholds=(0.0,), noise_sd=1.0, positions=positions)
+    elif design["type"] == "latent":
         model = LatentModel(
             thresholds=tuple(design["thresholds"]),
             noise_sd=design["sd_noise"],
@@ -296,3 +320,8 @@ def test_simulated_studies_of_other_raters(setting: Any) -> None:
     )
     error = math.hypot(plan.errors["coverage"], setting["validation"]["mcse_coverage"])
     assert plan.coverage == pytest.approx(reference["coverage"], abs=4.0 * error)
+
+
+def test_every_kind_of_setting_is_held_against() -> None:
+    text = Path(__file__).read_text("utf-8")
+    assert all(f'"{setting["kind"]}"' in text for setting in SETTINGS)

@@ -1,5 +1,6 @@
 """Sizes: the smallest that reaches an aim, and one sentence where none can."""
 
+import math
 from typing import Any
 
 import pytest
@@ -13,6 +14,14 @@ KAPPA: dict[str, Any] = {
     "prevalences": [0.7, 0.3],
     "model": "mixture",
     "target": "items",
+}
+
+
+NORMAL: dict[str, Any] = {
+    "coefficient": "icc_1",
+    "model": None,
+    "prevalences": None,
+    "target": "both",
 }
 
 
@@ -57,12 +66,21 @@ def plan(**options: Any) -> Plan:
         ({"prices": (-1, 0, 0)}, "prices: needs three of at least 0"),
         ({"coefficient": "kendall_w"}, "coefficient: Kendall's W cannot be planned"),
         ({"coefficient": "kappa"}, "coefficient: needs"),
-        ({"coefficient": "icc_1"}, "model: ICC(1) takes none"),
-        ({"coefficient": "icc_1", "model": None}, "target: the interval of ICC(1)"),
+        ({**NORMAL, "model": "mixture"}, "model: ICC(1) takes none"),
+        ({**NORMAL, "target": "items"}, "target: the interval of ICC(1)"),
         ({"rng": -1}, "rng: needs a seed of at least 0"),
         ({"categories": 0, "prevalences": None}, "categories: needs at least 2, got 0"),
         ({"prevalences": [1.0, 0.0]}, "needs two categories that occur"),
         ({"rater_share": 0.5}, "rater_share: is of icc_a1 alone"),
+        ({"prices": (0, math.nan, 1)}, "prices: needs three of at least 0"),
+        ({"max_cost": math.nan}, "max_cost: needs a number above 0, got nan"),
+        ({"max_cost": -5}, "max_cost: needs a number above 0, got -5"),
+        ({"value": "0.5"}, "value: needs a number, got '0.5'"),
+        ({"half_width": "0.2"}, "half_width: needs a number, got '0.2'"),
+        ({"p_missing": None}, "p_missing: needs a number, got None"),
+        ({**NORMAL, "prevalences": [0.5, 0.5]}, "prevalences: ICC(1) takes none"),
+        ({**NORMAL, "weights": "linear"}, "weights: ICC(1) takes none"),
+        ({**NORMAL, "p_missing": 0.1}, "p_missing: ICC(1) takes none"),
     ],
 )
 def test_bad_input_is_one_sentence(options: dict[str, Any], words: str) -> None:
@@ -70,6 +88,14 @@ def test_bad_input_is_one_sentence(options: dict[str, Any], words: str) -> None:
         plan(**{"half_width": 0.2, **options})
     assert words in str(error.value)
     assert "\n" not in str(error.value)
+
+
+def test_a_prior_is_of_the_method_that_uses_it() -> None:
+    common: dict[str, Any] = {**KAPPA, "n_items": 30, "n_raters": 2, "null": 0.3}
+    with pytest.raises(ParameterError, match="prior: needs two numbers above 0"):
+        precision(**common, prior=(-1, 2), method="goodness-of-fit")
+    with pytest.raises(ParameterError, match='prior: is of method "goodness-of-fit"'):
+        precision(**common, prior=(1, 2))
 
 
 def test_an_aim_out_of_reach_says_the_best_that_can_be_had() -> None:
@@ -88,6 +114,66 @@ def test_so_many_raters_as_are_looked_at_may_be_too_few() -> None:
 def test_a_budget_alone_buys_what_it_can() -> None:
     bought = plan(max_cost=101, prices=(0, 1, 1), interval="normal")
     assert (bought.n_items, bought.cost) == (49, 100)
+
+
+@pytest.mark.parametrize(
+    "prices",
+    [
+        (5.0, 20.0, 1.0),
+        pytest.param((0.0, 0.0, 1.0), marks=pytest.mark.slow),
+        pytest.param((1.0, 60.0, 0.0), marks=pytest.mark.slow),
+        pytest.param((10.0, 20.0, 1.0), marks=pytest.mark.slow),
+    ],
+)
+def test_the_cheapest_is_that_of_every_number_of_raters(prices: Any) -> None:
+    common: dict[str, Any] = {
+        **{**KAPPA, "prevalences": [0.5, 0.3, 0.2]},
+        **{"half_width": 0.25, "interval": "t", "prices": prices, "rng": 1},
+    }
+    of_raters = [sample_size(**common, n_raters=n) for n in range(2, 8)]
+    assert sample_size(**common) == min(of_raters, key=lambda each: each.cost)
+
+
+def test_a_budget_is_held_and_the_best_is_named() -> None:
+    common: dict[str, Any] = {**KAPPA, "interval": "t", "prices": (5, 20, 1)}
+    bought = sample_size(**common, max_cost=250, rng=1)
+    assert bought.cost <= 250
+    words = f"is {bought.n_items} items and {bought.n_raters} raters, which cost"
+    with pytest.raises(ParameterError, match=words):
+        sample_size(**common, half_width=0.1, max_cost=250, rng=1)
+    with pytest.raises(ParameterError, match="max_cost: needs at least 54"):
+        sample_size(**common, half_width=0.1, max_cost=50, rng=1)
+
+
+def test_of_two_named_raters_the_cheapest_has_two() -> None:
+    cheapest = sample_size(
+        **{**KAPPA, "coefficient": "cohen_kappa"},
+        half_width=0.3,
+        interval="normal",
+        prices=(5, 20, 1),
+    )
+    alone = sample_size(
+        **{**KAPPA, "coefficient": "cohen_kappa"},
+        half_width=0.3,
+        interval="normal",
+        n_raters=2,
+    )
+    assert (cheapest.n_items, cheapest.n_raters) == (alone.n_items, 2)
+
+
+def test_studies_that_are_drawn_are_counted_as_they_come() -> None:
+    seen: list[tuple[int, int]] = []
+    plan = precision(
+        **{**KAPPA, "prevalences": [0.4, 0.3, 0.3]},
+        n_items=30,
+        n_raters=4,
+        interval="t",
+        half_width=0.15,
+        rng=1,
+        progress=lambda *counts: seen.append(counts),
+    )
+    assert seen[-1] == (plan.n_studies, plan.n_studies)
+    assert [drawn for drawn, _ in seen] == sorted({drawn for drawn, _ in seen})
 
 
 @pytest.mark.slow
