@@ -7,6 +7,7 @@ the joint parameters of each model in SI units, and two hashes.
 from masrel.protocol._gates import Gate, GateKeys, gates_of, parse_gate
 from masrel.protocol._occasions import Occasions
 from masrel.protocol._questions import Question, Questionnaire
+from masrel.protocol._sample_sizes import SampleSize
 from masrel.protocol.content import (
     elbow_parameters,
     joint_model,
@@ -56,6 +57,7 @@ __all__ = [
     "Rater",
     "RaterField",
     "Report",
+    "SampleSize",
     "ScaleDefinition",
     "ScheduleScheme",
     "Session",

@@ -10,7 +10,8 @@ from dataclasses import dataclass, fields
 from difflib import get_close_matches
 from typing import Any
 
-from masrel.elbow.joint_model import MODELS, JointModel
+from masrel.elbow.joint_model import JointModel
+from masrel.elbow.laws import MODELS
 from masrel.elbow.parameters import ElbowParameters
 from masrel.elbow.tone import ToneModel
 from masrel.errors import ParameterError

@@ -107,7 +107,7 @@ def _value(question: Question, answer: str | float) -> str | int | float | None:
         return answer if answer in question.choices else None
     try:
         number = float(answer)
-    except ValueError:
+    except (ValueError, OverflowError):  # a whole number beyond every float
         return None
     low, high = question.range or ANALOGUE_RANGE
     if not math.isfinite(number) or not low <= number <= high:

@@ -15,6 +15,7 @@ from masrel.protocol._occasions import occasion_rules
 from masrel.protocol._order_rules import order_rules
 from masrel.protocol._questions import question_rules
 from masrel.protocol._rater_fields import rater_field_rules
+from masrel.protocol._sample_sizes import sample_size_rules
 from masrel.protocol.definition import Model, PresentationRules
 
 Values = dict[str, Any]
@@ -52,6 +53,7 @@ def broken_rules(values: Values) -> Iterator[str]:
         kind_rules(values),
         joint_rules(values),
         _plan(values),
+        sample_size_rules(values),
         gate_rules(values),
     )
 

@@ -109,6 +109,7 @@ def report_sections(protocol: Protocol) -> tuple[str, ...]:
     if protocol.report.sections is not None:
         return protocol.report.sections
     has_something = {
+        "sample-size": bool(protocol.analysis.sample_sizes),
         "test-retest": any(
             line.kind == "test-retest" for line in protocol.analysis.estimates
         ),
@@ -120,6 +121,7 @@ def report_sections(protocol: Protocol) -> tuple[str, ...]:
 
 _STORY = (
     "design",
+    "sample-size",
     "grades",
     "agreement",
     "test-retest",
@@ -188,6 +190,7 @@ _PRESENTED = (
 """The tables that decide what a rater meets, besides the study's id."""
 
 _LATER: dict[str, dict[str, object]] = {
+    "study": {"language": "en"},
     "elbow": {
         "catch_rise_s": 0.0,
         "residual_reading": "residual",
@@ -231,6 +234,7 @@ _LATER: dict[str, dict[str, object]] = {
         "torque_sensor": False,
     },
     "simulated_raters": {"hold_s": 0.0, "hand": "clamp"},
+    "analysis": {"sample_sizes": ()},
     "report": {"gates": (), "formats": ("html", "markdown")},
     "training": {
         "kappa_insufficient": 0.6,
@@ -375,7 +379,7 @@ def _drop_later(plain: dict[str, Any]) -> None:
     if "report" in plain and plain["report"]["sections"] is None:
         plain["report"]["sections"] = _FORMER_SECTIONS
     for table, defaults in _LATER.items():
-        if table not in plain:
+        if not isinstance(plain.get(table), dict):  # of a study perhaps its id alone
             continue
         _drop(plain[table], defaults)
         if not plain[table]:

@@ -16,6 +16,7 @@ from masrel.protocol._gates import GateKeys
 from masrel.protocol._keys import _Identifier, _Table, _Text
 from masrel.protocol._occasions import Occasions
 from masrel.protocol._questions import Questionnaire
+from masrel.protocol._sample_sizes import SampleSize
 
 # TOML has inf and nan, no key of a protocol does: every float here has its limits.
 _LARGEST = sys.float_info.max
@@ -34,6 +35,7 @@ class Study(_Table, frozen=True, kw_only=True):
     title: _Text
     source: str = ""
     notes: str = ""
+    language: Literal["en", "de", "fr", "es"] = "en"
 
 
 class ScaleDefinition(_Table, frozen=True, kw_only=True):
@@ -285,6 +287,7 @@ class Analysis(_Table, frozen=True, kw_only=True):
     seed: Annotated[int, Meta(ge=0, le=2**63 - 1)] = 0
     n_resamples: Annotated[int, Meta(ge=100, le=1_000_000)] = 10_000
     estimates: tuple[EstimatePlan, ...] = ()
+    sample_sizes: tuple[SampleSize, ...] = ()
 
 
 class Report(_Table, frozen=True, kw_only=True):
@@ -296,6 +299,7 @@ class Report(_Table, frozen=True, kw_only=True):
         tuple[
             Literal[
                 "design",
+                "sample-size",
                 "grades",
                 "agreement",
                 "test-retest",

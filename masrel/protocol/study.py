@@ -102,6 +102,11 @@ class StudyPaths:
         return self.root / ".key" / "secret.txt"
 
     @property
+    def serve_key_file(self) -> Path:
+        """The key that cookies of `masrel serve` are signed with; it stays there."""
+        return self.root / ".key" / "serve.txt"
+
+    @property
     def published_secret_file(self) -> Path:
         """The same secret once everybody may know it."""
         return self.root / "published_secret.txt"

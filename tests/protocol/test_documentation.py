@@ -32,6 +32,7 @@ TABLES = {
     "[training]": definition.Training,
     "[analysis]": definition.Analysis,
     "[[analysis.estimates]]": definition.EstimatePlan,
+    "[[analysis.sample_sizes]]": definition.SampleSize,
     "[report]": definition.Report,
     "[[report.gates]]": definition.GateKeys,
 }
@@ -72,6 +73,7 @@ def test_every_table_of_a_protocol_is_there() -> None:
     fields = {field.name for field in msgspec.structs.fields(Protocol)}
     inner = {
         "analysis.estimates",
+        "analysis.sample_sizes",
         "models.constants",
         "questionnaires.questions",
         "report.gates",
@@ -91,4 +93,6 @@ def test_the_default_sections_are_all_that_every_study_has() -> None:
     protocol = read_protocol(study / "protocol.toml")
     report = msgspec.structs.replace(protocol.report, sections=None)
     default = report_sections(msgspec.structs.replace(protocol, report=report))
-    assert {*default, "in-person", "claims"} == set(info.item_type.values)
+    assert {*default, "in-person", "claims", "sample-size"} == set(
+        info.item_type.values
+    )

@@ -205,6 +205,8 @@ def test_a_protocol_without_files_has_the_hash_it_had_before_there_were_any() ->
     assert content["device"].pop("post_catch_ramp_ms") == 100.0
     assert content["device"].pop("loose_inertia_kg_m2") == 0.06
     assert content["device"].pop("torque_sensor") is False
+    assert content["analysis"].pop("sample_sizes") == ()
+    assert content["study"].pop("language") == "en"
     canonical = msgspec.json.encode(content, order="sorted")
     assert protocol_hash(protocol) == hashlib.sha256(canonical).hexdigest()
 
