@@ -140,7 +140,23 @@ class Claim:
             raise ParameterError(
                 f"level: needs a number from 0.5 to below 1, got {self.level!r}"
             )
-        self.printed()
+        printed = self.printed()
+        if self.low is not None and printed["low"].value > printed["high"].value:
+            raise ParameterError(
+                f"low: needs to be no higher than high, {self.high}, got {self.low}"
+            )
+
+    @property
+    def excludes_kappa(self) -> bool:
+        """Whether the interval has kappa outside, which is true of no table."""
+        if self.low is None or self.kappa is None:
+            return False
+        printed, kappa = self.printed(), parse_kappa(self.kappa)
+        low, high = printed["low"], printed["high"]
+        return (
+            low.value - low.half_unit > kappa.value + kappa.half_unit
+            or high.value + high.half_unit < kappa.value - kappa.half_unit
+        )
 
     def printed(self) -> dict[str, PrintedNumber]:
         """Return standard error, interval and p, as far as they are printed."""

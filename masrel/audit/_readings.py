@@ -280,6 +280,7 @@ def _looked_at(
 ) -> tuple[list[ClaimReading], tuple[CellRows, ...]]:
     # readings of margins, errors and p, from tables made one by one
     tables, is_whole = _listed(claim, question)
+    is_whole = is_whole or claim.excludes_kappa
     uncertainty = Uncertainty.of(claim, tables, question.kappa_weights)
     errors = ERROR_KINDS if uncertainty.has_error else (None,)
     tests = tuple(uncertainty.tests) or (None,)

@@ -20,6 +20,7 @@ from masrel.checklist._items import ChecklistItem
 from masrel.checklist._rater_facts import rater_characteristics, rater_flow
 from masrel.report._design import beside_presentations, stretches_asked_for
 from masrel.report._estimate_words import TARGETS, coefficient_name, sentence
+from masrel.report._sample_size import size_sentence
 from masrel.report._tables import counted, percent
 
 _Source = Literal["protocol", "logs", "ratings"]
@@ -104,6 +105,7 @@ def _sizes(facts: StudyFacts) -> tuple[str, ...]:
     return (
         f"Planned: {counted(n_models, 'model')}, each presented "
         f"{counted(repeats, 'time')} a session; {sessions}; {planned} ratings.",
+        *(size_sentence(protocol, size) for size in protocol.analysis.sample_sizes),
         "The plan stands in the protocol, whose hash every drawn schedule has.",
     )
 

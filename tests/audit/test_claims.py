@@ -136,6 +136,7 @@ BAD_CLAIMS = [
     ({"kappa": "0.5", "margins_1": (20,)}, "margins_1: needs 2 counts"),
     ({"kappa": "0.5", "margins_2": (3, 17), "n_raters": 3}, "margins_2: needs two"),
     ({"agreement": "85.0", "p": "0.01"}, "p: needs the kappa of two raters"),
+    ({"kappa": "0.5", "low": "0.7", "high": "0.3"}, "low: needs to be no higher than"),
     ({"kappa": "0.5", "p": 0.01}, "p: needs a text"),
     ({"kappa": "0.5", "low": "0.1"}, "high: needed beside low"),
     ({"kappa": "0.5", "level": 95.0}, "level: needs a number from 0.5"),
@@ -188,3 +189,13 @@ def test_a_file_that_is_none_is_refused(
     with pytest.raises(RatingsError) as caught:
         read_claims(file)
     assert str(caught.value).startswith(f"{file}: {message}")
+
+
+def test_an_interval_beside_its_kappa_is_of_no_table_however_many_there_are() -> None:
+    claim = Claim(n_items=38, n_categories=4, kappa="0.50", low="0.6", high="0.7")
+    assert claim.excludes_kappa
+    audit = audit_claim(claim)
+    assert audit.is_possible is False
+    assert {reading.n_tables for reading in audit.readings} == {0}
+    touching = Claim(n_items=38, n_categories=4, kappa="0.5", low="0.5", high="0.7")
+    assert not touching.excludes_kappa
