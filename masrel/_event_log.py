@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Self
 from masrel._files import make_folder, naming, no_follow, sync_folder
 from masrel._input import MAX_TABLE, parse_json, read_regular
 from masrel._once import once
-from masrel.errors import SessionLogError
+from masrel.errors import SessionLogError, SessionLogInUseError
 
 if TYPE_CHECKING:
     from masrel.recording import _Fact, _Facts  # loads numpy
@@ -389,7 +389,9 @@ def _lock(descriptor: int, path: Path) -> None:
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError as error:
-        raise SessionLogError(f"{path}: another process has this log open") from error
+        raise SessionLogInUseError(
+            f"{path}: another process has this log open"
+        ) from error
     except OSError as error:
         error.filename = str(path)  # such as a file system without locks
         raise

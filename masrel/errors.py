@@ -10,6 +10,7 @@ The tree::
     ├── ParameterError (ValueError)      an argument is outside its range
     ├── RecordingError (ValueError)      a recording is damaged or not one
     ├── SessionLogError (ValueError)     a session log is damaged or not one
+    │   └── SessionLogInUseError         another process has it open
     ├── ConvergenceError (RuntimeError)  a sampler has not converged
     ├── SessionStoppedError (RuntimeError)  a person stopped a session before its end
     └── DeviceError (RuntimeError)       the device cannot go on
@@ -51,6 +52,7 @@ __all__ = [
     "RecordingWarning",
     "ScheduleError",
     "SessionLogError",
+    "SessionLogInUseError",
     "SessionStoppedError",
     "SmallSampleWarning",
     "UndefinedStatisticWarning",
@@ -102,6 +104,10 @@ class RecordingError(MasrelError, ValueError):
 
 class SessionLogError(MasrelError, ValueError):
     """A session log is damaged or not a session log."""
+
+
+class SessionLogInUseError(SessionLogError):
+    """Another process has a session log open."""
 
 
 class ConvergenceError(MasrelError, RuntimeError):

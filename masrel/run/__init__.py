@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from masrel._event_log import Event, SessionLog, read_log
+    from masrel.run._corrections import (
+        record_answer,
+        record_correction,
+        record_skip,
+    )
     from masrel.run._grade_sources import (
+        GradeCorrection,
         GradeRequest,
         GradeSource,
         OccasionSource,
@@ -22,16 +28,12 @@ if TYPE_CHECKING:
     from masrel.run._settings import model_controller
     from masrel.run._simulated_raters import SimulatedGrades
     from masrel.run.console import ConsoleGrades
-    from masrel.run.session import (
-        record_answer,
-        record_correction,
-        record_skip,
-        run_session,
-    )
+    from masrel.run.session import run_session
 
 __all__ = [
     "ConsoleGrades",
     "Event",
+    "GradeCorrection",
     "GradeRequest",
     "GradeSource",
     "OccasionSource",
@@ -51,7 +53,9 @@ __all__ = [
 ]
 
 _HOMES = {
+    "masrel.run._corrections": ("record_answer", "record_correction", "record_skip"),
     "masrel.run._grade_sources": (
+        "GradeCorrection",
         "GradeRequest",
         "GradeSource",
         "OccasionSource",
@@ -65,12 +69,7 @@ _HOMES = {
     "masrel.run._settings": ("model_controller",),
     "masrel.run._simulated_raters": ("SimulatedGrades",),
     "masrel.run.console": ("ConsoleGrades",),
-    "masrel.run.session": (
-        "record_answer",
-        "record_correction",
-        "record_skip",
-        "run_session",
-    ),
+    "masrel.run.session": ("run_session",),
 }
 
 

@@ -1,7 +1,9 @@
 """What a source of grades is, and the one that reads them off a script."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Protocol, cast
 
 from masrel.errors import ParameterError
@@ -12,9 +14,29 @@ from masrel.run._state import Felt
 from masrel.schedule import Presentation
 
 if TYPE_CHECKING:
-    from masrel.hess import PresentationStatus  # loads numpy
+    from masrel.hess import EmergencyStop, PresentationStatus  # loads numpy
 
 MAX_FAULTS = 3  # in a row of one presentation; after that nobody is asked any more
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GradeCorrection:
+    """What a grade should have been.
+
+    Attributes
+    ----------
+    code : str
+        The blinded code of a presentation that has been graded.
+    grade : str or None
+        The grade; None for a missing one.
+    who, why : str
+        Who corrects it, and for what reason.
+    """
+
+    code: str
+    grade: str | None
+    who: str
+    why: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,6 +75,15 @@ class GradeRequest:
         before.
     may_skip: bool
         Whether the presentation can be left without a grade after a fault.
+    correct : callable or None
+        Corrects a grade of the session while it goes on; raises ParameterError or
+        SessionLogError where it cannot. None where nothing can be corrected.
+    last : tuple of str and str or None, or None
+        Code and grade of what the session graded last, as it is corrected: what a
+        rater may want to correct. None before there is one.
+    samples : Path or None
+        File that keeps every sample of the presentation while it goes on. None before
+        and after.
     """
 
     rater: str
@@ -69,6 +100,9 @@ class GradeRequest:
     felt: Felt | None = None
     ended: str | None = None
     may_skip: bool = False
+    correct: "Callable[[GradeCorrection], None] | None" = None
+    last: tuple[str, str | None] | None = None
+    samples: Path | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -116,6 +150,8 @@ class QuestionRequest:
     presentation : Presentation or None
         What it is about; None for the session or the study. A person is told its code,
         never the model.
+    correct : callable or None
+        As that of a `GradeRequest`.
     """
 
     rater: str
@@ -123,6 +159,7 @@ class QuestionRequest:
     questionnaire: Questionnaire
     question: Question
     presentation: Presentation | None
+    correct: "Callable[[GradeCorrection], None] | None" = None
 
 
 class GradeSource(Protocol):
@@ -148,6 +185,22 @@ class GradeSource(Protocol):
 
     def present_again(self, request: GradeRequest, fault: str) -> bool | Skip:
         """Return whether to present it again after a fault, or that it is skipped."""
+        ...
+
+
+class ListeningSource(GradeSource, Protocol):
+    """A source of grades that is listened to while a model is presented.
+
+    To any other source nobody listens but to the terminal.
+    """
+
+    def listening(
+        self, request: GradeRequest, stop: "EmergencyStop"
+    ) -> AbstractContextManager[object]:
+        """Return what lasts as long as the presentation.
+
+        It may press `stop`, or say that the rater is done by ``request.status``.
+        """
         ...
 
 

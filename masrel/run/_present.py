@@ -5,7 +5,6 @@ import dataclasses
 import functools
 import hashlib
 import math
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,7 +27,7 @@ from masrel.hess import (
     open_device,
     run_presentation,
 )
-from masrel.hess._stop import enter_on_empty_line, stop_on_key, stop_on_signals
+from masrel.hess._stop import stop_on_signals
 from masrel.hess._watchdog import watched
 from masrel.protocol import PresentationRules, Protocol, joint_model
 from masrel.recording import (
@@ -53,7 +52,11 @@ from masrel.run._stretch_facts import (
     stretch_facts,
     stretch_rules,
 )
-from masrel.run.console import _cues_shown
+
+Listening = Callable[
+    [GradeRequest, EmergencyStop], contextlib.AbstractContextManager[object]
+]
+"""Listens to whoever is with the rater, as long as a presentation lasts."""
 
 # After this a presentation of one stretch ends, wherever the arm is.
 _ONE_STRETCH_S = 10.0
@@ -98,37 +101,24 @@ def present(
     clock: Clock,
     file: Path,
     stop: EmergencyStop,
+    listening: Listening,
 ) -> Outcome:
     """Present a model once on the protocol's device and write the recording.
 
     What was kept while it was made stays beside it until the log names it.
     """
-    # Signals that would end the process, and with a real clock any key of the terminal,
-    # press the emergency stop while the device is open.
+    # Signals that would end the process, and with a real clock whoever is listened to,
+    # can press the emergency stop while the device is open.
     limits = device_limits(protocol.device)
     status = request.status or presentation_status(protocol, request)
+    spool = spool_of(file)
     with contextlib.ExitStack() as stack:
         stack.enter_context(stop_on_signals(stop))
         if isinstance(clock, RealClock):
-            _listen(stack, protocol.presentation, status, stop)
-        spool = spool_of(file)
+            shown = dataclasses.replace(request, status=status, samples=spool)
+            stack.enter_context(listening(shown, stop))
         presented = _on_device(protocol, request, status, clock, limits, stop, spool)
     return _keep(presented, protocol, request, file)
-
-
-def _listen(
-    stack: contextlib.ExitStack,
-    rules: PresentationRules,
-    status: PresentationStatus,
-    stop: EmergencyStop,
-) -> None:
-    # to the person at the console, to whom Enter is never an emergency stop
-    enter: Callable[[], object] = lambda: None  # noqa: E731 - nothing at all
-    if rules.stretches != 1 and rules.done_with == "enter":
-        enter = status.done
-        stack.enter_context(enter_on_empty_line(sys.stdin, enter))
-    stack.enter_context(stop_on_key(stop, sys.stdin, enter))
-    stack.enter_context(_cues_shown(rules, status, sys.stdin))
 
 
 def recover(protocol: Protocol, request: GradeRequest, *, file: Path) -> Outcome | None:

@@ -23,6 +23,7 @@ from masrel.run._present import (
     recover,
     spool_of,
 )
+from masrel.run.console import _at_terminal
 
 ClockName = Literal["real", "simulated"]
 
@@ -128,7 +129,14 @@ class Presenter:
         file = self._file(request)
         # A new one each time, so that the simulated clock starts at zero.
         clock, stop = CLOCKS[self._clock](), EmergencyStop()
-        outcome = present(self._protocol, request, clock=clock, file=file, stop=stop)
+        outcome = present(
+            self._protocol,
+            request,
+            clock=clock,
+            file=file,
+            stop=stop,
+            listening=getattr(self._grades, "listening", _at_terminal),
+        )
         self.n_again += request.attempt > 1
         self._log_presented(request, outcome, file)
         if stop.reason in _TERMINATING:

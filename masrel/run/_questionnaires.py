@@ -6,7 +6,11 @@ from masrel.errors import ParameterError
 from masrel.protocol import Protocol, Question, Questionnaire
 from masrel.protocol._questions import When, checked_answer, questions_of
 from masrel.recording import _Fact
-from masrel.run._grade_sources import OccasionSource, QuestionRequest
+from masrel.run._grade_sources import (
+    GradeCorrection,
+    OccasionSource,
+    QuestionRequest,
+)
 from masrel.schedule import Presentation
 
 
@@ -19,6 +23,7 @@ def ask_questions(
     session: str,
     presentation: Presentation | None = None,
     answered: Container[tuple[str, str]] = (),
+    correct: Callable[[GradeCorrection], None] | None = None,
     log: Callable[[dict[str, _Fact]], object],
 ) -> None:
     """Ask what has no answer yet, and log each answer before the next question."""
@@ -31,6 +36,7 @@ def ask_questions(
             questionnaire=questionnaire,
             question=question,
             presentation=presentation,
+            correct=correct,
         )
         answer = checked_answer(question, source.answer(request), where=_place(request))
         names: dict[str, _Fact] = {

@@ -12,8 +12,15 @@ from masrel.conduct._study_log import stated
 from masrel.errors import SessionLogError, SessionStoppedError
 from masrel.protocol import Protocol, StudyPaths, presented_hash, protocol_hash
 from masrel.recording import _Fact, _Facts
+from masrel.run._corrections import correct_in_session
 from masrel.run._days import days_since, interval_fields, last_time
-from masrel.run._grade_sources import GradeRequest, GradeSource, Skip, with_occasions
+from masrel.run._grade_sources import (
+    GradeCorrection,
+    GradeRequest,
+    GradeSource,
+    Skip,
+    with_occasions,
+)
 from masrel.run._practice import practice_presentations
 from masrel.run._presenter import CLOCKS, ClockName, Presenter
 from masrel.run._questionnaires import ask_questions
@@ -293,6 +300,7 @@ class SessionRunner:
                 session=self._schedule.session,
                 presentation=presentation,
                 answered={key[:2] for key in self._state.answers if key[2] == code},
+                correct=self.correct,
                 log=lambda fields: self._log.append(
                     "answered", {**fields, "code": code}
                 ),
@@ -325,4 +333,15 @@ class SessionRunner:
             rehearsal=self._is_rehearsal,
             rules=self._protocol.presentation,
             may_skip=True,
+            correct=self.correct,
+            last=self._last_grade(),
         )
+
+    def correct(self, correction: GradeCorrection) -> None:
+        """Correct a grade of the session while it goes on."""
+        correct_in_session(self._log, self._protocol, correction)
+
+    def _last_grade(self) -> tuple[str, str | None] | None:
+        state = replay(self._log.path, self._log.events)
+        code = next(reversed(state.first_grades), None)
+        return None if code is None else (code, state.grades.get(code))

@@ -23,7 +23,7 @@ FELT: tuple[Felt, ...] = get_args(Felt)
 FROM_PAPER = "paper"
 """The source of grades that were written on a sheet."""
 
-FROM_PERSONS = ("console", FROM_PAPER)
+FROM_PERSONS = ("console", "browser", FROM_PAPER)
 """Sources of grades, by the names that logs have them by, that are a person's."""
 
 FORMAT = 2

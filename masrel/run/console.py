@@ -2,14 +2,15 @@
 
 import sys
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, ClassVar, TextIO
 
-from masrel.errors import ParameterError, SessionStoppedError
+from masrel.errors import ParameterError, SessionLogError, SessionStoppedError
 from masrel.protocol import PresentationRules, Question
 from masrel.protocol._questions import Answer, checked_answer
 from masrel.run._grade_sources import (
+    GradeCorrection,
     GradeRequest,
     QuestionRequest,
     Skip,
@@ -18,7 +19,7 @@ from masrel.run._grade_sources import (
 from masrel.scales import PublishedScale, Scale, published_scale
 
 if TYPE_CHECKING:
-    from masrel.hess import PresentationStatus  # loads numpy
+    from masrel.hess import EmergencyStop, PresentationStatus  # loads numpy
 
 _CUE_EVERY_S = 0.05  # how often it is looked whether a stretch is over
 
@@ -27,7 +28,8 @@ class ConsoleGrades:
     """A person at the console, who is told positions and blinded codes only.
 
     The words ``again`` and ``stop`` in place of a grade present the model again and
-    stop the session; a ``?`` says what the grades of a scale of the literature mean.
+    stop the session; ``correct CODE GRADE WHY`` corrects a grade given before, ``NA``
+    for a missing one; a ``?`` says what the grades of a scale of the literature mean.
     After more than one stretch, ``1+ 2`` is the grade 1+ that rests on stretch 2.
 
     Parameters
@@ -80,7 +82,7 @@ class ConsoleGrades:
         ]
         label = f"{', '.join(labels)}, no rating of the study. " if labels else ""
         instruction = _instruction(request.rules)
-        answer = self._ask(
+        answer = self._ask_or_correct(
             request,
             f"{label}Presentation {presentation.position} of "
             f"{request.n_presentations}, code {presentation.code}{again}. {instruction}"
@@ -88,6 +90,35 @@ class ConsoleGrades:
         )
         if answer == "stop":
             raise _stopped(request, "on request")
+
+    def _ask_or_correct(self, request: GradeRequest, question: str) -> str:
+        # the answer; before it any grade of the session can be corrected
+        while True:
+            answer = self._ask(request, question)
+            word, _, words = answer.partition(" ")
+            if word != "correct" or request.correct is None:
+                return answer
+            correction = self._correction(request.rater, words.strip())
+            if correction is None:
+                self._say("To correct a grade: correct CODE GRADE WHY.\n")
+                continue
+            try:
+                request.correct(correction)
+                self._say(f"{correction.code} is corrected in the log.\n")
+            except (ParameterError, SessionLogError) as error:
+                self._say(f"{error}.\n")
+
+    def _correction(self, rater: str, words: str) -> GradeCorrection | None:
+        code, _, rest = words.partition(" ")
+        grades = (*self._scale.grades, "NA")  # no scale has such a grade
+        begins = [grade for grade in grades if rest.startswith(f"{grade} ")]
+        grade = max(begins, key=len, default="")
+        why = rest.removeprefix(grade).strip()
+        if not grade or not why:
+            return None
+        return GradeCorrection(
+            code=code, grade=None if grade == "NA" else grade, who=rater, why=why
+        )
 
     def grade(self, request: GradeRequest) -> str | StretchGrade | None:
         """Ask for the grade until it is one of the scale.
@@ -120,7 +151,7 @@ class ConsoleGrades:
         if n_stretches > 1:
             rests = f", and the stretch it rests on, 1 to {n_stretches}, if any"
         while True:
-            answer = self._ask(
+            answer = self._ask_or_correct(
                 request,
                 f"Grade of {request.presentation.code} ({grades}{rests}; again; "
                 f"stop{meanings}): ",
@@ -342,6 +373,23 @@ def _instruction(rules: PresentationRules, *, on_paper: bool = False) -> str:
         )
     cues = [f"{cue}. " for cue in _cues_in_words(rules)]
     return "".join([*cues, *(["Bring the arm back each time. "] if cues[1:] else [])])
+
+
+@contextmanager
+def _at_terminal(request: GradeRequest, stop: "EmergencyStop") -> Iterator[None]:
+    """Listen to the keys of the terminal: any but Enter is an emergency stop."""
+    from masrel.hess._stop import enter_on_empty_line, stop_on_key  # loads numpy
+
+    rules, status = request.rules, request.status
+    with ExitStack() as stack:
+        enter: Callable[[], object] = lambda: None  # noqa: E731 - nothing at all
+        if status and rules.stretches != 1 and rules.done_with == "enter":
+            enter = status.done
+            stack.enter_context(enter_on_empty_line(sys.stdin, enter))
+        stack.enter_context(stop_on_key(stop, sys.stdin, enter))
+        if status:
+            stack.enter_context(_cues_shown(rules, status, sys.stdin))
+        yield
 
 
 @contextmanager

@@ -205,3 +205,30 @@ def test_a_skip_that_makes_no_sense_is_refused(
 ) -> None:
     who = ("--rater", "R1", "--session", "test")
     assert message in call("run", small[0].root, *who, *options, code=2)
+
+
+def test_a_grade_is_corrected_at_the_console_while_the_session_runs(
+    new_study: Callable[..., Small],
+) -> None:
+    small = new_study()
+    first, second, _ = codes(small)
+    lines = [
+        *["", "1+"],
+        f"correct {first}",  # neither grade nor reason
+        f"correct {second} 2 it was softer",  # has no grade yet
+        f"correct {first} 5 it was softer",  # no grade of the scale
+        *["", f"correct {first} 2 pressed the wrong key", "3"],
+        *[f"correct {second} NA the arm was held wrongly", "", "0"],
+    ]
+    summary, said = run(small, "".join(f"{line}\n" for line in lines))
+    assert grades(small) == ["2", None, "0"]
+    assert summary.n_graded == 2
+    log = read_log(small[0].log_file("R1", "test"))
+    corrections = [event.fields for event in log if event.kind == "correction"]
+    assert [(c["code"], c["grade"], c["why"]) for c in corrections] == [
+        (first, "2", "pressed the wrong key"),
+        (second, None, "the arm was held wrongly"),
+    ]
+    assert said.count("correct CODE GRADE WHY") == 2
+    assert f"needed a code that was graded ({first}), got '{second}'" in said
+    assert verify_study(small[0]).is_whole
