@@ -9,13 +9,22 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from masrel.report._conduct import StudyConduct, study_conduct
     from masrel.report._document import ReportFiles, write_report
+    from masrel.report._published_numbers import PublishedClaims, published_claims
 
-__all__ = ["ReportFiles", "StudyConduct", "study_conduct", "write_report"]
+__all__ = [
+    "PublishedClaims",
+    "ReportFiles",
+    "StudyConduct",
+    "published_claims",
+    "study_conduct",
+    "write_report",
+]
 
 
 def __getattr__(name: str) -> object:
     if name in __all__:
-        from masrel.report import _conduct, _document
+        from masrel.report import _conduct, _document, _published_numbers
 
-        return getattr(_conduct if "onduct" in name else _document, name)
+        modules = (_conduct, _published_numbers, _document)
+        return next(getattr(m, name) for m in modules if hasattr(m, name))
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

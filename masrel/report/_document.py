@@ -36,6 +36,7 @@ from masrel.report._report_folder import (
     report_files,
 )
 from masrel.report._result import result_text
+from masrel.report._sample_size import sample_size_section
 from masrel.report._stretches import speeds_section
 from masrel.report._tables import Table, as_csv, tag_of
 from masrel.report._trace_section import traces_section
@@ -46,6 +47,7 @@ Progress = Callable[[str], object]
 
 SECTIONS: dict[str, Callable[[Material], Section]] = {
     "design": design_section,
+    "sample-size": sample_size_section,
     "grades": grades_section,
     "agreement": partial(estimates_section, kind="inter-rater"),
     "test-retest": partial(estimates_section, kind="test-retest"),
@@ -107,6 +109,7 @@ def write_report(
     conduct: StudyConduct | None = None,
     anchors: Sequence[Anchor] = (),
     progress: Progress | None = None,
+    claims: PublishedClaims | None = None,
     raw_csv: bool = False,
     cache: Path | None = None,
 ) -> ReportFiles:
@@ -138,6 +141,8 @@ def write_report(
         end: a report kept elsewhere shows whether the logs were written anew.
     progress : callable, optional
         Called with the name of each figure, and of the pages, once it is made.
+    claims : PublishedClaims, optional
+        What a paper printed of the study (`published_claims`), for section ``claims``.
     raw_csv : bool, optional
         Whether texts of the tables' files are as they are. Else those that a
         spreadsheet would run as formulas stand after an apostrophe.
@@ -167,6 +172,7 @@ def write_report(
         conduct=conduct,
         anchors=anchors,
         progress=progress,
+        claims=claims,
         raw_csv=raw_csv,
         cache=Cache(cache),
     )

@@ -7,7 +7,7 @@ import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from masrel.errors import ParameterError
 from masrel.report._material import Drawing, Listing, Paragraph
@@ -17,6 +17,8 @@ from masrel.report._tables import Table, page_cells
 if TYPE_CHECKING:
     from docx.document import Document as WordDocument
 
+_CONTENTS = "Contents"
+_FIELD = ' TOC \\o "1-1" \\h \\z \\u '  # headings of level 1, as links
 _FIRST_DAY = (1980, 1, 1, 0, 0, 0)  # the earliest that a zip can say
 
 
@@ -37,7 +39,12 @@ class Picture:
     alt: str
 
 
-Part = Heading | Paragraph | Table | Listing | Picture
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Contents:
+    """A table of contents: the headings of level 1, each a link to its place."""
+
+
+Part = Heading | Paragraph | Table | Listing | Picture | Contents
 """What a document is made of."""
 
 
@@ -55,6 +62,7 @@ def report_docx(document: Document) -> bytes:
     parts += [Paragraph(text=document.banner)] if document.banner else []
     parts.append(Paragraph(text=document.provenance))
     parts.append(Paragraph(text=f"{document.tag} {document.result}".strip()))
+    parts.append(Contents())
     for section in document.sections:
         parts.append(Heading(text=section.title, level=1))
         parts += [_part(block, document.tag) for block in section.blocks]
@@ -92,6 +100,8 @@ def as_docx(
         _turn(document)
     for part in parts:
         _add(document, part)
+    if any(isinstance(part, Contents) for part in parts):
+        _fill_contents(document)
     properties = document.core_properties
     properties.author = properties.comments = ""
     properties.created = properties.modified = datetime(*_FIRST_DAY)
@@ -111,8 +121,63 @@ def _add(document: "WordDocument", part: Part) -> None:
         document.add_paragraph(part.text, style="macro")
     elif isinstance(part, Picture):
         _add_picture(document, part)
+    elif isinstance(part, Contents):
+        document.add_heading(_CONTENTS, 1)
     else:
         _add_table(document, part)
+
+
+def _fill_contents(document: "WordDocument") -> None:
+    """Put a field below the heading of the contents, with what it will say."""
+    # One paragraph an entry: the field begins in the first and ends after the last. It
+    # has no pages, which only what lays out knows: to update the field adds them.
+    from docx.enum.style import WD_STYLE_TYPE
+
+    headings = [p for p in document.paragraphs if p.style.name == "Heading 1"]  # type: ignore[union-attr]
+    place = next(nth for nth, p in enumerate(headings) if p.text == _CONTENTS)
+    after = headings[place + 1]
+    document.styles.add_style("toc 1", WD_STYLE_TYPE.PARAGRAPH, builtin=True)
+    for nth, heading in enumerate(headings[place + 1 :]):
+        _bookmark(heading, nth)
+        entry = after.insert_paragraph_before(style="toc 1")
+        if nth == 0:
+            _field_part(entry, "begin")
+            text = _add_element(
+                entry.add_run()._r, "w:instrText", ("xml:space", "preserve")
+            )
+            text.text = _FIELD
+            _field_part(entry, "separate")
+        link = _add_element(
+            entry._p, "w:hyperlink", ("w:anchor", _mark(nth)), ("w:history", "1")
+        )
+        _add_element(_add_element(link, "w:r"), "w:t").text = heading.text
+    _field_part(after.insert_paragraph_before(), "end")
+
+
+def _bookmark(heading: Any, nth: int) -> None:
+    number = ("w:id", str(nth))
+    start = _add_element(heading._p, "w:bookmarkStart", number, ("w:name", _mark(nth)))
+    heading.runs[0]._r.addprevious(start)
+    _add_element(heading._p, "w:bookmarkEnd", number)
+
+
+def _mark(nth: int) -> str:
+    return "_Toc" + str(nth + 1).zfill(8)
+
+
+def _field_part(paragraph: Any, kind: str) -> None:
+    _add_element(paragraph.add_run()._r, "w:fldChar", ("w:fldCharType", kind))
+
+
+def _add_element(parent: Any, name: str, *attributes: tuple[str, str]) -> Any:
+    from docx.oxml import OxmlElement
+    from docx.oxml.ns import qn
+
+    element = OxmlElement(name)
+    for key, value in attributes:
+        element.set(qn(key), value)
+    parent.append(element)
+    return element
 
 
 def _clean(text: str) -> str:
@@ -167,13 +232,9 @@ def _add_table(document: "WordDocument", table: Table) -> None:
     document.add_paragraph()
 
 
-def _repeat_on_pages(row: object) -> None:
-    from docx.oxml import OxmlElement
-    from docx.oxml.ns import qn
-
-    mark = OxmlElement("w:tblHeader")
-    mark.set(qn("w:val"), "true")
-    row._tr.get_or_add_trPr().append(mark)  # type: ignore[attr-defined]  # python-docx has no other way
+def _repeat_on_pages(row: Any) -> None:
+    # python-docx has no other way
+    _add_element(row._tr.get_or_add_trPr(), "w:tblHeader", ("w:val", "true"))
 
 
 def _without_times(data: bytes) -> bytes:

@@ -46,6 +46,17 @@ class GradeCounts:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class GradesByAim:
+    """How often models of each intended grade were given each grade."""
+
+    intended: tuple[str, ...]
+    scale: tuple[str, ...]  # every grade of the scale, mildest first
+    counts: tuple[tuple[int, ...], ...]  # by intended grade and grade
+    # by intended grade: the part that has it, and the ends of its interval
+    shares: tuple[tuple[float, float, float], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ForestRow:
     """One estimate with its interval."""
 
@@ -330,10 +341,10 @@ class LearningView:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlanCurve:
-    """What studies of so many raters can show, by their number of items."""
+    """What studies of so many raters, or items, can show, by the number of others."""
 
     label: str
-    n_items: tuple[int, ...]
+    sizes: tuple[int, ...]
     numbers: tuple[float, ...]
 
 
@@ -343,6 +354,8 @@ class PlanCurves:
 
     title: str
     what: str  # the number
+    over: str  # "items" or "raters"
+    limit: float | None  # what it is to reach
     curves: tuple[PlanCurve, ...]
 
 
@@ -362,6 +375,24 @@ class OrderPanels:
     """How even orders are, session below session."""
 
     panels: tuple[OrderPanel, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlaceDots:
+    """How far the grades of each part of a session are from those of their models."""
+
+    session: str
+    places: tuple[str, ...]  # of the parts, from the first
+    steps: tuple[float, ...]  # mean of each part, of the scale; not finite without one
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OrderDifferences:
+    """Differences of grades by when a model came, in steps of the scale."""
+
+    parts: tuple[PlaceDots, ...]  # by session; none where no places are known
+    # what is compared; mean, and the ends of its interval, which may not be finite
+    effects: tuple[tuple[str, float, float, float], ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -399,6 +430,8 @@ class AnswerBars:
 Content = (
     GradeGrid
     | GradeCounts
+    | GradesByAim
+    | OrderDifferences
     | RaterFlow
     | Forest
     | SpeedDots

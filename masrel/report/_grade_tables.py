@@ -1,10 +1,16 @@
 """Sections `categories` and `confusion`: agreement on each grade, and grades given."""
 
-from collections import Counter
-
 from masrel.analysis._category_agreement import category_agreement
 from masrel.analysis._exclusions import analysed_ratings
-from masrel.report._material import Material, Paragraph, Section, absent_section
+from masrel.analysis._given_grades import GivenGrades, given_grades
+from masrel.report._figure_data import GradesByAim
+from masrel.report._material import (
+    Drawing,
+    Material,
+    Paragraph,
+    Section,
+    absent_section,
+)
 from masrel.report._result import main_estimate
 from masrel.report._tables import Column, Table, Value, counted, percent
 
@@ -59,51 +65,97 @@ def categories_section(material: Material) -> Section:
     return Section(name="categories", title=_CATEGORIES, blocks=(table,))
 
 
+def shows_confusion(material: Material) -> bool:
+    """Say whether a model with an intended grade has ratings."""
+    return bool(_grades_met(material)[1])
+
+
 def confusion_section(material: Material) -> Section:
     """Show which grades models of each intended grade were given."""
-    grades = material.ratings.scale.grades
-    session, met = _met(material)
-    if not met:
+    session, rows = _grades_met(material)
+    if session is None or not rows:
         reason = "no model with an intended grade has ratings"
         return absent_section("confusion", _CONFUSION, reason)
-    rows: list[tuple[Value, ...]] = []
-    for aim in grades:
-        counts = [met[aim, grade] for grade in grades]
-        if n := sum(counts):
-            rows.append((aim, *counts, n, 100.0 * met[aim, aim] / n))
+    grades = material.ratings.scale.grades
+    met = sum(row.counts[grades.index(row.intended)] for row in rows)
     text = (
-        f"Of {counted(met.total(), 'grade')} of models with an intended grade, "
-        f"{sum(met[aim, aim] for aim in grades)} are the intended one."
+        f"Of {counted(sum(row.n for row in rows), 'grade')} of models with an intended "
+        f"grade, {met} are the intended one."
     )
-    table = Table(
+    blocks = (
+        Paragraph(text=text),
+        _confusion_drawing(material, session, rows),
+        _confusion_table(material, session, rows),
+    )
+    return Section(name="confusion", title=_CONFUSION, blocks=blocks)
+
+
+def _grades_met(material: Material) -> tuple[str | None, tuple[GivenGrades, ...]]:
+    analysis = material.analysis
+    ratings = analysed_ratings(material.ratings, analysis.excluded)
+    return given_grades(material.protocol, ratings, analysis.level)
+
+
+def _confusion_table(
+    material: Material, session: str, rows: tuple[GivenGrades, ...]
+) -> Table:
+    level = percent(material.analysis.level)
+    return Table(
         name="confusion",
         caption=f"{_CONFUSION}, session {session}",
         columns=(
             Column(key="intended_grade", heading="Intended", align="left"),
-            *(Column(key=f"grade_{g}", heading=g) for g in grades),
+            *(
+                Column(key=f"grade_{g}", heading=g)
+                for g in material.ratings.scale.grades
+            ),
             Column(key="n_ratings", heading="Ratings"),
             Column(key="percent", heading="As intended (%)", digits=1),
+            Column(key="low", heading="Low", digits=1),
+            Column(key="high", heading="High", digits=1),
         ),
-        rows=tuple(rows),
+        rows=tuple(
+            (
+                row.intended,
+                *row.counts,
+                row.n,
+                *(100.0 * share for share in (row.share, row.low, row.high)),
+            )
+            for row in rows
+        ),
         notes=(
             "Rows: the grade a model was built for; columns: the grades given. Where "
             "the scale has an order, those left of the intended one are too low and "
-            "those right of it too high.",
+            f"those right of it too high. Low, High: {level} % confidence interval of "
+            "the percentage, for other raters like these on these models.",
         ),
         data=material.data,
     )
-    blocks = (Paragraph(text=text), table)
-    return Section(name="confusion", title=_CONFUSION, blocks=blocks)
 
 
-def _met(material: Material) -> tuple[str | None, Counter[tuple[str, str]]]:
-    # the first session that has ratings, and how often grades met intended ones there
-    intended = {model.id: model.intended_grade for model in material.protocol.models}
-    ratings = analysed_ratings(material.ratings, material.analysis.excluded)
-    table = ratings.table[ratings.table["grade"].notna()]
-    present = set(table["session"])
-    session = next((s for s in material.sessions if s in present), None)
-    table = table[table["session"] == session]
-    pairs = zip(table["model"], table["grade"], strict=True)
-    aims = ((intended[model], grade) for model, grade in pairs)
-    return session, Counter((aim, grade) for aim, grade in aims if aim is not None)
+def _confusion_drawing(
+    material: Material, session: str, rows: tuple[GivenGrades, ...]
+) -> Drawing:
+    grades = material.ratings.scale.grades
+    level = percent(material.analysis.level)
+    texts = [
+        f"intended {row.intended}: "
+        + ", ".join(f"{n} of {g}" for g, n in zip(grades, row.counts, strict=True) if n)
+        for row in rows
+    ]
+    return Drawing(
+        name="confusion",
+        caption=(
+            f"{_CONFUSION}, session {session}. Left: how often; darker is a larger "
+            "part of the row. Right: the percentage as intended, "
+            f"with its {level} % confidence interval for other raters like these."
+        ),
+        alt=f"Counts of grades given. {'; '.join(texts)}.",
+        content=GradesByAim(
+            intended=tuple(row.intended for row in rows),
+            scale=grades,
+            counts=tuple(row.counts for row in rows),
+            shares=tuple((row.share, row.low, row.high) for row in rows),
+        ),
+        stamp=material.stamp,
+    )

@@ -3,6 +3,7 @@ r"""Tables as LaTeX, and a whole report as a file that pdflatex and lualatex com
 Every text is escaped. A letter that pdflatex cannot set is named in the first lines.
 """
 
+import re
 import textwrap
 import unicodedata
 from collections.abc import Iterator, Sequence
@@ -74,6 +75,15 @@ _ACCENTS = frozenset(
     "\N{COMBINING CIRCUMFLEX ACCENT}\N{COMBINING DIAERESIS}\N{COMBINING CARON}"
     "\N{COMBINING RING ABOVE}\N{COMBINING CEDILLA}"
 )
+# Marks of formulas: above a Greek letter, and above another one, as LaTeX names them.
+_MARKS = {
+    "\N{COMBINING DOT ABOVE}": ("dot", "."),
+    "\N{COMBINING DIAERESIS}": ("ddot", '"'),
+    "\N{COMBINING CIRCUMFLEX ACCENT}": ("hat", "^"),
+    "\N{COMBINING MACRON}": ("bar", "="),
+    "\N{COMBINING TILDE}": ("tilde", "~"),
+}
+_MARKED = re.compile(f"([A-Za-z{''.join(_GREEK)}])([{''.join(_MARKS)}])")
 _LETTERS = frozenset("ßæøœłıÆØŒŁ…‘’“”—§¶£·³¹°")
 
 
@@ -291,7 +301,21 @@ def _text(text: str) -> str:
 
 def _escape(text: str) -> str:
     # of an option's two hyphens TeX would make a dash
-    return text.replace("--", f"-{_APART}-").translate(_ESCAPES)
+    text = text.replace("--", f"-{_APART}-")
+    pieces = (c if _is_set(c) else unicodedata.normalize("NFD", c) for c in text)
+    first, *others = _MARKED.split("".join(pieces))
+    shown = [_plain(first)]
+    for letter, mark, after in zip(*(others[k::3] for k in range(3)), strict=True):
+        of_formula, of_text = _MARKS[mark]
+        is_greek = letter in _GREEK
+        name = rf"\{_GREEK[letter]}" if is_greek else letter
+        marked = rf"$\{of_formula}{{{name}}}$" if is_greek else rf"\{of_text}{{{name}}}"
+        shown += [marked, _plain(after)]
+    return "".join(shown)
+
+
+def _plain(text: str) -> str:
+    return unicodedata.normalize("NFC", text).translate(_ESCAPES)
 
 
 def _is_set(letter: str) -> bool:

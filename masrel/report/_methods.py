@@ -9,6 +9,7 @@ from masrel.estimates import Estimate, Interval
 from masrel.protocol import report_sections, scale_of
 from masrel.protocol._kinds import DEFAULT_KIND
 from masrel.report._design import beside_presentations, stretches_asked_for
+from masrel.report._grade_tables import shows_confusion
 from masrel.report._material import Content, Listing, Material, Paragraph, Section
 from masrel.report._order_section import shows_order
 from masrel.report._references import (
@@ -113,6 +114,8 @@ def _of_sections(material: Material, used: list[str]) -> Iterator[str]:
             interval_reference=_cite(("korn1998",), used),
             kappa_reference=_cite(("fleiss1971",), used),
         )
+    if "confusion" in sections and shows_confusion(material):
+        yield sentence("methods", "confusion", reference=_cite(("korn1998",), used))
     if "order" in sections and shows_order(material):
         yield sentence("methods", "order")
 

@@ -9,15 +9,17 @@ from masrel.analysis._order_effects import (
     place_summaries,
 )
 from masrel.ratings import Ratings
+from masrel.report._figure_data import OrderDifferences, PlaceDots
 from masrel.report._material import (
     Content,
+    Drawing,
     Material,
     Paragraph,
     Section,
     absent_section,
 )
 from masrel.report._sentences import sentence
-from masrel.report._tables import Column, Table, percent
+from masrel.report._tables import Column, Table, interval_text, number, percent
 
 _TITLE = "Effects of order"
 
@@ -36,6 +38,7 @@ def order_section(material: Material) -> Section:
     if not effects:
         return absent_section("order", _TITLE, sentence("order", "nothing"))
     blocks: list[Content] = [Paragraph(text=sentence("order", "steps"))]
+    blocks.append(_drawing(material, places, effects))
     if places:
         blocks.append(_places_table(material, places))
     else:
@@ -46,6 +49,44 @@ def order_section(material: Material) -> Section:
 
 def _analysed(material: Material) -> Ratings:
     return analysed_ratings(material.ratings, material.analysis.excluded)
+
+
+def _drawing(
+    material: Material,
+    places: tuple[PlaceSummary, ...],
+    effects: tuple[OrderEffect, ...],
+) -> Drawing:
+    level = percent(material.analysis.level)
+    left = "Left: means of each part of a session. Right: " if places else "Here: "
+    right = f"mean differences, with {level} % confidence intervals for other raters"
+    texts = [
+        f"{_question(effect)}: {number(effect.mean, 2)} "
+        f"{interval_text(effect.low, effect.high, 2)}"
+        for effect in effects
+    ]
+    return Drawing(
+        name="order_effects",
+        caption=f"Effects of order, in steps of the scale. {left}{right}.",
+        alt=f"Forest plot of differences in steps. {'; '.join(texts)}.",
+        content=OrderDifferences(
+            parts=tuple(
+                PlaceDots(
+                    session=session,
+                    places=tuple(_places(part) for part in of_session),
+                    steps=tuple(part.deviation for part in of_session),
+                )
+                for session in dict.fromkeys(part.session for part in places)
+                for of_session in [[p for p in places if p.session == session]]
+            ),
+            effects=tuple((_question(e), e.mean, e.low, e.high) for e in effects),
+        ),
+        stamp=material.stamp,
+    )
+
+
+def _places(part: PlaceSummary) -> str:
+    first, last = part.first, part.last
+    return f"{first}–{last}" if first < last else str(first)
 
 
 def _places_table(material: Material, places: tuple[PlaceSummary, ...]) -> Table:
@@ -62,7 +103,7 @@ def _places_table(material: Material, places: tuple[PlaceSummary, ...]) -> Table
         ),
         rows=tuple(
             (
-                f"{part.first}–{part.last}" if part.first < part.last else part.first,
+                _places(part),
                 part.session,
                 part.n,
                 part.deviation,

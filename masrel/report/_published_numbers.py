@@ -14,7 +14,15 @@ _TITLE = "Published numbers"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PublishedClaims:
-    """What a paper printed, with the hash of the file that says it."""
+    """What a paper printed of a study, as `published_claims` reads it.
+
+    Attributes
+    ----------
+    claims : tuple of Claim
+        Each number that was printed, with the tables that it may come from.
+    sha256 : str
+        Hash of the file that says so.
+    """
 
     claims: tuple[Claim, ...]
     sha256: str
@@ -26,7 +34,36 @@ class PublishedClaims:
 
 
 def published_claims(paths: StudyPaths, protocol: Protocol) -> PublishedClaims | None:
-    """Return what the paper of a study printed, if its report is to have it."""
+    """Read what a paper printed of a study, for the section ``claims`` of its report.
+
+    Parameters
+    ----------
+    paths : StudyPaths
+        The study's files; numbers are in its ``ratings/claims.csv``.
+    protocol : Protocol
+        The study's protocol.
+
+    Returns
+    -------
+    PublishedClaims or None
+        None where the report is to have no such section, or there is no such file.
+
+    Raises
+    ------
+    RatingsError
+        If the file is not one of claims; the message names row and column.
+    OSError
+        If it cannot be read.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from masrel.protocol import StudyPaths, read_protocol
+    >>> from masrel.report import published_claims
+    >>> paths = StudyPaths(Path("studies/small"))
+    >>> print(published_claims(paths, read_protocol(paths.protocol)))
+    None
+    """
     file = paths.claims_file
     if "claims" not in report_sections(protocol) or not file.exists():
         return None

@@ -118,6 +118,11 @@ def half_up(value: float, decimals: int) -> str:
     return text.replace("-", "−")
 
 
+def rounded(value: float, decimals: int) -> float:
+    """Return a number with so many decimals, for a file that takes numbers."""
+    return round(value, decimals)
+
+
 def significant(value: float, digits: int = 6) -> str:
     """Return a number with so many digits, whatever its size."""
     return f"{value:.{digits}g}"

@@ -184,14 +184,19 @@ def _band(lines: Sequence[_Line]) -> TraceBand:
     ends = np.array([line.time[-1] for line in lines])
     time = np.linspace(0.0, float(np.median(ends)), _N_POINTS)
     under_way = time <= ends[:, np.newaxis]  # (n_lines, n_points)
+    n_under_way = under_way.sum(axis=0)
 
     def ends_of(values: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
         known = [
             np.interp(time, line.time, of_line)
             for line, of_line in zip(lines, values, strict=True)
         ]
-        shown = np.where(under_way, np.stack(known), np.nan)
-        return np.asarray(np.nanquantile(shown, _BAND_SHARES, axis=0))
+        ordered = np.sort(np.where(under_way, np.stack(known), np.inf), axis=0)
+        shown = np.empty((len(_BAND_SHARES), time.size))
+        for n in np.unique(n_under_way):
+            of_n = n_under_way == n
+            shown[:, of_n] = np.quantile(ordered[:n, of_n], _BAND_SHARES, axis=0)
+        return shown
 
     return TraceBand(
         time=time,

@@ -58,9 +58,10 @@ class Scene:
     @property
     def title(self) -> str:
         """Name of the scene."""
-        if self.speed_deg_s is None:
-            return f"{self.model}, {self.kind}"
-        return f"{self.model}, {self.kind} {significant(self.speed_deg_s)} deg/s"
+        speed = ""
+        if self.speed_deg_s is not None:
+            speed = f" {significant(self.speed_deg_s)} deg/s"
+        return f"{self.model}, {self.kind}{speed}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,7 +107,7 @@ def scene_document(scene: Scene, quantities: Quantities) -> dict[str, object]:
     for key, number in document.items():
         if isinstance(number, float) and not math.isfinite(number):
             raise ParameterError(
-                f"{scene.title}: {key}: needs a number that a float can hold, got "
+                f"{key}: needs a number that a float can hold, got "
                 f"{significant(number)}; some parameter or speed is too large"
             )
     return document
@@ -137,44 +138,36 @@ def _requested(
 
 def scene_text(document: dict[str, Any], title: str) -> str:
     """Return the document of one scene for a person."""
-    lines = [title, _phase_line(["phase", "start s", "end s", "start deg", "end deg"])]
+    rows = [["phase", "start s", "end s", "start deg", "end deg"]]
     for span in document["phases"]:
         times = [fixed_or_significant(span[key], 3) for key in ("start_s", "end_s")]
         angles = [
             fixed_or_significant(span[key], 2) for key in ("start_deg", "end_deg")
         ]
-        lines.append(_phase_line([span["name"], *times, *angles]))
+        rows.append([span["name"], *times, *angles])
+    lines = [title]
+    for name, *cells in rows:
+        # as wide as an ordinary stretch needs; a long number keeps its distance
+        widths = zip(cells, (9, 9, 11, 9), strict=True)
+        padded = (text.rjust(max(width, len(text) + 2)) for text, width in widths)
+        lines.append(name.ljust(11) + "".join(padded))
     lines += [
         f"{event['name']} at {fixed_or_significant(event['time_s'], 3)} s, "
         f"{fixed_or_significant(event['angle_deg'], 2)} deg"
         for event in document.get("events", ())  # of another kind of joint
     ]
-    lines.append(
-        f"peak torque {fixed_or_significant(document['peak_torque_nm'], 3)} N·m"
-    )
+    values = [("peak torque", document["peak_torque_nm"], "N·m")]
     for key, (name, unit) in _LINES.items():
-        if key not in document:
-            continue
-        if document[key] is None:
-            lines.append(f"{name} none: the stretch has no catch")
-        else:
-            lines.append(f"{name} {fixed_or_significant(document[key], 3)} {unit}")
+        if key in document:
+            values.append((name, document[key], unit))
+    values += [(f"torque at {place}", t, "N·m") for place, t in _places(document)]
     lines += [
-        f"torque at {place} {fixed_or_significant(value, 3)} N·m"
-        for place, value in _places(document)
+        f"{name} none: the stretch has no catch"
+        if value is None
+        else f"{name} {fixed_or_significant(value, 3)} {unit}"
+        for name, value, unit in values
     ]
     return "\n".join(lines)
-
-
-def _phase_line(cells: Sequence[str]) -> str:
-    # as wide as an ordinary stretch needs; a long number keeps its distance
-    name, *numbers = cells
-    widths = (9, 9, 11, 9)
-    parts = [
-        text.rjust(max(width, len(text) + 2))
-        for text, width in zip(numbers, widths, strict=True)
-    ]
-    return name.ljust(11) + "".join(parts)
 
 
 def _places(document: dict[str, Any]) -> list[tuple[str, float]]:

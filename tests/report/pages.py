@@ -16,6 +16,7 @@ from tests.analysis.studies import in_person, plan, protocol_with, table_v
 
 ALL = (
     "design",
+    "sample-size",
     "grades",
     "agreement",
     "test-retest",

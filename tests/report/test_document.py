@@ -7,7 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from masrel.report import ReportFiles
+from masrel.analysis import analyze
+from masrel.protocol import StudyPaths
+from masrel.report import ReportFiles, published_claims, write_report
+from tests.analysis.studies import plan, protocol_with, table_v
 from tests.report.pages import (
     ALL,
     HOSTILE,
@@ -20,6 +23,7 @@ from tests.report.pages import (
 
 TITLES = {
     "design": "Design",
+    "sample-size": "Sample size",
     "grades": "Grades",
     "agreement": "Agreement between raters",
     "test-retest": "Test-retest agreement",
@@ -225,3 +229,23 @@ def test_symbols_have_their_index_set_low(published: ReportFiles) -> None:
     text = published.html.read_text(encoding="utf-8")
     assert "ν<sub>L</sub>" in text
     assert "ν_L" not in text
+
+
+def test_what_a_paper_printed_is_held_against_every_table(tmp_path: Path) -> None:
+    paths = StudyPaths(Path(__file__).parents[2] / "studies" / "hess2012")
+    protocol = protocol_with(plan(id="kappa"), sections=("claims",))
+    claims = published_claims(paths, protocol)
+    assert claims is not None
+    assert published_claims(paths, protocol_with(sections=("design",))) is None
+    analysis = analyze(protocol, table_v())
+    files = write_report(
+        protocol, table_v(), analysis, tmp_path / "report", claims=claims
+    )
+    assert files.html is not None
+    assert claims.sha256 in files.html.read_text(encoding="utf-8")
+    names = [path.name.rpartition("-")[0] for path in files.tables]
+    rows = csv_rows(files.tables[0])
+    assert len(names) == 2
+    assert {row[0] for row in rows[1:]} >= {claim.name for claim in claims.claims}
+    bare = write_report(protocol, table_v(), analysis, tmp_path / "bare")
+    assert bare.tables == ()

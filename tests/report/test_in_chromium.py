@@ -117,6 +117,32 @@ def test_a_telephone_shows_all_of_a_page_with_enough_contrast(
     assert page["skips"]
 
 
+@pytest.mark.parametrize("report", ["published", "simulated"])
+def test_a_page_asks_for_nothing_but_itself(
+    report: str, request: pytest.FixtureRequest
+) -> None:
+    files: ReportFiles = request.getfixturevalue(report)
+    api = pytest.importorskip("playwright.sync_api")
+    asked: list[str] = []
+    with api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(
+            executable_path=CHROMIUM, args=["--no-sandbox"]
+        )
+        page = browser.new_page()
+        page.on("request", lambda each: asked.append(each.url))
+        page.goto(files.html.as_uri(), wait_until="networkidle")
+        page.locator("a").first.focus()
+        page.emulate_media(media="print")
+        assert page.locator("img").count() == len(files.figures) // 2
+        # the listener hears what a page asks for
+        page.evaluate("fetch('http://127.0.0.1:9/').catch(() => 0)")
+        browser.close()
+    itself, *others, heard = [url for url in asked if not url.startswith("data:")]
+    assert itself == files.html.as_uri()
+    assert others == []
+    assert heard == "http://127.0.0.1:9/"
+
+
 @dataclass(frozen=True)
 class Word:
     """A word of a PDF, and its box in points from the upper left corner."""

@@ -22,6 +22,7 @@ if _backend is not None and not _is_loaded:
     with contextlib.suppress(ValueError):
         mpl.rcParams["backend"] = _backend
 
-from masrel.report.figures._style import draw, draw_all  # noqa: E402 - loads matplotlib
+from masrel.report.figures._processes import draw_all  # noqa: E402 - loads matplotlib
+from masrel.report.figures._style import draw  # noqa: E402
 
 __all__ = ["draw", "draw_all"]

@@ -12,12 +12,13 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backend_bases import RendererBase
 from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
+
+from masrel.report.figures._picture import Measure
 
 _EDGE, _GAP = 4.0, 10.0  # points: around all, and between two axes
 _LEAST = 72.0  # points of an axes, across and down
@@ -25,7 +26,7 @@ _LEAST_ACROSS = 144.0  # points of all axes of a row
 _POINTS = 72.0  # an inch
 
 _Floats = NDArray[np.float64]
-_METRICS = RendererBase()  # knows how large texts are, and draws nothing
+_METRICS = Measure()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,5 +1,6 @@
 """How a figure becomes files: drawn once, as vectors and as pixels at a time."""
 
+import functools
 import io
 from collections.abc import Sequence
 from typing import Any
@@ -63,7 +64,21 @@ def _pdf(figure: Figure) -> bytes:
     return file.getvalue()
 
 
-class _VectorsAndPixels(RendererBase):
+@functools.cache
+def _text_size(text: str, prop: Any, ismath: Any) -> tuple[float, float, float]:
+    return RendererBase().get_text_width_height_descent(text, prop, ismath)
+
+
+class Measure(RendererBase):
+    """Knows how large texts are, once for all figures, and draws nothing."""
+
+    def get_text_width_height_descent(
+        self, s: str, prop: Any, ismath: Any
+    ) -> tuple[float, float, float]:
+        return _text_size(s, prop, ismath)
+
+
+class _VectorsAndPixels(Measure):
     """Draws into an SVG, and the same, enlarged, into pixels."""
 
     def __init__(self, svg: Any, pixels: Any) -> None:

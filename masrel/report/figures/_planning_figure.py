@@ -1,4 +1,4 @@
-"""What studies can show, over how many items they have: a line for so many raters."""
+"""What studies can show, over how many items, or raters, they have."""
 
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
@@ -16,7 +16,7 @@ def planning_figure(content: PlanCurves) -> Figure:
     axes = figure.subplots()
     for place, curve in enumerate(content.curves):
         axes.plot(
-            curve.n_items,
+            curve.sizes,
             curve.numbers,
             marker=_MARKERS[place % len(_MARKERS)],
             markersize=4.5,
@@ -25,10 +25,12 @@ def planning_figure(content: PlanCurves) -> Figure:
             label=curve.label,
         )
     axes.set_title(content.title, loc="left")
-    axes.set_xlabel("items")
+    if content.limit is not None:
+        axes.axhline(content.limit, color=GREY, linewidth=0.8, linestyle="--")
+    axes.set_xlabel(content.over)
     axes.set_ylabel(content.what)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.set_ylim(0.0, 1.02 if content.what == "power" else None)
+    axes.set_ylim(0.0, 1.02 if content.what in ("power", "assurance") else None)
     axes.grid(axis="y")
     figure.legend(loc="outside lower center", ncols=4, fontsize=8)
     return figure

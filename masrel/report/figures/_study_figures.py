@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import PatchCollection
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -15,6 +16,7 @@ from masrel.report._figure_data import (
     MANY_RATERS,
     GradeCounts,
     GradeGrid,
+    GradesByAim,
     SpeedColumn,
     SpeedDots,
 )
@@ -111,17 +113,56 @@ def count_figure(content: GradeCounts) -> Figure:
     size = (1.3 + min(7.4, 0.62 * n_columns), 0.9 + 0.3 * n_rows)
     figure = Figure(figsize=size)
     axes = figure.add_subplot()
-    counts = np.array(content.counts, dtype=np.int64).reshape(n_rows, n_columns)
+    _draw_counts(axes, content.counts, content.intended, content.scale)
+    axes.set_yticks(range(n_rows), [short_name(model) for model in content.models])
+    axes.set_xlabel("grade given; framed: the intended grade")
+    return figure
+
+
+def aim_figure(content: GradesByAim) -> Figure:
+    """Return grades by intended ones, and beside each row the part as intended."""
+    n_rows, n_columns = len(content.intended), len(content.scale)
+    cells = min(5.4, 0.6 * n_columns)
+    figure = Figure(figsize=(1.2 + cells + 2.4, 0.95 + 0.36 * n_rows))
+    left, right = figure.subplots(1, 2, sharey=True, width_ratios=(cells, 2.2))
+    _draw_counts(left, content.counts, content.intended, content.scale)
+    left.set_yticks(range(n_rows), content.intended)
+    left.set_ylabel("intended grade")
+    left.set_xlabel("grade given; framed: as intended")
+    for row, share in enumerate(content.shares):
+        value, *ends = (100.0 * part for part in share)
+        right.plot(ends, [row, row], color=BLUE, linewidth=1.8, marker="|")
+        right.plot([value], [row], "o", color=BLACK, markersize=5)
+    right.set_xlim(-3.0, 103.0)
+    right.set_xticks([0, 25, 50, 75, 100])
+    right.set_xlabel("as intended (%)")
+    right.tick_params(axis="y", length=0, labelleft=False)
+    right.spines["left"].set_visible(False)
+    right.grid(axis="x")
+    return figure
+
+
+def _draw_counts(
+    axes: Axes,
+    rows: Sequence[Sequence[int]],
+    intended: Sequence[str | None],
+    scale: Sequence[str],
+) -> None:
+    # rows: how often each grade of the scale was given
+    n_rows, n_columns = len(rows), len(scale)
+    counts = np.array(rows, dtype=np.int64).reshape(n_rows, n_columns)
     shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
-    axes.imshow(
-        shares, cmap=_SHADES, vmin=0.0, vmax=1.0, aspect="auto",
-        interpolation="nearest",
+    places = [(x - 0.5, y - 0.5) for y in range(n_rows) for x in range(n_columns)]
+    axes.add_collection(
+        PatchCollection(
+            [Rectangle(corner, 1.0, 1.0) for corner in places],
+            facecolors=_SHADES(shares.ravel()), edgecolors="white", linewidth=2.0,
+        )
     )  # fmt: skip
-    look: dict[str, Any] = {"color": "white", "linewidth": 2.0}
-    axes.hlines(np.arange(0.5, n_rows - 1), -0.5, n_columns - 0.5, **look)
-    axes.vlines(np.arange(0.5, n_columns - 1), -0.5, n_rows - 0.5, **look)
-    for row, aim in enumerate(content.intended):
-        for column, grade in enumerate(content.scale):
+    axes.set_xlim(-0.5, n_columns - 0.5)
+    axes.set_ylim(n_rows - 0.5, -0.5)
+    for row, aim in enumerate(intended):
+        for column, grade in enumerate(scale):
             if n_columns <= _MOST_NUMBERS and counts[row, column]:
                 _write_count(axes, row, column, counts, shares)
             if grade == aim:
@@ -129,13 +170,10 @@ def count_figure(content: GradeCounts) -> Figure:
                 corner = (column - 0.46, row - 0.42)
                 axes.add_patch(Rectangle(corner, 0.92, 0.84, facecolor="none", **frame))
     every = 1 if n_columns <= _MOST_NUMBERS else -(-n_columns // 10)
-    axes.set_xticks(range(0, n_columns, every), content.scale[::every])
-    axes.set_yticks(range(n_rows), [short_name(model) for model in content.models])
+    axes.set_xticks(range(0, n_columns, every), scale[::every])
     axes.tick_params(length=0)
     axes.xaxis.tick_top()
     axes.spines[:].set_visible(False)
-    axes.set_xlabel("grade given; framed: the intended grade")
-    return figure
 
 
 def _write_count(

@@ -20,8 +20,6 @@ from masrel.report.figures._picture import files_of
 if TYPE_CHECKING:
     from matplotlib.typing import RcKeyType
 
-    from masrel.report._material import Drawing
-
 BLACK = "#000000"
 GREY = "#6B6B6B"
 BLUE = "#0072B2"
@@ -119,26 +117,15 @@ def _stamp(figure: Figure, text: str) -> Text:
     )
 
 
-def draw_all(drawings: "Sequence[Drawing]") -> list[dict[data.Form, bytes]]:
-    """Draw the figures of a report, one after the other.
-
-    Parameters
-    ----------
-    drawings : sequence of Drawing
-        What is drawn, and the line below which it stands.
-
-    Returns
-    -------
-    list of dict of str to bytes
-        The files of each drawing: its PNG and its SVG.
-    """
-    return [draw(drawing.content, stamp=drawing.stamp) for drawing in drawings]
-
-
 def _figure(content: data.Content) -> Figure:
     # Imported here: one figure loads what no other needs.
     match content:
-        case data.GradeGrid() | data.GradeCounts() | data.SpeedDots():
+        case (
+            data.GradeGrid()
+            | data.GradeCounts()
+            | data.GradesByAim()
+            | data.SpeedDots()
+        ):
             return _study_figure(content)
         case data.TraceColumns() | data.MeasuredTorque():
             from masrel.report.figures import _trace_figures as traces
@@ -154,6 +141,7 @@ def _figure(content: data.Content) -> Figure:
             data.PairMaps()
             | data.LearningView()
             | data.OrderPanels()
+            | data.OrderDifferences()
             | data.RaterFlow()
             | data.AnswerBars()
         ):
@@ -179,7 +167,7 @@ def _figure(content: data.Content) -> Figure:
 
 
 def _study_figure(
-    content: data.GradeGrid | data.GradeCounts | data.SpeedDots,
+    content: data.GradeGrid | data.GradeCounts | data.GradesByAim | data.SpeedDots,
 ) -> Figure:
     from masrel.report.figures import _study_figures as study
 
@@ -187,6 +175,8 @@ def _study_figure(
         return study.grade_figure(content)
     if isinstance(content, data.GradeCounts):
         return study.count_figure(content)
+    if isinstance(content, data.GradesByAim):
+        return study.aim_figure(content)
     return study.speed_figure(content)
 
 
@@ -195,6 +185,7 @@ def _rater_figure(
         data.PairMaps
         | data.LearningView
         | data.OrderPanels
+        | data.OrderDifferences
         | data.RaterFlow
         | data.AnswerBars
     ),
@@ -203,6 +194,10 @@ def _rater_figure(
         from masrel.report.figures._order_figure import order_figure
 
         return order_figure(content)
+    if isinstance(content, data.OrderDifferences):
+        from masrel.report.figures._order_differences import difference_figure
+
+        return difference_figure(content)
     if isinstance(content, data.RaterFlow):
         from masrel.report.figures._rater_flow import flow_figure
 

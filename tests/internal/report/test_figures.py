@@ -13,7 +13,10 @@ from masrel.report._figure_data import (
     Forest,
     ForestRow,
     GradeGrid,
+    GradesByAim,
+    OrderDifferences,
     PairMaps,
+    PlaceDots,
     RaterPairs,
     SpeedColumn,
     SpeedDots,
@@ -22,8 +25,9 @@ from masrel.report._figure_data import (
 )
 from masrel.report.figures import draw
 from masrel.report.figures._forest import forest_figure
+from masrel.report.figures._order_differences import difference_figure
 from masrel.report.figures._rater_pairs import rater_figure
-from masrel.report.figures._study_figures import speed_figure
+from masrel.report.figures._study_figures import aim_figure, speed_figure
 from masrel.report.figures._style import STYLE, house_style
 from masrel.report.figures._trace_figures import trace_figure
 
@@ -318,3 +322,50 @@ def test_every_group_has_its_map_one_below_the_other() -> None:
     cells = (first.height / 3, second[0].height / 12)
     inches = figure.get_figheight()
     assert [cell * inches for cell in cells] == pytest.approx([0.42, 0.33])
+
+
+def test_the_part_as_intended_stands_beside_its_row() -> None:
+    content = GradesByAim(
+        intended=("1", "2"),
+        scale=("0", "1", "2"),
+        counts=((1, 3, 0), (0, 0, 2)),
+        shares=((0.75, 0.2, 0.99), (1.0, 0.16, 1.0)),
+    )
+    with house_style():
+        left, right = aim_figure(content).axes
+    assert [text.get_text() for text in left.texts] == ["1", "3", "2"]
+    frames = [patch.get_x() + 0.46 for patch in left.patches]
+    assert frames == pytest.approx([1, 2])  # the columns of 1 and of 2
+    lines = [np.asarray(line.get_xydata()).tolist() for line in right.lines]
+    assert lines == [
+        [[20.0, 0.0], [99.0, 0.0]],
+        [[75.0, 0.0]],
+        [[16.0, 1.0], [100.0, 1.0]],
+        [[100.0, 1.0]],
+    ]
+
+
+@pytest.mark.parametrize("has_places", [True, False])
+def test_effects_of_order_reach_as_far_as_they_are(has_places: bool) -> None:
+    nan = float("nan")
+    content = OrderDifferences(
+        parts=(
+            PlaceDots(session="a", places=("1–2", "3–4"), steps=(0.1, -0.1)),
+            PlaceDots(session="b", places=("1", "2"), steps=(nan, 0.9)),
+        )
+        if has_places
+        else (),
+        effects=(("one", 0.2, -2.0, 2.4), ("other", -0.1, nan, nan)),
+    )
+    with house_style():
+        *left, right = difference_figure(content).axes
+    low, high = right.get_xlim()
+    assert low == -high
+    assert high >= 2.4
+    assert len(right.lines) == 4  # zero, an interval and its dot, a dot without one
+    assert len(left) == has_places
+    for axes in left:
+        assert axes.get_ylim()[1] >= 0.9
+        # sessions of unlike places have parts in common, not places
+        assert [tick.get_text() for tick in axes.get_xticklabels()] == ["1", "2"]
+    assert draw(content, stamp="published")["svg"].startswith(b"<?xml")

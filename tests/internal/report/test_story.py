@@ -11,9 +11,10 @@ import masrel
 from masrel.agreement import COEFFICIENTS
 from masrel.analysis import analyze
 from masrel.analysis._category_agreement import category_agreement
+from masrel.analysis._given_grades import GivenGrades, given_grades
 from masrel.intervals import diagnose
-from masrel.protocol import Protocol
-from masrel.ratings import Ratings, rating_matrix
+from masrel.protocol import Protocol, scale_of
+from masrel.ratings import Ratings, rating_matrix, ratings_from_rows
 from masrel.report._document import SECTIONS
 from masrel.report._material import Listing, Paragraph, Section, gather
 from masrel.report._references import (
@@ -91,17 +92,51 @@ def test_grades_are_counted_by_the_intended_one() -> None:
     )
     made = section("confusion", protocol_with(plan()), rows)
     # intended: 1, 1+, 2, 3; of the first session alone
-    assert table_of(made).rows == (
+    rows_shown = table_of(made).rows
+    assert [row[:-2] for row in rows_shown] == [
         ("1", 1, 1, 0, 0, 0, 0, 2, 50.0),
         ("1+", 0, 0, 2, 0, 0, 0, 2, 100.0),
         ("2", 0, 0, 0, 1, 1, 0, 2, 50.0),
         ("3", 0, 0, 0, 0, 1, 1, 2, 50.0),
-    )
+    ]
+    # Clopper and Pearson's of 1 and of 2 of 2: at the ends √α/2, α being 0.05
+    root = 100.0 * math.sqrt(0.025)
+    for row, ends in zip(rows_shown, ([1.26, 98.74], [root, 100.0]), strict=False):
+        assert row[-2:] == pytest.approx(ends, abs=0.005)
     assert text_of(made) == (
         "Of 8 grades of models with an intended grade, 5 are the intended one."
     )
     without = section("confusion", protocol_with(plan()), rows, excluded=["R2"])
     assert text_of(without).startswith("Of 4 grades")
+
+
+def given_hm1(cells: list[tuple[str, ...]]) -> GivenGrades:
+    """Grades of one model, by rater those of every presentation."""
+    rows = [
+        {"session": "test", "rater": f"R{rater}", "model": "HM1", "repeat": repeat}
+        | {"grade": grade}
+        for rater, grades in enumerate(cells, start=1)
+        for repeat, grade in enumerate(grades, start=1)
+    ]
+    made = ratings_from_rows(rows, scale_of(protocol_with()))
+    (row,) = given_grades(protocol_with(), made, 0.95)[1]
+    return row
+
+
+def test_grades_of_one_rater_alike_count_for_less() -> None:
+    # 8 raters: a grade each, or the same one twice; then halves of each rater's
+    once = ["1", "1", "1", "1", "1", "1", "2", "2"]
+    alike, mixed = [(g, g) for g in once], [("1", "2")] * 8
+    every = {"once": [(g,) for g in once], "alike": alike, "mixed": mixed}
+    of = {name: given_hm1(cells) for name, cells in every.items()}
+    # 6 of 8: 34.9 to 96.8 % (Clopper & Pearson 1934)
+    assert (of["once"].low, of["once"].high) == pytest.approx((0.349, 0.968), abs=5e-4)
+    assert of["alike"].share == of["once"].share
+    # twice as many grades that say nothing new: hardly narrower
+    width = {name: row.high - row.low for name, row in of.items()}
+    assert 0.9 * width["once"] < width["alike"] < 1.1 * width["once"]
+    assert of["mixed"].share == 0.5
+    assert of["mixed"].n_raters == 8
 
 
 def test_without_intended_grades_there_is_no_such_table() -> None:
